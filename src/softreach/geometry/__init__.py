@@ -1,0 +1,1 @@
+"""Points to numbers; nothing here knows a robot."""

@@ -1,0 +1,54 @@
+"""Threads over blocks of work.
+
+The kernels release the interpreter lock, so plain threads use every core, nest safely in other
+people's thread and process pools, and let Ctrl-C through between blocks.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+
+__all__ = ["blocks", "run", "thread_count"]
+
+
+def thread_count() -> int:
+    """Number of threads used: ``SOFTREACH_NUM_THREADS``, or the cores this process may use."""
+    asked = os.environ.get("SOFTREACH_NUM_THREADS", "")
+    if asked.isdigit() and int(asked) > 0:
+        return int(asked)
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def blocks(total: int, size: int) -> Iterator[slice]:
+    """Consecutive slices of at most ``size`` that cover ``range(total)``."""
+    for start in range(0, total, size):
+        yield slice(start, min(start + size, total))
+
+
+def run(tasks: Iterable[Callable[[], object]]) -> None:
+    """Call every task on the threads; at most twice as many are drawn ahead as are running.
+
+    The first exception (Ctrl-C too) stops the drawing of further tasks and is raised once the
+    tasks already begun have ended.
+    """
+    threads = thread_count()
+    pending: set[Future[object]] = set()
+    with ThreadPoolExecutor(threads) as pool:
+        for task in tasks:
+            pending.add(pool.submit(task))
+            if len(pending) >= 2 * threads:
+                pending = _drain(pending)
+        while pending:
+            pending = _drain(pending)
+
+
+def _drain(pending: set[Future[object]]) -> set[Future[object]]:
+    """Wait for one task at least, raise what it raised, and return those still to come."""
+    done, rest = wait(pending, return_when=FIRST_COMPLETED)
+    for future in done:
+        future.result()
+    return rest
