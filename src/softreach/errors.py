@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
-__all__ = ["InvalidInput", "MissingExtra", "SoftreachError", "SoftreachWarning"]
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+__all__ = [
+    "Fault",
+    "InvalidDesign",
+    "InvalidInput",
+    "MissingExtra",
+    "Range",
+    "SoftreachError",
+    "SoftreachWarning",
+]
 
 
 class SoftreachError(Exception):
@@ -26,6 +38,69 @@ class InvalidInput(SoftreachError, ValueError):
         super().__init__(f"{message}; {hint}" if hint else message)
 
 
+class Range(NamedTuple):
+    """The numbers that a quantity may take."""
+
+    low: float = -math.inf
+    high: float = math.inf
+    unit: str = ""
+    open_low: bool = False
+    open_high: bool = False
+    whole: bool = False
+
+    def admits(self, value: object) -> bool:
+        """Whether the value is a finite number (a whole one where asked) in the range."""
+        if isinstance(value, bool) or not isinstance(value, int if self.whole else int | float):
+            return False
+        above = value > self.low or (value == self.low and not self.open_low)
+        below = value < self.high or (value == self.high and not self.open_high)
+        return math.isfinite(value) and above and below
+
+    def in_degrees(self) -> Range:
+        """The same range of an angle, for files and the command line."""
+        return self._replace(low=math.degrees(self.low), high=math.degrees(self.high), unit="deg")
+
+    def __str__(self) -> str:
+        unit = f" {self.unit}" if self.unit else ""
+        low = f"{'>' if self.open_low else '>='} {self.low:.6g}" if self.low > -math.inf else ""
+        high = f"{'<' if self.open_high else '<='} {self.high:.6g}" if self.high < math.inf else ""
+        limits = " and ".join(text for text in (low, high) if text)
+        number = "a whole number" if self.whole else "a finite number"
+        return f"must be {number} {limits}".rstrip() + unit
+
+
+class Fault(NamedTuple):
+    """One thing wrong with a design."""
+
+    path: str
+    """Where: ``taper``, or ``fibers[1].extent``."""
+    value: object
+    """What was given."""
+    allowed: Range | str
+    """What is allowed, and what to do."""
+
+    def __str__(self) -> str:
+        shown = f"{self.value:.6g}" if isinstance(self.value, float) else repr(self.value)
+        return f"{self.path} = {shown}: {self.allowed}"
+
+
+class InvalidDesign(SoftreachError, ValueError):
+    """A design that cannot exist; every fault is named at once.
+
+    Attributes:
+        faults: The faults, in the order of the design's fields.
+    """
+
+    def __init__(self, faults: Sequence[Fault], source: str = "") -> None:
+        self.faults = tuple(faults)
+        lines = [str(fault) for fault in self.faults]
+        if source:
+            count = f"{len(lines)} problem" + ("s" if len(lines) > 1 else "")
+            super().__init__("\n  ".join([f"{source}: {count}", *lines]))
+        else:
+            super().__init__("\n".join(lines))
+
+
 class MissingExtra(SoftreachError, ImportError):
     """An optional library is needed and not installed."""
 
@@ -35,3 +110,4 @@ class MissingExtra(SoftreachError, ImportError):
 
 class SoftreachWarning(UserWarning):
     """A result that can be used, with a limit that its reader should know."""
+

@@ -1,0 +1,82 @@
+"""Named designs, each with its source."""
+
+from __future__ import annotations
+
+import math
+
+from softreach.fiber import FiberArchitecture
+from softreach.manipulator import Manipulator
+
+__all__ = ["minimal_trunk", "redundant_trunk"]
+
+_EXTENT = math.radians(48)
+
+
+def minimal_trunk(
+    revolution: float = math.radians(108),
+    taper: float = math.radians(2),
+    *,
+    length: float = 1.0,
+    radius_ratio: float = 0.75,
+) -> Manipulator:
+    """The paper's minimal design: two helical bundles of opposite hand and a longitudinal one.
+
+    Kaczmarski, Moulton, Goriely, Kuhl, EML 71 (2024) 102207, section 2. The paper prints
+    R1(0) = L/12, which exceeds its R2(0) = L/16; 12/16 of R2(0) is our reading of that misprint, so
+    `radius_ratio` is a parameter and not the paper's value.
+
+    Args:
+        revolution: Ω of the right-handed bundle; the left-handed one has -Ω [rad].
+        taper: φ [rad].
+        length: L [m].
+        radius_ratio: R1/R2 [-].
+    """
+    helices = (
+        FiberArchitecture(name="left", revolution=-revolution, offset=math.radians(66), extent=_EXTENT),
+        FiberArchitecture(name="right", revolution=revolution, offset=math.radians(114), extent=_EXTENT),
+    )
+    return _trunk((*helices, _longitudinal(270)), taper, length, radius_ratio)
+
+
+def redundant_trunk(
+    revolution: float = math.radians(108),
+    taper: float = math.radians(2),
+    *,
+    length: float = 1.0,
+    radius_ratio: float = 0.75,
+) -> Manipulator:
+    """The paper's redundant design: the longitudinal bundle of `minimal_trunk` split in two.
+
+    The paper does not print where the two lie (section 5). Here they have the extent of the others
+    and centers at 246° and 294°: adjacent like the helical pair, symmetric about the plane of
+    symmetry. At Ω = 108° each then meets a helical bundle near the tip.
+
+    Args:
+        revolution: Ω of the right-handed bundle; the left-handed one has -Ω [rad].
+        taper: φ [rad].
+        length: L [m].
+        radius_ratio: R1/R2 [-].
+    """
+    arm = minimal_trunk(revolution, taper, length=length, radius_ratio=radius_ratio)
+    pair = (_longitudinal(246, "longitudinal 1"), _longitudinal(294, "longitudinal 2"))
+    return arm.replace(fibers=(*arm.fibers[:2], *pair))
+
+
+def _longitudinal(offset_deg: float, name: str = "longitudinal") -> FiberArchitecture:
+    offset = math.radians(offset_deg)
+    return FiberArchitecture(name=name, helical_angle=0.0, offset=offset, extent=_EXTENT)
+
+
+def _trunk(
+    fibers: tuple[FiberArchitecture, ...], taper: float, length: float, radius_ratio: float
+) -> Manipulator:
+    radius = length / 16
+    return Manipulator(
+        length=length,
+        outer_radius=radius,
+        inner_radius=radius_ratio * radius,
+        taper=taper,
+        poisson_ratio=0.5,
+        fibers=fibers,
+        activation_bounds=(-5 / 3, 0.0),
+    )
