@@ -1,0 +1,27 @@
+"""How every kernel is compiled: once, cached on disk, without the interpreter lock.
+
+`FAST` lets the compiler fuse multiply-add and reassociate, which rounds differently from the order
+written here (a few units in the last place) and is the same for every block and thread. It assumes
+finite numbers: callers check. The predicates of the triangulation must not use it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from numba import njit
+
+__all__ = ["FAST", "inline", "kernel"]
+
+FAST = {"contract", "reassoc", "nsz", "arcp", "nnan", "ninf"}
+
+
+def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a loop over samples."""
+    return njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")(function)
+
+
+def inline(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a small function into its callers; a call left in a loop stops vectorisation."""
+    return njit(forceinline=True, nogil=True, fastmath=FAST, error_model="numpy")(function)

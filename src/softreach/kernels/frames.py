@@ -1,0 +1,95 @@
+"""Whole configurations: frames along the rod, walked from the base to the tip."""
+
+from __future__ import annotations
+
+from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.magnus import exponent
+from softreach.kernels.twist import act, add, cross, exp_coefficients
+
+__all__ = ["frames"]
+
+
+@inline
+def _node(table, k, node, gamma):
+    """A = (ζu, e3 ζ) dZ at one node of step k."""
+    row = 4 * node
+    length, x, y, z = table[k, row, -1], 0.0, 0.0, 0.0
+    for j in range(gamma.shape[0]):
+        length += table[k, row, j] * gamma[j]
+        x += table[k, row + 1, j] * gamma[j]
+        y += table[k, row + 2, j] * gamma[j]
+        z += table[k, row + 3, j] * gamma[j]
+    return length * x, length * y, length * z, 0.0, 0.0, length
+
+
+@inline
+def _turned(omega, p, s, c):
+    """exp(ω) p for a direction p."""
+    inner = cross(omega, p)
+    outer = cross(omega, inner)
+    return (
+        p[0] + s * inner[0] + c * outer[0],
+        p[1] + s * inner[1] + c * outer[1],
+        p[2] + s * inner[2] + c * outer[2],
+    )
+
+
+@kernel
+def frames(table, ends, gamma, position, directors):
+    """Centerline and directors of n rods at stations.
+
+    Args:
+        table: Packed node tables, (step, 12, fiber + 1).
+        ends: Number of steps from the base to each station, ascending, (station,).
+        gamma: Activations, (n, fiber).
+        position: Filled with r, (n, station, 3).
+        directors: Filled with d1, d2, d3 as rows, (n, station, 3, 3).
+    """
+    for sample in range(gamma.shape[0]):
+        r = (0.0, 0.0, 0.0)
+        d1, d2, d3 = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+        k = 0
+        for station in range(ends.shape[0]):
+            while k < ends[station]:
+                nodes = (
+                    _node(table, k, 0, gamma[sample]),
+                    _node(table, k, 1, gamma[sample]),
+                    _node(table, k, 2, gamma[sample]),
+                )
+                omega = exponent(nodes[0], nodes[1], nodes[2])
+                step = act(omega, (0.0, 0.0, 0.0))
+                r = _moved(r, d1, d2, d3, step)
+                d1, d2, d3 = _rotated(d1, d2, d3, omega)
+                k += 1
+            _store(position, directors, sample, station, r, d1, d2, d3)
+
+
+@inline
+def _moved(r, d1, d2, d3, step):
+    """r + step, the step given in the directors."""
+    return (
+        r[0] + d1[0] * step[0] + d2[0] * step[1] + d3[0] * step[2],
+        r[1] + d1[1] * step[0] + d2[1] * step[1] + d3[1] * step[2],
+        r[2] + d1[2] * step[0] + d2[2] * step[1] + d3[2] * step[2],
+    )
+
+
+@inline
+def _rotated(d1, d2, d3, omega):
+    """The directors after the rotation exp(ω), ω given in the directors themselves."""
+    w = (
+        d1[0] * omega[0] + d2[0] * omega[1] + d3[0] * omega[2],
+        d1[1] * omega[0] + d2[1] * omega[1] + d3[1] * omega[2],
+        d1[2] * omega[0] + d2[2] * omega[1] + d3[2] * omega[2],
+    )
+    s, c, _ = exp_coefficients(omega)
+    return _turned(w, d1, s, c), _turned(w, d2, s, c), _turned(w, d3, s, c)
+
+
+@inline
+def _store(position, directors, sample, station, r, d1, d2, d3):
+    for axis in range(3):
+        position[sample, station, axis] = r[axis]
+        directors[sample, station, 0, axis] = d1[axis]
+        directors[sample, station, 1, axis] = d2[axis]
+        directors[sample, station, 2, axis] = d3[axis]

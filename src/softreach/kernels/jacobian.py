@@ -1,0 +1,97 @@
+"""Tip Jacobians of many rods: the exact derivative of `rod.tips`, in the same walk.
+
+With g = exp(Ω1) ... exp(ΩK), the spatial twist dg g⁻¹ of the part of the rod beyond a step obeys
+ξ <- dexp(dΩ) + Ad(exp Ω) ξ = ξ + dexp(dΩ + [Ω, ξ]): one column per bundle, no finite differences.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.magnus import exponent, exponent_derivative
+from softreach.kernels.rod import LANES, TIP, WORK, load, node_values, nodes_at, walk
+from softreach.kernels.twist import add, bracket, dexp
+
+__all__ = ["jacobians"]
+
+
+@inline
+def _change(length, weights, a):
+    """Change of A = (ζu, e3 ζ) dZ per unit of one activation, from its column of the table.
+
+    Product rule on ω = ℓu, with u = ω/ℓ.
+    """
+    d_length, ratio = weights[0], weights[0] / length
+    return (
+        ratio * a[0] + length * weights[1],
+        ratio * a[1] + length * weights[2],
+        ratio * a[2] + length * weights[3],
+        0.0,
+        0.0,
+        d_length,
+    )
+
+
+@kernel
+def _walk_column(work, column, table, k, j):
+    """Carry one column of the Jacobian of every lane across step k."""
+    t = table[k, :, j]
+    at_base, at_middle, at_tip = (
+        (t[0], t[1], t[2], t[3]),
+        (t[4], t[5], t[6], t[7]),
+        (t[8], t[9], t[10], t[11]),
+    )
+    for i in range(LANES):
+        base, middle, tip = nodes_at(work, i)
+        omega = exponent(base, middle, tip)
+        d_omega = exponent_derivative(
+            base,
+            middle,
+            tip,
+            _change(base[5], at_base, base),
+            _change(middle[5], at_middle, middle),
+            _change(tip[5], at_tip, tip),
+        )
+        xi = (
+            column[i],
+            column[LANES + i],
+            column[2 * LANES + i],
+            column[3 * LANES + i],
+            column[4 * LANES + i],
+            column[5 * LANES + i],
+        )
+        xi = add(xi, dexp(omega, add(d_omega, bracket(omega, xi))))
+        for row in range(6):
+            column[row * LANES + i] = xi[row]
+
+
+@kernel
+def jacobians(table, gamma, tips, out):
+    """Tips (n, 3) and spatial Jacobians (n, 6, fiber), linear rows first, of n activations."""
+    bundles = gamma.shape[1]
+    work = np.zeros(WORK)
+    lanes = np.zeros((table.shape[2] - 1, LANES))
+    columns = np.zeros((bundles, 6 * LANES))
+    for first in range(0, gamma.shape[0], LANES):
+        count = min(LANES, gamma.shape[0] - first)
+        load(lanes, gamma, first, count)
+        work[TIP:] = 0.0
+        columns[:] = 0.0
+        for k in range(table.shape[0] - 1, -1, -1):
+            node_values(work, lanes, table, k)
+            for j in range(bundles):
+                _walk_column(work, columns[j], table, k, j)
+            walk(work)
+        _store(work, columns, first, count, tips, out)
+
+
+@inline
+def _store(work, columns, first, count, tips, out):
+    """Columns hold (ω, v); the Jacobian has its linear rows first."""
+    for i in range(count):
+        for axis in range(3):
+            tips[first + i, axis] = work[TIP + axis * LANES + i]
+        for j in range(out.shape[2]):
+            for row in range(6):
+                out[first + i, row, j] = columns[j, (row + 3) % 6 * LANES + i]

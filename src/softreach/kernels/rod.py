@@ -1,0 +1,113 @@
+"""Tips of many rods: the product of exponentials, applied to a point from the tip to the base.
+
+r(L) = exp(Ω1) exp(Ω2) ... exp(ΩK) 0 needs no rotation matrices when read from the right: each step
+moves one point. Samples lie innermost, LANES at a time, so that every loop over them vectorises.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.magnus import exponent
+from softreach.kernels.twist import act
+
+__all__ = ["LANES", "TIP", "WORK", "load", "node_values", "nodes_at", "pack", "tips", "walk"]
+
+LANES = 128
+"""Samples side by side: whole blocks only, so a sample's result never depends on its neighbors."""
+
+# A workspace is a flat array of rows of LANES numbers: 12 node values, then 3 coordinates of the
+# point. Rows at constant distances in one array are what the compiler can prove disjoint.
+NODE_ROWS = 12
+TIP = NODE_ROWS * LANES
+WORK = TIP + 3 * LANES
+_GROUP = 4  # bundles added at once
+
+
+def pack(measure, stretch, curvature):
+    """Node tables as one array (step, 12, fiber + 1): rows ℓ, u1, u2, u3 of each node.
+
+    The last column is the value at rest; bundles are padded with zeros to a multiple of four.
+
+    Args:
+        measure: Length of the step as each node sees it [m], shape (step, 3).
+        stretch: z [-], shape (step, 3, fiber).
+        curvature: U [1/m], shape (step, 3, 3, fiber).
+    """
+    steps, _, bundles = stretch.shape
+    table = np.zeros((steps, 3, 4, -(-bundles // _GROUP) * _GROUP + 1))
+    table[:, :, 0, :bundles] = measure[..., None] * stretch
+    table[:, :, 0, -1] = measure
+    table[:, :, 1:, :bundles] = curvature
+    return table.reshape(steps, NODE_ROWS, -1)
+
+
+@inline
+def load(lanes, gamma, first, count):
+    """Lay the activations of `count` samples side by side, one row for each bundle."""
+    for j in range(gamma.shape[1]):
+        for i in range(count):
+            lanes[j, i] = gamma[first + i, j]
+
+
+@kernel
+def node_values(work, lanes, table, k):
+    """ℓ = dZ (1 + z·γ) and u = Uγ at the nodes of step k, for every lane."""
+    for row in range(NODE_ROWS):
+        values = work[row * LANES : (row + 1) * LANES]
+        values[:] = table[k, row, -1]
+        for j in range(0, lanes.shape[0], _GROUP):
+            _add_group(values, lanes[j], lanes[j + 1], lanes[j + 2], lanes[j + 3], table[k, row, j : j + _GROUP])
+
+
+@kernel
+def _add_group(values, g0, g1, g2, g3, weights):
+    a, b, c, d = weights[0], weights[1], weights[2], weights[3]
+    for i in range(LANES):
+        values[i] += (a * g0[i] + b * g1[i]) + (c * g2[i] + d * g3[i])
+
+
+@inline
+def nodes_at(work, i):
+    """A = (ζu, e3 ζ) dZ of lane i at the three nodes, base first."""
+    base, middle, tip = work[i], work[4 * LANES + i], work[8 * LANES + i]
+    return (
+        _twist(base, work[LANES + i], work[2 * LANES + i], work[3 * LANES + i]),
+        _twist(middle, work[5 * LANES + i], work[6 * LANES + i], work[7 * LANES + i]),
+        _twist(tip, work[9 * LANES + i], work[10 * LANES + i], work[11 * LANES + i]),
+    )
+
+
+@inline
+def _twist(length, u1, u2, u3):
+    return length * u1, length * u2, length * u3, 0.0, 0.0, length
+
+
+@kernel
+def walk(work):
+    """Carry the point of every lane across one step, toward the base."""
+    for i in range(LANES):
+        base, middle, tip = nodes_at(work, i)
+        point = work[TIP + i], work[TIP + LANES + i], work[TIP + 2 * LANES + i]
+        x, y, z = act(exponent(base, middle, tip), point)
+        work[TIP + i] = x
+        work[TIP + LANES + i] = y
+        work[TIP + 2 * LANES + i] = z
+
+
+@kernel
+def tips(table, gamma, out):
+    """Tip positions: (n, fiber) activations into (n, 3) `out`, in the units of `table`."""
+    work = np.zeros(WORK)
+    lanes = np.zeros((table.shape[2] - 1, LANES))
+    for first in range(0, gamma.shape[0], LANES):
+        count = min(LANES, gamma.shape[0] - first)
+        load(lanes, gamma, first, count)
+        work[TIP:] = 0.0
+        for k in range(table.shape[0] - 1, -1, -1):
+            node_values(work, lanes, table, k)
+            walk(work)
+        for i in range(count):
+            for axis in range(3):
+                out[first + i, axis] = work[TIP + axis * LANES + i]

@@ -1,0 +1,98 @@
+"""The vocabulary of the rod kernels: twists (ω, v) of se(3) as tuples of six scalars.
+
+Tuples live in registers; an array allocated in a sample loop would cost more than the arithmetic.
+Zeros written as literals are folded away by the compiler, so sparse twists need no code of their
+own.
+"""
+
+from __future__ import annotations
+
+import math
+
+from softreach.kernels.compiler import inline
+
+__all__ = ["act", "add", "bracket", "cross", "dexp", "exp_coefficients", "scaled"]
+
+_TERMS = range(8)
+"""Terms kept of each series in θ²: exact to rounding for θ <= 1, to 1e-13 for θ <= 1.5."""
+
+# sin θ/θ, (1 - cos θ)/θ², (θ - sin θ)/θ³ as power series in θ².
+_SINC, _COSC, _SINC3 = (
+    tuple((-1) ** k / math.factorial(2 * k + shift) for k in _TERMS) for shift in (1, 2, 3)
+)
+
+# Coefficients of ad .. ad⁴ in the left-trivialised differential of exp (Selig 2005): reducing
+# Σ adᵏ/(k+1)! with ad⁵ = -2θ² ad³ - θ⁴ ad leaves four functions of θ alone, here as their series.
+_DEXP = (
+    tuple((-1) ** k * (1 - k) / math.factorial(2 * k + 2) for k in _TERMS),
+    tuple((-1) ** k * (1 - k) / math.factorial(2 * k + 3) for k in _TERMS),
+    tuple((-1) ** k * (1 + k) / math.factorial(2 * k + 4) for k in _TERMS),
+    tuple((-1) ** k * (1 + k) / math.factorial(2 * k + 5) for k in _TERMS),
+)
+_DEXP1, _DEXP2, _DEXP3, _DEXP4 = _DEXP
+
+
+@inline
+def cross(a, b):
+    """a × b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@inline
+def add(a, b):
+    """a + b of two twists."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5]
+
+
+@inline
+def scaled(s, a):
+    """s a."""
+    return s * a[0], s * a[1], s * a[2], s * a[3], s * a[4], s * a[5]
+
+
+@inline
+def bracket(a, b):
+    """[(ω1, v1), (ω2, v2)] = (ω1 × ω2, ω1 × v2 - ω2 × v1)."""
+    x, y, z = cross(a[:3], b[:3])
+    p, q, r = cross(a[:3], b[3:])
+    s, t, u = cross(b[:3], a[3:])
+    return x, y, z, p - s, q - t, r - u
+
+
+@inline
+def _series(t, c):
+    """Horner's rule for eight terms."""
+    high = c[4] + t * (c[5] + t * (c[6] + t * c[7]))
+    return c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * high)))
+
+
+@inline
+def exp_coefficients(a):
+    """sin θ/θ, (1 - cos θ)/θ² and (θ - sin θ)/θ³ of a twist's rotation."""
+    t = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+    return _series(t, _SINC), _series(t, _COSC), _series(t, _SINC3)
+
+
+@inline
+def act(a, p):
+    """exp(a) applied to a point: p + v + ω × (s p + c v + ω × (c p + k v))."""
+    s, c, k = exp_coefficients(a)
+    w, v = a[:3], a[3:]
+    inner = cross(w, (c * p[0] + k * v[0], c * p[1] + k * v[1], c * p[2] + k * v[2]))
+    x = s * p[0] + c * v[0] + inner[0]
+    y = s * p[1] + c * v[1] + inner[1]
+    z = s * p[2] + c * v[2] + inner[2]
+    outer = cross(w, (x, y, z))
+    return p[0] + v[0] + outer[0], p[1] + v[1] + outer[1], p[2] + v[2] + outer[2]
+
+
+@inline
+def dexp(a, x):
+    """d exp(a) exp(-a) along x: Σ ad_aᵏ x/(k+1)!, summed in closed form."""
+    t = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+    total = add(x, scaled(_series(t, _DEXP1), bracket(a, x)))
+    second = bracket(a, bracket(a, x))
+    total = add(total, scaled(_series(t, _DEXP2), second))
+    third = bracket(a, second)
+    total = add(total, scaled(_series(t, _DEXP3), third))
+    return add(total, scaled(_series(t, _DEXP4), bracket(a, third)))
