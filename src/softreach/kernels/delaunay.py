@@ -26,27 +26,33 @@ import numpy as np
 from numba import njit
 
 from softreach.kernels.expansions import scratch
-from softreach.kernels.predicates import collinear, insphere, orient
+from softreach.kernels.predicates import (
+    collinear,
+    insphere,
+    insphere_filter,
+    orient,
+    orient_filter,
+)
 
 __all__ = ["FACES", "GHOST", "triangulate"]
 
 GHOST = -1
 DEAD = -2
+INSIDE, UNSURE = -1, -2
 # Vertices of the face opposite vertex i, in the order that makes its normal point outwards.
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 
 class Mesh(NamedTuple):
-    """Cells in their slots; a freed slot holds DEAD and, as neighbor 0, the next freed slot."""
+    """Cells in their slots, and room to note a cavity.
+
+    A freed slot holds DEAD and, as neighbor 0, the next freed slot. ``dug`` lists the cells of the
+    cavity, ``walls`` its faces as 4 · cell + face.
+    """
 
     cells: np.ndarray
     neighbors: np.ndarray
     mark: np.ndarray
-
-
-class Cavity(NamedTuple):
-    """Cells to dig out, and walls to keep: three vertices, the cell behind, its slot for us."""
-
     dug: np.ndarray
     walls: np.ndarray
 
@@ -70,7 +76,6 @@ def triangulate(points):
     mesh = empty_mesh(8 * len(points) + 64)
     used = set_first_cell(mesh, start)
     free, last = DEAD, 0
-    cavity = Cavity(np.empty(256, np.int32), np.empty((512, 5), np.int32))
     table = np.empty((2, 2048), np.int64)
     for p in range(len(points)):
         if p in start:
@@ -80,12 +85,12 @@ def triangulate(points):
         if twin >= 0:
             same[p] = twin
             continue
-        cavity, dug, walls = dig(points, mesh, cavity, p, found, w)
+        dug, walls = dig(points, mesh, p, found, w)
         if used + walls > len(mesh.mark):
             mesh = grown_mesh(mesh, walls)
         if 8 * walls > table.shape[1]:
             table = np.empty((2, 32 * walls), np.int64)
-        used, free, last = fill(mesh, cavity, p, dug, walls, used, free, table)
+        used, free, last = fill(mesh, p, dug, walls, used, free, table)
     count = compact(mesh, used)
     return mesh.cells[:count], mesh.neighbors[:count], same
 
@@ -124,7 +129,11 @@ def equal(points, a, b):
 def empty_mesh(size):
     """A mesh with room for ``size`` cells; memory is touched only as cells come."""
     return Mesh(
-        np.empty((size, 4), np.int32), np.empty((size, 4), np.int32), np.empty(size, np.int32)
+        np.empty((size, 4), np.int32),
+        np.empty((size, 4), np.int32),
+        np.empty(size, np.int32),
+        np.empty(size, np.int32),
+        np.empty(2 * size + 4, np.int64),
     )
 
 
@@ -136,6 +145,8 @@ def grown_mesh(mesh, more):
     grown.cells[:size] = mesh.cells
     grown.neighbors[:size] = mesh.neighbors
     grown.mark[:size] = mesh.mark
+    grown.dug[:size] = mesh.dug
+    grown.walls[: 2 * size] = mesh.walls[: 2 * size]
     return grown
 
 
@@ -155,13 +166,6 @@ def set_first_cell(mesh, start):
 
 
 @njit(cache=True)
-def side(points, cells, t, i, p, w):
-    """`orient` of cell t with its vertex i replaced by p."""
-    a, b, c = cells[t, FACES[i, 0]], cells[t, FACES[i, 1]], cells[t, FACES[i, 2]]
-    return -orient(points, a, b, c, p, w)
-
-
-@njit(cache=True)
 def ghost_slot(cells, t):
     """Which vertex of cell t is the ghost; -1 if none."""
     for i in range(4):
@@ -177,27 +181,54 @@ def locate(points, mesh, p, t, w):
     At every cell step through a face that has p on its other side. The face looked at first
     changes from step to step, so that no walk runs in circles among cospherical points.
     """
-    slot = ghost_slot(mesh.cells, t)
+    cells, neighbors = mesh.cells, mesh.neighbors
+    slot = ghost_slot(cells, t)
     if slot >= 0:
-        t = mesh.neighbors[t, slot]
+        t = neighbors[t, slot]
     came_from, turn = -1, np.uint32(p)
-    while ghost_slot(mesh.cells, t) < 0:
+    while ghost_slot(cells, t) < 0:
         turn = turn * np.uint32(1664525) + np.uint32(1013904223)
-        onward = exit_face(points, mesh, p, t, came_from, np.int64(turn >> np.uint32(30)), w)
-        if onward < 0:
+        first = np.int64(turn >> np.uint32(30))
+        onward = sure_exit(points, cells, neighbors, p, t, came_from, first)
+        if onward == UNSURE:
+            onward = exact_exit(points, cells, p, t, first, w)
+        if onward == INSIDE:
             return t
-        came_from, t = t, mesh.neighbors[t, onward]
+        came_from, t = t, neighbors[t, onward]
     return t
 
 
 @njit(cache=True)
-def exit_face(points, mesh, p, t, came_from, first, w):
-    """A face of finite cell t with p strictly beyond it; -1 if the cell holds p."""
+def sure_exit(points, cells, neighbors, p, t, came_from, first):
+    """A face of finite cell t with p beyond it, INSIDE, or UNSURE because of rounding."""
+    answer = INSIDE
     for k in range(4):
         i = (first + k) & 3
-        if mesh.neighbors[t, i] != came_from and side(points, mesh.cells, t, i, p, w) < 0.0:
+        if neighbors[t, i] != came_from:
+            a, b, c = cells[t, FACES[i, 0]], cells[t, FACES[i, 1]], cells[t, FACES[i, 2]]
+            beyond = orient_filter(points, a, b, c, p)
+            if beyond > 0.0:
+                return i
+            if beyond == 0.0:
+                answer = UNSURE
+    return answer
+
+
+@njit(cache=True)
+def exact_exit(points, cells, p, t, first, w):
+    """A face of finite cell t with p strictly beyond it, or INSIDE."""
+    for k in range(4):
+        i = (first + k) & 3
+        if beyond(points, cells, p, t, i, w) > 0.0:
             return i
-    return -1
+    return INSIDE
+
+
+@njit(cache=True)
+def beyond(points, cells, p, t, i, w):
+    """+1 if p lies beyond face i of cell t, 0 in its plane, -1 on the side of the cell."""
+    a, b, c = cells[t, FACES[i, 0]], cells[t, FACES[i, 1]], cells[t, FACES[i, 2]]
+    return orient(points, a, b, c, p, w)
 
 
 @njit(cache=True)
@@ -211,52 +242,50 @@ def twin_in(points, mesh, p, t):
 
 
 @njit(cache=True)
-def conflicts(points, mesh, p, t, w):
-    """Whether p lies strictly inside the sphere of cell t (see the module on ghosts and ties)."""
-    slot = ghost_slot(mesh.cells, t)
-    if slot >= 0:
-        beyond = side(points, mesh.cells, t, slot, p, w)
-        if beyond != 0.0:
-            return beyond > 0.0
-        t = mesh.neighbors[t, slot]
-    a, b, c, d = mesh.cells[t, 0], mesh.cells[t, 1], mesh.cells[t, 2], mesh.cells[t, 3]
-    return insphere(points, a, b, c, d, p, w) > 0.0
+def sure_conflict(points, cells, p, t):
+    """+1 if p lies inside the sphere of cell t, -1 if outside, 0 if rounding or a ghost hides it."""
+    a, b, c, d = cells[t, 0], cells[t, 1], cells[t, 2], cells[t, 3]
+    return insphere_filter(points, a, b, c, d, p) if (a | b | c | d) >= 0 else 0.0
 
 
 @njit(cache=True)
-def dig(points, mesh, cavity, p, start, w):
-    """Find the cells in conflict with p, from one of them outwards, and the walls around them.
+def exact_conflict(points, cells, neighbors, p, t, w):
+    """+1 if p lies strictly inside the sphere of cell t (see the module on ghosts and ties)."""
+    slot = ghost_slot(cells, t)
+    if slot >= 0:
+        # the base of a ghost cell, seen from the ghost, faces the hull
+        within = -beyond(points, cells, p, t, slot, w)
+        if within != 0.0:
+            return within
+        t = neighbors[t, slot]
+    return insphere(points, cells[t, 0], cells[t, 1], cells[t, 2], cells[t, 3], p, w)
 
-    Returns the cavity (enlarged if it had to be), its number of cells and its number of walls.
-    """
+
+@njit(cache=True)
+def dig(points, mesh, p, start, w):
+    """Find the cells in conflict with p, from one of them outwards; return how many, and walls."""
+    cells, neighbors, mark, dug, walls = mesh
     inside, outside = 2 * p + 1, 2 * p
-    cells, neighbors, mark = mesh
-    dug, walls = cavity
     dug[0], mark[start] = start, inside
     n_dug, n_walls, at = 1, 0, 0
     while at < n_dug:
         t = dug[at]
         at += 1
-        if n_dug + 4 > len(dug):
-            dug = np.concatenate((dug, np.empty_like(dug)))
-        if n_walls + 4 > len(walls):
-            walls = np.concatenate((walls, np.empty_like(walls)))
         for i in range(4):
             u = neighbors[t, i]
             if mark[u] != inside and mark[u] != outside:
-                mark[u] = inside if conflicts(points, mesh, p, u, w) else outside
-                if mark[u] == inside:
-                    dug[n_dug] = u
+                within = sure_conflict(points, cells, p, u)
+                if within == 0.0:
+                    within = exact_conflict(points, cells, neighbors, p, u, w)
+                if within > 0.0:
+                    mark[u], dug[n_dug] = inside, u
                     n_dug += 1
+                else:
+                    mark[u] = outside
             if mark[u] == outside:
-                # the outward face turned round: p is inside, so (wall, p) is positive
-                walls[n_walls, 0] = cells[t, FACES[i, 0]]
-                walls[n_walls, 1] = cells[t, FACES[i, 2]]
-                walls[n_walls, 2] = cells[t, FACES[i, 1]]
-                walls[n_walls, 3] = u
-                walls[n_walls, 4] = slot_of(neighbors, u, t)
+                walls[n_walls] = 4 * t + i
                 n_walls += 1
-    return Cavity(dug, walls), n_dug, n_walls
+    return n_dug, n_walls
 
 
 @njit(cache=True)
@@ -269,7 +298,7 @@ def slot_of(neighbors, u, t):
 
 
 @njit(cache=True)
-def fill(mesh, cavity, p, n_dug, n_walls, used, free, table):
+def fill(mesh, p, n_dug, n_walls, used, free, table):
     """Join p to every wall; return slots used, the head of the freed slots, and the last cell."""
     size = 1
     while size < 4 * n_walls:
@@ -277,30 +306,31 @@ def fill(mesh, cavity, p, n_dug, n_walls, used, free, table):
     table[0, :size] = -1
     t = 0
     for k in range(n_walls):
-        if k < n_dug:
-            t = cavity.dug[k]
-        elif free != DEAD:
+        if free != DEAD:
             t, free = free, mesh.neighbors[free, 0]
         else:
             t, used = used, used + 1
             mesh.mark[t] = -1
-        join(mesh, cavity.walls, k, p, t)
+        join(mesh, mesh.walls[k] >> 2, mesh.walls[k] & 3, p, t)
         for i in range(3):
             link(mesh, t, i, table, size)
-    for k in range(n_walls, n_dug):
-        bury(mesh, cavity.dug[k], free)
-        free = cavity.dug[k]
+    for k in range(n_dug):
+        bury(mesh, mesh.dug[k], free)
+        free = mesh.dug[k]
     return used, free, t
 
 
 @njit(cache=True)
-def join(mesh, walls, k, p, t):
-    """Make cell t of wall k and p, and tie it to the cell behind the wall."""
-    for i in range(3):
-        mesh.cells[t, i] = walls[k, i]
+def join(mesh, old, i, p, t):
+    """Make cell t of p and face i of an old cell, and tie it to the cell behind that face."""
+    # the outward face turned round: p is on its inner side, so (face, p) is positive
+    mesh.cells[t, 0] = mesh.cells[old, FACES[i, 0]]
+    mesh.cells[t, 1] = mesh.cells[old, FACES[i, 2]]
+    mesh.cells[t, 2] = mesh.cells[old, FACES[i, 1]]
     mesh.cells[t, 3] = p
-    mesh.neighbors[t, 3] = walls[k, 3]
-    mesh.neighbors[walls[k, 3], walls[k, 4]] = t
+    behind = mesh.neighbors[old, i]
+    mesh.neighbors[t, 3] = behind
+    mesh.neighbors[behind, slot_of(mesh.neighbors, behind, old)] = t
 
 
 @njit(cache=True)
@@ -334,7 +364,7 @@ def link(mesh, t, i, table, size):
 @njit(cache=True)
 def compact(mesh, used):
     """Move the finite cells to the front, in place; return how many there are."""
-    cells, neighbors, renumbered = mesh
+    cells, neighbors, renumbered = mesh.cells, mesh.neighbors, mesh.mark
     count = 0
     for t in range(used):
         renumbered[t] = -1

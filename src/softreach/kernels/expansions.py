@@ -31,7 +31,7 @@ def scratch():
 
 @njit(cache=True)
 def two_sum(a, b):
-    """a + b as rounded sum and exact rest (Theorem 7)."""
+    """Return a + b as rounded sum and exact rest (Theorem 7)."""
     total = a + b
     b_seen = total - a
     return total, (a - (total - b_seen)) + (b - b_seen)
@@ -47,7 +47,7 @@ def split(a):
 
 @njit(cache=True)
 def two_product(a, b):
-    """a · b as rounded product and exact rest (Theorem 18)."""
+    """Return a · b as rounded product and exact rest (Theorem 18)."""
     product = a * b
     a_high, a_low = split(a)
     b_high, b_low = split(b)

@@ -23,7 +23,7 @@ from softreach.kernels.expansions import (
     subtract,
 )
 
-__all__ = ["collinear", "insphere", "orient"]
+__all__ = ["collinear", "insphere", "insphere_filter", "orient", "orient_filter"]
 
 EPS = 2.0**-53
 ORIENT_BOUND = 6 * 7.1 * EPS  # permanent <= 6 x y z
@@ -39,6 +39,28 @@ def max4(a, b, c, d):
 @njit(cache=True)
 def orient(points, a, b, c, d, w):
     """Sign of det[b-a, c-a, d-a]: +1 if d lies on the side to which the normal of abc points."""
+    sure = orient_filter(points, a, b, c, d)
+    return sure if sure != 0.0 else orient_exact(points, a, b, c, d, w)
+
+
+@njit(cache=True)
+def insphere(points, a, b, c, d, e, w):
+    """+1 if e lies inside the sphere through a positively oriented abcd, 0 on it, -1 outside."""
+    sure = insphere_filter(points, a, b, c, d, e)
+    return sure if sure != 0.0 else insphere_exact(points, a, b, c, d, e, w)
+
+
+@njit(cache=True)
+def outside(x, bound):
+    """Sign of x if it is beyond the bound of its error, else 0."""
+    if abs(x) > bound:
+        return 1.0 if x > 0.0 else -1.0
+    return 0.0
+
+
+@njit(cache=True)
+def orient_filter(points, a, b, c, d):
+    """`orient` where rounding cannot change it, else 0."""
     ax = points[a, 0] - points[d, 0]
     ay = points[a, 1] - points[d, 1]
     az = points[a, 2] - points[d, 2]
@@ -52,17 +74,12 @@ def orient(points, a, b, c, d, w):
     x = max(max(abs(ax), abs(bx)), abs(cx))
     y = max(max(abs(ay), abs(by)), abs(cy))
     z = max(max(abs(az), abs(bz)), abs(cz))
-    bound = ORIENT_BOUND * x * y * z
-    if det > bound:
-        return 1.0
-    if det < -bound:
-        return -1.0
-    return orient_exact(points, a, b, c, d, w)
+    return outside(det, ORIENT_BOUND * x * y * z)
 
 
 @njit(cache=True)
-def insphere(points, a, b, c, d, e, w):
-    """+1 if e lies inside the sphere through a positively oriented abcd, 0 on it, -1 outside."""
+def insphere_filter(points, a, b, c, d, e):
+    """`insphere` where rounding cannot change it, else 0."""
     ax = points[a, 0] - points[e, 0]
     ay = points[a, 1] - points[e, 1]
     az = points[a, 2] - points[e, 2]
@@ -91,12 +108,7 @@ def insphere(points, a, b, c, d, e, w):
     d2 = dx * dx + dy * dy + dz * dz
     det = (c2 * dab - d2 * abc) + (a2 * bcd - b2 * cda)
     size = max4(ax, bx, cx, dx) * max4(ay, by, cy, dy) * max4(az, bz, cz, dz)
-    bound = INSPHERE_BOUND * size * max(max(a2, b2), max(c2, d2))
-    if det > bound:
-        return 1.0
-    if det < -bound:
-        return -1.0
-    return insphere_exact(points, a, b, c, d, e, w)
+    return outside(det, INSPHERE_BOUND * size * max(max(a2, b2), max(c2, d2)))
 
 
 @njit(cache=True)
