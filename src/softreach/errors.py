@@ -75,11 +75,13 @@ class Fault(NamedTuple):
     path: str
     """Where: ``taper``, or ``fibers[1].extent``."""
     value: object
-    """What was given."""
+    """What was given; None if nothing was."""
     allowed: Range | str
     """What is allowed, and what to do."""
 
     def __str__(self) -> str:
+        if self.value is None:
+            return f"{self.path}: {self.allowed}"
         shown = f"{self.value:.6g}" if isinstance(self.value, float) else repr(self.value)
         return f"{self.path} = {shown}: {self.allowed}"
 

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from importlib.metadata import version
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+from softreach.design_file import design_to_toml
+from softreach.errors import InvalidInput
+from softreach.manipulator import Manipulator
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -16,15 +21,93 @@ __all__ = ["AXES", "SCHEMA_VERSION", "check_cloud", "cloud_dataset", "configurat
 SCHEMA_VERSION = 1
 AXES = ("x", "y", "z")
 
+Array = NDArray[np.float64]
+
 # variable -> (dimensions, unit, meaning)
 _CLOUD = {
     "tip": (("sample", "axis"), "m", "tip position"),
     "activation": (("sample", "fiber"), "1", "activation γ of each bundle; negative contracts"),
 }
 _CONFIGURATION = {
-    "position": (("station", "axis"), "m", "centerline r"),
-    "directors": (("station", "director", "axis"), "1", "directors d1, d2, d3"),
-    "curvature": (("station", "component"), "1/m", "Darboux vector u1, u2, u3 in the directors"),
-    "extension": (("station",), "1", "axial extension ζ"),
+    "position": (("sample", "station", "axis"), "m", "centerline r"),
+    "directors": (("sample", "station", "director", "axis"), "1", "directors d1, d2, d3"),
+    "curvature": (("sample", "station", "component"), "1/m", "Darboux vector u in the directors"),
+    "extension": (("sample", "station"), "1", "axial extension ζ"),
     "radius": (("station",), "m", "outer radius R2 before activation"),
+    "activation": (("sample", "fiber"), "1", "activation γ of each bundle; negative contracts"),
 }
+
+
+def cloud_dataset(
+    arm: Manipulator, activation: Array, tip: Array, *, seed: int, sampler: str, tol: float
+) -> xr.Dataset:
+    """A reachability cloud: tips and activations with everything needed to make them again."""
+    import xarray as xr
+
+    attrs = {**_provenance(arm), "seed": seed, "sampler": sampler, "tol": tol}
+    variables = _variables(_CLOUD, {"tip": tip, "activation": activation})
+    cloud = xr.Dataset(variables, {"axis": list(AXES), "fiber": list(arm.bundle_names)}, attrs)
+    cloud.tip.attrs["length"] = arm.length
+    return cloud
+
+
+def configuration_dataset(
+    arm: Manipulator, activation: Array, z: Array, **arrays: Array
+) -> xr.Dataset:
+    """Shapes of an arm at stations Z, one for each row of `activation`."""
+    import xarray as xr
+
+    variables = _variables(
+        _CONFIGURATION, {**arrays, "radius": arm.radius(z), "activation": activation}
+    )
+    coordinates = {
+        "Z": ("station", z, {"units": "m", "long_name": "station before activation"}),
+        "axis": list(AXES),
+        "director": ["d1", "d2", "d3"],
+        "component": ["u1", "u2", "u3"],
+        "fiber": list(arm.bundle_names),
+    }
+    return xr.Dataset(variables, coordinates, _provenance(arm))
+
+
+def check_cloud(cloud: xr.Dataset) -> xr.Dataset:
+    """The dataset itself, if it is a cloud of this schema.
+
+    Raises:
+        InvalidInput: What is missing, or of another shape or version.
+    """
+    for name, (dims, _, _) in _CLOUD.items():
+        if name not in cloud or cloud[name].dims != dims:
+            found = cloud[name].dims if name in cloud else "missing"
+            raise InvalidInput(f"cloud.{name}", found, f"a variable over {dims}")
+    found = cloud.attrs.get("schema_version")
+    if found != SCHEMA_VERSION:
+        raise InvalidInput("cloud.attrs['schema_version']", found, str(SCHEMA_VERSION))
+    return cloud
+
+
+def _variables(
+    table: Mapping[str, tuple[tuple[str, ...], str, str]], arrays: Mapping[str, Array]
+) -> dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]:
+    return {
+        name: (dims, arrays[name], {"units": unit, "long_name": meaning})
+        for name, (dims, unit, meaning) in table.items()
+    }
+
+
+def _provenance(arm: Manipulator) -> dict[str, object]:
+    return {
+        "design": design_to_toml(arm),
+        "softreach_version": version("softreach"),
+        "schema_version": SCHEMA_VERSION,
+    }
+
+
+def storable(dataset: xr.Dataset) -> xr.Dataset:
+    """The dataset with its names as variable-length strings, which Zarr v3 specifies."""
+    names = {
+        name: coordinate.astype(np.dtypes.StringDType())
+        for name, coordinate in dataset.coords.items()
+        if coordinate.dtype.kind == "U"
+    }
+    return dataset.assign_coords(names)

@@ -1,0 +1,14 @@
+from softreach import designs as designs
+from softreach.cloud import compute_cloud as compute_cloud
+from softreach.cloud import design_of as design_of
+from softreach.cloud import open_cloud as open_cloud
+from softreach.cloud import save_cloud as save_cloud
+from softreach.errors import InvalidDesign as InvalidDesign
+from softreach.errors import InvalidInput as InvalidInput
+from softreach.errors import SoftreachError as SoftreachError
+from softreach.errors import SoftreachWarning as SoftreachWarning
+from softreach.fiber import FiberArchitecture as FiberArchitecture
+from softreach.kinematics import configuration as configuration
+from softreach.kinematics import tip_jacobian as tip_jacobian
+from softreach.kinematics import tip_positions as tip_positions
+from softreach.manipulator import Manipulator as Manipulator

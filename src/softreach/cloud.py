@@ -1,0 +1,137 @@
+"""Reachability clouds: sampled activations, their tips, and where both came from (section 3)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from os import PathLike, fspath
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach import parallel, progress, schema
+from softreach.atomic import replacing
+from softreach.design_file import design_from_toml
+from softreach.errors import InvalidInput
+from softreach.kinematics import BLOCK, tip_task
+from softreach.manipulator import Manipulator
+from softreach.sampling import check_sampler, cube_blocks
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["compute_cloud", "design_of", "open_cloud", "save_cloud"]
+
+Array = NDArray[np.float64]
+
+
+def compute_cloud(
+    arm: Manipulator,
+    n: int = 400_000,
+    seed: int = 0,
+    sampler: str = "uniform",
+    *,
+    tol: float = 1e-6,
+    report: progress.Progress | None = None,
+) -> xr.Dataset:
+    """Sample the activation box and compute the tip of each sample (section 3).
+
+    The result depends on the design, n, seed, sampler and tol alone: not on threads or blocks. Memory
+    is the result's own, (3 + bundles) 8 bytes a sample, and a few blocks.
+
+    Args:
+        arm: The design.
+        n: Number of samples.
+        seed: Seed of the sampler.
+        sampler: `uniform` (the paper's), `boundary`, `sobol` or `grid`; see `sampling.sample_cube`.
+        tol: Largest tip error, in L.
+        report: Called with the number of samples done since its last call; by default a bar is
+            shown on a terminal when the cloud is large.
+
+    Returns:
+        Dataset with `tip` (sample, axis) [m] and `activation` (sample, fiber) [-]; its attributes
+        hold the design, seed, sampler, tol and versions.
+
+    Raises:
+        InvalidInput: An argument out of range; the message says what to use instead.
+    """
+    check_sampler(sampler, n, arm.bundles, seed)
+    activation, tip = np.empty((n, arm.bundles)), np.empty((n, 3))
+    if report is not None:
+        _fill(arm, activation, tip, sampler, seed, tol, report)
+    else:
+        with progress.bar("computing tips", n) if n > _LONG else _no_bar() as shown:
+            _fill(arm, activation, tip, sampler, seed, tol, shown)
+    return schema.cloud_dataset(arm, activation, tip, seed=int(seed), sampler=sampler, tol=tol)
+
+
+def save_cloud(cloud: xr.Dataset, path: str | PathLike[str]) -> None:
+    """Write a cloud as a Zarr v3 store; it appears whole, in place of an older one, or not at all.
+
+    Raises:
+        InvalidInput: The dataset is no cloud.
+    """
+    schema.check_cloud(cloud)
+    chunk = min(cloud.sizes["sample"], 1 << 20)
+    encoding = {name: {"chunks": (chunk, cloud[name].shape[1])} for name in ("tip", "activation")}
+    with replacing(path) as partial_path:
+        schema.storable(cloud).to_zarr(
+            partial_path, mode="w", zarr_format=3, consolidated=False, encoding=encoding
+        )
+
+
+def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
+    """Read a cloud that `save_cloud` wrote.
+
+    Raises:
+        InvalidInput: There is no such store, or it holds something else.
+    """
+    import xarray as xr
+
+    if not (Path(path) / "zarr.json").is_file():
+        raise InvalidInput("cloud", fspath(path), "a Zarr store written by softreach")
+    with xr.open_zarr(path, consolidated=False, zarr_format=3, chunks=None) as stored:
+        return schema.check_cloud(stored.load())
+
+
+def design_of(cloud: xr.Dataset) -> Manipulator:
+    """The design that a cloud or configuration was computed from."""
+    return design_from_toml(cloud.attrs["design"], source="the cloud's design")
+
+
+_LONG = 5_000_000  # samples from which a bar is worth its lines
+
+
+def _fill(
+    arm: Manipulator,
+    activation: Array,
+    tip: Array,
+    sampler: str,
+    seed: int,
+    tol: float,
+    report: progress.Progress,
+) -> None:
+    """Draw activations block by block and let the threads turn them into tips meanwhile."""
+    low, width = arm.bounds[:, 0], np.diff(arm.bounds, axis=1)[:, 0]
+
+    def tasks() -> Iterator[Callable[[], object]]:
+        first = 0
+        for cube in cube_blocks(sampler, len(tip), arm.bundles, seed, BLOCK):
+            block = slice(first, first := first + len(cube))
+            np.add(low, np.multiply(cube, width, out=cube), out=activation[block])
+            yield partial(_reported, tip_task(arm, tol, activation[block], tip[block]), report, len(cube))
+
+    parallel.run(tasks())
+
+
+def _reported(task: Callable[[], object], report: progress.Progress, count: int) -> None:
+    task()
+    report(count)
+
+
+def _no_bar():  # noqa: ANN202
+    from contextlib import nullcontext
+
+    return nullcontext(progress.silent)

@@ -1,0 +1,242 @@
+"""Designs as TOML files: lengths in metres, angles in degrees, the unit in every key."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import math
+import tomllib
+from collections.abc import Iterator, Mapping
+from decimal import Decimal
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from softreach.atomic import replacing
+from softreach.errors import Fault, InvalidDesign, Range
+from softreach.fiber import FiberArchitecture, fiber_faults
+from softreach.manipulator import Manipulator, manipulator_faults
+
+__all__ = ["design_from_toml", "design_to_toml", "load_design", "save_design"]
+
+_PI = Decimal("3.14159265358979323846264338327950288420")
+_LONG = 17  # digits from which a number of degrees is read exactly
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+class _FiberTable(_Model):
+    """The keys of [[fibers]] and their types; ranges are the design's own business."""
+
+    name: str = ""
+    helical_angle_deg: float | None = None
+    revolution_deg: float | None = None
+    offset_deg: float = 0.0
+    extent_deg: float
+    bundles: int = 1
+
+
+class _DesignTable(_Model):
+    """The keys of a design file and their types."""
+
+    length_m: float
+    outer_radius_m: float
+    inner_radius_m: float
+    taper_deg: float = 0.0
+    poisson_ratio: float = 0.5
+    activation_bounds: list[float] | list[list[float]] = [-5 / 3, 0.0]
+    fibers: list[_FiberTable]
+
+
+class _Decimal(float):
+    """A number that remembers how it was written, so that degrees convert without a lost digit."""
+
+    def __new__(cls, text: str) -> _Decimal:
+        number = super().__new__(cls, text)
+        number.text = text
+        return number
+
+    text: str
+
+
+def load_design(path: str | PathLike[str]) -> Manipulator:
+    """Read a design file.
+
+    Raises:
+        InvalidDesign: Every fault of the file, with its key, value and what is allowed.
+        OSError: The file cannot be read.
+    """
+    return design_from_toml(Path(path).read_text(encoding="utf-8"), source=fspath(path))
+
+
+def save_design(arm: Manipulator, path: str | PathLike[str]) -> None:
+    """Write a design file that reads back to an equal design; an old file is replaced whole."""
+    with replacing(path) as partial:
+        partial.write_text(design_to_toml(arm), encoding="utf-8")
+
+
+def design_from_toml(text: str, source: str = "design") -> Manipulator:
+    """Read a design from TOML text; `source` is what errors call it.
+
+    Raises:
+        InvalidDesign: Every fault of the text, with its key, value and what is allowed.
+    """
+    try:
+        document = tomllib.loads(text, parse_float=_Decimal)
+    except tomllib.TOMLDecodeError as error:
+        raise InvalidDesign([Fault("TOML", str(error), "must be valid TOML")], source) from None
+    faults = list(_table_faults(document))
+    blamed = {fault.path for fault in faults}
+    faults += _physics_faults(document, blamed)
+    if faults:
+        raise InvalidDesign(faults, source)
+    try:
+        return _manipulator(document)
+    except InvalidDesign as error:
+        raise InvalidDesign([_in_file_terms(f, "") for f in error.faults], source) from None
+
+
+def design_to_toml(arm: Manipulator) -> str:
+    """The design as TOML text, every number such that it reads back to the same one."""
+    bounds = json.dumps(arm.activation_bounds)
+    lines = [
+        f"length_m = {arm.length!r}",
+        f"outer_radius_m = {arm.outer_radius!r}",
+        f"inner_radius_m = {arm.inner_radius!r}",
+        f"taper_deg = {_degrees_text(arm.taper)}",
+        f"poisson_ratio = {arm.poisson_ratio!r}",
+        f"activation_bounds = {bounds}",
+    ]
+    for fiber in arm.fibers:
+        lines += ["", "[[fibers]]", *_fiber_lines(fiber)]
+    return "\n".join(lines) + "\n"
+
+
+def _fiber_lines(fiber: FiberArchitecture) -> Iterator[str]:
+    if fiber.name:
+        yield f"name = {json.dumps(fiber.name)}"
+    for key in ("helical_angle", "revolution", "offset", "extent"):
+        angle = getattr(fiber, key)
+        if angle is not None:
+            yield f"{key}_deg = {_degrees_text(angle)}"
+    yield f"bundles = {fiber.bundles}"
+
+
+def _table_faults(document: Mapping[str, Any]) -> Iterator[Fault]:
+    """Keys that are unknown or missing, and values of another type."""
+    try:
+        _DesignTable.model_validate(document)
+    except ValidationError as error:
+        for problem in error.errors(include_url=False):
+            yield _as_fault(problem)
+
+
+def _as_fault(problem: Any) -> Fault:
+    location = [part for part in problem["loc"] if not str(part).startswith("list[")]
+    path = _dotted(location)
+    if problem["type"] == "missing":
+        return Fault(path, None, "required key is missing")
+    if problem["type"] == "extra_forbidden":
+        return Fault(path, problem["input"], f"unknown key{_nearest(location)}")
+    message = str(problem["msg"]).replace("Input should be", "must be")
+    return Fault(path, problem["input"], message)
+
+
+def _nearest(location: list[Any]) -> str:
+    table = _FiberTable if location[0] == "fibers" and len(location) > 1 else _DesignTable
+    close = difflib.get_close_matches(str(location[-1]), table.model_fields, n=1)
+    known = ", ".join(table.model_fields)
+    return f'; did you mean "{close[0]}"?' if close else f"; known keys: {known}"
+
+
+def _dotted(location: list[Any]) -> str:
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
+    return text.lstrip(".")
+
+
+def _physics_faults(document: Mapping[str, Any], blamed: set[str]) -> Iterator[Fault]:
+    """Ranges and relations, over every value that its type does not already disqualify."""
+    values = {_field(k): _si(k, v) for k, v in document.items() if k in _DesignTable.model_fields}
+    sound = {name: value for name, value in values.items() if _key(name) not in blamed}
+    tables = sound.pop("fibers", None)
+    if tables == []:
+        yield Fault("fibers", [], "must hold one [[fibers]] table or more")
+    if any(path.startswith("activation_bounds") for path in blamed):
+        sound.pop("activation_bounds", None)
+    yield from (_in_file_terms(fault, "") for fault in manipulator_faults(sound))
+    for k, table in enumerate(tables or []):
+        prefix = f"fibers[{k}]."
+        if not isinstance(table, dict):
+            continue
+        known = {key: table.get(key, field.default) for key, field in _FiberTable.model_fields.items()}
+        sound_keys = {_field(key): _si(key, v) for key, v in known.items() if prefix + key not in blamed}
+        yield from (_in_file_terms(fault, prefix) for fault in fiber_faults(sound_keys))
+
+
+def _manipulator(document: Mapping[str, Any]) -> Manipulator:
+    values = {_field(key): _si(key, value) for key, value in document.items()}
+    fibers = [
+        FiberArchitecture(**{_field(key): _si(key, value) for key, value in table.items()})
+        for table in values.pop("fibers")
+    ]
+    return Manipulator(fibers=tuple(fibers), **values)
+
+
+_KEYS = {
+    key.removesuffix("_m").removesuffix("_deg"): key
+    for table in (_DesignTable, _FiberTable)
+    for key in table.model_fields
+}
+
+
+def _key(field: str) -> str:
+    return _KEYS.get(field, field)
+
+
+def _field(key: str) -> str:
+    return key.removesuffix("_m").removesuffix("_deg")
+
+
+def _si(key: str, value: Any) -> Any:
+    """A value in SI units; one that is no number is left as it is, for the checks to name."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return value
+    if key.endswith("_deg"):
+        return _radians(getattr(value, "text", repr(value)).replace("_", ""))
+    return float(value) if isinstance(value, _Decimal) else value
+
+
+def _radians(text: str) -> float:
+    """Degrees as people write them convert like `math.radians`; longer ones by exact decimals.
+
+    Floating-point degrees miss one angle in ten by a unit in the last place; twenty digits do not.
+    """
+    if len(text.lstrip("-0.").replace(".", "")) < _LONG or not math.isfinite(float(text)):
+        return math.radians(float(text))
+    return float(Decimal(text) * _PI / 180)
+
+
+def _degrees_text(angle: float) -> str:
+    """The shortest number of degrees that converts to exactly this angle."""
+    degrees = Decimal(angle) * 180 / _PI
+    texts = (f"{degrees:.{digits}f}" for digits in range(1, 40))
+    return next((text for text in texts if _radians(text) == angle), repr(math.degrees(angle)))
+
+
+def _in_file_terms(fault: Fault, prefix: str) -> Fault:
+    """The same fault under the file's key and in the file's unit."""
+    names = ", ".join(prefix + _key(name) for name in fault.path.split(", "))
+    if isinstance(fault.allowed, Range) and fault.allowed.unit == "rad":
+        return Fault(names, _shown_degrees(fault.value), fault.allowed.in_degrees())
+    value = _shown_degrees(fault.value) if names.endswith("_deg") else fault.value
+    return Fault(names, value, fault.allowed)
+
+
+def _shown_degrees(value: object) -> object:
+    if isinstance(value, tuple):
+        return tuple(_shown_degrees(item) for item in value)
+    return float(f"{math.degrees(value):.12g}") if isinstance(value, float) else value

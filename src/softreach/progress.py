@@ -1,0 +1,37 @@
+"""What long work reports while it runs."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+__all__ = ["Progress", "bar", "silent"]
+
+Progress = Callable[[int], None]
+"""Called with the number of items done since the last call."""
+
+
+def silent(done: int) -> None:
+    """Report nothing."""
+    del done
+
+
+@contextmanager
+def bar(label: str, total: int) -> Iterator[Progress]:
+    """A progress bar with rate and time left on standard error, if that is a terminal."""
+    if not sys.stderr.isatty():
+        yield silent
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TaskProgressColumn(show_speed=True),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as display:
+        task = display.add_task(label, total=total)
+        yield lambda done: display.update(task, advance=done)

@@ -1,0 +1,149 @@
+"""Points of the unit cube: (sampler, n, dim, seed) -> (n, dim), streamed in blocks.
+
+A sequence depends on its four arguments alone: blocks only cut it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.errors import InvalidInput
+
+__all__ = ["SAMPLERS", "check_sampler", "cube_blocks", "sample_cube"]
+
+Array = NDArray[np.float64]
+Draw = Callable[[int, int], Array]
+"""(first, count) -> the points first .. first + count; called in order, without gaps."""
+
+
+class Sampler(NamedTuple):
+    """One way to spread points."""
+
+    begin: Callable[[int, int, int], Draw]
+    """(n, dim, seed) -> a source of points."""
+    refusal: Callable[[int, int], str | None]
+    """(n, dim) -> which n to use instead, or None when n will do."""
+
+
+def sample_cube(sampler: str, n: int, dim: int, seed: int = 0) -> Array:
+    """All n points at once [-], shape (n, dim).
+
+    Args:
+        sampler: `uniform` (the paper's), `boundary` (uniform, a fifth of the points on the faces),
+            `sobol` (scrambled, n a power of two) or `grid` (n a dim-th power, ends included).
+        n: Number of points.
+        dim: Dimension of the cube.
+        seed: What random samplers start from.
+
+    Raises:
+        InvalidInput: An unknown sampler, or an n that the sampler cannot spread.
+    """
+    return next(cube_blocks(sampler, n, dim, seed, size=n))
+
+
+def cube_blocks(sampler: str, n: int, dim: int, seed: int, size: int) -> Iterator[Array]:
+    """The points of `sample_cube` in consecutive blocks of at most `size`."""
+    check_sampler(sampler, n, dim, seed)
+    draw = SAMPLERS[sampler].begin(n, dim, seed)
+    for first in range(0, n, size):
+        yield draw(first, min(size, n - first))
+
+
+def check_sampler(sampler: str, n: int, dim: int, seed: int) -> None:
+    """Raise InvalidInput unless the sampler exists and can spread n points."""
+    if sampler not in SAMPLERS:
+        raise InvalidInput("sampler", repr(sampler), f"one of {', '.join(SAMPLERS)}")
+    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
+        raise InvalidInput("n", n, "a whole number, 1 or more")
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise InvalidInput("seed", seed, "a whole number, 0 or more")
+    if (advice := SAMPLERS[sampler].refusal(int(n), dim)) is not None:
+        raise InvalidInput("n", n, advice)
+
+
+def _uniform(n: int, dim: int, seed: int) -> Draw:
+    del n
+    rng = np.random.default_rng(seed)
+    return lambda first, count: rng.random((count, dim))
+
+
+def _boundary(n: int, dim: int, seed: int) -> Draw:
+    """Every fifth uniform point is moved onto a face, the 2 dim faces in turn."""
+    inside = _uniform(n, dim, seed)
+
+    def draw(first: int, count: int) -> Array:
+        points = inside(first, count)
+        rows = np.arange(-first % 5, count, 5)
+        face = (first + rows) // 5 % (2 * dim)
+        points[rows, face // 2] = face % 2
+        return points
+
+    return draw
+
+
+def _sobol(n: int, dim: int, seed: int) -> Draw:
+    from scipy.stats import qmc
+
+    del n
+    sequence = qmc.Sobol(dim, scramble=True, rng=np.random.default_rng(seed))
+    # Blocks need not be powers of two, the whole is: its balance is what counts.
+    return lambda first, count: _quiet_random(sequence, count)
+
+
+def _quiet_random(sequence, count: int) -> Array:  # noqa: ANN001
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="The balance properties of Sobol'")
+        return sequence.random(count)
+
+
+def _grid(n: int, dim: int, seed: int) -> Draw:
+    """A lattice with both ends, the last coordinate running fastest."""
+    del seed
+    side = _root(n, dim)
+    ticks = np.linspace(0.0, 1.0, side) if side > 1 else np.array([0.5])
+
+    def draw(first: int, count: int) -> Array:
+        index = np.unravel_index(np.arange(first, first + count), (side,) * dim)
+        return ticks[np.stack(index, axis=1)]
+
+    return draw
+
+
+def _any(n: int, dim: int) -> str | None:
+    del n, dim
+
+
+def _power_of_two(n: int, dim: int) -> str | None:
+    del dim
+    if n & (n - 1) == 0:
+        return None
+    low = 1 << (n.bit_length() - 1)
+    return f"a power of two for the sobol sampler, {low} or {2 * low} for instance"
+
+
+def _whole_power(n: int, dim: int) -> str | None:
+    side = _root(n, dim)
+    if side**dim == n:
+        return None
+    near = (f"{k}^{dim} = {k**dim}" for k in (side, side + 1) if k > 0)
+    return f"k^{dim} for the grid sampler with {dim} bundles, {' or '.join(near)} for instance"
+
+
+def _root(n: int, dim: int) -> int:
+    """The largest whole number whose dim-th power is within n."""
+    side = round(n ** (1 / dim))
+    return side if side**dim <= n else side - 1
+
+
+SAMPLERS: dict[str, Sampler] = {
+    "uniform": Sampler(_uniform, _any),
+    "boundary": Sampler(_boundary, _any),
+    "sobol": Sampler(_sobol, _power_of_two),
+    "grid": Sampler(_grid, _whole_power),
+}
