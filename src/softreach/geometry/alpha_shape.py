@@ -1,0 +1,112 @@
+"""Alpha shapes of every radius from one triangulation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+
+import numpy as np
+
+from softreach import parallel
+from softreach.geometry.delaunay import Delaunay, unit_scale
+from softreach.geometry.hull import Hull, compact_surface, surface_area
+from softreach.kernels import alpha as kernels
+
+__all__ = ["AlphaComplex"]
+
+BLOCK = 200_000  # cells measured by one thread at a time
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class AlphaComplex:
+    """A triangulation whose tetrahedra carry the radius from which on they belong to the shape.
+
+    The alpha shape of radius α is the union of the tetrahedra whose circumscribed sphere has a
+    radius R <= α (Edelsbrunner and Mücke 1994): what is left of the convex hull after a ball of
+    that radius has scooped out everything it can reach without touching a point.
+    """
+
+    triangulation: Delaunay
+    radii: np.ndarray = field(init=False, repr=False)
+    """Circumscribed radii [m], shape (m,)."""
+    volumes: np.ndarray = field(init=False, repr=False)
+    """Volumes of the tetrahedra [m³], shape (m,)."""
+
+    def __post_init__(self) -> None:
+        """Measure the tetrahedra."""
+        radii, volumes = _measure(self.triangulation)
+        object.__setattr__(self, "radii", radii)
+        object.__setattr__(self, "volumes", volumes)
+
+    @cached_property
+    def _curve(self) -> tuple[np.ndarray, np.ndarray]:
+        """Radii in increasing order, and the volumes summed up to each."""
+        order = np.argsort(self.radii)
+        return self.radii[order], np.cumsum(self.volumes[order])
+
+    def volume_curve(self) -> tuple[np.ndarray, np.ndarray]:
+        """Every radius at which the volume steps [m], and the volume from there on [m³]."""
+        radii, volumes = self._curve
+        return radii.copy(), volumes.copy()
+
+    def volume(self, alpha: float | np.ndarray) -> float | np.ndarray:
+        """Volume [m³] of the shape at one radius or at an array of radii [m]."""
+        radii, volumes = self._curve
+        steps = np.searchsorted(radii, alpha, side="right")
+        found = np.where(steps > 0, volumes[steps - 1], 0.0) if len(volumes) else 0.0 * steps
+        return float(found) if np.ndim(alpha) == 0 else found
+
+    def regions(self, alpha: float) -> int:
+        """Number of parts of the shape that hang together by faces."""
+        return int(kernels.join_regions(self.triangulation.neighbors, self.radii <= alpha)[1])
+
+    def critical_alpha(self) -> float:
+        """The smallest radius [m] at which one region covers all points; inf for a flat cloud.
+
+        The true smallest: below the radius that covers every point no radius will do, and from
+        there on the tetrahedra are added one by one. The number of regions is not monotone in the
+        radius, so a bisection over it can settle on a larger one. Neither this radius nor the
+        volume there converges as a random cloud grows: its loneliest point decides.
+        """
+        mesh = self.triangulation
+        if len(mesh.tetrahedra) == 0:
+            return np.inf
+        covering = kernels.covering_radius(mesh.tetrahedra, self.radii, len(mesh.points))
+        parent, regions = kernels.join_regions(mesh.neighbors, self.radii <= covering)
+        if regions == 1:
+            return float(covering)
+        later = np.flatnonzero(self.radii > covering)
+        order = later[np.argsort(self.radii[later])]
+        return float(
+            kernels.radius_of_one_region(mesh.neighbors, self.radii, parent, regions, order)
+        )
+
+    def hull(self, alpha: float) -> Hull:
+        """The shape of one radius [m]: surface, volume, area and regions."""
+        mesh, kept = self.triangulation, self.radii <= alpha
+        faces = kernels.boundary_faces(mesh.tetrahedra, mesh.neighbors, kept)
+        vertices, faces = compact_surface(mesh.points, faces)
+        return Hull(
+            vertices=vertices,
+            faces=faces,
+            volume=float(self.volumes[kept].sum()),
+            area=surface_area(vertices, faces),
+            alpha=float(alpha),
+            regions=self.regions(alpha),
+            n=len(mesh.points),
+        )
+
+
+def _measure(mesh: Delaunay) -> tuple[np.ndarray, np.ndarray]:
+    """Radii [m] and volumes [m³] of all tetrahedra, on all threads."""
+    points, exponent = unit_scale(mesh.points)
+    radii, volumes = np.empty((2, len(mesh.tetrahedra)))
+
+    def task(part: slice) -> Callable[[], object]:
+        return partial(
+            kernels.measure_cells, points, mesh.tetrahedra[part], radii[part], volumes[part]
+        )
+
+    parallel.run(task(part) for part in parallel.blocks(len(radii), BLOCK))
+    return np.ldexp(radii, exponent), np.ldexp(volumes, 3 * exponent)

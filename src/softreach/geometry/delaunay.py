@@ -1,0 +1,141 @@
+"""The Delaunay triangulation of a cloud, exact whatever the points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from softreach.arrays import Points
+from softreach.errors import InvalidInput
+from softreach.kernels.delaunay import triangulate
+from softreach.kernels.spatial_sort import insertion_order
+
+__all__ = ["Delaunay", "delaunay", "finite_points", "unit_scale"]
+
+FINEST = 200  # bits below the largest coordinate that `kernels.predicates` may see
+METHODS = ("auto", "numba", "qhull")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Delaunay:
+    """Tetrahedra whose circumscribed spheres hold no other point.
+
+    Points in one plane, on one line or fewer than four give no tetrahedra at all.
+    """
+
+    points: Points
+    """Positions [m], shape (n, 3)."""
+    tetrahedra: np.ndarray
+    """Vertices as indices of points, positively oriented, shape (m, 4)."""
+    neighbors: np.ndarray
+    """Neighbor i shares the face opposite vertex i; -1 outside the hull. Shape (m, 4)."""
+    duplicate_of: np.ndarray
+    """For each point itself, or the equal point that stands for it; shape (n,)."""
+
+
+def delaunay(points: Points, method: Literal["auto", "numba", "qhull"] = "auto") -> Delaunay:
+    """Triangulate a cloud of points.
+
+    ``"numba"`` (which ``"auto"`` means) inserts one point after the other with exact predicates
+    and is right for any input, see `softreach.kernels.delaunay`. ``"qhull"`` is SciPy's, several
+    times slower; among near-duplicate or cospherical points it may leave some out.
+
+    Coordinates smaller than 2^-200 of the largest count as zero.
+
+    Args:
+        points: Positions [m], shape (n, 3).
+        method: Who triangulates.
+
+    Raises:
+        InvalidInput: Points of another shape, or not finite; an unknown method.
+    """
+    points = finite_points(points)
+    if method not in METHODS:
+        raise InvalidInput("method", repr(method), f"one of {', '.join(METHODS)}")
+    build = _by_qhull if method == "qhull" else _by_insertion
+    tetrahedra, neighbors, duplicate_of = build(unit_scale(points)[0])
+    return Delaunay(
+        points=points, tetrahedra=tetrahedra, neighbors=neighbors, duplicate_of=duplicate_of
+    )
+
+
+def finite_points(points: object) -> Points:
+    """Points as floats in memory order, shape (n, 3), or a clear error.
+
+    Raises:
+        InvalidInput: Another shape, or rows that are not finite.
+    """
+    array = np.ascontiguousarray(points, dtype=np.float64)
+    if array.size == 0:
+        return array.reshape(0, 3)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise InvalidInput("points", f"array of shape {array.shape}", "of shape (n, 3) [m]")
+    wrong = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if len(wrong):
+        found = f"{len(wrong)} rows with NaN or infinity, the first at index {wrong[0]}"
+        raise InvalidInput("points", found, "finite", "drop these rows or find out whence they are")
+    return array
+
+
+def unit_scale(points: Points) -> tuple[Points, int]:
+    """Points times 2^-e in [-1, 1], and e: exact, but for what lies below 2^-200 of the largest."""
+    exponent = int(np.frexp(np.abs(points).max(initial=0.0))[1])
+    scaled = np.ldexp(points, -exponent)
+    return np.ldexp(np.round(np.ldexp(scaled, FINEST)), -FINEST), exponent
+
+
+def _by_insertion(points: Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Our own triangulation; points enter it in an order that keeps the work local."""
+    if len(points) < 4:
+        return *_nothing(), _first_equal(points)
+    order = insertion_order(points)
+    cells, neighbors, same = triangulate(points[order])
+    if len(cells) == 0:
+        return *_nothing(), _first_equal(points)
+    duplicate_of = np.empty(len(points), np.int64)
+    duplicate_of[order] = order[same]
+    return order.astype(np.int32)[cells], neighbors, duplicate_of
+
+
+def _by_qhull(points: Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """SciPy's triangulation of the distinct points, its cells turned to positive orientation."""
+    from scipy.spatial import Delaunay as Qhull  # lazily
+    from scipy.spatial import QhullError
+
+    duplicate_of = _first_equal(points)
+    distinct = np.unique(duplicate_of)
+    if len(distinct) < 4:
+        return *_nothing(), duplicate_of
+    inner = points[distinct] - points[distinct].mean(axis=0)
+    try:
+        found = Qhull(inner, qhull_options="Qbb Qc Qz Q12")
+    except QhullError:  # flat
+        return *_nothing(), duplicate_of
+    cells, neighbors = _positively_oriented(inner, found.simplices, found.neighbors)
+    return distinct.astype(np.int32)[cells], neighbors, duplicate_of
+
+
+def _positively_oriented(
+    points: Points, cells: np.ndarray, neighbors: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Copies with two vertices exchanged where det[b-a, c-a, d-a] < 0."""
+    corners = points[cells]
+    negative = np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0
+    swap = np.array([1, 0, 2, 3])
+    cells, neighbors = cells.copy(), neighbors.copy()
+    cells[negative] = cells[negative][:, swap]
+    neighbors[negative] = neighbors[negative][:, swap]
+    return cells, neighbors
+
+
+def _nothing() -> tuple[np.ndarray, np.ndarray]:
+    """No cells and no neighbors."""
+    return np.empty((0, 4), np.int32), np.empty((0, 4), np.int32)
+
+
+def _first_equal(points: Points) -> np.ndarray:
+    """For each point the first that equals it."""
+    _, first, inverse = np.unique(points, axis=0, return_index=True, return_inverse=True)
+    return first[inverse.reshape(-1)] if len(points) else np.empty(0, np.int64)

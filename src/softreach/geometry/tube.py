@@ -1,0 +1,159 @@
+"""Closed triangle meshes along curves: tubes of varying radius, and ribbons with a thickness."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.errors import InvalidInput
+
+__all__ = ["grid_faces", "polyline_tube", "ribbon_mesh", "rotation_minimizing_frames", "tube_mesh"]
+
+Array = NDArray[np.float64]
+Faces = NDArray[np.int64]
+Mesh = tuple[Array, Faces]
+
+
+def tube_mesh(
+    centerline: ArrayLike,
+    normal: ArrayLike,
+    binormal: ArrayLike,
+    radii: ArrayLike,
+    sides: int = 32,
+) -> Mesh:
+    """A tube of circular sections, capped at both ends, with outward faces.
+
+    Args:
+        centerline: Centers of the sections [m], shape (stations, 3), two or more.
+        normal: Unit vectors in the sections, shape (stations, 3).
+        binormal: Unit vectors in the sections such that normal x binormal points along the
+            centerline, shape (stations, 3).
+        radii: Radius of each section, or one for all [m].
+        sides: Corners of each section.
+
+    Returns:
+        Vertices [m], shape (stations * sides + 2, 3), ring by ring with the centers of the two caps
+        last; faces, shape (2 * stations * sides, 3).
+
+    Raises:
+        InvalidInput: Fewer than two stations or three sides.
+    """
+    center = _check_curve(centerline)
+    if sides < 3:
+        raise InvalidInput("sides", sides, "at least 3")
+    angles = 2 * np.pi * np.arange(sides) / sides
+    spokes = np.multiply.outer(np.cos(angles), np.asarray(normal, float))
+    spokes += np.multiply.outer(np.sin(angles), np.asarray(binormal, float))
+    reach = np.broadcast_to(np.asarray(radii, float), len(center))[:, None]
+    rings = (center + reach * spokes).swapaxes(0, 1).reshape(-1, 3)
+    return np.concatenate([rings, center[[0, -1]]]), _tube_faces(len(center), sides)
+
+
+def polyline_tube(points: ArrayLike, radius: ArrayLike, sides: int = 12) -> Mesh:
+    """A closed tube along a curve that brings no frame of its own.
+
+    Args:
+        points: The curve [m], shape (stations, 3); consecutive points differ.
+        radius: Radius of each section, or one for all [m].
+        sides: Corners of each section.
+
+    Raises:
+        InvalidInput: Fewer than two points or three sides.
+    """
+    return tube_mesh(points, *rotation_minimizing_frames(points), radius, sides)
+
+
+def rotation_minimizing_frames(points: ArrayLike) -> tuple[Array, Array]:
+    """Normals and binormals that turn about the curve as little as possible.
+
+    Each frame is the one before, reflected twice (Wang, Jüttler, Zheng, Liu, ACM TOG 27, 2008).
+
+    Args:
+        points: The curve [m], shape (stations, 3); consecutive points differ.
+
+    Returns:
+        Normals and binormals, each of shape (stations, 3).
+
+    Raises:
+        InvalidInput: Fewer than two points.
+    """
+    curve = _check_curve(points)
+    tangents = _unit(np.gradient(curve, axis=0))
+    normals = np.zeros_like(curve)
+    # the coordinate axis farthest from the tangent starts a well-conditioned frame
+    seed = np.eye(3)[np.argmin(np.abs(tangents[0]))]
+    normals[0] = _unit(seed - (seed @ tangents[0]) * tangents[0])
+    for k, step in enumerate(np.diff(curve, axis=0)):
+        moved = _reflect(normals[k], step)
+        turn = tangents[k + 1] - _reflect(tangents[k], step)
+        normals[k + 1] = _reflect(moved, turn) if turn @ turn > 0 else moved
+    return normals, np.cross(tangents, normals)
+
+
+def ribbon_mesh(lower: ArrayLike, upper: ArrayLike) -> Mesh:
+    """The closed skin between two surface patches: a ribbon with a thickness.
+
+    Args:
+        lower: One patch [m], shape (stations, across, 3).
+        upper: The other, same shape, on the side that (along x across) points to.
+
+    Returns:
+        Vertices [m], shape (2 * stations * across, 3), `lower` first; outward faces.
+
+    Raises:
+        InvalidInput: Patches of different shapes or fewer than two points along a side.
+    """
+    low, high = np.asarray(lower, float), np.asarray(upper, float)
+    if low.shape != high.shape or low.ndim != 3 or min(low.shape[:2]) < 2:
+        raise InvalidInput("lower, upper", (low.shape, high.shape), "two equal (n, k, 3) patches")
+    index = np.arange(low.shape[0] * low.shape[1]).reshape(low.shape[:2])
+    rim = np.concatenate([index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]])
+    wall = np.column_stack([rim, np.roll(rim, -1)])
+    quads = [_grid(index)[:, ::-1], _grid(index) + index.size]
+    quads += [np.column_stack([wall, wall[:, ::-1] + index.size])]
+    return np.concatenate([low.reshape(-1, 3), high.reshape(-1, 3)]), _halves(np.concatenate(quads))
+
+
+def grid_faces(stations: int, across: int) -> Faces:
+    """Triangles of an open grid of points (stations, across), turning from the first axis to it.
+
+    Returns:
+        Faces, shape (2 * (stations - 1) * (across - 1), 3).
+    """
+    return _halves(_grid(np.arange(stations * across).reshape(stations, across)))
+
+
+def _check_curve(points: ArrayLike) -> Array:
+    curve = np.asarray(points, float)
+    if curve.ndim != 2 or curve.shape[1] != 3 or len(curve) < 2:
+        raise InvalidInput("centerline.shape", curve.shape, "(stations, 3) with stations >= 2")
+    return curve
+
+
+def _tube_faces(stations: int, sides: int) -> Faces:
+    ring = np.arange(sides)
+    after = np.roll(ring, -1)
+    quad = np.column_stack([ring, after, after + sides, ring + sides])
+    walls = _halves((quad + sides * np.arange(stations - 1)[:, None, None]).reshape(-1, 4))
+    last = (stations - 1) * sides
+    first_cap = np.column_stack([np.full(sides, stations * sides), after, ring])
+    last_cap = np.column_stack([np.full(sides, stations * sides + 1), ring + last, after + last])
+    return np.concatenate([walls, first_cap, last_cap])
+
+
+def _grid(index: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The quads of a grid of vertices, turning from the first axis to the second."""
+    corners = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    return np.column_stack([corner.ravel() for corner in corners])
+
+
+def _halves(quads: NDArray[np.int64]) -> Faces:
+    return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def _unit(vectors: Array) -> Array:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def _reflect(vector: Array, normal: Array) -> Array:
+    return vector - (2 * (vector @ normal) / (normal @ normal)) * normal

@@ -1,0 +1,203 @@
+"""Alpha shapes from a Delaunay triangulation: radii, volumes, boundary, regions, critical radius.
+
+The alpha shape of radius α is the union of the cells whose circumscribed sphere has radius R <= α.
+A region is a set of such cells that hang together by faces.
+
+References:
+    Edelsbrunner, Mücke (1994), Three-dimensional alpha shapes, ACM Trans. Graphics 13, 43-72.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from softreach.kernels.cells import FACES
+from softreach.kernels.expansions import scratch, value
+from softreach.kernels.predicates import ORIENT_BOUND, dot3, edge, end, minor
+
+__all__ = [
+    "boundary_faces",
+    "covering_radius",
+    "join_regions",
+    "measure_cells",
+    "radius_of_one_region",
+]
+
+# A determinant this close to its rounding error makes a radius wrong in its 8th digit.
+SLIVER_BOUND = ORIENT_BOUND * 2.0**26
+
+
+@njit(cache=True, nogil=True)
+def measure_cells(points, cells, radii, volumes):
+    """Write the radius of the circumscribed sphere and the volume of every cell.
+
+    With edges a, b, c from the fourth vertex, 6V = a · (b × c) and
+    R = |a² b × c + b² c × a + c² a × b| / 12V.
+
+    Args:
+        points: Coordinates in [-1, 1], shape (n, 3).
+        cells: Vertices, shape (m, 4).
+        radii: Result, shape (m,); inf where a cell has no volume.
+        volumes: Result, shape (m,).
+    """
+    w = scratch()
+    for t in range(len(cells)):
+        i, j, k, m = cells[t, 0], cells[t, 1], cells[t, 2], cells[t, 3]
+        length, det, sure = sphere(points, i, j, k, m)
+        if not sure:
+            length, det = sphere_exact(points, i, j, k, m, w)
+        volumes[t] = abs(det) / 6.0
+        radii[t] = length / (2.0 * abs(det)) if det != 0.0 else np.inf
+
+
+@njit(cache=True)
+def sphere(points, i, j, k, m):
+    """The numerator |...| of R and 6V, and whether rounding left them good to eight digits."""
+    ax, ay, az = arrow(points, i, m)
+    bx, by, bz = arrow(points, j, m)
+    cx, cy, cz = arrow(points, k, m)
+    a2 = ax * ax + ay * ay + az * az
+    b2 = bx * bx + by * by + bz * bz
+    c2 = cx * cx + cy * cy + cz * cz
+    bc_x, bc_y, bc_z = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
+    ca_x, ca_y, ca_z = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
+    ab_x, ab_y, ab_z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    x = a2 * bc_x + b2 * ca_x + c2 * ab_x
+    y = a2 * bc_y + b2 * ca_y + c2 * ab_y
+    z = a2 * bc_z + b2 * ca_z + c2 * ab_z
+    det = ax * bc_x + ay * bc_y + az * bc_z
+    size = max(abs(ax), abs(bx), abs(cx)) * max(abs(ay), abs(by), abs(cy))
+    size *= max(abs(az), abs(bz), abs(cz))
+    return np.sqrt(x * x + y * y + z * z), det, abs(det) > SLIVER_BOUND * size
+
+
+@njit(cache=True)
+def arrow(points, i, m):
+    """The edge from point m to point i."""
+    return points[i, 0] - points[m, 0], points[i, 1] - points[m, 1], points[i, 2] - points[m, 2]
+
+
+@njit(cache=True)
+def sphere_exact(points, i, j, k, m, w):
+    """`sphere` with each sum exact until its last rounding: a flat cell cancels most digits."""
+    a = edge(w, 0, points, i, m)
+    b = edge(w, end(a[2]), points, j, m)
+    c = edge(w, end(b[2]), points, k, m)
+    a2 = dot3(w, end(c[2]), a[0], a[0], a[1], a[1], a[2], a[2])
+    b2 = dot3(w, end(a2), b[0], b[0], b[1], b[1], b[2], b[2])
+    c2 = dot3(w, end(b2), c[0], c[0], c[1], c[1], c[2], c[2])
+    x, det_x = sphere_component(w, end(c2), a, b, c, a2, b2, c2, 1, 2)
+    y, _ = sphere_component(w, end(c2), a, b, c, a2, b2, c2, 2, 0)
+    z, _ = sphere_component(w, end(c2), a, b, c, a2, b2, c2, 0, 1)
+    return np.sqrt(x * x + y * y + z * z), det_x
+
+
+@njit(cache=True)
+def sphere_component(w, top, a, b, c, a2, b2, c2, u, v):
+    """One component of a² b × c + b² c × a + c² a × b, and a · (b × c) by the same minors."""
+    bc = minor(w, top, b[u], b[v], c[u], c[v])
+    ca = minor(w, end(bc), c[u], c[v], a[u], a[v])
+    ab = minor(w, end(ca), a[u], a[v], b[u], b[v])
+    total = dot3(w, end(ab), a2, bc, b2, ca, c2, ab)
+    component = value(w, total)
+    other = 3 - u - v
+    det = dot3(w, end(ab), a[other], bc, b[other], ca, c[other], ab)
+    return component, value(w, det)
+
+
+@njit(cache=True, nogil=True)
+def boundary_faces(cells, neighbors, kept):
+    """The faces between kept cells and the rest, normals outwards, shape (f, 3).
+
+    Args:
+        cells: Vertices, shape (m, 4).
+        neighbors: Neighbors, -1 for none, shape (m, 4).
+        kept: Which cells belong to the shape, shape (m,).
+    """
+    count = 0
+    for t in range(len(cells)):
+        for i in range(4):
+            count += is_boundary(neighbors, kept, t, i)
+    faces = np.empty((count, 3), cells.dtype)
+    at = 0
+    for t in range(len(cells)):
+        for i in range(4):
+            if is_boundary(neighbors, kept, t, i):
+                for k in range(3):
+                    faces[at, k] = cells[t, FACES[i, k]]
+                at += 1
+    return faces
+
+
+@njit(cache=True)
+def is_boundary(neighbors, kept, t, i):
+    """Whether cell t is kept and its neighbor i is not."""
+    return kept[t] and (neighbors[t, i] < 0 or not kept[neighbors[t, i]])
+
+
+@njit(cache=True)
+def merges(neighbors, parent, t):
+    """Join cell t, new, to the cells around it that have a region; how many regions that cost.
+
+    ``parent`` leads from each cell towards the one that names its region (union-find).
+    """
+    merged = 0
+    here = t
+    for i in range(4):
+        there = neighbors[t, i]
+        if there < 0 or parent[there] < 0:
+            continue
+        while parent[there] != there:
+            parent[there] = parent[parent[there]]
+            there = parent[there]
+        if there != here:
+            parent[here] = there
+            here = there
+            merged += 1
+    return merged
+
+
+@njit(cache=True, nogil=True)
+def join_regions(neighbors, kept):
+    """The regions of the kept cells: `merges`' parent of every cell (-1 if not kept), how many."""
+    parent = np.full(len(neighbors), -1, np.int32)
+    regions = 0
+    for t in range(len(neighbors)):
+        if kept[t]:
+            parent[t] = t
+            regions += 1 - merges(neighbors, parent, t)
+    return parent, regions
+
+
+@njit(cache=True, nogil=True)
+def covering_radius(cells, radii, n_points):
+    """The smallest radius at which every vertex belongs to a kept cell."""
+    smallest = np.full(n_points, -1.0)
+    for t in range(len(cells)):
+        for i in range(4):
+            v = cells[t, i]
+            if smallest[v] < 0.0 or radii[t] < smallest[v]:
+                smallest[v] = radii[t]
+    return smallest.max()
+
+
+@njit(cache=True, nogil=True)
+def radius_of_one_region(neighbors, radii, parent, regions, order):
+    """The first radius at which one region is left, adding further cells one after the other.
+
+    Args:
+        neighbors: Neighbors, -1 for none, shape (m, 4).
+        radii: Circumscribed radii, shape (m,).
+        parent: Regions so far, from `join_regions`; changed.
+        regions: How many they are.
+        order: The cells still to come, by increasing radius.
+    """
+    for k in range(len(order)):
+        t = order[k]
+        parent[t] = t
+        regions += 1 - merges(neighbors, parent, t)
+        last = k + 1 == len(order) or radii[order[k + 1]] > radii[t]
+        if last and regions == 1:
+            return radii[t]
+    return np.inf

@@ -1,0 +1,185 @@
+"""The mesh that a triangulation grows: cells, who neighbors whom, and cavities dug and filled.
+
+A cell abcd has det[b-a, c-a, d-a] > 0; its neighbor i lies opposite vertex i. The ghost vertex
+stands for all of space beyond the convex hull, so that every face has a cell on both its sides.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+__all__ = [
+    "DEAD",
+    "FACES",
+    "GHOST",
+    "Mesh",
+    "compact",
+    "empty_mesh",
+    "fill",
+    "ghost_slot",
+    "grown_mesh",
+    "set_first_cell",
+]
+
+GHOST = -1
+DEAD = -2
+# Vertices of the face opposite vertex i, in the order that makes its normal point outwards.
+FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+
+
+class Mesh(NamedTuple):
+    """Cells in their slots, and room to note a cavity.
+
+    A freed slot holds DEAD and, as neighbor 0, the next freed slot. ``dug`` lists the cells of the
+    cavity, ``walls`` its faces as 4 · cell + face.
+    """
+
+    cells: np.ndarray
+    neighbors: np.ndarray
+    mark: np.ndarray
+    dug: np.ndarray
+    walls: np.ndarray
+
+
+@njit(cache=True)
+def empty_mesh(size):
+    """A mesh with room for ``size`` cells; memory is touched only as cells come."""
+    return Mesh(
+        np.empty((size, 4), np.int32),
+        np.empty((size, 4), np.int32),
+        np.empty(size, np.int32),
+        np.empty(size, np.int32),
+        np.empty(2 * size + 4, np.int64),
+    )
+
+
+@njit(cache=True)
+def grown_mesh(mesh, more):
+    """A copy with at least ``more`` further slots."""
+    size = len(mesh.mark)
+    grown = empty_mesh(size + size // 2 + more)
+    grown.cells[:size] = mesh.cells
+    grown.neighbors[:size] = mesh.neighbors
+    grown.mark[:size] = mesh.mark
+    grown.dug[:size] = mesh.dug
+    grown.walls[: 2 * size] = mesh.walls[: 2 * size]
+    return grown
+
+
+@njit(cache=True)
+def set_first_cell(mesh, start):
+    """The first cell and the ghost cells on its four faces; return the number of slots used."""
+    mesh.mark[:5] = -1
+    for i in range(4):
+        mesh.cells[0, i] = start[i]
+        mesh.neighbors[0, i] = i + 1
+        for k in range(3):
+            mesh.cells[i + 1, k] = start[FACES[i, k]]
+            mesh.neighbors[i + 1, k] = FACES[i, k] + 1
+        mesh.cells[i + 1, 3] = GHOST
+        mesh.neighbors[i + 1, 3] = 0
+    return 5
+
+
+@njit(cache=True)
+def ghost_slot(cells, t):
+    """Which vertex of cell t is the ghost; -1 if none."""
+    for i in range(4):
+        if cells[t, i] == GHOST:
+            return i
+    return -1
+
+
+@njit(cache=True)
+def slot_of(neighbors, u, t):
+    """Which neighbor of u is t."""
+    for i in range(3):
+        if neighbors[u, i] == t:
+            return i
+    return 3
+
+
+@njit(cache=True)
+def fill(mesh, p, n_dug, n_walls, used, free, table):
+    """Join p to every wall; return slots used, the head of the freed slots, and the last cell."""
+    size = 1
+    while size < 4 * n_walls:
+        size *= 2
+    table[0, :size] = -1
+    t = 0
+    for k in range(n_walls):
+        if free != DEAD:
+            t, free = free, mesh.neighbors[free, 0]
+        else:
+            t, used = used, used + 1
+            mesh.mark[t] = -1
+        join(mesh, mesh.walls[k] >> 2, mesh.walls[k] & 3, p, t)
+        for i in range(3):
+            link(mesh, t, i, table, size)
+    for k in range(n_dug):
+        bury(mesh, mesh.dug[k], free)
+        free = mesh.dug[k]
+    return used, free, t
+
+
+@njit(cache=True)
+def join(mesh, old, i, p, t):
+    """Make cell t of p and face i of an old cell, and tie it to the cell behind that face."""
+    # the outward face turned round: p is on its inner side, so (face, p) is positive
+    mesh.cells[t, 0] = mesh.cells[old, FACES[i, 0]]
+    mesh.cells[t, 1] = mesh.cells[old, FACES[i, 2]]
+    mesh.cells[t, 2] = mesh.cells[old, FACES[i, 1]]
+    mesh.cells[t, 3] = p
+    behind = mesh.neighbors[old, i]
+    mesh.neighbors[t, 3] = behind
+    mesh.neighbors[behind, slot_of(mesh.neighbors, behind, old)] = t
+
+
+@njit(cache=True)
+def bury(mesh, t, free):
+    """Put slot t on the list of freed ones."""
+    mesh.cells[t, 0] = DEAD
+    mesh.neighbors[t, 0] = free
+
+
+@njit(cache=True)
+def link(mesh, t, i, table, size):
+    """Tie face i of new cell t to the new cell on the same edge of the cavity, once both exist.
+
+    The two walls that meet in an edge find each other in a small hash table keyed by that edge.
+    """
+    a = np.int64(mesh.cells[t, (i + 1) % 3]) + 1
+    b = np.int64(mesh.cells[t, (i + 2) % 3]) + 1
+    key = (min(a, b) << 32) | max(a, b)
+    at = (min(a, b) * 31 + max(a, b)) & (size - 1)
+    while table[0, at] != -1:
+        if table[0, at] == key:
+            u, j = table[1, at] >> 2, table[1, at] & 3
+            mesh.neighbors[t, i] = u
+            mesh.neighbors[u, j] = t
+            return
+        at = (at + 1) & (size - 1)
+    table[0, at] = key
+    table[1, at] = (t << 2) | i
+
+
+@njit(cache=True)
+def compact(mesh, used):
+    """Move the finite cells to the front, in place; return how many there are."""
+    cells, neighbors, renumbered = mesh.cells, mesh.neighbors, mesh.mark
+    count = 0
+    for t in range(used):
+        renumbered[t] = -1
+        if min(min(cells[t, 0], cells[t, 1]), min(cells[t, 2], cells[t, 3])) >= 0:
+            renumbered[t] = count
+            count += 1
+    for t in range(used):
+        to = renumbered[t]
+        if to >= 0:
+            for i in range(4):
+                cells[to, i] = cells[t, i]
+                neighbors[to, i] = renumbered[neighbors[t, i]]
+    return count
