@@ -35,7 +35,7 @@ class Delaunay:
     """For each point itself, or the equal point that stands for it; shape (n,)."""
 
 
-def delaunay(points: Points, method: Literal["auto", "numba", "qhull"] = "auto") -> Delaunay:
+def delaunay(points: np.ndarray, method: Literal["auto", "numba", "qhull"] = "auto") -> Delaunay:
     """Triangulate a cloud of points.
 
     ``"numba"`` (which ``"auto"`` means) inserts one point after the other with exact predicates

@@ -47,7 +47,7 @@ class Hull:
         return None if self.volume_corrected is None else self.volume - self.volume_corrected
 
 
-def convex_hull(points: Points) -> Hull:
+def convex_hull(points: np.ndarray) -> Hull:
     """The convex hull of a cloud by Qhull.
 
     Points in one plane, on one line or fewer than four have volume 0 and no faces.

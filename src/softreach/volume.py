@@ -1,0 +1,197 @@
+"""How much space a cloud of tips fills, and how much of its hull it cannot reach (section 4)."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from softreach.errors import InvalidInput, SoftreachWarning
+from softreach.geometry import hull as hulls
+from softreach.geometry.alpha_shape import AlphaComplex
+from softreach.geometry.delaunay import delaunay, finite_points
+from softreach.geometry.hull import Hull
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["concave_hull", "convex_hull", "unreachability", "volume_curve"]
+
+DEFAULT_RADIUS = 0.05  # of the arm's length
+SPACINGS = 3.0  # a smaller radius falls through between the points
+
+Method = Literal["auto", "numba", "qhull"]
+
+
+def concave_hull(
+    points: np.ndarray | xr.DataArray,
+    alpha: float | str | None = None,
+    *,
+    bias: bool = False,
+    method: Method = "auto",
+) -> Hull:
+    """The alpha shape of a cloud: what a ball of radius alpha cannot scoop out of its convex hull.
+
+    The volume of a random cloud of N points falls short of that of infinitely many by an amount
+    that shrinks as N^-1/2 (2 to 3 % for 400,000 tips), the same in every repetition. With
+    ``bias=True`` the shape of a quarter of the points is computed too, for a quarter of the time,
+    and gives the estimate ``Hull.volume_corrected`` = 2 V(N) - V(N/4). It is meant for random
+    clouds: a grid has less bias than this takes it to have.
+
+    ``alpha="critical"`` is the smallest radius at which one region covers all points. Neither it
+    nor the volume there converges with N, as the loneliest point decides: compare clouds at a
+    fixed radius.
+
+    Points in one plane, on one line or fewer than four have volume 0 and no faces.
+
+    Args:
+        points: Tips [m], shape (n, 3), or ``cloud.tip``.
+        alpha: Radius [m]; ``"critical"``; or None for 0.05 of ``points.attrs["length"]``.
+        bias: Whether to estimate the sampling bias.
+        method: Who triangulates, see `softreach.geometry.delaunay.delaunay`.
+
+    Raises:
+        InvalidInput: Points of another shape, or not finite; a radius that is not positive, or
+            None for points that do not carry their arm's length.
+
+    Warns:
+        SoftreachWarning: The radius is below three mean spacings of the points.
+
+    References:
+        Edelsbrunner, Mücke (1994), Three-dimensional alpha shapes, ACM Trans. Graphics 13, 43-72.
+    """
+    positions = _positions(points)
+    radius = _radius(alpha, points)
+    shape = _alpha_complex(positions, method)
+    hull = shape.hull(shape.critical_alpha() if radius == "critical" else float(radius))
+    _warn_if_fine(hull)
+    return _corrected(hull, positions, method) if bias else hull
+
+
+def convex_hull(points: np.ndarray | xr.DataArray) -> Hull:
+    """The convex hull of a cloud, by Qhull.
+
+    Points in one plane, on one line or fewer than four have volume 0 and no faces.
+
+    Args:
+        points: Tips [m], shape (n, 3), or ``cloud.tip``.
+
+    Raises:
+        InvalidInput: Points of another shape, or not finite.
+    """
+    return hulls.convex_hull(_positions(points))
+
+
+def unreachability(
+    points: np.ndarray | xr.DataArray,
+    alpha: float | str | None = None,
+    *,
+    method: Method = "auto",
+) -> float:
+    """The part of the convex hull that the cloud does not fill, UNR = 1 - V_conc / V_conv [-].
+
+    Both volumes come from one triangulation.
+
+    Args:
+        points: Tips [m], shape (n, 3), or ``cloud.tip``.
+        alpha: Radius as in `concave_hull`.
+        method: Who triangulates.
+
+    Raises:
+        InvalidInput: As `concave_hull`; also a cloud without volume, as 0/0 says nothing.
+
+    Warns:
+        SoftreachWarning: The radius is below three mean spacings of the points.
+    """
+    positions = _positions(points)
+    radius = _radius(alpha, points)
+    shape = _alpha_complex(positions, method)
+    convex = float(shape.volumes.sum())
+    if convex == 0.0:
+        raise InvalidInput("points", "a cloud of volume 0", "spread in all three directions")
+    hull = shape.hull(shape.critical_alpha() if radius == "critical" else float(radius))
+    _warn_if_fine(hull)
+    return 1.0 - hull.volume / convex
+
+
+def volume_curve(
+    points: np.ndarray | xr.DataArray, alphas: np.ndarray, *, method: Method = "auto"
+) -> np.ndarray:
+    """Volumes of the alpha shapes of many radii, from one triangulation.
+
+    Args:
+        points: Tips [m], shape (n, 3), or ``cloud.tip``.
+        alphas: Radii [m], any shape.
+        method: Who triangulates.
+
+    Returns:
+        Volumes [m³], shape of the radii.
+
+    Raises:
+        InvalidInput: Points of another shape, or not finite.
+    """
+    shape = _alpha_complex(_positions(points), method)
+    return np.asarray(shape.volume(np.asarray(alphas, dtype=float)))
+
+
+def _positions(points: np.ndarray | xr.DataArray) -> np.ndarray:
+    """Points as an array (n, 3); a labelled one may have its axes in either order."""
+    array = np.asarray(points)
+    if getattr(points, "dims", None) == ("axis", "sample"):
+        array = array.T
+    return finite_points(array)
+
+
+def _radius(alpha: float | str | None, points: np.ndarray | xr.DataArray) -> float | str:
+    """The radius asked for [m], or ``"critical"``."""
+    allowed = "a radius > 0 [m], 'critical', or None"
+    if alpha is None:
+        return _default_radius(points)
+    if isinstance(alpha, str):
+        if alpha != "critical":
+            raise InvalidInput("alpha", repr(alpha), allowed)
+        return alpha
+    if not alpha > 0:  # NaN too
+        raise InvalidInput("alpha", alpha, allowed)
+    return float(alpha)
+
+
+def _default_radius(points: np.ndarray | xr.DataArray) -> float:
+    """0.05 of the length of the arm whose tips these are [m]."""
+    length = getattr(points, "attrs", {}).get("length")
+    if length is None:
+        hint = (
+            "only points with attrs['length'] [m], as cloud.tip has, have a default of 0.05 of it"
+        )
+        raise InvalidInput("alpha", None, "a radius [m] for these points", hint)
+    return DEFAULT_RADIUS * float(length)
+
+
+def _alpha_complex(positions: np.ndarray, method: Method) -> AlphaComplex:
+    """Triangulate and measure."""
+    return AlphaComplex(triangulation=delaunay(positions, method))
+
+
+def _warn_if_fine(hull: Hull) -> None:
+    """Say so if the radius is too small for the density of the points."""
+    if hull.alpha < SPACINGS * hull.spacing:
+        warnings.warn(
+            f"alpha = {hull.alpha:.4g} m is {hull.alpha / hull.spacing:.2g} mean spacings of the "
+            f"{hull.n} points ({hull.spacing:.4g} m): below {SPACINGS:g} the shape has holes "
+            "between points and its volume is too small; use more points or a larger alpha",
+            SoftreachWarning,
+            stacklevel=3,
+        )
+
+
+def _corrected(hull: Hull, positions: np.ndarray, method: Method) -> Hull:
+    """The hull with V* = 2 V(N) - V(N/4), from a fixed random quarter of the points.
+
+    Not every fourth one: in a Sobol sequence those all lie in one quarter of the box.
+    """
+    quarter = np.random.default_rng(0).permutation(len(positions))[: len(positions) // 4]
+    shape = _alpha_complex(positions[np.sort(quarter)], method)
+    fewer = float(shape.volumes[shape.radii <= hull.alpha].sum())
+    return replace(hull, volume_corrected=2.0 * hull.volume - fewer)
