@@ -103,11 +103,14 @@ def enclosed_volume(vertices: Points, faces: Faces) -> float:
     """Volume inside an oriented closed surface [m³] by the divergence theorem."""
     if len(faces) == 0:
         return 0.0
-    a, b, c = np.moveaxis((vertices - vertices.mean(axis=0))[faces], 1, 0)
-    return float(np.einsum("fi,fi->", a, np.cross(b, c)) / 6.0)
+    scaled, exponent = unit_scale(vertices)
+    a, b, c = np.moveaxis((scaled - scaled.mean(axis=0))[faces], 1, 0)
+    return float(np.ldexp(np.einsum("fi,fi->", a, np.cross(b, c)) / 6.0, 3 * exponent))
 
 
 def surface_area(vertices: Points, faces: Faces) -> float:
     """Area of a surface [m²]."""
-    a, b, c = np.moveaxis(vertices[faces], 1, 0)
-    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2.0)
+    scaled, exponent = unit_scale(vertices)  # squares of squares overflow early
+    a, b, c = np.moveaxis(scaled[faces], 1, 0)
+    twice = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
+    return float(np.ldexp(twice / 2.0, 2 * exponent))

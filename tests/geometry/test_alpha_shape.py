@@ -1,0 +1,172 @@
+"""Alpha shapes against their definition, and against SciPy."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from softreach.geometry.alpha_shape import AlphaComplex
+from softreach.geometry.delaunay import delaunay
+from softreach.geometry.hull import convex_hull, enclosed_volume
+from tests.geometry.clouds import DEGENERATE, FLAT, arc_tips, random_points
+from tests.geometry.exact import rational
+
+
+@pytest.fixture(scope="module")
+def arm_shape() -> AlphaComplex:
+    return alpha_complex(arc_tips(3000))
+
+
+def alpha_complex(points: np.ndarray, method: str = "auto") -> AlphaComplex:
+    return AlphaComplex(triangulation=delaunay(points, method))
+
+
+def regions_by_scipy(shape: AlphaComplex, kept: np.ndarray) -> int:
+    """Connected components of the kept cells."""
+    t, i = np.nonzero(shape.triangulation.neighbors >= 0)
+    u = shape.triangulation.neighbors[t, i]
+    both = kept[t] & kept[u]
+    graph = coo_array((np.ones(both.sum()), (t[both], u[both])), shape=(len(kept), len(kept)))
+    _, labels = connected_components(graph, directed=False)
+    return len(np.unique(labels[kept]))
+
+
+def encloses_all_as_one(shape: AlphaComplex, alpha: float) -> bool:
+    """The definition of a radius at which one region covers every point."""
+    kept = shape.radii <= alpha
+    cells = shape.triangulation.tetrahedra
+    covered = len(np.unique(cells[kept])) == len(np.unique(cells))
+    return covered and regions_by_scipy(shape, kept) == 1
+
+
+def test_circumscribed_spheres_pass_through_their_corners(arm_shape):
+    """The center solves 2 (p_i - p_0) · x = |p_i|² - |p_0|²."""
+    corners = arm_shape.triangulation.points[arm_shape.triangulation.tetrahedra]
+    edges = corners[:, 1:] - corners[:, :1]
+    good = np.linalg.cond(edges) < 1e5
+    right = (edges[good] ** 2).sum(axis=2)[..., None] / 2.0
+    centers = np.linalg.solve(edges[good], right)[..., 0]
+    np.testing.assert_allclose(arm_shape.radii[good], np.linalg.norm(centers, axis=1), rtol=1e-8)
+    volumes = np.abs(np.linalg.det(edges)) / 6.0
+    np.testing.assert_allclose(arm_shape.volumes, volumes, rtol=1e-6, atol=1e-17)
+
+
+def test_radii_of_almost_flat_cells_keep_their_digits():
+    """A unit circle at z = 0 and a fourth point (x, y, h): the center is at height z."""
+    for h in 2.0 ** -np.arange(10, 60, 7):
+        points = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0.28, 0.96, h]])
+        x, y, h = rational(points[3])
+        z = (x * x + y * y + h * h - 1) / (2 * h)
+        shape = alpha_complex(points)
+        assert shape.radii == pytest.approx([np.sqrt(float(1 + z * z))], rel=1e-8)
+        assert shape.volumes == pytest.approx([float(h) / 3.0], rel=1e-14, abs=0)
+
+
+@pytest.mark.parametrize("alpha", [0.01, 0.03, 0.1, 0.3, np.inf])
+def test_volumes_and_regions_equal_those_of_scipy(alpha):
+    points = arc_tips(1500, seed=5)
+    ours, scipys = alpha_complex(points), alpha_complex(points, "qhull")
+    assert ours.volume(alpha) == pytest.approx(scipys.volume(alpha), rel=1e-9, abs=1e-15)
+    assert ours.regions(alpha) == scipys.regions(alpha)
+    assert ours.regions(alpha) == regions_by_scipy(ours, ours.radii <= alpha)
+    assert ours.hull(alpha).area == pytest.approx(scipys.hull(alpha).area, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["cube corners", "on a sphere", "moment curve", "five points"])
+def test_of_infinite_radius_it_is_the_convex_hull(name):
+    points = DEGENERATE[name]
+    hull, convex = alpha_complex(points).hull(np.inf), convex_hull(points)
+    assert hull.volume == pytest.approx(convex.volume, rel=1e-12)
+    assert hull.area == pytest.approx(convex.area, rel=1e-9)
+    assert hull.regions == 1
+    assert {*map(tuple, convex.vertices)} <= {*map(tuple, hull.vertices)}
+
+
+def test_of_a_random_cloud_of_infinite_radius_it_has_the_faces_of_the_convex_hull():
+    points = random_points(300)
+    hull, convex = alpha_complex(points).hull(np.inf), convex_hull(points)
+    ours, qhulls = ({frozenset(map(tuple, f)) for f in h.vertices[h.faces]} for h in (hull, convex))
+    assert ours == qhulls
+
+
+@given(st.floats(0.005, 2.0), st.integers(0, 20))
+def test_the_surface_encloses_the_volume_of_the_tetrahedra(alpha, seed):
+    hull = alpha_complex(arc_tips(400, seed)).hull(alpha)
+    enclosed = enclosed_volume(hull.vertices, hull.faces)
+    assert enclosed == pytest.approx(hull.volume, rel=1e-12, abs=1e-17)
+
+
+@given(st.floats(0.02, 2.0), st.integers(0, 20))
+def test_the_surface_is_closed_and_oriented(alpha, seed):
+    """Along every edge as many faces run one way as the other."""
+    faces = alpha_complex(arc_tips(400, seed)).hull(alpha).faces
+    runs = Counter((int(a), int(b)) for f in faces for a, b in zip(f, np.roll(f, -1), strict=True))
+    assert all(runs[b, a] == count for (a, b), count in runs.items())
+
+
+def test_volume_grows_with_the_radius(arm_shape):
+    radii, volumes = arm_shape.volume_curve()
+    assert (np.diff(radii) >= 0).all()
+    assert (np.diff(volumes) >= 0).all()
+    assert arm_shape.volume(0.0) == 0.0
+    assert volumes[-1] == pytest.approx(arm_shape.volumes.sum())
+
+
+def test_the_curve_passes_through_the_volume_of_every_hull(arm_shape):
+    alphas = np.geomspace(0.003, 3.0, 12)
+    hulls = [arm_shape.hull(alpha).volume for alpha in alphas]
+    np.testing.assert_allclose(arm_shape.volume(alphas), hulls, rtol=1e-12, atol=1e-17)
+
+
+def test_a_cell_belongs_to_the_shape_of_exactly_its_radius(arm_shape):
+    radius = np.median(arm_shape.radii)
+    below = np.nextafter(radius, 0.0)
+    step = arm_shape.volumes[arm_shape.radii == radius].sum()
+    assert arm_shape.volume(radius) - arm_shape.volume(below) == pytest.approx(step)
+
+
+@given(st.integers(5, 40), st.integers(0, 2**32 - 1))
+def test_the_critical_radius_is_the_smallest_of_all_that_will_do(n, seed):
+    shape = alpha_complex(random_points(n, seed))
+    suitable = [a for a in np.unique(shape.radii) if encloses_all_as_one(shape, a)]
+    assert shape.critical_alpha() == suitable[0]
+
+
+def test_just_below_the_critical_radius_something_is_missing(arm_shape):
+    critical = arm_shape.critical_alpha()
+    assert encloses_all_as_one(arm_shape, critical)
+    assert not encloses_all_as_one(arm_shape, np.nextafter(critical, 0.0))
+
+
+def test_the_number_of_regions_is_not_monotone(arm_shape):
+    """Which is why the critical radius is not searched by bisection."""
+    regions = np.array([arm_shape.regions(a) for a in np.geomspace(0.005, 1.0, 40)])
+    assert (np.diff(regions) > 0).any()
+    assert (np.diff(regions) < 0).any()
+
+
+@pytest.mark.parametrize("name", FLAT)
+def test_flat_clouds_have_no_volume_at_any_radius(name):
+    shape = alpha_complex(FLAT[name])
+    assert shape.volume(1.0) == 0.0
+    assert shape.volume(np.array([0.1, np.inf])).tolist() == [0.0, 0.0]
+    assert shape.critical_alpha() == np.inf
+    hull = shape.hull(np.inf)
+    assert (hull.volume, hull.area, hull.regions, len(hull.faces)) == (0.0, 0.0, 0, 0)
+
+
+@pytest.mark.parametrize("scale", [1e-80, 1e-3, 1e60])
+def test_scaling_the_cloud_scales_radii_areas_and_volumes(scale):
+    shape, scaled = alpha_complex(random_points(60)), alpha_complex(scale * random_points(60))
+    assert scaled.critical_alpha() == pytest.approx(
+        scale * shape.critical_alpha(), rel=1e-12, abs=0
+    )
+    small, large = shape.hull(0.4), scaled.hull(0.4 * scale)
+    assert large.volume == pytest.approx(scale**3 * small.volume, rel=1e-12, abs=0)
+    assert large.area == pytest.approx(scale**2 * small.area, rel=1e-12, abs=0)

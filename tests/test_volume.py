@@ -1,0 +1,125 @@
+"""The public hulls: what they state, what they warn of, what they refuse."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from softreach.errors import InvalidInput, SoftreachWarning
+from softreach.volume import concave_hull, convex_hull, unreachability, volume_curve
+from tests.geometry.clouds import FLAT, arc_tips, random_points
+
+BALL = 4.0 / 3.0 * np.pi
+
+
+@pytest.fixture(scope="module")
+def tips() -> xr.DataArray:
+    """A labelled cloud of an arm of one meter."""
+    return xr.DataArray(arc_tips(4000), dims=("sample", "axis"), attrs={"length": 1.0})
+
+
+def in_ball(n: int, seed: int = 0) -> np.ndarray:
+    """Uniform in the unit ball."""
+    rng = np.random.default_rng(seed)
+    x = rng.normal(size=(n, 3))
+    return x / np.linalg.norm(x, axis=1, keepdims=True) * np.cbrt(rng.random((n, 1)))
+
+
+def test_a_hollow_ball_keeps_its_hollow():
+    points = in_ball(20_000)
+    shell = points[np.linalg.norm(points, axis=1) > 0.7]
+    hull = concave_hull(shell, alpha=0.3, bias=True)
+    assert hull.volume_corrected == pytest.approx(BALL * (1 - 0.7**3), rel=0.03)
+    assert unreachability(shell, alpha=0.3) == pytest.approx(0.7**3, abs=0.03)
+
+
+def test_the_corrected_volume_is_nearer_to_the_truth():
+    hull = concave_hull(in_ball(20_000), alpha=0.3, bias=True)
+    assert hull.volume_corrected is not None
+    assert abs(hull.volume_corrected - BALL) < 0.5 * abs(hull.volume - BALL)
+    assert hull.bias == pytest.approx(hull.volume - hull.volume_corrected)
+    assert hull.bias < 0
+
+
+def test_the_hull_states_what_it_was_made_of():
+    hull = concave_hull(in_ball(3000), alpha=0.5)
+    assert (hull.n, hull.alpha, hull.regions) == (3000, 0.5, 1)
+    assert hull.spacing == pytest.approx((hull.volume / 3000) ** (1 / 3))
+    assert hull.volume_corrected is None
+    assert hull.bias is None
+
+
+def test_labelled_tips_have_a_default_radius_of_a_twentieth_of_the_length(tips):
+    labelled, plain = concave_hull(tips), concave_hull(tips.values, alpha=0.05)
+    assert labelled.alpha == 0.05
+    assert labelled.volume == plain.volume
+
+
+def test_labelled_tips_may_have_their_axes_in_either_order(tips):
+    assert concave_hull(tips.T, 0.2).volume == concave_hull(tips, 0.2).volume
+
+
+def test_points_without_a_length_need_a_radius():
+    with pytest.raises(InvalidInput, match=r"alpha = None: must be a radius \[m\].*length"):
+        concave_hull(random_points(10))
+
+
+@pytest.mark.parametrize("alpha", [0.0, -1.0, np.nan, "optimal"])
+def test_other_radii_are_refused(alpha):
+    with pytest.raises(InvalidInput, match="a radius > 0"):
+        concave_hull(random_points(10), alpha)
+
+
+def test_the_critical_radius_leaves_one_region_around_all_points(tips):
+    hull = concave_hull(tips, "critical")
+    assert hull.regions == 1
+    assert len(np.unique(hull.vertices, axis=0)) == len(hull.vertices)
+
+
+def test_a_radius_below_three_spacings_warns_with_both_numbers():
+    points = random_points(1000)
+    with pytest.warns(SoftreachWarning, match=r"alpha = 0.15 m is 1.\d+ mean spacings.*0.09"):
+        concave_hull(points, alpha=0.15)
+
+
+def test_the_curve_equals_the_hulls(tips):
+    alphas = np.array([[0.2, 0.3], [0.5, np.inf]])
+    curve = volume_curve(tips, alphas)
+    hulls = [concave_hull(tips, a).volume for a in alphas.flat]
+    np.testing.assert_allclose(curve.ravel(), hulls, rtol=1e-12)
+
+
+def test_unreachability_is_what_the_concave_hull_lacks_of_the_convex_one(tips):
+    ratio = concave_hull(tips, 0.2).volume / convex_hull(tips).volume
+    assert unreachability(tips, 0.2) == pytest.approx(1 - ratio, rel=1e-9)
+    assert unreachability(tips, np.inf) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_both_methods_agree(tips):
+    ours, qhulls = (concave_hull(tips, 0.2, method=method) for method in ("numba", "qhull"))
+    assert ours.volume == pytest.approx(qhulls.volume, rel=1e-9)
+    assert len(ours.faces) == len(qhulls.faces)
+
+
+@pytest.mark.parametrize("name", FLAT)
+def test_flat_clouds_have_volume_zero_and_no_faces(name):
+    for hull in (
+        concave_hull(FLAT[name], 0.5, bias=True),
+        concave_hull(FLAT[name], "critical"),
+        convex_hull(FLAT[name]),
+    ):
+        assert hull.volume == hull.area == hull.spacing == 0.0
+        assert hull.faces.shape == hull.vertices.shape == (0, 3)
+    with pytest.raises(InvalidInput, match="a cloud of volume 0"):
+        unreachability(FLAT[name], 0.5)
+
+
+@pytest.mark.parametrize("function", [concave_hull, unreachability, volume_curve])
+def test_rows_that_are_not_finite_are_refused(function):
+    points = random_points(30)
+    points[7, 2] = np.nan
+    with pytest.raises(InvalidInput, match="1 rows with NaN or infinity, the first at index 7"):
+        function(points, np.array(0.5) if function is volume_curve else 0.5)
+    with pytest.raises(InvalidInput, match="index 7"):
+        convex_hull(points)
