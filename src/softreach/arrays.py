@@ -6,7 +6,13 @@ import numpy as np
 from jaxtyping import Float, Int
 
 __all__ = [
-    "Activations", "Faces", "Jacobians", "PerStation", "Points", "StationMap", "StationVectors",
+    "Activations",
+    "Faces",
+    "Jacobians",
+    "PerStation",
+    "Points",
+    "StationMap",
+    "StationVectors",
 ]
 
 Points = Float[np.ndarray, "point 3"]

@@ -121,7 +121,9 @@ def _fill(
         for cube in cube_blocks(sampler, len(tip), arm.bundles, seed, BLOCK):
             block = slice(first, first := first + len(cube))
             np.add(low, np.multiply(cube, width, out=cube), out=activation[block])
-            yield partial(_reported, tip_task(arm, tol, activation[block], tip[block]), report, len(cube))
+            yield partial(
+                _reported, tip_task(arm, tol, activation[block], tip[block]), report, len(cube)
+            )
 
     parallel.run(tasks())
 
@@ -131,7 +133,7 @@ def _reported(task: Callable[[], object], report: progress.Progress, count: int)
     report(count)
 
 
-def _no_bar():  # noqa: ANN202
+def _no_bar():
     from contextlib import nullcontext
 
     return nullcontext(progress.silent)

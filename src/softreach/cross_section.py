@@ -53,11 +53,13 @@ def section_integrals(
     helix = 1.0 + (x * np.tan(alpha)) ** 2
     k = (1.0 + nu) / (cone * helix) - nu
     t = x * np.tan(alpha) / (helix * np.sqrt(cone))
-    return SectionIntegrals(*(np.sum(half * _WEIGHTS * f, axis=-1) for f in (x * k, x**2 * k, x**2 * t)))
+    return SectionIntegrals(
+        *(np.sum(half * _WEIGHTS * f, axis=-1) for f in (x * k, x**2 * k, x**2 * t))
+    )
 
 
 def extension_per_activation(axial: ArrayLike, extent: ArrayLike) -> NDArray[np.float64]:
-    """z = I0 σ/π of one bundle [-]: ring and core of one modulus (section 2, extension).
+    """Z = I0 σ/π of one bundle [-]: ring and core of one modulus (section 2, extension).
 
     Args:
         axial: I0 [-].

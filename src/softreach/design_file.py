@@ -172,8 +172,12 @@ def _physics_faults(document: Mapping[str, Any], blamed: set[str]) -> Iterator[F
         prefix = f"fibers[{k}]."
         if not isinstance(table, dict):
             continue
-        known = {key: table.get(key, field.default) for key, field in _FiberTable.model_fields.items()}
-        sound_keys = {_field(key): _si(key, v) for key, v in known.items() if prefix + key not in blamed}
+        known = {
+            key: table.get(key, field.default) for key, field in _FiberTable.model_fields.items()
+        }
+        sound_keys = {
+            _field(key): _si(key, v) for key, v in known.items() if prefix + key not in blamed
+        }
         yield from (_in_file_terms(fault, prefix) for fault in fiber_faults(sound_keys))
 
 
@@ -215,7 +219,8 @@ def _radians(text: str) -> float:
 
     Floating-point degrees miss one angle in ten by a unit in the last place; twenty digits do not.
     """
-    if len(text.lstrip("-0.").replace(".", "")) < _LONG or not math.isfinite(float(text)):
+    digits = text.lower().partition("e")[0].lstrip("+-0.").replace(".", "")
+    if len(digits) < _LONG or not math.isfinite(float(text)):
         return math.radians(float(text))
     return float(Decimal(text) * _PI / 180)
 
@@ -223,8 +228,9 @@ def _radians(text: str) -> float:
 def _degrees_text(angle: float) -> str:
     """The shortest number of degrees that converts to exactly this angle."""
     degrees = Decimal(angle) * 180 / _PI
-    texts = (f"{degrees:.{digits}f}" for digits in range(1, 40))
-    return next((text for text in texts if _radians(text) == angle), repr(math.degrees(angle)))
+    texts = (f"{degrees:.{digits}g}" for digits in range(1, 26))
+    text = next((text for text in texts if _radians(text) == angle), repr(math.degrees(angle)))
+    return text if "." in text or "e" in text else f"{text}.0"
 
 
 def _in_file_terms(fault: Fault, prefix: str) -> Fault:

@@ -32,8 +32,12 @@ def minimal_trunk(
         radius_ratio: R1/R2 [-].
     """
     helices = (
-        FiberArchitecture(name="left", revolution=-revolution, offset=math.radians(66), extent=_EXTENT),
-        FiberArchitecture(name="right", revolution=revolution, offset=math.radians(114), extent=_EXTENT),
+        FiberArchitecture(
+            name="left", revolution=-revolution, offset=math.radians(66), extent=_EXTENT
+        ),
+        FiberArchitecture(
+            name="right", revolution=revolution, offset=math.radians(114), extent=_EXTENT
+        ),
     )
     return _trunk((*helices, _longitudinal(270)), taper, length, radius_ratio)
 

@@ -112,4 +112,3 @@ class MissingExtra(SoftreachError, ImportError):
 
 class SoftreachWarning(UserWarning):
     """A result that can be used, with a limit that its reader should know."""
-

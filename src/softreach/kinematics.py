@@ -144,5 +144,3 @@ def _checked_stations(arm: Manipulator, stations: int | ArrayLike) -> Array:
     if not inside or z[0] < 0 or z[-1] > arm.length or (np.diff(z) < 0).any():
         raise InvalidInput("stations", stations, f"ascending Z within [0, {arm.length:g}] m")
     return z
-
-

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach import cross_section, taper
 from softreach.errors import Fault, InvalidDesign, InvalidInput, Range
-from softreach.fiber import FiberArchitecture, fiber_faults, plain_number, range_faults
+from softreach.fiber import FiberArchitecture, plain_number, range_faults
 
 __all__ = ["Manipulator", "manipulator_faults"]
 
@@ -179,10 +179,11 @@ def manipulator_faults(values: Mapping[str, Any]) -> list[Fault]:
     blamed = {fault.path for fault in faults}
     sound = {name: values[name] for name in values if name not in blamed}
     faults += _radius_faults(**{name: plain_number(sound.get(name)) for name in _RANGES})
-    if "fibers" in sound:
-        faults += _fibers_faults(sound["fibers"])
+    fiber_trouble = _fibers_faults(sound["fibers"]) if "fibers" in sound else []
+    faults += fiber_trouble
     if "activation_bounds" in sound:
-        faults += _bounds_faults(sound["activation_bounds"], sound.get("fibers"))
+        fibers = None if fiber_trouble else sound.get("fibers")
+        faults += _bounds_faults(sound["activation_bounds"], fibers)
     return faults
 
 
@@ -194,7 +195,9 @@ def _radius_faults(
     **_: object,
 ) -> Iterator[Fault]:
     if outer_radius is not None and inner_radius is not None and inner_radius >= outer_radius:
-        yield Fault("inner_radius", inner_radius, f"must be below outer_radius = {outer_radius:g} m")
+        yield Fault(
+            "inner_radius", inner_radius, f"must be below outer_radius = {outer_radius:g} m"
+        )
     if length is None or outer_radius is None or taper is None:
         return
     tip = outer_radius - length * math.tan(taper)

@@ -104,7 +104,11 @@ def _overlap(arm: Manipulator, first: int, second: int) -> tuple[float, float]:
     if abs(end - start) < 1e-12:
         apart = abs(_wrapped(start))
         return extent - apart, 0.0
-    turns = 2 * np.pi * np.arange(np.floor(min(start, end) / (2 * np.pi)), max(start, end) / (2 * np.pi) + 2)
+    turns = (
+        2
+        * np.pi
+        * np.arange(np.floor(min(start, end) / (2 * np.pi)), max(start, end) / (2 * np.pi) + 2)
+    )
     nearest = np.clip(turns, min(start, end), max(start, end))
     depth = float((extent - np.abs(nearest - turns)).max())
     return depth, _first_contact(arm, start, end, extent)
@@ -117,7 +121,11 @@ def _first_contact(arm: Manipulator, start: float, end: float, extent: float) ->
         return 0.0
     toward = np.sign(end - start)
     travel = (2 * np.pi - toward * gap) % (2 * np.pi) - extent
-    s = taper.slender_coordinate(arm.length, arm.outer_radius, arm.taper) * travel / abs(end - start)
+    s = (
+        taper.slender_coordinate(arm.length, arm.outer_radius, arm.taper)
+        * travel
+        / abs(end - start)
+    )
     return float(np.clip(taper.station_of(s, arm.outer_radius, arm.taper), 0.0, arm.length))
 
 

@@ -94,7 +94,7 @@ def _sobol(n: int, dim: int, seed: int) -> Draw:
     return lambda first, count: _quiet_random(sequence, count)
 
 
-def _quiet_random(sequence, count: int) -> Array:  # noqa: ANN001
+def _quiet_random(sequence, count: int) -> Array:
     import warnings
 
     with warnings.catch_warnings():

@@ -7,10 +7,12 @@ finite numbers: callers check. The predicates of the triangulation must not use 
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from typing import Any
 
 from numba import njit
+from numba.core import event
 
 __all__ = ["FAST", "inline", "kernel"]
 
@@ -25,3 +27,22 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 def inline(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a small function into its callers; a call left in a loop stops vectorisation."""
     return njit(forceinline=True, nogil=True, fastmath=FAST, error_model="numpy")(function)
+
+
+class _FirstRun(event.Listener):
+    """Says once that kernels are being compiled, so that a first run is not taken for a hang."""
+
+    def __init__(self) -> None:
+        self.said = False
+
+    def on_start(self, event: event.Event) -> None:
+        function = getattr(event.data.get("dispatcher"), "py_func", None)
+        if not self.said and getattr(function, "__module__", "").startswith("softreach"):
+            self.said = True
+            sys.stderr.write("softreach: compiling kernels (first run only, then cached on disk)\n")
+
+    def on_end(self, event: event.Event) -> None:
+        pass
+
+
+event.register("numba:compile", _FirstRun())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.magnus import exponent
-from softreach.kernels.twist import act, add, cross, exp_coefficients
+from softreach.kernels.twist import act, cross, exp_coefficients
 
 __all__ = ["frames"]
 
@@ -66,7 +66,7 @@ def frames(table, ends, gamma, position, directors):
 
 @inline
 def _moved(r, d1, d2, d3, step):
-    """r + step, the step given in the directors."""
+    """R + step, the step given in the directors."""
     return (
         r[0] + d1[0] * step[0] + d2[0] * step[1] + d3[0] * step[2],
         r[1] + d1[1] * step[0] + d2[1] * step[1] + d3[1] * step[2],

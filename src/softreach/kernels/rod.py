@@ -58,7 +58,14 @@ def node_values(work, lanes, table, k):
         values = work[row * LANES : (row + 1) * LANES]
         values[:] = table[k, row, -1]
         for j in range(0, lanes.shape[0], _GROUP):
-            _add_group(values, lanes[j], lanes[j + 1], lanes[j + 2], lanes[j + 3], table[k, row, j : j + _GROUP])
+            _add_group(
+                values,
+                lanes[j],
+                lanes[j + 1],
+                lanes[j + 2],
+                lanes[j + 3],
+                table[k, row, j : j + _GROUP],
+            )
 
 
 @kernel

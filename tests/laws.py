@@ -1,0 +1,80 @@
+"""Designs and oracles that the laws are tested with."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from softreach.actuation import actuation
+from softreach.fiber import FiberArchitecture
+from softreach.manipulator import Manipulator
+
+Array = NDArray[np.float64]
+
+
+def arm_of(*fibers: FiberArchitecture, **changes: object) -> Manipulator:
+    """An arm of the paper's proportions with fibers of one's own."""
+    fields = {
+        "length": 1.0,
+        "outer_radius": 1 / 16,
+        "inner_radius": 3 / 64,
+        "fibers": fibers,
+        "activation_bounds": (-1.0, 0.0),
+    }
+    return Manipulator(**(fields | changes))
+
+
+def single(revolution: float = 0.0, **changes: object) -> Manipulator:
+    """One bundle of 48 degrees."""
+    fiber = FiberArchitecture(revolution=revolution, offset=0.7, extent=np.radians(48))
+    return arm_of(fiber, **changes)
+
+
+@st.composite
+def arms(draw: st.DrawFn) -> Manipulator:
+    """Any arm with one to three architectures of one to three narrow bundles."""
+    number = st.floats
+    fibers = tuple(
+        FiberArchitecture(
+            revolution=draw(number(-3, 3)),
+            offset=draw(number(-7, 7)),
+            extent=draw(number(0.05, 0.6)),
+            bundles=draw(st.integers(1, 3)),
+        )
+        for _ in range(draw(st.integers(1, 3)))
+    )
+    length = draw(number(0.05, 20))
+    radius = length * draw(number(0.03, 0.1))
+    steepest = np.arctan(0.8 * radius / length)
+    return Manipulator(
+        length=length,
+        outer_radius=radius,
+        inner_radius=radius * draw(number(0, 0.95)),
+        taper=draw(number(-0.1, 1)) * steepest,
+        poisson_ratio=draw(number(0, 0.5)),
+        fibers=fibers,
+        activation_bounds=(-draw(number(0, 0.8)), draw(number(0, 0.3))),
+    )
+
+
+def integrated_tip(arm: Manipulator, gamma: Array) -> Array:
+    """The tip by SciPy's eighth-order integrator on the rod's own equations (section 2)."""
+
+    def rhs(z: float, state: Array) -> Array:
+        table = actuation(arm, [z])
+        directors = state[3:].reshape(3, 3)  # rows d1, d2, d3
+        zeta = 1.0 + table.extension[0] @ gamma
+        u = (table.curvature[0] @ gamma) @ directors
+        return np.concatenate([zeta * directors[2], (zeta * np.cross(u, directors)).ravel()])
+
+    start = np.concatenate([np.zeros(3), np.eye(3).ravel()])
+    span = (0.0, arm.length)
+    return solve_ivp(rhs, span, start, method="DOP853", rtol=1e-12, atol=1e-13).y[:3, -1]
+
+
+def in_box(arm: Manipulator, n: int, seed: int = 1) -> Array:
+    """Random activations within the bounds."""
+    cube = np.random.default_rng(seed).random((n, arm.bundles))
+    return arm.bounds[:, 0] + cube * np.diff(arm.bounds, axis=1)[:, 0]

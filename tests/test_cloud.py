@@ -1,0 +1,111 @@
+"""Clouds: the same for the same arguments, complete, and whole on disk or not there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import softreach as sr
+from softreach import designs
+from softreach.errors import InvalidInput
+
+
+@pytest.fixture(scope="module")
+def cloud(trunk):
+    return sr.compute_cloud(trunk, n=40_000, seed=3)
+
+
+def test_the_tips_are_those_of_the_activations(cloud, trunk):
+    np.testing.assert_array_equal(cloud.tip, sr.tip_positions(trunk, cloud.activation.values))
+
+
+def test_the_activations_fill_the_box(cloud, trunk):
+    gamma = cloud.activation.values
+    width = np.ptp(trunk.bounds, axis=1)
+    assert (gamma >= trunk.bounds[:, 0]).all()
+    assert (gamma <= trunk.bounds[:, 1]).all()
+    assert (np.ptp(gamma, axis=0) > 0.999 * width).all()
+
+
+@pytest.mark.parametrize("sampler", ["uniform", "boundary", "sobol", "grid"])
+def test_a_cloud_depends_on_its_arguments_alone(trunk, sampler, monkeypatch):
+    first = sr.compute_cloud(trunk, n=32**3, seed=1, sampler=sampler)
+    monkeypatch.setenv("SOFTREACH_NUM_THREADS", "1")
+    monkeypatch.setattr("softreach.cloud.BLOCK", 1_000)
+    assert sr.compute_cloud(trunk, n=32**3, seed=1, sampler=sampler).identical(first)
+
+
+def test_a_cloud_knows_where_it_comes_from(cloud, trunk):
+    assert sr.design_of(cloud) == trunk
+    assert {k: cloud.attrs[k] for k in ("seed", "sampler", "tol")} == {
+        "seed": 3,
+        "sampler": "uniform",
+        "tol": 1e-6,
+    }
+    assert cloud.tip.attrs["units"] == "m"
+    assert cloud.tip.attrs["length"] == trunk.length
+    assert list(cloud.fiber.values) == ["left", "right", "longitudinal"]
+    again = sr.compute_cloud(sr.design_of(cloud), n=40_000, seed=cloud.attrs["seed"])
+    assert again.identical(cloud)
+
+
+def test_a_cloud_survives_the_disk(cloud, tmp_path):
+    path = tmp_path / "cloud.zarr"
+    sr.save_cloud(cloud, path)
+    sr.save_cloud(cloud, path)  # over an older one
+    assert sr.open_cloud(path).identical(cloud)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_an_interrupted_save_leaves_the_old_cloud(cloud, tmp_path, monkeypatch):
+    path = tmp_path / "cloud.zarr"
+    sr.save_cloud(cloud, path)
+
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("xarray.Dataset.to_zarr", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        sr.save_cloud(cloud, path)
+    assert list(tmp_path.iterdir()) == [path]
+    assert sr.open_cloud(path).identical(cloud)
+
+
+def test_an_interrupted_computation_ends(trunk):
+    def interrupted(_: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        sr.compute_cloud(trunk, n=200_000, report=interrupted)
+
+
+def test_progress_adds_up(trunk):
+    done = []
+    sr.compute_cloud(trunk, n=50_001, report=done.append)
+    assert sum(done) == 50_001
+
+
+def test_what_is_no_cloud_is_refused(cloud, tmp_path):
+    with pytest.raises(InvalidInput, match="a Zarr store"):
+        sr.open_cloud(tmp_path / "nothing.zarr")
+    with pytest.raises(InvalidInput, match=r"cloud.activation = missing"):
+        sr.save_cloud(cloud.drop_vars("activation"), tmp_path / "x.zarr")
+    old = cloud.copy()
+    old.attrs["schema_version"] = 0
+    with pytest.raises(InvalidInput, match="schema_version"):
+        sr.save_cloud(old, tmp_path / "x.zarr")
+
+
+@pytest.mark.parametrize("n", [0, -5, 2.5, True, "10"])
+def test_a_count_that_is_no_count_is_refused(trunk, n):
+    with pytest.raises(InvalidInput, match=f"n = {n}: must be a whole number, 1 or more"):
+        sr.compute_cloud(trunk, n=n)
+
+
+@pytest.mark.parametrize("bundles", [1, 2, 4])
+def test_any_number_of_bundles_makes_a_cloud(bundles):
+    arm = designs.minimal_trunk()
+    fiber = arm.fibers[0].replace(bundles=bundles)
+    cloud = sr.compute_cloud(arm.replace(fibers=(fiber,)), n=500)
+    assert cloud.activation.shape == (500, bundles)
+    assert np.isfinite(cloud.tip).all()
