@@ -1,0 +1,47 @@
+"""An arm for other programs: its body and every bundle as closed surfaces with names and colors."""
+
+from __future__ import annotations
+
+from os import PathLike
+from typing import TYPE_CHECKING
+
+from softreach.arm_shape import arm_mesh, band_mesh
+from softreach.export.surface import Part, write_parts
+from softreach.palette import bundle_color
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from softreach.manipulator import Manipulator
+
+__all__ = ["export_arm"]
+
+
+def export_arm(
+    arm: Manipulator, configuration: xr.Dataset, path: str | PathLike[str], *, sides: int = 64
+) -> None:
+    """Write a deformed arm as .ply, .stl, .obj, .glb, .vtu or .vtk, chosen by the suffix.
+
+    The body is a closed tube; each bundle is a closed skin as wide as its extent, half sunk into
+    the body's surface. Parts are called ``body`` and by the names of the bundles.
+
+    Args:
+        arm: The design.
+        configuration: One configuration of that arm [m].
+        path: The file; it is replaced only when the new one is complete.
+        sides: Corners of each section of the body.
+
+    Raises:
+        InvalidInput: Unknown suffix, or several configurations.
+        MissingExtra: The format needs a library that is not installed.
+    """
+    parts = [Part("body", *arm_mesh(configuration, sides))]
+    for index, mesh in enumerate(band_mesh(arm, configuration)):
+        parts.append(Part(_part_name(arm.bundle_names, index), *mesh, bundle_color(index)))
+    write_parts(parts, path)
+
+
+def _part_name(names: tuple[str, ...], index: int) -> str:
+    """The bundle's name, with its number where another part has that name."""
+    taken = ("body", *names[:index])
+    return names[index] if names[index] not in taken else f"{names[index]} ({index + 1})"

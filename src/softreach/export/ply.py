@@ -1,0 +1,58 @@
+"""Binary PLY of points with any number of columns (Turk's Stanford polygon format, version 1.0)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["write_points"]
+
+_TYPES = {"f8": "double", "f4": "float", "u1": "uchar"}
+
+
+def write_points(
+    path: Path,
+    count: int,
+    blocks: Iterable[Mapping[str, NDArray[np.generic]]],
+    description: Mapping[str, object],
+) -> None:
+    """Write blocks of equally named columns as one `vertex` element.
+
+    Args:
+        path: Where to.
+        count: Rows of all blocks together.
+        blocks: Columns of float64, float32 or uint8, by name.
+        description: Goes into the header, one comment per line of text.
+    """
+    with path.open("wb") as file:
+        for number, block in enumerate(blocks):
+            rows = _records(block)
+            if number == 0:
+                file.write(_header(count, rows.dtype, description))
+            rows.tofile(file)
+
+
+def _records(columns: Mapping[str, NDArray[np.generic]]) -> NDArray[np.void]:
+    fields = [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()]
+    rows = np.zeros(len(next(iter(columns.values()))), fields)
+    for name, values in columns.items():
+        rows[name] = values
+    return rows
+
+
+def _header(count: int, fields: np.dtype[np.void], description: Mapping[str, object]) -> bytes:
+    lines = ["ply", "format binary_little_endian 1.0"]
+    for key, value in description.items():
+        lines += [f"comment {key}: {_ascii(line)}" for line in str(value).splitlines()]
+    lines.append(f"element vertex {count}")
+    for name in fields.names or ():
+        lines.append(f"property {_TYPES[fields[name].str[1:]]} {name}")
+    return "\n".join([*lines, "end_header", ""]).encode("ascii")
+
+
+def _ascii(text: str) -> str:
+    r"""A PLY header is ASCII; a TOML string means the same with its letters as \\uXXXX."""
+    return "".join(c if c.isascii() else f"\\u{ord(c):04x}" for c in text if c.isprintable())

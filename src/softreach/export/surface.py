@@ -1,0 +1,158 @@
+"""Surfaces for other programs: parts with a name and a color, in the formats that have them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.errors import InvalidInput
+from softreach.export.formats import load_library, write_by_suffix
+from softreach.palette import BODY, Color
+
+__all__ = ["Part", "SurfaceMesh", "export_mesh", "write_parts"]
+
+_Z_UP_TO_Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
+
+
+class SurfaceMesh(Protocol):
+    """Anything with vertices and triangles: a Hull, a trimesh.Trimesh."""
+
+    @property
+    def vertices(self) -> ArrayLike:
+        """[m], shape (v, 3)."""
+        ...
+
+    @property
+    def faces(self) -> ArrayLike:
+        """Indices into the vertices, shape (f, 3)."""
+        ...
+
+
+class Part(NamedTuple):
+    """One surface of a scene."""
+
+    name: str
+    vertices: NDArray[np.float64]
+    """[m], shape (v, 3)."""
+    faces: NDArray[np.int64]
+    """Shape (f, 3)."""
+    color: Color = BODY
+
+
+def export_mesh(
+    mesh_or_hull: SurfaceMesh | tuple[ArrayLike, ArrayLike], path: str | PathLike[str]
+) -> None:
+    """Write a triangle mesh as .ply, .stl, .obj, .glb, .vtu or .vtk, chosen by the suffix.
+
+    Lengths are in meters. STL and GLB keep single precision. glTF has y up: a GLB holds our
+    coordinates under one node that turns z up into y up.
+
+    Args:
+        mesh_or_hull: An object with vertices [m] and faces, or the pair of them.
+        path: The file; it is replaced only when the new one is complete.
+
+    Raises:
+        InvalidInput: Unknown suffix, or no triangles to write.
+        MissingExtra: The format needs a library that is not installed.
+    """
+    pair = mesh_or_hull
+    if not isinstance(pair, tuple):
+        pair = (pair.vertices, pair.faces)
+    vertices, faces = np.asarray(pair[0], float), np.asarray(pair[1], np.int64)
+    if not len(faces):
+        raise InvalidInput("mesh.faces", "none", "one triangle at least")
+    write_parts([Part("surface", vertices, faces)], path)
+
+
+def write_parts(parts: Sequence[Part], path: str | PathLike[str]) -> None:
+    """Write surfaces that belong together.
+
+    Names survive in OBJ (objects), GLB (nodes) and VTK (a number per triangle, in order); colors in
+    PLY, OBJ and GLB.
+
+    Raises:
+        InvalidInput: Unknown suffix.
+        MissingExtra: The format needs a library that is not installed.
+    """
+    write_by_suffix(path, _WRITERS, parts)
+
+
+def _write_joined(parts: Sequence[Part], path: Path) -> None:
+    trimesh = load_library("trimesh")
+    joined = trimesh.util.concatenate([_colored(part) for part in parts])
+    joined.export(path)
+
+
+def _write_obj(parts: Sequence[Part], path: Path) -> None:
+    trimesh = load_library("trimesh")
+    scene = trimesh.Scene([_colored(part) for part in parts])
+    # exact enough for an arm of a millimeter; a name of ours, not an address, in the first line
+    options = {"include_normals": False, "digits": 12, "header": "softreach, lengths in m"}
+    path.write_text(trimesh.exchange.obj.export_obj(scene, **options), encoding="utf-8")
+
+
+def _write_glb(parts: Sequence[Part], path: Path) -> None:
+    trimesh = load_library("trimesh")
+    scene = trimesh.Scene(base_frame="world")
+    # as a node and not in the numbers, so that a reader gets back the vertices we have
+    scene.graph.update(frame_to="z_up", frame_from="world", matrix=_Z_UP_TO_Y_UP)
+    for part in parts:
+        names = {"node_name": part.name, "geom_name": part.name}
+        scene.add_geometry(_shiny(part), parent_node_name="z_up", **names)
+    path.write_bytes(scene.export(file_type="glb"))
+
+
+def _write_vtk(parts: Sequence[Part], path: Path) -> None:
+    meshio = load_library("meshio")
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
+    number = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])
+    mesh = meshio.Mesh(
+        np.concatenate([part.vertices for part in parts]),
+        [("triangle", np.concatenate(faces))],
+        cell_data={"part": [number]},
+    )
+    meshio.write(path, mesh)
+
+
+def _colored(part: Part) -> Any:
+    trimesh = load_library("trimesh")
+    rgba = np.append(np.rint(255 * np.array(part.color)), 255).astype(np.uint8)
+    colors = np.tile(rgba, (len(part.vertices), 1))
+    return trimesh.Trimesh(
+        part.vertices,
+        part.faces,
+        vertex_colors=colors,
+        metadata={"name": part.name},
+        process=False,
+    )
+
+
+def _shiny(part: Part) -> Any:
+    trimesh = load_library("trimesh")
+    visual = load_library("trimesh.visual")
+    material = visual.material.PBRMaterial(
+        name=part.name,
+        baseColorFactor=[*part.color, 1.0],
+        metallicFactor=0.0,
+        roughnessFactor=0.6,
+        doubleSided=True,
+    )
+    return trimesh.Trimesh(
+        part.vertices, part.faces, visual=visual.TextureVisuals(material=material), process=False
+    )
+
+
+_WRITERS = {
+    ".ply": _write_joined,
+    ".stl": _write_joined,
+    ".obj": _write_obj,
+    ".glb": _write_glb,
+    ".vtu": _write_vtk,
+    ".vtk": _write_vtk,
+}

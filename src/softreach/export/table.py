@@ -1,0 +1,104 @@
+"""A cloud as a table: x, y, z and one activation column per bundle, with what describes it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.errors import InvalidInput
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["CloudTable", "cloud_table", "column_names"]
+
+Array = NDArray[np.float64]
+
+_BLOCK = 1 << 18
+
+
+class CloudTable(NamedTuple):
+    """Tips and activations as plain arrays."""
+
+    tip: Array
+    """[m], shape (sample, 3)."""
+    activation: Array
+    """γ [-], shape (sample, fiber)."""
+    fibers: tuple[str, ...]
+    """Names of the bundles as the cloud has them."""
+    metadata: dict[str, str | int | float]
+    """Design (TOML), seed, tolerance, versions and units."""
+
+    @property
+    def gammas(self) -> list[str]:
+        """Names of the activation columns."""
+        return column_names(self.fibers)
+
+    def columns(self, rows: slice = slice(None)) -> dict[str, Array]:
+        """Contiguous columns by name: x, y, z, then the activations."""
+        arrays = [*self.tip[rows].T, *self.activation[rows].T]
+        names = ["x", "y", "z", *self.gammas]
+        return {name: np.ascontiguousarray(a) for name, a in zip(names, arrays, strict=True)}
+
+    def blocks(self) -> Iterator[dict[str, Array]]:
+        """The columns, a bounded number of rows at a time."""
+        for start in range(0, len(self.tip), _BLOCK) or [0]:
+            yield self.columns(slice(start, start + _BLOCK))
+
+
+def cloud_table(cloud: xr.Dataset) -> CloudTable:
+    """The arrays and the description of a cloud.
+
+    Args:
+        cloud: tip(sample, axis) [m] and activation(sample, fiber) [-].
+
+    Raises:
+        InvalidInput: The dataset is not a cloud.
+    """
+    missing = {"tip", "activation"} - set(map(str, cloud.data_vars))
+    if missing:
+        found = ", ".join(map(str, cloud.data_vars)) or "nothing"
+        raise InvalidInput("cloud", found, "a dataset with tip and activation")
+    tip, activation = cloud["tip"], cloud["activation"]
+    return CloudTable(
+        tip.transpose("sample", "axis").values.astype(float, copy=False),
+        activation.transpose("sample", "fiber").values.astype(float, copy=False),
+        _fiber_names(activation),
+        _metadata(cloud),
+    )
+
+
+def column_names(fibers: Sequence[str]) -> list[str]:
+    """Column names that every format and language can hold, all different.
+
+    >>> column_names(["left", "fiber 1 2", "left"])
+    ['gamma_left', 'gamma_fiber_1_2', 'gamma_left_2']
+    """
+    names: list[str] = []
+    for k, fiber in enumerate(fibers):
+        safe = re.sub(r"[^0-9A-Za-z]+", "_", fiber).strip("_") or str(k + 1)
+        name = f"gamma_{safe}"
+        names.append(name if name not in names else f"{name}_{k}")
+    return names
+
+
+def _fiber_names(activation: xr.DataArray) -> tuple[str, ...]:
+    if "fiber" in activation.coords:
+        return tuple(map(str, activation["fiber"].values))
+    return tuple(str(k + 1) for k in range(activation.sizes["fiber"]))
+
+
+def _metadata(cloud: xr.Dataset) -> dict[str, str | int | float]:
+    units = {"tip_units": cloud["tip"].attrs.get("units", "m"), "activation_units": "1"}
+    length = cloud["tip"].attrs.get("length")
+    known = cloud.attrs | units | ({} if length is None else {"length_m": length})
+    return {str(key): _plain(value) for key, value in known.items()}
+
+
+def _plain(value: Any) -> str | int | float:
+    value = value.item() if isinstance(value, np.generic) else value
+    return value if isinstance(value, str | int | float) else str(value)

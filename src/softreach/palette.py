@@ -1,0 +1,54 @@
+"""Which color a bundle has in every picture and file, and which color its activations mix to."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["BODY", "Color", "activation_colors", "bundle_color"]
+
+Color = tuple[float, float, float]
+
+BODY: Color = (0.87, 0.85, 0.82)
+"""The passive body of an arm."""
+
+# The paper's red, green, blue and yellow come first; lightness differs along the list, so that the
+# order survives most color deficiencies and gray print.
+_BUNDLES: tuple[Color, ...] = (
+    (0.82, 0.10, 0.12),
+    (0.16, 0.64, 0.24),
+    (0.12, 0.30, 0.82),
+    (0.97, 0.78, 0.12),
+    (0.60, 0.20, 0.65),
+    (0.10, 0.68, 0.75),
+    (0.95, 0.50, 0.10),
+    (0.35, 0.35, 0.35),
+)
+# Light that an activation adds: pure, so that three bundles are the paper's RGB.
+_LIGHTS = np.array(
+    [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 0.5, 0], [1, 1, 1]],
+    float,
+)
+
+
+def bundle_color(index: int) -> Color:
+    """The color of a bundle: red, green, blue, yellow, then others; they repeat after eight."""
+    return _BUNDLES[index % len(_BUNDLES)]
+
+
+def activation_colors(activation: ArrayLike) -> NDArray[np.uint8]:
+    """RGB of each sample: every bundle adds its light in proportion to |γ| / max |γ|.
+
+    With three bundles R, G and B are the three relative magnitudes, as in the paper.
+
+    Args:
+        activation: Activations γ [-], shape (sample, fiber); NaN is black.
+
+    Returns:
+        Colors from 0 to 255, shape (sample, 3).
+    """
+    gamma = np.nan_to_num(np.asarray(activation, float))
+    largest = max(gamma.max(initial=0.0), -gamma.min(initial=0.0)) or 1.0
+    lights = _LIGHTS[np.arange(gamma.shape[1]) % len(_LIGHTS)]
+    mix = lights * (255.0 / largest) / np.maximum(lights.sum(axis=0), 1.0)
+    return np.rint(np.abs(gamma) @ mix).astype(np.uint8)

@@ -1,0 +1,150 @@
+"""What a color says about a sample, and the key that tells the reader."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.errors import InvalidInput
+from softreach.palette import activation_colors
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["BundleKey", "Coloring", "ScalarKey", "color_samples", "draw_figure_key", "draw_key"]
+
+_COLORMAP = "viridis"
+
+
+class BundleKey(NamedTuple):
+    """Each bundle adds a color."""
+
+    names: list[str]
+    colors: NDArray[np.uint8]
+
+
+class ScalarKey(NamedTuple):
+    """A color stands for a number from low to high."""
+
+    label: str
+    low: float
+    high: float
+
+
+class Coloring(NamedTuple):
+    """RGB of every sample, shape (sample, 3), and what it means."""
+
+    rgb: NDArray[np.uint8]
+    key: BundleKey | ScalarKey | None
+
+
+def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike = "rgb") -> Coloring:
+    """Color samples by all activations, by one bundle's magnitude, or by given values.
+
+    Args:
+        cloud: activation(sample, fiber) [-].
+        color: "rgb" for |γ| / max |γ| of all bundles; the name or index of one bundle; one number
+            per sample; or RGB from 0 to 1 per sample.
+
+    Raises:
+        InvalidInput: No such bundle, or an array of another length.
+    """
+    activation = cloud["activation"].transpose("sample", "fiber")
+    names = _names(activation)
+    if isinstance(color, str) and color == "rgb":
+        lights = activation_colors(np.eye(len(names)))
+        return Coloring(activation_colors(activation.values), BundleKey(names, lights))
+    if isinstance(color, str | int | np.integer):
+        bundle = _bundle(names, color)
+        magnitude = np.abs(activation.values[:, bundle])
+        return _scalar(magnitude, f"|γ| {names[bundle]}", 0.0)
+    return _given(np.asarray(color, float), activation.sizes["sample"])
+
+
+def draw_key(ax: Axes, key: BundleKey | ScalarKey | None) -> None:
+    """Explain the colors in axes, by a legend above them or a color bar beside them."""
+    if isinstance(key, BundleKey):
+        ax.legend(handles=_patches(key), **_ABOVE)
+    elif key is not None:
+        bar = {"label": key.label, "fraction": 0.046, "pad": 0.03}
+        ax.figure.colorbar(_mappable(key), ax=ax, **bar)
+
+
+def draw_figure_key(figure: Figure, key: BundleKey | ScalarKey | None, top: float) -> None:
+    """Explain the colors once for a figure, at its upper edge.
+
+    Args:
+        figure: A figure with room there.
+        key: What to explain; None for nothing.
+        top: Height of that room, as a share of the figure.
+    """
+    if isinstance(key, BundleKey):
+        options = _ABOVE | {"loc": "center", "bbox_to_anchor": (0.5, 1 - top / 2)}
+        figure.legend(handles=_patches(key), **options)
+    elif key is not None:
+        bar = figure.add_axes((0.4, 1 - 0.5 * top, 0.4, 0.2 * top))
+        figure.colorbar(_mappable(key), cax=bar, orientation="horizontal")
+        bar.set_ylabel(key.label, rotation=0, ha="right", va="center")
+
+
+_ABOVE: dict[str, Any] = {
+    "loc": "lower center",
+    "bbox_to_anchor": (0.5, 1.0),
+    "ncols": 4,
+    "handlelength": 1.0,
+    "columnspacing": 1.2,
+}
+
+
+def _names(activation: xr.DataArray) -> list[str]:
+    if "fiber" in activation.coords:
+        return [str(name) for name in activation["fiber"].values]
+    return [str(k + 1) for k in range(activation.sizes["fiber"])]
+
+
+def _bundle(names: list[str], color: str | int | np.integer) -> int:
+    if isinstance(color, str) and color in names:
+        return names.index(color)
+    if not isinstance(color, str) and 0 <= color < len(names):
+        return int(color)
+    known = ", ".join(names)
+    raise InvalidInput("color", color, f'"rgb", a bundle ({known}) or its index, or an array')
+
+
+def _given(values: NDArray[np.float64], samples: int) -> Coloring:
+    if values.shape == (samples,):
+        return _scalar(values, "")
+    if values.shape == (samples, 3):
+        return Coloring(np.rint(255 * np.clip(values, 0, 1)).astype(np.uint8), None)
+    raise InvalidInput("color.shape", values.shape, f"({samples},) or ({samples}, 3)")
+
+
+def _scalar(values: NDArray[np.float64], label: str, low: float | None = None) -> Coloring:
+    from matplotlib import colormaps
+
+    finite = values[np.isfinite(values)]
+    start = finite.min(initial=np.inf) if low is None else low
+    stop = finite.max(initial=start) if len(finite) else start
+    start, stop = (float(start), float(stop)) if len(finite) else (0.0, 1.0)
+    scaled = (values - start) / ((stop - start) or 1.0)
+    colormap = colormaps[_COLORMAP].with_extremes(bad=(0.8, 0.8, 0.8))
+    table = colormap(np.ma.masked_invalid(scaled), bytes=True)
+    return Coloring(table[:, :3], ScalarKey(label, start, stop))
+
+
+def _mappable(key: ScalarKey) -> Any:
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    return ScalarMappable(Normalize(key.low, key.high), _COLORMAP)
+
+
+def _patches(key: BundleKey) -> list[Any]:
+    from matplotlib.patches import Patch
+
+    named = zip(key.names, key.colors / 255, strict=True)
+    return [Patch(facecolor=tuple(rgb), label=f"|γ| {name}") for name, rgb in named]

@@ -1,0 +1,64 @@
+"""Light on a surface: a mesh drawn into a z-buffer, bright where it faces the lamp."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.plot.projection import View, project
+from softreach.plot.zbuffer import ZBuffer
+
+__all__ = ["draw_mesh", "shade"]
+
+Array = NDArray[np.float64]
+
+_LAMP = np.array([-0.45, 0.60, 0.66])  # over the left shoulder: right, up, toward the eye
+_AMBIENT, _DIFFUSE, _GLOSS = 0.42, 0.62, 0.10
+
+
+def draw_mesh(
+    buffer: ZBuffer,
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    color: ArrayLike,
+    view: View,
+    fade: float = 0.0,
+) -> None:
+    """Draw a shaded triangle mesh.
+
+    Args:
+        buffer: Where to.
+        vertices: In the units of the buffer, shape (v, 3).
+        faces: Shape (f, 3).
+        color: RGB from 0 to 1.
+        view: The direction of the eye.
+        fade: How far the lit colors go toward white.
+    """
+    points, faces = project(vertices, view), np.asarray(faces)
+    colors = shade(vertex_normals(points, faces), color)
+    colors += fade * (255 - colors)
+    buffer.draw_triangles(points[faces], colors[faces])
+
+
+def shade(normals: Array, color: ArrayLike) -> Array:
+    """RGB from 0 to 255 of surface elements, lit alike from both sides, shape (n, 3).
+
+    Args:
+        normals: Unit normals: right, up, toward the eye; shape (n, 3).
+        color: RGB from 0 to 1.
+    """
+    facing = np.where(normals[:, 2:] < 0, -normals, normals)
+    light = np.clip(facing @ _LAMP / np.linalg.norm(_LAMP), 0.0, 1.0)[:, None]
+    lit = (_AMBIENT + _DIFFUSE * light) * np.asarray(color, float) + _GLOSS * light**12
+    return 255 * np.clip(lit, 0.0, 1.0)
+
+
+def vertex_normals(points: Array, faces: NDArray[np.integer]) -> Array:
+    """Unit mean of the normals of the faces around each vertex, by area, shape (v, 3)."""
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    total = np.zeros_like(points)
+    for k in range(3):
+        np.add.at(total, faces[:, k], normals)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.divide(total, length, out=np.zeros_like(total), where=length > 0)

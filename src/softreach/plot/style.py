@@ -1,0 +1,71 @@
+"""How every figure looks: light, small type, thin lines, images sharp at print size."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager, nullcontext
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+from softreach.atomic import replacing
+from softreach.errors import MissingExtra
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["DPI", "figure_style", "pyplot", "save_figure"]
+
+DPI = 250
+"""Pixels per inch of images inside figures, and of saved PNG files."""
+
+_RC: dict[str, Any] = {
+    "figure.facecolor": "white",
+    "axes.facecolor": "white",
+    "axes.edgecolor": "0.35",
+    "axes.linewidth": 0.6,
+    "axes.labelsize": 8,
+    "axes.titlesize": 8,
+    "font.family": "sans-serif",
+    "font.size": 8,
+    "legend.fontsize": 7,
+    "legend.frameon": False,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "xtick.color": "0.25",
+    "ytick.color": "0.25",
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.major.size": 2.5,
+    "ytick.major.size": 2.5,
+}
+# text stays text in vector files, so that a journal can set it in its own type
+_SAVING: dict[str, Any] = {"pdf.fonttype": 42, "svg.fonttype": "none"}
+
+
+def pyplot() -> Any:
+    """matplotlib.pyplot, loaded at first use.
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+    """
+    try:
+        from matplotlib import pyplot as plt
+    except ModuleNotFoundError as error:
+        raise MissingExtra("matplotlib", "plot") from error
+    return plt
+
+
+def figure_style(ax: Axes | None = None) -> AbstractContextManager[None]:
+    """Our defaults for a figure of our own; somebody else's axes keep theirs."""
+    return pyplot().rc_context(_RC) if ax is None else nullcontext()
+
+
+def save_figure(figure: Figure, path: str | PathLike[str]) -> None:
+    """Save as .png, .pdf, .svg or another format that matplotlib knows, whole or not at all.
+
+    Args:
+        figure: The figure, such as ``ax.figure``.
+        path: The file; it is replaced only when the new one is complete.
+    """
+    with pyplot().rc_context(_SAVING), replacing(path) as lent:
+        figure.savefig(lent, dpi=DPI)

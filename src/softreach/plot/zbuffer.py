@@ -1,0 +1,154 @@
+"""A z-buffer in NumPy: millions of points, and triangles, to one image where the nearest shows.
+
+Every pixel holds one 64-bit key, the depth above the color, and drawing takes the larger key. So
+the image does not depend on the order of what is drawn, and a point of several pixels is a shifted
+maximum of the finished image, whatever the number of points.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.plot.scanline import filled_pixels
+
+__all__ = ["Extent", "ZBuffer"]
+
+Array = NDArray[np.float64]
+Keys = NDArray[np.uint64]
+
+_BLOCK = 1 << 19  # points at a time: temporary arrays stay in the tens of MB
+
+
+class Extent(NamedTuple):
+    """The part of the projection plane that an image covers, as `imshow` wants it."""
+
+    left: float
+    right: float
+    bottom: float
+    top: float
+
+
+class ZBuffer:
+    """An image under construction: (right, up, toward the eye) coordinates in, RGBA out.
+
+    Args:
+        extent: What the image covers, in the units of the coordinates.
+        width: Columns of the image; pixels are square, so the rows follow.
+        oversample: Each pixel is the mean of this many squared, which smooths edges.
+        color_step: Colors of the image are multiples of this; a coarse step keeps files small.
+    """
+
+    def __init__(
+        self, extent: Extent, width: int, oversample: int = 2, color_step: int = 1
+    ) -> None:
+        self.extent, self.oversample, self.color_step = extent, oversample, color_step
+        aspect = (extent.top - extent.bottom) / (extent.right - extent.left)
+        height = max(1, round(width * aspect))
+        self._keys: Keys = np.zeros((height * oversample, width * oversample), np.uint64)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the image."""
+        return self._keys.shape[0] // self.oversample, self._keys.shape[1] // self.oversample
+
+    def draw_points(self, points: ArrayLike, colors: ArrayLike, size: float = 1.0) -> None:
+        """Draw discs that face the eye; points that are not finite or outside are left out.
+
+        Args:
+            points: Shape (n, 3).
+            colors: RGB from 0 to 255, shape (n, 3) or (3,).
+            size: Diameter in pixels of the image.
+        """
+        points = np.asarray(points, float)
+        colors = np.broadcast_to(np.asarray(colors, np.uint8), points.shape)
+        layer = np.zeros_like(self._keys)
+        for start in range(0, len(points), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            self._splat(layer, points[block], colors[block])
+        self._keep_larger(_grown(layer, size * self.oversample))
+
+    def draw_triangles(self, corners: ArrayLike, colors: ArrayLike) -> None:
+        """Draw filled triangles whose colors blend from corner to corner.
+
+        Args:
+            corners: Shape (n, 3 corners, 3).
+            colors: RGB from 0 to 255, shape (n, 3 corners, 3).
+        """
+        values = np.concatenate([np.asarray(corners, float), np.asarray(colors, float)], axis=2)
+        values = values[np.isfinite(values).all(axis=(1, 2))]
+        values[..., :2] = self._to_pixels(values)
+        for row, column, depth_and_color in filled_pixels(values, self._keys.shape):
+            depth, color = depth_and_color[:, 0], np.rint(depth_and_color[:, 1:])
+            index = row * self._keys.shape[1] + column
+            np.maximum.at(self._keys.reshape(-1), index, _keys(depth, color.astype(np.uint8)))
+
+    def rgba(self) -> NDArray[np.uint8]:
+        """The image from top to bottom, shape (rows, columns, 4); transparent where nothing is."""
+        packed = (self._keys & np.uint64(0xFFFFFFFF)).astype(np.uint32)
+        rgba = packed.astype(">u4")[..., None].view(np.uint8)
+        return _rounded(_averaged(rgba, self.oversample), self.color_step)
+
+    def _to_pixels(self, points: Array) -> Array:
+        """Column and row from the top, where whole numbers are the edges of pixels."""
+        e, (rows, columns) = self.extent, self._keys.shape
+        column = (points[..., 0] - e.left) * (columns / (e.right - e.left))
+        row = (e.top - points[..., 1]) * (rows / (e.top - e.bottom))
+        return np.stack([column, row], axis=-1)
+
+    def _splat(self, layer: Keys, points: Array, colors: NDArray[np.uint8]) -> None:
+        pixels = self._to_pixels(points)
+        inside = self._inside(pixels) & np.isfinite(points[:, 2])
+        column, row = pixels[inside].astype(np.int64).T
+        keys = _keys(points[inside, 2], colors[inside])
+        np.maximum.at(layer.reshape(-1), row * layer.shape[1] + column, keys)
+
+    def _inside(self, pixels: Array) -> NDArray[np.bool_]:
+        rows, columns = self._keys.shape
+        column, row = pixels[..., 0], pixels[..., 1]
+        return (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+
+    def _keep_larger(self, layer: Keys) -> None:
+        np.maximum(self._keys, layer, out=self._keys)
+
+
+def _keys(depth: Array, colors: NDArray[np.uint8]) -> Keys:
+    """Depth in the high half, in unsigned order; red, green, blue, 255 in the low."""
+    bits = depth.astype(np.float32).view(np.uint32)
+    negative = bits >> np.uint32(31) == 1
+    ordered = np.where(negative, ~bits, bits | np.uint32(0x80000000)).astype(np.uint64)
+    red, green, blue = colors.T.astype(np.uint32)
+    color = red << np.uint32(24) | green << np.uint32(16) | blue << np.uint32(8) | np.uint32(255)
+    return ordered << np.uint64(32) | color
+
+
+def _grown(layer: Keys, diameter: float) -> Keys:
+    """Every pixel takes the largest key of a disc around it."""
+    reach = int(diameter / 2)
+    result = layer.copy()
+    rows, columns = layer.shape
+    for dy in range(-reach, reach + 1):
+        for dx in range(-reach, reach + 1):
+            # the disc holds the pixels whose centers are nearer than its radius
+            if (dx, dy) == (0, 0) or 4 * (dx * dx + dy * dy) > diameter * diameter:
+                continue
+            to = slice(max(dy, 0), rows + min(dy, 0)), slice(max(dx, 0), columns + min(dx, 0))
+            of = slice(max(-dy, 0), rows - max(dy, 0)), slice(max(-dx, 0), columns - max(dx, 0))
+            np.maximum(result[to], layer[of], out=result[to])
+    return result
+
+
+def _rounded(rgba: NDArray[np.uint8], step: int) -> NDArray[np.uint8]:
+    levels = np.minimum(255, np.rint(np.arange(256) / step) * step).astype(np.uint8)
+    return np.concatenate([levels[rgba[..., :3]], rgba[..., 3:]], axis=-1)
+
+
+def _averaged(rgba: NDArray[np.uint8], by: int) -> NDArray[np.uint8]:
+    """Means of blocks of pixels; colors are weighted by opacity so that edges keep their color."""
+    rows, columns = rgba.shape[0] // by, rgba.shape[1] // by
+    # opacity is 0 or 255 here, and the color of an empty pixel is 0
+    total = rgba.reshape(rows, by, columns, by, 4).sum(axis=(1, 3), dtype=np.uint32)
+    full = np.maximum(total[..., 3:] // 255, 1)
+    return np.concatenate([total[..., :3] // full, total[..., 3:] // by**2], -1).astype(np.uint8)
