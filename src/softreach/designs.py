@@ -7,7 +7,7 @@ import math
 from softreach.fiber import FiberArchitecture
 from softreach.manipulator import Manipulator
 
-__all__ = ["minimal_trunk", "redundant_trunk"]
+__all__ = ["minimal_trunk", "redundant_trunk", "varied"]
 
 _EXTENT = math.radians(48)
 
@@ -84,3 +84,22 @@ def _trunk(
         fibers=fibers,
         activation_bounds=(-5 / 3, 0.0),
     )
+
+
+def varied(
+    arm: Manipulator, *, revolution: float | None = None, taper: float | None = None
+) -> Manipulator:
+    """A relative of a design: the same arm with another revolution or taper.
+
+    Args:
+        arm: The design.
+        revolution: |Ω| of every helical architecture, each keeping its own sense [rad];
+            longitudinal ones stay longitudinal. None keeps what there is.
+        taper: φ [rad]; the revolutions stay what they are, the helical angles follow.
+    """
+    wanted = [abs(revolution) if revolution is not None else abs(turn) for turn in arm.revolutions]
+    fibers = tuple(
+        fiber.replace(revolution=math.copysign(size, turn)) if turn else fiber
+        for fiber, turn, size in zip(arm.fibers, arm.revolutions.tolist(), wanted, strict=True)
+    )
+    return arm.replace(fibers=fibers, taper=arm.taper if taper is None else taper)

@@ -1,0 +1,55 @@
+# Two commands do everything on a machine with python3 and make: `make demo` and `make test`.
+
+PYTHON ?= python3
+BIN := .venv/bin
+READY := .venv/.ready
+
+.PHONY: help setup demo test check format bench docs lock clean
+
+help:
+	@echo "make demo    set up, then compute the paper's design into out/"
+	@echo "make test    set up, then run every check and test"
+	@echo "make check   format, lint, types, layers, documentation"
+	@echo "make bench   the benchmarks; writes docs/benchmarks.md"
+	@echo "make docs    build the documentation into site/"
+	@echo "make setup   make .venv from requirements.lock"
+	@echo "make lock    renew requirements.lock"
+
+setup: $(READY)
+
+$(READY): requirements.lock pyproject.toml
+	$(PYTHON) -m venv .venv
+	@command -v uv >/dev/null || $(BIN)/python -m pip install --quiet --disable-pip-version-check uv
+	PATH="$(CURDIR)/$(BIN):$$PATH" uv pip install --quiet --python $(BIN)/python --require-hashes -r requirements.lock
+	PATH="$(CURDIR)/$(BIN):$$PATH" uv pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation --editable .
+	@touch $(READY)
+
+demo: setup
+	$(BIN)/softreach demo --out out
+
+test: check
+	$(BIN)/python -m pytest -q
+
+check: setup
+	$(BIN)/ruff format --check src tests benchmarks
+	$(BIN)/ruff check src tests benchmarks
+	$(BIN)/lint-imports
+	$(BIN)/basedpyright
+	$(BIN)/mkdocs build --strict --quiet
+
+format: setup
+	$(BIN)/ruff format src tests benchmarks
+	$(BIN)/ruff check --fix src tests benchmarks
+
+bench: setup
+	$(BIN)/python -m benchmarks
+
+docs: setup
+	$(BIN)/mkdocs build --strict
+
+lock:
+	uv lock --upgrade
+	uv export --quiet --all-extras --all-groups --no-emit-project --no-header --format requirements-txt --output-file requirements.lock
+
+clean:
+	rm -rf .venv out site

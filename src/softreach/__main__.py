@@ -1,0 +1,5 @@
+"""`python -m softreach`."""
+
+from softreach.cli import main
+
+main()

@@ -1,0 +1,70 @@
+"""The `softreach` command and what its exit codes mean: 0 done, 2 wrong input, 130 interrupted."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from importlib.metadata import version
+
+from cyclopts import App, CycloptsError
+
+from softreach.errors import SoftreachError, SoftreachWarning
+
+__all__ = ["app", "main"]
+
+app = App(
+    name="softreach",
+    help="""Where a soft slender robot can go: from a design to its reachability cloud and volumes.
+
+A DESIGN is a TOML file (lengths in m, angles in degrees) or the name of a built-in design:
+minimal_trunk, redundant_trunk. Start with
+
+    softreach demo --out out
+""",
+    version=lambda: version("softreach"),
+    exit_on_error=False,
+    print_error=False,
+    suppress_keyboard_interrupt=False,
+    help_format="plaintext",
+)
+
+# Commands are imported when they are run; their summaries stand here so that help needs none of them.
+_COMMANDS = {
+    "demo": "The paper's design, start to end: cloud, volumes, hull and picture.",
+    "design": "What follows from a design: angles, radii, ranges, warnings.",
+    "cloud": "Compute a reachability cloud and store it.",
+    "volume": "Volume, convex volume and unreachability of a cloud.",
+    "show": "Draw a cloud and its arm.",
+    "export": "Write a cloud or an arm for other programs.",
+}
+for _name, _summary in _COMMANDS.items():
+    app.command(f"softreach.cli.{_name}:{_name}", name=_name, help=_summary, sort_key=list(_COMMANDS).index(_name))
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line and exit."""
+    sys.exit(run(sys.argv[1:] if arguments is None else arguments))
+
+
+def run(arguments: list[str]) -> int:
+    """Run the command line and return its exit code; wrong input costs one line, no traceback."""
+    with warnings.catch_warnings():
+        warnings.showwarning = _show_warning
+        try:
+            app(arguments, result_action="return_value")
+        except (CycloptsError, SoftreachError, OSError) as error:
+            return _failed(str(error) or type(error).__name__)
+        except KeyboardInterrupt:
+            sys.stderr.write("interrupted: nothing half-written was left behind\n")
+            return 130
+    return 0
+
+
+def _failed(message: str) -> int:
+    sys.stderr.write(f"error: {message}\n")
+    return 2
+
+
+def _show_warning(message: Warning | str, category: type[Warning], *_: object) -> None:
+    if issubclass(category, SoftreachWarning):
+        sys.stderr.write(f"warning: {message}\n")

@@ -1,0 +1,52 @@
+"""`softreach cloud`: compute a reachability cloud and store it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from softreach.cli.inputs import AsJson, Design, RevolutionDeg, Sampler, TaperDeg, design_from
+from softreach.cli.output import report
+
+__all__ = ["cloud"]
+
+
+def cloud(
+    design: Design,
+    *,
+    out: Annotated[Path, Parameter(help="Where the cloud goes.")] = Path("cloud.zarr"),
+    n: Annotated[int, Parameter(help="Number of samples.")] = 400_000,
+    seed: Annotated[int, Parameter(help="Seed of the sampler.")] = 0,
+    sampler: Sampler = "uniform",
+    tol: Annotated[float, Parameter(help="Largest tip error, in L.")] = 1e-6,
+    revolution_deg: RevolutionDeg = None,
+    taper_deg: TaperDeg = None,
+    json: AsJson = False,
+) -> None:
+    """Compute the reachability cloud of a design and store it as Zarr.
+
+    Example: softreach cloud minimal_trunk --n 400000 --out trunk.zarr
+    """
+    from time import perf_counter
+
+    from softreach.cloud import compute_cloud, save_cloud
+    from softreach.steps import steps_for
+
+    arm = design_from(design, revolution_deg, taper_deg)
+    start = perf_counter()
+    dataset = compute_cloud(arm, n, seed, sampler, tol=tol)
+    seconds = perf_counter() - start
+    save_cloud(dataset, out)
+    rows = {
+        "samples": (n, ""),
+        "sampler": (sampler, ""),
+        "seed": (seed, ""),
+        "steps per arm": (steps_for(arm, tol), ""),
+        "time to compute": (round(seconds, 3), "s"),
+        "highest tip": (float(dataset.tip[:, 2].max()) / arm.length, "L"),
+        "lowest tip": (float(dataset.tip[:, 2].min()) / arm.length, "L"),
+        "cloud": (str(out), ""),
+    }
+    report(f"cloud of {design}", rows, json)

@@ -1,0 +1,51 @@
+"""`softreach demo`: the main job on the paper's design, start to end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from softreach.cli.inputs import AsJson
+from softreach.cli.output import report
+from softreach.cli.volume import volume_rows
+
+__all__ = ["demo"]
+
+
+def demo(
+    *,
+    out: Annotated[Path, Parameter(help="Folder for the results.")] = Path("out"),
+    n: Annotated[int, Parameter(help="Number of samples.")] = 400_000,
+    json: AsJson = False,
+) -> None:
+    """The paper's design (Ω = 108°, φ = 2°): cloud, volumes, hull and picture, into a folder.
+
+    Example: softreach demo --out out
+    """
+    from time import perf_counter
+
+    from softreach import designs, export, plot
+    from softreach.cloud import compute_cloud, save_cloud
+    from softreach.kinematics import configuration
+    from softreach.volume import concave_hull, convex_hull
+
+    start = perf_counter()
+    arm = designs.minimal_trunk()
+    arm.save(out / "design.toml")
+    cloud = compute_cloud(arm, n)
+    computed = perf_counter() - start
+    concave, convex = concave_hull(cloud.tip, bias=True), convex_hull(cloud.tip)
+    save_cloud(cloud, out / "cloud.zarr")
+    export.export_cloud(cloud, out / "cloud.ply")
+    export.export_mesh(concave, out / "hull.ply")
+    shape = configuration(arm, [-1.0, 0.0, -0.4])
+    plot.save_figure(plot.plot_views(cloud, arm, shape)["front"].figure, out / "cloud.png")
+
+    rows = volume_rows(concave, convex, arm.length)
+    rows["time to compute the cloud"] = (round(computed, 3), "s")
+    rows["time in all"] = (round(perf_counter() - start, 3), "s")
+    files = ("design.toml", "cloud.zarr", "cloud.ply", "hull.ply", "cloud.png")
+    rows["written"] = ([str(out / name) for name in files], "")
+    report("minimal trunk, revolution 108°, taper 2°", rows, json)

@@ -1,0 +1,108 @@
+"""What commands take: designs, clouds, activations, radii; degrees end here."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from softreach.errors import InvalidInput
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from softreach.manipulator import Manipulator
+
+__all__ = [
+    "Activation",
+    "AsJson",
+    "Design",
+    "RevolutionDeg",
+    "Sampler",
+    "Source",
+    "TaperDeg",
+    "activation_of",
+    "cloud_of",
+    "design_from",
+    "radius_of",
+]
+
+Design = Annotated[str, Parameter(help="Design file (.toml), or minimal_trunk or redundant_trunk.")]
+Source = Annotated[str, Parameter(help="Cloud (.zarr), design file (.toml) or built-in design.")]
+RevolutionDeg = Annotated[
+    float | None,
+    Parameter(help="Give every helical fiber this revolution [deg], each in its own sense."),
+]
+TaperDeg = Annotated[float | None, Parameter(help="Use this taper angle instead [deg].")]
+Sampler = Annotated[str, Parameter(help="uniform, boundary, sobol or grid.")]
+AsJson = Annotated[bool, Parameter(name="--json", negative="", help="Print JSON for machines.")]
+Activation = Annotated[
+    str | None,
+    Parameter(help="Activations, one per bundle, comma-separated: -1,0,-0.5", allow_leading_hyphen=True),
+]
+
+
+def design_from(
+    text: str, revolution_deg: float | None = None, taper_deg: float | None = None
+) -> Manipulator:
+    """The design of that name or file, varied as asked."""
+    from softreach import designs
+
+    built_in = {name: getattr(designs, name) for name in ("minimal_trunk", "redundant_trunk")}
+    if text in built_in:
+        arm = built_in[text]()
+    elif text.endswith(".toml") or Path(text).is_file():
+        arm = _loaded(text)
+    else:
+        raise InvalidInput("design", text, f"a .toml file, or one of {', '.join(built_in)}")
+    return designs.varied(
+        arm,
+        revolution=None if revolution_deg is None else math.radians(revolution_deg),
+        taper=None if taper_deg is None else math.radians(taper_deg),
+    )
+
+
+def _loaded(path: str) -> Manipulator:
+    from softreach.manipulator import Manipulator
+
+    if not Path(path).is_file():
+        raise InvalidInput("design", path, "a file that exists")
+    return Manipulator.load(path)
+
+
+def cloud_of(source: str, n: int, seed: int, sampler: str) -> xr.Dataset:
+    """The stored cloud, or one computed from the design."""
+    from softreach.cloud import compute_cloud, open_cloud
+
+    if source.rstrip("/").endswith(".zarr"):
+        return open_cloud(source)
+    return compute_cloud(design_from(source), n, seed, sampler)
+
+
+def activation_of(text: str | None, arm: Manipulator) -> list[float]:
+    """Numbers from `-1,0,-0.5`; all bundles fully contracted when there is none."""
+    if text is None:
+        return arm.bounds[:, 0].tolist()
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != arm.bundles:
+        allowed = f"{arm.bundles} comma-separated numbers ({', '.join(arm.bundle_names)})"
+        raise InvalidInput("activation", text, allowed)
+    return values
+
+
+def radius_of(text: str, length: float) -> float | str:
+    """An alpha radius in m from `0.05L`, `0.05` (m) or `critical`."""
+    if text == "critical":
+        return text
+    try:
+        radius = float(text[:-1]) * length if text.endswith("L") else float(text)
+    except ValueError:
+        radius = math.nan
+    if not radius > 0:
+        raise InvalidInput("alpha", text, "a radius > 0 like 0.05L or 0.05 (m), or critical")
+    return radius

@@ -1,0 +1,40 @@
+"""`softreach show`: pictures of a cloud and its arm."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from softreach.cli.inputs import Activation, Sampler, Source, activation_of, cloud_of
+
+__all__ = ["show"]
+
+
+def show(
+    source: Source,
+    *,
+    out: Annotated[Path, Parameter(help="Picture file: .png .pdf .svg")] = Path("cloud.png"),
+    color: Annotated[str, Parameter(help="rgb, or the name of a bundle.")] = "rgb",
+    activation: Activation = None,
+    n: Annotated[int, Parameter(help="Samples, when the source is a design.")] = 400_000,
+    seed: int = 0,
+    sampler: Sampler = "uniform",
+) -> None:
+    """Draw a cloud in three orthogonal views and an oblique one, with the arm in it.
+
+    Example: softreach show trunk.zarr --color longitudinal --activation=-1,0,-0.5 --out trunk.pdf
+    """
+    import sys
+
+    from softreach import plot
+    from softreach.cloud import design_of
+    from softreach.kinematics import configuration
+
+    cloud = cloud_of(source, n, seed, sampler)
+    arm = design_of(cloud)
+    shape = None if activation is None else configuration(arm, activation_of(activation, arm))
+    axes = plot.plot_views(cloud, arm, shape, color=color)
+    plot.save_figure(axes["front"].figure, out)
+    sys.stdout.write(f"{out}\n")
