@@ -12,3 +12,8 @@ from .kinematics import configuration as configuration
 from .kinematics import tip_jacobian as tip_jacobian
 from .kinematics import tip_positions as tip_positions
 from .manipulator import Manipulator as Manipulator
+from .report import describe as describe
+from .volume import concave_hull as concave_hull
+from .volume import convex_hull as convex_hull
+from .volume import unreachability as unreachability
+from .volume import volume_curve as volume_curve
