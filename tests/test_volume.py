@@ -83,6 +83,12 @@ def test_a_radius_below_three_spacings_warns_with_both_numbers():
         concave_hull(points, alpha=0.15)
 
 
+def test_where_the_quarter_is_too_sparse_there_is_no_estimate_but_a_warning():
+    with pytest.warns(SoftreachWarning, match=r"no estimate of the bias.* of 500 points"):
+        hull = concave_hull(in_ball(2000), alpha=0.4, bias=True)
+    assert hull.volume_corrected is None
+
+
 def test_the_curve_equals_the_hulls(tips):
     alphas = np.array([[0.2, 0.3], [0.5, np.inf]])
     curve = volume_curve(tips, alphas)

@@ -21,6 +21,7 @@ __all__ = ["concave_hull", "convex_hull", "unreachability", "volume_curve"]
 
 DEFAULT_RADIUS = 0.05  # of the arm's length
 SPACINGS = 3.0  # a smaller radius falls through between the points
+QUARTER_SPACINGS = 2.5  # below, V(N/4) has left the law N^-1/2: see design/triangulation.md
 
 Method = Literal["auto", "numba", "qhull"]
 
@@ -37,8 +38,9 @@ def concave_hull(
     The volume of a random cloud of N points falls short of that of infinitely many by an amount
     that shrinks as N^-1/2 (2 to 3 % for 400,000 tips), the same in every repetition. With
     ``bias=True`` the shape of a quarter of the points is computed too, for a quarter of the time,
-    and gives the estimate ``Hull.volume_corrected`` = 2 V(N) - V(N/4). It is meant for random
-    clouds: a grid has less bias than this takes it to have.
+    and gives the estimate ``Hull.volume_corrected`` = 2 V(N) - V(N/4); it stays None, with a
+    warning, if alpha is too small for the quarter. It is meant for random clouds: a grid has less
+    bias than this takes it to have.
 
     ``alpha="critical"`` is the smallest radius at which one region covers all points. Neither it
     nor the volume there converges with N, as the loneliest point decides: compare clouds at a
@@ -57,7 +59,8 @@ def concave_hull(
             None for points that do not carry their arm's length.
 
     Warns:
-        SoftreachWarning: The radius is below three mean spacings of the points.
+        SoftreachWarning: The radius is below three mean spacings of the points, or below two and a
+            half of a quarter of them when the bias is asked for.
 
     References:
         Edelsbrunner, Mücke (1994), Three-dimensional alpha shapes, ACM Trans. Graphics 13, 43-72.
@@ -178,12 +181,19 @@ def _warn_if_fine(hull: Hull) -> None:
     """Say so if the radius is too small for the density of the points."""
     if hull.alpha < SPACINGS * hull.spacing:
         warnings.warn(
-            f"alpha = {hull.alpha:.4g} m is {hull.alpha / hull.spacing:.2g} mean spacings of the "
-            f"{hull.n} points ({hull.spacing:.4g} m): below {SPACINGS:g} the shape has holes "
-            "between points and its volume is too small; use more points or a larger alpha",
+            f"alpha = {_in_spacings(hull)}: below {SPACINGS:g} the shape has holes between points "
+            "and its volume is too small; use more points or a larger alpha",
             SoftreachWarning,
             stacklevel=3,
         )
+
+
+def _in_spacings(hull: Hull) -> str:
+    """The radius of a hull beside the mean spacing of its points."""
+    return (
+        f"{hull.alpha:.4g} m is {hull.alpha / hull.spacing:.2g} mean spacings of "
+        f"{hull.n} points ({hull.spacing:.4g} m)"
+    )
 
 
 def _corrected(hull: Hull, positions: np.ndarray, method: Method) -> Hull:
@@ -191,7 +201,14 @@ def _corrected(hull: Hull, positions: np.ndarray, method: Method) -> Hull:
 
     Not every fourth one: in a Sobol sequence those all lie in one quarter of the box.
     """
-    quarter = np.random.default_rng(0).permutation(len(positions))[: len(positions) // 4]
-    shape = _alpha_complex(positions[np.sort(quarter)], method)
-    fewer = float(shape.volumes[shape.radii <= hull.alpha].sum())
-    return replace(hull, volume_corrected=2.0 * hull.volume - fewer)
+    pick = np.random.default_rng(0).permutation(len(positions))[: len(positions) // 4]
+    quarter = _alpha_complex(positions[np.sort(pick)], method).hull(hull.alpha)
+    if quarter.alpha < QUARTER_SPACINGS * quarter.spacing:
+        warnings.warn(
+            f"no estimate of the bias: alpha = {_in_spacings(quarter)}, a quarter of the cloud; "
+            f"below {QUARTER_SPACINGS:g} the law N^-1/2 fails; use more points or a larger alpha",
+            SoftreachWarning,
+            stacklevel=3,
+        )
+        return hull
+    return replace(hull, volume_corrected=2.0 * hull.volume - quarter.volume)

@@ -31,9 +31,10 @@ class Hull:
     n: int
     """Number of points N of the cloud."""
     volume_corrected: float | None = None
-    """2 V(N) - V(N/4) [m³], an estimate of the volume of infinitely many points; None if not asked.
+    """2 V(N) - V(N/4) [m³], an estimate of the volume of infinitely many points.
 
-    The volume of a random cloud falls short by an amount that shrinks as N^-1/2.
+    The volume of a random cloud falls short by an amount that shrinks as N^-1/2. None if not asked
+    for, or if the quarter is too sparse for the radius.
     """
 
     @property

@@ -12,9 +12,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from softreach.kernels.cells import FACES
-from softreach.kernels.expansions import scratch, value
-from softreach.kernels.predicates import ORIENT_BOUND, dot3, edge, end, minor
+from softreach.kernels.cells import FACES, corners
+from softreach.kernels.expansions import BOTTOM, scratch, value
+from softreach.kernels.predicates import EPS, ORIENT_BOUND, dot3, edge, end, minor
 
 __all__ = [
     "boundary_faces",
@@ -24,8 +24,8 @@ __all__ = [
     "radius_of_one_region",
 ]
 
-# A determinant this close to its rounding error makes a radius wrong in its 8th digit.
-SLIVER_BOUND = ORIENT_BOUND * 2.0**26
+DIGITS = 2.0**26  # a value this many times its rounding error is good to eight digits
+LENGTH_BOUND = 48 * EPS  # three products of a square and a minor of two products
 
 
 @njit(cache=True, nogil=True)
@@ -43,7 +43,7 @@ def measure_cells(points, cells, radii, volumes):
     """
     w = scratch()
     for t in range(len(cells)):
-        i, j, k, m = cells[t, 0], cells[t, 1], cells[t, 2], cells[t, 3]
+        i, j, k, m = corners(cells, t)
         length, det, sure = sphere(points, i, j, k, m)
         if not sure:
             length, det = sphere_exact(points, i, j, k, m, w)
@@ -67,9 +67,16 @@ def sphere(points, i, j, k, m):
     y = a2 * bc_y + b2 * ca_y + c2 * ab_y
     z = a2 * bc_z + b2 * ca_z + c2 * ab_z
     det = ax * bc_x + ay * bc_y + az * bc_z
-    size = max(abs(ax), abs(bx), abs(cx)) * max(abs(ay), abs(by), abs(cy))
-    size *= max(abs(az), abs(bz), abs(cz))
-    return np.sqrt(x * x + y * y + z * z), det, abs(det) > SLIVER_BOUND * size
+    length = np.sqrt(x * x + y * y + z * z)
+    u = max(abs(ax), abs(bx), abs(cx))
+    v = max(abs(ay), abs(by), abs(cy))
+    w = max(abs(az), abs(bz), abs(cz))
+    length_size = max(a2, b2, c2) * (u * v + v * w + w * u)
+    sure = (
+        abs(det) > DIGITS * ORIENT_BOUND * u * v * w
+        and length > DIGITS * LENGTH_BOUND * length_size
+    )
+    return length, det, sure
 
 
 @njit(cache=True)
@@ -81,29 +88,21 @@ def arrow(points, i, m):
 @njit(cache=True)
 def sphere_exact(points, i, j, k, m, w):
     """`sphere` with each sum exact until its last rounding: a flat cell cancels most digits."""
-    a = edge(w, 0, points, i, m)
+    a = edge(w, BOTTOM, points, i, m)
     b = edge(w, end(a[2]), points, j, m)
     c = edge(w, end(b[2]), points, k, m)
     a2 = dot3(w, end(c[2]), a[0], a[0], a[1], a[1], a[2], a[2])
     b2 = dot3(w, end(a2), b[0], b[0], b[1], b[1], b[2], b[2])
     c2 = dot3(w, end(b2), c[0], c[0], c[1], c[1], c[2], c[2])
-    x, det_x = sphere_component(w, end(c2), a, b, c, a2, b2, c2, 1, 2)
-    y, _ = sphere_component(w, end(c2), a, b, c, a2, b2, c2, 2, 0)
-    z, _ = sphere_component(w, end(c2), a, b, c, a2, b2, c2, 0, 1)
-    return np.sqrt(x * x + y * y + z * z), det_x
-
-
-@njit(cache=True)
-def sphere_component(w, top, a, b, c, a2, b2, c2, u, v):
-    """One component of a² b × c + b² c × a + c² a × b, and a · (b × c) by the same minors."""
-    bc = minor(w, top, b[u], b[v], c[u], c[v])
-    ca = minor(w, end(bc), c[u], c[v], a[u], a[v])
-    ab = minor(w, end(ca), a[u], a[v], b[u], b[v])
-    total = dot3(w, end(ab), a2, bc, b2, ca, c2, ab)
-    component = value(w, total)
-    other = 3 - u - v
-    det = dot3(w, end(ab), a[other], bc, b[other], ca, c[other], ab)
-    return component, value(w, det)
+    square, det = 0.0, 0.0
+    for z in range(3):
+        x, y = (z + 1) % 3, (z + 2) % 3
+        bc = minor(w, end(c2), b[x], b[y], c[x], c[y])
+        ca = minor(w, end(bc), c[x], c[y], a[x], a[y])
+        ab = minor(w, end(ca), a[x], a[y], b[x], b[y])
+        square += value(w, dot3(w, end(ab), a2, bc, b2, ca, c2, ab)) ** 2
+        det = value(w, dot3(w, end(ab), a[z], bc, b[z], ca, c[z], ab))
+    return np.sqrt(square), det
 
 
 @njit(cache=True, nogil=True)

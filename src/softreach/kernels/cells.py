@@ -17,15 +17,16 @@ __all__ = [
     "GHOST",
     "Mesh",
     "compact",
+    "corners",
     "empty_mesh",
+    "face",
     "fill",
     "ghost_slot",
     "grown_mesh",
     "set_first_cell",
 ]
 
-GHOST = -1
-DEAD = -2
+GHOST, DEAD = np.intp(-1), np.intp(-2)  # typed: a literal compiles its functions once more
 # Vertices of the face opposite vertex i, in the order that makes its normal point outwards.
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
@@ -61,19 +62,22 @@ def grown_mesh(mesh, more):
     """A copy with at least ``more`` further slots."""
     size = len(mesh.mark)
     grown = empty_mesh(size + size // 2 + more)
-    grown.cells[:size] = mesh.cells
-    grown.neighbors[:size] = mesh.neighbors
-    grown.mark[:size] = mesh.mark
-    grown.dug[:size] = mesh.dug
-    grown.walls[: 2 * size] = mesh.walls[: 2 * size]
+    for t in range(size):  # loops, as slices of arrays take seconds to compile
+        for i in range(4):
+            grown.cells[t, i] = mesh.cells[t, i]
+            grown.neighbors[t, i] = mesh.neighbors[t, i]
+        grown.mark[t] = mesh.mark[t]
+        grown.dug[t] = mesh.dug[t]
+        grown.walls[2 * t], grown.walls[2 * t + 1] = mesh.walls[2 * t], mesh.walls[2 * t + 1]
     return grown
 
 
 @njit(cache=True)
 def set_first_cell(mesh, start):
     """The first cell and the ghost cells on its four faces; return the number of slots used."""
-    mesh.mark[:5] = -1
+    mesh.mark[0] = -1
     for i in range(4):
+        mesh.mark[i + 1] = -1
         mesh.cells[0, i] = start[i]
         mesh.neighbors[0, i] = i + 1
         for k in range(3):
@@ -81,7 +85,20 @@ def set_first_cell(mesh, start):
             mesh.neighbors[i + 1, k] = FACES[i, k] + 1
         mesh.cells[i + 1, 3] = GHOST
         mesh.neighbors[i + 1, 3] = 0
-    return 5
+    return np.intp(5)
+
+
+@njit(cache=True)
+def corners(cells, t):
+    """The four vertices of cell t."""
+    return np.intp(cells[t, 0]), np.intp(cells[t, 1]), np.intp(cells[t, 2]), np.intp(cells[t, 3])
+
+
+@njit(cache=True)
+def face(cells, t, i):
+    """The vertices of the face of cell t opposite its vertex i, normal outwards."""
+    a, b, c = cells[t, FACES[i, 0]], cells[t, FACES[i, 1]], cells[t, FACES[i, 2]]
+    return np.intp(a), np.intp(b), np.intp(c)
 
 
 @njit(cache=True)
@@ -108,11 +125,12 @@ def fill(mesh, p, n_dug, n_walls, used, free, table):
     size = 1
     while size < 4 * n_walls:
         size *= 2
-    table[0, :size] = -1
+    for k in range(size):
+        table[0, k] = -1
     t = 0
     for k in range(n_walls):
         if free != DEAD:
-            t, free = free, mesh.neighbors[free, 0]
+            t, free = free, np.intp(mesh.neighbors[free, 0])
         else:
             t, used = used, used + 1
             mesh.mark[t] = -1
@@ -120,8 +138,9 @@ def fill(mesh, p, n_dug, n_walls, used, free, table):
         for i in range(3):
             link(mesh, t, i, table, size)
     for k in range(n_dug):
-        bury(mesh, mesh.dug[k], free)
-        free = mesh.dug[k]
+        t_dug = np.intp(mesh.dug[k])
+        bury(mesh, t_dug, free)
+        free = t_dug
     return used, free, t
 
 
@@ -129,11 +148,9 @@ def fill(mesh, p, n_dug, n_walls, used, free, table):
 def join(mesh, old, i, p, t):
     """Make cell t of p and face i of an old cell, and tie it to the cell behind that face."""
     # the outward face turned round: p is on its inner side, so (face, p) is positive
-    mesh.cells[t, 0] = mesh.cells[old, FACES[i, 0]]
-    mesh.cells[t, 1] = mesh.cells[old, FACES[i, 2]]
-    mesh.cells[t, 2] = mesh.cells[old, FACES[i, 1]]
-    mesh.cells[t, 3] = p
-    behind = mesh.neighbors[old, i]
+    a, b, c = face(mesh.cells, old, i)
+    mesh.cells[t, 0], mesh.cells[t, 1], mesh.cells[t, 2], mesh.cells[t, 3] = a, c, b, p
+    behind = np.intp(mesh.neighbors[old, i])
     mesh.neighbors[t, 3] = behind
     mesh.neighbors[behind, slot_of(mesh.neighbors, behind, old)] = t
 

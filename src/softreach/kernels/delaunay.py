@@ -25,9 +25,11 @@ from numba import njit
 
 from softreach.kernels.cells import (
     DEAD,
-    FACES,
+    GHOST,
     compact,
+    corners,
     empty_mesh,
+    face,
     fill,
     ghost_slot,
     grown_mesh,
@@ -44,7 +46,7 @@ from softreach.kernels.predicates import (
 
 __all__ = ["triangulate"]
 
-INSIDE, UNSURE = -1, -2
+INSIDE, UNSURE = np.intp(-1), np.intp(-2)
 
 
 @njit(cache=True, nogil=True)
@@ -65,7 +67,7 @@ def triangulate(points):
         return np.empty((0, 4), np.int32), np.empty((0, 4), np.int32), same
     mesh = empty_mesh(8 * len(points) + 64)
     used = set_first_cell(mesh, start)
-    free, last = DEAD, 0
+    free, last = DEAD, np.intp(0)
     table = np.empty((2, 2048), np.int64)
     for p in range(len(points)):
         if p in start:
@@ -89,20 +91,20 @@ def triangulate(points):
 def first_cell(points, w):
     """Four points that span space, positively oriented; (0, 0, 0, -1) if there are none."""
     n = len(points)
-    b = 1
-    while b < n and equal(points, 0, b):
+    a, b = np.intp(0), np.intp(1)
+    while b < n and equal(points, a, b):
         b += 1
     c = b + 1
-    while c < n and collinear(points, 0, b, c, w):
+    while c < n and collinear(points, a, b, c, w):
         c += 1
     d = c + 1
-    while d < n and orient(points, 0, b, c, d, w) == 0.0:
+    while d < n and orient(points, a, b, c, d, w) == 0.0:
         d += 1
     if d >= n:
-        return 0, 0, 0, -1
-    if orient(points, 0, b, c, d, w) > 0.0:
-        return 0, b, c, d
-    return 0, c, b, d
+        return a, a, a, GHOST
+    if orient(points, a, b, c, d, w) > 0.0:
+        return a, b, c, d
+    return a, c, b, d
 
 
 @njit(cache=True)
@@ -125,8 +127,8 @@ def locate(points, mesh, p, t, w):
     cells, neighbors = mesh.cells, mesh.neighbors
     slot = ghost_slot(cells, t)
     if slot >= 0:
-        t = neighbors[t, slot]
-    came_from, turn = -1, np.uint32(p)
+        t = np.intp(neighbors[t, slot])
+    came_from, turn = GHOST, np.uint32(p)
     while ghost_slot(cells, t) < 0:
         turn = turn * np.uint32(1664525) + np.uint32(1013904223)
         first = np.int64(turn >> np.uint32(30))
@@ -135,7 +137,7 @@ def locate(points, mesh, p, t, w):
             onward = exact_exit(points, cells, p, t, first, w)
         if onward == INSIDE:
             return t
-        came_from, t = t, neighbors[t, onward]
+        came_from, t = t, np.intp(neighbors[t, onward])
     return t
 
 
@@ -146,7 +148,7 @@ def sure_exit(points, cells, neighbors, p, t, came_from, first):
     for k in range(4):
         i = (first + k) & 3
         if neighbors[t, i] != came_from:
-            a, b, c = cells[t, FACES[i, 0]], cells[t, FACES[i, 1]], cells[t, FACES[i, 2]]
+            a, b, c = face(cells, t, i)
             beyond = orient_filter(points, a, b, c, p)
             if beyond > 0.0:
                 return i
@@ -168,7 +170,7 @@ def exact_exit(points, cells, p, t, first, w):
 @njit(cache=True)
 def beyond(points, cells, p, t, i, w):
     """+1 if p lies beyond face i of cell t, 0 in its plane, -1 on the side of the cell."""
-    a, b, c = cells[t, FACES[i, 0]], cells[t, FACES[i, 1]], cells[t, FACES[i, 2]]
+    a, b, c = face(cells, t, i)
     return orient(points, a, b, c, p, w)
 
 
@@ -176,7 +178,7 @@ def beyond(points, cells, p, t, i, w):
 def twin_in(points, mesh, p, t):
     """The vertex of cell t that equals p; -1 if none."""
     for i in range(4):
-        v = mesh.cells[t, i]
+        v = np.intp(mesh.cells[t, i])
         if v >= 0 and equal(points, v, p):
             return v
     return -1
@@ -185,7 +187,7 @@ def twin_in(points, mesh, p, t):
 @njit(cache=True)
 def sure_conflict(points, cells, p, t):
     """+1 if p lies inside the sphere of cell t, -1 if outside, 0 if unsure or a ghost cell."""
-    a, b, c, d = cells[t, 0], cells[t, 1], cells[t, 2], cells[t, 3]
+    a, b, c, d = corners(cells, t)
     return insphere_filter(points, a, b, c, d, p) if (a | b | c | d) >= 0 else 0.0
 
 
@@ -198,8 +200,9 @@ def exact_conflict(points, cells, neighbors, p, t, w):
         within = -beyond(points, cells, p, t, slot, w)
         if within != 0.0:
             return within
-        t = neighbors[t, slot]
-    return insphere(points, cells[t, 0], cells[t, 1], cells[t, 2], cells[t, 3], p, w)
+        t = np.intp(neighbors[t, slot])
+    a, b, c, d = corners(cells, t)
+    return insphere(points, a, b, c, d, p, w)
 
 
 @njit(cache=True)
@@ -210,10 +213,10 @@ def dig(points, mesh, p, start, w):
     dug[0], mark[start] = start, inside
     n_dug, n_walls, at = 1, 0, 0
     while at < n_dug:
-        t = dug[at]
+        t = np.intp(dug[at])
         at += 1
         for i in range(4):
-            u = neighbors[t, i]
+            u = np.intp(neighbors[t, i])
             if mark[u] != inside and mark[u] != outside:
                 within = sure_conflict(points, cells, p, u)
                 if within == 0.0:

@@ -17,9 +17,20 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-__all__ = ["SCRATCH", "add", "difference", "multiply", "scratch", "sign", "subtract", "value"]
+__all__ = [
+    "BOTTOM",
+    "SCRATCH",
+    "add",
+    "difference",
+    "multiply",
+    "scratch",
+    "sign",
+    "subtract",
+    "value",
+]
 
 SCRATCH = 65_536  # floats; an expansion of the predicates has fewer than 1,100 terms
+BOTTOM = np.intp(0)  # typed: a literal 0 would compile every function once more
 SPLITTER = 134_217_729.0  # 2^27 + 1, cuts 53 bits in two halves
 
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 from numba import njit
 
 from softreach.kernels.expansions import (
+    BOTTOM,
     add,
     difference,
     multiply,
@@ -147,7 +148,7 @@ def edge(w, top, points, a, e):
 @njit(cache=True)
 def orient_exact(points, a, b, c, d, w):
     """`orient` without rounding."""
-    ax, ay, az = edge(w, 0, points, a, d)
+    ax, ay, az = edge(w, BOTTOM, points, a, d)
     bx, by, bz = edge(w, end(az), points, b, d)
     cx, cy, cz = edge(w, end(bz), points, c, d)
     bc = minor(w, end(cz), bx, by, cx, cy)
@@ -159,7 +160,7 @@ def orient_exact(points, a, b, c, d, w):
 @njit(cache=True)
 def insphere_exact(points, a, b, c, d, e, w):
     """`insphere` without rounding."""
-    ax, ay, az = edge(w, 0, points, a, e)
+    ax, ay, az = edge(w, BOTTOM, points, a, e)
     bx, by, bz = edge(w, end(az), points, b, e)
     cx, cy, cz = edge(w, end(bz), points, c, e)
     dx, dy, dz = edge(w, end(cz), points, d, e)
@@ -187,7 +188,7 @@ def insphere_exact(points, a, b, c, d, e, w):
 @njit(cache=True)
 def collinear(points, a, b, c, w):
     """Whether three points lie on one line, exactly."""
-    ax, ay, az = edge(w, 0, points, a, c)
+    ax, ay, az = edge(w, BOTTOM, points, a, c)
     bx, by, bz = edge(w, end(az), points, b, c)
     top = end(bz)
     return (

@@ -1,0 +1,167 @@
+"""Hulls of a cloud: ours beside SciPy's Qhull, in one run.
+
+`python benchmarks/bench_geometry.py [n]` prints a Markdown table of time and peak memory, each row
+measured in a process of its own; under pytest-benchmark the same work runs on a small cloud.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+ALPHA = 0.03
+
+
+def arm_cloud(n: int) -> np.ndarray:
+    """Tips of a real arm: strongly non-convex, of very uneven density."""
+    import softreach as sr
+
+    arm = sr.designs.minimal_trunk()
+    return sr.compute_cloud(arm, n=n, seed=0, sampler="uniform").tip.values
+
+
+def ours(points: np.ndarray) -> float:
+    """Alpha-shape volume by our own triangulation."""
+    return _alpha_volume(points, "numba")
+
+
+def scipy_route(points: np.ndarray) -> float:
+    """Alpha-shape volume as one writes it with SciPy."""
+    from scipy.spatial import Delaunay
+
+    corners = points[Delaunay(points).simplices]
+    edges = corners[:, 1:] - corners[:, :1]
+    squares = (edges**2).sum(axis=2)
+    crosses = np.cross(np.roll(edges, -1, axis=1), np.roll(edges, -2, axis=1))
+    six_volumes = np.abs((edges[:, 0] * crosses[:, 0]).sum(axis=1))
+    radii = np.linalg.norm((squares[..., None] * crosses).sum(axis=1), axis=1)
+    return float(six_volumes[radii <= 2.0 * ALPHA * six_volumes].sum() / 6.0)
+
+
+def ours_hull(points: np.ndarray) -> float:
+    """The same with surface, regions and area."""
+    return _shape(points, "numba").hull(ALPHA).volume
+
+
+def ours_with_bias(points: np.ndarray) -> float:
+    """The estimate for infinitely many points, at a radius that the quarter cloud bears."""
+    from softreach.volume import concave_hull
+
+    return concave_hull(points, 0.05 if len(points) > 200_000 else 0.3, bias=True).volume_corrected
+
+
+def qhull_kernels(points: np.ndarray) -> float:
+    """SciPy's triangulation, our kernels after it."""
+    return _alpha_volume(points, "qhull")
+
+
+def ours_curve(points: np.ndarray) -> float:
+    """The volume at a thousand radii."""
+    return float(_shape(points, "numba").volume(np.linspace(0.001, ALPHA, 1000))[-1])
+
+
+def ours_critical(points: np.ndarray) -> float:
+    """The volume at the smallest radius that leaves one region."""
+    shape = _shape(points, "numba")
+    return float(shape.volume(shape.critical_alpha()))
+
+
+def ours_convex(points: np.ndarray) -> float:
+    """Convex hull."""
+    from softreach.volume import convex_hull
+
+    return convex_hull(points).volume
+
+
+def _alpha_volume(points: np.ndarray, method: str) -> float:
+    shape = _shape(points, method)
+    return float(shape.volumes[shape.radii <= ALPHA].sum())
+
+
+def _shape(points: np.ndarray, method: str):
+    from softreach.geometry.alpha_shape import AlphaComplex
+    from softreach.geometry.delaunay import delaunay
+
+    return AlphaComplex(triangulation=delaunay(points, method))
+
+
+ROUTES: dict[str, tuple[str, Callable[[np.ndarray], float]]] = {
+    "scipy": ("SciPy (Qhull), V(α)", scipy_route),
+    "qhull": ("SciPy's triangulation, our kernels after it", qhull_kernels),
+    "ours": ("softreach, V(α)", ours),
+    "hull": ("softreach, hull with surface and regions", ours_hull),
+    "bias": ("softreach, hull and bias estimate at 0.05 L", ours_with_bias),
+    "curve": ("softreach, V at 1000 radii", ours_curve),
+    "critical": ("softreach, critical α and its V", ours_critical),
+    "convex": ("softreach, convex hull", ours_convex),
+}
+
+
+@pytest.mark.parametrize("name", ROUTES)
+def test_hulls(benchmark, name):
+    points = arm_cloud(4000)
+    volume = benchmark(ROUTES[name][1], points)
+    assert volume > 0
+    if name in ("ours", "hull", "curve"):
+        assert volume == pytest.approx(scipy_route(points), rel=1e-9)
+
+
+def measure(name: str, n: int) -> dict[str, float]:
+    """Time and peak memory of one route, in this process."""
+    route = ROUTES[name][1]
+    route(arm_cloud(1000))  # compile or load
+    points = arm_cloud(n)
+    before = _peak_bytes()
+    wall, cpu = time.perf_counter(), time.process_time()
+    volume = route(points)
+    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+    return {"volume": volume, "wall": wall, "cpu": cpu, "memory": _peak_bytes() - before}
+
+
+def _peak_bytes() -> int:
+    unit = 1 if sys.platform == "darwin" else 1024
+    return unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+def measured(name: str, n: int, repeat: int) -> dict[str, float]:
+    """The fastest of some runs, each in a fresh process."""
+    command = [sys.executable, __file__, str(n), "--route", name]
+    runs = [
+        json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+        for _ in range(repeat)
+    ]
+    return min(runs, key=lambda run: run["wall"])
+
+
+def main(n: int = 400_000, repeat: int = 3, names: tuple[str, ...] = tuple(ROUTES)) -> None:
+    """Print the table."""
+    print(f"Hulls of {n:,} points, α = {ALPHA} L, fastest of {repeat}\n")
+    print("| route | V [L³] | wall [s] | CPU [s] | memory [GB] | times faster than SciPy |")
+    print("|---|--:|--:|--:|--:|--:|")
+    slowest = None
+    for name in names:
+        run = measured(name, n, repeat if name not in ("scipy", "qhull") else 1)
+        slowest = slowest or run["wall"]
+        row = f"{run['volume']:.6f} | {run['wall']:.2f} | {run['cpu']:.2f} | "
+        row += f"{run['memory'] / 1e9:.2f} | {slowest / run['wall']:.1f}"
+        print(f"| {ROUTES[name][0]} | {row} |", flush=True)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("n", type=int, nargs="?", default=400_000)
+    parser.add_argument("--route", choices=ROUTES)
+    parser.add_argument("--repeat", type=int, default=3)
+    asked = parser.parse_args()
+    if asked.route:
+        print(json.dumps(measure(asked.route, asked.n)))
+    else:
+        main(asked.n, asked.repeat)
