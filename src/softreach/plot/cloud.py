@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = ["plot_cloud", "point_size", "tips_in_lengths"]
 
+_LARGEST = 8.0  # pixels
+
 
 def plot_cloud(
     cloud: xr.Dataset,
@@ -55,7 +57,8 @@ def plot_cloud(
         coloring = color_samples(cloud, color)
         extent = view_extent(box, view)
         width = image_width(ax, extent)
-        pixels = size or point_size(len(tips), box) * width / (extent.right - extent.left)
+        scale = width / (extent.right - extent.left)
+        pixels = size or min(_LARGEST, point_size(len(tips), box) * scale)
         # small points gain nothing from smoothing; fine steps of color drown in their noise
         buffer = ZBuffer(extent, width, oversample=1 if pixels < 3.5 else 2, color_step=8)
         buffer.draw_points(project(tips, view), coloring.rgb, pixels)
@@ -73,5 +76,5 @@ def tips_in_lengths(cloud: xr.Dataset) -> NDArray[np.float64]:
 
 def point_size(samples: int, box: NDArray[np.float64]) -> float:
     """A diameter that closes the surface of a cloud without blurring it, in units of the box."""
-    spacing = np.ptp(box, axis=0).max() / np.cbrt(max(samples, 1000))
+    spacing = np.ptp(box, axis=0).max() / np.cbrt(max(samples, 1))
     return 0.45 * float(spacing)

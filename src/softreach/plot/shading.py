@@ -13,7 +13,7 @@ __all__ = ["draw_mesh", "shade"]
 Array = NDArray[np.float64]
 
 _LAMP = np.array([-0.45, 0.60, 0.66])  # over the left shoulder: right, up, toward the eye
-_AMBIENT, _DIFFUSE, _GLOSS = 0.42, 0.62, 0.10
+_AMBIENT, _DIFFUSE, _GLOSS = 0.40, 0.62, 0.08
 
 
 def draw_mesh(
@@ -48,7 +48,8 @@ def shade(normals: Array, color: ArrayLike) -> Array:
         color: RGB from 0 to 1.
     """
     facing = np.where(normals[:, 2:] < 0, -normals, normals)
-    light = np.clip(facing @ _LAMP / np.linalg.norm(_LAMP), 0.0, 1.0)[:, None]
+    # from 0 to 1 all around, so that the dark side has a shape too
+    light = (0.5 + 0.5 * (facing @ _LAMP) / np.linalg.norm(_LAMP))[:, None] ** 1.5
     lit = (_AMBIENT + _DIFFUSE * light) * np.asarray(color, float) + _GLOSS * light**12
     return 255 * np.clip(lit, 0.0, 1.0)
 

@@ -37,7 +37,8 @@ def draw_box(ax: Axes, box: Array, view: View, unit: str) -> None:
     eye = view_axes(view)[2]
     far = np.where(eye > 0, box[0], box[1])
     lines = [project(line, view)[:, :2] for line in _wall_lines(box, ticks, far)]
-    ax.add_collection(LineCollection(lines, colors="0.85", linewidths=0.5, zorder=1))
+    walls = LineCollection(lines, colors="0.85", linewidths=0.5, zorder=1, clip_on=False)
+    ax.add_collection(walls)
     for axis in range(3):
         _label_edge(ax, box, view, edges[axis], ticks[axis], f"{'xyz'[axis]} {unit}")
     ax.set_axis_off()

@@ -125,19 +125,29 @@ def _keys(depth: Array, colors: NDArray[np.uint8]) -> Keys:
 
 
 def _grown(layer: Keys, diameter: float) -> Keys:
-    """Every pixel takes the largest key of a disc around it."""
+    """Every pixel takes the largest key of a disc around it: of centers within the radius.
+
+    The disc is built of rows from its narrow ends to its wide middle, so that each row only widens
+    the one before; that takes as many passes as the disc is high, not as it has pixels.
+    """
     reach = int(diameter / 2)
-    result = layer.copy()
-    rows, columns = layer.shape
-    for dy in range(-reach, reach + 1):
-        for dx in range(-reach, reach + 1):
-            # the disc holds the pixels whose centers are nearer than its radius
-            if (dx, dy) == (0, 0) or 4 * (dx * dx + dy * dy) > diameter * diameter:
-                continue
-            to = slice(max(dy, 0), rows + min(dy, 0)), slice(max(dx, 0), columns + min(dx, 0))
-            of = slice(max(-dy, 0), rows - max(dy, 0)), slice(max(-dx, 0), columns - max(dx, 0))
-            np.maximum(result[to], layer[of], out=result[to])
+    result, row, half = layer.copy(), layer.copy(), 0
+    for dy in range(reach, -1, -1):
+        width = int(np.sqrt(diameter * diameter / 4 - dy * dy))
+        for dx in range(half + 1, width + 1):
+            _raise(row.T, layer.T, dx)
+        half = width
+        _raise(result, row, dy)
     return result
+
+
+def _raise(target: Keys, source: Keys, shift: int) -> None:
+    """The larger of target and source moved down, and moved up, by some rows; in place."""
+    if shift >= len(source):
+        return
+    stop = len(source) - shift
+    np.maximum(target[shift:], source[:stop], out=target[shift:])
+    np.maximum(target[:stop], source[shift:], out=target[:stop])
 
 
 def _rounded(rgba: NDArray[np.uint8], step: int) -> NDArray[np.uint8]:

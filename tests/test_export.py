@@ -1,0 +1,252 @@
+"""Laws of exports: what a format's own reader finds is what was written, whole or not at all."""
+
+from __future__ import annotations
+
+import importlib
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.io import loadmat
+
+import softreach as sr
+from softreach.errors import InvalidInput, MissingExtra
+from softreach.export import export_arm, export_cloud, export_mesh
+from softreach.export.table import column_names
+
+meshio = pytest.importorskip("meshio")
+trimesh = pytest.importorskip("trimesh")
+csv = pytest.importorskip("pyarrow.csv")
+parquet = pytest.importorskip("pyarrow.parquet")
+
+COLUMNS = ["x", "y", "z", "gamma_left", "gamma_right", "gamma_longitudinal"]
+
+
+@pytest.fixture(scope="module")
+def cloud(trunk):
+    return sr.compute_cloud(trunk, n=300, seed=5)
+
+
+@pytest.fixture(scope="module")
+def bent(trunk):
+    return sr.configuration(trunk, [-1.2, -0.3, -0.8], stations=41)
+
+
+@pytest.fixture(scope="module")
+def expected(cloud):
+    return dict(zip(COLUMNS, [*cloud.tip.values.T, *cloud.activation.values.T], strict=True))
+
+
+@pytest.fixture(scope="module")
+def ball():
+    return trimesh.creation.icosphere(3, radius=0.4)
+
+
+def left_over(folder, *known):
+    return {p.name for p in folder.iterdir()} - set(known)
+
+
+class TestCloud:
+    def test_csv_reads_back_equal(self, cloud, expected, tmp_path):
+        export_cloud(cloud, tmp_path / "cloud.csv")
+        table = csv.read_csv(tmp_path / "cloud.csv")
+        assert table.column_names == COLUMNS
+        for name, values in expected.items():
+            np.testing.assert_array_equal(table[name].to_numpy(), values)
+
+    def test_parquet_reads_back_equal_with_its_description(self, cloud, expected, tmp_path):
+        export_cloud(cloud, tmp_path / "cloud.parquet")
+        table = parquet.read_table(tmp_path / "cloud.parquet")
+        for name, values in expected.items():
+            np.testing.assert_array_equal(table[name].to_numpy(), values)
+        assert table.schema.metadata[b"design"].decode() == cloud.attrs["design"]
+        assert table.schema.metadata[b"seed"] == b"5"
+        assert table.schema.field("x").metadata[b"units"] == b"m"
+
+    def test_npz_reads_back_equal_without_pickle(self, cloud, tmp_path):
+        export_cloud(cloud, tmp_path / "cloud.npz")
+        with np.load(tmp_path / "cloud.npz", allow_pickle=False) as data:
+            np.testing.assert_array_equal(data["tip"], cloud.tip)
+            np.testing.assert_array_equal(data["activation"], cloud.activation)
+            assert list(data["fiber"]) == ["left", "right", "longitudinal"]
+            assert str(data["design"]) == cloud.attrs["design"]
+            assert int(data["seed"]) == 5
+            assert str(data["tip_units"]) == "m"
+
+    def test_mat_reads_back_equal(self, cloud, tmp_path):
+        export_cloud(cloud, tmp_path / "cloud.mat")
+        data = loadmat(tmp_path / "cloud.mat", simplify_cells=True)
+        np.testing.assert_array_equal(data["tip"], cloud.tip)
+        np.testing.assert_array_equal(data["activation"], cloud.activation)
+        assert list(data["fiber"]) == ["left", "right", "longitudinal"]
+        assert data["metadata"]["design"] == cloud.attrs["design"]
+        assert data["metadata"]["seed"] == 5
+
+    @pytest.mark.parametrize("suffix", ["vtu", "vtk"])
+    def test_vtk_reads_back_equal(self, suffix, cloud, expected, tmp_path):
+        export_cloud(cloud, tmp_path / f"cloud.{suffix}")
+        mesh = meshio.read(tmp_path / f"cloud.{suffix}")
+        np.testing.assert_array_equal(mesh.points, cloud.tip)
+        for name in COLUMNS[3:]:
+            np.testing.assert_array_equal(np.ravel(mesh.point_data[name]), expected[name])
+
+    def test_ply_reads_back_equal_with_activations_and_design(self, cloud, expected, tmp_path):
+        export_cloud(cloud, tmp_path / "cloud.ply")
+        points = trimesh.load(tmp_path / "cloud.ply")
+        np.testing.assert_array_equal(points.vertices, cloud.tip)
+        data = meshio.read(tmp_path / "cloud.ply").point_data
+        for name in COLUMNS[3:]:
+            np.testing.assert_array_equal(data[name], expected[name])
+        header = (tmp_path / "cloud.ply").read_bytes().partition(b"end_header")[0].decode("ascii")
+        prefix = "comment design: "
+        design = [k.removeprefix(prefix) for k in header.split("\n") if k.startswith(prefix)]
+        assert design == cloud.attrs["design"].splitlines()
+        assert "comment seed: 5" in header
+
+    def test_ply_colors_are_the_relative_activations(self, cloud, tmp_path):
+        export_cloud(cloud, tmp_path / "cloud.ply")
+        rgb = trimesh.load(tmp_path / "cloud.ply").colors[:, :3]
+        gamma = np.abs(cloud.activation.values)
+        np.testing.assert_array_equal(rgb, np.rint(255 * gamma / gamma.max()))
+
+    def test_blocks_do_not_show_in_the_result(self, cloud, tmp_path, monkeypatch):
+        export_cloud(cloud, tmp_path / "whole.ply")
+        export_cloud(cloud, tmp_path / "whole.csv")
+        monkeypatch.setattr("softreach.export.table._BLOCK", 7)
+        export_cloud(cloud, tmp_path / "blocks.ply")
+        export_cloud(cloud, tmp_path / "blocks.csv")
+        for suffix in ("ply", "csv"):
+            whole, blocks = (tmp_path / f"{name}.{suffix}" for name in ("whole", "blocks"))
+            assert whole.read_bytes() == blocks.read_bytes()
+
+    @pytest.mark.parametrize("suffix", ["ply", "csv", "parquet", "npz", "mat"])
+    def test_a_cloud_without_samples_is_an_empty_file_of_its_kind(self, suffix, cloud, tmp_path):
+        export_cloud(cloud.isel(sample=slice(0)), tmp_path / f"none.{suffix}")
+        assert (tmp_path / f"none.{suffix}").stat().st_size > 0
+
+    def test_other_datasets_and_too_large_ones_are_refused(self, cloud, tmp_path, monkeypatch):
+        with pytest.raises(InvalidInput, match="tip and activation"):
+            export_cloud(cloud.drop_vars("tip"), tmp_path / "cloud.csv")
+        monkeypatch.setattr("softreach.export.cloud._MAT_LIMIT", 1000)
+        with pytest.raises(InvalidInput, match="parquet"):
+            export_cloud(cloud, tmp_path / "cloud.mat")
+        assert not left_over(tmp_path)
+
+
+@given(st.lists(st.text(max_size=8), max_size=6))
+def test_column_names_are_different_and_safe_in_every_language(names):
+    columns = column_names(names)
+    assert len(set(columns)) == len(names)
+    assert all(column.isidentifier() and column.isascii() for column in columns)
+
+
+class TestMesh:
+    @pytest.mark.parametrize("suffix", ["ply", "stl", "obj", "glb"])
+    def test_every_mesh_format_keeps_the_volume(self, suffix, ball, tmp_path):
+        export_mesh(ball, tmp_path / f"hull.{suffix}")
+        mesh = trimesh.load(tmp_path / f"hull.{suffix}", force="mesh")
+        assert mesh.is_watertight
+        assert mesh.volume == pytest.approx(ball.volume, rel=1e-6)
+
+    @pytest.mark.parametrize("suffix", ["vtu", "vtk"])
+    def test_vtk_keeps_vertices_and_faces(self, suffix, ball, tmp_path):
+        export_mesh((ball.vertices, ball.faces), tmp_path / f"hull.{suffix}")
+        mesh = meshio.read(tmp_path / f"hull.{suffix}")
+        np.testing.assert_array_equal(mesh.points, ball.vertices)
+        np.testing.assert_array_equal(mesh.cells_dict["triangle"], ball.faces)
+
+    @pytest.mark.parametrize(("suffix", "digits"), [("ply", 15), ("obj", 11)])
+    def test_vertices_are_exact_where_the_format_is(self, suffix, digits, ball, tmp_path):
+        export_mesh(ball, tmp_path / f"hull.{suffix}")
+        mesh = trimesh.load(tmp_path / f"hull.{suffix}", process=False)
+        np.testing.assert_allclose(mesh.vertices, ball.vertices, atol=10.0**-digits)
+        np.testing.assert_array_equal(mesh.faces, ball.faces)
+
+    def test_gltf_stands_upright_in_its_own_axes(self, trunk, bent, tmp_path):
+        """What points along our z points along y, which is up there."""
+        box = trimesh.creation.box(bounds=[[0, 0, 0], [1, 2, 3]])
+        export_mesh(box, tmp_path / "box.glb")
+        bounds = trimesh.load(tmp_path / "box.glb").bounds
+        np.testing.assert_allclose(bounds, [[0, 0, -2], [1, 3, 0]], atol=1e-6)
+
+    def test_nothing_to_write_is_refused(self, tmp_path):
+        with pytest.raises(InvalidInput, match="one triangle"):
+            export_mesh((np.zeros((3, 3)), np.zeros((0, 3), int)), tmp_path / "hull.ply")
+
+
+class TestArm:
+    def test_gltf_holds_named_closed_parts_in_their_colors(self, trunk, bent, tmp_path):
+        export_arm(trunk, bent, tmp_path / "arm.glb")
+        parts = trimesh.load(tmp_path / "arm.glb").geometry
+        assert list(parts) == ["body", "left", "right", "longitudinal"]
+        assert all(part.is_watertight for part in parts.values())
+        colors = [parts[n].visual.material.baseColorFactor[:3].argmax() for n in list(parts)[1:]]
+        assert colors == [0, 1, 2]  # red, green, blue
+
+    def test_obj_holds_named_parts(self, trunk, bent, tmp_path):
+        export_arm(trunk, bent, tmp_path / "arm.obj")
+        lines = (tmp_path / "arm.obj").read_text().splitlines()
+        names = [line[2:] for line in lines if line.startswith("o ")]
+        assert names == ["body", "left", "right", "longitudinal"]
+        assert not left_over(tmp_path, "arm.obj")
+
+    @pytest.mark.parametrize("suffix", ["ply", "stl", "obj", "glb"])
+    def test_all_formats_hold_the_same_solid(self, suffix, trunk, bent, tmp_path):
+        export_arm(trunk, bent, tmp_path / "arm.vtk")
+        export_arm(trunk, bent, tmp_path / f"arm.{suffix}")
+        plain = meshio.read(tmp_path / "arm.vtk")
+        reference = trimesh.Trimesh(plain.points, plain.cells_dict["triangle"], process=False)
+        mesh = trimesh.load(tmp_path / f"arm.{suffix}", force="mesh", process=False)
+        assert mesh.volume == pytest.approx(reference.volume, rel=1e-5)
+        assert set(np.unique(plain.cell_data["part"][0])) == {0, 1, 2, 3}
+
+    def test_bundles_of_one_name_become_different_parts(self, trunk, bent, tmp_path):
+        twins = trunk.replace(fibers=tuple(f.replace(name="body") for f in trunk.fibers))
+        export_arm(twins, bent, tmp_path / "arm.glb")
+        assert len(trimesh.load(tmp_path / "arm.glb").geometry) == 4
+
+
+class TestWhole:
+    @pytest.mark.parametrize("stop", [KeyboardInterrupt, OSError])
+    def test_an_interrupted_write_leaves_the_old_file_alone(
+        self, stop, cloud, tmp_path, monkeypatch
+    ):
+        path = tmp_path / "cloud.ply"
+        path.write_text("old")
+
+        def fail(file, *_):
+            file.write_text("half")
+            raise stop
+
+        monkeypatch.setattr("softreach.export.ply.write_points", fail)
+        with pytest.raises(stop):
+            export_cloud(cloud, path)
+        assert path.read_text() == "old"
+        assert not left_over(tmp_path, "cloud.ply")
+
+    def test_an_unknown_suffix_names_the_known_ones(self, trunk, cloud, ball, bent, tmp_path):
+        with pytest.raises(InvalidInput, match=r"\.ply, \.csv, \.parquet, \.npz, \.mat"):
+            export_cloud(cloud, tmp_path / "cloud.xls")
+        with pytest.raises(InvalidInput, match=r"\.ply, \.stl, \.obj, \.glb"):
+            export_mesh(ball, tmp_path / "hull")
+        with pytest.raises(InvalidInput, match=r"\.glb"):
+            export_arm(trunk, bent, tmp_path / "arm.step")
+
+    @pytest.mark.parametrize(
+        ("suffix", "library"), [("csv", "pyarrow"), ("vtu", "meshio"), ("parquet", "pyarrow")]
+    )
+    def test_a_missing_library_is_named_with_its_extra(
+        self, suffix, library, cloud, tmp_path, monkeypatch
+    ):
+        real = importlib.import_module
+
+        def refuse(name, *args):
+            if name.split(".")[0] == library:
+                raise ModuleNotFoundError(name=name)
+            return real(name, *args)
+
+        monkeypatch.setattr(importlib, "import_module", refuse)
+        with pytest.raises(MissingExtra, match=rf"{library}.*softreach\[export\]"):
+            export_cloud(cloud, tmp_path / f"cloud.{suffix}")
+        assert not left_over(tmp_path)
