@@ -12,7 +12,6 @@ from hypothesis import given
 
 import softreach as sr
 from softreach import designs
-from softreach.design_file import design_from_toml, design_to_toml
 from softreach.report import describe, design_warnings
 from tests.laws import arm_of, arms, single
 
@@ -113,7 +112,7 @@ def test_revolution_and_helical_angle_say_the_same(arm):
 
 @given(arm=arms())
 def test_a_design_survives_a_file_to_the_last_bit(arm):
-    assert design_from_toml(design_to_toml(arm)) == arm
+    assert sr.Manipulator.from_toml(arm.to_toml()) == arm
 
 
 def test_a_saved_design_loads_equal_and_nothing_is_left_beside_it(tmp_path, trunk):
@@ -150,7 +149,7 @@ helical_angle_deg = 3.0
 
 def test_every_fault_of_a_file_is_reported_with_its_key_value_and_what_is_allowed():
     with pytest.raises(sr.InvalidDesign) as error:
-        design_from_toml(BAD_FILE, source="bad.toml")
+        sr.Manipulator.from_toml(BAD_FILE, source="bad.toml")
     lines = str(error.value).splitlines()
     assert lines[0] == "bad.toml: 12 problems"
     for expected in (
@@ -174,7 +173,7 @@ def test_every_fault_of_a_file_is_reported_with_its_key_value_and_what_is_allowe
 @pytest.mark.parametrize("text", ["", "fibers = 3", "x =", "fibers = [1]", "taper_deg = [[1]]"])
 def test_no_text_makes_the_reader_crash(text):
     with pytest.raises(sr.InvalidDesign):
-        design_from_toml(text)
+        sr.Manipulator.from_toml(text)
 
 
 def test_bundle_geometry_follows_the_architecture():

@@ -1,7 +1,8 @@
 """softreach: where a soft slender robot can go.
 
-From a design (a tapered arm with contractile fibers) to its reachability cloud, its reachable volume
-and its blind spots. Public names load at first use, so that importing softreach costs nothing.
+From a design (a tapered arm with contractile fibers) to its reachability cloud, its reachable
+volume and its blind spots. Public names load at first use, so that importing softreach costs
+nothing.
 """
 
 import lazy_loader

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from softreach import parallel, progress, schema
 from softreach.atomic import replacing
-from softreach.design_file import design_from_toml
 from softreach.errors import InvalidInput
 from softreach.kinematics import BLOCK, tip_task
 from softreach.manipulator import Manipulator
@@ -38,8 +37,8 @@ def compute_cloud(
 ) -> xr.Dataset:
     """Sample the activation box and compute the tip of each sample (section 3).
 
-    The result depends on the design, n, seed, sampler and tol alone: not on threads or blocks. Memory
-    is the result's own, (3 + bundles) 8 bytes a sample, and a few blocks.
+    The result depends on the design, n, seed, sampler and tol alone: not on threads or blocks.
+    Memory is the result's own, (3 + bundles) 8 bytes a sample, and a few blocks.
 
     Args:
         arm: The design.
@@ -98,7 +97,7 @@ def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
 
 def design_of(cloud: xr.Dataset) -> Manipulator:
     """The design that a cloud or configuration was computed from."""
-    return design_from_toml(cloud.attrs["design"], source="the cloud's design")
+    return Manipulator.from_toml(cloud.attrs["design"], source="the cloud's design")
 
 
 _LONG = 5_000_000  # samples from which a bar is worth its lines

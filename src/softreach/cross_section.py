@@ -1,7 +1,7 @@
 """What one fiber does to the cross-section that it pulls on: the theory's radial integrals.
 
-The paper prints closed forms (Appendix A) that are singular at φ = 0, α = 0 and α = ±φ, need complex
-numbers, and hold a misprint in δ3. They are the integrals below, which have none of that:
+The paper prints closed forms (Appendix A) that are singular at φ = 0, α = 0 and α = ±φ, need
+complex numbers, and hold a misprint in δ3. They are the integrals below, which have none of that:
 δ0 = 4 R2² I0, δ1 = δ2 = 6 R2³ I1, δ3 = 6 R2³ I3.
 """
 

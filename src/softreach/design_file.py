@@ -8,18 +8,14 @@ import math
 import tomllib
 from collections.abc import Iterator, Mapping
 from decimal import Decimal
-from os import PathLike, fspath
-from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from softreach.atomic import replacing
+from softreach.checks import arm_faults, fiber_faults
 from softreach.errors import Fault, InvalidDesign, Range
-from softreach.fiber import FiberArchitecture, fiber_faults
-from softreach.manipulator import Manipulator, manipulator_faults
 
-__all__ = ["design_from_toml", "design_to_toml", "load_design", "save_design"]
+__all__ = ["in_file_terms", "parse", "render"]
 
 _PI = Decimal("3.14159265358979323846264338327950288420")
 _LONG = 17  # digits from which a number of degrees is read exactly
@@ -63,24 +59,12 @@ class _Decimal(float):
     text: str
 
 
-def load_design(path: str | PathLike[str]) -> Manipulator:
-    """Read a design file.
+def parse(text: str, source: str) -> dict[str, Any]:
+    """The fields of a design, in SI units, from TOML text; `fibers` is a list of such fields.
 
-    Raises:
-        InvalidDesign: Every fault of the file, with its key, value and what is allowed.
-        OSError: The file cannot be read.
-    """
-    return design_from_toml(Path(path).read_text(encoding="utf-8"), source=fspath(path))
-
-
-def save_design(arm: Manipulator, path: str | PathLike[str]) -> None:
-    """Write a design file that reads back to an equal design; an old file is replaced whole."""
-    with replacing(path) as partial:
-        partial.write_text(design_to_toml(arm), encoding="utf-8")
-
-
-def design_from_toml(text: str, source: str = "design") -> Manipulator:
-    """Read a design from TOML text; `source` is what errors call it.
+    Args:
+        text: The text of a design file.
+        source: What errors call it.
 
     Raises:
         InvalidDesign: Every fault of the text, with its key, value and what is allowed.
@@ -90,40 +74,41 @@ def design_from_toml(text: str, source: str = "design") -> Manipulator:
     except tomllib.TOMLDecodeError as error:
         raise InvalidDesign([Fault("TOML", str(error), "must be valid TOML")], source) from None
     faults = list(_table_faults(document))
-    blamed = {fault.path for fault in faults}
-    faults += _physics_faults(document, blamed)
+    faults += _physics_faults(document, {fault.path for fault in faults})
     if faults:
         raise InvalidDesign(faults, source)
-    try:
-        return _manipulator(document)
-    except InvalidDesign as error:
-        raise InvalidDesign([_in_file_terms(f, "") for f in error.faults], source) from None
+    values = _in_si(document)
+    values["fibers"] = [_in_si(table) for table in document["fibers"]]
+    return values
 
 
-def design_to_toml(arm: Manipulator) -> str:
-    """The design as TOML text, every number such that it reads back to the same one."""
-    bounds = json.dumps(arm.activation_bounds)
+def render(values: Mapping[str, Any]) -> str:
+    """TOML text of the fields of a design, every number such that it reads back to the same one."""
     lines = [
-        f"length_m = {arm.length!r}",
-        f"outer_radius_m = {arm.outer_radius!r}",
-        f"inner_radius_m = {arm.inner_radius!r}",
-        f"taper_deg = {_degrees_text(arm.taper)}",
-        f"poisson_ratio = {arm.poisson_ratio!r}",
-        f"activation_bounds = {bounds}",
+        f"length_m = {values['length']!r}",
+        f"outer_radius_m = {values['outer_radius']!r}",
+        f"inner_radius_m = {values['inner_radius']!r}",
+        f"taper_deg = {_degrees_text(values['taper'])}",
+        f"poisson_ratio = {values['poisson_ratio']!r}",
+        f"activation_bounds = {json.dumps(values['activation_bounds'])}",
     ]
-    for fiber in arm.fibers:
+    for fiber in values["fibers"]:
         lines += ["", "[[fibers]]", *_fiber_lines(fiber)]
     return "\n".join(lines) + "\n"
 
 
-def _fiber_lines(fiber: FiberArchitecture) -> Iterator[str]:
-    if fiber.name:
-        yield f"name = {json.dumps(fiber.name)}"
-    for key in ("helical_angle", "revolution", "offset", "extent"):
-        angle = getattr(fiber, key)
-        if angle is not None:
-            yield f"{key}_deg = {_degrees_text(angle)}"
-    yield f"bundles = {fiber.bundles}"
+def in_file_terms(error: InvalidDesign, source: str) -> InvalidDesign:
+    """The same faults under the file's keys and in its units."""
+    return InvalidDesign([_in_file_terms(fault, "") for fault in error.faults], source)
+
+
+def _fiber_lines(fiber: Mapping[str, Any]) -> Iterator[str]:
+    if fiber["name"]:
+        yield f"name = {json.dumps(fiber['name'], ensure_ascii=False)}"
+    for field in ("helical_angle", "revolution", "offset", "extent"):
+        if fiber[field] is not None:
+            yield f"{field}_deg = {_degrees_text(fiber[field])}"
+    yield f"bundles = {fiber['bundles']}"
 
 
 def _table_faults(document: Mapping[str, Any]) -> Iterator[Fault]:
@@ -160,34 +145,26 @@ def _dotted(location: list[Any]) -> str:
 
 def _physics_faults(document: Mapping[str, Any], blamed: set[str]) -> Iterator[Fault]:
     """Ranges and relations, over every value that its type does not already disqualify."""
-    values = {_field(k): _si(k, v) for k, v in document.items() if k in _DesignTable.model_fields}
-    sound = {name: value for name, value in values.items() if _key(name) not in blamed}
+    unsound = {path.partition("[")[0] for path in blamed} - {"fibers"}
+    values = _in_si({key: document[key] for key in document if key in _DesignTable.model_fields})
+    sound = {name: value for name, value in values.items() if _key(name) not in unsound}
     tables = sound.pop("fibers", None)
+    yield from (_in_file_terms(fault, "") for fault in arm_faults(sound))
     if tables == []:
         yield Fault("fibers", [], "must hold one [[fibers]] table or more")
-    if any(path.startswith("activation_bounds") for path in blamed):
-        sound.pop("activation_bounds", None)
-    yield from (_in_file_terms(fault, "") for fault in manipulator_faults(sound))
-    for k, table in enumerate(tables or []):
-        prefix = f"fibers[{k}]."
-        if not isinstance(table, dict):
-            continue
-        known = {
-            key: table.get(key, field.default) for key, field in _FiberTable.model_fields.items()
-        }
-        sound_keys = {
-            _field(key): _si(key, v) for key, v in known.items() if prefix + key not in blamed
-        }
-        yield from (_in_file_terms(fault, prefix) for fault in fiber_faults(sound_keys))
+    for k, table in enumerate(tables if isinstance(tables, list) else []):
+        if isinstance(table, dict):
+            yield from _fiber_table_faults(table, f"fibers[{k}].", blamed)
 
 
-def _manipulator(document: Mapping[str, Any]) -> Manipulator:
-    values = {_field(key): _si(key, value) for key, value in document.items()}
-    fibers = [
-        FiberArchitecture(**{_field(key): _si(key, value) for key, value in table.items()})
-        for table in values.pop("fibers")
-    ]
-    return Manipulator(fibers=tuple(fibers), **values)
+def _fiber_table_faults(table: dict[str, Any], prefix: str, blamed: set[str]) -> Iterator[Fault]:
+    known = {key: table.get(key, field.default) for key, field in _FiberTable.model_fields.items()}
+    sound = _in_si({key: known[key] for key in known if prefix + key not in blamed})
+    yield from (_in_file_terms(fault, prefix) for fault in fiber_faults(sound))
+
+
+def _in_si(table: Mapping[str, Any]) -> dict[str, Any]:
+    return {_field(key): _si(key, value) for key, value in table.items()}
 
 
 _KEYS = {

@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
-from softreach.errors import Fault, InvalidDesign, Range
+from softreach.checks import FIBER_RANGES, fiber_faults, plain_number
+from softreach.errors import InvalidDesign
 
 __all__ = ["FiberArchitecture"]
-
-_RANGES = {
-    "helical_angle": Range(-math.pi / 2, math.pi / 2, "rad", open_low=True, open_high=True),
-    "revolution": Range(unit="rad"),
-    "offset": Range(unit="rad"),
-    "extent": Range(0.0, 2 * math.pi, "rad", open_low=True),
-    "bundles": Range(low=1, whole=True),
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +38,7 @@ class FiberArchitecture:
     def __post_init__(self) -> None:
         if faults := fiber_faults(vars(self)):
             raise InvalidDesign(faults)
-        for field in _RANGES:
+        for field in FIBER_RANGES:
             object.__setattr__(self, field, plain_number(getattr(self, field)))
 
     def replace(self, **changes: Any) -> Self:
@@ -57,33 +48,3 @@ class FiberArchitecture:
         if changes.get("revolution") is not None:
             changes.setdefault("helical_angle", None)
         return replace(self, **changes)
-
-
-def plain_number(value: Any) -> Any:
-    """A Python number for a NumPy scalar; anything else as it is."""
-    return value.item() if hasattr(value, "item") and getattr(value, "ndim", 0) == 0 else value
-
-
-def range_faults(values: Mapping[str, Any], ranges: Mapping[str, Range]) -> list[Fault]:
-    """A fault for each value outside its range; None is skipped."""
-    faults = []
-    for name, allowed in ranges.items():
-        value = plain_number(values.get(name))
-        if value is not None and not allowed.admits(value):
-            faults.append(Fault(name, value, allowed))
-    return faults
-
-
-def fiber_faults(values: Mapping[str, Any]) -> list[Fault]:
-    """Everything wrong with the fields of one architecture; absent fields are not judged."""
-    faults = range_faults(values, _RANGES)
-    if {"helical_angle", "revolution"} <= values.keys():
-        faults += _winding_faults(values["helical_angle"], values["revolution"])
-    return faults
-
-
-def _winding_faults(angle: float | None, revolution: float | None) -> list[Fault]:
-    if (angle is None) != (revolution is None):
-        return []
-    allowed = "give exactly one of helical_angle and revolution (0 for a longitudinal fiber)"
-    return [Fault("helical_angle, revolution", (angle, revolution), allowed)]

@@ -3,31 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from os import PathLike
+from os import PathLike, fspath
+from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach import cross_section, taper
-from softreach.errors import Fault, InvalidDesign, InvalidInput, Range
-from softreach.fiber import FiberArchitecture, plain_number, range_faults
+from softreach import cross_section, design_file, taper
+from softreach.atomic import replacing
+from softreach.checks import ARM_RANGES, arm_faults, plain_number
+from softreach.errors import Fault, InvalidDesign, InvalidInput
+from softreach.fiber import FiberArchitecture
 
-__all__ = ["Manipulator", "manipulator_faults"]
+__all__ = ["Manipulator"]
 
 Array = NDArray[np.float64]
 Bounds = tuple[float, float] | tuple[tuple[float, float], ...]
-
-_RANGES = {
-    "length": Range(0.0, unit="m", open_low=True),
-    "outer_radius": Range(0.0, unit="m", open_low=True),
-    "inner_radius": Range(0.0, unit="m"),
-    "taper": Range(-math.pi / 2, math.pi / 2, "rad", open_low=True, open_high=True),
-    "poisson_ratio": Range(0.0, 0.5),
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,9 +51,9 @@ class Manipulator:
     """(lower, upper) of γ for every bundle, or one pair per bundle [-]; γ < 0 contracts."""
 
     def __post_init__(self) -> None:
-        if faults := manipulator_faults(vars(self)):
+        if faults := _faults(self):
             raise InvalidDesign(faults)
-        for field in _RANGES:
+        for field in ARM_RANGES:
             object.__setattr__(self, field, float(plain_number(getattr(self, field))))
         object.__setattr__(self, "fibers", tuple(self.fibers))
         object.__setattr__(self, "activation_bounds", _plain_bounds(self.activation_bounds))
@@ -70,21 +65,37 @@ class Manipulator:
         return replace(self, **changes)
 
     @classmethod
-    def load(cls, path: str | PathLike[str]) -> Manipulator:
-        """Read a design from a TOML file (lengths in m, angles in degrees).
+    def from_toml(cls, text: str, source: str = "design") -> Self:
+        """A design from the text of a file; `source` is what errors call it.
+
+        Raises:
+            InvalidDesign: The text's faults, all of them, in the file's own names and units.
+        """
+        values = design_file.parse(text, source)
+        try:
+            fibers = tuple(FiberArchitecture(**fiber) for fiber in values.pop("fibers"))
+            return cls(fibers=fibers, **values)
+        except InvalidDesign as error:
+            raise design_file.in_file_terms(error, source) from None
+
+    def to_toml(self) -> str:
+        """The design as the text of a file, from which `from_toml` makes an equal one."""
+        return design_file.render(asdict(self))
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Self:
+        """Read a design file (TOML, lengths in m, angles in degrees).
 
         Raises:
             InvalidDesign: The file's faults, all of them, in the file's own names and units.
+            OSError: The file cannot be read.
         """
-        from softreach.design_file import load_design
-
-        return load_design(path)
+        return cls.from_toml(Path(path).read_text(encoding="utf-8"), source=fspath(path))
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the design as a TOML file that `load` reads back to the same value."""
-        from softreach.design_file import save_design
-
-        save_design(self, path)
+        """Write a design file; an older one is replaced whole."""
+        with replacing(path) as partial:
+            partial.write_text(self.to_toml(), encoding="utf-8")
 
     @property
     def radius_ratio(self) -> float:
@@ -163,48 +174,17 @@ class Manipulator:
         if gamma.ndim != 2 or gamma.shape[1] != self.bundles:
             allowed = f"of shape (n, {self.bundles}), one column per bundle"
             raise InvalidInput("activations.shape", gamma.shape, allowed)
-        if not np.isfinite(gamma).all():
+        if gamma.size and not np.isfinite([gamma.min(), gamma.max()]).all():
             row = int(np.flatnonzero(~np.isfinite(gamma).all(axis=1))[0])
             raise InvalidInput(f"activations[{row}]", gamma[row], "finite numbers")
         return gamma
 
 
-def manipulator_faults(values: Mapping[str, Any]) -> list[Fault]:
-    """Everything wrong with the fields of a design; fields that are absent are not judged.
-
-    This serves the constructor and the file reader alike, so that a file with one unreadable key
-    still hears of all its other faults.
-    """
-    faults = range_faults(values, _RANGES)
-    blamed = {fault.path for fault in faults}
-    sound = {name: values[name] for name in values if name not in blamed}
-    faults += _radius_faults(**{name: plain_number(sound.get(name)) for name in _RANGES})
-    fiber_trouble = _fibers_faults(sound["fibers"]) if "fibers" in sound else []
-    faults += fiber_trouble
-    if "activation_bounds" in sound:
-        fibers = None if fiber_trouble else sound.get("fibers")
-        faults += _bounds_faults(sound["activation_bounds"], fibers)
-    return faults
-
-
-def _radius_faults(
-    length: float | None,
-    outer_radius: float | None,
-    inner_radius: float | None,
-    taper: float | None,
-    **_: object,
-) -> Iterator[Fault]:
-    if outer_radius is not None and inner_radius is not None and inner_radius >= outer_radius:
-        yield Fault(
-            "inner_radius", inner_radius, f"must be below outer_radius = {outer_radius:g} m"
-        )
-    if length is None or outer_radius is None or taper is None:
-        return
-    tip = outer_radius - length * math.tan(taper)
-    if tip <= 0:
-        limit = math.atan(outer_radius / length)
-        allowed = f"leaves no tip (R2(L) = {tip:.4g} m)"
-        yield Fault("taper", taper, f"{allowed}; must be below {limit:.6g} rad ({_degrees(limit)})")
+def _faults(arm: Manipulator) -> list[Fault]:
+    """Everything wrong with the fields of an arm."""
+    trouble = _fibers_faults(arm.fibers)
+    bundles = None if trouble else sum(fiber.bundles for fiber in arm.fibers)
+    return trouble + arm_faults(vars(arm), bundles)
 
 
 def _fibers_faults(fibers: Any) -> list[Fault]:
@@ -214,25 +194,6 @@ def _fibers_faults(fibers: Any) -> list[Fault]:
     if strangers:
         k = strangers[0]
         return [Fault(f"fibers[{k}]", fibers[k], "must be a FiberArchitecture")]
-    return []
-
-
-def _bounds_faults(bounds: Any, fibers: Sequence[FiberArchitecture] | None) -> list[Fault]:
-    try:
-        pairs = np.asarray(bounds, dtype=float)
-    except (TypeError, ValueError):
-        pairs = np.empty(0)
-    if pairs.shape[-1:] != (2,) or pairs.ndim > 2 or not pairs.size:
-        allowed = "must be a pair (lower, upper), or one such pair for each bundle"
-        return [Fault("activation_bounds", bounds, allowed)]
-    if not np.isfinite(pairs).all():
-        return [Fault("activation_bounds", bounds, "must hold finite numbers")]
-    if (pairs[..., 0] > pairs[..., 1]).any():
-        return [Fault("activation_bounds", bounds, "must have lower <= upper")]
-    count = sum(fiber.bundles for fiber in fibers) if fibers else len(pairs)
-    if pairs.ndim == 2 and len(pairs) != count:
-        allowed = f"must be one pair, or {count} pairs: one for each bundle"
-        return [Fault("activation_bounds", bounds, allowed)]
     return []
 
 
@@ -266,7 +227,3 @@ def _bundle_names(fibers: Sequence[FiberArchitecture]) -> Iterator[str]:
 def _plain_bounds(bounds: ArrayLike) -> Bounds:
     pairs = np.asarray(bounds, float).tolist()
     return tuple(pairs) if np.ndim(pairs) == 1 else tuple(tuple(pair) for pair in pairs)
-
-
-def _degrees(angle: float) -> str:
-    return f"{math.degrees(angle):.4g}°"

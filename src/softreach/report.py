@@ -1,4 +1,4 @@
-"""What follows from a design before any sample is drawn, and what its reader should be warned of."""
+"""What follows from a design before any sample is drawn, and what to be warned of."""
 
 from __future__ import annotations
 
@@ -76,8 +76,8 @@ def _large_activations(arm: Manipulator) -> Iterator[str]:
     largest = float(np.abs(arm.bounds).max())
     if largest > 1:
         yield (
-            f"activations reach |γ| = {largest:.3g}: above 1 a fiber would shorten by more than its "
-            "length, so γ is a load on the matrix there, not a strain of the fiber"
+            f"activations reach |γ| = {largest:.3g}: above 1 a fiber would shorten by more than "
+            "its length, so γ is a load on the matrix there, not a strain of the fiber"
         )
 
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.design_file import design_to_toml
 from softreach.errors import InvalidInput
 from softreach.manipulator import Manipulator
 
@@ -97,7 +96,7 @@ def _variables(
 
 def _provenance(arm: Manipulator) -> dict[str, object]:
     return {
-        "design": design_to_toml(arm),
+        "design": arm.to_toml(),
         "softreach_version": version("softreach"),
         "schema_version": SCHEMA_VERSION,
     }

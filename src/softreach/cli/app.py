@@ -28,7 +28,7 @@ minimal_trunk, redundant_trunk. Start with
     help_format="plaintext",
 )
 
-# Commands are imported when they are run; their summaries stand here so that help needs none of them.
+# Commands are imported when run; their summaries stand here, so that help needs none of them.
 _COMMANDS = {
     "demo": "The paper's design, start to end: cloud, volumes, hull and picture.",
     "design": "What follows from a design: angles, radii, ranges, warnings.",
@@ -38,7 +38,12 @@ _COMMANDS = {
     "export": "Write a cloud or an arm for other programs.",
 }
 for _name, _summary in _COMMANDS.items():
-    app.command(f"softreach.cli.{_name}:{_name}", name=_name, help=_summary, sort_key=list(_COMMANDS).index(_name))
+    app.command(
+        f"softreach.cli.{_name}:{_name}",
+        name=_name,
+        help=_summary,
+        sort_key=list(_COMMANDS).index(_name),
+    )
 
 
 def main(arguments: list[str] | None = None) -> None:

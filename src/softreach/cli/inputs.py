@@ -40,7 +40,9 @@ Sampler = Annotated[str, Parameter(help="uniform, boundary, sobol or grid.")]
 AsJson = Annotated[bool, Parameter(name="--json", negative="", help="Print JSON for machines.")]
 Activation = Annotated[
     str | None,
-    Parameter(help="Activations, one per bundle, comma-separated: -1,0,-0.5", allow_leading_hyphen=True),
+    Parameter(
+        help="Activations, one per bundle, comma-separated: -1,0,-0.5", allow_leading_hyphen=True
+    ),
 ]
 
 

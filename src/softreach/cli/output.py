@@ -23,7 +23,10 @@ def report(title: str, rows: Mapping[str, tuple[Any, str]], as_json: bool) -> No
         sys.stdout.write("\n")
         return
     width = max(len(name) for name in rows)
-    lines = (f"  {name:<{width}}  {_shown(value)} {unit}".rstrip() for name, (value, unit) in rows.items())
+    lines = (
+        f"  {name:<{width}}  {_shown(value)} {unit}".rstrip()
+        for name, (value, unit) in rows.items()
+    )
     sys.stdout.write("\n".join([title, *lines, ""]))
 
 

@@ -36,5 +36,5 @@ def show(
     arm = design_of(cloud)
     shape = None if activation is None else configuration(arm, activation_of(activation, arm))
     axes = plot.plot_views(cloud, arm, shape, color=color)
-    plot.save_figure(axes["front"].figure, out)
+    plot.save_figure(axes["front"], out)
     sys.stdout.write(f"{out}\n")

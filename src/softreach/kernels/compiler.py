@@ -36,7 +36,7 @@ class _FirstRun(event.Listener):
         self.said = False
 
     def on_start(self, event: event.Event) -> None:
-        function = getattr(event.data.get("dispatcher"), "py_func", None)
+        function = getattr((event.data or {}).get("dispatcher"), "py_func", None)
         if not self.said and getattr(function, "__module__", "").startswith("softreach"):
             self.said = True
             sys.stderr.write("softreach: compiling kernels (first run only, then cached on disk)\n")

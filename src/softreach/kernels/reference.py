@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 __all__ = ["frames", "hat", "tip", "twists"]
 
-Array = NDArray[np.generic]
+Array = NDArray[np.float64] | NDArray[np.complex128]
 
 
 def hat(omega: Array, v: Array) -> Array:

@@ -14,7 +14,7 @@ from softreach.kernels.twist import act
 
 __all__ = ["LANES", "TIP", "WORK", "load", "node_values", "nodes_at", "pack", "tips", "walk"]
 
-LANES = 128
+LANES = 256
 """Samples side by side: whole blocks only, so a sample's result never depends on its neighbors."""
 
 # A workspace is a flat array of rows of LANES numbers: 12 node values, then 3 coordinates of the
@@ -56,20 +56,21 @@ def node_values(work, lanes, table, k):
     """ℓ = dZ (1 + z·γ) and u = Uγ at the nodes of step k, for every lane."""
     for row in range(NODE_ROWS):
         values = work[row * LANES : (row + 1) * LANES]
-        values[:] = table[k, row, -1]
-        for j in range(0, lanes.shape[0], _GROUP):
-            _add_group(
-                values,
-                lanes[j],
-                lanes[j + 1],
-                lanes[j + 2],
-                lanes[j + 3],
-                table[k, row, j : j + _GROUP],
-            )
+        _first_group(values, lanes[0], lanes[1], lanes[2], lanes[3], table[k, row])
+        for j in range(_GROUP, lanes.shape[0], _GROUP):
+            weights = table[k, row, j:]
+            _next_group(values, lanes[j], lanes[j + 1], lanes[j + 2], lanes[j + 3], weights)
 
 
 @kernel
-def _add_group(values, g0, g1, g2, g3, weights):
+def _first_group(values, g0, g1, g2, g3, weights):
+    a, b, c, d, rest = weights[0], weights[1], weights[2], weights[3], weights[-1]
+    for i in range(LANES):
+        values[i] = (rest + a * g0[i] + b * g1[i]) + (c * g2[i] + d * g3[i])
+
+
+@kernel
+def _next_group(values, g0, g1, g2, g3, weights):
     a, b, c, d = weights[0], weights[1], weights[2], weights[3]
     for i in range(LANES):
         values[i] += (a * g0[i] + b * g1[i]) + (c * g2[i] + d * g3[i])
