@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["BundleKey", "Coloring", "ScalarKey", "color_samples", "draw_figure_key", "draw_key"]
 
 _COLORMAP = "viridis"
+_MISSING = 204  # light gray
 
 
 class BundleKey(NamedTuple):
@@ -126,14 +127,15 @@ def _given(values: NDArray[np.float64], samples: int) -> Coloring:
 def _scalar(values: NDArray[np.float64], label: str, low: float | None = None) -> Coloring:
     from matplotlib import colormaps
 
-    finite = values[np.isfinite(values)]
-    start = finite.min(initial=np.inf) if low is None else low
-    stop = finite.max(initial=start) if len(finite) else start
-    start, stop = (float(start), float(stop)) if len(finite) else (0.0, 1.0)
-    scaled = (values - start) / ((stop - start) or 1.0)
-    colormap = colormaps[_COLORMAP].with_extremes(bad=(0.8, 0.8, 0.8))
-    table = colormap(np.ma.masked_invalid(scaled), bytes=True)
-    return Coloring(table[:, :3], ScalarKey(label, start, stop))
+    finite = np.isfinite(values)
+    some = finite.any()
+    start = float(values.min(where=finite, initial=np.inf)) if low is None and some else low or 0.0
+    stop = float(values.max(where=finite, initial=start)) if some else start + 1.0
+    table = colormaps[_COLORMAP](np.arange(257), bytes=True)[:, :3]
+    table[256] = _MISSING
+    share = np.where(finite, (values - start) / ((stop - start) or 1.0), 0.0)
+    index = np.minimum(255, (256 * share).astype(np.int16))
+    return Coloring(table[np.where(finite, index, 256)], ScalarKey(label, start, stop))
 
 
 def _mappable(key: ScalarKey) -> Any:
