@@ -14,7 +14,7 @@ from softreach.kernels.twist import act
 
 __all__ = ["LANES", "TIP", "WORK", "load", "node_values", "nodes_at", "pack", "tips", "walk"]
 
-LANES = 256
+LANES = 128
 """Samples side by side: whole blocks only, so a sample's result never depends on its neighbors."""
 
 # A workspace is a flat array of rows of LANES numbers: 12 node values, then 3 coordinates of the

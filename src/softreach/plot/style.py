@@ -60,12 +60,14 @@ def figure_style(ax: Axes | None = None) -> AbstractContextManager[None]:
     return pyplot().rc_context(_RC) if ax is None else nullcontext()
 
 
-def save_figure(figure: Figure, path: str | PathLike[str]) -> None:
+def save_figure(figure: Figure | Axes, path: str | PathLike[str]) -> None:
     """Save as .png, .pdf, .svg or another format that matplotlib knows, whole or not at all.
 
     Args:
-        figure: The figure, such as ``ax.figure``.
+        figure: The figure, or axes in it.
         path: The file; it is replaced only when the new one is complete.
     """
     with pyplot().rc_context(_SAVING), replacing(path) as lent:
-        figure.savefig(lent, dpi=DPI)
+        whole = figure.get_figure(root=True)
+        if whole is not None:
+            whole.savefig(lent, dpi=DPI)
