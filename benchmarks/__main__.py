@@ -19,8 +19,8 @@ PARTS = ("kernels", "geometry")
 HEADER = """# Benchmarks
 
 Written by `make bench`; do not edit. {date}, softreach {softreach}, Python {python}, NumPy {numpy},
-Numba {numba}, {threads} threads on {machine}. The machine was shared with other work: compare within
-a table, where all rows come from one run, and trust CPU time before wall time.
+Numba {numba}, {threads} threads on {machine}. The machine was shared with other work: compare
+within a table, where all rows come from one run, and trust CPU time before wall time.
 
 """
 

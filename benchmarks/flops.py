@@ -37,7 +37,7 @@ Counted.__mul__ = Counted.__rmul__ = Counted._binary(1)
 
 
 def flops_per_step(bundles: int) -> int:
-    """Additions and multiplications of one step: 12 node values, 9 products ζu, exponent, action."""
+    """Additions and multiplications of a step: 12 node values, 9 products, exponent, action."""
     node_values = 12 * 2 * bundles
     products = 9
 

@@ -1,4 +1,4 @@
-"""The opponent: a compiled Tsit5 with fixed steps on the rod's twelve unknowns, as others integrate it.
+"""The opponent: a compiled Tsit5 with fixed steps on the rod's twelve unknowns.
 
 Same tables, same lanes, same compiler flags and threads as our kernel, so that only the method
 differs. Tsitouras, Comput. Math. Appl. 62 (2011) 770.
@@ -99,6 +99,14 @@ def _last(y, k5, w):
 
 
 @kernel
+def _step(y, stage, k, strain, lanes, table, measure, weights):
+    for s in range(6):
+        _combined(stage, y, k[0], k[1], k[2], k[3], k[4], weights[s])
+        _strain(strain, lanes, table[s])
+        _slope(k[s], stage, strain, measure[s])
+
+
+@kernel
 def tips(table, measure, weights, final, gamma, out):
     """Tip positions by Tsit5, (n, fiber) -> (n, 3)."""
     n, m = gamma.shape
@@ -114,10 +122,7 @@ def tips(table, measure, weights, final, gamma, out):
         for axis in range(3):
             y[(3 + 4 * axis) * LANES : (4 + 4 * axis) * LANES] = 1.0
         for step in range(table.shape[0]):
-            for s in range(6):
-                _combined(stage, y, k[0], k[1], k[2], k[3], k[4], weights[s])
-                _strain(strain, lanes, table[step, s])
-                _slope(k[s], stage, strain, measure[step, s])
+            _step(y, stage, k, strain, lanes, table[step], measure[step], weights)
             _combined(y, y, k[0], k[1], k[2], k[3], k[4], final)
             _last(y, k[5], final[5])
         for i in range(count):

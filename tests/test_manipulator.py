@@ -223,3 +223,18 @@ def test_bending_beyond_the_theory_and_large_activations_are_warned_of():
     assert any("|κ| R2 = 1.05" in line for line in sharp)
     assert any("|γ| = 1.67" in line for line in sharp)
     assert design_warnings(single(activation_bounds=(-0.9, 0.0))) == ()
+
+
+@pytest.mark.parametrize("bounds", [(-0.8, -0.3), (-0.5, 0.2), (-0.4, -0.4)])
+def test_the_range_of_curvature_is_that_of_all_activations(trunk, bounds):
+    from softreach.actuation import actuation
+
+    arm = trunk.replace(activation_bounds=bounds)
+    ticks = np.linspace(*bounds, 13)
+    gamma = np.stack(np.meshgrid(ticks, ticks, ticks), axis=-1).reshape(-1, 3)
+    u = actuation(arm, np.linspace(0, 1, 11)).curvature[:, :2] @ gamma.T
+    kappa = np.linalg.norm(u, axis=1)
+    low, high = describe(arm).curvature
+    assert low <= kappa.min() + 1e-9
+    assert kappa.min() - low < 0.2
+    assert kappa.max() == pytest.approx(high, rel=1e-5)

@@ -1,4 +1,6 @@
 from . import designs as designs
+from . import export as export
+from . import plot as plot
 from .cloud import compute_cloud as compute_cloud
 from .cloud import design_of as design_of
 from .cloud import open_cloud as open_cloud

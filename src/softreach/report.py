@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach import taper
-from softreach.actuation import curvature_range, extension_range
+from softreach.actuation import actuation, curvature_range, extension_range
 from softreach.manipulator import Manipulator
 
 __all__ = ["DesignReport", "describe", "design_warnings"]
@@ -35,7 +35,7 @@ class DesignReport:
     extension: tuple[float, float]
     """Smallest and largest ζ in the activation box [-]."""
     curvature: tuple[float, float]
-    """Largest bending curvature that the box reaches, times L, at the base and at the tip [-]."""
+    """Smallest and largest bending curvature times L, in the box and along the arm [-]."""
     warnings: tuple[str, ...]
     """Limits that the design touches, each with its number."""
 
@@ -50,7 +50,7 @@ def describe(arm: Manipulator) -> DesignReport:
         radius_ratio=arm.radius_ratio,
         taper_ratio=arm.outer_radius / arm.tip_radius,
         extension=extension_range(arm),
-        curvature=(float(bending[0] * arm.length), float(bending[-1] * arm.length)),
+        curvature=(_smallest_bending(arm) * arm.length, float(bending.max() * arm.length)),
         warnings=design_warnings(arm),
     )
 
@@ -58,6 +58,26 @@ def describe(arm: Manipulator) -> DesignReport:
 def design_warnings(arm: Manipulator) -> tuple[str, ...]:
     """One line for each limit that the design touches: none of them makes a result impossible."""
     return (*_overlaps(arm), *_sharp_bending(arm), *_large_activations(arm))
+
+
+def _smallest_bending(arm: Manipulator, stations: int = 11) -> float:
+    """Least √(u1² + u2²) in the box: bounded least squares at each station [1/m]."""
+    from scipy.optimize import lsq_linear
+
+    low, high = arm.bounds.T
+    if (low <= 0).all() and (high >= 0).all():
+        return 0.0
+    free = high > low
+    table = actuation(arm, np.linspace(0.0, arm.length, stations)).curvature[:, :2]
+    fixed = table[:, :, ~free] @ low[~free]
+    return min(
+        float(
+            np.linalg.norm(lsq_linear(u, -rest, (low[free], high[free])).fun)
+            if free.any()
+            else np.linalg.norm(rest)
+        )
+        for u, rest in zip(table[:, :, free], fixed, strict=True)
+    )
 
 
 def _sharp_bending(arm: Manipulator) -> Iterator[str]:

@@ -44,7 +44,7 @@ def design(
         "base to tip ratio": (facts.taper_ratio, ""),
         "inner to outer radius": (facts.radius_ratio, ""),
         "extension": (list(facts.extension), ""),
-        "largest curvature times L, base and tip": (list(facts.curvature), ""),
+        "curvature times L": (list(facts.curvature), ""),
     }
     if json:
         rows["warnings"] = (list(facts.warnings), "")
