@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from softreach.errors import InvalidInput
+from softreach.errors import InvalidDesign, InvalidInput
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,7 +50,7 @@ def design_from(
     text: str, revolution_deg: float | None = None, taper_deg: float | None = None
 ) -> Manipulator:
     """The design of that name or file, varied as asked."""
-    from softreach import designs
+    from softreach import design_file, designs
 
     built_in = {name: getattr(designs, name) for name in ("minimal_trunk", "redundant_trunk")}
     if text in built_in:
@@ -59,11 +59,14 @@ def design_from(
         arm = _loaded(text)
     else:
         raise InvalidInput("design", text, f"a .toml file, or one of {', '.join(built_in)}")
-    return designs.varied(
-        arm,
-        revolution=None if revolution_deg is None else math.radians(revolution_deg),
-        taper=None if taper_deg is None else math.radians(taper_deg),
-    )
+    try:
+        return designs.varied(
+            arm,
+            revolution=None if revolution_deg is None else math.radians(revolution_deg),
+            taper=None if taper_deg is None else math.radians(taper_deg),
+        )
+    except InvalidDesign as error:
+        raise design_file.in_file_terms(error, text) from None
 
 
 def _loaded(path: str) -> Manipulator:
