@@ -1,0 +1,103 @@
+"""The activation box of three bundles in cells, finer where it folds."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.inverse.problem import position_jacobian
+from softreach.kernels import candidates
+from softreach.kernels.candidates import Mesh
+from softreach.kernels.simplices import corner_bits
+from softreach.kinematics import tips_and_jacobians
+from softreach.manipulator import Manipulator
+
+__all__ = ["box_mesh"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_CORNERS = corner_bits(3)
+_EVEN = 0.3  # ratio of det J at a cell's corners below which the cell is cut in eight
+_MOST_CELLS = 300_000
+
+
+def box_mesh(arm: Manipulator, tol: float, cells: int, depth: int) -> Mesh:
+    """Cells of the activation box with tips and Jacobians at their corners.
+
+    Args:
+        arm: A design of three bundles, each free to move.
+        tol: Largest tip error, in L.
+        cells: Cells along each axis of the box.
+        depth: How often a cell may be halved where det J is uneven or changes sign.
+    """
+    lattice = _Lattice(arm, tol, cells << depth)
+    low, width = _even_cells(cells, depth)
+    kept: list[Index] = []
+    total = len(low)
+    for level in range(depth + 1):
+        corner = lattice.vertices(low[:, None] + width * _CORNERS)
+        uneven = _uneven(lattice.det[corner]) if level < depth else np.zeros(len(low), bool)
+        if total + 7 * int(uneven.sum()) > _MOST_CELLS:
+            uneven[:] = False
+        kept.append(corner[~uneven])
+        total += 7 * int(uneven.sum())
+        width //= 2
+        low = (low[uneven, None] + width * _CORNERS).reshape(-1, 3)
+    return _finished(lattice, np.concatenate(kept))
+
+
+def _even_cells(cells: int, depth: int) -> tuple[Index, int]:
+    """First corners of the coarsest cells, in steps of the finest lattice, and their width."""
+    axis = np.arange(cells) << depth
+    return np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3), 1 << depth
+
+
+def _uneven(det: Array) -> NDArray[np.bool_]:
+    """Cells in which det J changes sign or nearly so: there the map folds or is about to."""
+    small, large = np.abs(det).min(axis=1), np.abs(det).max(axis=1)
+    return (det.min(axis=1) * det.max(axis=1) <= 0) | (small < _EVEN * large)
+
+
+class _Lattice:
+    """Vertices asked for so far, each computed once, found by their place on the finest lattice."""
+
+    def __init__(self, arm: Manipulator, tol: float, cells: int) -> None:
+        self.arm, self.tol, self.side = arm, tol, cells + 1
+        self.key = np.empty(0, np.int64)
+        self.gamma, self.tip = np.empty((0, 3)), np.empty((0, 3))
+        self.slope, self.det = np.empty((0, 3, 3)), np.empty(0)
+
+    def vertices(self, place: Index) -> Index:
+        """Numbers of the vertices at lattice places (..., 3), computing those that are new."""
+        key = (place[..., 0] * self.side + place[..., 1]) * self.side + place[..., 2]
+        unique, inverse = np.unique(key, return_inverse=True)
+        known = np.isin(unique, self.key, assume_unique=True)
+        self._compute(unique[~known])
+        order = np.argsort(self.key)
+        number = order[np.searchsorted(self.key, unique, sorter=order)]
+        return number[inverse].reshape(key.shape)
+
+    def _compute(self, key: Index) -> None:
+        place = np.stack(np.unravel_index(key, (self.side,) * 3), -1)
+        low, high = self.arm.bounds.T
+        part = place / (self.side - 1)
+        gamma = low * (1 - part) + high * part
+        tip, jacobian = tips_and_jacobians(self.arm, gamma, self.tol)
+        slope = position_jacobian(tip, jacobian)
+        self.key = np.concatenate([self.key, key])
+        self.gamma = np.concatenate([self.gamma, gamma])
+        self.tip = np.concatenate([self.tip, tip])
+        self.slope = np.concatenate([self.slope, slope])
+        self.det = np.concatenate([self.det, np.linalg.det(slope)])
+
+
+def _finished(lattice: _Lattice, corner: Index) -> Mesh:
+    blur = np.empty(len(corner))
+    candidates.blurs(lattice.gamma, lattice.slope, corner, blur)
+    blur += 1e-9 * lattice.arm.length  # rounding must not put a target between two tetrahedra
+    change = np.sqrt(((lattice.slope[corner[:, 7]] - lattice.slope[corner[:, 0]]) ** 2).sum((1, 2)))
+    for bit in (1, 2, 4):
+        step = lattice.slope[corner[:, bit]] - lattice.slope[corner[:, 0]]
+        change += np.sqrt((step**2).sum((1, 2)))
+    return Mesh(lattice.gamma, lattice.tip, lattice.slope, corner, blur, change)

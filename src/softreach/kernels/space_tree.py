@@ -1,0 +1,93 @@
+"""An octree over space that lists, for every place, the tetrahedra that may cover it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from softreach.kernels.compiler import inline, kernel
+
+__all__ = ["SpaceTree", "children", "holds", "leaf_at"]
+
+
+class SpaceTree(NamedTuple):
+    """Nodes are cubes; a node's eight children follow each other, x slowest."""
+
+    planes: np.ndarray
+    """Faces of the tetrahedra, n·p >= d within [m], shape (tetrahedron, 4, 4)."""
+    low: np.ndarray
+    """Lowest corner of the root [m], shape (3,)."""
+    size: float
+    """Edge of the root [m]."""
+    child: np.ndarray
+    """First child of each node, 0 for a leaf."""
+    first: np.ndarray
+    """Where a leaf's tetrahedra begin in `item`."""
+    count: np.ndarray
+    """How many there are."""
+    item: np.ndarray
+    """Tetrahedra, leaf after leaf."""
+
+
+@inline
+def holds(planes, k, p, half):
+    """Whether a box of half-sizes round p meets tetrahedron k, as far as its face planes can tell."""
+    for i in range(4):
+        a, b, c = planes[k, i, 0], planes[k, i, 1], planes[k, i, 2]
+        reach = abs(a) * half[0] + abs(b) * half[1] + abs(c) * half[2]
+        if a * p[0] + b * p[1] + c * p[2] + reach < planes[k, i, 3]:
+            return False
+    return True
+
+
+@inline
+def leaf_at(low, size, child, first, count, p):
+    """Range of the items of the leaf that holds p; empty outside the root."""
+    x, y, z = (p[0] - low[0]) / size, (p[1] - low[1]) / size, (p[2] - low[2]) / size
+    if not (min(x, min(y, z)) >= 0.0 and max(x, max(y, z)) <= 1.0):
+        return 0, 0
+    node = 0
+    while child[node] > 0:
+        x, y, z = 2.0 * x, 2.0 * y, 2.0 * z
+        i, j, k = int(x >= 1.0), int(y >= 1.0), int(z >= 1.0)
+        node = child[node] + 4 * i + 2 * j + k
+        x, y, z = x - i, y - j, z - k
+    return first[node], first[node] + count[node]
+
+
+@kernel
+def children(planes, boxes, centers, half, first, count, item, counts, starts, out):
+    """Sort the items of nodes into their eight children.
+
+    Args:
+        planes: Faces of the tetrahedra.
+        boxes: Boxes round them, shape (tetrahedron, 2, 3).
+        centers: Centers of the nodes' children, shape (node, 8, 3).
+        half: Half the edge of a child.
+        first: Where each node's items begin in `item`.
+        count: How many there are.
+        item: Items of the nodes.
+        counts: Filled with the items of each child, shape (node, 8).
+        starts: Where to write each child's items, shape (node, 8).
+        out: Receives the items; empty to count only.
+    """
+    for n in range(centers.shape[0]):
+        for o in range(8):
+            p = (centers[n, o, 0], centers[n, o, 1], centers[n, o, 2])
+            found = 0
+            for entry in range(first[n], first[n] + count[n]):
+                k = item[entry]
+                if _near(boxes, k, p, half) and holds(planes, k, p, (half, half, half)):
+                    if out.shape[0]:
+                        out[starts[n, o] + found] = k
+                    found += 1
+            counts[n, o] = found
+
+
+@inline
+def _near(boxes, k, p, half):
+    for axis in range(3):
+        if p[axis] + half < boxes[k, 0, axis] or p[axis] - half > boxes[k, 1, axis]:
+            return False
+    return True
