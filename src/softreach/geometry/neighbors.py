@@ -1,0 +1,165 @@
+"""How far apart the values of neighbors are: a mean over a ball around each of many points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach import parallel
+from softreach.errors import InvalidInput
+from softreach.geometry.delaunay import finite_points
+from softreach.kernels.neighbors import PLACE_BITS, neighbor_sums, sort_keys, window_keys
+
+__all__ = ["mean_value_distance"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+BLOCK = 1 << 14  # queries that one thread takes at a time
+_CELLS = 2.0 ** (PLACE_BITS - 1)  # along an axis; the other half of the keys is room for windows
+_SLACK = 2.0**-20  # of a cell or a radius, far above the rounding of a key
+_SMALLEST = 1e-290  # width of a cell
+
+
+def mean_value_distance(
+    points: Array, values: Array, radius: float, queries: Index | None = None
+) -> tuple[Array, Index]:
+    """Mean ‖v_j - v_i‖₂ over the other points j within a radius of point i, and how many they are.
+
+    The ball is closed. Point i itself is not counted; another point at the same place is.
+    Neighbors come from all points, whatever the queries.
+
+    Memory is a sorted copy of points and values and a few blocks, however many pairs there are;
+    the result does not depend on blocks and threads.
+
+    Args:
+        points: Positions [m], shape (n, 3).
+        values: A vector of any length for each point, shape (n, m).
+        radius: Of the ball [m]; 0 leaves the points at the same place.
+        queries: Indices of the points i, shape (q,); None for all.
+
+    Returns:
+        Means in the unit of the values, NaN where there is no neighbor, shape (q,); numbers of
+        neighbors, shape (q,).
+
+    Raises:
+        InvalidInput: Arrays of another shape or not finite, or a radius below zero.
+    """
+    points, values = finite_points(points), _finite_values(values, len(points))
+    if not radius >= 0:  # NaN too
+        raise InvalidInput("radius", radius, "a radius >= 0 [m]")
+    if len(points) == 0:
+        return np.empty(0), np.empty(0, np.intp)
+    columns = _Columns.around(points, float(radius))
+    order, cloud = columns.sorted_sample(points, values)
+    if queries is None:
+        return _means(cloud, columns, cloud, order)
+    order, chosen = columns.sorted_sample(points[queries], values[queries])
+    return _means(cloud, columns, chosen, order)
+
+
+class _Sample(NamedTuple):
+    """Points sorted by key, each component contiguous."""
+
+    keys: NDArray[np.int64]
+    """Shape (n,)."""
+    points: Array
+    """Shape (3, n); the last axis runs along the columns."""
+    values: Array
+    """Shape (m, n)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Columns:
+    """Space cut into columns along the longest side of a cloud, and these into places."""
+
+    axes: Index
+    low: Array
+    widths: Array
+    reach: float
+    margin: float
+
+    @classmethod
+    def around(cls, points: Array, radius: float) -> _Columns:
+        """Columns at least a radius wide for all points, shape (n, 3)."""
+        low, high = _corners(points)
+        extent = high - low
+        axes = np.argsort(extent, kind="stable")
+        reach = min(radius, 2.0 * float(extent.sum()))  # all points are nearer than that
+        wide = reach * (1.0 + _SLACK)
+        widths = np.maximum(extent[axes] / _CELLS, [wide, wide, 0.0])
+        rounding = 2.0**-50 * float(np.abs([low, high]).max())
+        return cls(
+            axes=axes,
+            low=low[axes],
+            widths=np.maximum(widths, rounding / _CELLS + _SMALLEST),
+            reach=reach,
+            margin=wide + rounding,
+        )
+
+    def sorted_sample(self, points: Array, values: Array) -> tuple[Index, _Sample]:
+        """Points (n, 3) and values (n, m) in the order of their keys, and that order."""
+        points = np.ascontiguousarray(points.T[self.axes])
+        keys = np.empty(points.shape[1], np.int64)
+        sort_keys(points, self.low, 1.0 / self.widths, keys)
+        order = np.argsort(keys, kind="stable")
+        return order, _Sample(keys[order], _taken(points, order), _taken(values.T, order))
+
+    def windows(self, keys: NDArray[np.int64], along: Array) -> NDArray[np.int64]:
+        """First and last key of what each query can reach in its own column, shape (2, q)."""
+        first_last = np.empty((2, len(keys)), np.int64)
+        scale = 1.0 / self.widths[2]
+        window_keys(along, keys, self.margin, self.low[2], scale, *first_last)
+        return first_last
+
+
+def _means(
+    cloud: _Sample, columns: _Columns, queries: _Sample, order: Index
+) -> tuple[Array, Index]:
+    """Means and numbers of neighbors of sorted queries; results go to the places `order`."""
+    mean, others = np.empty(len(order)), np.empty(len(order), np.intp)
+
+    def task(part: slice) -> None:
+        total, count = _sums(cloud, columns, queries, part)
+        count -= 1.0  # the query itself, at distance zero
+        others[order[part]] = count
+        total[count == 0] = np.nan
+        mean[order[part]] = total / np.maximum(count, 1.0)
+
+    parallel.run(partial(task, part) for part in parallel.blocks(len(order), BLOCK))
+    return mean, others
+
+
+def _sums(cloud: _Sample, columns: _Columns, queries: _Sample, part: slice) -> tuple[Array, Array]:
+    """Sum of ‖v_j - v_i‖ over each query's ball, itself included, and the number of points."""
+    windows = columns.windows(queries.keys[part], queries.points[2, part])
+    total, count = np.zeros(windows.shape)
+    add = neighbor_sums(len(cloud.values))
+    add(*cloud, *queries[1:], part.start, *windows, columns.reach**2, total, count)
+    return total, count
+
+
+def _corners(points: Array) -> tuple[Array, Array]:
+    """Lower and upper corner; NumPy is slow along the short axis, so one axis at a time."""
+    return np.array([x.min() for x in points.T]), np.array([x.max() for x in points.T])
+
+
+def _taken(components: Array, order: Index) -> Array:
+    """Each component in another order, contiguous."""
+    return np.stack([component[order] for component in components])
+
+
+def _finite_values(values: object, n: int) -> Array:
+    """Values as floats, shape (n, m), or a clear error."""
+    array = np.ascontiguousarray(values, dtype=np.float64)
+    if array.ndim != 2 or len(array) != n:
+        raise InvalidInput("values", f"array of shape {array.shape}", f"of shape ({n}, m)")
+    wrong = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if len(wrong):
+        found = f"{len(wrong)} rows with NaN or infinity, the first at index {wrong[0]}"
+        raise InvalidInput("values", found, "finite")
+    return array

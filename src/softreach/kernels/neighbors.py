@@ -1,0 +1,152 @@
+"""Mean distance of values among neighbors in space, over points sorted by one integer key.
+
+The key of a point is (column, place): space is cut into columns at least a radius wide, and places
+count along a column. All neighbors of a query then lie in nine columns, in each of them in one
+window of consecutive keys. As the queries are in the order of the keys too, windows only move
+forward, and there is no table of cells to outgrow its memory when the radius is small or one point
+is far away.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numba import njit
+
+from softreach.kernels.compiler import inline, kernel
+
+__all__ = ["PLACE_BITS", "neighbor_sums", "sort_keys", "window_keys"]
+
+PLACE_BITS = 21  # of each of the three parts of a key
+_ROW = 1 << 2 * PLACE_BITS
+_COLUMN = 1 << PLACE_BITS
+
+# keys must not be reassociated: no neighbor is missed because their rounding is monotone
+_exact = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@_exact
+def _place(x, low, scale):
+    """Cell of a coordinate: from 1, as a window may begin one cell below the lowest point."""
+    return np.int64((x - low) * scale) + 1
+
+
+@_exact
+def sort_keys(points, low, scale, keys):
+    """Keys of points.
+
+    Args:
+        points: Positions, shape (3, n).
+        low: Lower corner of all points, shape (3,).
+        scale: Cells per unit of length along each axis, shape (3,); places run along the last.
+        keys: Filled with the keys, shape (n,), int64.
+    """
+    for i in range(len(keys)):
+        y = _place(points[0, i], low[0], scale[0])
+        z = _place(points[1, i], low[1], scale[1])
+        keys[i] = y * _ROW + z * _COLUMN + _place(points[2, i], low[2], scale[2])
+
+
+@_exact
+def window_keys(along, keys, reach, low, scale, first, last):
+    """Keys between which the neighbors of each query lie in its own column.
+
+    Args:
+        along: The queries' coordinates along the columns, shape (n,).
+        keys: The queries' keys, shape (n,).
+        reach: Largest distance of a neighbor.
+        low: Least coordinate of all points along the columns.
+        scale: Places per unit of length along the columns.
+        first: Filled with the least key, shape (n,).
+        last: Filled with the largest key, shape (n,).
+    """
+    places = np.int64(_COLUMN - 1)
+    for i in range(len(keys)):
+        column = keys[i] & ~places
+        x = max(along[i] - reach, low)
+        first[i] = column + _place(x, low, scale)
+        last[i] = column + min(_place(along[i] + reach, low, scale), places)
+
+
+@_exact
+def _first_at_least(keys, start, wanted):
+    """The first index from `start` on whose key is not below `wanted`, by steps that double."""
+    n, step = len(keys), 1
+    low = high = start
+    while high < n and keys[high] < wanted:
+        low, high, step = high + 1, high + step, 2 * step
+    high = min(high, n)
+    while low < high:
+        middle = (low + high) >> 1
+        if keys[middle] < wanted:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+def _window_sum(m):
+    """The loop over the points of one window, for values of m components.
+
+    m is a constant of the machine code, so that the loop over components unrolls inside the one
+    over points, which then uses the vector unit.
+    """
+
+    @inline
+    def window_sum(points, values, start, stop, position, value, square):
+        total, count = 0.0, 0.0
+        x, y, z = position
+        for j in range(np.uint64(start), np.uint64(stop)):  # unsigned: no test for negative ones
+            dx, dy, dz = points[0, j] - x, points[1, j] - y, points[2, j] - z
+            near = dx * dx + dy * dy + dz * dz <= square
+            distance = 0.0
+            for k in range(m):
+                difference = values[k, j] - value[k]
+                distance += difference * difference
+            total += np.sqrt(distance) if near else 0.0
+            count += 1.0 if near else 0.0
+        return total, count
+
+    return window_sum
+
+
+@cache
+def neighbor_sums(m):
+    """The kernel that adds up |value difference| over neighbors, for values of m components."""
+    window_sum = _window_sum(m)
+
+    @kernel
+    def sums(keys, points, values, places, amounts, begin, first, last, square, total, count):
+        """Add up |value difference| over the neighbors of some queries, each itself included.
+
+        Args:
+            keys: Keys of all points in increasing order, shape (n,).
+            points: Their positions, shape (3, n).
+            values: Their values, shape (m, n).
+            places: Positions of the queries in the order of their keys, shape (3, q).
+            amounts: Their values, shape (m, q).
+            begin: The first query to be evaluated.
+            first: Least key of each window in the query's own column, shape (evaluated,).
+            last: Largest key of it, shape (evaluated,).
+            square: Squared radius of the closed ball.
+            total: Added to, shape (evaluated,).
+            count: Number of points in the ball, added to, shape (evaluated,).
+        """
+        value = np.empty(m)
+        for neighbor in range(9):
+            shift = (neighbor // 3 - 1) * _ROW + (neighbor % 3 - 1) * _COLUMN
+            start = stop = 0
+            for i in range(len(first)):
+                start = _first_at_least(keys, start, first[i] + shift)
+                stop = _first_at_least(keys, max(start, stop), last[i] + shift + 1)
+                if start < stop:
+                    q = begin + i
+                    for k in range(m):
+                        value[k] = amounts[k, q]
+                    place = places[0, q], places[1, q], places[2, q]
+                    found = window_sum(points, values, start, stop, place, value, square)
+                    total[i] += found[0]
+                    count[i] += found[1]
+
+    return sums

@@ -1,0 +1,152 @@
+"""Means over balls equal a loop over all pairs, whatever the cloud and the radius."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from softreach import parallel
+from softreach.errors import InvalidInput
+from softreach.geometry import neighbors
+from softreach.geometry.neighbors import mean_value_distance
+
+
+def by_all_pairs(points, values, radius, queries=None):
+    """The definition, one point after the other."""
+    queries = np.arange(len(points)) if queries is None else queries
+    means, counts = np.full(len(queries), np.nan), np.zeros(len(queries), int)
+    for row, i in enumerate(queries):
+        near = ((points - points[i]) ** 2).sum(axis=1) <= radius**2
+        near[i] = False
+        counts[row] = near.sum()
+        if counts[row]:
+            means[row] = np.linalg.norm(values[near] - values[i], axis=1).mean()
+    return means, counts
+
+
+def assert_same(found, wanted):
+    np.testing.assert_array_equal(found[1], wanted[1])
+    np.testing.assert_allclose(found[0], wanted[0], rtol=1e-12, atol=1e-12)
+
+
+def uneven(n, m, seed=0):
+    """A cloud with a dense core, a thin halo, duplicates and one point far away."""
+    rng = np.random.default_rng(seed)
+    points = rng.normal(size=(n, 3)) * rng.random((n, 1)) ** 3
+    points[n // 2 : n // 2 + n // 20] = points[: n // 20]
+    points[-1] = [40.0, -30.0, 20.0]
+    return points, rng.normal(size=(n, m))
+
+
+@pytest.mark.parametrize("m", [3, 4])
+@pytest.mark.parametrize("radius", [0.0, 1e-9, 0.02, 0.2, 1.0, 200.0, np.inf])
+def test_equals_a_loop_over_all_pairs(m, radius):
+    points, values = uneven(2000, m)
+    assert_same(mean_value_distance(points, values, radius), by_all_pairs(points, values, radius))
+
+
+@pytest.mark.parametrize("m", [1, 2, 7])
+def test_values_may_have_any_number_of_components(m):
+    points, values = uneven(300, m)
+    assert_same(mean_value_distance(points, values, 0.3), by_all_pairs(points, values, 0.3))
+
+
+@given(
+    st.integers(1, 40),
+    st.floats(-8, 8),
+    st.floats(-1e9, 1e9),
+    st.floats(0, 2),
+    st.integers(0, 2),
+    st.integers(0, 99),
+)
+def test_scale_offset_and_flatness_do_not_matter(n, decade, offset, share, flat, seed):
+    rng = np.random.default_rng(seed)
+    size = 10.0**decade
+    points = np.round(rng.random((n, 3)) * 6) * size
+    points[:, :flat] = 0.0
+    points += offset
+    radius = 6 * size * share
+    values = rng.normal(size=(n, 3))
+    # a point on the sphere may fall to either side by rounding: compare between lattice radii
+    squares = ((points[:, None] - points) ** 2).sum(axis=2)
+    if (np.abs(squares - radius**2) > 1e-9 * (radius**2 + np.abs(points).max() ** 2)).all():
+        assert_same(
+            mean_value_distance(points, values, radius), by_all_pairs(points, values, radius)
+        )
+
+
+def test_the_ball_is_closed():
+    lattice = np.stack(np.meshgrid(*3 * [np.arange(11.0)]), axis=-1).reshape(-1, 3)
+    values = np.random.default_rng(1).normal(size=(len(lattice), 2))
+    for radius in (1.0, 3.0, 5.0):  # with 3-4-5 triangles; all of it exact in binary
+        found = mean_value_distance(lattice, values, radius)
+        assert_same(found, by_all_pairs(lattice, values, radius))
+    center = int(np.flatnonzero((lattice == 5.0).all(axis=1))[0])
+    assert mean_value_distance(lattice, values, 1.0)[1][center] == 6
+
+
+def test_the_point_itself_is_not_counted_but_another_at_its_place_is():
+    points, values = np.zeros((3, 3)), np.array([[0.0], [1.0], [3.0]])
+    mean, count = mean_value_distance(points, values, 0.0)
+    np.testing.assert_array_equal(count, 2)
+    np.testing.assert_allclose(mean, [2.0, 1.5, 2.5])
+
+
+def test_an_isolated_point_has_no_mean():
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1.1, 0, 0]])
+    mean, count = mean_value_distance(points, np.eye(3), 0.5)
+    np.testing.assert_array_equal(count, [0, 1, 1])
+    np.testing.assert_allclose(mean, [np.nan, np.sqrt(2), np.sqrt(2)])
+
+
+@pytest.mark.parametrize("radius", [0.0, 1.0])
+def test_one_point_is_isolated(radius):
+    mean, count = mean_value_distance(np.ones((1, 3)), np.ones((1, 3)), radius)
+    assert np.isnan(mean[0])
+    assert count[0] == 0
+
+
+def test_neighbors_come_from_all_points_whatever_the_queries():
+    points, values = uneven(2000, 3)
+    everywhere = mean_value_distance(points, values, 0.1)
+    queries = np.array([1999, 3, 3, 700, 0])
+    found = mean_value_distance(points, values, 0.1, queries)
+    np.testing.assert_array_equal(found[0], everywhere[0][queries])
+    np.testing.assert_array_equal(found[1], everywhere[1][queries])
+
+
+def test_no_queries_and_no_points_give_nothing():
+    points, values = uneven(100, 3)
+    nothing = np.empty(0, np.intp)
+    for found in (
+        mean_value_distance(points, values, 0.1, nothing),
+        mean_value_distance(np.empty((0, 3)), np.empty((0, 3)), 0.1),
+    ):
+        assert found[0].shape == found[1].shape == (0,)
+
+
+def test_blocks_and_threads_change_no_bit(monkeypatch):
+    points, values = uneven(2000, 3)
+    whole = mean_value_distance(points, values, 0.1)[0]
+    monkeypatch.setattr(neighbors, "BLOCK", 37)
+    monkeypatch.setattr(parallel, "thread_count", lambda: 5)
+    np.testing.assert_array_equal(mean_value_distance(points, values, 0.1)[0], whole)
+
+
+@pytest.mark.parametrize("radius", [-1.0, np.nan])
+def test_other_radii_are_refused(radius):
+    with pytest.raises(InvalidInput, match=r"radius = .*a radius >= 0 \[m\]"):
+        mean_value_distance(np.zeros((2, 3)), np.zeros((2, 1)), radius)
+
+
+def test_rows_that_are_not_finite_are_refused():
+    points, values = uneven(50, 3)
+    points[7, 1] = np.nan
+    with pytest.raises(InvalidInput, match=r"points = 1 rows .* first at index 7"):
+        mean_value_distance(points, values, 0.1)
+    with pytest.raises(InvalidInput, match=r"values = 1 rows .* first at index 7"):
+        mean_value_distance(values, points, 0.1)
+    with pytest.raises(InvalidInput, match=r"of shape \(50, m\)"):
+        mean_value_distance(values, np.zeros((49, 3)), 0.1)
