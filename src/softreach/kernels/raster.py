@@ -1,0 +1,185 @@
+"""Counting what covers the cell centers of a grid: lines of sight through critical triangles.
+
+Vertices are whole numbers, stored as floats, small enough for every comparison here to be exact
+(see `contour`). A line that meets an edge or a vertex counts as shifted by (ε, ε²), the same for
+every triangle, so that one of those around it is hit and not two or none. A center on a triangle
+counts as behind it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+__all__ = [
+    "Crossings",
+    "add_counts",
+    "crossings",
+    "empty_crossings",
+    "first_crossings",
+    "hits",
+    "joined_crossings",
+    "most_crossings",
+    "turn",
+    "upward",
+]
+
+Ints = NDArray[np.int64]
+
+
+class Crossings(NamedTuple):
+    """Where lines of sight meet critical triangles, one row a crossing."""
+
+    column: Ints
+    """Which line, (i, j) as i · width + j."""
+    center: Ints
+    """Number of the first cell center behind it, or on it."""
+    height: NDArray[np.float64]
+    """How far along the line, in cells."""
+    cover: Ints
+    """By how much the number of covering tetrahedra grows there."""
+    degree: Ints
+    """By how much the sum of their orientations grows there."""
+
+
+def empty_crossings(size: int) -> Crossings:
+    """Room for as many crossings."""
+    integers = np.empty((4, size), np.int64)
+    return Crossings(integers[0], integers[1], np.empty(size), integers[2], integers[3])
+
+
+def first_crossings(crossing: Crossings, size: int) -> Crossings:
+    """The rows that were written."""
+    return Crossings(*(field[:size] for field in crossing))  # pyright: ignore[reportArgumentType]
+
+
+def joined_crossings(parts: Sequence[Crossings]) -> Crossings:
+    """The rows of all parts."""
+    fields = zip(empty_crossings(0), *parts, strict=True)
+    return Crossings(*(np.concatenate(rows) for rows in fields))
+
+
+@njit(cache=True, nogil=True)
+def most_crossings(points, triangles, unit, p, q):
+    """An upper bound of the number of crossings, from the triangles' bounding boxes."""
+    count = 0
+    for t in range(len(triangles)):
+        low_p, high_p = span(points, triangles, t, unit, p)
+        low_q, high_q = span(points, triangles, t, unit, q)
+        count += max(0, high_p - low_p) * max(0, high_q - low_q)
+    return count
+
+
+@njit(cache=True, nogil=True)
+def crossings(points, triangles, unit, axis, width, out):
+    """Cross all triangles with the lines of sight through the cell centers, parallel to an axis.
+
+    Args:
+        points: Mapped vertices, whole numbers, shape (n, 3); cell centers are multiples of `unit`.
+        triangles: Rows of `critical_triangles`.
+        unit: Size of a cell, a power of two.
+        axis: Direction of the lines; the other two follow it cyclically.
+        width: Number of cells along the last of the other two.
+        out: Result, of type `Crossings`.
+
+    Returns:
+        Number of crossings written.
+    """
+    p, q = (axis + 1) % 3, (axis + 2) % 3
+    count = 0
+    for t in range(len(triangles)):
+        a, b, c, side = upward(points, triangles, t, p, q)
+        if side == 0:
+            continue
+        low, high = span(points, triangles, t, unit, q)
+        area = turn(points, a, b, points[c, p], points[c, q], p, q)
+        rise_b, rise_c = points[b, axis] - points[a, axis], points[c, axis] - points[a, axis]
+        for i in range(*span(points, triangles, t, unit, p)):
+            for j in range(low, high):
+                x, y = i * unit, j * unit
+                at_c, at_a = turn(points, a, b, x, y, p, q), turn(points, b, c, x, y, p, q)
+                at_b = area - at_a - at_c
+                if (
+                    hits(points, a, b, at_c, p, q)
+                    and hits(points, b, c, at_a, p, q)
+                    and hits(points, c, a, at_b, p, q)
+                ):
+                    rise = at_b * rise_b + at_c * rise_c
+                    out.column[count] = i * width + j
+                    out.height[count] = (points[a, axis] + rise / area) / unit
+                    out.center[count] = center_behind(points[a, axis], rise, area, unit)
+                    out.cover[count] = side * triangles[t, 3]
+                    out.degree[count] = side * triangles[t, 4]
+                    count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def span(points, triangles, t, unit, axis):
+    """Centers from the first to one past the last within a triangle's extent along an axis."""
+    a = points[triangles[t, 0], axis]
+    b = points[triangles[t, 1], axis]
+    c = points[triangles[t, 2], axis]
+    return int(np.ceil(min(a, b, c) / unit)), int(np.floor(max(a, b, c) / unit)) + 1
+
+
+@njit(cache=True, nogil=True)
+def upward(points, triangles, t, p, q):
+    """A triangle's vertices, counterclockwise as seen along the line, and which way its normal was.
+
+    1 along the line, -1 against it, 0 if the line grazes it.
+    """
+    a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+    area = turn(points, a, b, points[c, p], points[c, q], p, q)
+    if area < 0:
+        return a, c, b, -1
+    return a, b, c, int(area > 0)
+
+
+@njit(cache=True, nogil=True)
+def turn(points, a, b, x, y, p, q):
+    """Twice the area of the triangle of vertices a, b and (x, y), positive if counterclockwise."""
+    along, across = points[b, p] - points[a, p], points[b, q] - points[a, q]
+    return along * (y - points[a, q]) - across * (x - points[a, p])
+
+
+@njit(cache=True, nogil=True)
+def hits(points, a, b, area, p, q):
+    """Whether (x + ε, y + ε²) is on the left of edge ab, given twice the area at ε = 0."""
+    if area != 0:
+        return area > 0
+    across = points[b, q] - points[a, q]
+    return across < 0 or (across == 0 and points[b, p] > points[a, p])
+
+
+@njit(cache=True, nogil=True)
+def center_behind(base, rise, area, unit):
+    """The smallest k with k · unit >= base + rise / area, exactly."""
+    k = int(np.ceil((base + rise / area) / unit))
+    if (k * unit - base) * area < rise:
+        return k + 1
+    if ((k - 1) * unit - base) * area >= rise:
+        return k - 1
+    return k
+
+
+@njit(cache=True, nogil=True)
+def add_counts(crossing, counts, degrees):
+    """Cover counts at the cell centers: what was crossed on the way there.
+
+    Args:
+        crossing: Crossings with lines along the last axis of the grid.
+        counts: Result, zeros before, shape (columns, centers).
+        degrees: The same for orientations.
+    """
+    for e in range(len(crossing.column)):
+        counts[crossing.column[e], crossing.center[e]] += crossing.cover[e]
+        degrees[crossing.column[e], crossing.center[e]] += crossing.degree[e]
+    for column in range(len(counts)):
+        for k in range(1, counts.shape[1]):
+            counts[column, k] += counts[column, k - 1]
+            degrees[column, k] += degrees[column, k - 1]

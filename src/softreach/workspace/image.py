@@ -1,0 +1,209 @@
+"""A triangulated box mapped into space, and how its image covers a lattice of cells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach import parallel
+from softreach.kernels import contour, raster, stab
+from softreach.progress import Progress, silent
+
+__all__ = ["Image", "Lattice", "Spans", "image_of"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_MARGIN = 3  # empty cells around the image
+_ROWS = 1 << 20  # triangles a task may have to judge
+_POINTS = 1 << 14
+_TRIANGLES = 1 << 14  # critical triangles that a task rasterizes
+
+
+class Lattice(NamedTuple):
+    """Cubic cells that cover an image with room around it."""
+
+    origin: Array
+    """Center of cell (0, 0, 0) [m]."""
+    cell: float
+    """Edge h of a cell [m]."""
+    shape: tuple[int, int, int]
+
+    @classmethod
+    def around(cls, points: Array, cell: float) -> Lattice:
+        """The lattice around points, shape (n, 3) [m]."""
+        low, high = points.min(axis=0), points.max(axis=0)
+        count = np.ceil((high - low) / cell).astype(int) + 2 * _MARGIN
+        origin = (low + high - (count - 1) * cell) / 2.0
+        return cls(origin, cell, (int(count[0]), int(count[1]), int(count[2])))
+
+    def coordinates(self, points: Array) -> Array:
+        """Points [m] in cells from the center of cell (0, 0, 0)."""
+        return (points - self.origin) / self.cell
+
+
+class Spans(NamedTuple):
+    """Pieces of lines of sight between crossings, line by line, upwards."""
+
+    column: Ints
+    """Which line, (i, j) as i · width + j over the two axes that follow, cyclically."""
+    start: Array
+    """Where it begins, in cells."""
+    length: Array
+    """How long it is, in cells; 0 after the last crossing of a line."""
+    cover: Ints
+    """Number of simplices (m = 3) or tetrahedra (m > 3) that cover it."""
+    degree: Ints
+    """Those that kept their orientation minus those that were turned over (m = 3)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Image:
+    """The image of a triangulated box under the map that is linear on its simplices, m >= 3."""
+
+    lattice: Lattice
+    unit: float
+    """Whole units to a cell: vertices are rounded to cell / unit."""
+    vertices: Array
+    """Mapped vertices in these units from the lattice's origin, shape (n, 3)."""
+    triangles: Ints
+    """Critical triangles, as `kernels.contour.critical_triangles` lists them."""
+
+    def spans(self, axis: int) -> Spans:
+        """How the image covers the lines through the cell centers along an axis, to rounding."""
+        crossing = self._crossings(axis)
+        order = np.lexsort((crossing.height, crossing.column))
+        column, height = crossing.column[order], crossing.height[order]
+        same = np.diff(column, append=-1) == 0
+        length = np.where(same, np.diff(height, append=0.0), 0.0)
+        # Crossings at one height come in any order: between them sums may fall below zero.
+        cover = np.maximum(np.cumsum(crossing.cover[order]), 0)
+        return Spans(column, height, length, cover, np.cumsum(crossing.degree[order]))
+
+    @cached_property
+    def counts(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Cover counts and degrees at the cell centers, exactly; both of the lattice's shape."""
+        shape = self.lattice.shape
+        counts, degrees = np.zeros((2, shape[0] * shape[1], shape[2]), np.int32)
+        raster.add_counts(self._crossings(2), counts, degrees)
+        return counts.reshape(shape), degrees.reshape(shape)
+
+    def counts_at(self, points: Array) -> NDArray[np.int64]:
+        """Cover counts at any points [m], exactly but for rounding to units, shape (n,)."""
+        where = np.rint(self.lattice.coordinates(points) * self.unit)
+        out = np.empty(len(where), np.int64)
+        shape = self.lattice.shape[:2]
+        parallel.run(
+            partial(
+                stab.counts_at,
+                *(self.vertices, self.triangles, self.unit, shape, *self._bins),
+                *(where[block], out[block]),
+            )
+            for block in parallel.blocks(len(where), _POINTS)
+        )
+        return out
+
+    @cached_property
+    def _bins(self) -> tuple[Ints, Ints]:
+        return stab.bin_triangles(self.vertices, self.triangles, self.unit, self.lattice.shape[:2])
+
+    def boundary_crossings(self, axis: int) -> tuple[tuple[Ints, Ints, Ints], Array]:
+        """Where the boundary of the image cuts the edges between cell centers along an axis.
+
+        Returns:
+            The centers just before the boundary, as an index of arrays of the lattice's shape, and
+            how far behind them it lies, in cells, 0 to 1, shape (n,).
+        """
+        counts = np.moveaxis(self.counts[0], axis, 2)
+        crossing = self._crossings(axis)
+        i, j = np.divmod(crossing.column, self.lattice.shape[(axis + 2) % 3])
+        # np.moveaxis leaves the other two axes in ascending order, `_crossings` in cyclic order
+        i, j = (j, i) if axis == 1 else (i, j)
+        before = counts[i, j, crossing.center - 1]
+        near = np.flatnonzero((before > 0) != (counts[i, j, crossing.center] > 0))
+        near = near[np.lexsort((crossing.height[near], crossing.center[near], j[near], i[near]))]
+        i, j, k = i[near], j[near], crossing.center[near] - 1
+        after = before[near] + _running_sums(crossing.cover[near], _starts(i, j, k))
+        flips = (after > 0) != (after - crossing.cover[near] > 0)
+        index = [i[flips], j[flips]]
+        index.insert(axis, k[flips])
+        return (index[0], index[1], index[2]), crossing.height[near][flips] - k[flips]
+
+    def _crossings(self, axis: int) -> raster.Crossings:
+        p, q = (axis + 1) % 3, (axis + 2) % 3
+        blocks = list(parallel.blocks(len(self.triangles), _TRIANGLES))
+        parts: list[raster.Crossings] = [raster.empty_crossings(0)] * len(blocks)
+
+        def task(number: int) -> None:
+            rows = self.triangles[blocks[number]]
+            size = raster.most_crossings(self.vertices, rows, self.unit, p, q)
+            out = raster.empty_crossings(size)
+            width = self.lattice.shape[q]
+            used = raster.crossings(self.vertices, rows, self.unit, axis, width, out)
+            parts[number] = raster.first_crossings(out, used)
+
+        parallel.run(partial(task, number) for number in range(len(blocks)))
+        return raster.joined_crossings(parts)
+
+
+def _starts(*keys: Ints) -> NDArray[np.bool_]:
+    """Where a sorted list of keys changes."""
+    return np.any([np.diff(key, prepend=-1) != 0 for key in keys], axis=0)
+
+
+def _running_sums(values: Ints, starts: NDArray[np.bool_]) -> Ints:
+    """Cumulative sums that begin anew at every start."""
+    total = np.cumsum(values)
+    at = np.flatnonzero(starts)
+    offset = (total - values)[at]
+    return total - np.repeat(offset, np.diff(at, append=len(values)))
+
+
+def image_of(
+    points: Array, cells: tuple[int, ...], lattice: Lattice, report: Progress = silent
+) -> Image:
+    """The image of a grid of boxes whose vertices go to `points`.
+
+    Args:
+        points: Mapped vertices [m] in the C order of the grid, shape (prod(cells + 1), 3).
+        cells: Number of boxes along each of the m >= 3 axes.
+        lattice: Cells to rasterize on.
+        report: Called with the number of vertices done since its last call.
+    """
+    scaled = lattice.coordinates(points)
+    unit = _unit(scaled, cells)
+    vertices = np.rint(scaled * unit)
+    return Image(
+        lattice=lattice,
+        unit=unit,
+        vertices=vertices,
+        triangles=_critical_triangles(vertices, cells, report),
+    )
+
+
+def _unit(scaled: Array, cells: tuple[int, ...]) -> float:
+    """The largest power of two for which the kernels' determinants are exact."""
+    grid = scaled.reshape(*(n + 1 for n in cells), 3)
+    steps = [np.abs(np.diff(grid, axis=j)).max() for j in range(len(cells))]
+    longest = max(float(np.sum(steps)), 1.0)  # rounding adds at most 1 unit, hence the -1 below
+    return 2.0 ** np.floor(contour.EXACT_BITS - 1 - np.log2(longest))
+
+
+def _critical_triangles(vertices: Array, cells: tuple[int, ...], report: Progress) -> Ints:
+    star = contour.stars(cells)
+    blocks = list(parallel.blocks(len(vertices), max(1, _ROWS // len(star.triangles))))
+    parts: list[Ints] = [np.empty((0, 5), np.int64)] * len(blocks)
+
+    def task(number: int) -> None:
+        first, last = blocks[number].start, blocks[number].stop
+        out = np.empty(((last - first) * len(star.triangles), 5), np.int64)
+        used = contour.critical_triangles(vertices, np.array(cells), first, last, star, out)
+        parts[number] = out[:used].copy()
+        report(last - first)
+
+    parallel.run(partial(task, number) for number in range(len(blocks)))
+    return np.concatenate(parts)

@@ -1,0 +1,125 @@
+"""The boundary of a reachable set as triangles, and distances to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arrays import Faces, Points
+from softreach.errors import MissingExtra
+from softreach.geometry.hull import enclosed_volume, surface_area
+from softreach.kernels.nearest import distances_to_faces
+from softreach.workspace.image import Image
+
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
+
+__all__ = ["Surface", "boundary_surface", "critical_surface", "signed_field"]
+
+Array = NDArray[np.float64]
+
+_BAND = 2.5  # cells from the boundary beyond which the field is constant
+_CLOSEST = 1e-3  # cells: a center on the boundary itself would make triangles without area
+_NEIGHBORS = 4
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Surface:
+    """Triangles; around a solid they are closed and oriented outwards."""
+
+    vertices: Points
+    """Corners [m], shape (v, 3)."""
+    faces: Faces
+    """Indices into vertices, shape (f, 3)."""
+
+    @property
+    def volume(self) -> float:
+        """Volume inside, if the surface is closed [m³]."""
+        return enclosed_volume(self.vertices, self.faces)
+
+    @property
+    def area(self) -> float:
+        """Area [m²]."""
+        return surface_area(self.vertices, self.faces)
+
+    def distance(self, points: Array) -> Array:
+        """Distance of points to the nearest triangle around their 4 nearest vertices [m], (n,)."""
+        count = min(_NEIGHBORS, len(self.vertices))
+        near = self._tree.query(points, count, workers=-1)[1].reshape(len(points), count)
+        out = np.empty(len(points))
+        distances_to_faces(points, self.vertices, self.faces, *self._incidence, near, out)
+        return out
+
+    @cached_property
+    def _tree(self) -> KDTree:
+        from scipy.spatial import KDTree
+
+        return KDTree(self.vertices)
+
+    @cached_property
+    def _incidence(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Faces around each vertex, one after the other, and where each vertex's begin."""
+        corners = self.faces.ravel()
+        ends = np.cumsum(np.bincount(corners, minlength=len(self.vertices)))
+        return np.argsort(corners, kind="stable") // 3, np.concatenate([[0], ends])
+
+
+def critical_surface(image: Image) -> Surface:
+    """All critical triangles: the boundary of the image, and folds and walls inside it."""
+    used, corners = np.unique(image.triangles[:, :3], return_inverse=True)
+    lattice = image.lattice
+    vertices = lattice.origin + image.vertices[used] * (lattice.cell / image.unit)
+    return Surface(vertices=vertices, faces=corners.reshape(-1, 3))
+
+
+def signed_field(image: Image) -> Array:
+    """Distance of the cell centers to the boundary in cells, negative inside, up to 2.5.
+
+    Along each axis the boundary is located to rounding between two centers. A plane that cuts the
+    axes at distances a, b, c is 1/√(1/a² + 1/b² + 1/c²) away: linear interpolation between centers
+    gives the crossings back, to second order in the cell on a curved boundary.
+
+    Returns:
+        Of the lattice's shape.
+    """
+    inverse_square = np.zeros(image.lattice.shape)
+    for axis in range(3):
+        inverse_square += _axis_distances(image, axis) ** -2
+    with np.errstate(divide="ignore"):
+        distance = np.clip(inverse_square**-0.5, _CLOSEST, _BAND)
+    return np.where(image.counts[0] > 0, -distance, distance)
+
+
+def _axis_distances(image: Image, axis: int) -> Array:
+    """Distance to the boundary along an axis, in cells; infinite beyond two of them."""
+    distance = np.full(image.lattice.shape, np.inf)
+    index, behind = image.boundary_crossings(axis)
+    for step in (-1, 0, 1, 2):
+        shifted = list(index)
+        shifted[axis] = index[axis] + step
+        away = np.abs(behind - step).clip(_CLOSEST)
+        np.minimum.at(distance, tuple(shifted), away)
+    return distance
+
+
+def boundary_surface(image: Image, field: Array) -> Surface:
+    """The closed surface where the field is zero, by marching cubes.
+
+    Raises:
+        MissingExtra: scikit-image is not installed.
+    """
+    try:
+        from skimage.measure import marching_cubes
+    except ImportError as error:
+        raise MissingExtra("scikit-image", "surface") from error
+    if not (field < 0).any():
+        return Surface(vertices=np.empty((0, 3)), faces=np.empty((0, 3), np.int32))
+    vertices, faces, _, _ = marching_cubes(
+        field, 0.0, gradient_direction="descent", allow_degenerate=False
+    )
+    lattice = image.lattice
+    return Surface(vertices=lattice.origin + lattice.cell * vertices.astype(float), faces=faces)
