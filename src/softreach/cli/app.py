@@ -14,10 +14,10 @@ __all__ = ["app", "main"]
 
 app = App(
     name="softreach",
-    help="""Where a soft slender robot can go: from a design to its reachability cloud and volumes.
+    help="""Where a soft slender robot can go: from a design to its cloud and volumes.
 
-A DESIGN is a TOML file (lengths in m, angles in degrees) or the name of a built-in design:
-minimal_trunk, redundant_trunk. Start with
+A DESIGN is a TOML file (lengths in m, angles in degrees) or the name of a
+built-in design: minimal_trunk, redundant_trunk. Start with
 
     softreach demo --out out
 """,
@@ -28,21 +28,40 @@ minimal_trunk, redundant_trunk. Start with
     help_format="plaintext",
 )
 
-# Commands are imported when run; their summaries stand here, so that help needs none of them.
+# Commands are imported when run; their help stands here, so that `softreach --help` needs none of
+# them.
 _COMMANDS = {
-    "demo": "The paper's design, start to end: cloud, volumes, hull and picture.",
-    "design": "What follows from a design: angles, radii, ranges, warnings.",
-    "cloud": "Compute a reachability cloud and store it.",
-    "volume": "Volume, convex volume and unreachability of a cloud.",
-    "show": "Draw a cloud and its arm.",
-    "export": "Write a cloud or an arm for other programs.",
+    "demo": (
+        "The paper's design, start to end: cloud, volumes, hull and picture.",
+        "softreach demo --out out",
+    ),
+    "design": (
+        "What follows from a design: angles, radii, ranges, warnings.",
+        "softreach design minimal_trunk --taper-deg 3",
+    ),
+    "cloud": (
+        "Compute a reachability cloud and store it.",
+        "softreach cloud minimal_trunk --n 400000 --out trunk.zarr",
+    ),
+    "volume": (
+        "Volume, convex volume and unreachability of a cloud.",
+        "softreach volume trunk.zarr --alpha 0.05L --hull hull.ply",
+    ),
+    "show": (
+        "Draw a cloud and its arm.",
+        "softreach show trunk.zarr --activation=-1,0,-0.5 --out trunk.pdf",
+    ),
+    "export": (
+        "Write a cloud or an arm for other programs.",
+        "softreach export trunk.zarr trunk.parquet",
+    ),
 }
-for _name, _summary in _COMMANDS.items():
+for _place, (_name, (_summary, _example)) in enumerate(_COMMANDS.items()):
     app.command(
         f"softreach.cli.{_name}:{_name}",
         name=_name,
-        help=_summary,
-        sort_key=list(_COMMANDS).index(_name),
+        help=f"{_summary}\n\nExample: {_example}",
+        sort_key=_place,
     )
 
 

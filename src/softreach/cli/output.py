@@ -24,7 +24,7 @@ def report(title: str, rows: Mapping[str, tuple[Any, str]], as_json: bool) -> No
         return
     width = max(len(name) for name in rows)
     lines = (
-        f"  {name:<{width}}  {_shown(value)} {unit}".rstrip()
+        f"  {name:<{width}}  {_shown(value)} {'' if value is None else unit}".rstrip()
         for name, (value, unit) in rows.items()
     )
     sys.stdout.write("\n".join([title, *lines, ""]))

@@ -8,6 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from softreach.cli.inputs import Activation, Sampler, Source, activation_of, cloud_of
+from softreach.errors import InvalidInput
 
 __all__ = ["show"]
 
@@ -32,9 +33,19 @@ def show(
     from softreach.cloud import design_of
     from softreach.kinematics import configuration
 
+    _check_suffix(out)
     cloud = cloud_of(source, n, seed, sampler)
     arm = design_of(cloud)
     shape = None if activation is None else configuration(arm, activation_of(activation, arm))
     axes = plot.plot_views(cloud, arm, shape, color=color)
     plot.save_figure(axes["front"], out)
     sys.stdout.write(f"{out}\n")
+
+
+def _check_suffix(out: Path) -> None:
+    """Refuse a picture format that matplotlib cannot write, before anything is computed."""
+    from softreach.plot.style import pyplot
+
+    known = pyplot().Figure().canvas.get_supported_filetypes()
+    if out.suffix.lower().removeprefix(".") not in known:
+        raise InvalidInput("out", out, "a file name ending in .png, .pdf, .svg or the like")

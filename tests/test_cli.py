@@ -1,0 +1,324 @@
+"""The command line: what it prints, what it refuses, what its exit codes mean."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import softreach as sr
+from softreach.cli.app import app, run
+
+# Few samples make the α-shape too fine; the command line prints that and goes on.
+pytestmark = pytest.mark.filterwarnings("always::softreach.errors.SoftreachWarning")
+
+COMMANDS = ["demo", "design", "cloud", "volume", "show", "export"]
+HEAVY = {"numba", "scipy", "xarray", "matplotlib", "zarr", "pandas", "pydantic"}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """An empty folder to work in."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    """A cloud on disk."""
+    path = tmp_path_factory.mktemp("clouds") / "trunk.zarr"
+    sr.save_cloud(sr.compute_cloud(sr.designs.minimal_trunk(), n=3_000, seed=1), path)
+    return str(path)
+
+
+def printed_json(capsys, *arguments):
+    assert run([*arguments, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_of_every_command_teaches_with_an_example_that_parses(command, capsys):
+    assert run([command, "--help"]) == 0
+    text = capsys.readouterr().out
+    example = text.partition("Example: softreach ")[2].partition("\n\n")[0]
+    words = example.split()
+    assert words[0] == command
+    function, bound, *_ = app.parse_args(words, exit_on_error=False, print_error=False)
+    assert function.__name__ == command
+    assert bound.arguments
+
+
+def test_help_lists_every_command(capsys):
+    assert run(["--help"]) == 0
+    text = capsys.readouterr().out
+    assert all(f" {command} " in text for command in COMMANDS)
+
+
+def test_the_version_is_that_of_the_package(capsys):
+    from importlib.metadata import version
+
+    assert run(["--version"]) == 0
+    assert capsys.readouterr().out.strip() == version("softreach")
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import softreach",
+        "from softreach.cli.app import run; run(['--help'])",
+        "from softreach.cli.app import run; run(['nonsense'])",
+    ],
+)
+def test_importing_and_helping_load_no_heavy_library(code):
+    script = f"{code}\nimport sys; print(*sys.modules, file=sys.stderr)"
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    loaded = {name.partition(".")[0] for name in done.stderr.split()}
+    assert not HEAVY & loaded
+
+
+def test_the_installed_command_ends_with_the_exit_code():
+    command = [sys.executable, "-m", "softreach", "design", "nowhere.toml"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith("error: ")
+
+
+class TestDesign:
+    def test_what_is_printed_follows_from_the_design(self, capsys):
+        facts = printed_json(capsys, "design", "minimal_trunk", "--taper-deg", "3")
+        arm = sr.designs.minimal_trunk(taper=np.radians(3))
+        assert facts["bundles"] == 3
+        assert facts["bundle_names"] == list(arm.bundle_names)
+        np.testing.assert_allclose(facts["helical_angle_deg"], np.degrees(arm.helical_angles))
+        np.testing.assert_allclose(facts["revolution_deg"], [-108, 108, 0])
+        assert facts["outer_radius_at_tip_m"] == pytest.approx(arm.tip_radius)
+        assert any("|γ| = 1.67" in warning for warning in facts["warnings"])
+
+    def test_the_table_and_its_warnings_are_apart(self, capsys):
+        assert run(["design", "minimal_trunk"]) == 0
+        streams = capsys.readouterr()
+        assert "-108, 108, 0 deg" in streams.out
+        assert streams.err.startswith("warning: activations reach |γ| = 1.67")
+
+    def test_a_saved_design_is_the_varied_one(self, folder, capsys):
+        assert run(["design", "redundant_trunk", "--revolution-deg", "60", "--save", "a.toml"]) == 0
+        assert sr.Manipulator.load("a.toml") == sr.designs.varied(
+            sr.designs.redundant_trunk(), revolution=np.radians(60)
+        )
+        capsys.readouterr()
+        facts = printed_json(capsys, "design", "a.toml")
+        np.testing.assert_allclose(facts["revolution_deg"], [-60, 60, 0, 0])
+
+
+class TestCloud:
+    def test_the_cloud_on_disk_is_that_of_the_library(self, folder, capsys):
+        options = ["--n", "512", "--seed", "3", "--sampler", "sobol", "--out", "a.zarr"]
+        facts = printed_json(capsys, "cloud", "minimal_trunk", *options, "--taper-deg", "1")
+        arm = sr.designs.varied(sr.designs.minimal_trunk(), taper=np.radians(1))
+        cloud = sr.open_cloud("a.zarr")
+        assert cloud.identical(sr.compute_cloud(arm, 512, 3, "sobol"))
+        assert facts["samples"] == 512
+        assert facts["highest_tip_L"] == pytest.approx(float(cloud.tip[:, 2].max()))
+
+    def test_lengths_are_counted_in_l_whatever_the_length(self, folder, capsys):
+        sr.designs.minimal_trunk(length=0.3).save("short.toml")
+        short = printed_json(capsys, "cloud", "short.toml", "--n", "500")
+        long = printed_json(capsys, "cloud", "minimal_trunk", "--n", "500")
+        for name in ("highest_tip_L", "lowest_tip_L"):
+            assert short[name] == pytest.approx(long[name], rel=1e-6)
+
+
+class TestVolume:
+    def test_volumes_are_those_of_the_library(self, stored, capsys):
+        facts = printed_json(capsys, "volume", stored, "--alpha", "0.4L")
+        tip = sr.open_cloud(stored).tip
+        hull, convex = sr.concave_hull(tip, 0.4, bias=True), sr.convex_hull(tip)
+        assert facts["points"] == 3_000
+        assert facts["alpha_L"] == 0.4
+        assert facts["volume_L3"] == pytest.approx(hull.volume)
+        assert facts["convex_volume_L3"] == pytest.approx(convex.volume)
+        assert facts["unreachability"] == pytest.approx(1 - hull.volume / convex.volume)
+        corrected = facts["volume_without_sampling_bias_estimate_L3"]
+        assert corrected == pytest.approx(hull.volume_corrected)
+
+    @pytest.mark.parametrize(
+        ("alpha", "length", "radius"), [("0.3L", 2.0, 0.3), ("0.3", 2.0, 0.15)]
+    )
+    def test_a_radius_is_in_meters_or_in_l(self, alpha, length, radius, folder, capsys):
+        sr.designs.minimal_trunk(length=length).save("long.toml")
+        options = ("--alpha", alpha, "--n", "1000")
+        assert printed_json(capsys, "volume", "long.toml", *options)["alpha_L"] == radius
+
+    def test_the_critical_radius_leaves_one_region(self, stored, capsys):
+        assert printed_json(capsys, "volume", stored, "--alpha", "critical")["regions"] == 1
+
+    def test_too_fine_a_radius_is_warned_of_and_the_estimate_withheld(self, stored, capsys):
+        assert run(["volume", stored, "--alpha", "0.08L"]) == 0
+        streams = capsys.readouterr()
+        assert "warning: alpha = 0.08 m is" in streams.err
+        assert "use more points or a larger alpha" in streams.err
+        assert "Traceback" not in streams.err
+        assert streams.out.splitlines()[6].endswith("(estimate)  -")
+
+    def test_the_hull_is_written(self, stored, folder, capsys):
+        trimesh = pytest.importorskip("trimesh")
+        facts = printed_json(capsys, "volume", stored, "--alpha", "0.4L", "--hull", "hull.ply")
+        assert trimesh.load("hull.ply").volume == pytest.approx(facts["volume_L3"], rel=1e-6)
+
+
+class TestShow:
+    @pytest.mark.parametrize(
+        "options",
+        [
+            ["--out", "a.png"],
+            ["--out", "a.pdf", "--color", "longitudinal", "--activation=-1,0,-0.5"],
+        ],
+    )
+    def test_the_picture_is_where_it_says(self, stored, folder, capsys, options):
+        plt = pytest.importorskip("matplotlib.pyplot")
+        assert run(["show", stored, *options]) == 0
+        assert capsys.readouterr().out.strip() == options[1]
+        assert (folder / options[1]).stat().st_size > 10_000
+        plt.close("all")
+
+
+class TestExport:
+    def test_a_cloud_goes_out_by_suffix(self, stored, folder, capsys):
+        assert run(["export", stored, "cloud.npz"]) == 0
+        assert capsys.readouterr().out == "cloud.npz\n"
+        with np.load("cloud.npz") as table:
+            np.testing.assert_array_equal(table["tip"], sr.open_cloud(stored).tip)
+
+    def test_an_arm_goes_out_deformed(self, folder):
+        trimesh = pytest.importorskip("trimesh")
+        assert run(["export", "minimal_trunk", "arm.ply", "--activation=-1,0,-0.4"]) == 0
+        low, high = trimesh.load("arm.ply").bounds
+        tip = sr.tip_positions(sr.designs.minimal_trunk(), [[-1.0, 0.0, -0.4]])[0]
+        assert (low < tip).all()
+        assert (tip < high).all()
+        assert high[2] < 0.5  # curled: the arm at rest ends at 1
+
+
+@pytest.mark.parametrize("output", ["table", "json"])
+def test_the_demo_writes_every_file_it_names(output, folder, capsys):
+    plt = pytest.importorskip("matplotlib.pyplot")
+    pytest.importorskip("trimesh")
+    assert run(["demo", "--out", "results", "--n", "4000", *["--json"][: output == "json"]]) == 0
+    text = capsys.readouterr().out
+    names = {"design.toml", "cloud.zarr", "cloud.ply", "hull.ply", "cloud.png"}
+    assert {path.name for path in (folder / "results").iterdir()} == names
+    assert all(f"results/{name}" in text for name in names)
+    if output == "json":
+        assert json.loads(text)["points"] == 4000
+    assert sr.Manipulator.load("results/design.toml") == sr.designs.minimal_trunk()
+    assert sr.open_cloud("results/cloud.zarr").sizes["sample"] == 4000
+    plt.close("all")
+
+
+BAD_DESIGN = """
+length_m = 1.0
+outer_radius_m = "thick"
+inner_radius_m = 0.04
+taper_degrees = 2.0
+
+[[fibers]]
+extent_deg = 400.0
+helical_angle_deg = 0.0
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["desgin"], 'Did you mean "design"'),
+        (["design"], "requires an argument"),
+        (["design", "nowhere.toml"], "nowhere.toml: must be a file that exists"),
+        (["design", "elephant"], "elephant: must be a .toml file, or one of minimal_trunk"),
+        (["design", "minimal_trunk", "--tapr-deg", "3"], "Did you mean --taper-deg"),
+        (["design", "minimal_trunk", "--taper-deg", "steep"], '"steep" into float'),
+        (["cloud", "minimal_trunk", "--n", "many"], '"many" into int'),
+        (["cloud", "minimal_trunk", "--n", "0"], "n = 0: must be a whole number, 1 or more"),
+        (["cloud", "minimal_trunk", "--seed", "-1"], "seed = -1"),
+        (["cloud", "minimal_trunk", "--tol", "0"], "tol = 0"),
+        (
+            ["cloud", "minimal_trunk", "--sampler", "halton"],
+            "one of uniform, boundary, sobol, grid",
+        ),
+        (["cloud", "minimal_trunk", "--sampler", "sobol", "--n", "1000"], "512 or 1024"),
+        (["cloud", "minimal_trunk", "--sampler", "grid", "--n", "999"], "9^3 = 729 or 10^3 = 1000"),
+        (["volume", "nowhere.zarr"], "must be a Zarr store written by softreach"),
+        (["volume", "minimal_trunk", "--n", "9", "--alpha", "wide"], "alpha = wide"),
+        (["volume", "minimal_trunk", "--n", "9", "--alpha=-1L"], "alpha = -1L"),
+        (["show", "minimal_trunk", "--n", "9", "--color", "pink"], "left, right, longitudinal"),
+        (["show", "minimal_trunk", "--n", "9", "--activation", "1"], "3 comma-separated numbers"),
+        (["show", "minimal_trunk", "--out", "a.doc"], "a.doc: must be a file name ending in .png"),
+        (["show", "minimal_trunk", "--out", "a"], "a: must be a file name ending in .png"),
+        (["export", "minimal_trunk", "arm.doc"], ".ply, .stl, .obj, .glb"),
+        (["export", "minimal_trunk"], "requires an argument"),
+    ],
+)
+def test_wrong_input_is_one_line_and_exit_code_2(arguments, message, folder, capsys):
+    assert run(arguments) == 2
+    streams = capsys.readouterr()
+    assert streams.err.startswith("error: ")
+    assert streams.err.count("\n") == 1
+    assert message in streams.err
+    assert streams.out == ""
+    assert not any(folder.iterdir())
+
+
+def test_a_cloud_in_a_format_for_surfaces_is_refused(stored, folder, capsys):
+    assert run(["export", stored, "cloud.stl"]) == 2
+    assert ".csv, .parquet" in capsys.readouterr().err
+    assert not any(folder.iterdir())
+
+
+def test_a_variation_that_cannot_exist_is_refused_in_degrees(capsys):
+    assert run(["design", "minimal_trunk", "--taper-deg", "10"]) == 2
+    text = capsys.readouterr().err
+    assert "taper_deg = 10" in text
+    assert "3.576°" in text
+
+
+def test_every_fault_of_a_design_file_has_its_line(folder, capsys):
+    (folder / "bad.toml").write_text(BAD_DESIGN)
+    assert run(["design", "bad.toml"]) == 2
+    first, *faults = capsys.readouterr().err.splitlines()
+    assert first == "error: bad.toml: 3 problems"
+    assert all(fault.startswith("  ") for fault in faults)
+    for text in (
+        "outer_radius_m = 'thick'",
+        "taper_degrees = 2: unknown key",
+        "extent_deg = 400",
+    ):
+        assert sum(text in fault for fault in faults) == 1
+
+
+def test_text_that_is_no_toml_is_refused_with_its_line(folder, capsys):
+    (folder / "bad.toml").write_text("length_m = = 1\n")
+    assert run(["design", "bad.toml"]) == 2
+    assert "at line 1" in capsys.readouterr().err
+
+
+def test_a_place_that_cannot_be_written_is_an_error_of_one_line(folder, capsys):
+    (folder / "file").write_text("")
+    assert run(["cloud", "minimal_trunk", "--n", "10", "--out", "file/cloud.zarr"]) == 2
+    text = capsys.readouterr().err
+    assert text.startswith("error: ")
+    assert text.count("\n") == 1
+
+
+def test_an_interrupt_is_exit_code_130_and_leaves_nothing(folder, capsys, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("softreach.schema.storable", interrupted)
+    assert run(["cloud", "minimal_trunk", "--n", "10"]) == 130
+    assert capsys.readouterr().err == "interrupted: nothing half-written was left behind\n"
+    assert not any(folder.iterdir())

@@ -1,0 +1,169 @@
+"""The documentation runs: Python, commands and design files as they stand, and what they print.
+
+A fence in `README.md` or `docs/` is one of these, or the test fails:
+
+- `python`: executed, in order, in one namespace per page and an empty folder. One that cannot be
+  says why in its first line: `# not executed: REASON`.
+- `bash`: lines that begin with `softreach` are executed in the same folder; a line ending in
+  `# exit code 2` must fail so. Other lines set up a machine and are not executed.
+- `toml`: read as a design.
+- `text` right after one of these: what it printed. Numbers may differ by 0.1 %; `...` stands for
+  anything up to the end of the line.
+- `bibtex`: data.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+import shlex
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from pathlib import Path
+
+import pytest
+from sybil.document import Document
+from sybil.evaluators.python import PythonEvaluator
+from sybil.parsers.markdown import CodeBlockParser
+
+import softreach as sr
+from softreach.cli.app import run
+
+ROOT = Path(__file__).parent.parent
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+SETUP = {"pip", "make", "git", "cd", "python3", "export"}
+NOT_EXECUTED = re.compile(r"# not executed: \w.+")
+FENCE = re.compile(r"^ *(`{3,})(.*)\n(?:.*\n)*?^ *\1 *$", re.MULTILINE)
+
+
+def on_page(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+@pytest.mark.filterwarnings("always::softreach.errors.SoftreachWarning")
+@pytest.mark.parametrize("page", PAGES, ids=on_page)
+def test_everything_on_a_page_runs_and_prints_what_it_says(page, tmp_path, monkeypatch):
+    plt = pytest.importorskip("matplotlib.pyplot")
+    monkeypatch.chdir(tmp_path)
+    parsers = [
+        CodeBlockParser("python", run_python),
+        CodeBlockParser("bash", run_small_commands if page.name == "README.md" else run_commands),
+        CodeBlockParser("toml", read_design),
+        CodeBlockParser("text", compare_output),
+    ]
+    document = Document.parse(str(page), *parsers, encoding="utf-8")
+    document.namespace["__name__"] = "__documentation__"
+    for example in document.examples():
+        example.evaluate()
+    plt.close("all")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=on_page)
+def test_every_fence_is_declared(page):
+    languages = {"python", "bash", "toml", "text", "bibtex"}
+    found = [match[2].strip() for match in FENCE.finditer(page.read_text(encoding="utf-8"))]
+    assert set(found) <= languages
+
+
+def test_every_public_name_is_in_the_reference():
+    reference = (ROOT / "docs" / "reference.md").read_text(encoding="utf-8")
+    shown = set(re.findall(r"^::: softreach\.(?:\w+\.)*(\w+)", reference, re.MULTILINE))
+    assert set(sr.__all__) <= shown
+
+
+def test_the_readme_is_short():
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) < 200
+
+
+@pytest.mark.parametrize("picture", sorted((ROOT / "docs").rglob("*.png")), ids=on_page)
+def test_pictures_stay_small(picture):
+    assert picture.stat().st_size < 400_000
+
+
+def run_python(example):
+    """Execute a fence and keep what it prints."""
+    if NOT_EXECUTED.match(example.parsed):
+        example.namespace["_printed"] = None
+        return
+    with printed_into(example):
+        PythonEvaluator()(example)
+
+
+def run_commands(example):
+    """Execute the lines that begin with softreach, as they stand."""
+    _run_lines(example, small=False)
+
+
+def run_small_commands(example):
+    """Execute them with few samples."""
+    _run_lines(example, small=True)
+
+
+def _run_lines(example, *, small):
+    with printed_into(example):
+        for line in example.parsed.replace("\\\n", " ").splitlines():
+            words = shlex.split(line, comments=True)
+            if words and words[0] == "softreach":
+                expected = 2 if line.rstrip().endswith("# exit code 2") else 0
+                assert run(_few(words[1:]) if small else words[1:]) == expected, line
+            else:
+                assert not words or words[0] in SETUP, f"neither softreach nor set-up: {line}"
+
+
+def _few(arguments):
+    """The same command with 20,000 samples."""
+    if arguments[0] not in ("demo", "cloud"):
+        return arguments
+    if "--n" in arguments:
+        at = arguments.index("--n")
+        arguments = arguments[:at] + arguments[at + 2 :]
+    return [*arguments, "--n", "20000"]
+
+
+def read_design(example):
+    """Read a fence as a design file, and keep it as one for the commands that follow."""
+    sr.Manipulator.from_toml(example.parsed)
+    Path("trunk.toml").write_text(example.parsed, encoding="utf-8")
+    example.namespace["_printed"] = None
+
+
+def compare_output(example):
+    """Hold a text fence against what was printed last."""
+    printed = example.namespace.pop("_printed", None)
+    assert printed is not None, f"line {example.line}: no executed fence before this output"
+    # compiling is said on the first run only
+    found = [line for line in printed.splitlines() if not line.startswith("softreach: compiling")]
+    wanted = example.parsed.splitlines()
+    assert len(found) == len(wanted), f"line {example.line}: printed {found}"
+    for one, other in zip(wanted, found, strict=True):
+        assert same_line(one, other), f"line {example.line}: {one!r} says the page, not {other!r}"
+
+
+def same_line(wanted, found):
+    """Whether two lines agree word by word."""
+    head, cut, _ = wanted.partition("...")
+    want, have = _words(head), _words(found)
+    return (len(have) >= len(want) if cut else len(have) == len(want)) and all(
+        map(_same, want, have)
+    )
+
+
+def _words(line):
+    return re.findall(r"[-+]?\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?|[^\s\d]+|\d", line)
+
+
+def _same(wanted, found):
+    try:
+        one, other = float(wanted.replace(",", "")), float(found.replace(",", ""))
+    except ValueError:
+        return wanted == found
+    return math.isclose(one, other, rel_tol=1e-3, abs_tol=1e-9)
+
+
+@contextmanager
+def printed_into(example):
+    """Keep standard output and error of the block for a text fence after it."""
+    text = io.StringIO()
+    with redirect_stdout(text), redirect_stderr(text):
+        yield
+    example.namespace["_printed"] = text.getvalue()
