@@ -1,0 +1,199 @@
+"""D̄ of real and of made-up clouds, and what is said of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from softreach import designs
+from softreach.cloud import compute_cloud
+from softreach.errors import InvalidInput
+from softreach.redundancy import (
+    activation_distance,
+    distance_map,
+    redundancy_summary,
+    tip_density,
+)
+from softreach.schema import cloud_dataset
+from tests.geometry.test_neighbors import by_all_pairs
+
+
+def made_up(tip, activation=None) -> xr.Dataset:
+    """A cloud with tips of one's own; the design only gives the length of 1 m."""
+    tip = np.asarray(tip, float)
+    activation = np.zeros((len(tip), 3)) if activation is None else np.asarray(activation, float)
+    arm = designs.minimal_trunk()
+    return cloud_dataset(arm, activation, tip, seed=0, sampler="uniform", tol=1e-6)
+
+
+@pytest.fixture(scope="module")
+def strewn() -> xr.Dataset:
+    """Points strewn evenly over a box of eight cells of 0.1 m, with activations x, y, z / m."""
+    tip = np.random.default_rng(3).random((4000, 3)) * 0.2
+    return made_up(tip, tip)
+
+
+@pytest.mark.parametrize("design", [designs.minimal_trunk, designs.redundant_trunk])
+@pytest.mark.parametrize("radius", [0.0, 1 / 60, 0.1, 5.0])
+def test_equals_a_loop_over_all_pairs(design, radius):
+    cloud = compute_cloud(design(), n=2000)
+    found = activation_distance(cloud, radius)
+    mean, count = by_all_pairs(cloud.tip.values, cloud.activation.values, radius)
+    np.testing.assert_allclose(found, mean, rtol=1e-12, atol=1e-12)
+    np.testing.assert_array_equal(found.neighbors, count)
+
+
+def test_the_result_says_what_it_is(strewn):
+    found = activation_distance(strewn, 0.01)
+    assert found.name == "activation_distance"
+    assert found.attrs["units"] == "1"
+    assert found.attrs["radius"] == 0.01
+    np.testing.assert_array_equal(found.sample, np.arange(4000))
+    np.testing.assert_array_equal(np.isnan(found), found.neighbors == 0)
+
+
+def test_what_is_evaluated_does_not_change_what_comes_out(strewn):
+    everywhere = activation_distance(strewn, 0.02)
+    for queries in (100, np.array([5, 5, 3999, 0])):
+        some = activation_distance(strewn, 0.02, queries)
+        np.testing.assert_array_equal(some, everywhere[some.sample.values])
+
+
+def test_a_number_of_queries_takes_one_sample_of_each_equal_part(strewn):
+    sample = activation_distance(strewn, 0.02, 50).sample.values
+    np.testing.assert_array_equal(sample // 80, np.arange(50))
+    np.testing.assert_array_equal(activation_distance(strewn, 0.02, 50).sample, sample)
+    np.testing.assert_array_equal(activation_distance(strewn, 0.02, 4000).sample, range(4000))
+
+
+@pytest.mark.parametrize("queries", [0, [], np.empty(0, int)])
+def test_no_queries_give_nothing(strewn, queries):
+    assert activation_distance(strewn, 0.02, queries).sizes == {"sample": 0}
+
+
+@pytest.mark.parametrize(
+    ("queries", "said"),
+    [
+        (-1, "queries = -1.*from 0 to the cloud's 4000 samples"),
+        (4001, "queries = 4001.*from 0 to the cloud's 4000 samples"),
+        ([4000], "indices from 4000 to 4000.*from 0 to 3999"),
+        ([-1], "indices from -1"),
+        ([0.5], "whole numbers"),
+        ([[1]], "one-dimensional"),
+        (np.ones(4000, bool), "whole numbers"),
+    ],
+)
+def test_other_queries_are_refused(strewn, queries, said):
+    with pytest.raises(InvalidInput, match=said):
+        activation_distance(strewn, 0.02, queries)
+
+
+def test_tips_that_are_not_finite_are_refused_by_their_index():
+    tip = np.zeros((5, 3))
+    tip[3, 1] = np.nan
+    for function in (lambda cloud: activation_distance(cloud, 0.1), tip_density):
+        with pytest.raises(InvalidInput, match="1 rows with NaN or infinity, the first at index 3"):
+            function(made_up(tip))
+
+
+def test_a_second_way_to_every_place_shows_as_its_distance():
+    tip = np.random.default_rng(0).random((200, 3))
+    gamma = np.zeros((400, 3))
+    gamma[200:] = [3.0, 4.0, 0.0]
+    found = activation_distance(made_up(np.concatenate([tip, tip]), gamma), 0.0)
+    np.testing.assert_allclose(found, 5.0)
+
+
+@pytest.mark.slow
+def test_minimal_and_redundant_trunk_differ_as_in_the_paper():
+    found = {}
+    for design in (designs.minimal_trunk, designs.redundant_trunk):
+        cloud = compute_cloud(design(), n=2_000_000, tol=1e-4)
+        distance = activation_distance(cloud, 1 / 60, 10_000)
+        found[design] = redundancy_summary(distance, cloud)
+    minimal, redundant = found.values()
+    assert minimal.median == pytest.approx(0.05, abs=0.01)
+    assert redundant.median == pytest.approx(0.5, abs=0.05)
+    assert redundant.quantiles[0.95] == pytest.approx(0.95, abs=0.03)  # "on the order of 1.0"
+    assert minimal.redundant_volume < 0.02 < 0.3 < redundant.redundant_volume
+
+
+def test_the_summary_counts_points_and_cells():
+    # two cells of 0.1 m: near ones far apart in activation, three alike, and a lonely third cell
+    tip = [[0.01] * 3, [0.02] * 3, [0.11] * 3, [0.12] * 3, [0.13] * 3, [0.95] * 3]
+    gamma = np.zeros((6, 3))
+    gamma[0, 0] = 1.0
+    cloud = made_up(tip, gamma)
+    found = redundancy_summary(activation_distance(cloud, 0.05), cloud, 0.5, cell=0.1)
+    assert found.evaluated == 6
+    assert found.isolated == pytest.approx(1 / 6)
+    assert found.redundant_points == pytest.approx(2 / 5)
+    assert found.redundant_volume == pytest.approx(1 / 2)
+    assert found.measured_volume == pytest.approx(2e-3)
+    assert found.occupied_volume == pytest.approx(3e-3)
+    assert found.median == 0.0
+    assert found.quantiles[0.95] == pytest.approx(1.0)
+
+
+def test_where_all_points_are_isolated_there_is_nothing_to_summarize():
+    cloud = made_up(np.eye(3))
+    found = redundancy_summary(activation_distance(cloud, 0.0), cloud)
+    assert found.isolated == 1.0
+    assert found.measured_volume == 0.0
+    assert np.isnan([found.median, found.redundant_points, found.redundant_volume]).all()
+
+
+def test_a_map_keeps_the_mean(strewn):
+    distance = activation_distance(strewn, 0.02, 1000)
+    grid = distance_map(strewn, distance, cell=0.03)
+    weighted = (grid.activation_distance * grid.evaluated).sum() / grid.evaluated.sum()
+    assert float(weighted) == pytest.approx(float(distance.mean()))
+    assert int(grid.evaluated.sum()) == int(distance.count())
+    np.testing.assert_array_equal(grid.activation_distance.isnull(), grid.evaluated == 0)
+
+
+def test_a_map_puts_every_value_where_its_tip_is():
+    tip = np.array([[-0.26, 0.0, 0.51], [0.31, 0.2, 0.49], [0.31, 0.2, 0.49]])
+    cloud = made_up(tip, [[0, 0, 0], [1, 0, 0], [3, 0, 0]])
+    grid = distance_map(cloud, activation_distance(cloud, 0.0), cell=0.1)
+    assert float(grid.activation_distance.sel(x=0.35, y=0.25, z=0.45, method="nearest")) == pytest.approx(2.0)
+    assert float(grid.activation_distance.count()) == 1.0
+    assert grid.x.attrs["units"] == "m"
+
+
+def test_distances_of_another_cloud_are_refused(strewn):
+    distance = activation_distance(strewn, 0.02)
+    small = strewn.isel(sample=slice(10))
+    with pytest.raises(InvalidInput, match=r"distance.sample = indices from 0 to 3999"):
+        distance_map(small, distance)
+    with pytest.raises(InvalidInput, match="made by activation_distance"):
+        redundancy_summary(distance.drop_vars("sample"), strewn)
+
+
+def test_density_adds_up_to_the_number_of_tips(trunk):
+    cloud = compute_cloud(trunk, n=5000)
+    grid = tip_density(cloud, 0.07)
+    assert float(grid.density.sum()) * 0.07**3 == pytest.approx(5000)
+    assert grid.density.attrs["units"] == "m-3"
+
+
+def test_points_strewn_evenly_vary_by_chance_alone(strewn):
+    grid = tip_density(strewn, 0.1)
+    assert grid.density.shape == (2, 2, 2)
+    np.testing.assert_allclose(grid.density, 4000 / 0.2**3, rtol=0.2)
+    assert grid.chance == pytest.approx(500**-0.5)
+    assert grid.coefficient_of_variation == pytest.approx(grid.chance, rel=0.6)
+
+
+def test_a_dense_half_is_heterogeneous():
+    tip = np.random.default_rng(5).random((40_000, 3)) * 0.2
+    tip = tip[(tip[:, 0] < 0.1) | (np.arange(len(tip)) % 3 == 0)]
+    grid = tip_density(made_up(tip), 0.05)
+    assert grid.heterogeneity == pytest.approx(0.5, abs=0.03)  # (3 - 1) / (3 + 1)
+
+
+@pytest.mark.parametrize("cell", [0.0, -1.0, np.nan, np.inf, 1e-9])
+def test_other_cells_are_refused(strewn, cell):
+    with pytest.raises(InvalidInput, match="cell = "):
+        tip_density(strewn, cell)
