@@ -1,0 +1,66 @@
+"""The best designs of an atlas under constraints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from softreach.errors import InvalidInput
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Interval", "best_designs"]
+
+Interval = tuple[float | None, float | None]
+
+
+def best_designs(
+    atlas: xr.Dataset,
+    metric: str,
+    *,
+    smallest: bool = False,
+    where: Mapping[str, Interval] | None = None,
+    count: int = 1,
+) -> xr.Dataset:
+    """The designs with the largest or smallest metric among those that meet the constraints.
+
+    Args:
+        atlas: From `open_atlas`.
+        metric: What to compare.
+        smallest: Whether small is good.
+        where: Metric or parameter -> (lowest, highest) allowed; None leaves an end open.
+        count: How many designs at most.
+
+    Returns:
+        All metrics and parameters over `rank`, the best first; empty if no design qualifies.
+
+    Raises:
+        InvalidInput: No such metric or parameter.
+    """
+    dims = atlas["status"].dims
+    scalars = [name for name in atlas.data_vars if atlas[name].dims == dims]
+    _check_known(metric, [str(name) for name in scalars if atlas[name].dtype.kind == "f"])
+    stacked = atlas[[*scalars, *_parameters(atlas)]].stack(rank=dims, create_index=False)
+    allowed = np.isfinite(stacked[metric].values)
+    for name, (low, high) in (where or {}).items():
+        _check_known(name, [str(known) for known in stacked.variables])
+        values = stacked[name].values
+        allowed &= (values >= (-np.inf if low is None else low)) & (
+            values <= (np.inf if high is None else high)
+        )
+    order = np.argsort(stacked[metric].values * (1 if smallest else -1), kind="stable")
+    return stacked.isel(rank=order[allowed[order]][:count])
+
+
+def _parameters(atlas: xr.Dataset) -> list[str]:
+    """Coordinates that only the designs' own dimensions have."""
+    dims = set(atlas["status"].dims)
+    return [str(n) for n, c in atlas.variables.items() if len(c.dims) == 1 and set(c.dims) <= dims]
+
+
+def _check_known(name: str, known: list[str]) -> None:
+    if name not in known:
+        raise InvalidInput("metric", name, f"one of {', '.join(dict.fromkeys(known))}")

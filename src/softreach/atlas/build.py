@@ -1,0 +1,162 @@
+"""Build an atlas: every design of a space, stored as it comes, resumed where it stopped."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from threading import Lock
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from softreach import progress
+from softreach.atlas.command import Command
+from softreach.atlas.executor import ExecutorLike, run_designs
+from softreach.atlas.metrics import METRICS
+from softreach.atlas.reading import open_atlas
+from softreach.atlas.space import DesignSpace
+from softreach.atlas.store import DONE, GAP, AtlasStore
+from softreach.errors import InvalidInput, SoftreachWarning
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from zarr.storage import StoreLike
+
+__all__ = ["build_atlas"]
+
+
+def build_atlas(
+    space: DesignSpace,
+    store: StoreLike,
+    n: int = 400_000,
+    seed: int = 0,
+    *,
+    sampler: str = "uniform",
+    metrics: Sequence[str] = tuple(METRICS),
+    alpha: float = 0.05,
+    accuracy: float = 3e-3,
+    tol: float = 1e-6,
+    keep_clouds: bool = True,
+    executor: ExecutorLike = None,
+    shard: tuple[int, int] = (0, 1),
+    report: progress.Progress | None = None,
+) -> xr.Dataset:
+    """Compute the cloud and the metrics of every design (sections 3 and 4), or what is missing.
+
+    All designs share one set of unit activations, scaled to each one's bounds. Every design is
+    stored when it is done: after an interruption, however rude, the same call continues and ends
+    with the same numbers. A design that fails is recorded with its error, the rest goes on, and the
+    next call tries it again. Combinations that no arm can have stay gaps.
+
+    Stored clouds are rounded to 1e-5 L, an error of 5e-6 L at most in each coordinate, which halves
+    their size; metrics are computed before.
+
+    Args:
+        space: The designs.
+        store: Path, URL or Zarr store of the atlas.
+        n: Samples of each design.
+        seed: Seed of the sampler.
+        sampler: As `compute_cloud` has it.
+        metrics: Groups of metrics: extent, convex, concave, exact, curvature.
+        alpha: Radius of the alpha shapes, in L.
+        accuracy: Relative error asked of the exact volumes; see `reachable_set`.
+        tol: Largest tip error, in L.
+        keep_clouds: Whether to store the tips, 6.2 bytes each.
+        executor: None for all cores of this process, holding two clouds and one triangulation per
+            thread at most; a `concurrent.futures` executor; a function that makes one, which is
+            called again should a worker die; or a Dask client. Workers write to the store, which
+            they must see at the same place, and use one thread each unless
+            ``SOFTREACH_NUM_THREADS`` says otherwise.
+        shard: (i, k) computes every k-th design from the i-th on, i from 0: k processes share a
+            store without knowing of each other.
+        report: Called with the number of designs done since its last call; by default a bar is
+            shown on a terminal.
+
+    Returns:
+        The atlas as `open_atlas` has it.
+
+    Raises:
+        InvalidInput: An argument out of range, no valid design, or a store that another command
+            began; the message says what differs.
+        StoreFailed: The store cannot be written, as the disk is full for instance.
+
+    Warns:
+        SoftreachWarning: There are gaps, failed designs, or designs whose points are too sparse for
+            the radius.
+    """
+    command = Command(
+        space=space,
+        n=n,
+        seed=seed,
+        sampler=sampler,
+        tol=tol,
+        alpha=alpha,
+        accuracy=accuracy,
+        metrics=tuple(metrics),
+        keep_clouds=keep_clouds,
+    )
+    indices = _checked_shard(shard, space.size)
+    _tell_gaps(space)
+    atlas = AtlasStore.begin(store, command)
+    _run(atlas, indices[~np.isin(atlas.status()[indices], (DONE, GAP))], executor, report)
+    built = open_atlas(store)
+    _tell_sparse(built)
+    return built
+
+
+def _run(
+    atlas: AtlasStore,
+    indices: np.ndarray,
+    executor: ExecutorLike,
+    report: progress.Progress | None,
+) -> None:
+    failures: dict[int, str] = {}
+    lock = Lock()
+    with progress.bar("computing designs", len(indices)) as shown, warnings.catch_warnings():
+        # The metrics hold what these say: the spacing of the points, the error of the volume.
+        warnings.simplefilter("ignore", SoftreachWarning)
+
+        def came(outcome: tuple[int, str]) -> None:
+            index, failure = outcome
+            with lock:
+                if failure:
+                    failures[index] = failure
+                (report or shown)(1)
+
+        run_designs(atlas, indices.tolist(), executor, came)
+    if failures:
+        index, message = next(iter(failures.items()))
+        _warn(f"{len(failures)} designs failed, first number {index}: {message}")
+
+
+def _checked_shard(shard: tuple[int, int], size: int) -> np.ndarray:
+    first, count = shard
+    if not 0 <= first < count:
+        raise InvalidInput("shard", f"{first}/{count}", "i/k with 0 <= i < k")
+    return np.arange(first, size, count)
+
+
+def _tell_gaps(space: DesignSpace) -> None:
+    if space.gaps and len(space.gaps) < space.size:
+        index, reason = next(iter(space.gaps.items()))
+        _warn(
+            f"{len(space.gaps)} of {space.size} designs cannot exist and stay gaps, first "
+            f"{space.values(index)}: {reason}"
+        )
+
+
+def _tell_sparse(atlas: xr.Dataset) -> None:
+    """Say where the alpha shapes have holes between points."""
+    if "spacing" not in atlas:
+        return
+    radius = atlas.volume.attrs["alpha_over_length"] * atlas.attrs["length"]
+    sparse = int((radius < 3.0 * atlas.spacing).sum())
+    if sparse:
+        _warn(
+            f"alpha = {radius:.4g} m is below three mean spacings of the points of {sparse} "
+            "designs and their volume too small; use more points or a larger alpha"
+        )
+
+
+def _warn(message: str) -> None:
+    warnings.warn(message, SoftreachWarning, stacklevel=4)

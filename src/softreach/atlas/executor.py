@@ -1,0 +1,221 @@
+"""Who computes the designs: the threads of this process, or workers elsewhere.
+
+Workers write to the store themselves, so a task that ran twice, or whose answer was lost with its
+worker, leaves the same bytes.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    wait,
+)
+from typing import Any, Protocol, Self
+
+from softreach import parallel
+from softreach.atlas.design_task import Outcome, Remote, begin_design, run_remotely
+from softreach.atlas.store import AtlasStore
+from softreach.errors import InvalidInput, SoftreachError
+
+__all__ = ["ExecutorLike", "Workers", "run_designs", "worker_processes"]
+
+ATTEMPTS = 3
+"""How often a design may take its worker with it before it counts as failed."""
+
+
+class DaskClient(Protocol):
+    """What is asked of a `dask.distributed.Client`."""
+
+    def get_executor(self, **options: Any) -> Executor:
+        """Its tasks as futures."""
+        ...
+
+
+Workers = Callable[[], Executor]
+"""Starts a pool; called again when a dead worker has broken the one before."""
+
+ExecutorLike = Executor | DaskClient | Workers | None
+
+
+def worker_processes(count: int) -> Workers:
+    """Worker processes on this machine, begun anew should one die.
+
+    Args:
+        count: Number of processes; each uses one thread.
+    """
+
+    def start() -> Executor:
+        import multiprocessing
+        from concurrent.futures import ProcessPoolExecutor
+
+        context = multiprocessing.get_context("spawn")  # threads and forks do not mix
+        return ProcessPoolExecutor(count, mp_context=context)
+
+    return start
+
+
+def run_designs(
+    store: AtlasStore,
+    indices: Sequence[int],
+    executor: ExecutorLike,
+    report: Callable[[Outcome], None],
+) -> None:
+    """Compute designs and store them.
+
+    Args:
+        store: Where they go.
+        indices: Which designs.
+        executor: None for the threads of this process; else who runs the designs, one a task.
+        report: Called with each outcome as it comes.
+
+    Raises:
+        StoreFailed: The store cannot be written.
+        SoftreachError: An executor that cannot be begun anew has lost a worker.
+    """
+    if executor is None:
+        # Drawing a task computes the tips, so at most a few clouds per thread are held at once.
+        parallel.run(_reporting(begin_design(store, index), report) for index in indices)
+        return
+    with _Pool(executor) as pool:
+        for index in _run_in_pool(pool, Remote(store), deque(indices), report):
+            report(_given_up(store, index))
+
+
+def _reporting(
+    task: Callable[[], Outcome], report: Callable[[Outcome], None]
+) -> Callable[[], None]:
+    return lambda: report(task())
+
+
+class _Pool:
+    """An executor that is begun anew where that is possible."""
+
+    def __init__(self, executor: ExecutorLike) -> None:
+        self._start: Workers | None = None
+        if isinstance(executor, Executor):
+            self._now = executor
+        elif hasattr(executor, "get_executor"):
+            # The scheduler itself tries the task of a dead worker again.
+            self._now = executor.get_executor(pure=False)  # pyright: ignore
+        elif callable(executor):
+            self._start = executor
+            self._now = executor()
+        else:
+            allowed = "a concurrent.futures executor, a function that makes one, or a Dask client"
+            raise InvalidInput("executor", executor, allowed)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._start is not None:
+            self._now.shutdown(wait=True, cancel_futures=True)
+
+    @property
+    def window(self) -> int:
+        """Tasks to have in the pool at a time: few, as any of them may have broken it."""
+        return 2 * getattr(self._now, "_max_workers", 512)
+
+    def submit(self, *call: Any) -> Future[Outcome]:
+        """Hand a call to a worker."""
+        return self._now.submit(*call)
+
+    def renew(self) -> None:
+        """Replace a broken executor."""
+        if self._start is None:
+            raise SoftreachError(
+                "a worker died and broke its executor; the same command continues, and a function "
+                "that makes the executor, in its place, lets it go on by itself"
+            )
+        self._now.shutdown(wait=False, cancel_futures=True)
+        self._now = self._start()
+
+
+def _run_in_pool(
+    pool: _Pool, remote: Remote, waiting: deque[int], report: Callable[[Outcome], None]
+) -> list[int]:
+    """Run the designs; those that kill their workers again and again are returned."""
+    lost: list[int] = []
+    while waiting:
+        suspects = _run_until_broken(pool, remote, waiting, report)
+        # One at a time, so that the guilty design is told from its neighbors.
+        lost += [index for index in suspects if not _survives(pool, remote, index, report)]
+    return lost
+
+
+def _survives(pool: _Pool, remote: Remote, index: int, report: Callable[[Outcome], None]) -> bool:
+    tries = (_run_until_broken(pool, remote, deque([index]), report) for _ in range(ATTEMPTS))
+    return any(not died for died in tries)
+
+
+def _run_until_broken(
+    pool: _Pool, remote: Remote, waiting: deque[int], report: Callable[[Outcome], None]
+) -> list[int]:
+    """Take designs from `waiting` until all are done, or a worker has died: who was there then."""
+    pending: dict[Future[Outcome], int] = {}
+    suspects: list[int] = []
+    broken = False
+    try:
+        while (waiting or pending) and not broken:
+            broken = not _fill(pool, remote, waiting, pending)
+            done = wait(pending, return_when=FIRST_COMPLETED).done
+            suspects += _settle(pending, done, remote, report)
+            broken = broken or bool(suspects)
+    finally:
+        for future in pending:
+            future.cancel()
+    if broken:
+        suspects += _settle(pending, wait(pending).done, remote, report)
+        pool.renew()
+    return suspects
+
+
+def _fill(
+    pool: _Pool, remote: Remote, waiting: deque[int], pending: dict[Future[Outcome], int]
+) -> bool:
+    """Submit designs up to the pool's window; False if the pool is broken."""
+    try:
+        while waiting and len(pending) < pool.window:
+            pending[pool.submit(run_remotely, remote, waiting[0])] = waiting[0]
+            waiting.popleft()
+    except BrokenExecutor:
+        return False
+    return True
+
+
+def _settle(
+    pending: dict[Future[Outcome], int],
+    done: set[Future[Outcome]],
+    remote: Remote,
+    report: Callable[[Outcome], None],
+) -> list[int]:
+    """Report what has ended; designs that ended with their worker are returned."""
+    ended = [(future, pending.pop(future)) for future in done]
+    return [index for future, index in ended if not _reported(future, index, remote, report)]
+
+
+def _reported(
+    future: Future[Outcome], index: int, remote: Remote, report: Callable[[Outcome], None]
+) -> bool:
+    """Report an outcome; False if there is none, as the worker died."""
+    try:
+        report(future.result())
+    except (BrokenExecutor, CancelledError):
+        return False
+    except Exception as error:
+        if type(error).__name__ != "KilledWorker":
+            raise
+        report(_given_up(remote.store(), index))  # Dask has tried it again by then
+    return True
+
+
+def _given_up(store: AtlasStore, index: int) -> Outcome:
+    message = "its worker died, time after time"
+    store.write_failure(index, message)
+    return index, message

@@ -1,0 +1,170 @@
+"""The arrays of an atlas store: names, dimensions, types, chunks and units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from softreach.atlas.command import Command
+from softreach.atlas.metrics import METRICS, scalar_names
+from softreach.curvature import QUANTITIES
+from softreach.schema import AXES
+
+__all__ = ["RESOLUTION", "Plan", "array_plans"]
+
+RESOLUTION = 1e-5
+"""Step of stored tips, in the shortest L: coordinates are off by half of it at most."""
+
+_MISSING = int(np.iinfo(np.int32).min)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Plan:
+    """An array to create."""
+
+    name: str
+    shape: tuple[int, ...]
+    dims: tuple[str, ...]
+    dtype: Any
+    chunks: tuple[int, ...]
+    fill: Any
+    attrs: dict[str, Any] = field(default_factory=dict)
+    data: Any = None
+    """Values to write at once; None for those that designs bring."""
+
+    def compressor(self) -> Any:
+        """Codecs of the Zarr v3 core, which every reader has."""
+        from zarr.codecs import BloscCodec
+
+        large = self.name in ("tip", "unit_activation")
+        return BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle") if large else None
+
+
+def array_plans(command: Command, cube: np.ndarray) -> Iterator[Plan]:
+    """Every array of an atlas; `cube` are its unit activations, shape (n, bundles)."""
+    yield from _parameters(command)
+    yield _labels("metric", list(scalar_names(command.metrics)))
+    yield _labels("axis", list(AXES))
+    yield _shared("unit_activation", cube, ("sample", "fiber"), _CUBE)
+    yield _per_design(command, "status", np.uint8, 0, attrs=_STATUS)
+    yield _per_design(
+        command, "message", str, "", attrs={"long_name": "why a design has no numbers"}
+    )
+    names = {"metric": len(scalar_names(command.metrics))}
+    yield _per_design(command, "metrics", np.float64, np.nan, names, _units(command))
+    if "curvature" in command.metrics:
+        yield from _curvature(command)
+    if command.keep_clouds:
+        yield _tips(command)
+
+
+_CUBE = {
+    "units": "1",
+    "long_name": "place in the activation box of each design: 0 is its lower bound, 1 its upper",
+}
+_STATUS = {
+    "long_name": "status of the design",
+    "flag_values": [0, 1, 2, 3],
+    "flag_meanings": "to_do done failed gap",
+}
+
+
+def _parameters(command: Command) -> Iterator[Plan]:
+    space = command.space
+    for name, values in space.parameters:
+        dims = (name,) if space.layout == "grid" else ("design",)
+        yield _shared(name, np.array(values), dims, {"units": space.units()[name]})
+
+
+def _curvature(command: Command) -> Iterator[Plan]:
+    yield _labels("quantity", list(QUANTITIES))
+    place = {"units": "1", "long_name": "station Z before activation, in L"}
+    yield _shared("station", np.array(command.stations), ("station",), place)
+    yield _shared("quantile", np.array(command.quantiles), ("quantile",), {"units": "1"})
+    sizes = {
+        "quantity": len(QUANTITIES),
+        "station": len(command.stations),
+        "quantile": len(command.quantiles),
+    }
+    attrs = {"long_name": "quantiles of bending [1/m], torsion [1/m] and extension [1]"}
+    yield _per_design(command, "curvature", np.float64, np.nan, sizes, attrs)
+
+
+def _tips(command: Command) -> Plan:
+    """Fixed-point tips: half the size of floats, with an error that is the same everywhere."""
+    lengths = dict(command.space.parameters).get("length", (command.space.base.length,))
+    attrs = {
+        "units": "m",
+        "long_name": "tip position",
+        "scale_factor": RESOLUTION * min(lengths),
+        "_FillValue": _MISSING,
+    }
+    sizes = {"axis": len(AXES), "sample": command.n}
+    return _per_design(command, "tip", np.int32, _MISSING, sizes, attrs)
+
+
+def _units(command: Command) -> dict[str, Any]:
+    """What each number is, for readers without softreach."""
+    metrics = {k: v for group in command.metrics for k, v in METRICS[group].items()}
+    told = "; ".join(
+        f"{name} [{metric.unit}]: {metric.meaning}" for name, metric in metrics.items()
+    )
+    return {
+        "long_name": "metrics of the designs",
+        "metrics": told,
+        "alpha_over_length": command.alpha,
+    }
+
+
+def _per_design(
+    command: Command,
+    name: str,
+    dtype: Any,
+    fill: Any,
+    sizes: dict[str, int] | None = None,
+    attrs: dict[str, Any] | None = None,
+) -> Plan:
+    """An array whose chunks are designs."""
+    space, inner = command.space, sizes or {}
+    return Plan(
+        name=name,
+        shape=(*space.shape, *inner.values()),
+        dims=(*space.dims, *inner),
+        dtype=dtype,
+        chunks=(*(1 for _ in space.shape), *(max(size, 1) for size in inner.values())),
+        fill=fill,
+        attrs=attrs or {},
+    )
+
+
+def _shared(name: str, data: np.ndarray, dims: tuple[str, ...], attrs: dict[str, Any]) -> Plan:
+    """An array that all designs share, written when the store is created."""
+    chunks = (min(data.shape[0], 1 << 20), *data.shape[1:])
+    fill = 0 if data.dtype.kind in "iu" else np.nan
+    return Plan(
+        name=name,
+        shape=data.shape,
+        dims=dims,
+        dtype=data.dtype,
+        chunks=chunks,
+        fill=fill,
+        attrs=attrs,
+        data=data,
+    )
+
+
+def _labels(name: str, labels: list[str]) -> Plan:
+    data = np.array(labels, dtype=np.dtypes.StringDType())
+    count = len(labels)
+    return Plan(
+        name=name,
+        shape=(count,),
+        dims=(name,),
+        dtype=str,
+        chunks=(max(count, 1),),
+        fill="",
+        data=data,
+    )

@@ -1,0 +1,191 @@
+"""A family of designs: one design, some of its parameters, and the values they take."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from math import prod
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from softreach.atlas.parameter import changed, parameter_units
+from softreach.errors import InvalidDesign, InvalidInput
+from softreach.manipulator import Manipulator
+
+__all__ = ["DesignSpace"]
+
+Layout = Literal["grid", "list"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignSpace:
+    """Designs that differ from a base in named parameters, by `grid`, `listed` or `sampled`.
+
+    Combinations that no arm can have are found when asked for (`gaps`) and have no design.
+
+    Raises:
+        InvalidInput: An unknown parameter, no values, values that are not finite or come twice, or
+            lists of different length.
+    """
+
+    base: Manipulator
+    """The design that all others are changes of."""
+    parameters: tuple[tuple[str, tuple[float, ...]], ...]
+    """Name and values [SI units] of every parameter."""
+    layout: Layout = "grid"
+    """Every combination (grid), or the values taken together, one of each (list)."""
+
+    def __post_init__(self) -> None:
+        for fault in _faults(self):
+            raise fault
+
+    @classmethod
+    def grid(cls, base: Manipulator, **values: ArrayLike) -> Self:
+        """Every combination of the values.
+
+        Args:
+            base: The design to vary.
+            **values: Parameter -> values [SI units], for instance `taper=np.radians([0, 1, 2])`;
+                see `parameter_units` for the names.
+        """
+        return cls(base=base, parameters=_plain(values), layout="grid")
+
+    @classmethod
+    def listed(cls, base: Manipulator, **values: ArrayLike) -> Self:
+        """The first values of all parameters make a design, the second ones the next, and so on."""
+        return cls(base=base, parameters=_plain(values), layout="list")
+
+    @classmethod
+    def sampled(
+        cls,
+        base: Manipulator,
+        count: int,
+        *,
+        method: Literal["sobol", "latin"] = "sobol",
+        seed: int = 0,
+        **ranges: tuple[float, float],
+    ) -> Self:
+        """Designs spread evenly over a box of parameters.
+
+        Args:
+            base: The design to vary.
+            count: Number of designs; a power of two for "sobol".
+            method: Scrambled Sobol sequence, or Latin hypercube.
+            seed: Of the sampler.
+            **ranges: Parameter -> lower and upper end [SI units].
+        """
+        cube = _spread(count, len(ranges), method, seed)
+        ends = np.array(list(ranges.values()), float).reshape(-1, 2)
+        points = ends[:, 0] + cube * np.diff(ends, axis=1)[:, 0]
+        if whole := [k for k, name in enumerate(ranges) if name.startswith("bundles")]:
+            points[:, whole] = np.rint(points[:, whole])
+        columns = zip(ranges, points.T.tolist(), strict=True)
+        return cls(base=base, parameters=_plain(dict(columns)), layout="list")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The parameters' names."""
+        return tuple(name for name, _ in self.parameters)
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Dimensions of the atlas: the parameters of a grid, or `design`."""
+        return self.names if self.layout == "grid" else ("design",)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of designs along each dimension."""
+        counts = tuple(len(values) for _, values in self.parameters)
+        return counts if self.layout == "grid" else counts[:1]
+
+    @property
+    def size(self) -> int:
+        """Number of designs, gaps included."""
+        return prod(self.shape)
+
+    def units(self) -> dict[str, str]:
+        """Unit of each parameter."""
+        known = parameter_units(self.base)
+        return {name: known[name] for name in self.names}
+
+    def values(self, index: int) -> dict[str, float]:
+        """Parameters of the design with this number, counted in C order over `shape`."""
+        place = np.unravel_index(index, self.shape)
+        where = place if self.layout == "grid" else place * len(self.parameters)
+        return {
+            name: values[int(k)] for (name, values), k in zip(self.parameters, where, strict=True)
+        }
+
+    def design(self, index: int) -> Manipulator:
+        """The design with this number.
+
+        Raises:
+            InvalidDesign: No such arm can exist.
+        """
+        return changed(self.base, self.values(index))
+
+    @cached_property
+    def gaps(self) -> Mapping[int, str]:
+        """Combinations that no arm can have: number -> why not."""
+        return {index: reason for index, reason in self._judged() if isinstance(reason, str)}
+
+    @cached_property
+    def bundles(self) -> int:
+        """The largest number of bundles of any design."""
+        return max(
+            (arm.bundles for _, arm in self._judged() if not isinstance(arm, str)), default=0
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The space in plain values, from which `from_dict` makes an equal one."""
+        parameters = {name: [*values] for name, values in self.parameters}
+        return {"design": self.base.to_toml(), "layout": self.layout, "parameters": parameters}
+
+    @classmethod
+    def from_dict(cls, space: Mapping[str, Any]) -> Self:
+        """The space that `to_dict` described."""
+        base = Manipulator.from_toml(space["design"], source="the base design")
+        return cls(base=base, parameters=_plain(space["parameters"]), layout=space["layout"])
+
+    def _judged(self) -> Iterator[tuple[int, Manipulator | str]]:
+        for index in range(self.size):
+            try:
+                yield index, self.design(index)
+            except InvalidDesign as error:
+                yield index, "; ".join(str(error).splitlines())
+
+
+def _plain(values: Mapping[str, ArrayLike]) -> tuple[tuple[str, tuple[float, ...]], ...]:
+    columns = {name: np.atleast_1d(np.asarray(column)) for name, column in values.items()}
+    return tuple((name, tuple(column.ravel().tolist())) for name, column in columns.items())
+
+
+def _faults(space: DesignSpace) -> Iterator[InvalidInput]:
+    known = parameter_units(space.base)
+    if not space.parameters:
+        yield InvalidInput("parameters", "none", f"one at least of {', '.join(known)}")
+    for name, values in space.parameters:
+        if name not in known:
+            yield InvalidInput("parameter", name, f"one of {', '.join(known)}")
+        if not values or not np.isfinite(values).all():
+            yield InvalidInput(name, values, "one finite value or more")
+        if space.layout == "grid" and len(set(values)) < len(values):
+            yield InvalidInput(name, values, "values that differ")
+    if space.layout == "list" and len({len(values) for _, values in space.parameters}) > 1:
+        counts = ", ".join(f"{name}: {len(values)}" for name, values in space.parameters)
+        yield InvalidInput("parameters", counts, "as many values of each in a list of designs")
+
+
+def _spread(count: int, dim: int, method: str, seed: int) -> np.ndarray:
+    from scipy.stats import qmc
+
+    from softreach.sampling import sample_cube
+
+    if method == "sobol":
+        return sample_cube("sobol", count, dim, seed)
+    if method == "latin":
+        return qmc.LatinHypercube(dim, rng=np.random.default_rng(seed)).random(count)
+    raise InvalidInput("method", method, "sobol or latin")

@@ -1,0 +1,251 @@
+"""How much an arm bends, twists and stretches over a whole cloud, station by station (section 4).
+
+Everything is linear in the activations but the size of the bending, so the statistics are streamed:
+blocks of samples fill histograms, and no array of samples by stations ever exists.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.actuation import Actuation, actuation
+from softreach.cloud import design_of
+from softreach.errors import InvalidInput
+from softreach.manipulator import Manipulator
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "QUANTILES",
+    "QUANTITIES",
+    "curvature_statistics",
+    "distal_stations",
+    "stream_statistics",
+]
+
+Array = NDArray[np.float64]
+
+QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+"""Minimum, quartiles, maximum and the middle nine tenths."""
+
+QUANTITIES = {
+    "bending": ("1/m", "bending curvature κ = √(u1² + u2²)"),
+    "torsion": ("1/m", "torsion u3"),
+    "extension": ("1", "axial extension ζ"),
+}
+"""Quantity -> unit and meaning."""
+
+_BLOCK = 65_536  # samples at a time: their values at one station stay in the cache
+_HEADINGS = 720
+
+
+def curvature_statistics(
+    cloud: xr.Dataset,
+    stations: ArrayLike | None = None,
+    *,
+    bins: int = 2048,
+    quantiles: Sequence[float] = QUANTILES,
+) -> xr.Dataset:
+    """Distributions of bending κ, torsion u3 and extension ζ over a cloud (section 4).
+
+    Curvatures are per unit of activated arclength, in the directors. Memory does not grow with the
+    number of stations times samples.
+
+    Args:
+        cloud: A cloud; its design and activations are used.
+        stations: Z [m], shape (station,); None for six even stations of the distal half.
+        bins: Bins of each histogram; quantiles are good to one bin.
+        quantiles: Which quantiles, each in [0, 1].
+
+    Returns:
+        For each quantity over `station` (coordinate Z [m]): `..._count` over `bin` with the bins'
+        ends `..._edge`, and `..._quantile`, `..._mean`, `..._std`.
+
+    Raises:
+        InvalidInput: Stations off the arm, or bins or quantiles out of range.
+    """
+    activation = cloud["activation"].transpose("sample", "fiber").values
+    rows = (activation[first : first + _BLOCK] for first in range(0, len(activation), _BLOCK))
+    return stream_statistics(design_of(cloud), rows, stations, bins=bins, quantiles=quantiles)
+
+
+def stream_statistics(
+    arm: Manipulator,
+    activations: Iterable[Array],
+    stations: ArrayLike | None = None,
+    *,
+    bins: int = 2048,
+    quantiles: Sequence[float] = QUANTILES,
+) -> xr.Dataset:
+    """`curvature_statistics` of activations that arrive in blocks, inside the arm's bounds.
+
+    Args:
+        arm: The design.
+        activations: Blocks of γ [-], shape (n, bundles) each.
+        stations: As for `curvature_statistics`.
+        bins: As for `curvature_statistics`.
+        quantiles: As for `curvature_statistics`.
+
+    Raises:
+        InvalidInput: As for `curvature_statistics`; also no activations at all.
+    """
+    z = _checked_stations(arm, stations)
+    _check_resolution(bins, quantiles)
+    table = actuation(arm, z)
+    tallies = {name: _Tally.between(*_range(arm, table, name), bins) for name in QUANTITIES}
+    for block in activations:
+        for k in range(len(z)):
+            for name, tally in tallies.items():
+                tally.add(k, _VALUES[name](table, k, block))
+    if not tallies["bending"].count.any():
+        raise InvalidInput("activations", "none", "one sample at least")
+    return _dataset(arm, z, tallies, quantiles)
+
+
+def distal_stations(arm: Manipulator, count: int = 6) -> Array:
+    """Even stations from the middle of the arm to its tip, both included, Z [m] (figure 4c)."""
+    return np.linspace(0.5, 1.0, count) * arm.length
+
+
+def _bending(table: Actuation, k: int, gamma: Array) -> Array:
+    u1, u2 = table.curvature[k, :2] @ gamma.T
+    return np.hypot(u1, u2)
+
+
+def _torsion(table: Actuation, k: int, gamma: Array) -> Array:
+    return gamma @ table.curvature[k, 2]
+
+
+def _extension(table: Actuation, k: int, gamma: Array) -> Array:
+    return 1.0 + gamma @ table.extension[k]
+
+
+_VALUES: dict[str, Callable[[Actuation, int, Array], Array]] = {
+    "bending": _bending,
+    "torsion": _torsion,
+    "extension": _extension,
+}
+
+
+def _range(arm: Manipulator, table: Actuation, name: str) -> tuple[Array, Array]:
+    """What the activation box allows at each station: lower and upper end, shape (station,)."""
+    if name == "bending":
+        return np.zeros(len(table.stations)), _most_bending(arm, table)
+    row = table.curvature[:, 2] if name == "torsion" else table.extension
+    ends = row[..., None] * arm.bounds
+    offset = 1.0 if name == "extension" else 0.0
+    return offset + ends.min(-1).sum(-1), offset + ends.max(-1).sum(-1)
+
+
+def _most_bending(arm: Manipulator, table: Actuation) -> Array:
+    """An upper bound of κ, at most 1e-5 too large: the support of (u1, u2) in many directions."""
+    heading = np.linspace(0.0, 2.0 * np.pi, _HEADINGS, endpoint=False)
+    toward = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    along = np.einsum("hc,scf->shf", toward, table.curvature[:, :2])
+    support = (along[..., None] * arm.bounds).max(-1).sum(-1)
+    return support.max(axis=1) / np.cos(np.pi / _HEADINGS)
+
+
+@dataclass(frozen=True, eq=False)
+class _Tally:
+    """Histogram, extremes and moments of one quantity at every station."""
+
+    low: Array
+    width: Array
+    count: NDArray[np.int64]
+    extremes: Array
+    moments: Array
+
+    @classmethod
+    def between(cls, low: Array, high: Array, bins: int) -> _Tally:
+        stations = len(low)
+        # A quantity that cannot vary still needs bins of some width.
+        width = np.maximum(high - low, 1e-12 * np.maximum(np.abs(high), 1.0)) / bins
+        count = np.zeros((stations, bins), np.int64)
+        extremes = np.tile([np.inf, -np.inf], (stations, 1))
+        return cls(low, width, count, extremes, np.zeros((stations, 2)))
+
+    def add(self, k: int, values: Array) -> None:
+        """Count the values of a block at station k."""
+        if not len(values):
+            return
+        bins = self.count.shape[1]
+        place = ((values - self.low[k]) / self.width[k]).astype(np.int64)
+        self.count[k] += np.bincount(np.clip(place, 0, bins - 1), minlength=bins)
+        low, high = self.extremes[k]
+        self.extremes[k] = min(low, values.min()), max(high, values.max())
+        # About the lower end, so that a narrow range far from zero loses no digits.
+        shifted = values - self.low[k]
+        self.moments[k] += shifted.sum(), shifted @ shifted
+
+    @property
+    def edges(self) -> Array:
+        """Ends of the bins, shape (station, bin + 1)."""
+        return self.low[:, None] + self.width[:, None] * np.arange(self.count.shape[1] + 1)
+
+    def quantiles(self, shares: Sequence[float]) -> Array:
+        """Quantiles, linear within a bin and inside the extremes, shape (station, quantile)."""
+        rows = zip(self.count, self.edges, self.extremes, strict=True)
+        return np.array([_quantiles(*row, shares) for row in rows])
+
+    def mean_and_std(self) -> tuple[Array, Array]:
+        """Mean and standard deviation, shape (station,) each."""
+        first, second = (self.moments / self.count.sum(axis=1, keepdims=True)).T
+        return self.low + first, np.sqrt(np.maximum(second - first**2, 0.0))
+
+
+def _quantiles(
+    count: NDArray[np.int64], edges: Array, extremes: Array, shares: Sequence[float]
+) -> Array:
+    below = np.concatenate([[0], np.cumsum(count)]) / count.sum()
+    # Empty bins make flat pieces of the distribution; its inverse jumps over them.
+    rises = np.flatnonzero(np.diff(below) > 0)
+    corners = np.unique(np.concatenate([rises, rises + 1]))
+    return np.clip(np.interp(shares, below[corners], edges[corners]), *extremes)
+
+
+def _dataset(
+    arm: Manipulator, z: Array, tallies: dict[str, _Tally], quantiles: Sequence[float]
+) -> xr.Dataset:
+    import xarray as xr
+
+    variables = {}
+    for name, tally in tallies.items():
+        unit, meaning = QUANTITIES[name]
+        mean, std = tally.mean_and_std()
+        of = {"units": unit, "long_name": meaning}
+        variables |= {
+            f"{name}_count": (("station", "bin"), tally.count, {"units": "1"}),
+            f"{name}_edge": (("station", "edge"), tally.edges, of),
+            f"{name}_quantile": (("station", "quantile"), tally.quantiles(quantiles), of),
+            f"{name}_mean": ("station", mean, of),
+            f"{name}_std": ("station", std, of),
+        }
+    coordinates = {
+        "Z": ("station", z, {"units": "m", "long_name": "station before activation"}),
+        "quantile": np.asarray(quantiles, float),
+    }
+    return xr.Dataset(variables, coordinates, {"design": arm.to_toml(), "length": arm.length})
+
+
+def _checked_stations(arm: Manipulator, stations: ArrayLike | None) -> Array:
+    if stations is None:
+        return distal_stations(arm)
+    z = np.atleast_1d(np.asarray(stations, float))
+    if z.ndim != 1 or not z.size or not ((z >= 0) & (z <= arm.length)).all():
+        raise InvalidInput("stations", stations, f"Z within [0, {arm.length:g}] m")
+    return z
+
+
+def _check_resolution(bins: int, quantiles: Sequence[float]) -> None:
+    if bins < 1:
+        raise InvalidInput("bins", bins, "1 or more")
+    shares = np.asarray(quantiles, float)
+    if not shares.size or not ((shares >= 0) & (shares <= 1)).all():
+        raise InvalidInput("quantiles", quantiles, "numbers in [0, 1]")
