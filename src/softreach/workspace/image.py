@@ -73,8 +73,12 @@ class Image:
     triangles: Ints
     """Critical triangles, as `kernels.contour.critical_triangles` lists them."""
 
-    def spans(self, axis: int) -> Spans:
-        """How the image covers the lines through the cell centers along an axis, to rounding."""
+    @cached_property
+    def spans(self) -> tuple[Spans, Spans, Spans]:
+        """How it covers the lines through the cell centers along each axis, to rounding."""
+        return self._spans(0), self._spans(1), self._spans(2)
+
+    def _spans(self, axis: int) -> Spans:
         crossing = self._crossings(axis)
         order = np.lexsort((crossing.height, crossing.column))
         column, height = crossing.column[order], crossing.height[order]

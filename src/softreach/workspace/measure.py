@@ -23,6 +23,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
+_LEFT = 0.4  # of what is removed; for four bundles 0.28 to 0.34 of it were found wrong
 _NODES = 24  # Gauss nodes along each axis; two thirds of them tell the error
 
 
@@ -40,7 +41,7 @@ def solid(box: ActivationBox, fine: Image, coarse: Image) -> Estimate:
     V = ∫ [x is reached] dx = |∫ det J dγ| + ∫ ([x is reached] - |d|) dx for an image whose larger
     part keeps (or turns) the orientation. The first integral is exact to many digits, the second
     lives only where the image folds or overlaps and is taken from the rasterized images. For m > 3
-    the whole volume is. What is rasterized errs by O(1/n²), which both grids together remove; half
+    the whole volume is. What is rasterized errs by O(1/n²), which both grids together remove; 0.4
     of what they remove is the error stated, beside the noise of the raster.
     """
     if box.m > 3:
@@ -54,7 +55,7 @@ def solid(box: ActivationBox, fine: Image, coarse: Image) -> Estimate:
 def extrapolated(fine: Estimate, coarse: Estimate) -> Estimate:
     """The limit of values whose error falls by four when the grid is halved (Richardson)."""
     removed = (fine.value - coarse.value) / 3.0
-    return Estimate(fine.value + removed, abs(removed) / 2.0 + fine.error)
+    return Estimate(fine.value + removed, _LEFT * abs(removed) + fine.error)
 
 
 def covered_volume(image: Image) -> Estimate:
@@ -100,14 +101,14 @@ def _correction(image: Image, sense: int) -> Estimate:
     def missing(spans: Spans) -> float:
         return float(spans.length @ ((spans.cover > 0) - sense * spans.degree))
 
-    values = [missing(image.spans(axis)) for axis in range(3)]
+    values = [missing(spans) for spans in image.spans]
     scale = image.lattice.cell**3
     return Estimate(scale * float(np.mean(values)), scale * float(np.ptp(values)))
 
 
 def _mean(image: Image, quantity: Callable[[Spans], ArrayLike]) -> Array:
     """Mean over the three directions of sight, in m³; shorter arrays are filled with zeros."""
-    rows = [np.atleast_1d(quantity(image.spans(axis))) for axis in range(3)]
+    rows = [np.atleast_1d(quantity(spans)) for spans in image.spans]
     size = max(len(row) for row in rows)
     mean = sum(np.pad(row, (0, size - len(row))) for row in rows) / 3.0
     return np.squeeze(mean * image.lattice.cell**3)

@@ -14,7 +14,7 @@ from softreach.manipulator import Manipulator
 from softreach.progress import Progress, silent
 from softreach.workspace import measure
 from softreach.workspace.box import ActivationBox
-from softreach.workspace.image import Image, Lattice, image_of
+from softreach.workspace.image import Lattice, image_of
 from softreach.workspace.reachable import ReachableSet
 from softreach.workspace.surface import Surface
 
@@ -22,7 +22,7 @@ __all__ = ["reachable_set"]
 
 Array = NDArray[np.float64]
 
-_MOST_TRIANGLES = 3e7  # triangles of the activation grid
+_MOST_TRIANGLES = 4e7  # triangles of the activation grid
 _MOST_CELLS = 2.0**26
 _SHEET = {0: 1, 1: 1024, 2: 128}  # grid of a curve or surface, for distances and pictures
 
@@ -43,9 +43,11 @@ def reachable_set(
     simplex is the union of the tetrahedra on its corners (Carathéodory), and all three-dimensional
     faces of the triangulation are used. The result is rasterized on cells of edge h.
 
-    The resolutions follow from the accuracy ε: n = √(5/ε) for m = 3 and √(1.4/ε) for m > 3, even,
+    The resolutions follow from the accuracy ε: n = √(5/ε) for m = 3 and √(2.2/ε) for m > 3, even,
     and limited for m > 4 by the number of simplices; h = √(ε/30) times the cube root of the volume
-    of the bounding box. For m = 3 the volume itself is far more accurate than asked.
+    of the bounding box. For m = 3 the volume itself is then far more accurate than asked. Where the
+    map folds, what lies behind the fold is reached more than once: n is doubled until the volume of
+    that changes by less than ε as well. A fold thinner than a cell of the grid may be missed.
 
     Args:
         arm: The design. Bundles with equal bounds are held there and add no dimension.
@@ -68,6 +70,8 @@ def reachable_set(
         return _thin_set(box)
     cells = _checked_grid(grid) if grid is not None else _grid_for(box.m, accuracy)
     found = _solid_set(box, cells, cell, accuracy, report or silent)
+    while grid is None and not _settled(found, accuracy) and _fits(box.m, 2 * found.cells):
+        found = _solid_set(box, 2 * found.cells, cell, accuracy, report or silent)
     if found.volume_error > accuracy * found.volume:
         warnings.warn(_inaccurate(found, accuracy), SoftreachWarning, stacklevel=2)
     return found
@@ -80,6 +84,7 @@ def _solid_set(
     lattice = _lattice(tips, cell, accuracy)
     fine = image_of(tips, (cells,) * box.m, lattice, report)
     coarse = image_of(_every_second(tips, cells, box.m), (cells // 2,) * box.m, lattice)
+    several = [measure.multiply_covered(image) if box.m == 3 else {} for image in (fine, coarse)]
     volume, error = measure.solid(box, fine, coarse)
     return ReachableSet(
         arm=box.arm,
@@ -87,7 +92,8 @@ def _solid_set(
         measure=volume,
         measure_error=error,
         convex_volume=measure.convex_volume(fine, coarse),
-        multiplicity=_multiplicity(fine, volume) if box.m == 3 else {},
+        multiplicity={1: volume - sum(several[0].values()), **several[0]} if box.m == 3 else {},
+        multiplicity_error=abs(sum(several[0].values()) - sum(several[1].values())),
         fold_volume=measure.fold_volume(fine) if box.m == 3 else 0.0,
         cells=cells,
         image=fine,
@@ -95,9 +101,14 @@ def _solid_set(
     )
 
 
-def _multiplicity(image: Image, volume: float) -> dict[int, float]:
-    several = measure.multiply_covered(image)
-    return {1: volume - sum(several.values()), **several}
+def _settled(found: ReachableSet, accuracy: float) -> bool:
+    """Whether a finer grid would hardly change the volume or how much of it is reached twice."""
+    error = max(found.volume_error, found.multiplicity_error)
+    return error <= accuracy * found.volume
+
+
+def _fits(m: int, cells: int) -> bool:
+    return (cells + 1) ** m * len(chains(m, 2)) <= _MOST_TRIANGLES
 
 
 def _thin_set(box: ActivationBox) -> ReachableSet:
@@ -113,6 +124,7 @@ def _thin_set(box: ActivationBox) -> ReachableSet:
         measure_error=abs(fine - rough),
         convex_volume=convex_hull(tips).volume,
         multiplicity={},
+        multiplicity_error=0.0,
         fold_volume=0.0,
         cells=cells,
         image=None,
@@ -138,7 +150,7 @@ def _every_second(tips: Array, cells: int, m: int) -> Array:
 
 def _grid_for(m: int, accuracy: float) -> int:
     """The rule for n: even, within what memory and patience hold."""
-    wanted = np.sqrt((5.0 if m == 3 else 1.4) / accuracy)
+    wanted = np.sqrt((5.0 if m == 3 else 2.2) / accuracy)
     most = (_MOST_TRIANGLES / len(chains(m, 2))) ** (1 / m) - 1
     return max(2, 2 * int(np.ceil(min(wanted, most) / 2)))
 

@@ -52,6 +52,8 @@ class ReachableSet:
     multiplicity: Mapping[int, float]
     """Volume of the places that exactly 1, 2, ... activations reach [m³]. Three bundles only:
     with more, every place inside is reached by infinitely many, and this is empty."""
+    multiplicity_error: float
+    """By how much the volume reached more than once changed from half as fine a grid [m³]."""
     fold_volume: float
     """Volume of the places reached with both orientations of the map [m³]; they lie behind a fold.
     Three bundles only, else 0."""
@@ -174,7 +176,7 @@ class ReachableSet:
     def _boundary(self) -> Surface:
         if self.sheet is not None:
             return self.sheet
-        return boundary_surface(self._solid("surface"), self._field)
+        return boundary_surface(self._solid("surface"), self._field, self.volume)
 
     @cached_property
     def _critical(self) -> Surface:

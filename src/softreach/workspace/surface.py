@@ -106,20 +106,32 @@ def _axis_distances(image: Image, axis: int) -> Array:
     return distance
 
 
-def boundary_surface(image: Image, field: Array) -> Surface:
-    """The closed surface where the field is zero, by marching cubes.
+def boundary_surface(image: Image, field: Array, volume: float) -> Surface:
+    """The closed surface around a volume where the field is constant, by marching cubes.
+
+    The image of a grid is a little small where it is convex: a small offset, the same everywhere,
+    gives the surface the extrapolated volume.
 
     Raises:
         MissingExtra: scikit-image is not installed.
     """
+    surface = _level_set(image, field, 0.0)
+    if surface.area == 0.0:
+        return surface
+    offset = (volume - surface.volume) / (surface.area * image.lattice.cell)
+    return _level_set(image, field, float(np.clip(offset, -0.5, 0.5)))
+
+
+def _level_set(image: Image, field: Array, level: float) -> Surface:
+    """Where the field, in cells, has a value."""
     try:
         from skimage.measure import marching_cubes
     except ImportError as error:
         raise MissingExtra("scikit-image", "surface") from error
-    if not (field < 0).any():
+    if not (field < level).any():
         return Surface(vertices=np.empty((0, 3)), faces=np.empty((0, 3), np.int32))
     vertices, faces, _, _ = marching_cubes(
-        field, 0.0, gradient_direction="descent", allow_degenerate=False
+        field, level, gradient_direction="descent", allow_degenerate=False
     )
     lattice = image.lattice
     return Surface(vertices=lattice.origin + lattice.cell * vertices.astype(float), faces=faces)
