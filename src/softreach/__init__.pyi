@@ -19,3 +19,7 @@ from .volume import concave_hull as concave_hull
 from .volume import convex_hull as convex_hull
 from .volume import unreachability as unreachability
 from .volume import volume_curve as volume_curve
+from .inverse import solve_inverse as solve_inverse
+from .path import track_path as track_path
+from .redundancy import activation_distance as activation_distance
+from .workspace import reachable_set as reachable_set

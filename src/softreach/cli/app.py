@@ -47,6 +47,18 @@ _COMMANDS = {
         "Volume, convex volume and unreachability of a cloud.",
         "softreach volume trunk.zarr --alpha 0.05L --hull hull.ply",
     ),
+    "reach": (
+        "The exact reachable set: volume, multiplicity, folds, boundary.",
+        "softreach reach minimal_trunk --surface reach.stl --figure reach.png",
+    ),
+    "solve": (
+        "Every activation that puts the tip at a target.",
+        "softreach solve minimal_trunk --target 0.2,0.1,0.6",
+    ),
+    "track": (
+        "Activations that follow a path of tip positions.",
+        "softreach track minimal_trunk path.csv --out activations.csv",
+    ),
     "show": (
         "Draw a cloud and its arm.",
         "softreach show trunk.zarr --activation=-1,0,-0.5 --out trunk.pdf",

@@ -1,0 +1,83 @@
+"""`softreach solve`: every activation that puts the tip at a target."""
+
+from __future__ import annotations
+
+import json as json_format
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from softreach.cli.inputs import AsJson, Design, RevolutionDeg, TaperDeg, design_from, points_of
+from softreach.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from softreach.inverse import Solution
+
+__all__ = ["solve"]
+
+
+def solve(
+    design: Design,
+    *,
+    target: Annotated[
+        str | None, Parameter(help="Tip position x,y,z [m].", allow_leading_hyphen=True)
+    ] = None,
+    targets: Annotated[Path | None, Parameter(help="CSV file with columns x, y, z [m].")] = None,
+    family: Annotated[
+        int, Parameter(help="With more than three bundles: solutions for each target.")
+    ] = 1,
+    revolution_deg: RevolutionDeg = None,
+    taper_deg: TaperDeg = None,
+    json: AsJson = False,
+) -> None:
+    """Every activation that reaches a target, or the nearest point that can be reached."""
+    from softreach.inverse import solve_inverse
+
+    if (target is None) == (targets is None):
+        raise InvalidInput("target", target, "given, or --targets, and not both")
+    arm = design_from(design, revolution_deg, taper_deg)
+    points = points_of(target, targets)
+    solutions = solve_inverse(arm, points, family=family)
+    if json:
+        json_format.dump([_as_json(solution) for solution in solutions], sys.stdout)
+        sys.stdout.write("\n")
+        return
+    for solution in solutions:
+        sys.stdout.write("\n".join(_lines(solution, arm.bundle_names)) + "\n")
+
+
+def _as_json(solution: Solution) -> dict[str, object]:
+    return {
+        "target_m": solution.target.tolist(),
+        "status": solution.status.name.lower(),
+        "activations": solution.activations.tolist(),
+        "residuals_m": solution.residuals.tolist(),
+        "condition": [value if value < 1e300 else None for value in solution.condition.tolist()],
+        "margin": solution.margin.tolist(),
+        "nearest_m": solution.nearest.tolist(),
+        "nearest_activation": solution.nearest_activation.tolist(),
+        "gap_m": solution.gap,
+    }
+
+
+def _lines(solution: Solution, names: tuple[str, ...]) -> list[str]:
+    at = ", ".join(f"{x:.6g}" for x in solution.target)
+    lines = [f"target ({at}) m: {solution.status.name.lower().replace('_', ' ')}"]
+    for gamma, residual, condition, margin in zip(
+        solution.activations,
+        solution.residuals,
+        solution.condition,
+        solution.margin,
+        strict=True,
+    ):
+        shown = ", ".join(f"{name} {g:.6f}" for name, g in zip(names, gamma, strict=True))
+        quality = f"residual {residual:.1e} m, condition {condition:.3g}, margin {margin:.3g}"
+        lines.append(f"  {shown}  ({quality})")
+    if not len(solution):
+        near = ", ".join(f"{x:.6g}" for x in solution.nearest)
+        lines.append(f"  nearest ({near}) m, {solution.gap:.4g} m away")
+        shown = zip(names, solution.nearest_activation, strict=True)
+        lines.append("  reached by " + ", ".join(f"{name} {g:.6f}" for name, g in shown))
+    return lines
