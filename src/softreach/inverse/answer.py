@@ -17,7 +17,7 @@ from softreach.inverse.problem import tips_and_slopes
 from softreach.inverse.redundant import least_changes
 from softreach.inverse.solutions import Solutions, Status
 from softreach.inverse.tree import space_tree
-from softreach.kernels.candidates import Mesh
+from softreach.kernels.images import Mesh
 from softreach.kernels.space_tree import SpaceTree
 from softreach.manipulator import Manipulator
 
@@ -158,7 +158,7 @@ def _by_search(prepared: Preparation, targets: Array, wishes: Wishes, found: Fou
         )
         found = _evaluated(prepared, targets, rows[target], gamma)
         missing = _missing(found, targets)
-        return _answer(prepared, targets, wishes, found, missing, Nearest(*(p[missing] for p in close)))
+        return _answer(prepared, targets, wishes, found, missing, close.of(missing))
     return _answer(prepared, targets, wishes, found, everything, close)
 
 
@@ -175,10 +175,12 @@ def _answer(
     found = found.and_also(rescued.where(rescued.residual <= wishes.residual))
     status = np.full(len(targets), Status.REACHED, np.int8)
     far = rescued.residual > wishes.residual
-    status[missing[far]] = np.where(
-        close.settled[far], Status.UNREACHABLE, Status.NOT_CONVERGED
+    status[missing] = np.where(close.settled, Status.UNREACHABLE, Status.NOT_CONVERGED)
+    # Reached by the nearest point alone: the least change was not found.
+    status[missing[~far]] = Status.NOT_CONVERGED if prepared.arm.bundles > 3 else Status.REACHED
+    first = np.minimum(
+        np.searchsorted(found.target, np.arange(len(targets))), len(found.target) - 1
     )
-    first = np.minimum(np.searchsorted(found.target, np.arange(len(targets))), len(found.target) - 1)
     activation = np.empty((len(targets), prepared.arm.bundles))
     gap = np.empty(len(targets))
     point = targets.copy()

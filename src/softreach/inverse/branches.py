@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from softreach import parallel
 from softreach.inverse.problem import tips_and_slopes
 from softreach.kernels import candidates, folds, newton
-from softreach.kernels.candidates import Mesh
+from softreach.kernels.images import Mesh
 from softreach.kernels.newton import CONVERGED, UNDER_WAY, Search
 from softreach.kernels.space_tree import SpaceTree
 from softreach.kinematics import tip_positions
 from softreach.manipulator import Manipulator
 
-__all__ = ["Found", "ROUNDING", "conditions", "distinct", "every_branch", "starts"]
+__all__ = ["ROUNDING", "Found", "conditions", "distinct", "every_branch", "starts"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -44,13 +44,25 @@ class Found(NamedTuple):
     cell: Index
     """Cell of the mesh where the search began, shape (n,)."""
 
-    def where(self, chosen: Array | Index) -> Found:
+    def where(self, chosen: NDArray[np.bool_] | Index) -> Found:
         """Those chosen by a mask or an index."""
-        return Found(*(field[chosen] for field in self))
+        return Found(
+            self.target[chosen],
+            self.gamma[chosen],
+            self.slope[chosen],
+            self.residual[chosen],
+            self.cell[chosen],
+        )
 
     def and_also(self, other: Found) -> Found:
         """Both, sorted by target."""
-        both = Found(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
+        both = Found(
+            np.concatenate([self.target, other.target]),
+            np.concatenate([self.gamma, other.gamma]),
+            np.concatenate([self.slope, other.slope]),
+            np.concatenate([self.residual, other.residual]),
+            np.concatenate([self.cell, other.cell]),
+        )
         return both.where(np.argsort(both.target, kind="stable"))
 
 
@@ -69,7 +81,9 @@ def every_branch(
     """
     rounding = ROUNDING * arm.length
     target, cell, start = starts(arm, mesh, tree, targets)
-    found = _within(arm, _search(arm, target, cell, start, targets, tol, residual), targets, tol, residual)
+    found = _within(
+        arm, _search(arm, target, cell, start, targets, tol, residual), targets, tol, residual
+    )
     found = distinct(found, len(targets), rounding)
     fresh = found
     for _ in range(2):  # a partner may have a partner of its own where two folds meet
@@ -130,7 +144,11 @@ def starts(
 
     def fill(part: list[tuple[Index, Index, Array]], first: int, last: int) -> None:
         room = candidates.MOST + 4 * _BLOCK
-        target, cell, start = np.empty(room, np.int64), np.empty(room, np.int64), np.empty((room, 3))
+        target, cell, start = (
+            np.empty(room, np.int64),
+            np.empty(room, np.int64),
+            np.empty((room, 3)),
+        )
         while first < last:
             done, found = candidates.find_starts(
                 mesh, tree, targets[first:last], low, high, target, cell, start

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.inverse.problem import position_jacobian
-from softreach.kernels import candidates
-from softreach.kernels.candidates import Mesh
+from softreach.kernels.images import Mesh, blurs
 from softreach.kernels.simplices import corner_bits
 from softreach.kinematics import tips_and_jacobians
 from softreach.manipulator import Manipulator
@@ -94,7 +93,7 @@ class _Lattice:
 
 def _finished(lattice: _Lattice, corner: Index) -> Mesh:
     blur = np.empty(len(corner))
-    candidates.blurs(lattice.gamma, lattice.slope, corner, blur)
+    blurs(lattice.gamma, lattice.slope, corner, blur)
     blur += 1e-9 * lattice.arm.length  # rounding must not put a target between two tetrahedra
     change = np.sqrt(((lattice.slope[corner[:, 7]] - lattice.slope[corner[:, 0]]) ** 2).sum((1, 2)))
     for bit in (1, 2, 4):

@@ -29,15 +29,15 @@ class Landmarks:
     """Activations with their tips, to begin from: the vertices of a grid over the box."""
 
     def __init__(self, gamma: Array, tip: Array, width: Array) -> None:
-        from scipy.spatial import cKDTree
+        from scipy.spatial import KDTree
 
         self.gamma, self.tip, self.width = gamma, tip, width
-        self.tree = cKDTree(tip)
+        self.tree = KDTree(tip)
 
     def near(self, targets: Array, count: int = _ASKED) -> Index:
         """The landmarks whose tips are nearest, nearest first, shape (t, count)."""
         count = min(count, len(self.tip))
-        return self.tree.query(targets, k=np.arange(1, count + 1), workers=1)[1]
+        return np.asarray(self.tree.query(targets, k=count)[1], np.int64).reshape(-1, count)
 
     def starts(self, targets: Array) -> tuple[Index, Array]:
         """For each target the nearest landmark, and the next ones far from it in the box.
@@ -67,6 +67,10 @@ class Nearest(NamedTuple):
     """The points [m], shape (t, 3)."""
     settled: NDArray[np.bool_]
     """Whether the search came to rest, shape (t,)."""
+
+    def of(self, rows: Index) -> Nearest:
+        """Those of some of the targets."""
+        return Nearest(self.gamma[rows], self.tip[rows], self.settled[rows])
 
 
 def landmarks(arm: Manipulator, tol: float) -> Landmarks:

@@ -18,8 +18,8 @@ __all__ = ["LeastChange", "least_change", "least_changes"]
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_PENALTIES = (1e2, 1e4, 1e6, 1e6, 1e6, 1e6, 1e6, 1e6)
-"""Rising, so that the first searches see a wide valley and the last a nearly exact one."""
+_PENALTIES = (1e4, 1e5, 1e6, 1e6, 1e6, 1e6, 1e6, 1e6)
+"""Rising; with a lower first one a small miss would buy a large change of activation."""
 _POLISH = 4
 _LANDMARKS = 96
 
@@ -61,7 +61,7 @@ def least_change(
         weight: What a direction error of 1 rad counts for against a change of 1.
     """
     low, high = arm.bounds.T.copy()
-    gamma, multiplier = start.copy(), np.zeros((len(start), 3))
+    gamma, multiplier = start.copy(), _multipliers(arm, start, near, tol)
     settled = np.ones(len(start), bool)
     miss = np.full(len(start), np.inf)
     for penalty in _PENALTIES:
@@ -86,6 +86,13 @@ def least_change(
         miss[rows] = np.linalg.norm(error, axis=1) * arm.length
     gamma, miss = _polished(arm, targets, gamma, tol)
     return LeastChange(gamma, miss, settled)
+
+
+def _multipliers(arm: Manipulator, gamma: Array, near: Array, tol: float) -> Array:
+    """λ for which γ - near + Jᵀλ is least, at the start: those of a solution were it one."""
+    slopes = tips_and_slopes(arm, gamma, tol)[1] / arm.length
+    inverse = np.linalg.pinv(slopes.transpose(0, 2, 1), rcond=1e-3)
+    return -np.einsum("nij,nj->ni", inverse, gamma - near)
 
 
 def _polished(arm: Manipulator, targets: Array, gamma: Array, tol: float) -> tuple[Array, Array]:
@@ -179,7 +186,7 @@ def _best(
         cost += (weight * np.linalg.norm(off, axis=1)) ** 2
     order = np.lexsort((np.where(found.miss <= residual, cost, np.inf), of))
     best = order[np.searchsorted(of[order], np.arange(len(targets)))]
-    return LeastChange(*(part[best] for part in found))
+    return LeastChange(found.gamma[best], found.miss[best], found.settled[best])
 
 
 def _starts(places: Landmarks, targets: Array, near: Array) -> tuple[Index, Array]:

@@ -127,12 +127,17 @@ class Solutions(Sequence[Solution]):
         inside = np.arange(offsets[-1]) - np.repeat(offsets[:-1], counts)
         rows = np.repeat(self.offsets[chosen], counts) + inside
         return Solutions(
-            self.arm,
-            self.targets[chosen],
-            offsets,
-            *(part[rows] for part in (self.activations, self.residuals, self.condition, self.margin)),
-            *(part[chosen] for part in (self.status, self.nearest)),
-            *(part[chosen] for part in (self.nearest_activation, self.gap)),
+            arm=self.arm,
+            targets=self.targets[chosen],
+            offsets=offsets,
+            activations=self.activations[rows],
+            residuals=self.residuals[rows],
+            condition=self.condition[rows],
+            margin=self.margin[rows],
+            status=self.status[chosen],
+            nearest=self.nearest[chosen],
+            nearest_activation=self.nearest_activation[chosen],
+            gap=self.gap[chosen],
         )
 
     def to_dataset(self) -> xr.Dataset:
@@ -145,7 +150,11 @@ class Solutions(Sequence[Solution]):
                 "position": (("target", "axis"), self.targets, {"units": "m"}),
                 "status": ("target", self.status, {"units": "1", "meanings": meanings}),
                 "nearest": (("target", "axis"), self.nearest, {"units": "m"}),
-                "nearest_activation": (("target", "fiber"), self.nearest_activation, {"units": "1"}),
+                "nearest_activation": (
+                    ("target", "fiber"),
+                    self.nearest_activation,
+                    {"units": "1"},
+                ),
                 "gap": ("target", self.gap, {"units": "m"}),
                 "target_of": ("solution", np.repeat(np.arange(len(self)), self.counts)),
                 "activation": (("solution", "fiber"), self.activations, {"units": "1"}),

@@ -1,12 +1,11 @@
-"""An octree over the images of the activation cells: prepared once, a target then costs no search."""
+"""An octree over the images of the activation cells, so that a target costs no search."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.kernels import candidates
-from softreach.kernels.candidates import Mesh
+from softreach.kernels.images import Mesh, face_planes
 from softreach.kernels.space_tree import SpaceTree, children
 
 __all__ = ["space_tree"]
@@ -23,7 +22,7 @@ _OCTANTS = np.array([[o >> 2 & 1, o >> 1 & 1, o & 1] for o in range(8)])
 def space_tree(mesh: Mesh) -> SpaceTree:
     """Divide space until few tetrahedra remain in each place."""
     planes = np.empty((6 * len(mesh.corner), 4, 4))
-    candidates.face_planes(mesh, 1e-9 * float(np.ptp(mesh.tip)), planes)
+    face_planes(mesh, 1e-9 * float(np.ptp(mesh.tip)), planes)
     boxes = np.repeat(_image_boxes(mesh), 6, axis=0)
     low = boxes[:, 0].min(axis=0)
     size = float((boxes[:, 1].max(axis=0) - low).max())
@@ -89,7 +88,9 @@ class _Growing:
         self.child.append(child)
         leaf = ~open_nodes
         count = np.where(leaf, self.count, 0)
-        listed = np.repeat(leaf, self.count) if len(self.count) > 1 else np.zeros(len(self.item), bool)
+        listed = (
+            np.repeat(leaf, self.count) if len(self.count) > 1 else np.zeros(len(self.item), bool)
+        )
         self.done.append((self.listed + np.cumsum(count) - count, count))
         self.items.append(self.item[listed])
         self.listed += int(count.sum())

@@ -46,10 +46,7 @@ def _factored(hessian, n, shift, free, factor):
     m = factor.shape[0]
     for i in range(m):
         for j in range(i + 1):
-            if free[i] and free[j]:
-                total = 0.5 * (hessian[n, i, j] + hessian[n, j, i])
-            else:
-                total = 0.0
+            total = 0.5 * (hessian[n, i, j] + hessian[n, j, i]) if free[i] and free[j] else 0.0
             if i == j:
                 total += shift if free[i] else 1.0
             scale = abs(total)

@@ -50,12 +50,7 @@ def partners(mesh, cell, gamma, slope, smallest, reach, low, high, start, near):
 @inline
 def _null_vectors(slope, n, adjugate, u, v):
     """Singular vectors u, v of the smallest singular value, uᵀ J v, by inverse iteration."""
-    for i in range(3):
-        for j in range(3):
-            i1, i2, j1, j2 = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3
-            adjugate[j, i] = (
-                slope[n, i1, j1] * slope[n, i2, j2] - slope[n, i1, j2] * slope[n, i2, j1]
-            )
+    _transposed_cofactors(slope, n, adjugate)
     for i in range(3):
         u[i] = 0.5 + 0.25 * i  # along no axis of symmetry
     for _ in range(_ROUNDS):
@@ -70,6 +65,14 @@ def _null_vectors(slope, n, adjugate, u, v):
         for j in range(3):
             sigma += u[i] * slope[n, i, j] * v[j]
     return sigma
+
+
+@inline
+def _transposed_cofactors(a, n, out):
+    for i in range(3):
+        for j in range(3):
+            i1, i2, j1, j2 = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3
+            out[j, i] = a[n, i1, j1] * a[n, i2, j2] - a[n, i1, j2] * a[n, i2, j1]
 
 
 @inline

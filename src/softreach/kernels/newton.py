@@ -78,7 +78,7 @@ def newton_step(search, active, tips, slopes, low, high, tol):
 
 @inline
 def _solve(a, r0, r1, r2, out):
-    """out = A⁻¹ r by cofactors; the gradient's direction where A is singular."""
+    """Write A⁻¹ r, by cofactors; the gradient's direction where A is singular."""
     c00 = a[1, 1] * a[2, 2] - a[1, 2] * a[2, 1]
     c01 = a[1, 2] * a[2, 0] - a[1, 0] * a[2, 2]
     c02 = a[1, 0] * a[2, 1] - a[1, 1] * a[2, 0]

@@ -24,7 +24,7 @@ class SpaceTree(NamedTuple):
     """First child of each node, 0 for a leaf."""
     first: np.ndarray
     """Where a leaf's tetrahedra begin in `item`."""
-    count: np.ndarray
+    length: np.ndarray
     """How many there are."""
     item: np.ndarray
     """Tetrahedra, leaf after leaf."""
@@ -32,7 +32,7 @@ class SpaceTree(NamedTuple):
 
 @inline
 def holds(planes, k, p, half):
-    """Whether a box of half-sizes round p meets tetrahedron k, as far as its face planes can tell."""
+    """Whether a box round p, of half-sizes, meets tetrahedron k as far as its face planes tell."""
     for i in range(4):
         a, b, c = planes[k, i, 0], planes[k, i, 1], planes[k, i, 2]
         reach = abs(a) * half[0] + abs(b) * half[1] + abs(c) * half[2]
@@ -42,7 +42,7 @@ def holds(planes, k, p, half):
 
 
 @inline
-def leaf_at(low, size, child, first, count, p):
+def leaf_at(low, size, child, first, length, p):
     """Range of the items of the leaf that holds p; empty outside the root."""
     x, y, z = (p[0] - low[0]) / size, (p[1] - low[1]) / size, (p[2] - low[2]) / size
     if not (min(x, min(y, z)) >= 0.0 and max(x, max(y, z)) <= 1.0):
@@ -53,7 +53,7 @@ def leaf_at(low, size, child, first, count, p):
         i, j, k = int(x >= 1.0), int(y >= 1.0), int(z >= 1.0)
         node = child[node] + 4 * i + 2 * j + k
         x, y, z = x - i, y - j, z - k
-    return first[node], first[node] + count[node]
+    return first[node], first[node] + length[node]
 
 
 @kernel
