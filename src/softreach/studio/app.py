@@ -1,0 +1,119 @@
+"""The studio: a server, and a session for every tab."""
+
+from __future__ import annotations
+
+import threading
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+from softreach.studio.server import LOOPBACK, page_url, start_server, stop_server
+from softreach.studio.session import Session, Start
+from softreach.studio.state import Camera
+
+if TYPE_CHECKING:
+    from viser import ClientHandle
+
+__all__ = ["Studio"]
+
+_EYE = Camera(position=(1.2, -2.2, 1.0), look_at=(0.0, 0.0, 0.45))
+
+
+class Studio:
+    """A local page on a design; every tab has its own state."""
+
+    def __init__(self, start: Start, host: str = LOOPBACK, port: int | None = None) -> None:
+        """Start serving.
+
+        Args:
+            start: What new tabs begin with.
+            host: Address to listen on.
+            port: None for a free one.
+
+        Raises:
+            InvalidInput: The address cannot be used.
+            MissingExtra: viser is not installed.
+        """
+        self.start = start
+        self.sessions: dict[int, Session] = {}
+        self._lock = threading.Lock()
+        self.server = start_server(host, port)
+        camera = start.state.camera or _EYE
+        self.server.initial_camera.position = camera.position
+        self.server.initial_camera.look_at = camera.look_at
+        self.server.on_client_connect(self._connected)
+        self.server.on_client_disconnect(self._disconnected)
+
+    @property
+    def url(self) -> str:
+        """Where the page is."""
+        return page_url(self.server)
+
+    def stop(self) -> None:
+        """Stop serving."""
+        for session in list(self.sessions.values()):
+            session.close()
+        self._say_goodbye()
+        stop_server(self.server)
+
+    def _say_goodbye(self, patience: float = 3.0) -> None:
+        """Close the tabs' connections first: viser ends its pool before it tells of the closing."""
+        self.server._websock_server.disconnect_all_clients()
+        deadline = time.monotonic() + patience
+        while self.sessions and time.monotonic() < deadline:
+            time.sleep(0.02)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.stop()
+
+    def _connected(self, client: ClientHandle) -> None:
+        session = Session(client, self.start)
+        with self._lock:
+            self.sessions[client.client_id] = session
+        _furnish(session)
+        session.begin()
+
+    def _disconnected(self, client: ClientHandle) -> None:
+        with self._lock:
+            session = self.sessions.pop(client.client_id, None)
+        if session is not None:
+            session.close()
+
+
+def _furnish(session: Session) -> None:
+    """Add the panels, and let clicks in the scene reach those that wait for them."""
+    from softreach.studio.panels.activation import ActivationPanel
+    from softreach.studio.panels.atlas import AtlasPanel
+    from softreach.studio.panels.design import DesignPanel
+    from softreach.studio.panels.export import ExportPanel
+    from softreach.studio.panels.inverse import InversePanel
+    from softreach.studio.panels.status import StatusPanel
+    from softreach.studio.panels.view import ViewPanel
+
+    gui = session.client.gui
+    made: list[Any] = [StatusPanel(gui)]
+    tabs = gui.add_tab_group()
+    kinds = {
+        "Design": DesignPanel,
+        "Activation": ActivationPanel,
+        "Inverse": InversePanel,
+        "View": ViewPanel,
+        "Export": ExportPanel,
+    }
+    made += [kind(gui, tabs.add_tab(name), session) for name, kind in kinds.items()]
+    if session.atlas is not None:
+        made.append(AtlasPanel(gui, tabs.add_tab("Atlas"), session, session.atlas))
+    session.panels = made
+    waiting = [panel for panel in reversed(made) if isinstance(panel, AtlasPanel | InversePanel)]
+
+    @session.client.scene.on_click()
+    def _(event: Any) -> None:
+        any(panel.click(event.ray_origin, event.ray_direction) for panel in waiting)

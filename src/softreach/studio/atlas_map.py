@@ -1,0 +1,140 @@
+"""A contour map over two parameters of an atlas, and the design under a click."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.errors import InvalidInput
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["AtlasMap", "atlas_map", "metric_names"]
+
+_INCHES, _DPI = 4.0, 160
+_FRAME = (0.16, 0.14, 0.62, 0.72)  # of the axes: left, bottom, width, height
+_BAR = (0.82, 0.14, 0.035, 0.72)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class AtlasMap:
+    """A square picture."""
+
+    image: NDArray[np.uint8]
+    """RGB, shape (pixels, pixels, 3)."""
+    x: NDArray[np.float64]
+    """Values of the parameter to the right, SI."""
+    y: NDArray[np.float64]
+    names: tuple[str, str]
+    fixed: dict[str, float]
+    """The other parameters, SI."""
+
+    def parameters_at(self, right: float, up: float) -> dict[str, float] | None:
+        """The design nearest to a place, 0 to 1 from the picture's lower left; None outside."""
+        left, bottom, width, height = _FRAME
+        share = (right - left) / width, (up - bottom) / height
+        if not (0 <= share[0] <= 1 and 0 <= share[1] <= 1):
+            return None
+        places = zip(self.names, (self.x, self.y), share, strict=True)
+        return {name: _nearest(values, part) for name, values, part in places} | self.fixed
+
+    def place_of(self, **at: float) -> tuple[float, float]:
+        """Where a design is in the picture: the inverse of `parameters_at`."""
+        shares = [
+            (at[name] - values[0]) / ((values[-1] - values[0]) or 1.0)
+            for name, values in zip(self.names, (self.x, self.y), strict=True)
+        ]
+        left, bottom, width, height = _FRAME
+        return left + width * shares[0], bottom + height * shares[1]
+
+
+def metric_names(atlas: xr.Dataset) -> list[str]:
+    """The single numbers that an atlas holds of every design, volume and unreachability first."""
+    dims = atlas["status"].dims
+    names = [str(n) for n, v in atlas.data_vars.items() if v.dims == dims and v.dtype.kind == "f"]
+    first = ("exact_volume", "exact_unreachability", "volume", "unreachability")
+    return sorted(names, key=lambda name: first.index(name) if name in first else len(first))
+
+
+def atlas_map(atlas: xr.Dataset, metric: str) -> AtlasMap:
+    """Draw a metric over the first two parameters; the others are held where it is largest.
+
+    Raises:
+        InvalidInput: The atlas is no grid of two parameters or more, or holds no such number.
+    """
+    names = tuple(map(str, atlas["status"].dims))
+    if len(names) < 2:
+        raise InvalidInput("atlas", ", ".join(names), "a grid of two parameters or more for a map")
+    values = atlas[metric]
+    if not np.isfinite(values.values).any():
+        raise InvalidInput("metric", metric, "computed for one design at least")
+    best = np.unravel_index(np.nanargmax(values.values), values.shape)
+    held = dict(list(zip(names, map(int, best), strict=True))[2:])
+    x, y = (atlas[name].values.astype(float) for name in names[:2])
+    shown = values.isel(held).values.T
+    if values.attrs.get("units") == "m3":
+        shown = shown / float(atlas.attrs["length"]) ** 3
+    labels = [_label(atlas, name) for name in names[:2]]
+    return AtlasMap(
+        image=_drawn(_shown(atlas, names[0]), _shown(atlas, names[1]), shown, labels, metric),
+        x=x,
+        y=y,
+        names=(names[0], names[1]),
+        fixed={name: float(atlas[name].values[place]) for name, place in held.items()},
+    )
+
+
+def _nearest(values: NDArray[np.float64], share: float) -> float:
+    wanted = values[0] + share * (values[-1] - values[0])
+    return float(values[np.abs(values - wanted).argmin()])
+
+
+def _shown(atlas: xr.Dataset, name: str) -> NDArray[np.float64]:
+    """The values of a parameter as a person reads them: angles in degrees."""
+    values = atlas[name].values.astype(float)
+    return np.degrees(values) if atlas[name].attrs.get("units") == "rad" else values
+
+
+def _label(atlas: xr.Dataset, name: str) -> str:
+    unit = {"rad": "deg", "1": ""}.get(atlas[name].attrs.get("units", ""), "m")
+    return f"{name.replace('_', ' ')} [{unit}]" if unit else name.replace("_", " ")
+
+
+def _drawn(x: Any, y: Any, values: Any, labels: list[str], metric: str) -> NDArray[np.uint8]:
+    # Not through pyplot, which belongs to one thread.
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(_INCHES, _INCHES), dpi=_DPI)
+    canvas = FigureCanvasAgg(figure)
+    ax = figure.add_axes(_FRAME)
+    filled = _fill(ax, x, y, np.ma.masked_invalid(values))
+    ax.plot(*(grid.ravel() for grid in np.meshgrid(x, y)), ".", color="k", ms=2, alpha=0.35)
+    ax.set(xlabel=labels[0], ylabel=labels[1], title=_title(metric))
+    ax.set_xlim(x[0], _end(x))
+    ax.set_ylim(y[0], _end(y))
+    figure.colorbar(filled, cax=figure.add_axes(_BAR))
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+
+def _fill(ax: Any, x: Any, y: Any, values: Any) -> Any:
+    if min(values.shape) < 2 or np.ptp(values.compressed()) == 0:
+        return ax.pcolormesh(x, y, values, shading="nearest")
+    filled = ax.contourf(x, y, values, 14)
+    lines = ax.contour(x, y, values, 7, colors="w", linewidths=0.7)
+    ax.clabel(lines, fontsize=7)
+    return filled
+
+
+def _end(values: NDArray[np.float64]) -> float:
+    return float(values[-1]) if len(values) > 1 else float(values[0]) + 1.0
+
+
+def _title(metric: str) -> str:
+    text = metric.replace("_", " ")
+    return f"{text} / L³" if "volume" in metric else text

@@ -1,0 +1,110 @@
+"""What the color of a point says, and the key that tells the reader."""
+
+from __future__ import annotations
+
+import html
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.kinematics import tips_and_jacobians
+from softreach.manipulator import Manipulator
+from softreach.plot.coloring import BundleKey, Coloring, ScalarKey, color_samples
+from softreach.redundancy import activation_distance
+from softreach.studio.jobs import kernels
+from softreach.studio.reach import Reach, shown_samples
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["color_names", "key_html", "manipulability", "sample_colors"]
+
+Array = NDArray[np.float64]
+
+_RADIUS = 1 / 60  # [L], within which D̄ compares activations
+
+
+def color_names(arm: Manipulator) -> dict[str, str]:
+    """What points can be colored by: name -> what the menu says."""
+    names = {"rgb": "all activations (RGB)"}
+    names |= {f"bundle {k}": f"|γ| {name}" for k, name in enumerate(arm.bundle_names)}
+    names["manipulability"] = "manipulability"
+    names["activation distance"] = "activation distance D̄"
+    if np.count_nonzero(np.diff(arm.bounds, axis=1)) == 3:
+        names["multiplicity"] = "multiplicity"
+    return names
+
+
+def sample_colors(reach: Reach, level: int, color: str) -> Coloring:
+    """Colors of the samples that are shown; an unknown name colors by all activations."""
+    cloud = reach.cloud[["tip", "activation"]].isel(sample=shown_samples(reach, level))
+    if color.startswith("bundle ") and int(color[7:]) < reach.arm.bundles:
+        return color_samples(cloud, int(color[7:]))
+    if color not in _VALUES or color not in color_names(reach.arm):
+        return color_samples(cloud)
+    with kernels:
+        values = _VALUES[color](reach, cloud)
+    coloring = color_samples(cloud, values)
+    key = coloring.key
+    return Coloring(coloring.rgb, key._replace(label=color) if isinstance(key, ScalarKey) else key)
+
+
+def manipulability(arm: Manipulator, activation: Array) -> Array:
+    """Volume of the tip's velocities for unit rates, √det(J Jᵀ) [L³], shape (n,).
+
+    J = ∂r/∂γ [L]; with fewer than three bundles √det(Jᵀ J): an area or a length.
+    """
+    tips, twists = tips_and_jacobians(arm, activation, 1e-5)
+    slope = twists[:, :3] + np.cross(twists[:, 3:], tips[:, :, None], axis=1)
+    return np.prod(np.linalg.svd(slope / arm.length, compute_uv=False), axis=1)
+
+
+def key_html(key: BundleKey | ScalarKey | None) -> str:
+    """The colors explained, as HTML without anything from elsewhere."""
+    if isinstance(key, BundleKey):
+        named = zip(key.names, key.colors.tolist(), strict=True)
+        parts = (f"{_swatch(rgb)} |γ| {html.escape(name)}" for name, rgb in named)
+        return _line(" &ensp; ".join(parts))
+    if key is None:
+        return ""
+    stops = ("#440154", "#3b528b", "#21918c", "#5ec962", "#fde725")  # viridis
+    bar = f"background:linear-gradient(90deg,{','.join(stops)});height:0.6em;margin:0.2em 0"
+    ends = f"<span>{key.low:.3g}</span><span>{html.escape(key.label)}</span><span>{key.high:.3g}"
+    flex = "display:flex;justify-content:space-between"
+    return _line(f'<div style="{bar}"></div><div style="{flex}">{ends}</span></div>')
+
+
+def _swatch(rgb: list[int]) -> str:
+    color = ",".join(map(str, rgb))
+    return f'<span style="color:rgb({color})">\N{BLACK SQUARE}</span>'
+
+
+def _line(content: str) -> str:
+    return f'<div style="font-size:0.8em;padding:0 0.8em 0.4em">{content}</div>'
+
+
+def _multiplicity(reach: Reach, cloud: xr.Dataset) -> Array:
+    image = reach.exact.image
+    assert image is not None  # three free bundles fill a solid
+    # A sample is reached by its own activation at least, whatever the grid says at the rim.
+    return np.maximum(image.counts_at(cloud.tip.values), 1).astype(float)
+
+
+def _manipulability(reach: Reach, cloud: xr.Dataset) -> Array:
+    return manipulability(reach.arm, cloud.activation.values)
+
+
+def _activation_distance(reach: Reach, cloud: xr.Dataset) -> Array:
+    """D̄ of the samples that are shown, among all there are; NaN where isolated."""
+    shown = np.arange(reach.samples)[shown_samples(reach, cloud.sizes["sample"].bit_length() - 1)]
+    rows = np.sort(shown)
+    found = activation_distance(reach.cloud, _RADIUS * reach.arm.length, rows)
+    return found.values[np.argsort(np.argsort(shown))]
+
+
+_VALUES = {
+    "multiplicity": _multiplicity,
+    "manipulability": _manipulability,
+    "activation distance": _activation_distance,
+}

@@ -1,0 +1,86 @@
+"""What a tab can be saved as: bytes under a name."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from softreach.errors import InvalidInput
+from softreach.export import export_cloud, export_mesh
+from softreach.kinematics import configuration
+from softreach.manipulator import Manipulator
+from softreach.studio.reach import Reach, shown_samples
+from softreach.studio.state import StudioState
+
+__all__ = [
+    "CLOUD_FORMATS",
+    "SURFACE_FORMATS",
+    "cloud_file",
+    "figure_file",
+    "state_from",
+    "surface_file",
+]
+
+CLOUD_FORMATS = (".parquet", ".csv", ".ply", ".npz", ".mat", ".vtu")
+SURFACE_FORMATS = (".stl", ".ply", ".obj", ".glb", ".vtu")
+
+
+def state_from(name: str, content: bytes, state: StudioState) -> StudioState:
+    """The state in a file that was saved, or the present one with the design of a TOML file.
+
+    Raises:
+        InvalidInput: Neither of them.
+        InvalidDesign: The design in it cannot exist.
+    """
+    if name.lower().endswith(".toml"):
+        try:
+            return state.replace(design=Manipulator.from_toml(content.decode("utf-8"), name))
+        except UnicodeDecodeError as error:
+            raise InvalidInput(name, str(error), "text in UTF-8") from None
+    return StudioState.from_json(content)
+
+
+def cloud_file(reach: Reach, suffix: str) -> bytes:
+    """All samples."""
+    return _written(f"cloud{suffix}", lambda path: export_cloud(reach.cloud, path))
+
+
+def surface_file(reach: Reach, suffix: str) -> bytes:
+    """The exact boundary of the reachable set [m].
+
+    Raises:
+        InvalidInput: A curve or a point has none.
+    """
+    return _written(f"surface{suffix}", lambda path: export_mesh(_surface(reach), path))
+
+
+def figure_file(reach: Reach, state: StudioState) -> bytes:
+    """Three views and an oblique one, as PNG."""
+    from softreach import plot
+    from softreach.plot.style import pyplot
+
+    shown = reach.cloud[["tip", "activation"]].isel(
+        sample=shown_samples(reach, state.appearance.level)
+    )
+    shape = configuration(state.design, state.activation)
+
+    def write(path: Path) -> None:
+        axes = plot.plot_views(shown, state.design, shape)
+        plot.save_figure(axes["front"], path)
+        pyplot().close(axes["front"].get_figure(root=True))
+
+    return _written("figure.png", write)
+
+
+def _surface(reach: Reach):
+    surface = reach.exact.surface()
+    return surface.vertices, surface.faces
+
+
+def _written(name: str, write: Callable[[Path], object]) -> bytes:
+    """What the library's own writers put into a file of this name."""
+    with tempfile.TemporaryDirectory(prefix="softreach-") as folder:
+        path = Path(folder) / name
+        write(path)
+        return path.read_bytes()

@@ -1,0 +1,53 @@
+"""A web page in one file: the scene as it is, to be turned and zoomed without a server."""
+
+from __future__ import annotations
+
+import html
+
+from softreach.studio.colors import key_html
+from softreach.studio.panels.status import reach_text
+from softreach.studio.reach import Reach
+from softreach.studio.scene import Scene
+from softreach.studio.server import start_server, stop_server
+from softreach.studio.state import StudioState
+
+__all__ = ["static_page"]
+
+_MOST = 17  # level: a page of some 2 MB
+_BOX = (
+    "position:fixed;left:0;bottom:0;z-index:9;max-width:100%;padding:0.6em 1em;"
+    "background:rgba(255,255,255,0.9);font:14px sans-serif;color:#222"
+)
+
+
+def static_page(state: StudioState, reach: Reach) -> str:
+    """The page, with the numbers of the design and its file under the scene.
+
+    Only a server's scene can be saved, so one is started for a moment, on loopback.
+    """
+    server = start_server()
+    try:
+        if state.camera is not None:
+            server.initial_camera.position = state.camera.position
+            server.initial_camera.look_at = state.camera.look_at
+        key = _draw(Scene(server.scene), state, reach)
+        page = server.scene.as_html()
+    finally:
+        stop_server(server)
+    end = page.rindex("</body>")
+    return page[:end] + _caption(state, reach, key) + page[end:]
+
+
+def _draw(scene: Scene, state: StudioState, reach: Reach) -> str:
+    look = state.showing(level=min(_MOST, state.appearance.level)).appearance
+    scene.draw_axes(reach, look)
+    if look.arm:
+        scene.draw_arm(state.design, state.activation)
+    scene.draw_surfaces(reach, look)
+    return key_html(scene.draw_cloud(reach, look))
+
+
+def _caption(state: StudioState, reach: Reach, key: str) -> str:
+    numbers = html.escape(reach_text(reach).replace("**", ""))
+    design = f"<details><summary>design</summary><pre>{html.escape(state.design.to_toml())}</pre>"
+    return f'<div style="{_BOX}">{numbers}{key}{design}</details></div>'

@@ -1,0 +1,1 @@
+"""Widgets beside the scene, one concept a file."""

@@ -1,0 +1,79 @@
+"""One slider per bundle moves the arm."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Any
+
+from softreach.manipulator import Manipulator
+from softreach.studio.panels.binding import bind, bind_button
+from softreach.studio.state import StudioState
+
+if TYPE_CHECKING:
+    from viser import GuiApi
+
+    from softreach.studio.session import Session
+
+__all__ = ["ActivationPanel"]
+
+
+class ActivationPanel:
+    """Activations of the bundles within their bounds, and where the tip is."""
+
+    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
+        """Add the widgets."""
+        self._gui, self._session = gui, session
+        self._lock = threading.RLock()
+        self._sliders: list[Any] = []
+        self._made_for: Any = None
+        with tab:
+            self._tip = gui.add_markdown("")
+            self._folder = gui.add_folder("activation γ")
+            self._trail = gui.add_checkbox("leave a trail", False)
+            rest = gui.add_button("Rest")
+        bind(self._trail, session, lambda s, on: s.showing(trail=on))
+        bind_button(rest, session, lambda: session.update(lambda s: s.replace(activation=())))
+
+    def show(self, session: Session) -> None:
+        """Move the sliders to the state, and tell the tip."""
+        with self._lock:
+            if _slider_ends(session.state.design) != self._made_for:
+                self._build(session)
+            for slider, value in zip(self._sliders, session.state.activation, strict=False):
+                slider.value = value
+        self._trail.value = session.state.appearance.trail
+        if session.tip is not None:
+            x, y, z = session.tip
+            self._tip.content = f"tip at ({x:.6f}, {y:.6f}, {z:.6f}) L"
+
+    def _build(self, session: Session) -> None:
+        arm, self._made_for = session.state.design, _slider_ends(session.state.design)
+        for slider in self._sliders:
+            slider.remove()
+        with self._folder:
+            self._sliders = [
+                self._slider(name, low, high, value)
+                for (name, low, high), value in zip(
+                    self._made_for, session.state.activation, strict=True
+                )
+            ]
+        assert len(self._sliders) == arm.bundles
+
+    def _slider(self, name: str, low: float, high: float, value: float) -> Any:
+        high = max(high, low + 1e-6)  # a slider needs room; the state keeps to the bounds
+        slider = self._gui.add_slider(f"γ {name}", low, high, 1e-3, value)
+        bind(slider, self._session, self._wanted)
+        return slider
+
+    def _wanted(self, state: StudioState, moved: float) -> StudioState:
+        """Read all sliders: the last of several events that run at once then has it right."""
+        del moved
+        return state.replace(activation=tuple(float(slider.value) for slider in self._sliders))
+
+
+def _slider_ends(arm: Manipulator) -> list[tuple[str, float, float]]:
+    """Name and bounds of every bundle."""
+    return [
+        (name, low, high)
+        for name, (low, high) in zip(arm.bundle_names, arm.bounds.tolist(), strict=True)
+    ]

@@ -1,0 +1,41 @@
+"""From a widget that a person moves to a change of the session's state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from softreach.errors import SoftreachError
+from softreach.studio.state import StudioState
+
+if TYPE_CHECKING:
+    from softreach.studio.session import Session
+
+__all__ = ["bind", "bind_button"]
+
+
+def bind(widget: Any, session: Session, change: Callable[[StudioState, Any], StudioState]) -> None:
+    """Change the state by what the widget holds whenever a person moves it.
+
+    Events run at once and in any order: each reads what the widget holds by then, so that the last
+    one has it right. Widgets that we set ourselves also send events, without a client.
+    """
+
+    def moved(event: Any) -> None:
+        if event.client_id is not None:
+            told(session, lambda: session.update(lambda state: change(state, widget.value)))
+
+    widget.on_update(moved)
+
+
+def bind_button(button: Any, session: Session, action: Callable[[], object]) -> None:
+    """Act whenever a person presses the button."""
+    button.on_click(lambda _: told(session, action))
+
+
+def told(session: Session, action: Callable[[], object]) -> None:
+    """Act, and show the reader what is wrong if that fails."""
+    try:
+        action()
+    except (SoftreachError, OSError) as error:
+        session.say(str(error))

@@ -1,0 +1,160 @@
+"""Sliders for the design; what cannot exist is said beside the slider that asked for it."""
+
+from __future__ import annotations
+
+import html
+import math
+import threading
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from softreach.atlas.parameter import changed, parameter_units
+from softreach.design_file import in_file_terms
+from softreach.errors import InvalidDesign
+from softreach.manipulator import Manipulator
+from softreach.studio.panels.binding import bind, bind_button
+
+if TYPE_CHECKING:
+    from viser import GuiApi
+
+    from softreach.studio.session import Session
+
+__all__ = ["Control", "DesignPanel", "controls"]
+
+
+class Control(NamedTuple):
+    """One slider: a parameter of `atlas.parameter` in the unit that a person reads."""
+
+    name: str
+    label: str
+    value: float
+    low: float
+    high: float
+    step: float
+    scale: float = 1.0
+    """SI per shown unit."""
+
+    @property
+    def shown(self) -> float:
+        """The value on the slider."""
+        return round(self.value / self.scale, 6)
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Ends of the slider: wide enough for a design from a file."""
+        return min(self.low, self.shown), max(self.high, self.shown)
+
+
+def controls(arm: Manipulator) -> list[Control]:
+    """The sliders of a design."""
+    helical = [abs(turn) for turn in arm.revolutions.tolist() if turn]
+    low, high = arm.bounds[0].tolist()
+    found = [
+        Control("taper", "taper φ [deg]", arm.taper, -2, 5, 0.05, _DEG),
+        Control("radius_ratio", "inner / outer radius", arm.radius_ratio, 0, 1, 0.01),
+        Control("outer_radius", "outer radius / L", arm.outer_radius, 0.02, 0.12, 5e-4, arm.length),
+        Control("extent", "extent σ [deg]", arm.fibers[0].extent, 2, 120, 1, _DEG),
+        Control("lower", "lowest γ", low, -4, 0, 0.01),
+        Control("upper", "highest γ", high, -1, 2, 0.01),
+    ]
+    if helical:
+        turn = Control("revolution", "revolution Ω [deg]", helical[0], 1, 360, 1, _DEG)
+        found.insert(0, turn)
+    return found + list(_fiber_controls(arm))
+
+
+_DEG = math.radians(1)
+
+
+def _fiber_controls(arm: Manipulator) -> Iterator[Control]:
+    for fiber, key, turn in zip(arm.fibers, _keys(arm), arm.revolutions.tolist(), strict=True):
+        name = fiber.name or key.replace("_", " ")
+        if not turn:
+            yield Control(f"bundles_{key}", f"bundles of {name}", fiber.bundles, 1, 6, 1)
+        yield Control(f"offset_{key}", f"offset of {name} [deg]", fiber.offset, 0, 360, 1, _DEG)
+
+
+def _keys(arm: Manipulator) -> list[str]:
+    """The names by which the parameters of each fiber end."""
+    return [n.removeprefix("bundles_") for n in parameter_units(arm) if n.startswith("bundles_")]
+
+
+class _Row(NamedTuple):
+    control: Control
+    slider: Any
+    message: Any
+    first: float
+    """What the slider showed before anyone moved it."""
+
+
+class DesignPanel:
+    """All sliders of a design together; a valid design may lie behind an invalid one."""
+
+    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
+        """Add the widgets."""
+        self._gui, self._tab, self._session = gui, tab, session
+        self._lock = threading.RLock()
+        self._rows: list[_Row] = []
+        self._base: Manipulator | None = None
+        self._made: Manipulator | None = None
+        with tab:
+            self._folder = gui.add_folder("design")
+            with gui.add_folder("compare"):
+                keep = gui.add_button("Keep this design as reference")
+                self._beside = gui.add_checkbox("side by side", False)
+                clear = gui.add_button("Forget the reference")
+        bind_button(keep, session, lambda: session.update(lambda s: s.replace(reference=s.design)))
+        bind_button(clear, session, lambda: session.update(lambda s: s.replace(reference=None)))
+        bind(self._beside, session, lambda s, on: s.replace(side_by_side=on))
+
+    def show(self, session: Session) -> None:
+        """Build the sliders anew for a design that they did not make."""
+        with self._lock:
+            if session.state.design != self._made:
+                self._build(session.state.design)
+        self._beside.value = session.state.side_by_side
+
+    def _build(self, arm: Manipulator) -> None:
+        for row in self._rows:
+            row.slider.remove()
+            row.message.remove()
+        self._base = self._made = arm
+        with self._folder:
+            self._rows = [self._row(control) for control in controls(arm)]
+
+    def _row(self, control: Control) -> _Row:
+        low, high = control.limits
+        slider = self._gui.add_slider(control.label, low, high, control.step, control.shown)
+        message = self._gui.add_html("", visible=False)
+        slider.on_update(lambda event: self._moved(control.name, event))
+        return _Row(control, slider, message, slider.value)
+
+    def _moved(self, name: str, event: Any) -> None:
+        """Read all sliders, as older and newer events may come in any order."""
+        if event.client_id is None:
+            return
+        with self._lock:
+            assert self._base is not None
+            try:
+                self._made = changed(self._base, self._values())
+            except InvalidDesign as error:
+                self._complain(name, str(in_file_terms(error, "")))
+                return
+            self._complain(name, "")
+            made = self._made
+        self._session.update(lambda s: s.replace(design=made))
+
+    def _values(self) -> dict[str, float]:
+        """What differs from the base, which a slider may show rounded."""
+        moved = (row for row in self._rows if row.slider.value != row.first)
+        return {row.control.name: row.slider.value * row.control.scale for row in moved}
+
+    def _complain(self, name: str, text: str) -> None:
+        for row in self._rows:
+            mine = text if row.control.name == name else ""
+            row.message.content, row.message.visible = _warning(mine), bool(mine)
+
+
+def _warning(text: str) -> str:
+    style = "color:#c92a2a;font-size:0.8em;padding:0 0.8em 0.5em;white-space:pre-line"
+    return f'<div role="alert" style="{style}">{html.escape(text)}</div>'

@@ -1,0 +1,91 @@
+"""Save what there is, and take it up again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from softreach.errors import InvalidInput
+from softreach.studio.files import (
+    CLOUD_FORMATS,
+    SURFACE_FORMATS,
+    cloud_file,
+    figure_file,
+    state_from,
+    surface_file,
+)
+from softreach.studio.page import static_page
+from softreach.studio.panels.binding import bind_button, told
+
+if TYPE_CHECKING:
+    from viser import GuiApi, UploadedFile
+
+    from softreach.studio.reach import Reach
+    from softreach.studio.session import Session
+
+__all__ = ["ExportPanel"]
+
+
+class ExportPanel:
+    """Buttons that send a file to the browser, and one that takes a file back."""
+
+    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
+        """Add the widgets."""
+        self._session = session
+        with tab:
+            self._button("Save state", self._save_state)
+            self._button("Save design (TOML)", self._save_design)
+            load = gui.add_upload_button("Load state or design")
+            self._cloud = gui.add_dropdown("cloud format", CLOUD_FORMATS)
+            self._button("Save cloud", self._save_cloud)
+            self._surface = gui.add_dropdown("surface format", SURFACE_FORMATS)
+            self._button("Save surface", self._save_surface)
+            self._button("Save figure (PNG)", self._save_figure)
+            self._button("Save web page (HTML)", self._save_page)
+        load.on_upload(lambda _: told(session, lambda: self._restore(load.value)))
+
+    def show(self, session: Session) -> None:
+        """Nothing here depends on the state."""
+
+    def _save_state(self) -> None:
+        session = self._session
+        state = session.state.replace(camera=session.camera_now())
+        self._send("softreach-studio.json", state.to_json().encode())
+
+    def _save_design(self) -> None:
+        self._send("design.toml", self._session.state.design.to_toml().encode())
+
+    def _save_cloud(self) -> None:
+        suffix = self._cloud.value
+        self._send(f"cloud{suffix}", cloud_file(self._reach(), suffix))
+
+    def _save_surface(self) -> None:
+        suffix = self._surface.value
+        self._send(f"surface{suffix}", surface_file(self._reach(), suffix))
+
+    def _save_figure(self) -> None:
+        self._send("reachability.png", figure_file(self._reach(), self._session.state))
+
+    def _save_page(self) -> None:
+        session = self._session
+        state = session.state.replace(camera=session.camera_now())
+        self._send("reachability.html", static_page(state, self._reach()).encode())
+
+    def _button(self, label: str, action: Callable[[], None]) -> None:
+        bind_button(self._session.client.gui.add_button(label), self._session, action)
+
+    def _restore(self, file: UploadedFile) -> None:
+        session = self._session
+        state = state_from(file.name, file.content, session.state)
+        session.update(lambda _: state)
+        if state.camera is not None:
+            session.look_from(state.camera)
+
+    def _reach(self) -> Reach:
+        reach = self._session.reach
+        if reach is None or not reach.fine or reach.arm != self._session.state.design:
+            raise InvalidInput("cloud", "still being computed", "complete", "try again soon")
+        return reach
+
+    def _send(self, name: str, content: bytes) -> None:
+        self._session.client.send_file_download(name, content, save_immediately=True)

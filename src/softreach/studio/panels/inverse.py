@@ -1,0 +1,102 @@
+"""Every activation that reaches a place: click a point of the cloud, or type it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softreach.studio.panels.binding import bind, bind_button, told
+from softreach.studio.picking import picked_point
+from softreach.studio.reach import shown_samples
+from softreach.studio.scene import cloud_points, in_slice
+
+if TYPE_CHECKING:
+    from viser import GuiApi
+
+    from softreach.inverse import Solution
+    from softreach.studio.session import Session
+
+__all__ = ["InversePanel"]
+
+_HINT = "Click a point of the cloud, or type a target."
+
+
+class InversePanel:
+    """The target, and the activations that reach it."""
+
+    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
+        """Add the widgets."""
+        self._gui, self._session = gui, session
+        self._shown: Solution | None = None
+        self._buttons: list[Any] = []
+        with tab:
+            self._text = gui.add_markdown(_HINT)
+            self._target = gui.add_vector3("target / L", (0.0, 0.0, 1.0), step=0.001)
+            solve = gui.add_button("Solve")
+            self._ghosts = gui.add_checkbox("show all shapes", session.state.appearance.ghosts)
+            self._folder = gui.add_folder("activations that reach it", visible=False)
+            clear = gui.add_button("Clear")
+        bind_button(solve, session, self._solve_typed)
+        bind_button(clear, session, lambda: session.update(lambda s: s.replace(target=None)))
+        bind(self._ghosts, session, lambda s, on: s.showing(ghosts=on))
+
+    def show(self, session: Session) -> None:
+        """List the solutions."""
+        self._ghosts.value = session.state.appearance.ghosts
+        if session.answer is self._shown:
+            return
+        self._shown = answer = session.answer
+        for button in self._buttons:
+            button.remove()
+        self._buttons, self._folder.visible = [], answer is not None and len(answer) > 0
+        self._text.content = _HINT
+        if answer is not None:
+            length = session.state.design.length
+            self._target.value = answer.target / length
+            self._text.content = _told(answer, length)
+            with self._folder:
+                self._buttons = [self._button(row) for row in answer.activations]
+
+    def click(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
+        """Aim at the point of the cloud under the cursor, and whether there is one."""
+        session = self._session
+        reach, look = session.reach, session.state.appearance
+        if reach is None or not look.cloud or reach.arm != session.state.design:
+            return False
+        points = cloud_points(reach, look.level)
+        kept = np.flatnonzero(in_slice(points, look.slice))
+        found = picked_point(points[kept], origin, direction)
+        if found is None:
+            return False
+        tips = reach.cloud.tip.values[shown_samples(reach, look.level)]
+        told(session, lambda: session.aim(tips[kept[found]]))
+        return True
+
+    def _solve_typed(self) -> None:
+        length = self._session.state.design.length
+        self._session.aim(length * np.asarray(self._target.value))
+
+    def _button(self, activation: Any) -> Any:
+        wanted = tuple(activation.tolist())
+        button = self._gui.add_button("γ = " + ", ".join(f"{value:.3f}" for value in wanted))
+        take = lambda: self._session.update(lambda s: s.replace(activation=wanted))  # noqa: E731
+        bind_button(button, self._session, take)
+        return button
+
+
+def _told(answer: Solution, length: float) -> str:
+    """What became of the target, in words."""
+    place = _place(answer.target / length)
+    if not len(answer):
+        certain = "out of reach" if answer.status == 1 else "not reached, perhaps out of reach"
+        near = _place(answer.nearest / length)
+        return f"{place} is {certain}. Nearest: {near}, {answer.gap / length:.4g} L away."
+    rest = "" if len(answer) == 1 else "s"
+    worst = answer.residuals.max() / length
+    return f"{len(answer)} activation{rest} reach {place} to {worst:.1e} L."
+
+
+def _place(point: Any) -> str:
+    return "({:.4f}, {:.4f}, {:.4f}) L".format(*point)

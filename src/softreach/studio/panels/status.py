@@ -1,0 +1,50 @@
+"""What is known of the design at this moment: volume, unreachability, and what colors mean."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from softreach.studio.colors import key_html
+
+if TYPE_CHECKING:
+    from viser import GuiApi
+
+    from softreach.studio.reach import Reach
+    from softreach.studio.session import Session
+
+__all__ = ["StatusPanel", "reach_text"]
+
+_UNITS = {"volume": "L³", "area": "L²", "length": "L", "point": ""}
+
+
+class StatusPanel:
+    """Text above all tabs."""
+
+    def __init__(self, gui: GuiApi) -> None:
+        """Add the widgets."""
+        self._numbers = gui.add_markdown("computing ...")
+        self._key = gui.add_html("")
+        self._note = gui.add_markdown("", visible=False)
+
+    def show(self, session: Session) -> None:
+        """Tell what is known, and whether it is about to change."""
+        reach = session.reach
+        self._numbers.content = "computing ..." if reach is None else _told(session, reach)
+        self._key.content = key_html(session.key)
+        self._note.content, self._note.visible = session.note, bool(session.note)
+
+
+def _told(session: Session, reach: Reach) -> str:
+    stale = reach.arm != session.state.design
+    return reach_text(reach) + (" · computing ..." if stale or not reach.fine else "")
+
+
+def reach_text(reach: Reach) -> str:
+    """The numbers of a reach in one line."""
+    name = reach.exact.measure_name
+    error = reach.exact.measure_error / reach.arm.length**reach.exact.dimension
+    parts = [f"**{name} {reach.volume:.4f} ± {error:.1g} {_UNITS[name]}**"]
+    if not math.isnan(reach.unreachability):
+        parts.append(f"**UNR {100 * reach.unreachability:.2f} %**")
+    return " · ".join([*parts, f"{reach.samples:,} samples"])

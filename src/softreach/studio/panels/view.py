@@ -1,0 +1,87 @@
+"""What is drawn and how: colors, number of points, slice, surfaces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from softreach.studio.colors import color_names
+from softreach.studio.panels.binding import bind
+from softreach.studio.state import LEVELS, Appearance, StudioState
+
+if TYPE_CHECKING:
+    from viser import GuiApi
+
+    from softreach.studio.session import Session
+
+__all__ = ["ViewPanel"]
+
+_COUNTS = {f"{1 << level:,}": level for level in LEVELS}
+_ACROSS: tuple[str, ...] = ("none", "x", "y", "z")
+_TOGGLES = {
+    "cloud": "cloud",
+    "arm": "arm",
+    "surface": "exact surface",
+    "alpha_shape": "α-shape (0.05 L)",
+    "axes": "axes",
+}
+
+
+class ViewPanel:
+    """Widgets of the appearance."""
+
+    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
+        """Add the widgets."""
+        self._session = session
+        look, names = session.state.appearance, color_names(session.state.design)
+        with tab:
+            self._color = gui.add_dropdown("color by", tuple(names.values()))
+            self._count = gui.add_dropdown("points", tuple(_COUNTS), initial_value=_count(look))
+            self._size = gui.add_slider("point size / L", 5e-4, 0.02, 5e-4, look.point_size)
+            with gui.add_folder("show"):
+                self._toggles = {
+                    field: gui.add_checkbox(label, getattr(look, field))
+                    for field, label in _TOGGLES.items()
+                }
+            with gui.add_folder("slice"):
+                self._slice = {
+                    "axis": gui.add_dropdown("across", _ACROSS, initial_value=look.slice.axis),
+                    "center": gui.add_slider("center / L", -1.5, 1.5, 0.01, look.slice.center),
+                    "thickness": gui.add_slider(
+                        "thickness / L", 0.01, 1.0, 0.01, look.slice.thickness
+                    ),
+                }
+        self._listen(session)
+
+    def _listen(self, session: Session) -> None:
+        bind(self._color, session, self._recolored)
+        bind(self._count, session, lambda s, text: s.showing(level=_COUNTS[text]))
+        bind(self._size, session, lambda s, size: s.showing(point_size=size))
+        for field, box in self._toggles.items():
+            bind(box, session, lambda s, on, field=field: s.showing(**{field: on}))
+        for field, widget in self._slice.items():
+            bind(widget, session, lambda s, value, field=field: _sliced(s, field, value))
+
+    def show(self, session: Session) -> None:
+        """Bring the widgets in line with the state."""
+        look, names = session.state.appearance, color_names(session.state.design)
+        if self._color.options != tuple(names.values()):
+            self._color.options = tuple(names.values())
+        self._color.value = names.get(look.color, names["rgb"])
+        self._count.value, self._size.value = _count(look), look.point_size
+        for field, box in self._toggles.items():
+            box.value = getattr(look, field)
+        for field, widget in self._slice.items():
+            widget.value = getattr(look.slice, field)
+
+    def _recolored(self, state: StudioState, label: str) -> StudioState:
+        names = color_names(state.design)
+        return state.showing(color=next((n for n, text in names.items() if text == label), "rgb"))
+
+
+def _sliced(state: StudioState, field: str, value: Any) -> StudioState:
+    return state.showing(slice=replace(state.appearance.slice, **{field: value}))
+
+
+def _count(look: Appearance) -> str:
+    return f"{1 << look.level:,}"

@@ -1,0 +1,120 @@
+"""What a design can reach, coarse first and then fine."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.cloud import compute_cloud, design_of
+from softreach.errors import SoftreachWarning
+from softreach.manipulator import Manipulator
+from softreach.studio.jobs import StaleCheck, kernels
+from softreach.volume import concave_hull
+from softreach.workspace import ReachableSet, reachable_set
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from softreach.geometry.hull import Hull
+
+__all__ = ["Quality", "Reach", "reached", "shown_samples", "stages"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quality:
+    """How much is computed before the first picture, and after it."""
+
+    coarse_level: int = 16
+    fine_level: int = 19
+    coarse_accuracy: float = 0.02
+    """Relative error allowed in the volume."""
+    fine_accuracy: float = 0.003
+    tol: float = 1e-5
+    """Largest tip error, in L: far below a pixel."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Reach:
+    """A cloud and the exact set behind it."""
+
+    cloud: xr.Dataset
+    exact: ReachableSet
+    fine: bool
+    order: NDArray[np.int64] | None = field(default=None, repr=False)
+    """An order whose prefixes are even subsamples, where the cloud's own is not."""
+
+    @property
+    def arm(self) -> Manipulator:
+        """The design."""
+        return self.exact.arm
+
+    @property
+    def samples(self) -> int:
+        """Number of points there are."""
+        return self.cloud.sizes["sample"]
+
+    @property
+    def volume(self) -> float:
+        """Volume, area or length by `exact.measure_name` [L³, L², L]."""
+        return self.exact.measure / self.arm.length**self.exact.dimension
+
+    @property
+    def unreachability(self) -> float:
+        """UNR [-]; NaN without a volume."""
+        return self.exact.unreachability if self.exact.dimension == 3 else math.nan
+
+    @cached_property
+    def alpha_shape(self) -> Hull:
+        """The α-shape of at most 2^17 points, α = 0.05 L."""
+        with kernels, warnings.catch_warnings():
+            warnings.simplefilter("ignore", SoftreachWarning)  # coarse clouds are sparse
+            return concave_hull(self.cloud.tip[shown_samples(self, 17)])
+
+
+def stages(arm: Manipulator, level: int, quality: Quality, check: StaleCheck) -> Iterator[Reach]:
+    """The reach of a design, coarse and then fine; waits for its turn at the kernels.
+
+    Args:
+        arm: The design.
+        level: The fine cloud has at least 2^level points.
+        quality: How much is computed in each stage.
+        check: Called all the time; raises to stop.
+    """
+    fine = max(level, quality.fine_level)
+    sizes = (quality.coarse_level, quality.coarse_accuracy), (fine, quality.fine_accuracy)
+    for stage, (points, accuracy) in enumerate(sizes):
+        check()
+        with kernels:
+            cloud = compute_cloud(
+                arm, 1 << points, 0, "sobol", tol=quality.tol, report=lambda _: check()
+            )
+            exact = _exact(arm, accuracy, quality.tol, check)
+        yield Reach(cloud=cloud, exact=exact, fine=stage == 1)
+
+
+def reached(cloud: xr.Dataset, quality: Quality) -> Reach:
+    """The reach that belongs to a cloud from a file."""
+    with kernels:
+        exact = _exact(design_of(cloud), quality.fine_accuracy, quality.tol, lambda: None)
+    ordered = cloud.attrs.get("sampler") in ("uniform", "sobol")
+    shuffled = None if ordered else np.random.default_rng(0).permutation(cloud.sizes["sample"])
+    return Reach(cloud=cloud, exact=exact, fine=True, order=shuffled)
+
+
+def shown_samples(reach: Reach, level: int) -> slice | NDArray[np.int64]:
+    """Which samples a picture of 2^level points shows."""
+    first = slice(0, min(1 << level, reach.samples))
+    return first if reach.order is None else reach.order[first]
+
+
+def _exact(arm: Manipulator, accuracy: float, tol: float, check: StaleCheck) -> ReachableSet:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SoftreachWarning)  # the error is shown beside the volume
+        return reachable_set(arm, accuracy=accuracy, tol=tol, report=lambda _: check())

@@ -1,0 +1,227 @@
+"""Draws what a tab shows into a viser scene, in units of L, through nodes named by paths."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm_shape import arm_mesh, fiber_bands
+from softreach.geometry.tube import grid_faces
+from softreach.kinematics import configuration
+from softreach.manipulator import Manipulator
+from softreach.palette import BODY, bundle_color
+from softreach.studio.axes import axes_box
+from softreach.studio.colors import sample_colors
+from softreach.studio.reach import Reach, shown_samples
+from softreach.studio.state import Appearance, Slice
+
+if TYPE_CHECKING:
+    from viser import SceneApi
+
+    from softreach.plot.coloring import BundleKey, ScalarKey
+
+__all__ = ["Scene", "in_slice"]
+
+Array = NDArray[np.float64]
+Color = tuple[int, int, int]
+
+_STATIONS, _SIDES, _ACROSS = 51, 24, np.pi / 12
+_LIFT = 0.02  # of the fibers above the body, in R2
+_GHOST, _REFERENCE, _SURFACE, _HULL = 0.35, (150, 150, 158), (90, 140, 200), (220, 150, 60)
+_MARK: Color = (220, 30, 120)
+
+
+class Scene:
+    """One scene and what has been drawn into it."""
+
+    def __init__(self, api: SceneApi) -> None:
+        """Draw into the scene of a client, or of a server for a page that is saved."""
+        self._api = api
+        self._arms: dict[str, tuple[Manipulator, list[Any]]] = {}
+
+    def draw_cloud(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
+        """Points, thinned by prefix and cut by the slice; returns the key to their colors."""
+        if not look.cloud:
+            self.remove("/cloud", "/slice")
+            return None
+        points = cloud_points(reach, look.level)
+        coloring = sample_colors(reach, look.level, look.color)
+        kept = in_slice(points, look.slice)
+        self._points("/cloud", points[kept], coloring.rgb[kept], look.point_size)
+        self._slab(look.slice, points)
+        return coloring.key
+
+    def draw_arm(self, arm: Manipulator, activation: Sequence[float], path: str = "/arm") -> Array:
+        """The body and its fibers; returns the tip [L]. Redrawn by moving what there is."""
+        shape = configuration(arm, activation, _STATIONS, tol=1e-5)
+        meshes = _arm_meshes(arm, shape)
+        known, handles = self._arms.get(path, (None, []))
+        if known is arm:
+            for handle, (vertices, _, _) in zip(handles, meshes, strict=True):
+                handle.vertices = vertices
+        else:
+            self.remove(path)
+            ghost = path.startswith("/ghosts")
+            self._arms[path] = (
+                arm,
+                [
+                    self._mesh(f"{path}/{k}", *mesh, opacity=_GHOST if ghost else None)
+                    for k, mesh in enumerate(meshes)
+                ],
+            )
+        return shape["position"].values[-1] / arm.length
+
+    def draw_ghosts(self, arm: Manipulator, activations: Array) -> None:
+        """Many shapes at once, transparent."""
+        self.remove("/ghosts")
+        for k, activation in enumerate(activations):
+            self.draw_arm(arm, activation.tolist(), f"/ghosts/{k}")
+
+    def draw_surface(self, path: str, vertices: Array, faces: NDArray[Any], color: Color) -> None:
+        """A transparent surface [L]."""
+        self._mesh(path, vertices, faces, color, opacity=0.35)
+
+    def draw_surfaces(self, reach: Reach, look: Appearance) -> None:
+        """The exact boundary and the α-shape, as asked for; slow the first time."""
+        self.remove("/surface", "/alpha-shape")
+        if look.surface and reach.exact.dimension >= 2:
+            exact = reach.exact.surface()
+            self.draw_surface("/surface", exact.vertices / reach.arm.length, exact.faces, _SURFACE)
+        if look.alpha_shape and len(reach.alpha_shape.faces):
+            hull = reach.alpha_shape
+            self.draw_surface("/alpha-shape", hull.vertices / reach.arm.length, hull.faces, _HULL)
+
+    def draw_axes(self, reach: Reach, look: Appearance) -> None:
+        """The box with numbers around cloud and arm."""
+        self.remove("/axes")
+        if not look.axes:
+            return
+        box = axes_box(cloud_points(reach, 14), np.array([[0, 0, 0], [0, 0, 1.0]]))
+        self._api.add_line_segments(
+            "/axes/lines", box.lines.astype(np.float32), (170, 170, 175), thickness=0.003
+        )
+        for k, (text, at) in enumerate(box.labels):
+            self._api.add_label(f"/axes/label {k}", text, position=at, font_screen_scale=0.8)
+
+    def draw_trail(self, tips: Array) -> None:
+        """A line through the places where the tip has been [L], shape (n, 3)."""
+        if len(tips) < 2:
+            self.remove("/trail")
+            return
+        pieces = np.stack([tips[:-1], tips[1:]], axis=1).astype(np.float32)
+        self._api.add_line_segments("/trail", pieces, _MARK, thickness=0.004)
+
+    def draw_target(self, target: Array | None, nearest: Array | None = None) -> None:
+        """A mark where the tip should go [L], and a line to the nearest place in reach."""
+        self.remove("/target", "/gap")
+        if target is None:
+            return
+        self._api.add_icosphere("/target", 0.012, _MARK, position=target)
+        if nearest is not None:
+            gap = np.stack([target, nearest])[None].astype(np.float32)
+            self._api.add_line_segments("/gap", gap, _MARK, thickness=0.004)
+            self._api.add_icosphere("/gap/nearest", 0.008, (40, 40, 40), position=nearest)
+
+    def draw_picture(
+        self, path: str, image: NDArray[np.uint8], size: float, center: Array, turn: Any
+    ) -> None:
+        """A square picture [L]."""
+        self._api.add_image(path, image, size, size, format="png", wxyz=turn, position=center)
+
+    def draw_mark(self, path: str, center: Array) -> None:
+        """A small ball."""
+        self._api.add_icosphere(path, 0.02, _MARK, position=center)
+
+    def draw_reference(self, reach: Reach, look: Appearance, shift: Array) -> None:
+        """Another design's cloud, gray over this one or in color beside it."""
+        self.remove("/reference")
+        points = cloud_points(reach, min(look.level, 16))
+        beside = bool(np.any(shift))
+        if beside:
+            colors = sample_colors(reach, min(look.level, 16), look.color).rgb
+        else:
+            colors = np.array(_REFERENCE, np.uint8)
+        self._points("/reference/cloud", points + shift, colors, look.point_size)
+        tip = np.full(reach.arm.bundles, 0.0).tolist()
+        if beside:
+            self.draw_arm(reach.arm, tip, "/reference/arm")
+            for handle in self._arms["/reference/arm"][1]:
+                handle.position = shift
+
+    def remove(self, *paths: str) -> None:
+        """Take nodes and everything under them out of the scene."""
+        for path in paths:
+            for known in [p for p in self._arms if p == path or p.startswith(f"{path}/")]:
+                del self._arms[known]
+            if self._api.get_handle_by_name(path) is not None:
+                self._api.remove_by_name(path)
+
+    def _points(self, path: str, points: Array, colors: NDArray[np.uint8], size: float) -> None:
+        # viser's default is float16: a quarter of a millimeter in a meter
+        self._api.add_point_cloud(
+            path,
+            points.astype(np.float32),
+            colors,
+            point_size=size,
+            precision="float32",
+            point_shape="circle",
+            point_shading="flat",
+        )
+
+    def _mesh(
+        self, path: str, vertices: Array, faces: Any, color: Color, opacity: float | None = None
+    ) -> Any:
+        return self._api.add_mesh_simple(
+            path,
+            vertices.astype(np.float32),
+            faces.astype(np.uint32),
+            color=color,
+            opacity=opacity,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+    def _slab(self, cut: Slice, points: Array) -> None:
+        """The middle plane of the slice, as wide as the cloud."""
+        self.remove("/slice")
+        if cut.axis == "none":
+            return
+        axis = "xyz".index(cut.axis)
+        low, high = points.min(axis=0), points.max(axis=0)
+        corners = np.tile(low, (4, 1))
+        corners[:, axis] = cut.center
+        for other, side in zip([k for k in range(3) if k != axis], ((1, 2), (2, 3)), strict=True):
+            corners[list(side), other] = high[other]
+        faces = np.array([[0, 1, 2], [0, 2, 3]])
+        self._mesh("/slice", corners, faces, (200, 200, 205), opacity=0.25)
+
+
+def cloud_points(reach: Reach, level: int) -> Array:
+    """Tips that a picture of 2^level points shows [L]."""
+    return reach.cloud.tip.values[shown_samples(reach, level)] / reach.arm.length
+
+
+def in_slice(points: Array, cut: Slice) -> NDArray[np.bool_]:
+    """Which points [L] a slice shows."""
+    if cut.axis == "none":
+        return np.ones(len(points), bool)
+    return np.abs(points[:, "xyz".index(cut.axis)] - cut.center) <= cut.thickness / 2
+
+
+def _arm_meshes(arm: Manipulator, shape: Any) -> list[tuple[Array, NDArray[Any], Color]]:
+    """Vertices [L], faces and color of the body and of every bundle."""
+    vertices, faces = arm_mesh(shape, _SIDES)
+    meshes = [(vertices / arm.length, faces, _rgb(BODY))]
+    for k, band in enumerate(fiber_bands(arm, shape, lift=_LIFT, step=_ACROSS)):
+        skin = grid_faces(*band.shape[:2])
+        meshes.append((band.reshape(-1, 3) / arm.length, skin, _rgb(bundle_color(k))))
+    return meshes
+
+
+def _rgb(color: Sequence[float]) -> Color:
+    r, g, b = (round(255 * c) for c in color)
+    return r, g, b

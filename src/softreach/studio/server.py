@@ -1,0 +1,106 @@
+"""A safe start: this machine only, a free port, no tunnel, no pages from elsewhere."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import socket
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+from softreach.errors import InvalidInput, MissingExtra
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+
+__all__ = ["LOOPBACK", "page_url", "same_origin", "start_server", "stop_server"]
+
+LOOPBACK = "127.0.0.1"
+_LOCAL_NAMES = {"localhost", "127.0.0.1", "::1"}
+
+
+def start_server(host: str = LOOPBACK, port: int | None = None) -> ViserServer:
+    """Start serving the page.
+
+    Args:
+        host: Address to listen on; everyone who can reach it may use the studio.
+        port: None for a free one.
+
+    Raises:
+        InvalidInput: The port is taken, or the host is not this machine's.
+        MissingExtra: viser is not installed.
+    """
+    try:
+        import viser
+    except ModuleNotFoundError as error:
+        raise MissingExtra("viser", "studio") from error
+
+    _check_free(host, port or 0)
+    with contextlib.redirect_stdout(io.StringIO()):  # its banner; we print our own line
+        server = viser.ViserServer(host=host, port=port or 0, verbose=False, label="softreach")
+    _disable_tunnel(server)
+    _refuse_foreign_pages(server, host)
+    # Shadows and a mirrored room cost seconds where no graphics card helps, and say nothing.
+    server.scene.configure_environment_map(None)
+    server.scene.configure_default_lights(cast_shadow=False)
+    server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
+    server.gui.main_panel.dock_right()
+    return server
+
+
+def stop_server(server: ViserServer) -> None:
+    """Stop serving, without the line that viser prints."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        server.stop()
+
+
+def page_url(server: ViserServer) -> str:
+    """Where the page is, for a browser on this machine."""
+    host = server.get_host()
+    shown = LOOPBACK if host in ("0.0.0.0", "::") else host
+    return f"http://{f'[{shown}]' if ':' in shown else shown}:{server.get_port()}"
+
+
+def same_origin(headers: Mapping[str, str], host: str) -> bool:
+    """Whether a connection comes from our own page, or from no page at all.
+
+    Browsers let any web page open a socket to this machine; they tell where it came from. On
+    loopback the name must be local too, as foreign names can be made to point here.
+    """
+    asked = urlsplit(f"//{headers.get('Host', '')}")
+    if host in _LOCAL_NAMES and asked.hostname not in _LOCAL_NAMES:
+        return False
+    origin = headers.get("Origin")
+    return origin is None or urlsplit(origin).netloc == asked.netloc
+
+
+def _check_free(host: str, port: int) -> None:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family) as trial:
+        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            trial.bind((host, port))
+        except OSError as error:
+            allowed = "an address of this machine and a free port"
+            raise InvalidInput("host:port", f"{host}:{port}", allowed, str(error)) from None
+
+
+def _disable_tunnel(server: ViserServer) -> None:
+    """Any client could ask for a public address: the button is not the only way."""
+
+    def refuse(*_: Any, **__: Any) -> None:
+        return None
+
+    server.request_share_url = refuse
+
+
+def _refuse_foreign_pages(server: ViserServer, host: str) -> None:
+    connections = server._websock_server  # viser has no public hook before its own hello
+
+    @connections.on_client_connect
+    async def _(client: Any) -> None:
+        live = connections._live_connections[client.client_id]
+        request = live.request
+        if request is None or not same_origin(request.headers, host):
+            await live.close(1008, "not our page")

@@ -1,0 +1,213 @@
+"""What a tab of the studio shows, as a value, and what follows when it changes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from enum import Enum, auto
+from typing import Any, Self
+
+import numpy as np
+
+from softreach.errors import InvalidInput
+from softreach.manipulator import Manipulator
+
+__all__ = [
+    "LEVELS",
+    "Appearance",
+    "Camera",
+    "Slice",
+    "StudioState",
+    "Work",
+    "vector",
+    "what_follows",
+]
+
+VERSION = 1
+LEVELS = range(14, 22)
+"""The cloud has 2^level points: in a Sobol sequence every such prefix is an even subsample."""
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slice:
+    """A slab across the cloud; the rest is hidden."""
+
+    axis: str = "none"
+    """"x", "y" or "z" across the slab, or "none"."""
+    center: float = 0.0
+    """[L]."""
+    thickness: float = 0.05
+    """[L]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Appearance:
+    """What is drawn and how."""
+
+    level: int = 17
+    color: str = "rgb"
+    """One of `colors.color_names`."""
+    point_size: float = 0.003
+    """[L]."""
+    slice: Slice = field(default_factory=Slice)
+    cloud: bool = True
+    arm: bool = True
+    axes: bool = True
+    surface: bool = False
+    """The exact boundary of the reachable set."""
+    alpha_shape: bool = False
+    trail: bool = False
+    """Where the tip has been."""
+    ghosts: bool = True
+    """The shapes of all solutions of the inverse problem at once."""
+
+    def __post_init__(self) -> None:
+        if self.level not in LEVELS:
+            raise InvalidInput("level", self.level, f"{LEVELS[0]} to {LEVELS[-1]}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Camera:
+    """Where the eye is and what it looks at [L]."""
+
+    position: Vector
+    look_at: Vector
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudioState:
+    """Everything that a tab shows follows from this value."""
+
+    design: Manipulator
+    activation: tuple[float, ...] = ()
+    """γ of each bundle, within the bounds [-]; rest, or what is nearest to it, by default."""
+    appearance: Appearance = field(default_factory=Appearance)
+    target: Vector | None = None
+    """Where the tip should go [m]."""
+    reference: Manipulator | None = None
+    """A design kept for comparison."""
+    side_by_side: bool = False
+    camera: Camera | None = None
+
+    def __post_init__(self) -> None:
+        within = _within(self.design, self.activation)
+        object.__setattr__(self, "activation", within)
+
+    def replace(self, **changes: Any) -> Self:
+        """A copy with some fields changed; activations are moved into the bounds."""
+        return replace(self, **changes)
+
+    def showing(self, **changes: Any) -> Self:
+        """A copy that looks different."""
+        return replace(self, appearance=replace(self.appearance, **changes))
+
+    def to_json(self) -> str:
+        """The state as text, from which `from_json` makes an equal one."""
+        values = {name: getattr(self, name) for name in _PLAIN}
+        values["appearance"] = asdict(self.appearance)
+        values["camera"] = self.camera and asdict(self.camera)
+        values["design"] = self.design.to_toml()
+        values["reference"] = self.reference and self.reference.to_toml()
+        return json.dumps({"softreach_studio": VERSION, **values}, indent=1, ensure_ascii=False)
+
+    @classmethod
+    def from_json(cls, text: str | bytes) -> Self:
+        """The state that `to_json` wrote.
+
+        Raises:
+            InvalidInput: The text is no such state.
+            InvalidDesign: A design in it cannot exist.
+        """
+        values = _parsed(text)
+        try:
+            return cls(**_fields(values))
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            if type(error).__module__.startswith("softreach"):
+                raise
+            raise InvalidInput("state file", str(error), "one that the studio saved") from None
+
+
+_PLAIN = ("activation", "target", "side_by_side")
+
+
+def _parsed(text: str | bytes) -> dict[str, Any]:
+    allowed = f"a state that the studio saved, version {VERSION}"
+    try:
+        values = json.loads(text)
+    except ValueError as error:
+        raise InvalidInput("state file", str(error), allowed) from None
+    found = values.pop("softreach_studio", None) if isinstance(values, dict) else None
+    if found != VERSION:
+        raise InvalidInput("state file", f"version {found}", allowed)
+    return values
+
+
+def _fields(values: dict[str, Any]) -> dict[str, Any]:
+    look = dict(values["appearance"])
+    look["slice"] = Slice(**look["slice"])
+    camera, reference = values["camera"], values["reference"]
+    return {
+        "design": Manipulator.from_toml(values["design"], "state file"),
+        "activation": tuple(map(float, values["activation"])),
+        "appearance": Appearance(**look),
+        "target": values["target"] and vector(values["target"]),
+        "reference": reference and Manipulator.from_toml(reference, "state file"),
+        "side_by_side": bool(values["side_by_side"]),
+        "camera": camera and Camera(**{name: vector(v) for name, v in camera.items()}),
+    }
+
+
+def vector(values: Iterable[float]) -> Vector:
+    """Three plain numbers."""
+    x, y, z = map(float, values)
+    return x, y, z
+
+
+def _within(arm: Manipulator, activation: Sequence[float]) -> tuple[float, ...]:
+    """As many activations as there are bundles, each within its bounds."""
+    wanted = np.zeros(arm.bundles)
+    count = min(len(activation), arm.bundles)
+    wanted[:count] = np.asarray(activation, float)[:count]
+    if not np.isfinite(wanted).all():
+        raise InvalidInput("activation", tuple(activation), "finite numbers")
+    return tuple(np.clip(wanted, *arm.bounds.T).tolist())
+
+
+class Work(Enum):
+    """What has to be done again."""
+
+    REACH = auto()
+    """Cloud, volume, unreachability of the design."""
+    ARM = auto()
+    CLOUD = auto()
+    """Colors, number of points, slice."""
+    SURFACES = auto()
+    INVERSE = auto()
+    REFERENCE = auto()
+
+
+def what_follows(old: StudioState | None, new: StudioState) -> frozenset[Work]:
+    """What a change makes stale; everything if there was nothing before."""
+    if old is None:
+        return frozenset(Work)
+    return frozenset(work for work, value in _CAUSES.items() if value(old) != value(new))
+
+
+_CAUSES = {
+    Work.REACH: lambda s: s.design,
+    Work.ARM: lambda s: (s.design, s.activation, s.appearance.arm, s.appearance.trail),
+    Work.CLOUD: lambda s: (
+        s.appearance.level,
+        s.appearance.color,
+        s.appearance.point_size,
+        s.appearance.slice,
+        s.appearance.cloud,
+        s.appearance.axes,
+    ),
+    Work.SURFACES: lambda s: (s.appearance.surface, s.appearance.alpha_shape),
+    Work.INVERSE: lambda s: (s.design, s.target, s.appearance.ghosts),
+    Work.REFERENCE: lambda s: (s.reference, s.side_by_side),
+}

@@ -1,0 +1,125 @@
+"""A browser tab as a person uses it, beside the session that serves it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from softreach.studio import Studio
+from softreach.studio.session import Session
+
+FLAGS = [
+    "--no-sandbox",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-default-apps",
+    "--disable-sync",
+    "--metrics-recording-only",
+    "--no-first-run",
+    "--no-pings",
+]
+PATIENCE = 90.0  # a loaded machine compiles shaders slowly
+
+
+class Tab:
+    """One page and its session."""
+
+    def __init__(self, browser, studio: Studio) -> None:
+        self.context = browser.new_context(
+            viewport={"width": 900, "height": 560}, accept_downloads=True
+        )
+        self.requests: list[str] = []
+        self.errors: list[str] = []
+        self.context.on("request", lambda request: self.requests.append(request.url))
+        self.page = self.context.new_page()
+        self.page.set_default_timeout(1000 * PATIENCE)
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("console", self._console)
+        known = set(studio.sessions)
+        self.page.goto(studio.url)
+        self.wait(lambda: set(studio.sessions) - known, "the page connects")
+        self.session: Session = studio.sessions[max(studio.sessions)]
+        self.page.get_by_text("taper φ [deg]").wait_for()
+        self.settle()
+
+    def _console(self, message) -> None:
+        if message.type == "error":
+            self.errors.append(message.text)
+
+    def close(self) -> None:
+        self.context.close()
+
+    def wait(self, condition: Callable[[], object], what: str) -> None:
+        """Let the page and the server work until the condition holds."""
+        deadline = time.monotonic() + PATIENCE
+        while not condition():
+            assert time.monotonic() < deadline, f"still waiting until {what}"
+            if hasattr(self, "page"):
+                self.page.wait_for_timeout(30)
+
+    def settle(self) -> None:
+        assert self.session.settle(PATIENCE)
+
+    def open(self, name: str) -> None:
+        self.page.get_by_role("tab", name=name).click()
+
+    def slider(self, label: str):
+        return self.page.locator(
+            f"xpath=//label[normalize-space()='{label}']/following::*[@role='slider'][1]"
+        )
+
+    def drag(self, label: str, pixels: int) -> None:
+        """Grab the thumb of a slider and pull it along."""
+        thumb = self.slider(label)
+        thumb.scroll_into_view_if_needed()
+        box = thumb.bounding_box()
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        self.page.mouse.move(x, y)
+        self.page.mouse.down()
+        self.page.mouse.move(x + pixels, y, steps=4)
+        self.page.mouse.up()
+
+    def press(self, button: str) -> None:
+        self.page.get_by_role("button", name=button, exact=True).click()
+
+    def save(self, button: str, folder: Path) -> Path:
+        """What a press of the button downloads."""
+        with self.page.expect_download() as caught:
+            self.press(button)
+        path = folder / caught.value.suggested_filename
+        caught.value.save_as(path)
+        return path
+
+    def load(self, path: Path) -> None:
+        with self.page.expect_file_chooser() as caught:
+            self.press("Load state or design")
+        caught.value.set_files(path)
+
+    def click_at(self, point: np.ndarray) -> None:
+        """Click where a point of the scene [L] appears."""
+        canvas = self.page.locator("canvas").first.bounding_box()
+        right, down = self.projected(point)
+        self.page.mouse.click(
+            canvas["x"] + right * canvas["width"], canvas["y"] + down * canvas["height"]
+        )
+
+    def projected(self, point: np.ndarray) -> tuple[float, float]:
+        """Place of a point in the canvas, 0 to 1 from its upper left."""
+        camera = self.session.client.camera
+        forward = unit(camera.look_at - camera.position)
+        right = unit(np.cross(forward, camera.up_direction))
+        up = np.cross(right, forward)
+        offset = point - camera.position
+        half = np.tan(camera.fov / 2) * (offset @ forward)
+        across = offset @ right / (half * camera.aspect)
+        return 0.5 + across / 2, 0.5 - offset @ up / half / 2
+
+
+def unit(vector: np.ndarray) -> np.ndarray:
+    return vector / np.linalg.norm(vector)

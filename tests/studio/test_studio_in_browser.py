@@ -1,0 +1,129 @@
+"""End to end: what a person does in the page, and what the library says about it."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+
+import softreach as sr
+from softreach.studio import StudioState
+from tests.studio.tab import Tab
+
+pytestmark = [
+    # viser's own use of websockets and of its handles while a tab closes
+    pytest.mark.filterwarnings("ignore::DeprecationWarning:websockets"),
+    pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning"),
+]
+
+
+def test_the_page_opens_with_the_volume_of_the_design(tab):
+    reach = tab.session.reach
+    assert reach.fine
+    tab.page.get_by_text(f"volume {reach.volume:.4f}").wait_for()
+    assert reach.volume == pytest.approx(0.69, abs=0.02)
+    assert tab.page.locator("canvas").count() > 0
+
+
+def test_a_design_slider_changes_volume_and_cloud(tab):
+    tab.open("Design")
+    before = tab.session.reach
+    tab.drag("revolution Ω [deg]", 40)
+    tab.wait(lambda: tab.session.state.design != before.arm, "the design changes")
+    tab.settle()
+    after = tab.session.reach
+    assert after.fine
+    assert after.arm == tab.session.state.design
+    assert np.degrees(after.arm.revolutions[1]) > 130
+    tab.page.get_by_text(f"volume {after.volume:.4f}").wait_for()
+    assert after.volume != before.volume
+    assert not np.allclose(after.cloud.tip, before.cloud.tip)
+
+
+def test_an_activation_puts_the_tip_where_the_library_says(tab):
+    tab.open("Activation")
+    start = tab.session.tip.copy()
+    tab.drag("γ left", -60)
+    tab.drag("γ longitudinal", -30)
+    tab.wait(lambda: np.count_nonzero(tab.session.state.activation) == 2, "two bundles pull")
+    tab.settle()
+    state = tab.session.state
+    tip = sr.tip_positions(state.design, [state.activation])[0] / state.design.length
+    assert np.linalg.norm(tip - start) > 0.05
+    np.testing.assert_allclose(tab.session.tip, tip, atol=2e-5)
+    x, y, z = tab.session.tip
+    tab.page.get_by_text(f"tip at ({x:.6f}, {y:.6f}, {z:.6f}) L").wait_for()
+
+
+def test_a_click_on_a_point_of_the_cloud_finds_activations_that_reach_it(tab):
+    tab.open("Inverse")
+    tab.click_at(tab.session.reach.cloud.tip.values[100] / tab.session.state.design.length)
+    tab.wait(lambda: tab.session.answer is not None, "a target is solved for")
+    tab.settle()
+    state, cloud = tab.session.state, tab.session.reach.cloud
+    target = np.array(state.target)
+    assert np.linalg.norm(cloud.tip.values - target, axis=1).min() == 0.0
+    tip = sr.tip_positions(state.design, [state.activation])[0]
+    assert np.linalg.norm(tip - target) < 1e-6 * state.design.length
+    tab.page.get_by_text("reach (").wait_for()
+
+
+def test_a_target_out_of_reach_shows_the_gap(tab):
+    tab.open("Inverse")
+    tab.session.aim(np.array([0.0, 0.0, 1.5]))
+    tab.settle()
+    assert len(tab.session.answer) == 0
+    tab.page.get_by_text("out of reach").wait_for()
+    tab.page.get_by_text("L away").wait_for()
+
+
+def test_a_design_that_cannot_exist_shows_the_librarys_message(tab):
+    tab.open("Design")
+    good = tab.session.state.design
+    tab.drag("taper φ [deg]", 90)
+    alert = tab.page.get_by_role("alert").filter(has_text="leaves no tip")
+    alert.wait_for()
+    assert "must be below" in alert.inner_text()
+    assert tab.session.state.design.tip_radius > 0
+    tab.drag("taper φ [deg]", -95)
+    alert.wait_for(state="hidden")
+    assert tab.session.state.design != good
+
+
+def test_a_saved_state_comes_back(tab, tmp_path):
+    tab.settle()
+    tab.open("Export")
+    kept = tab.session.state
+    file = tab.save("Save state", tmp_path)
+    assert json.loads(file.read_text())["softreach_studio"] == 1
+    design = tab.save("Save design (TOML)", tmp_path)
+    assert tomllib.loads(design.read_text())["length_m"] == 1.0
+    tab.session.update(lambda s: StudioState(design=sr.designs.redundant_trunk()))
+    tab.settle()
+    tab.load(file)
+    tab.wait(lambda: tab.session.state.design == kept.design, "the design is back")
+    tab.settle()
+    assert tab.session.state.replace(camera=None) == kept.replace(camera=None)
+    assert tab.session.reach.arm == kept.design
+
+
+def test_tabs_stay_apart(tab, browser, studio):
+    kept = tab.session.state
+    other = Tab(browser, studio)
+    other.drag("revolution Ω [deg]", -30)
+    other.wait(lambda: other.session.state != studio.start.state, "the other tab changes")
+    other.settle()
+    assert other.session.state.design != kept.design
+    assert tab.session.state == kept
+    assert tab.session.reach.arm == kept.design
+    assert not other.errors
+    other.close()
+    tab.wait(lambda: len(studio.sessions) == 1, "the session of the closed tab ends")
+
+
+def test_nothing_leaves_the_machine_and_the_console_stays_clean(tab, studio):
+    assert tab.requests
+    assert all(url.startswith((studio.url, f"blob:{studio.url}", "data:")) for url in tab.requests)
+    assert tab.errors == []
