@@ -88,11 +88,27 @@ def convex_volume(fine: Image, coarse: Image) -> float:
     The hull of mapped vertices lies inside that of the image by O(1/n²), which is removed.
     """
     volumes = [
-        convex_hull(image.vertices[np.unique(image.triangles[:, :3])]).volume
-        * (image.lattice.cell / image.unit) ** 3
+        convex_hull(_outer_vertices(image)).volume * image.lattice.cell**3
         for image in (fine, coarse)
     ]
     return volumes[0] + (volumes[0] - volumes[1]) / 3.0
+
+
+def _outer_vertices(image: Image) -> Array:
+    """Vertices of critical triangles that may be corners of the convex hull, in cells.
+
+    A plane through such a corner leaves the image on one side, and with it at least one of the
+    eight cell centers around the corner.
+    """
+    used = np.zeros(len(image.vertices), bool)
+    used[image.triangles[:, :3]] = True
+    vertices = image.vertices[used] / image.unit
+    covered = image.counts[0] > 0
+    for axis in range(3):
+        rolled = np.moveaxis(covered, axis, 0)
+        covered = np.moveaxis(rolled[:-1] & rolled[1:], 0, axis)
+    i, j, k = np.floor(vertices).astype(int).T
+    return vertices[~covered[i, j, k]]
 
 
 def _correction(image: Image, sense: int) -> Estimate:

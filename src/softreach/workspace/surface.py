@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from softreach.arrays import Faces, Points
 from softreach.errors import MissingExtra
-from softreach.geometry.hull import enclosed_volume, surface_area
+from softreach.geometry.hull import compact_surface, enclosed_volume, surface_area
 from softreach.kernels.nearest import distances_to_faces
 from softreach.workspace.image import Image
 
@@ -70,10 +70,10 @@ class Surface:
 
 def critical_surface(image: Image) -> Surface:
     """All critical triangles: the boundary of the image, and folds and walls inside it."""
-    used, corners = np.unique(image.triangles[:, :3], return_inverse=True)
+    vertices, faces = compact_surface(image.vertices, image.triangles[:, :3])
     lattice = image.lattice
-    vertices = lattice.origin + image.vertices[used] * (lattice.cell / image.unit)
-    return Surface(vertices=vertices, faces=corners.reshape(-1, 3))
+    placed = lattice.origin + vertices * (lattice.cell / image.unit)
+    return Surface(vertices=placed, faces=faces)
 
 
 def signed_field(image: Image) -> Array:
