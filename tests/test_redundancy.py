@@ -157,7 +157,9 @@ def test_a_map_puts_every_value_where_its_tip_is():
     tip = np.array([[-0.26, 0.0, 0.51], [0.31, 0.2, 0.49], [0.31, 0.2, 0.49]])
     cloud = made_up(tip, [[0, 0, 0], [1, 0, 0], [3, 0, 0]])
     grid = distance_map(cloud, activation_distance(cloud, 0.0), cell=0.1)
-    assert float(grid.activation_distance.sel(x=0.35, y=0.25, z=0.45, method="nearest")) == pytest.approx(2.0)
+    assert float(
+        grid.activation_distance.sel(x=0.35, y=0.25, z=0.45, method="nearest")
+    ) == pytest.approx(2.0)
     assert float(grid.activation_distance.count()) == 1.0
     assert grid.x.attrs["units"] == "m"
 
