@@ -4,7 +4,9 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: help setup demo test check format bench docs lock clean
+SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
+
+.PHONY: help setup demo test browser check format bench docs lock clean
 
 help:
 	@echo "make demo    set up, then compute the paper's design into out/"
@@ -27,8 +29,13 @@ $(READY): requirements.lock pyproject.toml
 demo: setup
 	$(BIN)/softreach demo --out out
 
-test: check
+test: check browser
 	$(BIN)/python -m pytest -q
+
+# The studio is tested in a real browser: Debian's, where there is none yet.
+browser:
+	@command -v chromium >/dev/null || { $(SUDO) apt-get update -qq && $(SUDO) apt-get install -y -qq chromium >/dev/null; } \
+		|| echo "no chromium: the tests in a browser will be skipped"
 
 check: setup
 	$(BIN)/ruff format --check src tests benchmarks

@@ -106,4 +106,6 @@ def _draw_key(ax: Axes, highest: int, name: str) -> None:
 
     labels = _LABELS[1 : highest + 1] if name == "count" else ("reachable",)
     patches = [Patch(color=c, label=t) for c, t in zip(_COLORS[1:], labels, strict=False)]
-    ax.legend(handles=patches, loc="upper right", title="reached by" if name == "count" else None)
+    title = "reached by" if name == "count" else None
+    place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.2), "ncols": 2}
+    ax.legend(handles=patches, title=title, **place)
