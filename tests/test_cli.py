@@ -15,7 +15,7 @@ from softreach.cli.app import app, run
 # Few samples make the α-shape too fine; the command line prints that and goes on.
 pytestmark = pytest.mark.filterwarnings("always::softreach.errors.SoftreachWarning")
 
-COMMANDS = ["demo", "design", "cloud", "volume", "show", "export"]
+COMMANDS = [name for name in app if not name.startswith("-")]
 HEAVY = {"numba", "scipy", "xarray", "matplotlib", "zarr", "pandas", "pydantic"}
 
 

@@ -20,6 +20,7 @@ import re
 import shlex
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 from sybil.document import Document
@@ -68,7 +69,8 @@ def test_every_fence_is_declared(page):
 def test_every_public_name_is_in_the_reference():
     reference = (ROOT / "docs" / "reference.md").read_text(encoding="utf-8")
     shown = set(re.findall(r"^::: softreach\.(?:\w+\.)*(\w+)", reference, re.MULTILINE))
-    assert set(sr.__all__) <= shown
+    functions = {name for name in sr.__all__ if not isinstance(getattr(sr, name), ModuleType)}
+    assert functions <= shown
 
 
 def test_the_readme_is_short():
