@@ -1,0 +1,128 @@
+"""All branches of the inverse problem, beside SciPy from the nearest point of a cloud.
+
+`python -m benchmarks.bench_inverse [n]` prints a Markdown table with the share of the original
+activations that each finds; under pytest-benchmark the same work runs on few targets.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+DESIGNS = [(108, 2), (75, 3), (36, 3), (0, 0)]
+FEW = 300  # targets for SciPy, whose time for one does not depend on their number
+
+
+def trunk(revolution: float, taper: float):
+    import softreach as sr
+
+    return sr.designs.minimal_trunk(np.radians(revolution), np.radians(taper))
+
+
+@lru_cache(maxsize=1)
+def prepared(arm):
+    """Solver and cloud: neither's preparation is timed with the targets."""
+    from scipy.spatial import KDTree
+
+    from softreach.inverse import InverseSolver
+    from softreach.kinematics import tip_positions
+
+    solver = InverseSolver(arm)
+    solver(targets_of(arm, 50)[1])
+    cloud = np.random.default_rng(9).uniform(*arm.bounds.T, (100_000, 3))
+    return solver, cloud, KDTree(tip_positions(arm, cloud))
+
+
+def targets_of(arm, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Random activations and their tips."""
+    from softreach.kinematics import tip_positions
+
+    gamma = np.random.default_rng(0).uniform(*arm.bounds.T, (n, 3))
+    return gamma, tip_positions(arm, gamma)
+
+
+def by_scipy(arm, targets: np.ndarray) -> np.ndarray:
+    """One solution for each target: least_squares with the exact Jacobian."""
+    from scipy.optimize import least_squares
+
+    from softreach.inverse.problem import tips_and_slopes
+
+    _, cloud, tree = prepared(arm)
+    starts = cloud[tree.query(targets)[1]]
+    found = np.empty_like(starts)
+    for i, (start, target) in enumerate(zip(starts, targets, strict=True)):
+        found[i] = least_squares(
+            lambda x, target=target: tips_and_slopes(arm, x[None], 1e-6)[0][0] - target,
+            start,
+            jac=lambda x: tips_and_slopes(arm, x[None], 1e-6)[1][0],
+            bounds=arm.bounds.T,
+            xtol=1e-12,
+            ftol=1e-12,
+            gtol=1e-12,
+        ).x
+    return found
+
+
+def timed(work) -> tuple[object, float, float]:
+    """Result, wall and CPU time."""
+    wall, cpu = time.perf_counter(), time.process_time()
+    result = work()
+    return result, time.perf_counter() - wall, time.process_time() - cpu
+
+
+def row(revolution: float, taper: float, n: int) -> str:
+    """One design's line of the table."""
+    arm = trunk(revolution, taper)
+    solver, *_ = prepared(arm)
+    gamma, targets = targets_of(arm, n)
+    solutions, wall, cpu = timed(lambda: solver(targets))
+    target = np.repeat(np.arange(n), solutions.counts)
+    apart = np.full(n, np.inf)
+    np.minimum.at(apart, target, np.abs(solutions.activations - gamma[target]).max(axis=1))
+    theirs, their_wall, their_cpu = timed(lambda: by_scipy(arm, targets[:FEW]))
+    hit = (np.abs(theirs - gamma[:FEW]).max(axis=1) < 1e-6).mean()
+    return (
+        f"| {revolution}°, {taper}° | {n / wall:,.0f} | {1e6 * cpu / n:.1f} | "
+        f"{solutions.counts.mean():.3f} | {solutions.residuals.max() / arm.length:.0e} | "
+        f"{int((apart > 1e-6).sum())} of {n} | {1e6 * their_cpu / FEW:,.0f} | {1 - hit:.1%} | "
+        f"{their_cpu / FEW / (cpu / n):,.0f} / {their_wall / FEW / (wall / n):,.0f} |"
+    )
+
+
+HEAD = """### Inverse: every branch, against least_squares from the nearest of 100,000 cloud points
+
+| Ω, φ | targets/s | CPU µs/target | branches | residual, L | original missed | SciPy CPU µs/target \
+| missed | ratio CPU / wall |
+|---|--:|--:|--:|--:|--:|--:|--:|--:|"""
+
+
+def main() -> None:
+    """Print the table."""
+    n = int(sys.argv[1]) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 100_000
+    print(HEAD)
+    for revolution, taper in DESIGNS:
+        print(row(revolution, taper, n), flush=True)
+
+
+@pytest.mark.benchmark(group="inverse")
+def test_every_branch(benchmark):
+    arm = trunk(108, 2)
+    solver, *_ = prepared(arm)
+    targets = targets_of(arm, 2000)[1]
+    assert (benchmark(solver, targets).counts >= 1).all()
+
+
+@pytest.mark.benchmark(group="inverse")
+def test_least_squares_from_the_nearest_cloud_point(benchmark):
+    arm = trunk(108, 2)
+    prepared(arm)
+    targets = targets_of(arm, 10)[1]
+    assert benchmark(by_scipy, arm, targets).shape == (10, 3)
+
+
+if __name__ == "__main__":
+    main()

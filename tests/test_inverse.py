@@ -1,0 +1,354 @@
+"""The inverse problem: every branch, nearest points, least change."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares, minimize
+
+from softreach import designs
+from softreach.errors import InvalidInput
+from softreach.inverse import InverseSolver, Solutions, Status, solve_inverse
+from softreach.inverse.problem import tips_and_slopes
+from softreach.kinematics import configuration, tip_positions
+from softreach.manipulator import Manipulator
+
+DESIGNS = [(108, 2), (75, 3), (36, 3), (0, 0)]
+
+
+def trunk_at(revolution: float, taper: float) -> Manipulator:
+    return designs.minimal_trunk(np.radians(revolution), np.radians(taper))
+
+
+def random_activations(arm: Manipulator, n: int, seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(*arm.bounds.T, (n, arm.bundles))
+
+
+def miss_of_original(solutions: Solutions, gamma: np.ndarray) -> np.ndarray:
+    """Distance from each original activation to the nearest of those found for its tip."""
+    target = np.repeat(np.arange(len(solutions)), solutions.counts)
+    apart = np.abs(solutions.activations - gamma[target]).max(axis=1)
+    nearest = np.full(len(solutions), np.inf)
+    np.minimum.at(nearest, target, apart)
+    return nearest
+
+
+@pytest.fixture(scope="module")
+def folded() -> Manipulator:
+    """A design whose activations overlap: many tips have two of them."""
+    return trunk_at(36, 3)
+
+
+@pytest.mark.parametrize(("revolution", "taper"), DESIGNS)
+def test_every_random_tip_is_solved_back_to_its_activation(revolution, taper):
+    arm = trunk_at(revolution, taper)
+    gamma = random_activations(arm, 3000)
+    solutions = solve_inverse(arm, tip_positions(arm, gamma))
+    assert (solutions.status == Status.REACHED).all()
+    assert miss_of_original(solutions, gamma).max() < 1e-6
+
+
+@pytest.mark.parametrize(("revolution", "taper"), DESIGNS)
+def test_solutions_are_within_bounds_and_reach_by_the_public_map(revolution, taper):
+    arm = trunk_at(revolution, taper)
+    targets = tip_positions(arm, random_activations(arm, 1000, seed=1))
+    solutions = solve_inverse(arm, targets)
+    target = np.repeat(np.arange(len(targets)), solutions.counts)
+    missed = np.linalg.norm(tip_positions(arm, solutions.activations) - targets[target], axis=1)
+    assert missed.max() <= 1e-10
+    assert np.allclose(missed, solutions.residuals, atol=1e-14)
+    assert (solutions.margin >= 0).all()
+    assert (solutions.activations >= arm.bounds[:, 0]).all()
+    assert (solutions.activations <= arm.bounds[:, 1]).all()
+
+
+def tip_tree(tips: np.ndarray):
+    from scipy.spatial import KDTree
+
+    return KDTree(tips)
+
+
+def coincident_activations(arm: Manipulator) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of activations with one tip, by search in a cloud and SciPy alone."""
+    gamma = random_activations(arm, 20_000, seed=5)
+    tips = tip_positions(arm, gamma)
+    first, second = tip_tree(tips).query_pairs(4e-3, output_type="ndarray").T
+    far = np.abs(gamma[first] - gamma[second]).max(axis=1) > 0.3
+    pairs = []
+    for a, b in zip(gamma[first[far]][:60], gamma[second[far]][:60], strict=True):
+        goal = tip_positions(arm, a[None])[0]
+        found = least_squares(
+            lambda x, goal=goal: tip_positions(arm, x[None])[0] - goal,
+            b,
+            bounds=arm.bounds.T,
+            xtol=1e-15,
+            ftol=1e-15,
+            gtol=1e-15,
+        )
+        if np.linalg.norm(found.fun) < 1e-11 and np.abs(found.x - a).max() > 0.2:
+            pairs.append((a, found.x))
+    return np.array([a for a, _ in pairs]), np.array([b for _, b in pairs])
+
+
+def test_two_activations_with_one_tip_are_both_found(folded):
+    one, other = coincident_activations(folded)
+    assert len(one) >= 5
+    solutions = solve_inverse(folded, tip_positions(folded, one))
+    assert miss_of_original(solutions, one).max() < 1e-6
+    assert miss_of_original(solutions, other).max() < 1e-6
+
+
+def fold_points(arm: Manipulator, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Activations where det J = 0, by bisection, and the null directions there."""
+    gamma = random_activations(arm, 4000, seed=2)
+    positive = np.linalg.det(tips_and_slopes(arm, gamma, 1e-6)[1]) > 0
+    count = min(n, int(positive.sum()), int((~positive).sum()))
+    a, b = gamma[positive][:count], gamma[~positive][:count]
+    for _ in range(60):
+        middle = 0.5 * (a + b)
+        up = np.linalg.det(tips_and_slopes(arm, middle, 1e-6)[1]) > 0
+        a, b = np.where(up[:, None], middle, a), np.where(up[:, None], b, middle)
+    return a, np.linalg.svd(tips_and_slopes(arm, a, 1e-6)[1])[2][:, 2]
+
+
+@pytest.mark.parametrize("distance", [1e-2, 1e-3, 1e-4])
+def test_both_preimages_near_a_fold_are_found(folded, distance):
+    fold, null = fold_points(folded, 200)
+    gamma = fold + distance * null
+    inside = ((gamma > folded.bounds[:, 0]) & (gamma < folded.bounds[:, 1])).all(axis=1)
+    mirror = fold - 3 * distance * null
+    inside &= ((mirror > folded.bounds[:, 0]) & (mirror < folded.bounds[:, 1])).all(axis=1)
+    solutions = solve_inverse(folded, tip_positions(folded, gamma[inside]))
+    assert miss_of_original(solutions, gamma[inside]).max() < 1e-6
+    # Nearly all: where two folds meet, the other preimage lies elsewhere or nowhere.
+    assert (solutions.counts >= 2).mean() > 0.95
+
+
+def test_a_target_on_a_fold_is_solved_to_the_root_of_the_tolerance(folded):
+    fold, _ = fold_points(folded, 200)
+    solutions = solve_inverse(folded, tip_positions(folded, fold))
+    assert (solutions.status == Status.REACHED).all()
+    assert miss_of_original(solutions, fold).max() < 10 * np.sqrt(1e-10)
+
+
+def test_a_finer_search_finds_the_same_number_of_solutions(folded):
+    targets = tip_positions(folded, random_activations(folded, 2000, seed=3))
+    coarse, fine = solve_inverse(folded, targets), InverseSolver(folded, cells=40, depth=1)(targets)
+    assert (coarse.counts != fine.counts).mean() < 1e-3
+    assert (coarse.counts > 1).mean() > 0.1
+
+
+def test_targets_on_the_boundary_of_the_box_are_reached():
+    arm = trunk_at(108, 2)
+    gamma = random_activations(arm, 900)
+    rows, side = np.arange(900), np.arange(900) // 3 % 2
+    gamma[rows, rows % 3] = arm.bounds[rows % 3, side]
+    corners = np.array(np.meshgrid(*arm.bounds)).reshape(3, -1).T
+    gamma = np.concatenate([gamma, corners])
+    solutions = solve_inverse(arm, tip_positions(arm, gamma))
+    assert (solutions.status == Status.REACHED).all()
+    assert miss_of_original(solutions, gamma).max() < 1e-6
+
+
+def test_no_point_of_a_dense_cloud_is_nearer_than_the_nearest_point():
+    arm = trunk_at(108, 2)
+    targets = np.random.default_rng(0).uniform(-1.3, 1.3, (500, 3))
+    solutions = solve_inverse(arm, targets)
+    out = solutions.status == Status.UNREACHABLE
+    assert out.sum() > 300
+    assert not (solutions.status == Status.NOT_CONVERGED).any()
+    cloud = tip_tree(tip_positions(arm, random_activations(arm, 200_000)))
+    apart = cloud.query(targets)[0]
+    assert (solutions.gap[out] <= apart[out]).all()
+    assert np.median(apart[out] - solutions.gap[out]) < 0.01
+    tips = tip_positions(arm, solutions.nearest_activation)
+    assert np.allclose(np.linalg.norm(tips - targets, axis=1), solutions.gap, atol=1e-12)
+    assert np.allclose(tips[out], solutions.nearest[out], atol=1e-12)
+
+
+def test_just_outside_the_surface_the_gap_is_the_distance(trunk):
+    gamma = random_activations(trunk, 300)
+    gamma[:, 0] = 0.0
+    tips, slopes = tips_and_slopes(trunk, gamma, 1e-6)
+    normal = np.cross(slopes[:, :, 1], slopes[:, :, 2])
+    normal *= np.sign((normal * slopes[:, :, 0]).sum(axis=1))[:, None]
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    solutions = solve_inverse(trunk, tips + 1e-5 * normal)
+    out = solutions.status == Status.UNREACHABLE
+    assert out.mean() > 0.5  # elsewhere the face lies inside the set
+    assert (solutions.gap[out] <= 1e-5 + 1e-12).all()
+    assert np.quantile(solutions.gap[out], 0.1) > 0.999e-5
+
+
+def test_a_target_is_solved_alike_alone_and_among_others(folded):
+    targets = tip_positions(folded, random_activations(folded, 300, seed=4))
+    together = solve_inverse(folded, targets)
+    for i in (0, 7, 299):
+        alone = solve_inverse(folded, targets[i : i + 1])[0]
+        assert np.array_equal(alone.activations, together[i].activations)
+
+
+def test_the_condition_number_is_that_of_the_position_jacobian(folded):
+    solutions = solve_inverse(folded, tip_positions(folded, random_activations(folded, 200)))
+    slopes = tips_and_slopes(folded, solutions.activations, 1e-6)[1]
+    assert np.allclose(solutions.condition, np.linalg.cond(slopes), rtol=1e-3)
+
+
+def test_solutions_read_like_a_list_and_as_a_dataset(folded):
+    targets = tip_positions(folded, random_activations(folded, 50))
+    solutions = solve_inverse(folded, np.concatenate([targets, [[0.0, 0.0, 2.0]]]))
+    assert len(solutions) == len(list(solutions)) == 51
+    assert solutions[-1].status is Status.UNREACHABLE
+    assert len(solutions[-1]) == 0
+    part = solutions[10:20]
+    assert len(part) == 10
+    assert np.array_equal(part[3].activations, solutions[13].activations)
+    dataset = solutions.to_dataset()
+    assert dataset.sizes["target"] == 51
+    assert dataset.activation.shape == (int(solutions.counts.sum()), 3)
+    assert Manipulator.from_toml(dataset.attrs["design"]) == folded
+    with pytest.raises(IndexError):
+        solutions[51]
+
+
+def test_no_targets_give_no_solutions(trunk):
+    assert len(solve_inverse(trunk, np.empty((0, 3)))) == 0
+
+
+@pytest.mark.parametrize(
+    ("targets", "named"),
+    [
+        ([0.0, 0.0, 1.0], "targets.shape"),
+        ([[0.0, 1.0]], "targets.shape"),
+        ([[0.0, 0.0, 1.0], [0.0, np.nan, 1.0]], r"targets\[1\]"),
+    ],
+)
+def test_targets_that_are_no_points_are_refused(trunk, targets, named):
+    with pytest.raises(InvalidInput, match=named):
+        solve_inverse(trunk, targets)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"tol": 0.0},
+        {"family": 0},
+        {"near": [0.0]},
+        {"near": [np.nan, 0.0, 0.0]},
+        {"direction": [0.0, 0.0, 0.0]},
+        {"direction": [1.0, 0.0]},
+        {"direction_weight": -1.0},
+    ],
+)
+def test_wishes_out_of_range_are_refused(trunk, wrong):
+    with pytest.raises(InvalidInput, match=next(iter(wrong))):
+        solve_inverse(trunk, [[0.0, 0.0, 1.0]], **wrong)
+
+
+def least_norm_by_slsqp(arm, target, near, starts):
+    """The smallest |γ - near| that SciPy finds from several starts."""
+    best = np.inf
+    for start in starts:
+        found = minimize(
+            lambda x: 0.5 * ((x - near) ** 2).sum(),
+            start,
+            jac=lambda x: x - near,
+            bounds=arm.bounds,
+            method="SLSQP",
+            options={"ftol": 1e-14, "maxiter": 300},
+            constraints={
+                "type": "eq",
+                "fun": lambda x: tips_and_slopes(arm, x[None], 1e-6)[0][0] - target,
+                "jac": lambda x: tips_and_slopes(arm, x[None], 1e-6)[1][0],
+            },
+        )
+        if np.linalg.norm(tip_positions(arm, found.x[None])[0] - target) < 1e-9:
+            best = min(best, float(np.linalg.norm(found.x - near)))
+    return best
+
+
+@pytest.mark.parametrize("near", [None, [-0.8, -0.2, -1.0, -0.5]])
+def test_four_bundles_change_as_little_as_scipy_finds(near):
+    arm = designs.redundant_trunk()
+    gamma = random_activations(arm, 6)
+    targets = tip_positions(arm, gamma)
+    solutions = solve_inverse(arm, targets, near=near)
+    assert (solutions.status == Status.REACHED).all()
+    assert solutions.residuals.max() <= 1e-10
+    rest = np.zeros(4) if near is None else np.asarray(near)
+    for i, solution in enumerate(solutions):
+        change = np.linalg.norm(solution.activations[0] - rest)
+        starts = [gamma[i], *random_activations(arm, 2, seed=i)]
+        assert change <= least_norm_by_slsqp(arm, targets[i], rest, starts) + 1e-7
+
+
+def test_a_family_reaches_its_target_in_different_ways():
+    arm = designs.redundant_trunk()
+    targets = tip_positions(arm, random_activations(arm, 6))
+    solutions = solve_inverse(arm, targets, family=5)
+    assert (solutions.counts == 5).all()
+    assert solutions.residuals.max() <= 1e-10
+    for solution in solutions:
+        norms = np.linalg.norm(solution.activations, axis=1)
+        assert norms.argmin() == 0
+        assert np.ptp(solution.activations, axis=0).max() > 0.01
+
+
+def test_four_bundles_cannot_reach_beyond_their_length():
+    solution = solve_inverse(designs.redundant_trunk(), [[0.0, 0.0, 3.0]])[0]
+    assert solution.status is Status.UNREACHABLE
+    assert solution.gap == pytest.approx(np.linalg.norm(solution.nearest - [0, 0, 3]))
+
+
+@pytest.mark.parametrize("kept", [1, 2])
+def test_fewer_bundles_come_as_near_as_a_dense_cloud(trunk, kept):
+    arm = trunk.replace(fibers=trunk.fibers[:kept])
+    targets = np.random.default_rng(1).uniform(-1, 1, (40, 3))
+    solutions = solve_inverse(arm, targets)
+    cloud = tip_tree(tip_positions(arm, random_activations(arm, 40_000)))
+    assert (solutions.gap <= cloud.query(targets)[0] + 1e-12).all()
+    back = solve_inverse(arm, tip_positions(arm, random_activations(arm, 20)))
+    assert (back.status == Status.REACHED).all()
+
+
+def test_a_bundle_without_room_stays_where_it_is(trunk):
+    arm = trunk.replace(activation_bounds=((-5 / 3, 0.0), (-0.5, -0.5), (-5 / 3, 0.0)))
+    gamma = random_activations(arm, 20)
+    solutions = solve_inverse(arm, tip_positions(arm, gamma))
+    assert (solutions.status == Status.REACHED).all()
+    assert (solutions.activations[:, 1] == -0.5).all()
+
+
+def direction_error(arm: Manipulator, gamma: np.ndarray, wanted: np.ndarray) -> float:
+    d3 = configuration(arm, gamma, [arm.length]).directors.values[0, 2]
+    return float(np.linalg.norm(d3 - wanted))
+
+
+def test_a_direction_trades_against_the_position_of_three_bundles(trunk):
+    gamma = random_activations(trunk, 1)[0]
+    target = tip_positions(trunk, gamma[None])
+    wanted = np.array([1.0, 0.0, 0.0])
+    errors = []
+    for weight in (1e-3, 0.1, 10.0):
+        solution = solve_inverse(trunk, target, direction=wanted, direction_weight=weight)[0]
+        errors.append(direction_error(trunk, solution.nearest_activation, wanted))
+    assert errors[0] > errors[1] > errors[2]
+
+
+def test_a_direction_that_is_met_costs_nothing(trunk):
+    gamma = random_activations(trunk, 1)[0]
+    d3 = configuration(trunk, gamma, [trunk.length]).directors.values[0, 2]
+    solution = solve_inverse(trunk, tip_positions(trunk, gamma[None]), direction=3 * d3)[0]
+    assert np.abs(solution.nearest_activation - gamma).max() < 1e-4
+
+
+def test_four_bundles_keep_the_position_and_turn_toward_the_direction():
+    arm = designs.redundant_trunk()
+    target = tip_positions(arm, random_activations(arm, 1, seed=8))
+    wanted = np.array([0.0, 0.6, 0.8])
+    free = solve_inverse(arm, target)[0]
+    turned = solve_inverse(arm, target, direction=wanted, direction_weight=30.0)[0]
+    assert turned.residuals[0] <= 1e-10
+    assert direction_error(arm, turned.activations[0], wanted) < direction_error(
+        arm, free.activations[0], wanted
+    )
