@@ -105,15 +105,13 @@ def atlas_cloud(atlas: xr.Dataset, **at: float) -> xr.Dataset:
         InvalidInput: A parameter is missing or unknown, or the design is not done.
     """
     command, number = _command(atlas), _number(atlas, at)
-    place = dict(
-        zip(command.space.dims, np.unravel_index(number, command.space.shape), strict=True)
-    )
-    if (status := int(atlas["status"][place])) != DONE:
+    row = _nearest(atlas[[name for name in ("status", "tip") if name in atlas]], at)
+    if (status := int(row["status"])) != DONE:
         raise InvalidInput("design", at, "done", f"its status is {status}")
     arm = command.design(number)
     activation = activations_of(arm, atlas["unit_activation"].values)
     if "tip" in atlas:
-        tip = np.ascontiguousarray(atlas["tip"][place].values.T, dtype=float)
+        tip = np.ascontiguousarray(row["tip"].values.T, dtype=float)
     else:
         tip = tip_positions(arm, activation, command.tol)
     return cloud_dataset(
@@ -152,13 +150,21 @@ def _command(atlas: xr.Dataset) -> Command:
     return Command.from_json(atlas.attrs["command"])
 
 
+def _nearest(atlas: xr.Dataset, at: Mapping[str, float]) -> xr.Dataset:
+    """One design; also of a part of an atlas."""
+    if "design" in at:
+        return atlas.isel(design=int(at["design"]))
+    return atlas.sel(at, method="nearest")
+
+
 def _number(atlas: xr.Dataset, at: Mapping[str, float]) -> int:
-    """The number of the nearest design, axis by axis."""
+    """The number of the nearest design in the whole atlas, axis by axis."""
     space = _command(atlas).space
     if set(at) != set(space.dims):
         raise InvalidInput("parameters", ", ".join(at) or "none", f"all of {', '.join(space.dims)}")
     if space.layout == "list":
         return int(at["design"])
     columns = dict(space.parameters)
-    place = [int(np.abs(np.subtract(columns[name], at[name])).argmin()) for name in space.dims]
+    near = _nearest(atlas[[*space.dims]], at)
+    place = [columns[name].index(near[name].item()) for name in space.dims]
     return int(np.ravel_multi_index(place, space.shape))

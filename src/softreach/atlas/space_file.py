@@ -1,0 +1,116 @@
+"""Design spaces as people write them: TOML and flags, angles in degrees, units in the keys."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from softreach.atlas.parameter import parameter_units
+from softreach.atlas.space import DesignSpace
+from softreach.errors import InvalidInput
+from softreach.manipulator import Manipulator
+
+__all__ = ["parse_parameter", "parse_space", "written_keys"]
+
+_SUFFIX = {"rad": "_deg", "m": "_m", "1": ""}
+_KEYS = ("design", "layout", "designs", "seed", "parameters")
+_LAYOUTS = ("grid", "list", "sobol", "latin")
+
+
+def parse_space(text: str, design_from: Callable[[str], Manipulator]) -> DesignSpace:
+    """A design space from the text of a file.
+
+    ```toml
+    design = "minimal_trunk"     # or a design file
+    layout = "grid"              # grid, list, sobol or latin
+    [parameters]
+    revolution_deg = "0:108:16"  # 16 values, ends included; or a list: [0, 54, 108]
+    taper_deg = "0:3:16"         # for sobol and latin the two ends: [0, 3]
+    ```
+
+    With `sobol` and `latin` the keys `designs` (their number) and `seed` apply too.
+
+    Args:
+        text: TOML.
+        design_from: Name or path of a design -> the design.
+
+    Raises:
+        InvalidInput: A key or value that is wrong, with what is allowed.
+    """
+    document = _document(text)
+    base = design_from(str(document.get("design", "minimal_trunk")))
+    given = document.get("parameters", {})
+    if not isinstance(given, dict):
+        raise InvalidInput("parameters", given, "a table of parameters and their values")
+    values = dict(parse_parameter(base, key, value) for key, value in given.items())
+    return _space(base, values, document)
+
+
+def parse_parameter(base: Manipulator, key: str, value: Any) -> tuple[str, list[float]]:
+    """Name and values [SI units] of a parameter as written: `taper_deg` and `0:3:16` or a list.
+
+    Raises:
+        InvalidInput: An unknown key, or values that are no numbers.
+    """
+    keys = written_keys(base)
+    if key not in keys:
+        raise InvalidInput("parameter", key, f"one of {', '.join(keys)}")
+    numbers = _numbers(key, value)
+    return keys[key], [math.radians(x) for x in numbers] if key.endswith("_deg") else numbers
+
+
+def written_keys(base: Manipulator) -> dict[str, str]:
+    """Parameters as written, with the unit -> their names."""
+    return {name + _SUFFIX[unit]: name for name, unit in parameter_units(base).items()}
+
+
+def _document(text: str) -> dict[str, Any]:
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InvalidInput("space", str(error), "valid TOML") from None
+    for key in document:
+        if key not in _KEYS:
+            raise InvalidInput("key", key, f"one of {', '.join(_KEYS)}")
+    return document
+
+
+def _space(
+    base: Manipulator, values: Mapping[str, list[float]], document: Mapping[str, Any]
+) -> DesignSpace:
+    layout = document.get("layout", "grid")
+    if layout not in _LAYOUTS:
+        raise InvalidInput("layout", layout, f"one of {', '.join(_LAYOUTS)}")
+    if layout in ("grid", "list"):
+        return (DesignSpace.grid if layout == "grid" else DesignSpace.listed)(base, **values)
+    for name, ends in values.items():
+        if len(ends) != 2:
+            raise InvalidInput(name, ends, f"two ends, [lower, upper], for {layout}")
+    ranges = {name: (ends[0], ends[1]) for name, ends in values.items()}
+    count, seed = document.get("designs", 64), document.get("seed", 0)
+    return DesignSpace.sampled(base, count, method=layout, seed=seed, **ranges)
+
+
+def _numbers(key: str, value: Any) -> list[float]:
+    allowed = "numbers: a list, or start:stop:count with both ends"
+    try:
+        if isinstance(value, str):
+            return _range(value) if ":" in value else [_number(part) for part in value.split(",")]
+        return [x if isinstance(x, int) else float(x) for x in np.atleast_1d(value).tolist()]
+    except (TypeError, ValueError):
+        raise InvalidInput(key, value, allowed) from None
+
+
+def _number(text: str) -> float:
+    return int(text) if text.strip().lstrip("-").isdigit() else float(text)
+
+
+def _range(text: str) -> list[float]:
+    start, stop, count = text.split(":")
+    values = np.linspace(float(start), float(stop), int(count))
+    # 1.8 and not 1.8000000000000003
+    return [float(f"{value:.15g}") for value in values]

@@ -1,0 +1,212 @@
+"""`softreach atlas`: sweeps over designs; build, status, figures, best."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import App, Parameter
+
+from softreach.cli.inputs import AsJson, Sampler, design_from
+from softreach.cli.output import report
+from softreach.errors import InvalidInput, MissingExtra
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from softreach.atlas.executor import ExecutorLike
+    from softreach.atlas.space import DesignSpace
+
+__all__ = ["atlas", "best", "build", "figures", "status"]
+
+atlas = App(name="atlas", help="Clouds and volumes of whole families of designs.")
+
+Store = Annotated[str, Parameter(help="The atlas: a folder (.zarr) or a URL.")]
+
+
+@atlas.command
+def build(
+    store: Store,
+    *,
+    space: Annotated[Path | None, Parameter(help="Design space (.toml); or use --vary.")] = None,
+    design: Annotated[str, Parameter(help="Base design for --vary.")] = "minimal_trunk",
+    vary: Annotated[
+        list[str] | None,
+        Parameter(help="A parameter of the grid, e.g. taper_deg=0:3:16 or bundles_left=1,2."),
+    ] = None,
+    n: Annotated[int, Parameter(help="Samples of each design.")] = 400_000,
+    seed: Annotated[int, Parameter(help="Seed of the sampler.")] = 0,
+    sampler: Sampler = "uniform",
+    alpha: Annotated[float, Parameter(help="Radius of the α-shapes, in L.")] = 0.05,
+    metrics: Annotated[
+        str, Parameter(help="Groups of metrics, comma-separated.")
+    ] = "extent,convex,concave,exact,curvature",
+    keep_clouds: Annotated[bool, Parameter(help="Store the tips.")] = True,
+    workers: Annotated[
+        int | None, Parameter(help="Use this many processes instead of threads.")
+    ] = None,
+    scheduler: Annotated[str | None, Parameter(help="Dask scheduler: tcp://host:port")] = None,
+    scheduler_file: Annotated[Path | None, Parameter(help="Dask scheduler file.")] = None,
+    shard: Annotated[
+        str, Parameter(help="Only part i of k, i from 0, as i/k; all k may share the store.")
+    ] = "0/1",
+    json: AsJson = False,
+) -> None:
+    """Compute the cloud and the metrics of every design; run again to continue.
+
+    Examples: softreach atlas build a.zarr --vary revolution_deg=0:108:16 --vary taper_deg=0:3:16
+    softreach atlas build atlas.zarr --space space.toml --shard 3/8
+    """
+    from softreach.atlas import build_atlas
+
+    build_atlas(
+        _space_of(space, design, vary),
+        store,
+        n,
+        seed,
+        sampler=sampler,
+        alpha=alpha,
+        metrics=tuple(metrics.split(",")),
+        keep_clouds=keep_clouds,
+        executor=_executor(workers, scheduler, scheduler_file),
+        shard=_shard(shard),
+    )
+    status(store, json=json)
+
+
+@atlas.command
+def status(store: Store, *, json: AsJson = False) -> None:
+    """How many designs are done, and what is wrong with the others.
+
+    Example: softreach atlas status atlas.zarr
+    """
+    from softreach.atlas import atlas_status
+
+    found = atlas_status(store)
+    counts = ("designs", "done", "todo", "failed", "gaps")
+    rows: dict[str, tuple[Any, str]] = {name: (getattr(found, name), "") for name in counts}
+    if json:
+        rows["messages"] = ({str(k): text for k, text in found.messages.items()}, "")
+    else:
+        rows |= {f"number {k}": (text, "") for k, text in list(found.messages.items())[:10]}
+    report(f"atlas {store}", rows, json)
+
+
+@atlas.command
+def best(
+    store: Store,
+    metric: Annotated[str, Parameter(help="What to compare, e.g. exact_volume.")],
+    *,
+    smallest: Annotated[bool, Parameter(negative="", help="Small is good.")] = False,
+    where: Annotated[
+        list[str] | None,
+        Parameter(help="A constraint: unreachability<=0.4 or taper_deg>=1."),
+    ] = None,
+    count: Annotated[int, Parameter(help="How many designs.")] = 1,
+    json: AsJson = False,
+) -> None:
+    """The designs with the largest (or smallest) metric that meet the constraints.
+
+    Example: softreach atlas best atlas.zarr exact_volume --where "taper_deg<=1" --count 3
+    """
+    from softreach.atlas import best_designs, open_atlas
+
+    opened = open_atlas(store)
+    limits = dict(_constraint(text) for text in where or ())
+    found = best_designs(opened, metric, smallest=smallest, where=limits, count=count)
+    names = [name for name in found.variables if found[name].dtype.kind in "fi"]
+    columns = [_written(found[name]) for name in names]
+    rows: dict[str, tuple[Any, str]] = {name: (values, unit) for name, values, unit in columns}
+    report(f"best {metric} of {store}", rows, json)
+
+
+@atlas.command
+def figures(
+    store: Store,
+    *,
+    out: Annotated[Path, Parameter(help="Folder for the figures.")] = Path("figures"),
+    panels: Annotated[int, Parameter(help="Columns and rows of the sheets at most.")] = 7,
+) -> None:
+    """Draw the atlas, each figure as PNG and PDF: sheets, corners, maps, curvature.
+
+    Example: softreach atlas figures atlas.zarr --out figures
+    """
+    import sys
+
+    from softreach.atlas import open_atlas
+    from softreach.cli.atlas_figures import atlas_figures
+    from softreach.plot.style import pyplot, save_figure
+
+    for name, figure in atlas_figures(open_atlas(store), panels):
+        for suffix in ("png", "pdf"):
+            save_figure(figure, out / f"{name}.{suffix}")
+            sys.stdout.write(f"{out / name}.{suffix}\n")
+        pyplot().close(figure.get_figure(root=True))
+
+
+def _space_of(path: Path | None, design: str, vary: list[str] | None) -> DesignSpace:
+    from softreach.atlas.space import DesignSpace
+    from softreach.atlas.space_file import parse_parameter, parse_space
+
+    if (path is None) == (vary is None):
+        raise InvalidInput("space", path, "given, or --vary, and not both")
+    if path is not None:
+        if not path.is_file():
+            raise InvalidInput("space", path, "a file that exists")
+        return parse_space(path.read_text(encoding="utf-8"), design_from)
+    base = design_from(design)
+    pairs = [text.partition("=") for text in vary or ()]
+    return DesignSpace.grid(
+        base, **dict(parse_parameter(base, key, values) for key, _, values in pairs)
+    )
+
+
+def _executor(
+    workers: int | None, scheduler: str | None, scheduler_file: Path | None
+) -> ExecutorLike:
+    if workers is not None:
+        from softreach.atlas import worker_processes
+
+        return worker_processes(workers)
+    if scheduler is None and scheduler_file is None:
+        return None
+    try:
+        from distributed import Client
+    except ModuleNotFoundError as error:
+        raise MissingExtra("distributed", "cluster") from error
+    return Client(scheduler) if scheduler else Client(scheduler_file=str(scheduler_file))
+
+
+def _shard(text: str) -> tuple[int, int]:
+    first, _, count = text.partition("/")
+    if not (first.isdigit() and count.isdigit()):
+        raise InvalidInput("shard", text, "i/k with 0 <= i < k")
+    return int(first), int(count)
+
+
+def _constraint(text: str) -> tuple[str, tuple[float | None, float | None]]:
+    """`taper_deg<=1` -> taper between anything and 1 degree."""
+    import math
+
+    for sign in ("<=", ">=", "<", ">"):
+        name, found, number = text.partition(sign)
+        if found:
+            break
+    try:
+        value = float(number)
+    except ValueError:
+        raise InvalidInput("where", text, "a name, <= or >=, and a number") from None
+    name = name.strip()
+    if name.endswith("_deg"):
+        name, value = name.removesuffix("_deg"), math.radians(value)
+    return name, (None, value) if "<" in sign else (value, None)
+
+
+def _written(column: xr.DataArray) -> tuple[str, list[float], str]:
+    """Name, values and unit as people read them."""
+    import numpy as np
+
+    unit = str(column.attrs.get("units", "1"))
+    if unit == "rad":
+        return str(column.name), np.round(np.degrees(column.values), 9).tolist(), "deg"
+    return str(column.name), column.values.tolist(), {"m3": "m³", "1": ""}.get(unit, unit)

@@ -1,0 +1,116 @@
+"""The figures of an atlas, one after the other, so that one cloud at a time is held."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from softreach.geometry.hull import Hull
+    from softreach.plot.sheet import SheetAxis
+
+__all__ = ["atlas_figures"]
+
+_METRICS = ("volume", "exact_volume", "unreachability", "exact_unreachability")
+
+
+def atlas_figures(atlas: xr.Dataset, panels: int = 7) -> Iterator[tuple[str, Any]]:
+    """Name and figure (or axes) of each figure that the atlas has the numbers for.
+
+    Args:
+        atlas: A grid of two parameters, from `open_atlas`.
+        panels: Columns and rows of the sheets at most.
+    """
+    from softreach.plot.atlas import atlas_box, plot_corners, plot_metric_map, sheet_axes
+    from softreach.plot.sheet import plot_cloud_sheet, plot_hull_sheet
+
+    for metric in _METRICS:
+        if metric in atlas and np.isfinite(atlas[metric].values).any():
+            yield f"map_{metric}", plot_metric_map(atlas, metric)
+    if "x_min" not in atlas:
+        return
+    box = atlas_box(atlas)
+    picked = _thinned(atlas, panels)
+    edges = sheet_axes(picked)
+    yield "clouds", plot_cloud_sheet(_clouds(picked), *edges, box=box)
+    yield "corners", plot_corners(_corners(atlas), box=box)
+    yield "curvature", _curvature(atlas)
+    length = atlas.attrs["length"]
+    yield "hulls", plot_hull_sheet(_hulls(picked), *edges, box=box, length=length)
+
+
+def _thinned(atlas: xr.Dataset, panels: int) -> xr.Dataset:
+    """As many designs along each parameter as there are panels, the ends among them."""
+    sizes = {str(dim): atlas.sizes[dim] for dim in atlas["status"].dims}
+    places = {
+        dim: np.unique(np.rint(np.linspace(0, size - 1, min(size, panels))).astype(int))
+        for dim, size in sizes.items()
+    }
+    return atlas.isel(places)
+
+
+def _clouds(atlas: xr.Dataset) -> Callable[[int, int], xr.Dataset | None]:
+    """(column, row) -> the cloud of the design there, if it is done."""
+    from softreach.atlas import atlas_cloud
+    from softreach.atlas.store import DONE
+
+    first, second = map(str, atlas["status"].dims)
+
+    def cloud_at(column: int, row: int) -> xr.Dataset | None:
+        if int(atlas["status"][column, row]) != DONE:
+            return None
+        at = {first: float(atlas[first][column]), second: float(atlas[second][row])}
+        return atlas_cloud(atlas, **at)
+
+    return cloud_at
+
+
+def _hulls(atlas: xr.Dataset) -> Callable[[int, int], Hull | None]:
+    from softreach.volume import concave_hull
+
+    cloud_at, share = _clouds(atlas), _alpha(atlas)
+
+    def hull_at(column: int, row: int) -> Hull | None:
+        cloud = cloud_at(column, row)
+        return None if cloud is None else concave_hull(cloud.tip, share * cloud.tip.attrs["length"])
+
+    return hull_at
+
+
+def _alpha(atlas: xr.Dataset) -> float:
+    """The radius that the atlas was measured with, in L."""
+    return float(atlas["volume"].attrs["alpha_over_length"]) if "volume" in atlas else 0.05
+
+
+def _corners(atlas: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
+    """Title and cloud at the ends of both parameters, in the paper's order."""
+    from softreach.plot.atlas import sheet_axes
+
+    ends = _thinned(atlas, 2)
+    across, up = sheet_axes(ends)
+    cloud_at = _clouds(ends)
+    places = [(column, row) for column in range(2) for row in range(2)]
+    found = ((f"{_at(across, j)}, {_at(up, i)}", cloud_at(j, i)) for j, i in places)
+    return [(title, cloud) for title, cloud in found if cloud is not None]
+
+
+def _at(axis: SheetAxis, k: int) -> str:
+    symbol, _, unit = axis.label.partition(" (")
+    return f"{symbol} = {axis.values[k]:.4g}{unit.rstrip(')')}"
+
+
+def _curvature(atlas: xr.Dataset) -> Any:
+    """The first against the last value of the second parameter, at the last of the first."""
+    from softreach.curvature import curvature_statistics
+    from softreach.plot.atlas import sheet_axes
+    from softreach.plot.curvature import plot_curvature
+
+    ends = _thinned(atlas, 2)
+    across, up = sheet_axes(ends)
+    clouds = {f"{_at(up, k)}": _clouds(ends)(len(across.values) - 1, k) for k in range(2)}
+    found = {label: cloud for label, cloud in clouds.items() if cloud is not None}
+    return plot_curvature({label: curvature_statistics(cloud) for label, cloud in found.items()})

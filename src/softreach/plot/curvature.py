@@ -1,0 +1,90 @@
+"""Distributions of curvature along an arm, one design beside another."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.errors import InvalidInput
+from softreach.plot.style import figure_style, pyplot
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+__all__ = ["plot_curvature"]
+
+Array = NDArray[np.float64]
+
+_COLORS = ("#2f6db5", "#e8a020")  # the paper's blue and yellow
+_LABELS = {"bending": "κL", "torsion": "$u_3 L$", "extension": "ζ"}
+_BINS = 96
+
+
+def plot_curvature(
+    statistics: Mapping[str, xr.Dataset], ax: Axes | None = None, *, quantity: str = "bending"
+) -> Axes:
+    """Distributions at the stations of one or two designs (figure 4c); dots are medians.
+
+    Each distribution is drawn to the same width. Curvatures are shown times L.
+
+    Args:
+        statistics: Label -> what `curvature_statistics` returned; the first is drawn to the left
+            of each station and the second to the right.
+        ax: Axes to draw in; None for a new figure.
+        quantity: "bending", "torsion" or "extension".
+
+    Raises:
+        InvalidInput: Not one or two designs, or an unknown quantity.
+    """
+    if not 1 <= len(statistics) <= 2:
+        raise InvalidInput("statistics", f"of {len(statistics)} designs", "of one or two")
+    if quantity not in _LABELS:
+        raise InvalidInput("quantity", quantity, f"one of {', '.join(_LABELS)}")
+    with figure_style(ax):
+        ax = _small_axes() if ax is None else ax
+        sides = (-1, 1) if len(statistics) == 2 else (0,)
+        for (label, found), side, color in zip(statistics.items(), sides, _COLORS, strict=False):
+            _draw(ax, found, quantity, side, color, label)
+        places = _places(next(iter(statistics.values())))
+        ax.set(xlabel="station Z / L", ylabel=_LABELS[quantity])
+        ax.set_xticks(range(len(places)), places)
+        ax.legend(loc="upper left")
+    return ax
+
+
+def _small_axes() -> Axes:
+    return pyplot().subplots(figsize=(3.4, 2.8), layout="constrained")[1]
+
+
+def _places(found: xr.Dataset) -> list[str]:
+    return [f"{z / found.attrs['length']:.2g}" for z in found["Z"].values]
+
+
+def _draw(ax: Axes, found: xr.Dataset, quantity: str, side: int, color: str, label: str) -> None:
+    scale = 1.0 if quantity == "extension" else found.attrs["length"]
+    medians = found[f"{quantity}_quantile"].sel(quantile=0.5).values * scale
+    for k in range(len(medians)):
+        edges, density = _coarse(found.isel(station=k), quantity)
+        reach = 0.46 * density / density.max()
+        low, high = (k - reach if side <= 0 else k), (k + reach if side >= 0 else k)
+        name = label if k == 0 else None
+        ax.fill_betweenx(
+            edges * scale, low, high, color=color, alpha=0.75, lw=0.3, ec="w", label=name
+        )
+    ax.plot(np.arange(len(medians)) + 0.1 * side, medians, ".", color="k", ms=3, zorder=3)
+
+
+def _coarse(found: xr.Dataset, quantity: str) -> tuple[Array, Array]:
+    """Centers of fewer bins, between the smallest and largest value, and counts per width."""
+    count, edges = found[f"{quantity}_count"].values, found[f"{quantity}_edge"].values
+    used = np.flatnonzero(count)
+    first, last = used[0], used[-1] + 1
+    ends = np.unique(np.linspace(first, last, _BINS + 1).astype(int))
+    sums = np.add.reduceat(count, ends[:-1])
+    sums[-1] = count[ends[-2] : last].sum()
+    centers = (edges[ends[:-1]] + edges[ends[1:]]) / 2
+    return centers, sums / np.diff(edges[ends])

@@ -1,0 +1,183 @@
+"""Sheets of an atlas: one small picture for each design, all at one scale."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.palette import activation_colors
+from softreach.plot.cloud import point_size, tips_in_lengths
+from softreach.plot.frame import view_extent
+from softreach.plot.hull import SurfaceMesh
+from softreach.plot.projection import OBLIQUE, View, project, view_axes
+from softreach.plot.shading import draw_mesh
+from softreach.plot.style import DPI, figure_style, pyplot
+from softreach.plot.zbuffer import Extent, ZBuffer
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["SheetAxis", "plot_cloud_sheet", "plot_hull_sheet"]
+
+Array = NDArray[np.float64]
+Grid = NDArray[np.object_]
+
+_STEEL = (0.55, 0.68, 0.82)
+_LEFT, _BOTTOM, _TOP = 0.75, 0.62, 0.08  # inches around a sheet
+
+
+class SheetAxis(NamedTuple):
+    """A parameter along an edge of a sheet, in the units of people."""
+
+    label: str
+    values: tuple[float, ...]
+
+
+def plot_cloud_sheet(
+    cloud_at: Callable[[int, int], xr.Dataset | None],
+    across: SheetAxis,
+    up: SheetAxis,
+    *,
+    box: Array,
+    view: View = OBLIQUE,
+    width: float = 6.9,
+) -> Figure:
+    """A sheet of clouds at one scale, colored by activation (figure 3a).
+
+    Args:
+        cloud_at: (column, row) -> cloud, row 0 at the bottom; None leaves a gap. Called once for
+            each, so that one cloud at a time is held.
+        across: Parameter along the horizontal edge.
+        up: Parameter along the vertical edge.
+        box: What each panel shows, lower and upper corner [L], shape (2, 3).
+        view: The direction of the eye.
+        width: Of the figure [inch].
+    """
+    with figure_style():
+        figure, panels = _sheet(across, up, box, view, width)
+        for (row, column), ax in np.ndenumerate(panels):
+            if (cloud := cloud_at(column, row)) is not None:
+                _draw_cloud(ax, cloud, box, view)
+        _draw_scale(panels[0, 0], view)
+    return figure
+
+
+def plot_hull_sheet(
+    hull_at: Callable[[int, int], SurfaceMesh | None],
+    across: SheetAxis,
+    up: SheetAxis,
+    *,
+    box: Array,
+    length: float = 1.0,
+    view: View = OBLIQUE,
+    width: float = 6.9,
+) -> Figure:
+    """A sheet of lit hulls at one scale (figure 4a).
+
+    Args:
+        hull_at: (column, row) -> surface [m], row 0 at the bottom; None leaves a gap.
+        across: As for `plot_cloud_sheet`.
+        up: As for `plot_cloud_sheet`.
+        box: As for `plot_cloud_sheet`.
+        length: L [m].
+        view: The direction of the eye.
+        width: Of the figure [inch].
+    """
+    with figure_style():
+        figure, panels = _sheet(across, up, box, view, width)
+        for (row, column), ax in np.ndenumerate(panels):
+            if (hull := hull_at(column, row)) is not None:
+                buffer = ZBuffer(view_extent(box, view), _columns(ax), oversample=3, color_step=4)
+                draw_mesh(buffer, np.asarray(hull.vertices) / length, hull.faces, _STEEL, view)
+                _show(ax, buffer)
+        _draw_scale(panels[0, 0], view)
+    return figure
+
+
+def _sheet(
+    across: SheetAxis, up: SheetAxis, box: Array, view: View, width: float
+) -> tuple[Figure, Grid]:
+    """A figure and its panels, the first row at the bottom, each as wide as the box."""
+    extent = view_extent(box, view)
+    aspect = (extent.top - extent.bottom) / (extent.right - extent.left)
+    columns, rows = len(across.values), len(up.values)
+    size = np.array([1.0, aspect]) * (width - _LEFT) / columns
+    height = _BOTTOM + rows * size[1] + _TOP
+    figure = pyplot().figure(figsize=(width, height))
+    panels = np.empty((rows, columns), object)
+    for row, column in np.ndindex(rows, columns):
+        left, bottom = _LEFT + column * size[0], _BOTTOM + row * size[1]
+        place = (left / width, bottom / height, size[0] / width, size[1] / height)
+        panels[row, column] = _blank(figure, place, extent)
+    _label_edges(panels, across, up)
+    middle = (_LEFT + (width - _LEFT) / 2) / width
+    figure.text(middle, 0.12 / height, across.label, ha="center", fontsize=9)
+    figure.text(
+        0.1 / width,
+        (_BOTTOM + rows * size[1] / 2) / height,
+        up.label,
+        va="center",
+        rotation=90,
+        fontsize=9,
+    )
+    return figure, panels
+
+
+def _blank(figure: Figure, place: tuple[float, float, float, float], extent: Extent) -> Axes:
+    ax = figure.add_axes(place)
+    ax.set(xlim=(extent.left, extent.right), ylim=(extent.bottom, extent.top), xticks=[], yticks=[])
+    ax.patch.set_visible(False)
+    for spine in ax.spines.values():
+        spine.set(color="0.88", linewidth=0.4)
+    return ax
+
+
+def _label_edges(panels: Grid, across: SheetAxis, up: SheetAxis) -> None:
+    for ax, value in zip(panels[0], across.values, strict=True):
+        ax.set_xlabel(f"{value:.4g}", labelpad=3)
+    for ax, value in zip(panels[:, 0], up.values, strict=True):
+        ax.set_ylabel(f"{value:.4g}", rotation=0, ha="right", va="center", labelpad=4)
+
+
+def _columns(ax: Axes) -> int:
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    return max(16, round(ax.get_position().width * figure.get_size_inches()[0] * DPI))
+
+
+def _draw_cloud(ax: Axes, cloud: xr.Dataset, box: Array, view: View) -> None:
+    extent, columns = view_extent(box, view), _columns(ax)
+    tips = tips_in_lengths(cloud)
+    pixels = point_size(len(tips), box) * columns / (extent.right - extent.left)
+    buffer = ZBuffer(extent, columns, oversample=2, color_step=8)
+    colors = activation_colors(cloud["activation"].transpose("sample", "fiber").values)
+    buffer.draw_points(project(tips, view), colors, max(1.0, pixels))
+    _show(ax, buffer)
+
+
+def _show(ax: Axes, buffer: ZBuffer) -> None:
+    """The image in its axes, whose frame and limits stay."""
+    ax.imshow(buffer.rgba(), extent=buffer.extent, interpolation="none", aspect="auto")
+
+
+def _draw_scale(ax: Axes, view: View) -> None:
+    """A bar of half a length and the directions of x, y and z, in the corner of a panel."""
+    left, right = ax.get_xlim()
+    bottom, top = ax.get_ylim()
+    start = np.array([left + 0.08 * (right - left), bottom + 0.07 * (top - bottom)])
+    ax.plot([start[0], start[0] + 0.5], [start[1]] * 2, color="0.2", lw=1.2, solid_capstyle="butt")
+    ax.text(start[0] + 0.55, start[1], "$L/2$", fontsize=6, va="center")
+    center = np.array([left + 0.2 * (right - left), bottom + 0.25 * (top - bottom)])
+    for name, direction in zip("xyz", view_axes(view)[:2].T, strict=True):
+        tip = center + 0.25 * direction
+        arrow = {"arrowstyle": "-|>,head_width=0.1,head_length=0.2", "lw": 0.6, "shrinkA": 0}
+        ax.annotate(
+            "", tuple(tip), tuple(center), arrowprops=arrow | {"color": "0.2", "shrinkB": 0}
+        )
+        x, y = center + 0.36 * direction
+        ax.text(x, y, name, fontsize=6, ha="center", va="center")

@@ -1,0 +1,542 @@
+"""Laws of the atlas: interrupted, shared or retried, it holds the same numbers."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import textwrap
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import softreach as sr
+from softreach.atlas import (
+    DesignSpace,
+    atlas_cloud,
+    atlas_design,
+    atlas_status,
+    best_designs,
+    build_atlas,
+    open_atlas,
+    parameter_units,
+    worker_processes,
+)
+from softreach.atlas import metrics as atlas_metrics
+from softreach.atlas.command import Command
+from softreach.atlas.store import AtlasStore, StoreFailed
+from softreach.errors import InvalidInput, SoftreachError, SoftreachWarning
+
+SMALL = {"n": 2_000, "alpha": 0.5, "metrics": ("extent", "convex", "concave", "curvature")}
+
+# What the subprocesses run; the test that starts them runs it too, as the truth.
+SCRIPT = """
+    import os
+    import signal
+    import sys
+    from pathlib import Path
+    import numpy as np
+    from softreach import designs
+    from softreach.atlas import DesignSpace, build_atlas, design_task, worker_processes
+
+    def build(store, n=3_000, alpha=0.3, accuracy=0.2, **options):
+        turns, tapers = np.radians([0, 36, 72, 108]), np.radians([0, 1, 2, 3])
+        space = DesignSpace.grid(designs.minimal_trunk(), revolution=turns, taper=tapers)
+        return build_atlas(space, store, n, seed=1, alpha=alpha, accuracy=accuracy, **options)
+
+    def die():
+        os.kill(os.getpid(), signal.SIGKILL)
+"""
+scope: dict = {}
+exec(textwrap.dedent(SCRIPT), scope)
+build16 = scope["build"]
+
+
+@pytest.fixture(scope="module")
+def paper(tmp_path_factory) -> xr.Dataset:
+    """A coarse atlas of the paper's designs."""
+    store = tmp_path_factory.mktemp("atlas") / "paper.zarr"
+    return build16(store, n=20_000, alpha=0.1, accuracy=0.02).load()
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory) -> xr.Dataset:
+    """The atlas of the subprocesses, without interruption."""
+    return build16(tmp_path_factory.mktemp("atlas") / "whole.zarr").load()
+
+
+def small_space(**more) -> DesignSpace:
+    tapers = np.radians([0.0, 2.0])
+    return DesignSpace.grid(sr.designs.minimal_trunk(), revolution=[0.5, 1.5], taper=tapers, **more)
+
+
+def run_script(folder: Path, body: str, *arguments: str) -> subprocess.Popen:
+    script = folder / "task.py"
+    script.write_text(textwrap.dedent(SCRIPT) + "\n" + textwrap.dedent(body))
+    command = [sys.executable, "-W", "error", str(script), *arguments]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+
+
+# Designs
+
+
+def test_a_grid_has_every_combination_in_c_order():
+    space = small_space()
+    assert (space.dims, space.shape, space.size) == (("revolution", "taper"), (2, 2), 4)
+    assert space.values(1) == {"revolution": 0.5, "taper": np.radians(2.0)}
+    arm = space.design(1)
+    assert arm.taper == np.radians(2.0)
+    np.testing.assert_allclose(np.abs(arm.revolutions[:2]), 0.5)
+
+
+def test_a_list_takes_values_together():
+    space = DesignSpace.listed(sr.designs.minimal_trunk(), taper=[0.0, 0.01], offset_left=[1, 2])
+    assert (space.dims, space.size) == (("design",), 2)
+    assert space.design(1).fibers[0].offset == 2
+
+
+@pytest.mark.parametrize("method", ["sobol", "latin"])
+def test_sampled_designs_fill_each_stratum_once(method):
+    arm = sr.designs.minimal_trunk()
+    space = DesignSpace.sampled(arm, 16, method=method, taper=(0.0, 0.04), extent=(0.5, 1.0))
+    for name, values in space.parameters:
+        low, high = {"taper": (0.0, 0.04), "extent": (0.5, 1.0)}[name]
+        strata = np.floor((np.array(values) - low) / (high - low) * 16)
+        assert sorted(strata) == list(range(16))
+
+
+@pytest.mark.parametrize("name", list(parameter_units(sr.designs.minimal_trunk())))
+def test_every_parameter_changes_the_design_and_its_own_value_changes_nothing(name):
+    base = sr.designs.minimal_trunk()
+    value = {"bundles": 2, "lower": -1.0, "upper": 0.5, "length": 1.1, "outer_radius": 0.07}
+    new = next((v for key, v in value.items() if name.startswith(key)), 0.3)
+    new = {"taper": 0.01}.get(name, new)
+    changed = DesignSpace.listed(base, **{name: [new]}).design(0)
+    assert changed != base
+    same = {"taper": base.taper, "poisson_ratio": 0.5, "length": 1.0, "radius_ratio": 0.75}
+    if name in same:
+        np.testing.assert_allclose(
+            sr.tip_positions(
+                DesignSpace.listed(base, **{name: [same[name]]}).design(0), [[-1] * 3]
+            ),
+            sr.tip_positions(base, [[-1] * 3]),
+            atol=1e-12,
+        )
+
+
+def test_a_valid_design_behind_an_invalid_one_is_found():
+    base = sr.designs.minimal_trunk(taper=np.radians(3))
+    space = DesignSpace.listed(base, outer_radius=[0.01], taper=[0.0])
+    assert space.design(0).outer_radius == 0.01
+
+
+def test_bounds_of_one_fiber_follow_its_bundles():
+    base = sr.designs.minimal_trunk()
+    space = DesignSpace.listed(base, bundles_left=[2], lower_left=[-1.0], upper=[0.1])
+    expected = [[-1, 0.1], [-1, 0.1], [-5 / 3, 0.1], [-5 / 3, 0.1]]
+    np.testing.assert_allclose(space.design(0).bounds, expected)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({}, "parameters = none"),
+        ({"tapper": [0]}, "parameter = tapper: must be one of revolution, taper"),
+        ({"taper": []}, "taper = .*: must be one finite value"),
+        ({"taper": [np.nan]}, "taper = .*: must be one finite value"),
+        ({"taper": [0.01, 0.01]}, "taper = .*: must be values that differ"),
+    ],
+)
+def test_faulty_spaces_are_refused_in_one_line(values, message):
+    with pytest.raises(InvalidInput, match=message) as caught:
+        DesignSpace.grid(sr.designs.minimal_trunk(), **values)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_space_survives_being_written():
+    space = small_space(offset_left=[1.0, 2.0])
+    assert DesignSpace.from_dict(space.to_dict()) == space
+
+
+# What it shows
+
+
+def test_volume_grows_with_revolution_for_every_taper(paper):
+    assert (paper.volume.diff("revolution") > 0).all()
+    assert (paper.exact_volume.diff("revolution") > 0).all()
+
+
+def test_largest_volume_is_at_full_revolution_and_two_degrees(paper):
+    for name in ("volume", "exact_volume"):
+        best = best_designs(paper, name)
+        np.testing.assert_allclose(np.degrees(best.revolution), 108)
+        np.testing.assert_allclose(np.degrees(best.taper), 2)
+
+
+def test_unreachability_falls_with_revolution_and_taper(paper):
+    for dim in ("revolution", "taper"):
+        assert (paper.exact_unreachability.diff(dim) < 0).all()
+        assert (paper.unreachability.diff(dim) < 0.02).all()  # sampled, with a coarse radius
+    np.testing.assert_allclose(
+        paper.exact_unreachability.isel(revolution=0, taper=0), 0.69, atol=0.01
+    )
+    np.testing.assert_allclose(
+        paper.exact_unreachability.isel(revolution=3, taper=3), 0.29, atol=0.01
+    )
+
+
+def test_metrics_agree_with_those_of_the_cloud_alone(paper):
+    at = {"revolution": np.radians(72), "taper": np.radians(1)}
+    alone = sr.compute_cloud(atlas_design(paper, **at), n=20_000, seed=1)
+    row = paper.sel(**at, method="nearest")
+    np.testing.assert_allclose(row.convex_volume, sr.convex_hull(alone.tip).volume, rtol=1e-9)
+    np.testing.assert_allclose(row.volume, sr.concave_hull(alone.tip, 0.1).volume, rtol=1e-12)
+    np.testing.assert_allclose(row.reach_height, alone.tip[:, 2].max())
+    np.testing.assert_allclose(
+        row.reach_radius, np.hypot(alone.tip[:, 0], alone.tip[:, 1]).max(), rtol=1e-12
+    )
+
+
+def test_stored_clouds_are_those_of_the_cloud_alone_to_half_a_step(paper):
+    at = {"revolution": 0.0, "taper": np.radians(3)}
+    stored = atlas_cloud(paper, **at)
+    alone = sr.compute_cloud(sr.design_of(stored), n=20_000, seed=1)
+    assert stored.activation.equals(alone.activation)
+    assert np.abs(stored.tip.values - alone.tip.values).max() <= 0.5e-5 * (1 + 1e-9)
+    assert stored.attrs == alone.attrs
+
+
+def test_clouds_that_were_not_kept_are_computed_again(tmp_path):
+    atlas = build_atlas(small_space(), tmp_path / "a.zarr", keep_clouds=False, **SMALL)
+    assert "tip" not in atlas
+    again = atlas_cloud(atlas, revolution=0.5, taper=0.0)
+    alone = sr.compute_cloud(sr.design_of(again), n=2_000)
+    assert again.tip.equals(alone.tip)
+
+
+def test_any_reader_of_zarr_and_cf_understands_the_store(tmp_path):
+    build_atlas(small_space(length=[1.0, 1.5]), tmp_path / "a.zarr", **SMALL)
+    raw = xr.open_zarr(tmp_path / "a.zarr", consolidated=False, zarr_format=3, chunks=None)
+    tips = raw.tip.isel(revolution=1, taper=1, length=1).T.values
+    alone = sr.compute_cloud(sr.designs.minimal_trunk(1.5).replace(length=1.5), n=2_000)
+    np.testing.assert_allclose(tips, alone.tip, atol=0.6e-5)
+    assert raw.taper.attrs["units"] == "rad"
+    assert raw.status.attrs["flag_meanings"].split()[1] == "done"
+
+
+def test_designs_with_more_bundles_share_the_activations_of_the_others(tmp_path):
+    space = DesignSpace.listed(sr.designs.minimal_trunk(), bundles_left=[1, 2])
+    atlas = build_atlas(space, tmp_path / "a.zarr", **SMALL)
+    few, more = atlas_cloud(atlas, design=0), atlas_cloud(atlas, design=1)
+    assert (few.sizes["fiber"], more.sizes["fiber"]) == (3, 4)
+    np.testing.assert_array_equal(few.activation, more.activation[:, :3])
+
+
+# Resuming
+
+
+@pytest.mark.slow
+def test_three_kills_leave_the_same_numbers_as_no_kill(whole, tmp_path):
+    store = tmp_path / "killed.zarr"
+    body = """
+        from softreach.atlas import store as stores
+        left, place = int(sys.argv[2]), sys.argv[3]
+
+        def count_down(*_):
+            global left
+            left -= 1
+            if not left:
+                die()
+
+        if place == "within a write":
+            right = stores.fixed_point
+            stores.fixed_point = lambda *given: (count_down(), right(*given))[1]
+        build(sys.argv[1], report=count_down if place == "after a design" else None)
+    """
+    done = 0
+    for count, place in ((2, "after a design"), (5, "within a write"), (3, "after a design")):
+        process = run_script(tmp_path, body, str(store), str(count), place)
+        assert process.communicate() == (None, "")
+        assert process.returncode == -signal.SIGKILL
+        assert done < atlas_status(store).done < 16
+        done = atlas_status(store).done
+    xr.testing.assert_identical(build16(store).load(), whole)
+
+
+def test_a_store_that_was_killed_while_being_created_is_completed(tmp_path, monkeypatch):
+    store, space = tmp_path / "a.zarr", small_space()
+    with monkeypatch.context() as patch:
+        patch.setattr("softreach.atlas.store._digest", lambda cube: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            build_atlas(space, store, **SMALL)
+    with pytest.raises(InvalidInput, match="written by build_atlas"):
+        open_atlas(store)
+    assert np.isfinite(build_atlas(space, store, **SMALL).volume).all()
+
+
+def test_a_second_call_computes_nothing(tmp_path, monkeypatch):
+    first = build_atlas(small_space(), tmp_path / "a.zarr", **SMALL).load()
+    monkeypatch.setattr("softreach.atlas.design_task.tip_positions", lambda *_: 1 / 0)
+    assert build_atlas(small_space(), tmp_path / "a.zarr", **SMALL).identical(first)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"n": 3_000}, "n: 2000 there, 3000 here"),
+        ({"seed": 1}, "seed: 0 there, 1 here"),
+        ({"alpha": 0.4}, "alpha: 0.5 there, 0.4 here"),
+        ({"keep_clouds": False}, "keep_clouds: True there, False here"),
+        ({"metrics": ("extent",)}, "metrics: .*'concave'.* there, .'extent',. here"),
+    ],
+)
+def test_another_command_is_refused_with_what_differs(tmp_path, change, message):
+    store = tmp_path / "a.zarr"
+    AtlasStore.begin(store, command(small_space(), **SMALL))
+    with pytest.raises(InvalidInput, match=message) as caught:
+        build_atlas(small_space(), store, **SMALL | change)
+    assert "\n" not in str(caught.value)
+
+
+def test_another_space_is_refused_with_what_differs(tmp_path):
+    AtlasStore.begin(tmp_path / "a.zarr", command(small_space(), **SMALL))
+    base = sr.designs.minimal_trunk()
+    for space, message in [
+        (DesignSpace.grid(base, revolution=[0.5, 1.0], taper=[0.0, np.radians(2)]), "revolution: "),
+        (DesignSpace.grid(base, revolution=[0.5, 1.5]), "taper: .* there, none here"),
+        (
+            DesignSpace.grid(base.replace(length=1.5), revolution=[0.5, 1.5]),
+            "length_m = 1.0 there, length_m = 1.5 here",
+        ),
+    ]:
+        with pytest.raises(InvalidInput, match=message):
+            build_atlas(space, tmp_path / "a.zarr", **SMALL)
+
+
+def command(space: DesignSpace, **options) -> Command:
+    rest = {"seed": 0, "sampler": "uniform", "tol": 1e-6, "accuracy": 3e-3, "keep_clouds": True}
+    return Command(space=space, **rest | options)
+
+
+def test_a_folder_with_other_things_is_left_alone(tmp_path):
+    (tmp_path / "thesis.tex").write_text("precious")
+    with pytest.raises(InvalidInput, match="a new folder, or an atlas"):
+        build_atlas(small_space(), tmp_path, **SMALL)
+    cloud = sr.compute_cloud(sr.designs.minimal_trunk(), n=100)
+    sr.save_cloud(cloud, tmp_path / "cloud.zarr")
+    with pytest.raises(InvalidInput, match="holds something else"):
+        build_atlas(small_space(), tmp_path / "cloud.zarr", **SMALL)
+
+
+def test_damaged_activations_are_noticed(tmp_path):
+    store = AtlasStore.begin(tmp_path / "a.zarr", command(small_space(), **SMALL))
+    store.group["unit_activation"][0, 0] = 0.5
+    with pytest.raises(SoftreachError, match="damaged"):
+        build_atlas(small_space(), tmp_path / "a.zarr", **SMALL)
+
+
+# Faults
+
+
+def test_gaps_are_told_before_anything_runs_and_stay_gaps(tmp_path):
+    base = sr.designs.minimal_trunk()
+    space = DesignSpace.grid(base, taper=np.radians([2.0, 4.0]), outer_radius=[1 / 16, 0.1])
+    assert list(space.gaps) == [2]
+    with pytest.warns(SoftreachWarning, match="1 of 4 designs cannot exist .*leaves no tip"):
+        atlas = build_atlas(space, tmp_path / "a.zarr", **SMALL)
+    assert np.isfinite(atlas.volume.values).tolist() == [[True, True], [False, True]]
+    status = atlas_status(tmp_path / "a.zarr")
+    assert (status.done, status.gaps) == (3, 1)
+    assert "leaves no tip" in status.messages[2]
+
+
+def test_a_space_of_gaps_alone_is_refused(tmp_path):
+    space = DesignSpace.grid(sr.designs.minimal_trunk(), taper=[0.1, 0.2])
+    with pytest.raises(InvalidInput, match=r"valid for one at least; .*leaves no tip"):
+        build_atlas(space, tmp_path / "a.zarr", **SMALL)
+
+
+def test_a_failing_design_is_recorded_and_tried_again_later(tmp_path, monkeypatch):
+    store, right = tmp_path / "a.zarr", atlas_metrics.hull_metrics
+
+    def fails_for_taper(arm, *rest):
+        if arm.taper > 0 and abs(arm.revolutions[0]) > 1:
+            raise RuntimeError("no hull today")
+        return right(arm, *rest)
+
+    with monkeypatch.context() as patch:
+        patch.setattr("softreach.atlas.design_task.hull_metrics", fails_for_taper)
+        with pytest.warns(SoftreachWarning, match="1 designs failed, .*no hull today"):
+            atlas = build_atlas(small_space(), store, **SMALL)
+    assert np.isfinite(atlas.volume.values).tolist() == [[True, True], [True, False]]
+    assert atlas_status(store).messages == {3: "RuntimeError: no hull today"}
+    assert np.isfinite(build_atlas(small_space(), store, **SMALL).volume).all()
+    assert atlas_status(store).messages == {}
+
+
+@pytest.mark.slow
+def test_a_full_disk_costs_one_line_and_the_rest_can_be_resumed(tmp_path):
+    store = tmp_path / "a.zarr"
+    body = """
+        import resource
+        store = sys.argv[1]
+        if len(sys.argv) > 2:  # tips no longer fit into any file
+            from softreach.atlas.store import AtlasStore
+            AtlasStore.open(store).cube
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (8_000, -1))
+        shard = (0, 1) if len(sys.argv) > 2 else (0, 8)
+        from softreach.errors import SoftreachError
+        try:
+            build(store, shard=shard)
+        except SoftreachError as error:
+            sys.exit(str(error))
+    """
+    assert run_script(tmp_path, body, str(store)).communicate() == (None, "")
+    _, said = run_script(tmp_path, body, str(store), "full").communicate()
+    assert said.count("\n") == 1
+    assert "cannot be written: File too large; what is done is safe" in said
+    assert atlas_status(store).done == 2
+    assert build16(store).volume.notnull().all()
+
+
+def test_trouble_of_the_disk_is_not_blamed_on_the_design(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("softreach.atlas.store.fixed_point", full)
+    with pytest.raises(StoreFailed, match=r"No space left on device; .* same command continues"):
+        build_atlas(small_space(), tmp_path / "a.zarr", **SMALL)
+    assert atlas_status(tmp_path / "a.zarr").failed == 0
+
+
+# Execution
+
+
+def test_shards_share_a_store_and_together_make_the_whole(whole, tmp_path):
+    store = tmp_path / "a.zarr"
+    part = build16(store, shard=(0, 2))
+    assert int(part.volume.notnull().sum()) == 8
+    xr.testing.assert_identical(build16(store, shard=(1, 2)).load(), whole)
+    with pytest.raises(InvalidInput, match="shard = 2/2"):
+        build16(store, shard=(2, 2))
+
+
+@pytest.mark.slow
+def test_shards_may_start_at_the_same_moment(whole, tmp_path):
+    store = tmp_path / "a.zarr"
+    body = "build(sys.argv[1], shard=(int(sys.argv[2]), 2))"
+    tasks = [run_script(tmp_path, body, str(store), str(k)) for k in range(2)]
+    assert [task.communicate()[1] for task in tasks] == ["", ""]
+    xr.testing.assert_identical(open_atlas(store).load(), whole)
+
+
+def test_an_executor_of_threads_gives_the_same_numbers(whole, tmp_path):
+    with ThreadPoolExecutor(2) as pool:
+        xr.testing.assert_identical(build16(tmp_path / "a.zarr", executor=pool).load(), whole)
+
+
+# Workers import the script too, so this is what they run.
+DEADLY = """
+    right = design_task.hull_metrics
+
+    def deadly(arm, *rest):
+        guilty = arm.taper > 0.05 and abs(arm.revolutions[0]) < 1e-9
+        mark = Path(sys.argv[0]).with_suffix(".died")
+        if guilty and (ALWAYS or not mark.exists()):
+            mark.touch()
+            die()
+        return right(arm, *rest)
+
+    design_task.hull_metrics = deadly
+"""
+
+
+def deadly(body: str, always: bool = False) -> str:
+    """A script in which a worker dies over design number 3, once or always."""
+    return f"ALWAYS = {always}\n" + textwrap.dedent(DEADLY) + textwrap.dedent(body)
+
+
+@pytest.mark.slow
+def test_worker_processes_survive_the_death_of_one(whole, tmp_path):
+    store = tmp_path / "a.zarr"
+    body = """
+        if __name__ == "__main__":
+            build(sys.argv[1], executor=worker_processes(2))
+    """
+    assert run_script(tmp_path, deadly(body), str(store)).communicate() == (None, "")
+    assert (tmp_path / "task.died").exists()
+    xr.testing.assert_identical(open_atlas(store).load(), whole)
+
+
+@pytest.mark.slow
+def test_a_design_that_kills_its_workers_is_given_up_and_the_rest_goes_on(tmp_path):
+    store = tmp_path / "a.zarr"
+    body = """
+        if __name__ == "__main__":
+            import warnings
+            warnings.simplefilter("ignore")
+            build(sys.argv[1], executor=worker_processes(2), metrics=("extent",))
+    """
+    assert run_script(tmp_path, deadly(body, True), str(store)).communicate() == (None, "")
+    status = atlas_status(store)
+    assert (status.done, status.messages) == (15, {3: "its worker died, time after time"})
+
+
+@pytest.mark.slow
+def test_dask_workers_survive_the_death_of_one(whole, tmp_path):
+    pytest.importorskip("distributed")
+    store = tmp_path / "a.zarr"
+    body = """
+        if __name__ == "__main__":
+            from distributed import Client, LocalCluster
+            options = {"dashboard_address": None, "silence_logs": 50}
+            with LocalCluster(2, threads_per_worker=1, **options) as cluster:
+                with Client(cluster) as client:
+                    build(sys.argv[1], executor=client)
+    """
+    process = run_script(tmp_path, deadly(body), str(store))
+    process.communicate()
+    assert process.returncode == 0
+    assert (tmp_path / "task.died").exists()
+    xr.testing.assert_identical(open_atlas(store).load(), whole)
+
+
+def test_what_is_no_executor_is_refused(tmp_path):
+    with pytest.raises(InvalidInput, match=r"executor = 3: must be a concurrent\.futures executor"):
+        build_atlas(small_space(), tmp_path / "a.zarr", executor=3, **SMALL)
+    assert worker_processes(1)  # makes nothing until it is called
+
+
+def test_progress_counts_every_design_once(tmp_path):
+    seen = []
+    build_atlas(small_space(), tmp_path / "a.zarr", report=seen.append, **SMALL)
+    assert seen == [1] * 4
+
+
+# Questions
+
+
+def test_best_designs_are_the_best_that_meet_the_constraints(paper):
+    found = best_designs(paper, "volume", where={"taper": (None, 0.01)}, count=3)
+    truth = np.sort(paper.volume.sel(taper=0.0).values)[::-1]
+    np.testing.assert_array_equal(found.volume, truth[:3])
+    least = best_designs(paper, "unreachability", smallest=True)
+    np.testing.assert_allclose(least.unreachability, [paper.unreachability.min()])
+    assert best_designs(paper, "volume", where={"volume": (9.0, None)}).sizes["rank"] == 0
+    with pytest.raises(InvalidInput, match="metric = volumes: must be one of"):
+        best_designs(paper, "volumes")
+
+
+def test_sparse_clouds_are_warned_of(tmp_path):
+    with pytest.warns(SoftreachWarning, match="below three mean spacings of the points of 4"):
+        build_atlas(small_space(), tmp_path / "a.zarr", **SMALL | {"alpha": 0.05})
+
+
+def test_what_is_not_there_is_not_opened(tmp_path):
+    with pytest.raises(InvalidInput, match="an atlas written by build_atlas"):
+        open_atlas(tmp_path / "nothing.zarr")
+    assert not (tmp_path / "nothing.zarr").exists()
