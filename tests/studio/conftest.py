@@ -19,7 +19,9 @@ SMALL = Quality(coarse_level=14, fine_level=15, coarse_accuracy=0.05, fine_accur
 
 @pytest.fixture(scope="session")
 def studio() -> Iterator[Studio]:
-    start = Start(state=StudioState(design=designs.minimal_trunk()).showing(level=14), quality=SMALL)
+    start = Start(
+        state=StudioState(design=designs.minimal_trunk()).showing(level=14), quality=SMALL
+    )
     with Studio(start) as running:
         yield running
 

@@ -12,12 +12,6 @@ import softreach as sr
 from softreach.studio import StudioState
 from tests.studio.tab import Tab
 
-pytestmark = [
-    # viser's own use of websockets and of its handles while a tab closes
-    pytest.mark.filterwarnings("ignore::DeprecationWarning:websockets"),
-    pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning"),
-]
-
 
 def test_the_page_opens_with_the_volume_of_the_design(tab):
     reach = tab.session.reach

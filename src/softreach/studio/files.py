@@ -6,6 +6,8 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from softreach.errors import InvalidInput
 from softreach.export import export_cloud, export_mesh
 from softreach.kinematics import configuration
@@ -63,7 +65,7 @@ def figure_file(reach: Reach, state: StudioState) -> bytes:
     shown = reach.cloud[["tip", "activation"]].isel(
         sample=shown_samples(reach, state.appearance.level)
     )
-    shape = configuration(state.design, state.activation)
+    shape = configuration(state.design, np.asarray(state.activation))
 
     def write(path: Path) -> None:
         axes = plot.plot_views(shown, state.design, shape)

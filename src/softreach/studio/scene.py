@@ -56,7 +56,7 @@ class Scene:
 
     def draw_arm(self, arm: Manipulator, activation: Sequence[float], path: str = "/arm") -> Array:
         """The body and its fibers; returns the tip [L]. Redrawn by moving what there is."""
-        shape = configuration(arm, activation, _STATIONS, tol=1e-5)
+        shape = configuration(arm, np.asarray(activation), _STATIONS, tol=1e-5)
         meshes = _arm_meshes(arm, shape)
         known, handles = self._arms.get(path, (None, []))
         if known is arm:
@@ -154,8 +154,9 @@ class Scene:
     def remove(self, *paths: str) -> None:
         """Take nodes and everything under them out of the scene."""
         for path in paths:
-            for known in [p for p in self._arms if p == path or p.startswith(f"{path}/")]:
-                del self._arms[known]
+            for known in list(self._arms):  # a copy: workers draw at the same time
+                if known == path or known.startswith(f"{path}/"):
+                    self._arms.pop(known, None)
             if self._api.get_handle_by_name(path) is not None:
                 self._api.remove_by_name(path)
 

@@ -1,0 +1,116 @@
+"""What a design can reach, coarse and fine, and how points are colored, thinned, cut and picked."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from softreach import designs
+from softreach.cloud import compute_cloud
+from softreach.kinematics import tip_positions
+from softreach.plot.coloring import ScalarKey
+from softreach.studio.axes import axes_box
+from softreach.studio.colors import color_names, key_html, manipulability, sample_colors
+from softreach.studio.jobs import Dropped
+from softreach.studio.picking import picked_point, plane_crossing
+from softreach.studio.reach import Quality, Reach, reached, shown_samples, stages
+from softreach.studio.scene import in_slice
+from softreach.studio.state import Slice
+
+SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
+
+
+@pytest.fixture(scope="module")
+def both(trunk) -> list[Reach]:
+    return list(stages(trunk, 11, SMALL, lambda: None))
+
+
+def test_the_coarse_cloud_is_the_beginning_of_the_fine_one(both):
+    coarse, fine = both
+    assert (coarse.fine, fine.fine) == (False, True)
+    assert (coarse.samples, fine.samples) == (1 << 10, 1 << 12)
+    np.testing.assert_array_equal(coarse.cloud.tip, fine.cloud.tip[: coarse.samples])
+    assert coarse.volume == pytest.approx(fine.volume, rel=0.02)
+
+
+def test_more_points_are_computed_when_more_are_to_be_shown(trunk):
+    *_, fine = stages(trunk, 14, SMALL, lambda: None)
+    assert fine.samples == 1 << 14
+
+
+def test_a_check_that_raises_stops_the_work(trunk):
+    def check():
+        raise Dropped
+
+    with pytest.raises(Dropped):
+        next(stages(trunk, 11, SMALL, check))
+
+
+def test_a_grid_from_a_file_is_thinned_evenly(trunk):
+    grid = reached(compute_cloud(trunk, 16**3, sampler="grid"), SMALL)
+    few = grid.cloud.activation.values[shown_samples(grid, 9)]
+    np.testing.assert_allclose(few.mean(axis=0), trunk.bounds.mean(axis=1), atol=0.1)
+    uniform = reached(compute_cloud(trunk, 1000), SMALL)
+    assert shown_samples(uniform, 14) == slice(0, 1000)
+
+
+def test_every_color_that_is_offered_colors_every_point_that_is_shown(both):
+    fine = both[1]
+    for color in color_names(fine.arm):
+        coloring = sample_colors(fine, 10, color)
+        assert coloring.rgb.shape == (1 << 10, 3)
+        assert "url(" not in key_html(coloring.key)
+    multiplicity = sample_colors(fine, 10, "multiplicity").key
+    assert isinstance(multiplicity, ScalarKey)
+    assert multiplicity.low == 1.0
+
+
+def test_an_unknown_color_is_that_of_the_activations(both):
+    plain = sample_colors(both[1], 10, "rgb").rgb
+    np.testing.assert_array_equal(sample_colors(both[1], 10, "bundle 9").rgb, plain)
+
+
+def test_multiplicity_is_offered_where_it_is_finite(trunk):
+    assert "multiplicity" in color_names(trunk)
+    assert "multiplicity" not in color_names(designs.redundant_trunk())
+
+
+def test_manipulability_is_the_determinant_of_the_tips_velocities(trunk):
+    gamma, h = np.full((1, 3), -0.6), 1e-4
+    columns = [
+        (tip_positions(trunk, gamma + h * e, 1e-9) - tip_positions(trunk, gamma - h * e, 1e-9))[0]
+        for e in np.eye(3)
+    ]
+    expected = abs(np.linalg.det(np.array(columns) / (2 * h)))
+    assert manipulability(trunk, gamma)[0] == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_slice_shows_what_lies_within_its_thickness(rng):
+    points = rng.uniform(-1, 1, (1000, 3))
+    assert in_slice(points, Slice()).all()
+    kept = in_slice(points, Slice(axis="y", center=0.2, thickness=0.3))
+    np.testing.assert_array_equal(kept, np.abs(points[:, 1] - 0.2) <= 0.15)
+
+
+def test_a_ray_picks_the_nearest_of_the_points_on_it():
+    eye, points = np.zeros(3), np.array([[0, 0, 5.0], [0, 0, 2.0], [1, 0, 1.0], [0, 0, -1.0]])
+    assert picked_point(points, eye, (0, 0, 3)) == 1
+    assert picked_point(points, eye, (1, 0, 1)) == 2
+    assert picked_point(points, eye, (0, 1, 0)) is None
+
+
+def test_a_ray_meets_a_plane_in_front_of_the_eye_only():
+    hit = plane_crossing((0, 0, 0), (1, 1, 0), (2, 0, 0), (1, 0, 0))
+    np.testing.assert_allclose(hit, (2, 2, 0))
+    assert plane_crossing((0, 0, 0), (-1, 0, 0), (2, 0, 0), (1, 0, 0)) is None
+    assert plane_crossing((0, 0, 0), (0, 1, 0), (2, 0, 0), (1, 0, 0)) is None
+
+
+def test_the_box_holds_every_point_and_its_numbers_are_round(rng):
+    points = rng.uniform(-0.73, 1.19, (100, 3))
+    box = axes_box(points)
+    low, high = box.lines[:12].min(axis=(0, 1)), box.lines[:12].max(axis=(0, 1))
+    assert (low <= points).all()
+    assert (points <= high).all()
+    texts = {text for text, _ in box.labels}
+    assert {"0", "0.5", "1", "x / L", "y / L", "z / L"} <= texts

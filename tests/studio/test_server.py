@@ -1,0 +1,73 @@
+"""A safe start."""
+
+from __future__ import annotations
+
+import socket
+
+import pytest
+
+from softreach.errors import InvalidInput
+from softreach.studio.server import page_url, same_origin, start_server, stop_server
+
+
+@pytest.fixture(scope="module")
+def server():
+    running = start_server()
+    yield running
+    stop_server(running)
+
+
+def test_only_this_machine_can_connect(server):
+    assert server.get_host() == "127.0.0.1"
+    assert page_url(server) == f"http://127.0.0.1:{server.get_port()}"
+
+
+def test_nobody_can_open_a_tunnel(server):
+    assert server.request_share_url() is None
+    assert server._share_tunnel is None
+
+
+def test_a_taken_port_is_refused_and_not_replaced(server):
+    with pytest.raises(InvalidInput, match="a free port"):
+        start_server(port=server.get_port())
+    with pytest.raises(InvalidInput, match=r"203\.0\.113\.7"):
+        start_server(host="203.0.113.7")
+
+
+@pytest.mark.parametrize(
+    ("host", "origin", "welcome"),
+    [
+        ("127.0.0.1:8080", "http://127.0.0.1:8080", True),
+        ("localhost:8080", "http://localhost:8080", True),
+        ("127.0.0.1:8080", None, True),
+        ("127.0.0.1:8080", "https://elsewhere.example", False),
+        ("127.0.0.1:8080", "http://127.0.0.1:9999", False),
+        ("127.0.0.1:8080", "null", False),
+        ("rebound.example:8080", "http://rebound.example:8080", False),
+    ],
+)
+def test_pages_from_elsewhere_are_turned_away(host, origin, welcome):
+    headers = {"Host": host} | ({"Origin": origin} if origin else {})
+    assert same_origin(headers, "127.0.0.1") is welcome
+
+
+def test_a_page_from_elsewhere_gets_no_data(server):
+    import viser
+    from websockets.exceptions import ConnectionClosed
+    from websockets.sync.client import connect
+
+    address = page_url(server).replace("http", "ws")
+    version = [f"viser-v{viser.__version__}"]
+    with connect(address, subprotocols=version, max_size=None) as ours:
+        assert ours.recv(timeout=10)
+    with (
+        connect(address, subprotocols=version, origin="https://elsewhere.example") as foreign,
+        pytest.raises(ConnectionClosed),
+    ):
+        foreign.recv(timeout=10)
+
+
+def test_the_address_of_the_client_build_is_a_plain_page(server):
+    with socket.create_connection(("127.0.0.1", server.get_port()), timeout=10) as line:
+        line.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+        assert line.recv(20).startswith(b"HTTP/1.1 200")

@@ -1,0 +1,108 @@
+"""Laws of the state, without a server."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from softreach import designs
+from softreach.errors import InvalidDesign, InvalidInput
+from softreach.studio.state import (
+    LEVELS,
+    Appearance,
+    Camera,
+    Slice,
+    StudioState,
+    Work,
+    what_follows,
+)
+from tests.laws import arms
+
+numbers = st.floats(-3, 3)
+vectors = st.tuples(numbers, numbers, numbers)
+
+
+@st.composite
+def states(draw: st.DrawFn) -> StudioState:
+    axis = draw(st.sampled_from(["none", "x", "y", "z"]))
+    look = Appearance(
+        level=draw(st.sampled_from(LEVELS)),
+        color=draw(st.sampled_from(["rgb", "bundle 0", "multiplicity"])),
+        slice=Slice(axis=axis, center=draw(numbers), thickness=draw(st.floats(0.01, 1))),
+        surface=draw(st.booleans()),
+        trail=draw(st.booleans()),
+    )
+    return StudioState(
+        design=draw(arms()),
+        activation=tuple(draw(st.lists(numbers, max_size=4))),
+        appearance=look,
+        target=draw(st.none() | vectors),
+        reference=draw(st.none() | st.just(designs.redundant_trunk())),
+        side_by_side=draw(st.booleans()),
+        camera=draw(st.none() | st.builds(Camera, position=vectors, look_at=vectors)),
+    )
+
+
+@given(states())
+def test_a_state_comes_back_from_its_text(state):
+    assert StudioState.from_json(state.to_json()) == state
+
+
+@given(states())
+def test_activations_stay_within_the_bounds_whatever_the_design(state):
+    low, high = state.design.bounds.T
+    gamma = np.array(state.activation)
+    assert gamma.shape == (state.design.bundles,)
+    assert ((low <= gamma) & (gamma <= high)).all()
+
+
+@given(states())
+def test_nothing_follows_from_no_change_and_all_from_a_first_state(state):
+    assert what_follows(state, state) == frozenset()
+    assert what_follows(None, state) == frozenset(Work)
+
+
+def test_each_change_makes_stale_what_depends_on_it(trunk):
+    state = StudioState(design=trunk)
+    changes = {
+        state.replace(activation=(-1.0, 0.0, 0.0)): {Work.ARM},
+        state.showing(color="multiplicity"): {Work.CLOUD},
+        state.showing(surface=True): {Work.SURFACES},
+        state.replace(target=(0.1, 0.0, 0.8)): {Work.INVERSE},
+        state.replace(reference=trunk): {Work.REFERENCE},
+        state.replace(design=trunk.replace(taper=0.01)): {Work.REACH, Work.ARM, Work.INVERSE},
+        state.replace(camera=Camera(position=(1, 1, 1), look_at=(0, 0, 0))): set(),
+    }
+    for changed, works in changes.items():
+        assert what_follows(state, changed) == works
+
+
+def test_a_design_with_other_bundles_keeps_the_activations_that_it_can(trunk):
+    state = StudioState(design=trunk, activation=(-1.0, -0.5, -0.2))
+    more = state.replace(design=designs.redundant_trunk())
+    assert more.activation == (-1.0, -0.5, -0.2, 0.0)
+    narrow = state.replace(design=trunk.replace(activation_bounds=(-0.4, -0.1)))
+    assert narrow.activation == (-0.4, -0.4, -0.2)
+
+
+def test_other_texts_are_refused(trunk):
+    good = json.loads(StudioState(design=trunk).to_json())
+    for text in ("", "[]", "{}", json.dumps(good | {"softreach_studio": 99})):
+        with pytest.raises(InvalidInput, match="state file"):
+            StudioState.from_json(text)
+    with pytest.raises(InvalidInput, match="state file"):
+        StudioState.from_json(json.dumps(good | {"target": [1, 2]}))
+    with pytest.raises(InvalidInput, match="level"):
+        StudioState.from_json(json.dumps(good | {"appearance": good["appearance"] | {"level": 40}}))
+    bad = good["design"].replace("taper_deg = 2.0", "taper_deg = 50.0")
+    with pytest.raises(InvalidDesign, match="leaves no tip"):
+        StudioState.from_json(json.dumps(good | {"design": bad}))
+
+
+def test_activations_must_be_numbers(trunk):
+    with pytest.raises(InvalidInput, match="finite"):
+        StudioState(design=trunk, activation=(np.nan, 0.0, 0.0))
