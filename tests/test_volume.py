@@ -51,13 +51,20 @@ def test_the_hull_states_what_it_was_made_of():
 
 
 def test_labelled_tips_have_a_default_radius_of_a_twentieth_of_the_length(tips):
-    labelled, plain = concave_hull(tips), concave_hull(tips.values, alpha=0.05)
+    with pytest.warns(SoftreachWarning, match="mean spacings"):
+        labelled, plain = concave_hull(tips), concave_hull(tips.values, alpha=0.05)
     assert labelled.alpha == 0.05
     assert labelled.volume == plain.volume
 
 
 def test_labelled_tips_may_have_their_axes_in_either_order(tips):
     assert concave_hull(tips.T, 0.2).volume == concave_hull(tips, 0.2).volume
+
+
+def test_a_shape_that_has_fallen_apart_is_warned_of(tips):
+    with pytest.warns(SoftreachWarning, match="below 3 the shape has holes"):
+        hull = concave_hull(tips, 1e-3)
+    assert hull.volume < 1e-3
 
 
 def test_points_without_a_length_need_a_radius():

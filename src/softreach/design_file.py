@@ -207,7 +207,9 @@ def _degrees_text(angle: float) -> str:
     degrees = Decimal(angle) * 180 / _PI
     texts = (f"{degrees:.{digits}g}" for digits in range(1, 26))
     text = next((text for text in texts if _radians(text) == angle), repr(math.degrees(angle)))
-    return text if "." in text or "e" in text else f"{text}.0"
+    exponent = math.log10(abs(angle)) if angle else 0.0
+    plain = f"{Decimal(text):f}" if -6 < exponent < 16 else text
+    return plain if "." in plain or "e" in plain else f"{plain}.0"
 
 
 def _in_file_terms(fault: Fault, prefix: str) -> Fault:

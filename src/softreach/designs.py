@@ -97,9 +97,15 @@ def varied(
             longitudinal ones stay longitudinal. None keeps what there is.
         taper: φ [rad]; the revolutions stay what they are, the helical angles follow.
     """
-    wanted = [abs(revolution) if revolution is not None else abs(turn) for turn in arm.revolutions]
-    fibers = tuple(
-        fiber.replace(revolution=math.copysign(size, turn)) if turn else fiber
-        for fiber, turn, size in zip(arm.fibers, arm.revolutions.tolist(), wanted, strict=True)
-    )
+    turns = zip(arm.fibers, arm.revolutions.tolist(), strict=True)
+    fibers = tuple(_wound(fiber, turn, revolution) for fiber, turn in turns)
     return arm.replace(fibers=fibers, taper=arm.taper if taper is None else taper)
+
+
+def _wound(fiber: FiberArchitecture, turn: float, revolution: float | None) -> FiberArchitecture:
+    """The fiber with its revolution stated, as it is or with another size."""
+    if turn == 0:
+        return fiber
+    if revolution is None:
+        return fiber if fiber.revolution is not None else fiber.replace(revolution=turn)
+    return fiber.replace(revolution=math.copysign(revolution, turn))

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from softreach.errors import InvalidInput, SoftreachWarning
 from softreach.geometry import hull as hulls
@@ -69,7 +70,7 @@ def concave_hull(
     radius = _radius(alpha, points)
     shape = _alpha_complex(positions, method)
     hull = shape.hull(shape.critical_alpha() if radius == "critical" else float(radius))
-    _warn_if_fine(hull)
+    _warn_if_fine(hull, float(shape.volumes.sum()))
     return _corrected(hull, positions, method) if bias else hull
 
 
@@ -115,12 +116,12 @@ def unreachability(
     if convex == 0.0:
         raise InvalidInput("points", "a cloud of volume 0", "spread in all three directions")
     hull = shape.hull(shape.critical_alpha() if radius == "critical" else float(radius))
-    _warn_if_fine(hull)
+    _warn_if_fine(hull, convex)
     return 1.0 - hull.volume / convex
 
 
 def volume_curve(
-    points: np.ndarray | xr.DataArray, alphas: np.ndarray, *, method: Method = "auto"
+    points: np.ndarray | xr.DataArray, alphas: ArrayLike, *, method: Method = "auto"
 ) -> np.ndarray:
     """Volumes of the alpha shapes of many radii, from one triangulation.
 
@@ -177,22 +178,28 @@ def _alpha_complex(positions: np.ndarray, method: Method) -> AlphaComplex:
     return AlphaComplex(triangulation=delaunay(positions, method))
 
 
-def _warn_if_fine(hull: Hull) -> None:
-    """Say so if the radius is too small for the density of the points."""
-    if hull.alpha < SPACINGS * hull.spacing:
+def _warn_if_fine(hull: Hull, convex_volume: float) -> None:
+    """Say so if the radius is too small for the density of the points.
+
+    A shape that has fallen apart has hardly any volume, hence no spacing of its own to judge by:
+    the convex hull bounds it from below, for clouds that fill a fifth of their hull or more.
+    """
+    sparse = 0.6 * float(np.cbrt(convex_volume / max(hull.n, 1)))
+    if hull.alpha < SPACINGS * max(hull.spacing, sparse):
+        spacing = max(hull.spacing, sparse)
         warnings.warn(
-            f"alpha = {_in_spacings(hull)}: below {SPACINGS:g} the shape has holes between points "
+            f"alpha = {_in_spacings(hull, spacing)}: below {SPACINGS:g} the shape has holes between points "
             "and its volume is too small; use more points or a larger alpha",
             SoftreachWarning,
             stacklevel=3,
         )
 
 
-def _in_spacings(hull: Hull) -> str:
+def _in_spacings(hull: Hull, spacing: float) -> str:
     """The radius of a hull beside the mean spacing of its points."""
     return (
-        f"{hull.alpha:.4g} m is {hull.alpha / hull.spacing:.2g} mean spacings of "
-        f"{hull.n} points ({hull.spacing:.4g} m)"
+        f"{hull.alpha:.4g} m is {hull.alpha / spacing:.2g} mean spacings of "
+        f"{hull.n} points ({spacing:.4g} m)"
     )
 
 
@@ -205,7 +212,7 @@ def _corrected(hull: Hull, positions: np.ndarray, method: Method) -> Hull:
     quarter = _alpha_complex(positions[np.sort(pick)], method).hull(hull.alpha)
     if quarter.alpha < QUARTER_SPACINGS * quarter.spacing:
         warnings.warn(
-            f"no estimate of the bias: alpha = {_in_spacings(quarter)}, a quarter of the cloud; "
+            f"no estimate of the bias: alpha = {_in_spacings(quarter, quarter.spacing)}, a quarter of the cloud; "
             f"below {QUARTER_SPACINGS:g} the law N^-1/2 fails; use more points or a larger alpha",
             SoftreachWarning,
             stacklevel=3,

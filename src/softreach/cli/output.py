@@ -34,7 +34,7 @@ _SUFFIX = {"m": "_m", "m³": "_m3", "L³": "_L3", "L": "_L", "deg": "_deg", "%":
 
 
 def _key(name: str, unit: str) -> str:
-    plain = name.lower().replace(" ", "_").replace("/", "_per_").replace("(", "").replace(")", "")
+    plain = name.replace(" ", "_").replace("/", "_per_").replace("(", "").replace(")", "")
     return plain + _SUFFIX.get(unit, "")
 
 

@@ -38,7 +38,9 @@ def volume(
 
     cloud = cloud_of(source, n, seed, sampler)
     length = float(cloud.tip.attrs["length"])
-    concave = concave_hull(cloud.tip, radius_of(alpha, length), bias=True)
+    concave = concave_hull(
+        cloud.tip, radius_of(alpha, length), bias=cloud.attrs["sampler"] == "uniform"
+    )
     report(f"volume of {source}", volume_rows(concave, convex_hull(cloud.tip), length), json)
     if hull is not None:
         from softreach.export import export_mesh
