@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from softreach import parallel
 from softreach.errors import InvalidInput
 from softreach.geometry.delaunay import finite_points
-from softreach.kernels.neighbors import PLACE_BITS, neighbor_sums, sort_keys, window_keys
+from softreach.kernels.neighbors import (
+    PLACE_BITS,
+    SHIFTS,
+    find_windows,
+    neighbor_sums,
+    sort_keys,
+    window_keys,
+)
 
 __all__ = ["mean_value_distance"]
 
@@ -136,10 +143,14 @@ def _means(
 
 def _sums(cloud: _Sample, columns: _Columns, queries: _Sample, part: slice) -> tuple[Array, Array]:
     """Sum of ‖v_j - v_i‖ over each query's ball, itself included, and the number of points."""
-    windows = columns.windows(queries.keys[part], queries.points[2, part])
-    total, count = np.zeros(windows.shape)
-    add = neighbor_sums(len(cloud.values))
-    add(*cloud, *queries[1:], part.start, *windows, columns.reach**2, total, count)
+    first, last = columns.windows(queries.keys[part], queries.points[2, part])
+    places, amounts = queries.points[:, part].T.copy(), queries.values[:, part].T.copy()
+    start, stop = np.empty((2, len(first)), np.int64)
+    total, count = np.zeros((2, len(first)))
+    add, square = neighbor_sums(len(cloud.values)), columns.reach**2
+    for shift in SHIFTS:
+        find_windows(cloud.keys, first + shift, last + shift, start, stop)
+        add(cloud.points, cloud.values, places, amounts, start, stop, square, total, count)
     return total, count
 
 
@@ -150,7 +161,10 @@ def _corners(points: Array) -> tuple[Array, Array]:
 
 def _taken(components: Array, order: Index) -> Array:
     """Each component in another order, contiguous."""
-    return np.stack([component[order] for component in components])
+    taken = np.empty((len(components), len(order)))
+    for source, target in zip(components, taken, strict=True):
+        np.take(source, order, out=target, mode="clip")  # "raise" would buffer the output
+    return taken
 
 
 def _finite_values(values: object, n: int) -> Array:

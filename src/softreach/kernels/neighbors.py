@@ -14,13 +14,15 @@ from functools import cache
 import numpy as np
 from numba import njit
 
-from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.compiler import kernel
 
-__all__ = ["PLACE_BITS", "neighbor_sums", "sort_keys", "window_keys"]
+__all__ = ["PLACE_BITS", "SHIFTS", "find_windows", "neighbor_sums", "sort_keys", "window_keys"]
 
 PLACE_BITS = 21  # of each of the three parts of a key
 _ROW = 1 << 2 * PLACE_BITS
 _COLUMN = 1 << PLACE_BITS
+SHIFTS = tuple(row * _ROW + column * _COLUMN for row in (-1, 0, 1) for column in (-1, 0, 1))
+"""What takes a key to the same place in each of the nine columns around."""
 
 # keys must not be reassociated: no neighbor is missed because their rounding is monotone
 _exact = njit(cache=True, nogil=True, error_model="numpy")
@@ -86,67 +88,60 @@ def _first_at_least(keys, start, wanted):
     return low
 
 
-def _window_sum(m):
-    """The loop over the points of one window, for values of m components.
+@_exact
+def find_windows(keys, first, last, start, stop):
+    """Where the windows of queries lie among the points.
+
+    Args:
+        keys: Keys of all points in increasing order, shape (n,).
+        first: Least key of each window, in increasing order, shape (q,).
+        last: Largest key of each, in increasing order, shape (q,).
+        start: Filled with the index of the first point of each, shape (q,).
+        stop: Filled with the index behind its last one, shape (q,).
+    """
+    begin = end = 0
+    for i in range(len(first)):
+        begin = _first_at_least(keys, begin, first[i])
+        end = _first_at_least(keys, max(begin, end), last[i] + 1)
+        start[i], stop[i] = begin, end
+
+
+@cache
+def neighbor_sums(m):
+    """The kernel that adds up |value difference| over neighbors, for values of m components.
 
     m is a constant of the machine code, so that the loop over components unrolls inside the one
     over points, which then uses the vector unit.
     """
 
-    @inline
-    def window_sum(points, values, start, stop, position, value, square):
-        total, count = 0.0, 0.0
-        x, y, z = position
-        for j in range(np.uint64(start), np.uint64(stop)):  # unsigned: no test for negative ones
-            dx, dy, dz = points[0, j] - x, points[1, j] - y, points[2, j] - z
-            near = dx * dx + dy * dy + dz * dz <= square
-            distance = 0.0
-            for k in range(m):
-                difference = values[k, j] - value[k]
-                distance += difference * difference
-            total += np.sqrt(distance) if near else 0.0
-            count += 1.0 if near else 0.0
-        return total, count
-
-    return window_sum
-
-
-@cache
-def neighbor_sums(m):
-    """The kernel that adds up |value difference| over neighbors, for values of m components."""
-    window_sum = _window_sum(m)
-
     @kernel
-    def sums(keys, points, values, places, amounts, begin, first, last, square, total, count):
-        """Add up |value difference| over the neighbors of some queries, each itself included.
+    def sums(points, values, places, amounts, start, stop, square, total, count):
+        """Add up |value difference| over the points of each query's window within the ball.
 
         Args:
-            keys: Keys of all points in increasing order, shape (n,).
-            points: Their positions, shape (3, n).
+            points: Positions of all points in the order of their keys, shape (3, n).
             values: Their values, shape (m, n).
-            places: Positions of the queries in the order of their keys, shape (3, q).
-            amounts: Their values, shape (m, q).
-            begin: The first query to be evaluated.
-            first: Least key of each window in the query's own column, shape (evaluated,).
-            last: Largest key of it, shape (evaluated,).
+            places: Positions of the queries, shape (q, 3).
+            amounts: Their values, shape (q, m).
+            start: Index of the first point of each window, shape (q,).
+            stop: Index behind its last one, shape (q,).
             square: Squared radius of the closed ball.
-            total: Added to, shape (evaluated,).
-            count: Number of points in the ball, added to, shape (evaluated,).
+            total: Added to, shape (q,).
+            count: Number of points in the ball, added to, shape (q,).
         """
-        value = np.empty(m)
-        for neighbor in range(9):
-            shift = (neighbor // 3 - 1) * _ROW + (neighbor % 3 - 1) * _COLUMN
-            start = stop = 0
-            for i in range(len(first)):
-                start = _first_at_least(keys, start, first[i] + shift)
-                stop = _first_at_least(keys, max(start, stop), last[i] + shift + 1)
-                if start < stop:
-                    q = begin + i
-                    for k in range(m):
-                        value[k] = amounts[k, q]
-                    place = places[0, q], places[1, q], places[2, q]
-                    found = window_sum(points, values, start, stop, place, value, square)
-                    total[i] += found[0]
-                    count[i] += found[1]
+        for i in range(len(start)):
+            x, y, z = places[i, 0], places[i, 1], places[i, 2]
+            apart, others = 0.0, 0.0
+            for j in range(np.uint64(start[i]), np.uint64(stop[i])):  # no test for negative ones
+                dx, dy, dz = points[0, j] - x, points[1, j] - y, points[2, j] - z
+                near = dx * dx + dy * dy + dz * dz <= square
+                distance = 0.0
+                for k in range(m):
+                    difference = values[k, j] - amounts[i, k]
+                    distance += difference * difference
+                apart += np.sqrt(distance) if near else 0.0
+                others += 1.0 if near else 0.0
+            total[i] += apart
+            count[i] += others
 
     return sums
