@@ -68,6 +68,13 @@ def whole(tmp_path_factory) -> xr.Dataset:
     return build16(tmp_path_factory.mktemp("atlas") / "whole.zarr").load()
 
 
+def assert_same(found: xr.Dataset, truth: xr.Dataset) -> None:
+    """Value for value; threaded BLAS leaves the last digits of the exact volumes open."""
+    exact = [name for name in truth.data_vars if name.startswith(("exact", "multi", "fold"))]
+    xr.testing.assert_identical(found.drop_vars(exact), truth.drop_vars(exact))
+    xr.testing.assert_allclose(found[exact], truth[exact], rtol=1e-9)
+
+
 def small_space(**more) -> DesignSpace:
     tapers = np.radians([0.0, 2.0])
     return DesignSpace.grid(sr.designs.minimal_trunk(), revolution=[0.5, 1.5], taper=tapers, **more)
@@ -263,7 +270,7 @@ def test_three_kills_leave_the_same_numbers_as_no_kill(whole, tmp_path):
         assert process.returncode == -signal.SIGKILL
         assert done < atlas_status(store).done < 16
         done = atlas_status(store).done
-    xr.testing.assert_identical(build16(store).load(), whole)
+    assert_same(build16(store).load(), whole)
 
 
 def test_a_store_that_was_killed_while_being_created_is_completed(tmp_path, monkeypatch):
@@ -420,7 +427,7 @@ def test_shards_share_a_store_and_together_make_the_whole(whole, tmp_path):
     store = tmp_path / "a.zarr"
     part = build16(store, shard=(0, 2))
     assert int(part.volume.notnull().sum()) == 8
-    xr.testing.assert_identical(build16(store, shard=(1, 2)).load(), whole)
+    assert_same(build16(store, shard=(1, 2)).load(), whole)
     with pytest.raises(InvalidInput, match="shard = 2/2"):
         build16(store, shard=(2, 2))
 
@@ -431,12 +438,12 @@ def test_shards_may_start_at_the_same_moment(whole, tmp_path):
     body = "build(sys.argv[1], shard=(int(sys.argv[2]), 2))"
     tasks = [run_script(tmp_path, body, str(store), str(k)) for k in range(2)]
     assert [task.communicate()[1] for task in tasks] == ["", ""]
-    xr.testing.assert_identical(open_atlas(store).load(), whole)
+    assert_same(open_atlas(store).load(), whole)
 
 
 def test_an_executor_of_threads_gives_the_same_numbers(whole, tmp_path):
     with ThreadPoolExecutor(2) as pool:
-        xr.testing.assert_identical(build16(tmp_path / "a.zarr", executor=pool).load(), whole)
+        assert_same(build16(tmp_path / "a.zarr", executor=pool).load(), whole)
 
 
 # Workers import the script too, so this is what they run.
@@ -469,7 +476,7 @@ def test_worker_processes_survive_the_death_of_one(whole, tmp_path):
     """
     assert run_script(tmp_path, deadly(body), str(store)).communicate() == (None, "")
     assert (tmp_path / "task.died").exists()
-    xr.testing.assert_identical(open_atlas(store).load(), whole)
+    assert_same(open_atlas(store).load(), whole)
 
 
 @pytest.mark.slow
@@ -502,7 +509,7 @@ def test_dask_workers_survive_the_death_of_one(whole, tmp_path):
     process.communicate()
     assert process.returncode == 0
     assert (tmp_path / "task.died").exists()
-    xr.testing.assert_identical(open_atlas(store).load(), whole)
+    assert_same(open_atlas(store).load(), whole)
 
 
 def test_what_is_no_executor_is_refused(tmp_path):

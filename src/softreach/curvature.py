@@ -114,16 +114,24 @@ def distal_stations(arm: Manipulator, count: int = 6) -> Array:
 
 
 def _bending(table: Actuation, k: int, gamma: Array) -> Array:
-    u1, u2 = table.curvature[k, :2] @ gamma.T
+    u1, u2 = (_response(gamma, row) for row in table.curvature[k, :2])
     return np.hypot(u1, u2)
 
 
 def _torsion(table: Actuation, k: int, gamma: Array) -> Array:
-    return gamma @ table.curvature[k, 2]
+    return _response(gamma, table.curvature[k, 2])
 
 
 def _extension(table: Actuation, k: int, gamma: Array) -> Array:
-    return 1.0 + gamma @ table.extension[k]
+    return 1.0 + _response(gamma, table.extension[k])
+
+
+def _response(gamma: Array, row: Array) -> Array:
+    """Σ_j row_j γ_j, in one order whatever BLAS and its threads would do."""
+    total = gamma[:, 0] * row[0]
+    for j in range(1, len(row)):
+        total += gamma[:, j] * row[j]
+    return total
 
 
 _VALUES: dict[str, Callable[[Actuation, int, Array], Array]] = {
@@ -182,7 +190,7 @@ class _Tally:
         self.extremes[k] = min(low, values.min()), max(high, values.max())
         # About the lower end, so that a narrow range far from zero loses no digits.
         shifted = values - self.low[k]
-        self.moments[k] += shifted.sum(), shifted @ shifted
+        self.moments[k] += shifted.sum(), (shifted * shifted).sum()
 
     @property
     def edges(self) -> Array:

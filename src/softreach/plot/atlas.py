@@ -82,9 +82,9 @@ def plot_corners(
     sides = ((azimuth, elevation), (azimuth + np.pi, elevation))
     with figure_style():
         column = width / len(clouds)
-        figure = pyplot().figure(figsize=(width, 2 * column + 0.4))
+        figure = pyplot().figure(figsize=(width, 2 * column + 0.5))
         panels = figure.subplots(2, len(clouds), squeeze=False)
-        figure.subplots_adjust(0.05, 0.08, 0.99, 0.86, wspace=0.30, hspace=0.25)
+        figure.subplots_adjust(0.08, 0.11, 0.965, 0.86, wspace=0.45, hspace=0.34)
         for k, (title, cloud) in enumerate(clouds):
             panels[0, k].set_title(f"({k + 1})  {title}", pad=4)
             for ax, side in zip(panels[:, k], sides, strict=True):

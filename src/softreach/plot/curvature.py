@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 _COLORS = ("#2f6db5", "#e8a020")  # the paper's blue and yellow
 _LABELS = {"bending": "κL", "torsion": "$u_3 L$", "extension": "ζ"}
-_BINS = 96
+_BINS = 64
 
 
 def plot_curvature(

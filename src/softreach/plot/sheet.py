@@ -63,7 +63,7 @@ def plot_cloud_sheet(
         for (row, column), ax in np.ndenumerate(panels):
             if (cloud := cloud_at(column, row)) is not None:
                 _draw_cloud(ax, cloud, box, view)
-        _draw_scale(panels[0, 0], view)
+        _draw_scale(figure, panels[0, 0], view)
     return figure
 
 
@@ -92,10 +92,10 @@ def plot_hull_sheet(
         figure, panels = _sheet(across, up, box, view, width)
         for (row, column), ax in np.ndenumerate(panels):
             if (hull := hull_at(column, row)) is not None:
-                buffer = ZBuffer(view_extent(box, view), _columns(ax), oversample=3, color_step=4)
+                buffer = ZBuffer(_panel_extent(box, view), _columns(ax), oversample=3, color_step=4)
                 draw_mesh(buffer, np.asarray(hull.vertices) / length, hull.faces, _STEEL, view)
                 _show(ax, buffer)
-        _draw_scale(panels[0, 0], view)
+        _draw_scale(figure, panels[0, 0], view)
     return figure
 
 
@@ -103,7 +103,7 @@ def _sheet(
     across: SheetAxis, up: SheetAxis, box: Array, view: View, width: float
 ) -> tuple[Figure, Grid]:
     """A figure and its panels, the first row at the bottom, each as wide as the box."""
-    extent = view_extent(box, view)
+    extent = _panel_extent(box, view)
     aspect = (extent.top - extent.bottom) / (extent.right - extent.left)
     columns, rows = len(across.values), len(up.values)
     size = np.array([1.0, aspect]) * (width - _LEFT) / columns
@@ -151,7 +151,7 @@ def _columns(ax: Axes) -> int:
 
 
 def _draw_cloud(ax: Axes, cloud: xr.Dataset, box: Array, view: View) -> None:
-    extent, columns = view_extent(box, view), _columns(ax)
+    extent, columns = _panel_extent(box, view), _columns(ax)
     tips = tips_in_lengths(cloud)
     pixels = point_size(len(tips), box) * columns / (extent.right - extent.left)
     buffer = ZBuffer(extent, columns, oversample=2, color_step=8)
@@ -165,19 +165,39 @@ def _show(ax: Axes, buffer: ZBuffer) -> None:
     ax.imshow(buffer.rgba(), extent=buffer.extent, interpolation="none", aspect="auto")
 
 
-def _draw_scale(ax: Axes, view: View) -> None:
-    """A bar of half a length and the directions of x, y and z, in the corner of a panel."""
-    left, right = ax.get_xlim()
-    bottom, top = ax.get_ylim()
-    start = np.array([left + 0.08 * (right - left), bottom + 0.07 * (top - bottom)])
-    ax.plot([start[0], start[0] + 0.5], [start[1]] * 2, color="0.2", lw=1.2, solid_capstyle="butt")
-    ax.text(start[0] + 0.55, start[1], "$L/2$", fontsize=6, va="center")
-    center = np.array([left + 0.2 * (right - left), bottom + 0.25 * (top - bottom)])
+def _draw_scale(figure: Figure, panel: Axes, view: View) -> None:
+    """A bar of half a length and the directions of x, y and z, in the margin of the sheet."""
+    width, height = figure.get_size_inches()
+    ax = figure.add_axes((0.04 / width, 0.02 / height, _LEFT / width, (_BOTTOM - 0.1) / height))
+    left, right = panel.get_xlim()
+    inch = (right - left) / (panel.get_position().width * width)  # in L
+    ax.set(xlim=(0, _LEFT * inch), ylim=(0, (_BOTTOM - 0.1) * inch))
+    ax.set_axis_off()
+    start, center = 0.08 * inch, np.array([0.22, 0.27]) * inch
+    ax.plot([start, start + 0.5], [start] * 2, color="0.2", lw=1.2, solid_capstyle="butt")
+    ax.text(start + 0.5 + 0.04 * inch, start, "$L/2$", fontsize=6, va="center")
     for name, direction in zip("xyz", view_axes(view)[:2].T, strict=True):
-        tip = center + 0.25 * direction
+        x, y = center + 0.15 * inch * direction
         arrow = {"arrowstyle": "-|>,head_width=0.1,head_length=0.2", "lw": 0.6, "shrinkA": 0}
-        ax.annotate(
-            "", tuple(tip), tuple(center), arrowprops=arrow | {"color": "0.2", "shrinkB": 0}
-        )
-        x, y = center + 0.36 * direction
+        ax.annotate("", (x, y), tuple(center), arrowprops=arrow | {"color": "0.2", "shrinkB": 0})
+        x, y = center + 0.21 * inch * direction
         ax.text(x, y, name, fontsize=6, ha="center", va="center")
+
+
+def _panel_extent(box: Array, view: View) -> Extent:
+    """What a panel shows: tighter than a box in space, whose corners are empty.
+
+    The ellipsoid in the box reaches √Σ(hᵢ eᵢ)² along a unit vector e; a fifth more leaves room for
+    clouds that bulge beyond it.
+    """
+    middle, half = box.mean(axis=0), np.ptp(box, axis=0) / 2
+    whole = view_extent(box, view)
+    axes = view_axes(view)[:2]
+    x, y = axes @ middle
+    w, h = 1.2 * np.linalg.norm(axes * half, axis=1)
+    return Extent(
+        max(whole.left, x - w),
+        min(whole.right, x + w),
+        max(whole.bottom, y - h),
+        min(whole.top, y + h),
+    )
