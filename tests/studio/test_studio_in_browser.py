@@ -61,7 +61,7 @@ def test_a_click_on_a_point_of_the_cloud_finds_activations_that_reach_it(tab):
     assert np.linalg.norm(cloud.tip.values - target, axis=1).min() == 0.0
     tip = sr.tip_positions(state.design, [state.activation])[0]
     assert np.linalg.norm(tip - target) < 1e-6 * state.design.length
-    tab.page.get_by_text("reach (").wait_for()
+    tab.page.get_by_text("activation").filter(has_text="to ").first.wait_for()
 
 
 def test_a_target_out_of_reach_shows_the_gap(tab):
@@ -94,7 +94,9 @@ def test_a_saved_state_comes_back(tab, tmp_path):
     assert json.loads(file.read_text())["softreach_studio"] == 1
     design = tab.save("Save design (TOML)", tmp_path)
     assert tomllib.loads(design.read_text())["length_m"] == 1.0
-    tab.session.update(lambda s: StudioState(design=sr.designs.redundant_trunk()))
+    tab.session.update(
+        lambda s: StudioState(design=sr.designs.minimal_trunk(1.0)).showing(level=14)
+    )
     tab.settle()
     tab.load(file)
     tab.wait(lambda: tab.session.state.design == kept.design, "the design is back")

@@ -12,7 +12,7 @@ __all__ = ["AxesBox", "axes_box"]
 Array = NDArray[np.float64]
 
 _TICK = 0.02  # length of a tick, of the largest side
-_MOST = 7  # ticks along the longest edge
+_MOST = 8  # ticks along the longest edge
 
 
 class AxesBox(NamedTuple):

@@ -44,6 +44,7 @@ def start_server(host: str = LOOPBACK, port: int | None = None) -> ViserServer:
     # Shadows and a mirrored room cost seconds where no graphics card helps, and say nothing.
     server.scene.configure_environment_map(None)
     server.scene.configure_default_lights(cast_shadow=False)
+    server.scene.add_light_ambient("/light", intensity=1.6)
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
     server.gui.main_panel.dock_right()
     return server

@@ -62,6 +62,8 @@ class Session:
         self.trail: list[Array] = []
         self.answer: Solution | None = None
         self.note = ""
+        self.revision = 0
+        """Number of changes that widgets have to follow."""
         self._aiming = False
         self._changing, self._drawing, self._showing = (threading.RLock() for _ in range(3))
         self._workers = {work: Latest(self._failed) for work in Work}
@@ -71,8 +73,15 @@ class Session:
         self._follow(what_follows(None, self.state))
         self.show()
 
-    def update(self, change: Callable[[StudioState], StudioState]) -> None:
+    def update(
+        self, change: Callable[[StudioState], StudioState], *, by_widget: bool = False
+    ) -> None:
         """Replace the state, and start what follows from that.
+
+        Args:
+            change: From the present state to the next.
+            by_widget: Whether the widgets show the change already. They are left alone then: one
+                that is being dragged would be thrown back to where it was a moment ago.
 
         Raises:
             SoftreachError: The change makes no valid state; nothing happens then.
@@ -80,6 +89,7 @@ class Session:
         with self._changing:
             old, self.state, self.note = self.state, change(self.state), ""
             new = self.state
+            self.revision += not by_widget
         self._follow(what_follows(old, new))
         self.show()
 

@@ -26,6 +26,7 @@ class ActivationPanel:
         self._lock = threading.RLock()
         self._sliders: list[Any] = []
         self._made_for: Any = None
+        self._revision = -1
         with tab:
             self._tip = gui.add_markdown("")
             self._folder = gui.add_folder("activation γ")
@@ -39,9 +40,11 @@ class ActivationPanel:
         with self._lock:
             if _slider_ends(session.state.design) != self._made_for:
                 self._build(session)
-            for slider, value in zip(self._sliders, session.state.activation, strict=False):
-                slider.value = value
-        self._trail.value = session.state.appearance.trail
+            elif session.revision != self._revision:
+                for slider, value in zip(self._sliders, session.state.activation, strict=False):
+                    slider.value = value
+                self._trail.value = session.state.appearance.trail
+            self._revision = session.revision
         if session.tip is not None:
             x, y, z = session.tip
             self._tip.content = f"tip at ({x:.6f}, {y:.6f}, {z:.6f}) L"

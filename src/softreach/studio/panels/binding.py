@@ -23,7 +23,7 @@ def bind(widget: Any, session: Session, change: Callable[[StudioState, Any], Stu
 
     def moved(event: Any) -> None:
         if event.client_id is not None:
-            told(session, lambda: session.update(lambda state: change(state, widget.value)))
+            told(session, lambda: session.update(lambda s: change(s, widget.value), by_widget=True))
 
     widget.on_update(moved)
 

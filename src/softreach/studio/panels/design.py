@@ -97,6 +97,7 @@ class DesignPanel:
         self._rows: list[_Row] = []
         self._base: Manipulator | None = None
         self._made: Manipulator | None = None
+        self._complaining, self._revision = False, -1
         with tab:
             self._folder = gui.add_folder("design")
             with gui.add_folder("compare"):
@@ -110,7 +111,10 @@ class DesignPanel:
     def show(self, session: Session) -> None:
         """Build the sliders anew for a design that they did not make."""
         with self._lock:
-            if session.state.design != self._made:
+            if session.revision == self._revision:
+                return
+            self._revision = session.revision
+            if session.state.design != self._made or self._complaining:
                 self._build(session.state.design)
         self._beside.value = session.state.side_by_side
 
@@ -119,6 +123,7 @@ class DesignPanel:
             row.slider.remove()
             row.message.remove()
         self._base = self._made = arm
+        self._complaining = False
         with self._folder:
             self._rows = [self._row(control) for control in controls(arm)]
 
@@ -142,7 +147,7 @@ class DesignPanel:
                 return
             self._complain(name, "")
             made = self._made
-        self._session.update(lambda s: s.replace(design=made))
+        self._session.update(lambda s: s.replace(design=made), by_widget=True)
 
     def _values(self) -> dict[str, float]:
         """What differs from the base, which a slider may show rounded."""
@@ -150,6 +155,7 @@ class DesignPanel:
         return {row.control.name: row.slider.value * row.control.scale for row in moved}
 
     def _complain(self, name: str, text: str) -> None:
+        self._complaining = bool(text)
         for row in self._rows:
             mine = text if row.control.name == name else ""
             row.message.content, row.message.visible = _warning(mine), bool(mine)

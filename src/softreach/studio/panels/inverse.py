@@ -29,6 +29,7 @@ class InversePanel:
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
         """Add the widgets."""
         self._gui, self._session = gui, session
+        self._revision = -1
         self._shown: Solution | None = None
         self._buttons: list[Any] = []
         with tab:
@@ -44,7 +45,9 @@ class InversePanel:
 
     def show(self, session: Session) -> None:
         """List the solutions."""
-        self._ghosts.value = session.state.appearance.ghosts
+        if session.revision != self._revision:
+            self._revision = session.revision
+            self._ghosts.value = session.state.appearance.ghosts
         if session.answer is self._shown:
             return
         self._shown = answer = session.answer
@@ -93,9 +96,8 @@ def _told(answer: Solution, length: float) -> str:
         certain = "out of reach" if answer.status == 1 else "not reached, perhaps out of reach"
         near = _place(answer.nearest / length)
         return f"{place} is {certain}. Nearest: {near}, {answer.gap / length:.4g} L away."
-    rest = "" if len(answer) == 1 else "s"
-    worst = answer.residuals.max() / length
-    return f"{len(answer)} activation{rest} reach {place} to {worst:.1e} L."
+    count = "1 activation reaches" if len(answer) == 1 else f"{len(answer)} activations reach"
+    return f"{count} {place} to {answer.residuals.max() / length:.1e} L."
 
 
 def _place(point: Any) -> str:

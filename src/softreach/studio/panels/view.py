@@ -32,7 +32,7 @@ class ViewPanel:
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
         """Add the widgets."""
-        self._session = session
+        self._revision = -1
         look, names = session.state.appearance, color_names(session.state.design)
         with tab:
             self._color = gui.add_dropdown("color by", tuple(names.values()))
@@ -67,6 +67,9 @@ class ViewPanel:
         look, names = session.state.appearance, color_names(session.state.design)
         if self._color.options != tuple(names.values()):
             self._color.options = tuple(names.values())
+        if session.revision == self._revision:
+            return
+        self._revision = session.revision
         self._color.value = names.get(look.color, names["rgb"])
         self._count.value, self._size.value = _count(look), look.point_size
         for field, box in self._toggles.items():

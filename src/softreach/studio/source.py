@@ -1,0 +1,62 @@
+"""What the studio is opened on: a design, a stored cloud, or an atlas."""
+
+from __future__ import annotations
+
+import json
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from softreach.errors import InvalidInput
+from softreach.manipulator import Manipulator
+from softreach.studio.atlas_map import metric_names
+from softreach.studio.reach import Quality, reached
+from softreach.studio.session import Start
+from softreach.studio.state import StudioState
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["start_on_design", "start_on_store"]
+
+
+def start_on_design(arm: Manipulator, quality: Quality | None = None) -> Start:
+    """Begin with a design."""
+    return Start(state=StudioState(design=arm), quality=quality or Quality())
+
+
+def start_on_store(path: str | PathLike[str], quality: Quality | None = None) -> Start:
+    """Begin with a cloud that `save_cloud` wrote, or with the largest design of an atlas.
+
+    Raises:
+        InvalidInput: The store is neither, or the atlas holds no design yet.
+    """
+    quality = quality or Quality()
+    if not _is_atlas(Path(path)):
+        from softreach.cloud import open_cloud
+
+        reach = reached(open_cloud(path), quality)
+        return Start(state=StudioState(design=reach.arm), quality=quality, reach=reach)
+    from softreach.atlas import open_atlas
+
+    atlas = open_atlas(path)
+    return Start(state=StudioState(design=_best(atlas)), quality=quality, atlas=atlas)
+
+
+def _is_atlas(path: Path) -> bool:
+    """Whether the store holds the command of an atlas."""
+    try:
+        about = json.loads((path / "zarr.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        raise InvalidInput("store", str(path), "a Zarr store written by softreach") from None
+    return "command" in about.get("attributes", {})
+
+
+def _best(atlas: xr.Dataset) -> Manipulator:
+    from softreach.atlas import atlas_design, best_designs
+
+    best = best_designs(atlas, metric_names(atlas)[0])
+    dims = [str(dim) for dim in atlas["status"].dims]
+    if not best.sizes.get("rank"):
+        raise InvalidInput("atlas", "no design is done", "built, at least in part")
+    return atlas_design(atlas, **{dim: float(best[dim].values[0]) for dim in dims})

@@ -1,0 +1,104 @@
+"""What a tab is opened on and saved as."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from softreach import designs
+from softreach.atlas import DesignSpace, build_atlas, open_atlas
+from softreach.cloud import compute_cloud, save_cloud
+from softreach.errors import InvalidInput
+from softreach.studio.atlas_map import atlas_map, metric_names
+from softreach.studio.files import cloud_file, figure_file, state_from, surface_file
+from softreach.studio.page import static_page
+from softreach.studio.reach import Quality, stages
+from softreach.studio.source import start_on_design, start_on_store
+from softreach.studio.state import StudioState
+
+SMALL = Quality(coarse_level=8, fine_level=10, coarse_accuracy=0.1, fine_accuracy=0.05)
+
+
+@pytest.fixture(scope="module")
+def fine(trunk):
+    *_, last = stages(trunk, 10, SMALL, lambda: None)
+    return last
+
+
+@pytest.fixture(scope="module")
+def store(trunk, tmp_path_factory):
+    space = DesignSpace.grid(trunk, revolution=[0.5, 1.5, 2.5], taper=[0.0, 0.02])
+    path = tmp_path_factory.mktemp("atlas") / "atlas.zarr"
+    build_atlas(space, path, n=200, metrics=("convex",), report=lambda _: None)
+    return path
+
+
+def test_files_are_those_of_the_librarys_own_writers(fine):
+    state = StudioState(design=fine.arm).showing(level=14)
+    assert cloud_file(fine, ".ply").startswith(b"ply\n")
+    pytest.importorskip("trimesh")
+    assert surface_file(fine, ".ply").startswith(b"ply\n")
+    assert figure_file(fine, state).startswith(b"\x89PNG")
+
+
+def test_a_saved_page_holds_everything_itself(fine):
+    page = static_page(StudioState(design=fine.arm), fine)
+    assert f"{fine.volume:.4f}" in page
+    assert "taper_deg = 2.0" in page
+    assert '<script src="http' not in page
+    assert '<link href="http' not in page
+
+
+def test_a_design_file_changes_the_design_alone(trunk):
+    state = StudioState(design=trunk, target=(0.0, 0.1, 0.5))
+    other = trunk.replace(taper=0.01)
+    assert state_from("x.TOML", other.to_toml().encode(), state) == state.replace(design=other)
+    assert state_from("x.json", state.to_json().encode(), StudioState(design=other)) == state
+    with pytest.raises(InvalidInput, match="UTF-8"):
+        state_from("x.toml", b"\xff\xfe", state)
+
+
+def test_a_cloud_from_a_file_is_shown_as_it_is(trunk, tmp_path):
+    cloud = compute_cloud(trunk, 500)
+    save_cloud(cloud, tmp_path / "cloud.zarr")
+    start = start_on_store(tmp_path / "cloud.zarr", SMALL)
+    assert start.reach is not None
+    np.testing.assert_array_equal(start.reach.cloud.tip, cloud.tip)
+    assert start.state.design == trunk
+    with pytest.raises(InvalidInput, match="Zarr store"):
+        start_on_store(tmp_path / "nothing.zarr")
+
+
+def test_an_atlas_opens_on_its_largest_design(store):
+    start = start_on_store(store, SMALL)
+    atlas = open_atlas(store)
+    best = atlas.convex_volume.where(atlas.convex_volume == atlas.convex_volume.max(), drop=True)
+    assert start.state.design.taper == float(best.taper[0])
+    assert start.state.design.revolutions[1] == pytest.approx(float(best.revolution[0]))
+    assert start.atlas is not None
+
+
+def test_a_click_on_the_map_finds_the_design_that_was_drawn_there(store):
+    atlas = open_atlas(store)
+    shown = atlas_map(atlas, "convex_volume")
+    for revolution in atlas.revolution.values:
+        for taper in atlas.taper.values:
+            at = {"revolution": float(revolution), "taper": float(taper)}
+            assert shown.parameters_at(*shown.place_of(**at)) == at
+    assert shown.parameters_at(0.01, 0.5) is None
+    assert shown.image.shape == (640, 640, 3)
+    assert metric_names(atlas) == ["convex_volume"]
+
+
+def test_a_map_needs_two_parameters(trunk, tmp_path):
+    space = DesignSpace.grid(trunk, taper=[0.0, 0.02])
+    atlas = build_atlas(
+        space, tmp_path / "a.zarr", n=100, metrics=("convex",), report=lambda _: None
+    )
+    with pytest.raises(InvalidInput, match="two parameters"):
+        atlas_map(atlas, "convex_volume")
+
+
+def test_a_design_starts_at_rest():
+    start = start_on_design(designs.redundant_trunk())
+    assert start.state.activation == (0.0, 0.0, 0.0, 0.0)
