@@ -95,8 +95,8 @@ def row(revolution: float, taper: float, n: int) -> str:
 
 HEAD = """### Inverse: every branch, against least_squares from the nearest of 100,000 cloud points
 
-| Ω, φ | targets/s | CPU µs/target | branches | residual, L | original missed | SciPy CPU µs/target \
-| missed | ratio CPU / wall |
+| Ω, φ | targets/s | CPU µs/target | branches | residual, L | original missed | SciPy CPU \
+µs/target | missed | ratio CPU / wall |
 |---|--:|--:|--:|--:|--:|--:|--:|--:|"""
 
 

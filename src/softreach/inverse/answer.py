@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.inverse.branches import ROUNDING, Found, conditions, distinct, every_branch, starts
+from softreach.inverse.branches import Aim, Found, conditions, distinct, every_branch, starts
 from softreach.inverse.mesh import box_mesh
 from softreach.inverse.nearest import Landmarks, Nearest, descend, landmarks, nearest
 from softreach.inverse.problem import tips_and_slopes
@@ -101,9 +101,8 @@ def answer(prepared: Preparation, targets: Array, wishes: Wishes) -> Answer:
     """Solve for one block of targets."""
     found = _no_solutions(prepared.arm)
     if prepared.determined:
-        found = every_branch(
-            prepared.arm, *prepared.index, targets, prepared.tip_tol, wishes.residual
-        )
+        aim = Aim(prepared.arm, targets, prepared.tip_tol, wishes.residual)
+        found = every_branch(aim, *prepared.index)
     if wishes.direction is not None or not prepared.determined:
         return _by_search(prepared, targets, wishes, found)
     found = found.and_also(_stubborn(prepared, targets, wishes, _missing(found, targets)))
@@ -118,12 +117,11 @@ def _missing(found: Found, targets: Array) -> Index:
 
 def _stubborn(prepared: Preparation, targets: Array, wishes: Wishes, missing: Index) -> Found:
     """What descent finds where Newton's method found nothing: solutions at a singular Jacobian."""
-    arm, tol = prepared.arm, prepared.tip_tol
-    of, _, start = starts(arm, *prepared.index, targets[missing])
-    found = descend(arm, targets[missing], of, start, tol)
-    found = _evaluated(prepared, targets, missing[of], found.gamma)
-    found = found.where(found.residual <= wishes.residual)
-    return distinct(found, len(targets), ROUNDING * arm.length)
+    aim = Aim(prepared.arm, targets, prepared.tip_tol, wishes.residual)
+    target, _, start = starts(aim, *prepared.index, missing)
+    found = descend(prepared.arm, targets, target, start, prepared.tip_tol)
+    found = _evaluated(prepared, targets, target, found.gamma)
+    return distinct(aim, found.where(found.residual <= wishes.residual))
 
 
 def _by_search(prepared: Preparation, targets: Array, wishes: Wishes, found: Found) -> Answer:

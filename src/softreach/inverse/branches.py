@@ -17,17 +17,29 @@ from softreach.kernels.space_tree import SpaceTree
 from softreach.kinematics import tip_positions
 from softreach.manipulator import Manipulator
 
-__all__ = ["ROUNDING", "Found", "conditions", "distinct", "every_branch", "starts"]
+__all__ = ["Aim", "Found", "conditions", "distinct", "every_branch", "starts"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-ROUNDING = 1e-13
-"""Of a tip, in L, with room to spare."""
+_ROUNDING = 1e-13  # of a tip, in L, with room to spare
 
 _BLOCK = 1024
 _ROUNDS = 40
 _PARTNER_RANGE = 1.5  # widths of a cell within which a fold's other preimage is looked for
+
+
+class Aim(NamedTuple):
+    """What is to be reached."""
+
+    arm: Manipulator
+    """The design."""
+    targets: Array
+    """Targets [m], shape (t, 3)."""
+    tol: float
+    """Largest tip error, in L."""
+    residual: float
+    """Largest |tip - target| of a solution [m]."""
 
 
 class Found(NamedTuple):
@@ -66,58 +78,46 @@ class Found(NamedTuple):
         return both.where(np.argsort(both.target, kind="stable"))
 
 
-def every_branch(
-    arm: Manipulator, mesh: Mesh, tree: SpaceTree, targets: Array, tol: float, residual: float
-) -> Found:
+def every_branch(aim: Aim, mesh: Mesh, tree: SpaceTree) -> Found:
     """All solutions inside the bounds, sorted by target.
 
     Args:
-        arm: A design of three bundles.
+        aim: What is to be reached, by a design of three bundles.
         mesh: Its `box_mesh`.
         tree: The mesh's `space_tree`.
-        targets: Targets [m], shape (t, 3).
-        tol: Largest tip error, in L.
-        residual: Largest |tip - target| of a solution [m].
     """
-    rounding = ROUNDING * arm.length
-    target, cell, start = starts(arm, mesh, tree, targets)
-    found = _within(
-        arm, _search(arm, target, cell, start, targets, tol, residual), targets, tol, residual
-    )
-    found = distinct(found, len(targets), rounding)
-    fresh = found
+    every = np.arange(len(aim.targets))
+    found = _searched(aim, *starts(aim, mesh, tree, every))
+    # Where the quadratics say that nothing leads there, look once more without believing them.
+    missing = np.flatnonzero(np.bincount(found.target, minlength=len(every)) == 0)
+    found = found.and_also(_searched(aim, *starts(aim, mesh, tree, missing, strict=False)))
+    found = fresh = distinct(aim, found)
     for _ in range(2):  # a partner may have a partner of its own where two folds meet
-        target, cell, start = _partners(arm, mesh, fresh)
-        fresh = _search(arm, target, cell, start, targets, tol, residual)
-        fresh = _within(arm, fresh, targets, tol, residual)
+        fresh = _searched(aim, *_partners(aim, mesh, fresh))
         before = len(found.target)
-        found = distinct(found.and_also(fresh), len(targets), rounding)
+        found = distinct(aim, found.and_also(fresh))
         if len(found.target) == before:
             break
     return found
 
 
-def _search(
-    arm: Manipulator,
-    target: Index,
-    cell: Index,
-    start: Array,
-    targets: Array,
-    tol: float,
-    residual: float,
-) -> Found:
-    """Damped Newton from every start (n, 3); those that arrive, wherever that is."""
-    low, high = arm.bounds.T.copy()
-    state = _begun(targets[target], start)
+def _searched(aim: Aim, target: Index, cell: Index, start: Array) -> Found:
+    """Damped Newton from every start (n, 3); the solutions that arrive within the bounds."""
+    low, high = aim.arm.bounds.T.copy()
+    state = _begun(aim.targets[target], start)
     for _ in range(_ROUNDS):
         active = np.flatnonzero(state.state == UNDER_WAY)
         if not len(active):
             break
-        tips, slopes = tips_and_slopes(arm, state.trial[active], tol)
-        newton.newton_step(state, active, tips, slopes, low, high, residual)
+        tips, slopes = tips_and_slopes(aim.arm, state.trial[active], aim.tol)
+        newton.newton_step(state, active, tips, slopes, low, high, aim.residual)
     arrived = np.flatnonzero(state.state == CONVERGED)
-    # The step that convergence left untaken; `_within` evaluates it.
-    return Found(target, state.trial, state.slope, state.residual, cell).where(arrived)
+    # The trial holds the step that convergence left untaken; it may overstep a bound a little.
+    gamma, target = np.clip(state.trial[arrived], low, high), target[arrived]
+    tips = tip_positions(aim.arm, gamma, aim.tol)
+    missed = np.linalg.norm(tips - aim.targets[target], axis=1)
+    found = Found(target, gamma, state.slope[arrived], missed, cell[arrived])
+    return found.where(missed <= aim.residual)
 
 
 def _begun(goal: Array, start: Array) -> Search:
@@ -135,10 +135,11 @@ def _begun(goal: Array, start: Array) -> Search:
 
 
 def starts(
-    arm: Manipulator, mesh: Mesh, tree: SpaceTree, targets: Array
+    aim: Aim, mesh: Mesh, tree: SpaceTree, rows: Index, strict: bool = True
 ) -> tuple[Index, Index, Array]:
-    """Target, cell and activation of every start, sorted by target."""
-    low, high = arm.bounds.T.copy()
+    """Target, cell and activation of every start for some of the targets, sorted."""
+    targets = aim.targets[rows]
+    low, high = aim.arm.bounds.T.copy()
     blocks = list(parallel.blocks(len(targets), _BLOCK))
     parts: list[list[tuple[Index, Index, Array]]] = [[] for _ in blocks]
 
@@ -151,9 +152,9 @@ def starts(
         )
         while first < last:
             done, found = candidates.find_starts(
-                mesh, tree, targets[first:last], low, high, target, cell, start
+                mesh, tree, targets[first:last], low, high, strict, target, cell, start
             )
-            part.append((target[:found] + first, cell[:found].copy(), start[:found].copy()))
+            part.append((rows[target[:found] + first], cell[:found].copy(), start[:found].copy()))
             first += done
 
     parallel.run(
@@ -168,27 +169,19 @@ def _no_starts() -> tuple[Index, Index, Array]:
     return np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 3))
 
 
-def _within(arm: Manipulator, found: Found, targets: Array, tol: float, residual: float) -> Found:
-    """Solutions moved onto the bounds they overstep, if they still are solutions there."""
-    low, high = arm.bounds.T
-    gamma = np.clip(found.gamma, low, high)
-    tips = tip_positions(arm, gamma, tol)
-    missed = np.linalg.norm(tips - targets[found.target], axis=1)
-    return found._replace(gamma=gamma, residual=missed).where(missed <= residual)
-
-
-def distinct(found: Found, targets: int, rounding: float) -> Found:
-    """Every solution once; those of a target nearer than `rounding` allows are one."""
-    offsets = np.searchsorted(found.target, np.arange(targets + 1))
+def distinct(aim: Aim, found: Found) -> Found:
+    """Every solution once."""
+    offsets = np.searchsorted(found.target, np.arange(len(aim.targets) + 1))
     smallest, _ = conditions(found.slope)
     kept = np.ones(len(found.target), bool)
+    rounding = _ROUNDING * aim.arm.length
     newton.merge(offsets, found.gamma, found.residual, smallest, rounding, kept)
     return found.where(kept)
 
 
-def _partners(arm: Manipulator, mesh: Mesh, found: Found) -> tuple[Index, Index, Array]:
+def _partners(aim: Aim, mesh: Mesh, found: Found) -> tuple[Index, Index, Array]:
     """Target, cell and start of the second preimage of every solution with a fold near."""
-    low, high = arm.bounds.T.copy()
+    low, high = aim.arm.bounds.T.copy()
     smallest, _ = conditions(found.slope)
     start, near = np.empty_like(found.gamma), np.zeros(len(found.target), bool)
     folds.partners(

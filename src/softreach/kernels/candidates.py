@@ -24,7 +24,7 @@ _CLOSE, _REST = 0.01, 0.4  # of the blur: good enough to end, good enough to kee
 
 
 @kernel
-def find_starts(mesh, tree, targets, low, high, target, cell, start):
+def find_starts(mesh, tree, targets, low, high, strict, target, cell, start):
     """Activations near each solution of the targets, until the arrays are full.
 
     Args:
@@ -33,6 +33,7 @@ def find_starts(mesh, tree, targets, low, high, target, cell, start):
         targets: Targets [m], shape (t, 3).
         low: Lower bounds, shape (3,).
         high: Upper bounds, shape (3,).
+        strict: Whether to leave out tetrahedra whose quadratic does not reach the target.
         target: Filled with the number of each start's target.
         cell: Filled with its cell.
         start: Filled with the activation, shape (room, 3).
@@ -56,7 +57,8 @@ def find_starts(mesh, tree, targets, low, high, target, cell, start):
                 c = k // 6
                 v = tetrahedron(corner, c, k % 6)
                 weights = _linear_weights(tip, v, p)
-                if _refine(gamma, tip, slope, v, weights, p, blur[c], guess) and _is_new(
+                reached = _refine(gamma, tip, slope, v, weights, p, blur[c], guess)
+                if (reached or not strict) and _is_new(
                     gamma, corner, c, guess, start, first, found
                 ):
                     for axis in range(3):

@@ -14,6 +14,9 @@ from softreach.kernels.compiler import inline, kernel
 
 __all__ = ["partners"]
 
+# Instead of 2: from beyond the other root Newton's method converges to it, from short of it perhaps
+# back to the one that is known.
+_OVERSHOOT = 2.8
 _ROUNDS = 3  # of inverse iteration, which near a fold gains many digits each
 
 
@@ -41,7 +44,7 @@ def partners(mesh, cell, gamma, slope, smallest, reach, low, high, start, near):
             continue
         for k in range(3):
             width = mesh.gamma[last, k] - mesh.gamma[first, k]
-            s = -2.0 * sigma / kappa * v[k]
+            s = -_OVERSHOOT * sigma / kappa * v[k]
             goal = gamma[n, k] + s
             start[n, k] = min(max(goal, low[k]), high[k])
             near[n] = near[n] and abs(s) <= reach * width and abs(start[n, k] - goal) <= width
