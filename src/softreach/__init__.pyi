@@ -23,3 +23,6 @@ from .inverse import solve_inverse as solve_inverse
 from .path import track_path as track_path
 from .redundancy import activation_distance as activation_distance
 from .workspace import reachable_set as reachable_set
+from .atlas import build_atlas as build_atlas
+from .atlas import open_atlas as open_atlas
+from .split import split_fiber as split_fiber

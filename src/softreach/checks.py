@@ -1,7 +1,7 @@
 """What a design must satisfy, checked on plain values.
 
-The constructors and the file reader share these checks. Absent values are not judged, so that a file
-with one unreadable key still hears of its other faults.
+The constructors and the file reader share these checks. Absent values are not judged, so that a
+file with one unreadable key still hears of its other faults.
 """
 
 from __future__ import annotations

@@ -188,8 +188,8 @@ def _warn_if_fine(hull: Hull, convex_volume: float) -> None:
     if hull.alpha < SPACINGS * max(hull.spacing, sparse):
         spacing = max(hull.spacing, sparse)
         warnings.warn(
-            f"alpha = {_in_spacings(hull, spacing)}: below {SPACINGS:g} the shape has holes between points "
-            "and its volume is too small; use more points or a larger alpha",
+            f"alpha = {_in_spacings(hull, spacing)}: below {SPACINGS:g} the shape has holes "
+            "between points and its volume is too small; use more points or a larger alpha",
             SoftreachWarning,
             stacklevel=3,
         )
@@ -212,8 +212,9 @@ def _corrected(hull: Hull, positions: np.ndarray, method: Method) -> Hull:
     quarter = _alpha_complex(positions[np.sort(pick)], method).hull(hull.alpha)
     if quarter.alpha < QUARTER_SPACINGS * quarter.spacing:
         warnings.warn(
-            f"no estimate of the bias: alpha = {_in_spacings(quarter, quarter.spacing)}, a quarter of the cloud; "
-            f"below {QUARTER_SPACINGS:g} the law N^-1/2 fails; use more points or a larger alpha",
+            f"no estimate of the bias: alpha = {_in_spacings(quarter, quarter.spacing)}, a quarter "
+            f"of the cloud; below {QUARTER_SPACINGS:g} the law N^-1/2 fails; use more points or a "
+            "larger alpha",
             SoftreachWarning,
             stacklevel=3,
         )

@@ -59,6 +59,14 @@ _COMMANDS = {
         "Activations that follow a path of tip positions.",
         "softreach track minimal_trunk path.csv --out activations.csv",
     ),
+    "atlas": (
+        "Clouds and volumes of whole families of designs.",
+        "softreach atlas build a.zarr --vary revolution_deg=0:108:4 --vary taper_deg=0:3:4",
+    ),
+    "studio": (
+        "The design desk in the browser: move sliders, see what the design can reach.",
+        "softreach studio minimal_trunk --no-open",
+    ),
     "show": (
         "Draw a cloud and its arm.",
         "softreach show trunk.zarr --activation=-1,0,-0.5 --out trunk.pdf",

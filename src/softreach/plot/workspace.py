@@ -58,16 +58,19 @@ def plot_slice(
         float(f(layer[axis]) + s) for axis in (across, up) for f, s in ((min, -half), (max, half))
     ]
     with figure_style(ax):
-        if ax is None:
-            ax = pyplot().subplots(figsize=(3.4, 3.6), layout="constrained")[1]
-        _draw(ax, shown, [edge / length for edge in edges])
+        axes: Axes = _new_axes() if ax is None else ax
+        _draw(axes, shown, [edge / length for edge in edges])
         if "degree" in layer:
-            _draw_folds(ax, layer, across, up, length)
-        ax.set(xlabel=f"{across} / L", ylabel=f"{up} / L", aspect="equal")
-        ax.set_title(f"{normal} = {at / length:.3g} L")
+            _draw_folds(axes, layer, across, up, length)
+        axes.set(xlabel=f"{across} / L", ylabel=f"{up} / L", aspect="equal")
+        axes.set_title(f"{normal} = {at / length:.3g} L")
         if key:
-            _draw_key(ax, int(shown.max()), name)
-    return ax
+            _draw_key(axes, int(shown.max()), name)
+    return axes
+
+
+def _new_axes() -> Axes:
+    return pyplot().subplots(figsize=(3.4, 4.2), layout="constrained")[1]
 
 
 def _layer(grid: xr.Dataset, normal: str, at: float) -> xr.Dataset:
