@@ -14,7 +14,7 @@ from pathlib import Path
 from softreach import parallel
 
 PAGE = Path(__file__).parent.parent / "docs" / "benchmarks.md"
-PARTS = ("kernels", "geometry", "workspace", "inverse", "redundancy", "atlas", "studio")
+PARTS = ("kernels", "geometry", "inverse", "redundancy", "atlas", "studio")
 
 HEADER = """# Benchmarks
 
@@ -40,9 +40,8 @@ def main() -> None:
             importlib.import_module(f"benchmarks.bench_{name}").main()
         print(captured.getvalue(), flush=True)
         text += captured.getvalue() + "\n"
-    if not sys.argv[1:]:
         PAGE.write_text(text, encoding="utf-8")
-        print(f"written to {PAGE}")
+    print(f"written to {PAGE}")
 
 
 if __name__ == "__main__":
