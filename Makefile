@@ -6,13 +6,14 @@ READY := .venv/.ready
 
 SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 
-.PHONY: help setup demo test browser check format bench docs lock clean
+.PHONY: help setup demo test browser check format bench atlas docs lock clean
 
 help:
 	@echo "make demo    set up, then compute the paper's design into out/"
 	@echo "make test    set up, then run every check and test"
 	@echo "make check   format, lint, types, layers, documentation"
 	@echo "make bench   the benchmarks; writes docs/benchmarks.md"
+	@echo "make atlas   the paper's 16 x 16 designs of 400,000 points into out/; can be interrupted"
 	@echo "make docs    build the documentation into site/"
 	@echo "make setup   make .venv from requirements.lock"
 	@echo "make lock    renew requirements.lock"
@@ -50,6 +51,10 @@ format: setup
 
 bench: setup
 	$(BIN)/python -m benchmarks
+
+atlas: setup
+	$(BIN)/softreach atlas build out/atlas.zarr --vary revolution_deg=0:108:16 --vary taper_deg=0:3:16
+	$(BIN)/softreach atlas figures out/atlas.zarr --out out/atlas
 
 docs: setup
 	$(BIN)/mkdocs build --strict
