@@ -53,6 +53,7 @@ class Tab:
             self.errors.append(message.text)
 
     def close(self) -> None:
+        self.settle()  # viser warns of what is drawn for a tab that is gone
         self.context.close()
 
     def wait(self, condition: Callable[[], object], what: str) -> None:

@@ -49,6 +49,12 @@ def test_a_saved_page_holds_everything_itself(fine):
     assert '<link href="http' not in page
 
 
+def test_a_saved_page_carries_the_map(fine):
+    red = np.zeros((4, 4, 3), np.uint8)
+    page = static_page(StudioState(design=fine.arm), fine, red)
+    assert "data:image/png;base64," in page
+
+
 def test_a_design_file_changes_the_design_alone(trunk):
     state = StudioState(design=trunk, target=(0.0, 0.1, 0.5))
     other = trunk.replace(taper=0.01)

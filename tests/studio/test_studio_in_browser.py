@@ -9,7 +9,12 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.studio import StudioState
+from softreach.atlas import DesignSpace, build_atlas
+from softreach.atlas.parameter import changed
+from softreach.studio import Studio, StudioState
+from softreach.studio.panels.atlas import AtlasPanel
+from softreach.studio.source import start_on_store
+from tests.studio.conftest import SMALL
 from tests.studio.tab import Tab
 
 
@@ -123,3 +128,19 @@ def test_nothing_leaves_the_machine_and_the_console_stays_clean(tab, studio):
     assert tab.requests
     assert all(url.startswith((studio.url, f"blob:{studio.url}", "data:")) for url in tab.requests)
     assert tab.errors == []
+
+
+def test_a_click_on_the_map_of_an_atlas_loads_the_design(browser, tmp_path):
+    trunk = sr.designs.minimal_trunk()
+    space = DesignSpace.grid(trunk, revolution=[0.5, 1.5, 2.5], taper=[0.0, 0.01, 0.02])
+    store = tmp_path / "atlas.zarr"
+    build_atlas(space, store, n=200, metrics=("convex",), report=lambda _: None)
+    with Studio(start_on_store(store, SMALL)) as studio:
+        tab = Tab(browser, studio)
+        panel = next(p for p in tab.session.panels if isinstance(p, AtlasPanel))
+        at = {"revolution": 0.5, "taper": 0.01}
+        tab.click_at(panel.place_of(**at))
+        tab.wait(lambda: tab.session.state.design.taper == 0.01, "the design is loaded")
+        assert tab.session.state.design == changed(trunk, at)
+        assert not tab.errors
+        tab.close()

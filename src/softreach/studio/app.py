@@ -8,7 +8,8 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from softreach.studio.server import LOOPBACK, page_url, start_server, stop_server
-from softreach.studio.session import Session, Start
+from softreach.studio.session import Session
+from softreach.studio.source import Start
 from softreach.studio.state import Camera
 
 if TYPE_CHECKING:

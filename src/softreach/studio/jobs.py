@@ -63,7 +63,8 @@ class Latest:
             except Dropped:
                 continue
             except Exception as error:  # told to the reader; a thread has nobody to raise to
-                self._failed(error)
+                if not self._closed:  # else the reader is gone
+                    self._failed(error)
 
     def _next(self) -> Callable[[StaleCheck], None] | None:
         with self._changed:

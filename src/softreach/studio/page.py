@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import base64
 import html
+import io
+
+import numpy as np
+from numpy.typing import NDArray
 
 from softreach.studio.colors import key_html
 from softreach.studio.panels.status import reach_text
@@ -20,10 +25,15 @@ _BOX = (
 )
 
 
-def static_page(state: StudioState, reach: Reach) -> str:
+def static_page(state: StudioState, reach: Reach, picture: NDArray[np.uint8] | None = None) -> str:
     """The page, with the numbers of the design and its file under the scene.
 
     Only a server's scene can be saved, so one is started for a moment, on loopback.
+
+    Args:
+        state: What to show.
+        reach: Of its design.
+        picture: RGB beside the numbers, such as the map of an atlas.
     """
     server = start_server()
     try:
@@ -35,7 +45,7 @@ def static_page(state: StudioState, reach: Reach) -> str:
     finally:
         stop_server(server)
     end = page.rindex("</body>")
-    return page[:end] + _caption(state, reach, key) + page[end:]
+    return page[:end] + _caption(state, reach, key + _image(picture)) + page[end:]
 
 
 def _draw(scene: Scene, state: StudioState, reach: Reach) -> str:
@@ -51,3 +61,16 @@ def _caption(state: StudioState, reach: Reach, key: str) -> str:
     numbers = html.escape(reach_text(reach).replace("**", ""))
     design = f"<details><summary>design</summary><pre>{html.escape(state.design.to_toml())}</pre>"
     return f'<div style="{_BOX}">{numbers}{key}{design}</details></div>'
+
+
+def _image(picture: NDArray[np.uint8] | None) -> str:
+    """The picture inside the page itself."""
+    if picture is None:
+        return ""
+    from matplotlib.image import imsave
+
+    file = io.BytesIO()
+    imsave(file, picture, format="png")
+    data = base64.b64encode(file.getvalue()).decode()
+    shown = f'<img alt="map" style="width:20em" src="data:image/png;base64,{data}">'
+    return f"<details><summary>atlas</summary>{shown}</details>"

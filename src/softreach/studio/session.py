@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -12,17 +11,17 @@ from numpy.typing import NDArray
 
 from softreach.errors import SoftreachError
 from softreach.studio.jobs import Latest, StaleCheck
-from softreach.studio.reach import Quality, Reach, stages
+from softreach.studio.reach import stages
 from softreach.studio.scene import Scene, cloud_points
+from softreach.studio.source import Start
 from softreach.studio.state import Camera, StudioState, Work, vector, what_follows
 
 if TYPE_CHECKING:
-    import xarray as xr
     from viser import ClientHandle
 
     from softreach.inverse import Solution
 
-__all__ = ["Panel", "Session", "Start"]
+__all__ = ["Panel", "Session"]
 
 Array = NDArray[np.float64]
 
@@ -36,16 +35,6 @@ class Panel(Protocol):
     def show(self, session: Session) -> None:
         """Bring the widgets in line with the session; called from any thread, one at a time."""
         ...
-
-
-@dataclass(frozen=True, kw_only=True)
-class Start:
-    """What every new tab begins with."""
-
-    state: StudioState
-    quality: Quality
-    reach: Reach | None = None
-    atlas: xr.Dataset | None = None
 
 
 class Session:
@@ -62,6 +51,7 @@ class Session:
         self.trail: list[Array] = []
         self.answer: Solution | None = None
         self.note = ""
+        self.map_image: NDArray[np.uint8] | None = None
         self.revision = 0
         """Number of changes that widgets have to follow."""
         self._aiming = False
@@ -117,7 +107,7 @@ class Session:
             self.client.camera.look_at = camera.look_at
 
     def say(self, note: str) -> None:
-        """Show a line of text to the reader."""
+        """Show text to the reader."""
         self.note = note
         self.show()
 

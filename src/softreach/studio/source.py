@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,14 +11,23 @@ from typing import TYPE_CHECKING
 from softreach.errors import InvalidInput
 from softreach.manipulator import Manipulator
 from softreach.studio.atlas_map import metric_names
-from softreach.studio.reach import Quality, reached
-from softreach.studio.session import Start
+from softreach.studio.reach import Quality, Reach, reached
 from softreach.studio.state import StudioState
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["start_on_design", "start_on_store"]
+__all__ = ["Start", "start_on_design", "start_on_store"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """What every new tab begins with."""
+
+    state: StudioState
+    quality: Quality
+    reach: Reach | None = None
+    atlas: xr.Dataset | None = None
 
 
 def start_on_design(arm: Manipulator, quality: Quality | None = None) -> Start:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softreach.studio.atlas_map import AtlasMap, atlas_map, metric_names
 from softreach.studio.panels.binding import told
@@ -46,9 +47,10 @@ class AtlasPanel:
     def draw(self) -> None:
         """Put the map into the scene, or take it out."""
         self._session.scene.remove("/atlas")
-        self._map = None
+        self._map = self._session.map_image = None
         if self._visible.value:
             self._map = atlas_map(self._atlas, self._metric.value)
+            self._session.map_image = self._map.image
             self._session.scene.draw_picture(
                 "/atlas/map", self._map.image, _SIZE, _CENTER, _UPRIGHT
             )
@@ -68,12 +70,15 @@ class AtlasPanel:
             told(self._session, lambda: self._load(at))
         return True
 
+    def place_of(self, **at: float) -> NDArray[np.float64]:
+        """Where in the scene the map shows a design [L]."""
+        assert self._map is not None
+        right, up = self._map.place_of(**at)
+        return _CENTER + _SIZE * np.array([right - 0.5, 0.0, up - 0.5])
+
     def _load(self, at: dict[str, float]) -> None:
         from softreach.atlas import atlas_design
 
         design = atlas_design(self._atlas, **at)
-        assert self._map is not None
-        right, up = self._map.place_of(**at)
-        place = _CENTER + _SIZE * np.array([right - 0.5, -0.01, up - 0.5])
-        self._session.scene.draw_mark("/atlas/here", place)
+        self._session.scene.draw_mark("/atlas/here", self.place_of(**at))
         self._session.update(lambda state: state.replace(design=design))

@@ -69,7 +69,9 @@ class ExportPanel:
     def _save_page(self) -> None:
         session = self._session
         state = session.state.replace(camera=session.camera_now())
-        self._send("reachability.html", static_page(state, self._reach()).encode())
+        self._send(
+            "reachability.html", static_page(state, self._reach(), session.map_image).encode()
+        )
 
     def _button(self, label: str, action: Callable[[], None]) -> None:
         bind_button(self._session.client.gui.add_button(label), self._session, action)
