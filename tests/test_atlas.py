@@ -27,8 +27,13 @@ from softreach.atlas import (
 )
 from softreach.atlas import metrics as atlas_metrics
 from softreach.atlas.command import Command
+from softreach.atlas.space_file import parse_space
 from softreach.atlas.store import AtlasStore, StoreFailed
+from softreach.cli import atlas as atlas_command
 from softreach.errors import InvalidInput, SoftreachError, SoftreachWarning
+from softreach.plot.atlas import atlas_box, plot_metric_map
+from softreach.plot.projection import OBLIQUE, view_axes
+from softreach.plot.sheet import panel_extent
 
 SMALL = {"n": 2_000, "alpha": 0.5, "metrics": ("extent", "convex", "concave", "curvature")}
 
@@ -547,3 +552,74 @@ def test_what_is_not_there_is_not_opened(tmp_path):
     with pytest.raises(InvalidInput, match="an atlas written by build_atlas"):
         open_atlas(tmp_path / "nothing.zarr")
     assert not (tmp_path / "nothing.zarr").exists()
+
+
+# Files, flags and figures
+
+
+def test_written_spaces_speak_in_degrees_and_ranges():
+    text = """
+        design = "minimal_trunk"
+        [parameters]
+        revolution_deg = "0:108:4"
+        taper_deg = [0, 1.5]
+        outer_radius_m = 0.0625
+    """
+    space = parse_space(text, lambda name: getattr(sr.designs, name)())
+    assert space.shape == (4, 2, 1)
+    np.testing.assert_allclose(np.degrees(space.values(3)["revolution"]), 36)
+    np.testing.assert_allclose(np.degrees(space.values(3)["taper"]), 1.5)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            'layout = "circle"\n[parameters]\ntaper_deg = [0]',
+            "layout = circle: must be one of grid",
+        ),
+        (
+            "[parameters]\ntaper = [0]",
+            "parameter = taper: must be one of revolution_deg, taper_deg",
+        ),
+        ('[parameters]\ntaper_deg = "0:3"', "taper_deg = 0:3: must be numbers"),
+        ('layout = "sobol"\n[parameters]\ntaper_deg = [0]', "taper = .*: must be two ends"),
+        ("lay_out = 1", "key = lay_out: must be one of design"),
+        ("=", "must be valid TOML"),
+    ],
+)
+def test_faulty_space_files_are_refused(text, message):
+    with pytest.raises(InvalidInput, match=message):
+        parse_space(text, lambda name: getattr(sr.designs, name)())
+
+
+def test_sampled_spaces_can_be_written_too():
+    text = 'layout = "latin"\ndesigns = 5\n[parameters]\ntaper_deg = [0, 3]'
+    space = parse_space(text, lambda name: getattr(sr.designs, name)())
+    assert (space.dims, space.shape) == (("design",), (5,))
+
+
+@pytest.mark.slow
+def test_every_figure_is_written_as_png_and_pdf(paper, tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    atlas_command.figures(paper.encoding["source"], out=tmp_path, panels=2)
+    capsys.readouterr()
+    names = {"clouds", "hulls", "corners", "curvature", "map_volume", "map_exact_unreachability"}
+    assert names <= {path.stem for path in tmp_path.glob("*.png")}
+    assert {p.stem for p in tmp_path.glob("*.png")} == {p.stem for p in tmp_path.glob("*.pdf")}
+
+
+def test_no_tip_lies_outside_its_panel_of_the_sheet(paper):
+    pytest.importorskip("matplotlib")
+    extent = panel_extent(atlas_box(paper), OBLIQUE)
+    seen = np.moveaxis(paper.tip.values, 2, -1).reshape(-1, 3) @ view_axes(OBLIQUE)[:2].T
+    assert extent.left < seen[:, 0].min() < seen[:, 0].max() < extent.right
+    assert extent.bottom < seen[:, 1].min() < seen[:, 1].max() < extent.top
+
+
+def test_maps_need_two_parameters(paper):
+    pytest.importorskip("matplotlib")
+    with pytest.raises(InvalidInput, match="a grid of two parameters"):
+        plot_metric_map(paper.isel(taper=0), "volume")
+    with pytest.raises(InvalidInput, match="metric = volumes"):
+        plot_metric_map(paper, "volumes")

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["SheetAxis", "plot_cloud_sheet", "plot_hull_sheet"]
+__all__ = ["SheetAxis", "panel_extent", "plot_cloud_sheet", "plot_hull_sheet"]
 
 Array = NDArray[np.float64]
 Grid = NDArray[np.object_]
@@ -92,7 +92,7 @@ def plot_hull_sheet(
         figure, panels = _sheet(across, up, box, view, width)
         for (row, column), ax in np.ndenumerate(panels):
             if (hull := hull_at(column, row)) is not None:
-                buffer = ZBuffer(_panel_extent(box, view), _columns(ax), oversample=3, color_step=4)
+                buffer = ZBuffer(panel_extent(box, view), _columns(ax), oversample=3, color_step=4)
                 draw_mesh(buffer, np.asarray(hull.vertices) / length, hull.faces, _STEEL, view)
                 _show(ax, buffer)
         _draw_scale(figure, panels[0, 0], view)
@@ -103,7 +103,7 @@ def _sheet(
     across: SheetAxis, up: SheetAxis, box: Array, view: View, width: float
 ) -> tuple[Figure, Grid]:
     """A figure and its panels, the first row at the bottom, each as wide as the box."""
-    extent = _panel_extent(box, view)
+    extent = panel_extent(box, view)
     aspect = (extent.top - extent.bottom) / (extent.right - extent.left)
     columns, rows = len(across.values), len(up.values)
     size = np.array([1.0, aspect]) * (width - _LEFT) / columns
@@ -151,7 +151,7 @@ def _columns(ax: Axes) -> int:
 
 
 def _draw_cloud(ax: Axes, cloud: xr.Dataset, box: Array, view: View) -> None:
-    extent, columns = _panel_extent(box, view), _columns(ax)
+    extent, columns = panel_extent(box, view), _columns(ax)
     tips = tips_in_lengths(cloud)
     pixels = point_size(len(tips), box) * columns / (extent.right - extent.left)
     buffer = ZBuffer(extent, columns, oversample=2, color_step=8)
@@ -184,7 +184,7 @@ def _draw_scale(figure: Figure, panel: Axes, view: View) -> None:
         ax.text(x, y, name, fontsize=6, ha="center", va="center")
 
 
-def _panel_extent(box: Array, view: View) -> Extent:
+def panel_extent(box: Array, view: View) -> Extent:
     """What a panel shows: tighter than a box in space, whose corners are empty.
 
     The ellipsoid in the box reaches √Σ(hᵢ eᵢ)² along a unit vector e; a fifth more leaves room for
