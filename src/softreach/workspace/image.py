@@ -41,6 +41,13 @@ class Lattice(NamedTuple):
         origin = (low + high - (count - 1) * cell) / 2.0
         return cls(origin, cell, (int(count[0]), int(count[1]), int(count[2])))
 
+    def centers(self) -> dict[str, tuple[str, Array, dict[str, str]]]:
+        """Coordinates of the cell centers for a dataset over x, y and z [m]."""
+        return {
+            name: (name, start + self.cell * np.arange(size), {"units": "m"})
+            for name, start, size in zip("xyz", self.origin, self.shape, strict=True)
+        }
+
     def coordinates(self, points: Array) -> Array:
         """Points [m] in cells from the center of cell (0, 0, 0)."""
         return (points - self.origin) / self.cell

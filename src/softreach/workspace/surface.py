@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 _BAND = 2.5  # cells from the boundary beyond which the field is constant
 _CLOSEST = 1e-3  # cells: a center on the boundary itself would make triangles without area
-_NEIGHBORS = 4
+_NEIGHBORS = 16  # with 4, distances to long triangles came out up to a cell too large
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,7 +47,7 @@ class Surface:
         return surface_area(self.vertices, self.faces)
 
     def distance(self, points: Array) -> Array:
-        """Distance of points to the nearest triangle around their 4 nearest vertices [m], (n,)."""
+        """Distance of points to the nearest triangle around their 16 nearest vertices [m], (n,)."""
         count = min(_NEIGHBORS, len(self.vertices))
         near = self._tree.query(points, count, workers=-1)[1].reshape(len(points), count)
         out = np.empty(len(points))

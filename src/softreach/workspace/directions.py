@@ -1,0 +1,122 @@
+"""From how many sides the tip can come to a place: the spread of its tangent d3 there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach import parallel
+from softreach.errors import InvalidInput
+from softreach.kinematics import configuration
+from softreach.manipulator import Manipulator
+from softreach.sampling import sample_cube
+from softreach.workspace.image import Lattice
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["direction_spread"]
+
+Array = NDArray[np.float64]
+
+_BLOCK = 1 << 15
+_PER_CELL = 64  # samples in a cell of the bounding box, on average
+_STEPS = 32  # the cone is then too wide by some percent at most
+
+
+def direction_spread(
+    arm: Manipulator,
+    *,
+    n: int = 1 << 19,
+    cell: float | None = None,
+    seed: int = 0,
+    tol: float = 1e-6,
+) -> xr.Dataset:
+    """The solid angle of the smallest cone that holds the tip directions d3 in each cell.
+
+    From a cloud of activations (Sobol). For three bundles hardly more than one direction leads to
+    each place, and what is seen is how much it varies within a cell; the fourth opens the cone. The
+    axis is that of the smallest ball around the directions (Bădoiu and Clarkson, 2003).
+
+    Volumes follow: ``spread.attrs["cell"] ** 3 * (spread.solid_angle > 0.1).sum()``.
+
+    Args:
+        arm: The design.
+        n: Number of samples, a power of two.
+        cell: Edge of a cell [m]; by default 64 samples would fall in each of the bounding box.
+        seed: Seed of the sampler.
+        tol: Largest tip error, in L.
+
+    Returns:
+        Dataset over cell centers x, y, z [m]: `solid_angle` [sr], 0 for one sample and NaN for
+        none, at most 4π; `samples`, their number.
+
+    Raises:
+        InvalidInput: An argument out of range.
+    """
+    if cell is not None and not 0 < cell < np.inf:
+        raise InvalidInput("cell", cell, "a length > 0 [m]")
+    tips, directions = _tips_and_directions(arm, sample_cube("sobol", n, arm.bundles, seed), tol)
+    if cell is None:
+        cell = float(np.cbrt(np.prod(np.ptp(tips, axis=0).clip(1e-3 * arm.length)) * _PER_CELL / n))
+    lattice = Lattice.around(tips, cell)
+    i, j, k = np.rint(lattice.coordinates(tips)).astype(int).T
+    place = (i * lattice.shape[1] + j) * lattice.shape[2] + k
+    order = np.argsort(place, kind="stable")
+    cells, starts = np.unique(place[order], return_index=True)
+    angle, samples = np.full(lattice.shape, np.nan), np.zeros(lattice.shape, np.int64)
+    angle.flat[cells] = _cones(directions[order], starts)
+    samples.flat[cells] = np.diff(starts, append=n)
+    return _dataset(lattice, angle, samples, arm)
+
+
+def _tips_and_directions(arm: Manipulator, cube: Array, tol: float) -> tuple[Array, Array]:
+    gamma = arm.bounds[:, 0] + cube * np.diff(arm.bounds, axis=1)[:, 0]
+    tips, directions = np.empty((2, len(gamma), 3))
+    for block in parallel.blocks(len(gamma), _BLOCK):
+        end = configuration(arm, gamma[block], stations=[arm.length], tol=tol)
+        tips[block] = end["position"].values[:, 0]
+        directions[block] = end["directors"].sel(director="d3").values[:, 0]
+    return tips, directions
+
+
+def _cones(directions: Array, starts: NDArray[np.intp]) -> Array:
+    """Solid angle [sr] of a small cone around each run of unit vectors, shape (runs,)."""
+    sizes = np.diff(starts, append=len(directions))
+    axis = np.add.reduceat(directions, starts) / sizes[:, None]
+    widest = np.full(len(starts), -1.0)  # cosine of the half-angle
+    for step in range(2, _STEPS + 2):
+        toward = np.einsum("ij,ij->i", directions, np.repeat(_unit(axis), sizes, axis=0))
+        widest = np.maximum(widest, np.minimum.reduceat(toward, starts))
+        # Move a little toward the direction that lies farthest off.
+        off = ((directions - np.repeat(axis, sizes, axis=0)) ** 2).sum(axis=1)
+        farthest = np.lexsort((off, np.repeat(np.arange(len(starts)), sizes)))[starts + sizes - 1]
+        axis += (directions[farthest] - axis) / step
+    return 2.0 * np.pi * (1.0 - np.minimum(widest, 1.0))
+
+
+def _unit(vectors: Array) -> Array:
+    """The vectors' directions; none for directions that cancel."""
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True).clip(1e-300)
+
+
+def _dataset(
+    lattice: Lattice, angle: Array, samples: NDArray[np.int64], arm: Manipulator
+) -> xr.Dataset:
+    import xarray as xr
+
+    dims = ("x", "y", "z")
+    return xr.Dataset(
+        {
+            "solid_angle": (
+                dims,
+                angle,
+                {"units": "sr", "long_name": "smallest cone of tip directions"},
+            ),
+            "samples": (dims, samples, {"units": "1", "long_name": "samples in the cell"}),
+        },
+        lattice.centers(),
+        {"cell": lattice.cell, "design": arm.to_toml()},
+    )

@@ -1,0 +1,270 @@
+"""The reachable set: known volumes, clouds inside it, and what is said of curves and surfaces."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from softreach import designs, sampling
+from softreach.cloud import compute_cloud
+from softreach.errors import InvalidInput, SoftreachWarning
+from softreach.fiber import FiberArchitecture
+from softreach.kinematics import tip_positions, tips_and_jacobians
+from softreach.manipulator import Manipulator
+from softreach.workspace import ReachableSet, direction_spread, reachable_set
+from softreach.workspace.surface import Surface
+
+
+def trunk_at(revolution_deg: float, taper_deg: float, **changes) -> Manipulator:
+    arm = designs.minimal_trunk(np.radians(revolution_deg), np.radians(taper_deg))
+    return arm.replace(**changes)
+
+
+@pytest.fixture(scope="module")
+def best(trunk: Manipulator) -> ReachableSet:
+    """The paper's best design."""
+    return reachable_set(trunk)
+
+
+@pytest.fixture(scope="module")
+def folded() -> ReachableSet:
+    """A design whose image folds over itself."""
+    return reachable_set(trunk_at(75, 3))
+
+
+def several(found: ReachableSet) -> float:
+    """Volume reached by more than one activation."""
+    return sum(volume for k, volume in found.multiplicity.items() if k > 1)
+
+
+def test_the_best_design_reaches_0691_and_little_of_it_twice(best):
+    assert best.volume == pytest.approx(0.691, abs=0.001)
+    assert best.volume_error < 1e-4
+    assert several(best) == pytest.approx(1e-4 * best.volume, rel=0.5)
+    assert sum(best.multiplicity.values()) == pytest.approx(best.volume)
+
+
+def test_doubled_resolutions_agree_within_the_errors(best, folded):
+    for coarse in (best, folded):
+        cell = coarse.grid.attrs["cell"] / 2
+        fine = reachable_set(coarse.arm, grid=2 * coarse.cells, cell=cell)
+        assert abs(fine.volume - coarse.volume) < fine.volume_error + coarse.volume_error
+        assert abs(several(fine) - several(coarse)) < coarse.multiplicity_error
+        assert fine.unreachability == pytest.approx(coarse.unreachability, abs=1e-3)
+
+
+def test_without_taper_it_is_06325():
+    assert reachable_set(trunk_at(108, 0)).volume == pytest.approx(0.6325, abs=5e-4)
+
+
+def test_at_75_degrees_and_3_of_taper_some_percent_are_reached_twice(folded):
+    assert 0.02 < several(folded) / folded.volume < 0.035
+    assert folded.fold_volume == pytest.approx(several(folded), rel=0.1)
+
+
+def test_volume_is_the_integral_of_det_j_minus_what_is_covered_again(folded):
+    # An independent route: Sobol points instead of Gauss nodes, |det J| instead of signed.
+    arm = folded.arm
+    cube = sampling.sample_cube("sobol", 1 << 16, 3, seed=1)
+    gamma = arm.bounds[:, 0] + cube * np.diff(arm.bounds, axis=1)[:, 0]
+    tips, twists = tips_and_jacobians(arm, gamma)
+    velocity = twists[:, :3] + np.cross(twists[:, 3:], tips[:, :, None], axis=1)
+    box = np.prod(np.diff(arm.bounds, axis=1))
+    integral = np.abs(np.linalg.det(velocity)).mean() * box
+    again = sum((k - 1) * volume for k, volume in folded.multiplicity.items())
+    assert integral - again == pytest.approx(folded.volume, rel=2e-3)
+
+
+def test_a_cloud_lies_inside_to_one_cell(best, folded):
+    for found in (best, folded):
+        tips = compute_cloud(found.arm, n=400_000).tip.values
+        outside = tips[~found.contains(tips)]
+        assert len(outside) < 0.05 * len(tips)
+        assert found.distance(outside).max() < found.grid.attrs["cell"]
+
+
+def test_the_grid_and_single_points_agree(folded):
+    grid = folded.grid
+    axes = [grid[name].values for name in "xyz"]
+    centers = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    some = np.random.default_rng(0).integers(0, len(centers), 5000)
+    assert folded.image is not None
+    counted = folded.image.counts_at(centers[some])
+    assert (counted == grid["count"].values.ravel()[some]).all()
+    assert (folded.contains(centers[some]) == (counted > 0)).all()
+
+
+def test_the_image_of_a_part_of_the_box_lies_within(best, trunk):
+    part = reachable_set(trunk.replace(activation_bounds=((-1.2, -0.3), (-1.5, -0.2), (-1.0, 0.0))))
+    assert part.volume < best.volume
+    vertices = part.surface().vertices
+    outside = vertices[~best.contains(vertices)]
+    assert best.distance(outside).max(initial=0.0) < best.grid.attrs["cell"]
+
+
+def test_the_surface_is_closed_outward_and_holds_the_volume(best, folded):
+    for found in (best, folded):
+        surface = found.surface()
+        edges = Counter(
+            (int(a), int(b)) for f in surface.faces for a, b in zip(f, np.roll(f, -1), strict=True)
+        )
+        assert all(edges[b, a] == 1 == n for (a, b), n in edges.items())
+        assert surface.volume == pytest.approx(found.volume, rel=5e-4)
+
+
+def test_the_surface_has_no_staircase(best):
+    # A staircase has all its normals along the axes, and half as much area again.
+    surface = best.surface()
+    a, b, c = np.moveaxis(surface.vertices[surface.faces], 1, 0)
+    normal = np.cross(b - a, c - a)
+    assert np.abs(normal).sum() / np.linalg.norm(normal, axis=1).sum() == pytest.approx(
+        1.5, abs=0.1
+    )
+    # vertices lie on the image of the grid, not half a cell away
+    off = np.abs(best.distance(surface.vertices + 1e-9))
+    assert np.quantile(off, 0.99) < 0.1 * best.grid.attrs["cell"]
+
+
+def test_distance_is_signed_and_grows_by_one(best):
+    rng = np.random.default_rng(3)
+    points = rng.uniform(-1.5, 1.5, (2000, 3))
+    distance = best.distance(points)
+    inside = best.contains(points)
+    assert (np.sign(distance) == np.where(inside, -1, 1)).all()
+    step = 0.05 * rng.normal(size=(2000, 3))
+    change = np.abs(best.distance(points + step) - distance)
+    assert (change < np.linalg.norm(step, axis=1) + best.grid.attrs["cell"]).all()
+
+
+def test_volume_scales_with_the_cube_of_the_length(best):
+    large = reachable_set(designs.minimal_trunk(length=3.0))
+    assert large.volume == pytest.approx(27 * best.volume, rel=1e-9)
+    assert large.unreachability == pytest.approx(best.unreachability, rel=1e-9)
+
+
+@pytest.fixture(scope="module")
+def redundant() -> ReachableSet:
+    return reachable_set(designs.redundant_trunk(), accuracy=1e-2)
+
+
+def test_four_bundles_reach_at_least_what_three_of_them_do(redundant):
+    for held in range(4):
+        for end in (0, 1):
+            bounds = redundant.arm.bounds.copy()
+            bounds[held] = bounds[held, end]
+            face = redundant.arm.replace(activation_bounds=tuple(map(tuple, bounds.tolist())))
+            part = reachable_set(face, accuracy=1e-2)
+            assert part.dimension == 3
+            assert part.volume < redundant.volume + redundant.volume_error
+    assert redundant.multiplicity == {}
+
+
+def test_four_bundles_agree_with_a_finer_grid_within_the_error(redundant):
+    fine = reachable_set(redundant.arm, accuracy=1e-2, grid=24, cell=redundant.grid.attrs["cell"])
+    assert abs(fine.volume - redundant.volume) < redundant.volume_error
+    assert "count" not in fine.grid
+
+
+def test_a_cloud_of_four_bundles_lies_inside_to_one_cell(redundant):
+    tips = compute_cloud(redundant.arm, n=2_000_000).tip.values
+    outside = tips[~redundant.contains(tips)]
+    assert redundant.distance(outside).max() < redundant.grid.attrs["cell"]
+
+
+def test_two_free_bundles_sweep_an_area(trunk):
+    arm = trunk.replace(activation_bounds=((-1.0, 0.0), (-1.0, 0.0), (-0.5, -0.5)))
+    sheet = reachable_set(arm)
+    assert (sheet.dimension, sheet.measure_name, sheet.volume) == (2, "area", 0.0)
+    assert sheet.surface().area == pytest.approx(sheet.measure, rel=1e-3)
+    gamma = np.column_stack([-np.random.default_rng(0).random((100, 2)), np.full(100, -0.5)])
+    assert sheet.distance(tip_positions(arm, gamma)).max() < 1e-4
+    with pytest.raises(InvalidInput, match="distance"):
+        sheet.contains(np.zeros((1, 3)))
+    with pytest.raises(InvalidInput, match="distance"):
+        _ = sheet.grid
+
+
+def test_one_free_bundle_draws_a_curve():
+    # A straight fiber that bends the arm: the tip's path, chord by chord.
+    arm = Manipulator(
+        length=1.0,
+        outer_radius=1 / 16,
+        inner_radius=3 / 64,
+        fibers=(FiberArchitecture(helical_angle=0.0, offset=0.0, extent=0.8),),
+    )
+    curve = reachable_set(arm)
+    path = tip_positions(arm, np.linspace(-5 / 3, 0, 4001)[:, None])
+    chords = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
+    assert (curve.dimension, curve.measure_name) == (1, "length")
+    assert curve.measure == pytest.approx(chords, rel=1e-6)
+    assert curve.distance(path).max() < 1e-5
+    with pytest.raises(InvalidInput, match="surface"):
+        curve.surface()
+
+
+def test_no_free_bundle_leaves_a_point(trunk):
+    point = reachable_set(trunk.replace(activation_bounds=(-0.5, -0.5)))
+    assert (point.dimension, point.measure_name, point.measure) == (0, "point", 0.0)
+    tip = tip_positions(trunk, np.full((1, 3), -0.5))
+    assert point.distance(tip + [[0.0, 0.3, 0.4]]) == pytest.approx(0.5)
+
+
+def test_a_held_bundle_with_room_elsewhere_changes_nothing():
+    whole = designs.redundant_trunk()
+    bounds = ((-5 / 3, 0.0), (-5 / 3, 0.0), (-5 / 3, 0.0), (0.0, 0.0))
+    held = reachable_set(whole.replace(activation_bounds=bounds))
+    three = whole.replace(fibers=whole.fibers[:3], activation_bounds=(-5 / 3, 0.0))
+    assert held.volume == pytest.approx(reachable_set(three).volume, rel=1e-6)
+
+
+def test_progress_counts_every_vertex(trunk):
+    done: list[int] = []
+    reachable_set(trunk, grid=8, accuracy=0.1, report=done.append)
+    assert sum(done) == 9**3
+
+
+def test_a_coarse_grid_is_told_so():
+    with pytest.warns(SoftreachWarning, match="grid above 4"):
+        reachable_set(designs.redundant_trunk(), grid=4)
+
+
+@pytest.mark.parametrize(
+    ("argument", "value", "told"),
+    [
+        ("accuracy", 0.0, "1e-6 to"),
+        ("grid", 7, "even"),
+        ("cell", 1e-9, "at least"),
+        ("cell", np.nan, "at"),
+    ],
+)
+def test_a_wrong_argument_is_named(trunk, argument, value, told):
+    with pytest.raises(InvalidInput, match=told) as caught:
+        reachable_set(trunk, **{argument: value})
+    assert caught.value.name == argument
+
+
+def test_directions_spread_no_wider_than_a_sphere(trunk):
+    spread = direction_spread(trunk, n=1 << 16, cell=0.05)
+    angle, number = spread["solid_angle"], spread["samples"]
+    assert int(number.sum()) == 1 << 16
+    known = angle.values[number.values > 1]
+    assert ((known >= 0) & (known <= 4 * np.pi)).all()
+    assert np.isnan(angle.values[number.values == 0]).all()
+
+
+def test_four_bundles_reach_places_from_more_sides_than_three(trunk):
+    three = direction_spread(trunk, n=1 << 18, cell=0.05)
+    four = direction_spread(designs.redundant_trunk(), n=1 << 18, cell=0.05)
+    means = [float(s["solid_angle"].where(s["samples"] > 30).median()) for s in (three, four)]
+    assert means[1] > 3 * means[0]
+
+
+def test_distance_to_a_slab_is_its_height_and_beyond_it_to_its_edges():
+    corners = np.array([[0.0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0]])
+    slab = Surface(vertices=corners, faces=np.array([[0, 1, 2], [0, 2, 3]]))
+    points = np.random.default_rng(5).uniform(-3, 7, (500, 3))
+    beyond = np.maximum(np.maximum(-points[:, :2], points[:, :2] - 4), 0)
+    expected = np.hypot(np.linalg.norm(beyond, axis=1), points[:, 2])
+    assert slab.distance(points) == pytest.approx(expected)
