@@ -62,7 +62,8 @@ class ActivationBox:
         x, w = np.polynomial.legendre.leggauss(nodes)
         cube = _product([(1.0 + x) / 2.0] * self.m)
         weights = np.prod(_product([w / 2.0] * self.m), axis=1) * np.prod(self.widths[self.axes])
-        return float(weights @ self._stretch(self.activations(cube)))
+        # Not a BLAS product, whose rounding would depend on its threads.
+        return float((weights * self._stretch(self.activations(cube))).sum())
 
     def _stretch(self, gamma: Array) -> Array:
         """The change of measure of the map at each activation: det J where J is square."""

@@ -115,7 +115,7 @@ def _correction(image: Image, sense: int) -> Estimate:
     """∫ ([x is reached] - sense · d) dx [m³], with the scatter of three directions of sight."""
 
     def missing(spans: Spans) -> float:
-        return float(spans.length @ ((spans.cover > 0) - sense * spans.degree))
+        return float((spans.length * ((spans.cover > 0) - sense * spans.degree)).sum())
 
     values = [missing(spans) for spans in image.spans]
     scale = image.lattice.cell**3
