@@ -25,23 +25,41 @@ within a table, where all rows come from one run, and trust CPU time before wall
 """
 
 
+MARK = "<!-- {} -->\n"
+
+
 def main() -> None:
-    """Run the parts named on the command line, or all, and write the page."""
-    text = HEADER.format(
+    """Run the parts named on the command line, or all; other parts of the page stay."""
+    header = HEADER.format(
         date=datetime.now(UTC).date(),
         python=platform.python_version(),
         threads=parallel.thread_count(),
         machine=platform.machine(),
         **{name: version(name) for name in ("softreach", "numpy", "numba")},
     )
+    sections = _sections()
     for name in sys.argv[1:] or PARTS:
         captured = io.StringIO()
         with redirect_stdout(captured):
             importlib.import_module(f"benchmarks.bench_{name}").main()
         print(captured.getvalue(), flush=True)
-        text += captured.getvalue() + "\n"
-        PAGE.write_text(text, encoding="utf-8")
+        sections[name] = captured.getvalue().strip() + "\n\n"
+        known = [part for part in PARTS if part in sections]
+        body = "".join(MARK.format(part) + sections[part] for part in known)
+        PAGE.write_text(header + body, encoding="utf-8")
     print(f"written to {PAGE}")
+
+
+def _sections() -> dict[str, str]:
+    """What the page holds of each part."""
+    text = PAGE.read_text(encoding="utf-8") if PAGE.exists() else ""
+    starts = {part: text.find(MARK.format(part)) for part in PARTS}
+    found = sorted((at, part) for part, at in starts.items() if at >= 0)
+    ends = [at for at, _ in found[1:]] + [len(text)]
+    return {
+        part: text[at + len(MARK.format(part)) : end]
+        for (at, part), end in zip(found, ends, strict=True)
+    }
 
 
 if __name__ == "__main__":

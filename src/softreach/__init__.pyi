@@ -27,4 +27,6 @@ from .volume import concave_hull as concave_hull
 from .volume import convex_hull as convex_hull
 from .volume import unreachability as unreachability
 from .volume import volume_curve as volume_curve
+from .workspace import ReachableSet as ReachableSet
+from .workspace import direction_spread as direction_spread
 from .workspace import reachable_set as reachable_set
