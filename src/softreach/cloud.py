@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from os import PathLike, fspath
 from pathlib import Path
@@ -58,11 +59,8 @@ def compute_cloud(
     """
     check_sampler(sampler, n, arm.bundles, seed)
     activation, tip = np.empty((n, arm.bundles)), np.empty((n, 3))
-    if report is not None:
-        _fill(arm, activation, tip, sampler, seed, tol, report)
-    else:
-        with progress.bar("computing tips", n) if n > _LONG else _no_bar() as shown:
-            _fill(arm, activation, tip, sampler, seed, tol, shown)
+    with _shown(report, n) as shown:
+        _fill(arm, activation, tip, sampler, seed, tol, shown)
     return schema.cloud_dataset(arm, activation, tip, seed=int(seed), sampler=sampler, tol=tol)
 
 
@@ -132,7 +130,8 @@ def _reported(task: Callable[[], object], report: progress.Progress, count: int)
     report(count)
 
 
-def _no_bar():
-    from contextlib import nullcontext
-
-    return nullcontext(progress.silent)
+def _shown(report: progress.Progress | None, n: int) -> AbstractContextManager[progress.Progress]:
+    """What the caller wants to hear, or a bar if the cloud is large enough to wait for."""
+    if report is None and n > _LONG:
+        return progress.bar("computing tips", n)
+    return nullcontext(report or progress.silent)
