@@ -3,6 +3,9 @@
 `FAST` lets the compiler fuse multiply-add and reassociate, which rounds differently from the order
 written here (a few units in the last place) and is the same for every block and thread. It assumes
 finite numbers: callers check. The predicates of the triangulation must not use it.
+
+A `kernel` never calls a `kernel`, only what is inlined: the process that compiles links a callee
+compiled by itself, later ones load the copy optimized with its caller, and the two round apart.
 """
 
 from __future__ import annotations

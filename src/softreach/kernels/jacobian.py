@@ -33,7 +33,7 @@ def _change(length, weights, a):
     )
 
 
-@kernel
+@inline
 def _walk_column(work, column, table, k, j):
     """Carry one column of the Jacobian of every lane across step k."""
     t = table[k, :, j]

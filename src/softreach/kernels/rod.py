@@ -51,7 +51,7 @@ def load(lanes, gamma, first, count):
             lanes[j, i] = gamma[first + i, j]
 
 
-@kernel
+@inline
 def node_values(work, lanes, table, k):
     """ℓ = dZ (1 + z·γ) and u = Uγ at the nodes of step k, for every lane."""
     for row in range(NODE_ROWS):
@@ -62,14 +62,14 @@ def node_values(work, lanes, table, k):
             _next_group(values, lanes[j], lanes[j + 1], lanes[j + 2], lanes[j + 3], weights)
 
 
-@kernel
+@inline
 def _first_group(values, g0, g1, g2, g3, weights):
     a, b, c, d, rest = weights[0], weights[1], weights[2], weights[3], weights[-1]
     for i in range(LANES):
         values[i] = (rest + a * g0[i] + b * g1[i]) + (c * g2[i] + d * g3[i])
 
 
-@kernel
+@inline
 def _next_group(values, g0, g1, g2, g3, weights):
     a, b, c, d = weights[0], weights[1], weights[2], weights[3]
     for i in range(LANES):
@@ -92,7 +92,7 @@ def _twist(length, u1, u2, u3):
     return length * u1, length * u2, length * u3, 0.0, 0.0, length
 
 
-@kernel
+@inline
 def walk(work):
     """Carry the point of every lane across one step, toward the base."""
     for i in range(LANES):

@@ -1,0 +1,31 @@
+"""Laws of compilation."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+SCRIPT = """
+import hashlib
+import numpy as np
+import softreach as sr
+from softreach.kinematics import tips_and_jacobians
+
+arm = sr.designs.redundant_trunk()
+gamma = np.random.default_rng(0).uniform(-5 / 3, 0, (500, 4))
+shape = sr.configuration(arm, gamma[:50])
+for values in (*tips_and_jacobians(arm, gamma), sr.tip_positions(arm, gamma), shape.position.values):
+    print(hashlib.sha256(values.tobytes()).hexdigest())
+"""
+
+
+def test_the_run_that_compiles_has_the_numbers_of_those_that_load(tmp_path):
+    def run() -> str:
+        environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+        command = [sys.executable, "-c", SCRIPT]
+        return subprocess.run(
+            command, env=environment, check=True, capture_output=True, text=True
+        ).stdout
+
+    assert run() == run()
