@@ -15,7 +15,8 @@ from softreach.kinematics import tips_and_jacobians
 arm = sr.designs.redundant_trunk()
 gamma = np.random.default_rng(0).uniform(-5 / 3, 0, (500, 4))
 shape = sr.configuration(arm, gamma[:50])
-for values in (*tips_and_jacobians(arm, gamma), sr.tip_positions(arm, gamma), shape.position.values):
+results = (*tips_and_jacobians(arm, gamma), sr.tip_positions(arm, gamma), shape.position.values)
+for values in results:
     print(hashlib.sha256(values.tobytes()).hexdigest())
 """
 
