@@ -55,6 +55,7 @@ METRICS: dict[str, dict[str, Metric]] = {
         "exact_convex_volume": Metric("m3", "volume of the reachable set's convex hull"),
         "exact_unreachability": Metric("1", "UNR = 1 - exact_volume / exact_convex_volume"),
         "multiplicity": Metric("1", "mean number of activations that reach a place, if finite"),
+        "multiple_volume": Metric("m3", "volume that more than one activation reaches, if finite"),
         "fold_volume": Metric("m3", "volume reached with both orientations of the map"),
     },
     "curvature": {},
@@ -95,6 +96,7 @@ def image_metrics(arm: Manipulator, tol: float, accuracy: float) -> Numbers:
         "exact_convex_volume": reached.convex_volume,
         "exact_unreachability": reached.unreachability,
         "multiplicity": _mean_multiplicity(reached.multiplicity),
+        "multiple_volume": _multiple_volume(reached.multiplicity),
         "fold_volume": reached.fold_volume,
     }
 
@@ -123,3 +125,7 @@ def _concave(tips: Array, radius: float) -> Numbers:
 def _mean_multiplicity(volumes: Mapping[int, float]) -> float:
     whole = sum(volumes.values())
     return sum(k * volume for k, volume in volumes.items()) / whole if whole > 0 else math.nan
+
+
+def _multiple_volume(volumes: Mapping[int, float]) -> float:
+    return sum(volume for k, volume in volumes.items() if k > 1) if volumes else math.nan
