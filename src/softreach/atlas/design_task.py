@@ -69,8 +69,12 @@ class Remote:
 
     def store(self) -> AtlasStore:
         """The store, opened once per process."""
+        from zarr.storage import MemoryStore
+
         if self._store is not None:
             return self._store
+        if isinstance(self._location, dict | MemoryStore):
+            raise StoreFailed("the store is in the memory of another process; use a path or a URL")
         key = repr(self._location), self._origin
         if key not in _opened:
             _opened.clear()

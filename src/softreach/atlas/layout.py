@@ -13,10 +13,13 @@ from softreach.atlas.metrics import METRICS, scalar_names
 from softreach.curvature import QUANTITIES
 from softreach.schema import AXES
 
-__all__ = ["RESOLUTION", "Plan", "array_plans"]
+__all__ = ["RESOLUTION", "SEAL", "Plan", "array_plans"]
 
 RESOLUTION = 1e-5
 """Step of stored tips, in the shortest L: coordinates are off by half of it at most."""
+
+SEAL = "metrics"
+"""The array that is created last: where it is, all others are."""
 
 _MISSING = int(np.iinfo(np.int32).min)
 
@@ -44,7 +47,7 @@ class Plan:
 
 
 def array_plans(command: Command, cube: np.ndarray) -> Iterator[Plan]:
-    """Every array of an atlas; `cube` are its unit activations, shape (n, bundles)."""
+    """Every array of an atlas, the seal last; `cube` are its unit activations, (n, bundles)."""
     yield from _parameters(command)
     yield _labels("metric", list(scalar_names(command.metrics)))
     yield _labels("axis", list(AXES))
@@ -53,12 +56,12 @@ def array_plans(command: Command, cube: np.ndarray) -> Iterator[Plan]:
     yield _per_design(
         command, "message", str, "", attrs={"long_name": "why a design has no numbers"}
     )
-    names = {"metric": len(scalar_names(command.metrics))}
-    yield _per_design(command, "metrics", np.float64, np.nan, names, _units(command))
     if "curvature" in command.metrics:
         yield from _curvature(command)
     if command.keep_clouds:
         yield _tips(command)
+    names = {"metric": len(scalar_names(command.metrics))}
+    yield _per_design(command, SEAL, np.float64, np.nan, names, _units(command))
 
 
 _CUBE = {

@@ -56,7 +56,7 @@ def open_atlas(store: StoreLike) -> xr.Dataset:
     """
     import xarray as xr
 
-    command = AtlasStore.open(store).command
+    command = AtlasStore.open(store, "r").command
     raw = xr.open_zarr(absolute(store), consolidated=False, zarr_format=3, chunks=None)
     # Status first: what it calls done is complete by then.
     done = (raw["status"].load() == DONE).values
@@ -70,7 +70,7 @@ def atlas_status(store: StoreLike) -> AtlasStatus:
     Raises:
         InvalidInput: There is no atlas.
     """
-    atlas = AtlasStore.open(store)
+    atlas = AtlasStore.open(store, "r")
     counts = np.bincount(atlas.status(), minlength=4).tolist()
     return AtlasStatus(
         designs=atlas.command.space.size,

@@ -2,33 +2,39 @@
 
 No two tasks ever write to the same chunk. Zarr's local store writes every chunk beside its place
 and renames it, so a killed writer leaves chunks whole or absent; a design whose status is missing
-is computed again, whatever else of it exists. Creating a store writes the same bytes whoever does
-it and deletes nothing, so the tasks of a job array may all try; the command is written last.
+is computed again, whatever else of it exists.
+
+A store is created in three steps, so that the tasks of a job array may all do it at once and be
+killed anywhere: its root, which holds the command, exists from one moment to the next and is never
+written again, so that everybody knows whose store it is; then come the arrays, whose bytes are the
+same whoever writes them, so that a late creator changes nothing; the last of them is the seal, and
+nobody reads a store or adds designs without it.
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.atlas.command import Command
-from softreach.atlas.layout import Plan, array_plans
+from softreach.atlas.layout import SEAL, Plan, array_plans
 from softreach.errors import InvalidInput, SoftreachError
 from softreach.sampling import sample_cube
 
 if TYPE_CHECKING:
     import zarr
-    from zarr.storage import StoreLike
+    from zarr.storage import StoreLike, StorePath
 
 __all__ = ["DONE", "FAILED", "GAP", "TODO", "AtlasStore", "Result", "StoreFailed"]
 
@@ -67,38 +73,57 @@ class AtlasStore:
                 that differs.
             StoreFailed: It cannot be written to.
         """
-        import zarr
-
         location = absolute(location)
-        _refuse_strangers(location)
         with writing(location):
-            group = zarr.open_group(location, mode="a", zarr_format=3)
-            if "command" not in group.attrs:
-                _create(location, group, command)
-        store = cls.open(location)
+            if _root(location) is None:
+                _claim(location, command)
+        store = cls._begun(location)
         if differences := command.differences(store.command):
             hint = f"it differs in {'; '.join(differences)}"
             raise InvalidInput("store", location, "new, or begun by the same command", hint)
+        if SEAL not in store.group:
+            with writing(location):
+                store._complete()
         return store
 
     @classmethod
-    def open(cls, location: StoreLike) -> Self:
+    def open(cls, location: StoreLike, mode: Literal["r", "r+"] = "r+") -> Self:
         """Open an atlas.
+
+        Args:
+            location: Where it is.
+            mode: "r" for a place that cannot be written to.
 
         Raises:
             InvalidInput: There is none, or of another version.
         """
-        import zarr
-
         location = absolute(location)
-        try:
-            group = zarr.open_group(location, mode="r+", zarr_format=3)
-        except FileNotFoundError:
-            raise InvalidInput("store", location, "an atlas written by build_atlas") from None
-        text = group.attrs.get("command")
-        if not isinstance(text, str):
+        group = _root(location, mode)
+        text = None if group is None or SEAL not in group else group.attrs.get("command")
+        if group is None or not isinstance(text, str):
             raise InvalidInput("store", location, "an atlas written by build_atlas")
         return cls(location, Command.from_json(text), group)
+
+    @classmethod
+    def _begun(cls, location: StoreLike) -> Self:
+        """The store, though its arrays may be missing."""
+        group = _root(location)
+        text = None if group is None else group.attrs.get("command")
+        if group is None or not isinstance(text, str):
+            allowed = "a new folder, or an atlas; it holds something else"
+            raise InvalidInput("store", location, allowed)
+        return cls(location, Command.from_json(text), group)
+
+    def _complete(self) -> None:
+        """Write everything but the designs, or what is missing of it, and the seal last."""
+        cube = _cube(self.command)
+        self._check_cube(cube, "this machine draws other activations than the one that began it")
+        *plans, seal = array_plans(self.command, cube)
+        for plan in plans:
+            _create_array(self.location, self.group, plan)
+        for index, reason in self.command.space.gaps.items():
+            _tell(self.group, self.command, index, reason, GAP)
+        _create_array(self.location, self.group, seal)
 
     def status(self) -> NDArray[np.uint8]:
         """TODO, DONE, FAILED or GAP of every design, in C order, shape (designs,)."""
@@ -117,10 +142,14 @@ class AtlasStore:
         Raises:
             StoreFailed: They are not what they were when the store was created.
         """
-        cube = np.asarray(self._array("unit_activation")[...])
-        if _digest(cube) != self.group.attrs["unit_activation_sha256"]:
-            raise StoreFailed(f"{self.location}: the stored activations are damaged; remove it")
+        with trouble(f"{self.location} cannot be read"):
+            cube = np.asarray(self._array("unit_activation")[...])
+        self._check_cube(cube, "the stored activations are damaged; remove it")
         return cube
+
+    def _check_cube(self, cube: NDArray[np.float64], otherwise: str) -> None:
+        if _digest(cube) != self.group.attrs["unit_activation_sha256"]:
+            raise StoreFailed(f"{self.location}: {otherwise}")
 
     def write(self, index: int, result: Result) -> None:
         """Store a design; its status comes last.
@@ -163,53 +192,84 @@ def fixed_point(tips: NDArray[np.float64], scale: float) -> NDArray[np.int32]:
 
 def absolute(location: StoreLike) -> StoreLike:
     """The same place for a process elsewhere."""
+    if isinstance(location, str):
+        # A path, so that files are written beside their place and renamed.
+        location = location.removeprefix("file://")
     if isinstance(location, os.PathLike) or (isinstance(location, str) and "://" not in location):
         return str(Path(location).absolute())
     return location
 
 
+def writing(location: StoreLike) -> AbstractContextManager[None]:
+    """Turn trouble of the disk or the network into one line that says what to do."""
+    return trouble(
+        f"{location} cannot be written",
+        "; what is done is safe, and the same command continues once that is mended",
+    )
+
+
 @contextmanager
-def writing(location: StoreLike) -> Iterator[None]:
-    """Turn trouble of the disk into one line that says what to do."""
+def trouble(what: str, then: str = "") -> Iterator[None]:
+    """Raise what a store raises, whatever kind of store it is, as `StoreFailed`."""
     try:
         yield
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise StoreFailed(
-            f"{location} cannot be written: {reason}; what is done is safe, and the same command "
-            "continues once that is mended"
-        ) from error
+    except SoftreachError:
+        raise
+    except Exception as error:
+        reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
+        raise StoreFailed(f"{what}: {reason}{then}") from error
 
 
-def _refuse_strangers(location: StoreLike) -> None:
-    """A folder with other things in it is nobody's to write to."""
-    if not isinstance(location, str) or not Path(location).exists():
-        return
-    found = Path(location)
-    if not found.is_dir() or (any(found.iterdir()) and not (found / "zarr.json").is_file()):
+def _root(location: StoreLike, mode: Literal["r", "r+"] = "r+") -> zarr.Group | None:
+    """The root group of a store, if there is one."""
+    import zarr
+
+    with trouble(f"{location} cannot be opened"):
+        try:
+            return zarr.open_group(location, mode=mode, zarr_format=3)
+        except FileNotFoundError:
+            return None
+        except (FileExistsError, ImportError, ValueError) as error:
+            allowed = "a new folder, or an atlas"
+            raise InvalidInput("store", location, allowed, str(error)) from None
+
+
+def _claim(location: StoreLike, command: Command) -> None:
+    """Write the root of a store, whole and never again: of several who try, the first does."""
+    from zarr.core.buffer import default_buffer_prototype
+    from zarr.core.sync import sync
+    from zarr.storage._common import make_store_path
+
+    root = sync(make_store_path(location, mode="a"))
+    # In this order: a claim by somebody else in between makes its files no strangers.
+    if sync(_holds_files(root)) and _root(location) is None:
         raise InvalidInput("store", location, "a new folder, or an atlas")
+    document = {"zarr_format": 3, "node_type": "group", "attributes": _attributes(command)}
+    text = default_buffer_prototype().buffer.from_bytes(json.dumps(document).encode())
+    sync((root / "zarr.json").set_if_not_exists(text))
 
 
-def _create(location: StoreLike, group: zarr.Group, command: Command) -> None:
-    """Write everything but the designs, and the command last."""
-    if group.attrs:
-        raise InvalidInput("store", location, "a new folder, or an atlas; it holds something else")
-    cube = sample_cube(command.sampler, command.n, command.space.bundles, command.seed)
-    for plan in array_plans(command, cube):
-        _create_array(location, group, plan)
-    for index, reason in command.space.gaps.items():
-        _tell(group, command, index, reason, GAP)
+async def _holds_files(root: StorePath) -> bool:
+    """Whether there is anything but what a killed writer leaves behind."""
+    names = [name async for name in root.store.list_dir(root.path)]
+    return any(not name.endswith(".partial") for name in names)
+
+
+def _attributes(command: Command) -> dict[str, str | float]:
+    """What the root says about the atlas."""
     versions = {name: version(name) for name in ("numpy", "scipy", "zarr", "xarray", "numba")}
-    group.attrs.update(
-        {
-            "title": "reachability cloud atlas",
-            "design": command.space.base.to_toml(),
-            "length": command.space.base.length,
-            "unit_activation_sha256": _digest(cube),
-            "versions": ", ".join(f"{name} {number}" for name, number in versions.items()),
-            "command": command.to_json(),
-        }
-    )
+    return {
+        "title": "reachability cloud atlas",
+        "design": command.space.base.to_toml(),
+        "length": command.space.base.length,
+        "unit_activation_sha256": _digest(_cube(command)),
+        "versions": ", ".join(f"{name} {number}" for name, number in versions.items()),
+        "command": command.to_json(),
+    }
+
+
+def _cube(command: Command) -> NDArray[np.float64]:
+    return sample_cube(command.sampler, command.n, command.space.bundles, command.seed)
 
 
 def _create_array(location: StoreLike, group: zarr.Group, plan: Plan) -> None:
