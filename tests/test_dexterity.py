@@ -7,9 +7,11 @@ import pytest
 
 from softreach import designs
 from softreach.cloud import compute_cloud
-from softreach.dexterity import dexterity
+from softreach.dexterity import dexterity, solution_measure
 from softreach.errors import InvalidInput
-from softreach.kinematics import tip_positions
+from softreach.inverse import solve_inverse
+from softreach.kinematics import tip_jacobian, tip_positions
+from softreach.workspace import reachable_set
 
 
 def differences(arm, gamma, step=1e-6):
@@ -63,3 +65,71 @@ def test_fewer_bundles_have_an_area_or_a_length_and_no_orientation(trunk):
 def test_only_a_cloud_has_dexterity(trunk):
     with pytest.raises(InvalidInput, match="cloud"):
         dexterity(compute_cloud(trunk, n=10).drop_vars("tip"))
+
+
+def position_slope(arm, gamma):
+    """Tip and ∂r/∂γ of one activation."""
+    tip, twist = tip_positions(arm, [gamma])[0], tip_jacobian(arm, [gamma])[0]
+    return tip, twist[:3] + np.cross(twist[3:], tip[:, None], axis=0)
+
+
+def solution_curve(arm, target, start, step=0.04):
+    """Points every `step` along the curve of activations of one tip through `start`."""
+    curve = [start]
+    for sense in (1, -1):
+        gamma, way = start, sense * np.linalg.svd(position_slope(arm, start)[1])[2][3]
+        while True:
+            ahead = gamma + step * way
+            for _ in range(2):
+                tip, slope = position_slope(arm, ahead)
+                ahead = ahead + np.linalg.pinv(slope) @ (target - tip)
+            if not ((arm.bounds[:, 0] <= ahead) & (ahead <= arm.bounds[:, 1])).all():
+                break
+            new = np.linalg.svd(slope)[2][3]
+            gamma, way = ahead, new * np.sign(new @ way)
+            curve.append(gamma)
+    return np.array(curve)
+
+
+@pytest.mark.slow
+def test_with_four_bundles_the_measure_is_the_length_of_the_curve_of_solutions():
+    arm, step = designs.redundant_trunk(), 0.1
+    cloud = compute_cloud(arm, n=1 << 19, sampler="sobol")
+    measure = solution_measure(cloud, 0.2).solution_measure
+    for place in ([0.1, -0.3, 0.5], [-0.1, 0.3, 0.7]):  # cells that lie inside
+        found = float(measure.sel(dict(zip("xyz", place, strict=True)), method="nearest"))
+        targets = place + np.random.default_rng(0).uniform(-0.1, 0.1, (80, 3))
+        total = 0.0
+        for solution in solve_inverse(arm, targets, family=6):
+            known = np.full((1, 4), np.inf)
+            for start in solution.activations:
+                if np.linalg.norm(known - start, axis=1).min() > step:
+                    curve = solution_curve(arm, solution.target, start, step)
+                    total += step * len(curve)  # half a step is lost at each end
+                    known = np.vstack([known, curve])
+        # Both are means over the cell, of standard errors about 0.02 and 0.03.
+        assert found == pytest.approx(total / len(targets), rel=0.1)
+
+
+def test_with_three_bundles_the_measure_is_the_number_of_activations(trunk):
+    cloud = compute_cloud(trunk, n=1 << 17, sampler="sobol")
+    measure = solution_measure(cloud, 0.1).solution_measure
+    reached = reachable_set(trunk)
+    centers = np.stack(np.meshgrid(measure.x, measure.y, measure.z, indexing="ij"), -1)
+    depth = reached.distance(centers.reshape(-1, 3)).reshape(measure.shape)
+    inner = measure.values[depth < -0.1]
+    assert len(inner) > 100
+    assert inner.mean() == pytest.approx(1.0, abs=5e-3)
+    assert inner.std() < 0.12  # some 190 samples in each cell
+    total = float(measure.sum()) * 0.1**3
+    assert total == pytest.approx(reached.volume, rel=2e-3)
+
+
+def test_the_measure_asks_for_an_even_cloud_of_three_bundles_or_more(trunk):
+    with pytest.raises(InvalidInput, match="sampler = boundary: must be one of uniform"):
+        solution_measure(compute_cloud(trunk, n=100, sampler="boundary"))
+    flat = trunk.replace(fibers=trunk.fibers[:2])
+    with pytest.raises(InvalidInput, match="bundles = 2: must be 3 or more"):
+        solution_measure(compute_cloud(flat, n=100))
+    with pytest.raises(InvalidInput, match="cell = 0: must be"):
+        solution_measure(compute_cloud(trunk, n=100), 0)

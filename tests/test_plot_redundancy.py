@@ -12,7 +12,7 @@ from softreach.plot.redundancy import (
     plot_distance,
     plot_distance_histograms,
     plot_redundancy,
-    plot_slice,
+    plot_slab,
 )
 from softreach.redundancy import activation_distance
 from tests.test_redundancy import made_up
@@ -44,11 +44,11 @@ def shown_pixels(ax) -> int:
 
 
 def test_a_slice_shows_the_slab_and_states_it(drawn):
-    ax = plot_slice(drawn[0], plane="right", thickness=0.1, color=3)
+    ax = plot_slab(drawn[0], plane="right", thickness=0.1, color=3)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("y / L", "z / L")
     assert "|x| ≤ 0.05 L" in [text.get_text() for text in ax.texts]
-    whole = plot_slice(drawn[0], plane="right", thickness=10.0, size=1.0, key=False)
-    thin = plot_slice(drawn[0], plane="right", thickness=0.01, size=1.0, key=False)
+    whole = plot_slab(drawn[0], plane="right", thickness=10.0, size=1.0, key=False)
+    thin = plot_slab(drawn[0], plane="right", thickness=0.01, size=1.0, key=False)
     assert 0 < shown_pixels(thin) < 0.2 * shown_pixels(whole)
 
 
@@ -80,9 +80,9 @@ def test_all_designs_stand_in_one_figure_at_one_scale(drawn):
 def test_what_cannot_be_drawn_is_refused(drawn):
     cloud, distance = drawn
     with pytest.raises(InvalidInput, match="plane = 'top'"):
-        plot_slice(cloud, plane="top")
+        plot_slab(cloud, plane="top")
     with pytest.raises(InvalidInput, match="a tip lies in the slab"):
-        plot_slice(cloud, thickness=-1.0)
+        plot_slab(cloud, thickness=-1.0)
     with pytest.raises(InvalidInput, match="distances = none"):
         plot_distance_histograms({})
     with pytest.raises(InvalidInput, match=r"distances = \['b'\]: must be of the clouds"):

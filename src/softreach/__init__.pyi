@@ -2,13 +2,19 @@ from . import designs as designs
 from . import export as export
 from . import plot as plot
 from .atlas import DesignSpace as DesignSpace
+from .atlas import atlas_cloud as atlas_cloud
+from .atlas import atlas_status as atlas_status
+from .atlas import best_designs as best_designs
 from .atlas import build_atlas as build_atlas
 from .atlas import open_atlas as open_atlas
+from .atlas import worker_processes as worker_processes
 from .cloud import compute_cloud as compute_cloud
 from .cloud import design_of as design_of
 from .cloud import open_cloud as open_cloud
 from .cloud import save_cloud as save_cloud
+from .curvature import curvature_statistics as curvature_statistics
 from .dexterity import dexterity as dexterity
+from .dexterity import solution_measure as solution_measure
 from .errors import InvalidDesign as InvalidDesign
 from .errors import InvalidInput as InvalidInput
 from .errors import SoftreachError as SoftreachError
@@ -22,7 +28,6 @@ from .manipulator import Manipulator as Manipulator
 from .path import track_path as track_path
 from .redundancy import activation_distance as activation_distance
 from .report import describe as describe
-from .split import split_fiber as split_fiber
 from .volume import concave_hull as concave_hull
 from .volume import convex_hull as convex_hull
 from .volume import unreachability as unreachability

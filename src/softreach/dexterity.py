@@ -1,4 +1,4 @@
-"""How well the tip can be moved from each sample of a cloud, from the Jacobian there."""
+"""How well the tip can be moved from each sample of a cloud, and how many activations reach it."""
 
 from __future__ import annotations
 
@@ -11,17 +11,22 @@ from numpy.typing import NDArray
 
 from softreach import parallel
 from softreach.cloud import design_of
+from softreach.errors import InvalidInput
+from softreach.geometry.cell_grid import CellGrid
 from softreach.kinematics import BLOCK, tips_and_jacobians
 from softreach.manipulator import Manipulator
-from softreach.schema import check_cloud
+from softreach.schema import AXES, check_cloud
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["dexterity"]
+__all__ = ["dexterity", "solution_measure"]
 
 Array = NDArray[np.float64]
 Signs = NDArray[np.int8]
+
+_CELL = 1 / 20  # of the arm's length
+_EVEN = ("uniform", "sobol", "grid")  # samplers that fill the activation box evenly
 
 
 def dexterity(cloud: xr.Dataset) -> xr.Dataset:
@@ -61,6 +66,44 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
     if arm.bundles == 3:
         result["orientation"] = ("sample", sign, {"units": "1", "long_name": "sign of det J"})
     return result
+
+
+def solution_measure(cloud: xr.Dataset, cell: float | None = None) -> xr.Dataset:
+    """How many activations reach each place: a number, or the size of the family of solutions.
+
+    For three bundles it is the number of activations that reach a place; with four they form
+    curves in the activation box, whose length this is; with five surfaces, whose area; and so on.
+    No inverse problem is solved: by the coarea formula (Federer 1969, 3.2.12) the integral of that
+    measure over a cell is ∫ √det(J Jᵀ) dγ over the activations that lead into it, here the mean
+    over a cloud that fills the activation box evenly. Values are means over a cell, with the
+    noise of so many samples; cells that the border of the cloud cuts count as they are.
+
+    Args:
+        cloud: A cloud of three bundles or more, sampled evenly: uniform, sobol or grid.
+        cell: Edge of the cells [m]; None for L/20.
+
+    Returns:
+        Dataset over the centers x, y, z [m] of cells: `solution_measure` [-], 0 where no tip is.
+
+    Raises:
+        InvalidInput: The dataset is no cloud, of fewer bundles, or sampled unevenly; cells that
+            are not positive or too many.
+    """
+    import xarray as xr
+
+    check_cloud(cloud)
+    arm, n = design_of(cloud), cloud.sizes["sample"]
+    if arm.bundles < 3:
+        raise InvalidInput("bundles", arm.bundles, "3 or more: fewer fill no cell")
+    if (sampler := cloud.attrs.get("sampler")) not in _EVEN:
+        raise InvalidInput("sampler", sampler, f"one of {', '.join(_EVEN)}")
+    grid = CellGrid.around(cloud["tip"].values, _CELL * arm.length if cell is None else cell)
+    weight = float(np.prod(np.diff(arm.bounds))) / n / grid.volume
+    total = weight * grid.sum(dexterity(cloud)["manipulability"].values)
+    name = {"units": "1", "long_name": "activations that reach a place: number, length, area, ..."}
+    centers = zip(AXES, grid.centers(), strict=True)
+    axes = {axis: (axis, places, {"units": "m"}) for axis, places in centers}
+    return xr.Dataset({"solution_measure": (AXES, total, name)}, axes, {"cell": grid.edge})
 
 
 def _slopes(arm: Manipulator, gamma: Array, tol: float) -> Array:

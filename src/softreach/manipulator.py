@@ -18,6 +18,7 @@ from softreach.atomic import replacing
 from softreach.checks import ARM_RANGES, arm_faults, plain_number
 from softreach.errors import Fault, InvalidDesign, InvalidInput
 from softreach.fiber import FiberArchitecture
+from softreach.split import split_fiber
 
 __all__ = ["Manipulator"]
 
@@ -63,6 +64,34 @@ class Manipulator:
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed, checked like a new design."""
         return replace(self, **changes)
+
+    def split(self, fiber: str | int, count: int, *, keep_extent: bool = True) -> Self:
+        """Replace an architecture of one bundle by `count` independent ones beside each other.
+
+        They are spread evenly about the center of the original, one extent apart, and wind as it
+        does. Splitting the longitudinal fiber of `designs.minimal_trunk` in two gives
+        `designs.redundant_trunk`. Overlap is not checked: fibers of different architectures
+        may cross anyway.
+
+        Args:
+            fiber: Name or index of the architecture.
+            count: How many shall take its place; 1 leaves the design as it is.
+            keep_extent: True gives each the extent σ of the original, False its share σ / count, so
+                that together they fill the sector of the original.
+
+        Returns:
+            The new design; the parts are named "NAME 1", "NAME 2", ..., and each has the activation
+            bounds of the original.
+
+        Raises:
+            InvalidInput: No such architecture, one of several bundles, or a count below 1.
+            InvalidDesign: The parts do not fit on the arm, such as a reachable extension of zero.
+        """
+        fibers, repeats = split_fiber(self.fibers, fiber, count, keep_extent)
+        bounds = self.activation_bounds
+        if np.ndim(bounds) == 2:
+            bounds = _plain_bounds(np.repeat(self.bounds, repeats, axis=0))
+        return self.replace(fibers=fibers, activation_bounds=bounds)
 
     @classmethod
     def from_toml(cls, text: str, source: str = "design") -> Self:

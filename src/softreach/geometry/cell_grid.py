@@ -66,6 +66,10 @@ class CellGrid:
         """How many of some points, all by default, each cube holds."""
         return np.bincount(self.cells[points], minlength=self._size).reshape(self.shape)
 
+    def sum(self, values: Array) -> Array:
+        """Sum of a value of every point in each cube."""
+        return np.bincount(self.cells, values, self._size).reshape(self.shape)
+
     def mean(self, values: Array, points: Index | slice = slice(None)) -> Array:
         """Mean of the finite values of some points in each cube; NaN where there is none."""
         known = np.isfinite(values)

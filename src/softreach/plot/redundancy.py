@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["plot_distance", "plot_distance_histograms", "plot_redundancy", "plot_slice"]
+__all__ = ["plot_distance", "plot_distance_histograms", "plot_redundancy", "plot_slab"]
 
 _NORMAL = {"front": 1, "right": 0}  # the axis that a plane through the origin leaves out
 _THICKNESS = 1 / 50  # of L
@@ -28,7 +28,7 @@ _ISOLATED = 190  # light gray
 _LABEL = "mean activation distance D̄"
 
 
-def plot_slice(
+def plot_slab(
     cloud: xr.Dataset,
     ax: Axes | None = None,
     *,
@@ -195,7 +195,7 @@ def plot_redundancy(
             rgb = coloring.rgb / 255
             plot_cloud(cloud, row["cloud"], color=rgb, **shared)
             for plane in _NORMAL:
-                plot_slice(cloud, row[plane], plane=plane, thickness=thickness, color=rgb, **shared)
+                plot_slab(cloud, row[plane], plane=plane, thickness=thickness, color=rgb, **shared)
             plot_distance(cloud, distances[title], row["distance"], high=high, **shared)
             _draw_row_keys(row, title, coloring.key, ScalarKey("D̄", 0.0, high))
     return axes

@@ -1,0 +1,69 @@
+"""Designs at rest side by side: the arm, and below it some of its cross-sections."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from softreach.arm_shape import rest_configuration
+from softreach.plot.arm import arm_points, plot_arm
+from softreach.plot.cross_section import plot_cross_section
+from softreach.plot.frame import bounding_box
+from softreach.plot.projection import View
+from softreach.plot.style import figure_style, pyplot
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from softreach.manipulator import Manipulator
+
+__all__ = ["DesignPanel", "plot_designs"]
+
+
+class DesignPanel(NamedTuple):
+    """One arm in a row of arms."""
+
+    title: str
+    arm: Manipulator
+    view: View = "front"
+
+
+def plot_designs(
+    panels: Sequence[DesignPanel], stations: Sequence[float] = (0.0,), *, width: float | None = None
+) -> Figure:
+    """Draw arms at rest, and under each its cross-sections, all at one scale (figures 1b-d, 4a).
+
+    Args:
+        panels: The arms, from left to right.
+        stations: Z / L of the cross-sections [-], from 0 to 1; none for the arms alone.
+        width: Of the figure [inch]; None for 1.5 a panel.
+
+    Raises:
+        InvalidInput: A station off an arm, or an unknown view.
+        MissingExtra: matplotlib is not installed.
+    """
+    box = bounding_box(*(arm_points(p.arm, rest_configuration(p.arm)) for p in panels))
+    reach = 1.08 * max(
+        float(p.arm.radius(s * p.arm.length)) / p.arm.length
+        for p in panels
+        for s in (*stations, 0.0)
+    )
+    width = 1.5 * len(panels) if width is None else width
+    rows = 1 + len(stations)
+    with figure_style():
+        heights = [2.6, *[width / len(panels)] * len(stations)]
+        shape = {"height_ratios": heights, "layout": "constrained", "squeeze": False}
+        figure, axes = pyplot().subplots(
+            rows, len(panels), figsize=(width, sum(heights) + 0.1), **shape
+        )
+        for k, panel in enumerate(panels):
+            plot_arm(panel.arm, ax=axes[0, k], view=panel.view, box=box)
+            axes[0, k].set_title(panel.title)
+            for ax, station in zip(axes[1:, k], stations, strict=True):
+                plot_cross_section(panel.arm, station * panel.arm.length, ax, reach=reach)
+                ax.set_title(f"Z = {station:.2g} L" if station else "Z = 0")
+        for ax in np.ravel(axes[:, 1:]):
+            ax.set(ylabel="", yticklabels=[])
+    return figure
