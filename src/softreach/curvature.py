@@ -109,7 +109,7 @@ def stream_statistics(
 
 
 def distal_stations(arm: Manipulator, count: int = 6) -> Array:
-    """Even stations from the middle of the arm to its tip, both included, Z [m] (figure 4c)."""
+    """Even stations from the middle of the arm to its tip, both included, Z [m] (figure 3c)."""
     return np.linspace(0.5, 1.0, count) * arm.length
 
 

@@ -113,4 +113,6 @@ def _curvature(atlas: xr.Dataset) -> Any:
     across, up = sheet_axes(ends)
     clouds = {f"{_at(up, k)}": _clouds(ends)(len(across.values) - 1, k) for k in range(2)}
     found = {label: cloud for label, cloud in clouds.items() if cloud is not None}
-    return plot_curvature({label: curvature_statistics(cloud) for label, cloud in found.items()})
+    ax = plot_curvature({label: curvature_statistics(cloud) for label, cloud in found.items()})
+    ax.set_title(_at(across, -1), fontsize=9)
+    return ax

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.cloud import design_of
 from softreach.errors import InvalidInput
+from softreach.plot.arm import plot_arm
 from softreach.plot.cloud import plot_cloud
 from softreach.plot.coloring import color_samples, draw_figure_key
 from softreach.plot.projection import OBLIQUE
@@ -70,10 +72,10 @@ def plot_corners(
     view: tuple[float, float] = OBLIQUE,
     width: float = 6.9,
 ) -> Figure:
-    """Clouds from two opposing sides, one column each (figure 3b).
+    """Clouds from two opposing sides, one column each, with their arms at rest (figure 2b).
 
     Args:
-        clouds: Title and cloud of each column.
+        clouds: Title and cloud of each column; the cloud says which arm.
         box: What each panel shows [L], shape (2, 3).
         view: Azimuth and elevation of the eye of the upper row [rad]; the lower row is opposite.
         width: Of the figure [inch].
@@ -84,17 +86,18 @@ def plot_corners(
         column = width / len(clouds)
         figure = pyplot().figure(figsize=(width, 2 * column + 0.5))
         panels = figure.subplots(2, len(clouds), squeeze=False)
-        figure.subplots_adjust(0.08, 0.11, 0.965, 0.86, wspace=0.45, hspace=0.34)
+        figure.subplots_adjust(0.085, 0.11, 0.965, 0.86, wspace=0.45, hspace=0.34)
         for k, (title, cloud) in enumerate(clouds):
             panels[0, k].set_title(f"({k + 1})  {title}", pad=4)
             for ax, side in zip(panels[:, k], sides, strict=True):
                 plot_cloud(cloud, ax, view=side, key=False, box=box)
+                plot_arm(design_of(cloud), ax=ax, view=side, box=box)
         draw_figure_key(figure, color_samples(clouds[0][1]).key, 0.09)
     return figure
 
 
 def plot_metric_map(atlas: xr.Dataset, metric: str, ax: Axes | None = None) -> Axes:
-    """Contours of a metric over the two parameters of an atlas (figure 4b); its best is marked.
+    """Contours of a metric over the two parameters of an atlas (figure 3b); its best is marked.
 
     Volumes and lengths are shown in L. The best is the largest value, of unreachability the
     smallest. Designs without a value stay white.
@@ -117,11 +120,7 @@ def plot_metric_map(atlas: xr.Dataset, metric: str, ax: Axes | None = None) -> A
         ax = _small_axes() if ax is None else ax
         shown = np.ma.masked_invalid(values)
         filled = ax.contourf(across.values, up.values, shown, 14, cmap="viridis")
-        lines = ax.contour(
-            across.values, up.values, shown, np.asarray(filled.levels)[::2], colors="w"
-        )
-        lines.set_linewidth(0.5)
-        ax.clabel(lines, fontsize=6, fmt="%.3g")
+        _draw_contours(ax, across, up, shown, np.asarray(filled.levels))
         ax.figure.colorbar(filled, ax=ax, label=_METRICS.get(metric, _plain(metric)))
         _mark_best(ax, across, up, values, smallest="unreachability" in metric)
         ax.set(xlabel=across.label, ylabel=up.label)
@@ -130,6 +129,27 @@ def plot_metric_map(atlas: xr.Dataset, metric: str, ax: Axes | None = None) -> A
 
 def _small_axes() -> Axes:
     return pyplot().subplots(figsize=(3.4, 2.8), layout="constrained")[1]
+
+
+def _draw_contours(
+    ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, levels: Array
+) -> None:
+    """Every second level as a line, white on dark and dark on bright, with its value."""
+    ink = ["w" if k < 0.65 * len(levels) else "0.15" for k in range(0, len(levels), 2)]
+    lines = ax.contour(across.values, up.values, values, levels[::2], colors=ink, linewidths=0.5)
+    low = np.array([across.values[0], up.values[0]])
+    span = np.array([across.values[-1], up.values[-1]]) - low
+    paths = ((path.vertices - low) / span for path in lines.get_paths())
+    places = [low + span * place for path in paths for place in _label_place(path)]
+    if places:
+        ax.clabel(lines, manual=places, fontsize=6, fmt="%.2f")
+
+
+def _label_place(path: Array) -> list[Array]:
+    """Where on a contour, from 0 to 1 across and up, its label is far from every edge."""
+    inside = path[((path > 0.1) & (path < 0.86)).all(axis=1)]
+    distance = np.abs(inside - (0.5, 0.35)).sum(axis=1)
+    return [inside[distance.argmin()]] if len(inside) else []
 
 
 def _mark_best(ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, smallest: bool) -> None:

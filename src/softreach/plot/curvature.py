@@ -27,7 +27,7 @@ _BINS = 64
 def plot_curvature(
     statistics: Mapping[str, xr.Dataset], ax: Axes | None = None, *, quantity: str = "bending"
 ) -> Axes:
-    """Distributions at the stations of one or two designs (figure 4c); dots are medians.
+    """Distributions at the stations of one or two designs (figure 3c); dots are medians.
 
     Each distribution is drawn to the same width. Curvatures are shown times L.
 

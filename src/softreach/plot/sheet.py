@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 Grid = NDArray[np.object_]
 
 _STEEL = (0.55, 0.68, 0.82)
-_LEFT, _BOTTOM, _TOP = 0.75, 0.62, 0.08  # inches around a sheet
+_LEFT, _RIGHT, _BOTTOM, _TOP = 0.75, 0.04, 0.62, 0.08  # inches around a sheet
 
 
 class SheetAxis(NamedTuple):
@@ -47,7 +47,7 @@ def plot_cloud_sheet(
     view: View = OBLIQUE,
     width: float = 6.9,
 ) -> Figure:
-    """A sheet of clouds at one scale, colored by activation (figure 3a).
+    """A sheet of clouds at one scale, colored by activation (figure 2a).
 
     Args:
         cloud_at: (column, row) -> cloud, row 0 at the bottom; None leaves a gap. Called once for
@@ -77,7 +77,7 @@ def plot_hull_sheet(
     view: View = OBLIQUE,
     width: float = 6.9,
 ) -> Figure:
-    """A sheet of lit hulls at one scale (figure 4a).
+    """A sheet of lit hulls at one scale (figure 3a).
 
     Args:
         hull_at: (column, row) -> surface [m], row 0 at the bottom; None leaves a gap.
@@ -106,7 +106,7 @@ def _sheet(
     extent = panel_extent(box, view)
     aspect = (extent.top - extent.bottom) / (extent.right - extent.left)
     columns, rows = len(across.values), len(up.values)
-    size = np.array([1.0, aspect]) * (width - _LEFT) / columns
+    size = np.array([1.0, aspect]) * (width - _LEFT - _RIGHT) / columns
     height = _BOTTOM + rows * size[1] + _TOP
     figure = pyplot().figure(figsize=(width, height))
     panels = np.empty((rows, columns), object)
@@ -115,7 +115,7 @@ def _sheet(
         place = (left / width, bottom / height, size[0] / width, size[1] / height)
         panels[row, column] = _blank(figure, place, extent)
     _label_edges(panels, across, up)
-    middle = (_LEFT + (width - _LEFT) / 2) / width
+    middle = (_LEFT + columns * size[0] / 2) / width
     figure.text(middle, 0.12 / height, across.label, ha="center", fontsize=9)
     figure.text(
         0.1 / width,
