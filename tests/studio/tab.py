@@ -89,6 +89,16 @@ class Tab:
     def press(self, button: str) -> None:
         self.page.get_by_role("button", name=button, exact=True).click()
 
+    def choose(self, label: str, option: str) -> None:
+        """Pick an option of a menu."""
+        menu = self.page.locator(f"xpath=//label[normalize-space()='{label}']/following::input[1]")
+        menu.click()
+        self.page.get_by_role("option", name=option, exact=True).click()
+
+    def drawn(self, path: str):
+        """The node of this tab's scene, or None."""
+        return self.session.client.scene.get_handle_by_name(path)
+
     def save(self, button: str, folder: Path) -> Path:
         """What a press of the button downloads."""
         with self.page.expect_download() as caught:

@@ -7,14 +7,17 @@ import pytest
 
 from softreach import designs
 from softreach.atlas import DesignSpace, build_atlas, open_atlas
+from softreach.atlas.parameter import changed
 from softreach.cloud import compute_cloud, save_cloud
 from softreach.errors import InvalidInput
-from softreach.studio.atlas_map import atlas_map, metric_names
+from softreach.studio.atlas_map import atlas_map, held_places, map_choices, metric_names
+from softreach.studio.colors import sample_values
 from softreach.studio.files import cloud_file, figure_file, state_from, surface_file
 from softreach.studio.page import static_page
 from softreach.studio.reach import Quality, stages
-from softreach.studio.source import start_on_design, start_on_store
-from softreach.studio.state import StudioState
+from softreach.studio.slicing import in_slice
+from softreach.studio.source import start_on_design, start_on_state, start_on_store
+from softreach.studio.state import MapView, Slice, StudioState
 
 SMALL = Quality(coarse_level=8, fine_level=10, coarse_accuracy=0.1, fine_accuracy=0.05)
 
@@ -41,6 +44,29 @@ def test_files_are_those_of_the_librarys_own_writers(fine):
     assert figure_file(fine, state).startswith(b"\x89PNG")
 
 
+@pytest.mark.parametrize("color", ["rgb", "bundle 1", "manipulability", "multiplicity"])
+def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypatch):
+    from softreach import plot
+
+    plotted, views = {}, plot.plot_views
+
+    def watched(cloud, *rest, color):
+        plotted.update(cloud=cloud, color=color, axes=views(cloud, *rest, color=color))
+        return plotted["axes"]
+
+    monkeypatch.setattr(plot, "plot_views", watched)
+    cut = Slice(axis="y", center=0.1, thickness=0.3)
+    figure_file(fine, StudioState(design=fine.arm).showing(level=14, color=color, slice=cut))
+    kept = in_slice(fine.cloud.tip.values / fine.arm.length, cut)
+    np.testing.assert_array_equal(plotted["cloud"].tip, fine.cloud.tip[kept])
+    wanted = sample_values(fine, 14, color)
+    wanted = wanted[kept] if isinstance(wanted, np.ndarray) else wanted
+    np.testing.assert_array_equal(plotted["color"], wanted)
+    if isinstance(wanted, np.ndarray):
+        bar = plotted["axes"]["front"].get_figure().axes[-1]
+        assert bar.get_ylabel().startswith(color)
+
+
 def test_a_saved_page_holds_everything_itself(fine):
     page = static_page(StudioState(design=fine.arm), fine)
     assert f"{fine.volume:.4f}" in page
@@ -62,6 +88,14 @@ def test_a_design_file_changes_the_design_alone(trunk):
     assert state_from("x.json", state.to_json().encode(), StudioState(design=other)) == state
     with pytest.raises(InvalidInput, match="UTF-8"):
         state_from("x.toml", b"\xff\xfe", state)
+
+
+def test_a_saved_state_is_begun_with(trunk, tmp_path):
+    state = StudioState(design=trunk, activation=(-1.0, 0.0, -0.2)).showing(level=14)
+    (tmp_path / "state.json").write_text(state.to_json(), encoding="utf-8")
+    assert start_on_state(tmp_path / "state.json").state == state
+    with pytest.raises(InvalidInput, match="state file"):
+        start_on_state(tmp_path / "nothing.json")
 
 
 def test_a_cloud_from_a_file_is_shown_as_it_is(trunk, tmp_path):
@@ -86,7 +120,7 @@ def test_an_atlas_opens_on_its_largest_design(store):
 
 def test_a_click_on_the_map_finds_the_design_that_was_drawn_there(store):
     atlas = open_atlas(store)
-    shown = atlas_map(atlas, "convex_volume")
+    shown = atlas_map(atlas, MapView(metric="convex_volume"), {})
     for revolution in atlas.revolution.values:
         for taper in atlas.taper.values:
             at = {"revolution": float(revolution), "taper": float(taper)}
@@ -102,7 +136,27 @@ def test_a_map_needs_two_parameters(trunk, tmp_path):
         space, tmp_path / "a.zarr", n=100, metrics=("convex",), report=lambda _: None
     )
     with pytest.raises(InvalidInput, match="two parameters"):
-        atlas_map(atlas, "convex_volume")
+        atlas_map(atlas, MapView(), {})
+
+
+def test_a_map_holds_what_it_does_not_show_nearest_to_the_design(trunk, tmp_path):
+    space = DesignSpace.grid(
+        trunk, revolution=[0.5, 1.5], taper=[0.0, 0.02], radius_ratio=[0.5, 0.7]
+    )
+    path = tmp_path / "a.zarr"
+    build_atlas(space, path, n=100, metrics=("convex",), report=lambda _: None)
+    atlas, view = open_atlas(path), MapView(right="radius_ratio", up="revolution")
+    held = held_places(atlas, view, changed(trunk, {"taper": 0.013}))
+    assert held == {"taper": 1}
+    shown = atlas_map(atlas, view, held)
+    assert (shown.names, shown.fixed) == (("radius_ratio", "revolution"), {"taper": 0.02})
+    at = {"radius_ratio": 0.7, "revolution": 0.5}
+    assert shown.parameters_at(*shown.place_of(**at)) == at | {"taper": 0.02}
+    assert shown.values_of(changed(trunk, at)) == pytest.approx(at)
+    assert shown.values_of(changed(trunk, {"revolution": 3.0})) is None
+    for wrong in (MapView(right="taper", up="taper"), MapView(up="x"), MapView(metric="x")):
+        with pytest.raises(InvalidInput):
+            map_choices(atlas, wrong)
 
 
 def test_a_design_starts_at_rest():

@@ -14,7 +14,7 @@ from softreach.studio.colors import color_names, key_html, manipulability, sampl
 from softreach.studio.jobs import Dropped
 from softreach.studio.picking import picked_point, plane_crossing
 from softreach.studio.reach import Quality, Reach, reached, shown_samples, stages
-from softreach.studio.scene import in_slice
+from softreach.studio.slicing import in_slice, sliced_faces
 from softreach.studio.state import Slice
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
@@ -113,4 +113,20 @@ def test_the_box_holds_every_point_and_its_numbers_are_round(rng):
     assert (low <= points).all()
     assert (points <= high).all()
     texts = {text for text, _ in box.labels}
+    assert "\N{MINUS SIGN}0" not in texts
     assert {"0", "0.5", "1", "x / L", "y / L", "z / L"} <= texts
+
+
+def test_a_slice_keeps_the_faces_within_it():
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 3.0]])
+    faces = np.array([[0, 1, 2], [0, 1, 3]])
+    kept = sliced_faces(vertices, faces, Slice(axis="z", center=0.0, thickness=0.5))
+    np.testing.assert_array_equal(kept, faces[:1])
+    np.testing.assert_array_equal(sliced_faces(vertices, faces, Slice()), faces)
+
+
+def test_the_volume_of_the_alpha_shape_is_known_once_it_is_there(trunk):
+    *_, fine = stages(trunk, 15, SMALL, lambda: None)
+    assert fine.alpha_volume is None
+    assert len(fine.alpha_shape.faces)
+    assert fine.alpha_volume == pytest.approx(fine.volume, rel=0.2)

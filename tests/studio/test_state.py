@@ -15,6 +15,7 @@ from softreach.studio.state import (
     LEVELS,
     Appearance,
     Camera,
+    MapView,
     Slice,
     StudioState,
     Work,
@@ -35,6 +36,7 @@ def states(draw: st.DrawFn) -> StudioState:
         slice=Slice(axis=axis, center=draw(numbers), thickness=draw(st.floats(0.01, 1))),
         surface=draw(st.booleans()),
         trail=draw(st.booleans()),
+        map=MapView(metric=draw(st.sampled_from(["", "volume"])), shown=draw(st.booleans())),
     )
     return StudioState(
         design=draw(arms()),
@@ -70,11 +72,18 @@ def test_each_change_makes_stale_what_depends_on_it(trunk):
     state = StudioState(design=trunk)
     changes = {
         state.replace(activation=(-1.0, 0.0, 0.0)): {Work.ARM},
-        state.showing(color="multiplicity"): {Work.CLOUD},
+        state.showing(color="multiplicity"): {Work.CLOUD, Work.REFERENCE},
+        state.showing(slice=Slice(axis="x")): {Work.CLOUD, Work.REFERENCE, Work.SURFACES},
+        state.showing(map=MapView(metric="volume")): {Work.MAP},
         state.showing(surface=True): {Work.SURFACES},
         state.replace(target=(0.1, 0.0, 0.8)): {Work.INVERSE},
         state.replace(reference=trunk): {Work.REFERENCE},
-        state.replace(design=trunk.replace(taper=0.01)): {Work.REACH, Work.ARM, Work.INVERSE},
+        state.replace(design=trunk.replace(taper=0.01)): {
+            Work.REACH,
+            Work.ARM,
+            Work.INVERSE,
+            Work.MAP,
+        },
         state.replace(camera=Camera(position=(1, 1, 1), look_at=(0, 0, 0))): set(),
     }
     for changed, works in changes.items():

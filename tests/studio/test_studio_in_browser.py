@@ -12,10 +12,11 @@ import softreach as sr
 from softreach.atlas import DesignSpace, build_atlas
 from softreach.atlas.parameter import changed
 from softreach.studio import Studio, StudioState
-from softreach.studio.panels.atlas import AtlasPanel
+from softreach.studio.panels.inverse import InversePanel
 from softreach.studio.source import start_on_store
+from softreach.studio.state import Slice
 from tests.studio.conftest import SMALL
-from tests.studio.tab import Tab
+from tests.studio.tab import PATIENCE, Tab
 
 
 def test_the_page_opens_with_the_volume_of_the_design(tab):
@@ -63,10 +64,82 @@ def test_a_click_on_a_point_of_the_cloud_finds_activations_that_reach_it(tab):
     tab.settle()
     state, cloud = tab.session.state, tab.session.reach.cloud
     target = np.array(state.target)
-    assert np.linalg.norm(cloud.tip.values - target, axis=1).min() == 0.0
+    nearest = np.linalg.norm(cloud.tip.values - target, axis=1).argmin()
+    known = sr.tip_positions(state.design, cloud.activation.values[[nearest]])[0]
+    np.testing.assert_array_equal(target, known)
     tip = sr.tip_positions(state.design, [state.activation])[0]
     assert np.linalg.norm(tip - target) < 1e-6 * state.design.length
     tab.page.get_by_text("activation").filter(has_text="to ").first.wait_for()
+
+
+def test_the_solution_that_the_arm_holds_is_marked_and_the_others_are_ghosts(tab):
+    tab.open("Inverse")
+    answer = tab.session.answer
+    panel = next(p for p in tab.session.panels if isinstance(p, InversePanel))
+    colors = [button.color for _, button in panel._buttons]
+    assert len(colors) == len(answer)
+    assert colors.count("green") == 1
+    ghosts = [tab.drawn(f"/ghosts/{k}/0") for k in range(len(answer))]
+    assert all(ghosts)
+
+
+def test_the_tip_leaves_a_trail_of_this_design_alone(tab):
+    tab.open("Activation")
+    assert not tab.drawn("/trail")
+    tab.page.get_by_label("leave a trail").check()
+    tab.drag("γ right", -40)
+    tab.wait(lambda: len(tab.session.trail) > 1, "the tip has moved")
+    tab.settle()
+    assert tab.drawn("/trail")
+    np.testing.assert_array_equal(tab.session.trail[-1], tab.session.tip)
+    tab.session.update(lambda s: s.replace(design=s.design.replace(taper=0.03)))
+    tab.settle()
+    assert len(tab.session.trail) <= 2  # this arm's tip was nowhere else
+    tab.page.get_by_label("leave a trail").uncheck()
+    tab.wait(lambda: not tab.drawn("/trail"), "the trail is gone")
+
+
+def test_a_reference_stays_while_the_design_changes(tab):
+    tab.open("Design")
+    kept, known = tab.session.state.design, tab.session.reach
+    tab.press("Keep this design as reference")
+    tab.wait(lambda: tab.drawn("/reference"), "the reference is drawn")
+    assert tab.session.reference is known
+    tab.drag("revolution Ω [deg]", 15)
+    tab.wait(lambda: tab.session.state.design != kept, "the design changes")
+    tab.settle()
+    tab.page.get_by_text(f"reference (gray): volume {known.volume:.4f}").wait_for()
+    eye = np.array(tab.session.camera_now().position)
+    tab.page.get_by_label("side by side").check()
+    tab.wait(lambda: tab.drawn("/reference/arm"), "the reference stands beside")
+    assert tab.session.reference is known
+    tab.wait(lambda: far(tab, eye), "the eye steps back")
+    tab.press("Forget the reference")
+    tab.wait(lambda: not tab.drawn("/reference"), "the reference is gone")
+    tab.wait(lambda: not far(tab, eye), "the eye is back")
+
+
+def far(tab, eye) -> bool:
+    return np.linalg.norm(np.array(tab.session.camera_now().position) - eye) > 0.2
+
+
+def test_surfaces_are_drawn_and_cut(tab):
+    tab.open("View")
+    tab.page.get_by_label("exact surface").check()
+    tab.page.get_by_label("α-shape (0.05 L)").check()
+    tab.wait(lambda: tab.drawn("/surface") and tab.drawn("/alpha-shape"), "both are drawn")
+    tab.settle()
+    tab.page.get_by_text(f"α-shape {tab.session.reach.alpha_volume:.4f}").wait_for()
+    cut = Slice(axis="y", center=0.0, thickness=0.1)
+    tab.session.update(lambda s: s.showing(slice=cut))
+    tab.settle()
+    left = tab.drawn("/surface")
+    centers = left.vertices[left.faces].mean(axis=1)
+    assert np.abs(centers[:, 1]).max() <= 0.05
+    assert tab.drawn("/slice")
+    tab.session.update(lambda s: s.showing(slice=Slice(), surface=False, alpha_shape=False))
+    tab.settle()
+    assert not tab.drawn("/surface")
 
 
 def test_a_target_out_of_reach_shows_the_gap(tab):
@@ -110,6 +183,26 @@ def test_a_saved_state_comes_back(tab, tmp_path):
     assert tab.session.reach.arm == kept.design
 
 
+def test_a_link_opens_the_state_in_another_tab(tab, studio):
+    tab.open("Export")
+    tab.session.update(lambda s: s.showing(color="manipulability"))
+    tab.settle()
+    kept, known = tab.session.state_now(), set(studio.sessions)
+    tab.press("Link to this state")
+    link = tab.page.get_by_text("state in a new tab")
+    tab.wait(link.count, "the link is there")
+    page = tab.context.new_page()
+    page.goto(link.get_attribute("href"))
+    tab.wait(lambda: set(studio.sessions) - known, "the other tab connects")
+    other = studio.sessions[max(studio.sessions)]
+    tab.wait(lambda: other.state == kept, "the state is there")
+    assert other.settle(PATIENCE)
+    assert other.reach.arm == kept.design
+    np.testing.assert_allclose(other.camera_now().position, kept.camera.position, atol=1e-6)
+    page.close()
+    tab.wait(lambda: set(studio.sessions) == known, "the session of the closed tab ends")
+
+
 def test_tabs_stay_apart(tab, browser, studio):
     kept = tab.session.state
     other = Tab(browser, studio)
@@ -134,13 +227,26 @@ def test_a_click_on_the_map_of_an_atlas_loads_the_design(browser, tmp_path):
     trunk = sr.designs.minimal_trunk()
     space = DesignSpace.grid(trunk, revolution=[0.5, 1.5, 2.5], taper=[0.0, 0.01, 0.02])
     store = tmp_path / "atlas.zarr"
-    build_atlas(space, store, n=200, metrics=("convex",), report=lambda _: None)
+    build_atlas(space, store, n=200, metrics=("exact",), report=lambda _: None)
     with Studio(start_on_store(store, SMALL)) as studio:
         tab = Tab(browser, studio)
-        panel = next(p for p in tab.session.panels if isinstance(p, AtlasPanel))
+        board = tab.session.board
         at = {"revolution": 0.5, "taper": 0.01}
-        tab.click_at(panel.place_of(**at))
+        tab.click_at(board.place_of(**at))
         tab.wait(lambda: tab.session.state.design.taper == 0.01, "the design is loaded")
         assert tab.session.state.design == changed(trunk, at)
+        assert board.map.names == ("revolution", "taper")
+        tab.open("Atlas")
+        tab.choose("to the right", "taper")
+        tab.wait(lambda: board.map.names == ("taper", "revolution"), "the axes change places")
+        tab.settle()
+        tab.choose("metric", "exact_unreachability")
+        tab.wait(lambda: tab.session.state.appearance.map.metric, "the metric is chosen")
+        tab.settle()
+        at = {"revolution": 1.5, "taper": 0.02}
+        tab.click_at(board.place_of(**at))
+        tab.wait(lambda: tab.session.state.design.taper == 0.02, "the design is loaded")
+        assert tab.session.state.design == changed(trunk, at)
+        assert tab.drawn("/atlas/here")
         assert not tab.errors
         tab.close()

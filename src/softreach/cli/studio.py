@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from softreach.cli.inputs import design_from
+
+if TYPE_CHECKING:
+    from softreach.studio import Start
 
 __all__ = ["studio"]
 
 
 def studio(
     source: Annotated[
-        str, Parameter(help="Design file (.toml), built-in design, cloud or atlas (.zarr).")
+        str,
+        Parameter(help="Design or its file (.toml), saved state (.json), cloud or atlas (.zarr)."),
     ] = "minimal_trunk",
     *,
     host: Annotated[
@@ -33,13 +37,20 @@ def studio(
     import webbrowser
 
     from softreach.studio import Studio
-    from softreach.studio.source import start_on_design, start_on_store
 
-    stored = source.rstrip("/").endswith(".zarr")
-    start = start_on_store(source) if stored else start_on_design(design_from(source))
-    with Studio(start, host, port) as running:
+    with Studio(_start(source), host, port) as running:
         sys.stdout.write(f"{running.url}  (Ctrl-C ends it)\n")
         sys.stdout.flush()
         if open_page:
             webbrowser.open(running.url)
         threading.Event().wait()
+
+
+def _start(source: str) -> Start:
+    from softreach.studio.source import start_on_design, start_on_state, start_on_store
+
+    if source.rstrip("/").endswith(".zarr"):
+        return start_on_store(source)
+    if source.lower().endswith(".json"):
+        return start_on_state(source)
+    return start_on_design(design_from(source))

@@ -7,7 +7,9 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from softreach.studio.server import LOOPBACK, page_url, start_server, stop_server
+from softreach.studio.link import state_in_request
+from softreach.studio.panels.binding import told
+from softreach.studio.server import LOOPBACK, asked_path, page_url, start_server, stop_server
 from softreach.studio.session import Session
 from softreach.studio.source import Start
 from softreach.studio.state import Camera
@@ -17,7 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Studio"]
 
-_EYE = Camera(position=(1.2, -2.2, 1.0), look_at=(0.0, 0.0, 0.45))
+_EYE = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
+_EYE_ON_MAP = Camera(position=(1.9, -6.3, 2.0), look_at=(-0.95, -0.5, 0.3))
 
 
 class Studio:
@@ -39,7 +42,7 @@ class Studio:
         self.sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
         self.server = start_server(host, port)
-        camera = start.state.camera or _EYE
+        camera = start.state.camera or (_EYE if start.atlas is None else _EYE_ON_MAP)
         self.server.initial_camera.position = camera.position
         self.server.initial_camera.look_at = camera.look_at
         self.server.on_client_connect(self._connected)
@@ -79,8 +82,17 @@ class Studio:
         session = Session(client, self.start)
         with self._lock:
             self.sessions[client.client_id] = session
-        _furnish(session)
+        _furnish(session, self.url)
         session.begin()
+        if session.atlas is not None and session.board is None:
+            session.say("There is no map: the atlas is no grid of two parameters or more.")
+        told(session, lambda: self._follow_link(session))
+
+    def _follow_link(self, session: Session) -> None:
+        """Bring a tab that was opened by a link into its state."""
+        state = state_in_request(asked_path(self.server, session.client.client_id))
+        if state is not None:
+            session.restore(state)
 
     def _disconnected(self, client: ClientHandle) -> None:
         with self._lock:
@@ -89,7 +101,7 @@ class Studio:
             session.close()
 
 
-def _furnish(session: Session) -> None:
+def _furnish(session: Session, url: str) -> None:
     """Add the panels, and let clicks in the scene reach those that wait for them."""
     from softreach.studio.panels.activation import ActivationPanel
     from softreach.studio.panels.atlas import AtlasPanel
@@ -107,11 +119,11 @@ def _furnish(session: Session) -> None:
         "Activation": ActivationPanel,
         "Inverse": InversePanel,
         "View": ViewPanel,
-        "Export": ExportPanel,
     }
     made += [kind(gui, tabs.add_tab(name), session) for name, kind in kinds.items()]
-    if session.atlas is not None:
-        made.append(AtlasPanel(gui, tabs.add_tab("Atlas"), session, session.atlas))
+    made.append(ExportPanel(gui, tabs.add_tab("Export"), session, url))
+    if session.board is not None:
+        made.append(AtlasPanel(gui, tabs.add_tab("Atlas"), session, session.board))
     session.panels = made
     waiting = [panel for panel in reversed(made) if isinstance(panel, AtlasPanel | InversePanel)]
 

@@ -9,14 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.errors import InvalidInput
+from softreach.manipulator import Manipulator
+from softreach.studio.parameter_value import parameter_value
+from softreach.studio.state import MapView
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["AtlasMap", "atlas_map", "metric_names"]
+__all__ = ["AtlasMap", "atlas_map", "held_places", "map_choices", "metric_names"]
 
 _INCHES, _DPI = 4.0, 160
 _FRAME = (0.16, 0.14, 0.62, 0.72)  # of the axes: left, bottom, width, height
+_SLACK = 0.03  # of the axes: designs lie on their rim
 _BAR = (0.82, 0.14, 0.035, 0.72)
 
 
@@ -37,10 +41,20 @@ class AtlasMap:
         """The design nearest to a place, 0 to 1 from the picture's lower left; None outside."""
         left, bottom, width, height = _FRAME
         share = (right - left) / width, (up - bottom) / height
-        if not (0 <= share[0] <= 1 and 0 <= share[1] <= 1):
+        if not all(-_SLACK <= part <= 1 + _SLACK for part in share):
             return None
         places = zip(self.names, (self.x, self.y), share, strict=True)
         return {name: _nearest(values, part) for name, values, part in places} | self.fixed
+
+    def values_of(self, design: Manipulator) -> dict[str, float] | None:
+        """The two parameters of a design, if the map goes so far."""
+        at = {name: parameter_value(design, name) for name in self.names}
+        places = (self.x, self.y)
+        inside = (
+            min(values) - 1e-9 <= value <= max(values) + 1e-9
+            for value, values in zip(at.values(), places, strict=True)
+        )
+        return at if all(inside) else None
 
     def place_of(self, **at: float) -> tuple[float, float]:
         """Where a design is in the picture: the inverse of `parameters_at`."""
@@ -60,32 +74,60 @@ def metric_names(atlas: xr.Dataset) -> list[str]:
     return sorted(names, key=lambda name: first.index(name) if name in first else len(first))
 
 
-def atlas_map(atlas: xr.Dataset, metric: str) -> AtlasMap:
-    """Draw a metric over the first two parameters; the others are held where it is largest.
+def map_choices(atlas: xr.Dataset, view: MapView) -> tuple[str, str, str]:
+    """Metric, parameter to the right and parameter upward of a view; what it leaves open, first.
 
     Raises:
-        InvalidInput: The atlas is no grid of two parameters or more, or holds no such number.
+        InvalidInput: The atlas is no grid of two parameters or more, or holds no such thing.
     """
-    names = tuple(map(str, atlas["status"].dims))
+    names, metrics = [str(dim) for dim in atlas["status"].dims], metric_names(atlas)
     if len(names) < 2:
         raise InvalidInput("atlas", ", ".join(names), "a grid of two parameters or more for a map")
-    values = atlas[metric]
-    if not np.isfinite(values.values).any():
-        raise InvalidInput("metric", metric, "computed for one design at least")
-    best = np.unravel_index(np.nanargmax(values.values), values.shape)
-    held = dict(list(zip(names, map(int, best), strict=True))[2:])
-    x, y = (atlas[name].values.astype(float) for name in names[:2])
-    shown = values.isel(held).values.T
-    if values.attrs.get("units") == "m3":
+    right = view.right or next(name for name in names if name != view.up)
+    up = view.up or next(name for name in names if name != right)
+    if right == up or not {right, up} <= set(names):
+        raise InvalidInput("map", f"{right} and {up}", f"two of {', '.join(names)}")
+    if view.metric and view.metric not in metrics:
+        raise InvalidInput("metric", view.metric, f"one of {', '.join(metrics)}")
+    return view.metric or metrics[0], right, up
+
+
+def held_places(atlas: xr.Dataset, view: MapView, design: Manipulator) -> dict[str, int]:
+    """Of each parameter that a map does not show, the number of the value nearest to a design's."""
+    _, *shown = map_choices(atlas, view)
+    others = [str(dim) for dim in atlas["status"].dims if dim not in shown]
+    return {
+        name: int(np.abs(atlas[name].values - parameter_value(design, name)).argmin())
+        for name in others
+    }
+
+
+def atlas_map(atlas: xr.Dataset, view: MapView, held: dict[str, int]) -> AtlasMap:
+    """Draw a metric over two parameters, the others held as `held_places` says.
+
+    Raises:
+        InvalidInput: There is no such map.
+    """
+    metric, *names = map_choices(atlas, view)
+    shown = atlas[metric].isel(held).transpose(names[1], names[0]).values
+    if atlas[metric].attrs.get("units") == "m3":
         shown = shown / float(atlas.attrs["length"]) ** 3
-    labels = [_label(atlas, name) for name in names[:2]]
+    x, y = (atlas[name].values.astype(float) for name in names)
+    labels = [_label(atlas, name) for name in names]
+    title = "\n".join([_title(metric), *_held_text(atlas, held)])
     return AtlasMap(
-        image=_drawn(_shown(atlas, names[0]), _shown(atlas, names[1]), shown, labels, metric),
+        image=_drawn(_shown(atlas, names[0]), _shown(atlas, names[1]), shown, labels, title),
         x=x,
         y=y,
         names=(names[0], names[1]),
         fixed={name: float(atlas[name].values[place]) for name, place in held.items()},
     )
+
+
+def _held_text(atlas: xr.Dataset, held: dict[str, int]) -> list[str]:
+    """One line with the parameters that are held, if there are any."""
+    parts = (f"{_label(atlas, name)} = {_shown(atlas, name)[k]:.4g}" for name, k in held.items())
+    return [", ".join(parts)] if held else []
 
 
 def _nearest(values: NDArray[np.float64], share: float) -> float:
@@ -104,7 +146,7 @@ def _label(atlas: xr.Dataset, name: str) -> str:
     return f"{name.replace('_', ' ')} [{unit}]" if unit else name.replace("_", " ")
 
 
-def _drawn(x: Any, y: Any, values: Any, labels: list[str], metric: str) -> NDArray[np.uint8]:
+def _drawn(x: Any, y: Any, values: Any, labels: list[str], title: str) -> NDArray[np.uint8]:
     # Not through pyplot, which belongs to one thread.
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -114,7 +156,7 @@ def _drawn(x: Any, y: Any, values: Any, labels: list[str], metric: str) -> NDArr
     ax = figure.add_axes(_FRAME)
     filled = _fill(ax, x, y, np.ma.masked_invalid(values))
     ax.plot(*(grid.ravel() for grid in np.meshgrid(x, y)), ".", color="k", ms=2, alpha=0.35)
-    ax.set(xlabel=labels[0], ylabel=labels[1], title=_title(metric))
+    ax.set(xlabel=labels[0], ylabel=labels[1], title=title)
     ax.set_xlim(x[0], _end(x))
     ax.set_ylim(y[0], _end(y))
     figure.colorbar(filled, cax=figure.add_axes(_BAR))
@@ -123,7 +165,8 @@ def _drawn(x: Any, y: Any, values: Any, labels: list[str], metric: str) -> NDArr
 
 
 def _fill(ax: Any, x: Any, y: Any, values: Any) -> Any:
-    if min(values.shape) < 2 or np.ptp(values.compressed()) == 0:
+    known = values.compressed()
+    if min(values.shape) < 2 or not len(known) or np.ptp(known) == 0:
         return ax.pcolormesh(x, y, values, shading="nearest")
     filled = ax.contourf(x, y, values, 14)
     lines = ax.contour(x, y, values, 7, colors="w", linewidths=0.7)

@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 
 _TICK = 0.02  # length of a tick, of the largest side
 _MOST = 8  # ticks along the longest edge
+_OUTWARD = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])  # of each edge's ticks
 
 
 class AxesBox(NamedTuple):
@@ -29,20 +30,29 @@ def axes_box(*points: Array) -> AxesBox:
     low, high = _round_sides(np.concatenate(points))
     step = _round_step(float((high - low).max()))
     lines, labels = list(_edges(low, high)), []
-    outward = _TICK * float((high - low).max()) * np.array([0.0, -1.0, 0.0])
-    for axis in range(3):
-        corner = low.copy()
-        ticks = np.arange(np.ceil(low[axis] / step), np.floor(high[axis] / step) + 1) * step
-        away = outward if axis != 1 else outward[[1, 0, 2]]
-        for value in ticks:
-            at = corner.copy()
-            at[axis] = value
+    size = _TICK * float((high - low).max())
+    for axis, (corner, away) in enumerate(zip(_corners(low, high), size * _OUTWARD, strict=True)):
+        for value in _ticks(low[axis], high[axis], step):
+            at = np.where(np.arange(3) == axis, value, corner)
             lines.append(np.stack([at, at + away]))
-            labels.append((f"{value:.10g}".replace("-", "\N{MINUS SIGN}"), at + 2.5 * away))
-        middle = corner.copy()
-        middle[axis] = (low[axis] + high[axis]) / 2
-        labels.append((f"{'xyz'[axis]} / L", middle + 6 * away))
+            labels.append((_number(value), at + 2.5 * away))
+        middle = np.where(np.arange(3) == axis, (low[axis] + high[axis]) / 2, corner)
+        labels.append((f"{'xyz'[axis]} / L", middle + 7 * away))
     return AxesBox(np.array(lines), labels)
+
+
+def _corners(low: Array, high: Array) -> Array:
+    """Where the three edges with numbers meet the others: in front, seen from +x and -y."""
+    return np.array([low, [high[0], low[1], low[2]], low])
+
+
+def _ticks(low: float, high: float, step: float) -> Array:
+    """Multiples of the step, 0 without a sign."""
+    return np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step + 0.0
+
+
+def _number(value: float) -> str:
+    return f"{value:.10g}".replace("-", "\N{MINUS SIGN}")
 
 
 def _round_sides(points: Array) -> tuple[Array, Array]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,14 @@ from softreach.studio.reach import Reach, shown_samples
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["color_names", "key_html", "manipulability", "sample_colors"]
+__all__ = [
+    "color_label",
+    "color_names",
+    "key_html",
+    "manipulability",
+    "sample_colors",
+    "sample_values",
+]
 
 Array = NDArray[np.float64]
 
@@ -39,15 +46,26 @@ def color_names(arm: Manipulator) -> dict[str, str]:
 def sample_colors(reach: Reach, level: int, color: str) -> Coloring:
     """Colors of the samples that are shown; an unknown name colors by all activations."""
     cloud = reach.cloud[["tip", "activation"]].isel(sample=shown_samples(reach, level))
+    coloring = color_samples(cloud, sample_values(reach, level, color))
+    if isinstance(coloring.key, ScalarKey) and color in _VALUES:
+        return coloring._replace(key=coloring.key._replace(label=color_label(color)))
+    return coloring
+
+
+def sample_values(reach: Reach, level: int, color: str) -> Literal["rgb"] | int | Array:
+    """What the samples that are shown are colored by, as the library's own figures take it."""
     if color.startswith("bundle ") and int(color[7:]) < reach.arm.bundles:
-        return color_samples(cloud, int(color[7:]))
+        return int(color[7:])
     if color not in _VALUES or color not in color_names(reach.arm):
-        return color_samples(cloud)
+        return "rgb"
+    cloud = reach.cloud[["tip", "activation"]].isel(sample=shown_samples(reach, level))
     with kernels:
-        values = _VALUES[color](reach, cloud)
-    coloring = color_samples(cloud, values)
-    key = coloring.key
-    return Coloring(coloring.rgb, key._replace(label=color) if isinstance(key, ScalarKey) else key)
+        return _VALUES[color](reach, cloud)
+
+
+def color_label(color: str) -> str:
+    """What stands at the key of a color; "" where the key names it itself."""
+    return _LABELS.get(color, "")
 
 
 def manipulability(arm: Manipulator, activation: Array) -> Array:
@@ -107,4 +125,10 @@ _VALUES = {
     "multiplicity": _multiplicity,
     "manipulability": _manipulability,
     "activation distance": _activation_distance,
+}
+
+_LABELS = {
+    "multiplicity": "multiplicity",
+    "manipulability": "manipulability [L³]",
+    "activation distance": "activation distance D̄ [-]",
 }

@@ -5,15 +5,22 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softreach.errors import InvalidInput
 from softreach.export import export_cloud, export_mesh
 from softreach.kinematics import configuration
 from softreach.manipulator import Manipulator
-from softreach.studio.reach import Reach, shown_samples
-from softreach.studio.state import StudioState
+from softreach.studio.colors import color_label, sample_values
+from softreach.studio.reach import Reach, cloud_points, shown_samples
+from softreach.studio.slicing import in_slice
+from softreach.studio.state import Appearance, StudioState
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = [
     "CLOUD_FORMATS",
@@ -23,6 +30,8 @@ __all__ = [
     "state_from",
     "surface_file",
 ]
+
+Array = NDArray[np.float64]
 
 CLOUD_FORMATS = (".parquet", ".csv", ".ply", ".npz", ".mat", ".vtu")
 SURFACE_FORMATS = (".stl", ".ply", ".obj", ".glb", ".vtu")
@@ -58,21 +67,31 @@ def surface_file(reach: Reach, suffix: str) -> bytes:
 
 
 def figure_file(reach: Reach, state: StudioState) -> bytes:
-    """Three views and an oblique one, as PNG."""
+    """Three views and an oblique one of the points that are shown, in their colors, as PNG."""
     from softreach import plot
     from softreach.plot.style import pyplot
 
-    shown = reach.cloud[["tip", "activation"]].isel(
-        sample=shown_samples(reach, state.appearance.level)
-    )
-    shape = configuration(state.design, np.asarray(state.activation))
+    look, shape = state.appearance, configuration(state.design, np.asarray(state.activation))
+    cloud, color = _shown(reach, look)
 
     def write(path: Path) -> None:
-        axes = plot.plot_views(shown, state.design, shape)
+        axes = plot.plot_views(cloud, state.design, shape, color=color)
+        figure = axes["front"].get_figure(root=True)
+        assert figure is not None
+        if label := color_label(look.color):
+            figure.axes[-1].yaxis.label.set_text(label)  # of the color bar
         plot.save_figure(axes["front"], path)
-        pyplot().close(axes["front"].get_figure(root=True))
+        pyplot().close(figure)
 
     return _written("figure.png", write)
+
+
+def _shown(reach: Reach, look: Appearance) -> tuple[xr.Dataset, str | int | Array]:
+    """The samples within the slice, and what they are colored by."""
+    cloud = reach.cloud[["tip", "activation"]].isel(sample=shown_samples(reach, look.level))
+    color = sample_values(reach, look.level, look.color)
+    kept = in_slice(cloud_points(reach, look.level), look.slice)
+    return cloud.isel(sample=kept), color[kept] if isinstance(color, np.ndarray) else color
 
 
 def _surface(reach: Reach):

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from softreach.geometry.hull import Hull
 
-__all__ = ["Quality", "Reach", "reached", "shown_samples", "stages"]
+__all__ = ["Quality", "Reach", "cloud_points", "reached", "shown_samples", "stages"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,6 +77,12 @@ class Reach:
             warnings.simplefilter("ignore", SoftreachWarning)  # coarse clouds are sparse
             return concave_hull(self.cloud.tip[shown_samples(self, 17)])
 
+    @property
+    def alpha_volume(self) -> float | None:
+        """Volume of the α-shape [L³], if it has been asked for; nothing is computed."""
+        hull: Hull | None = vars(self).get("alpha_shape")
+        return None if hull is None else hull.volume / self.arm.length**3
+
 
 def stages(arm: Manipulator, level: int, quality: Quality, check: StaleCheck) -> Iterator[Reach]:
     """The reach of a design, coarse and then fine; waits for its turn at the kernels.
@@ -112,6 +118,11 @@ def shown_samples(reach: Reach, level: int) -> slice | NDArray[np.int64]:
     """Which samples a picture of 2^level points shows."""
     first = slice(0, min(1 << level, reach.samples))
     return first if reach.order is None else reach.order[first]
+
+
+def cloud_points(reach: Reach, level: int) -> NDArray[np.float64]:
+    """Tips that a picture of 2^level points shows [L], shape (n, 3)."""
+    return reach.cloud.tip.values[shown_samples(reach, level)] / reach.arm.length
 
 
 def _exact(arm: Manipulator, accuracy: float, tol: float, check: StaleCheck) -> ReachableSet:

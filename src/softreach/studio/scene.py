@@ -15,7 +15,8 @@ from softreach.manipulator import Manipulator
 from softreach.palette import BODY, bundle_color
 from softreach.studio.axes import axes_box
 from softreach.studio.colors import sample_colors
-from softreach.studio.reach import Reach, shown_samples
+from softreach.studio.reach import Reach, cloud_points
+from softreach.studio.slicing import in_slice, sliced_faces
 from softreach.studio.state import Appearance, Slice
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
     from softreach.plot.coloring import BundleKey, ScalarKey
 
-__all__ = ["Scene", "in_slice"]
+__all__ = ["Scene"]
 
 Array = NDArray[np.float64]
 Color = tuple[int, int, int]
@@ -80,19 +81,13 @@ class Scene:
         for k, activation in enumerate(activations):
             self.draw_arm(arm, activation.tolist(), f"/ghosts/{k}")
 
-    def draw_surface(self, path: str, vertices: Array, faces: NDArray[Any], color: Color) -> None:
-        """A transparent surface [L]."""
-        self._mesh(path, vertices, faces, color, opacity=0.35)
-
     def draw_surfaces(self, reach: Reach, look: Appearance) -> None:
         """The exact boundary and the α-shape, as asked for; slow the first time."""
         self.remove("/surface", "/alpha-shape")
         if look.surface and reach.exact.dimension >= 2:
-            exact = reach.exact.surface()
-            self.draw_surface("/surface", exact.vertices / reach.arm.length, exact.faces, _SURFACE)
+            self._surface("/surface", reach.exact.surface(), reach, look.slice, _SURFACE)
         if look.alpha_shape and len(reach.alpha_shape.faces):
-            hull = reach.alpha_shape
-            self.draw_surface("/alpha-shape", hull.vertices / reach.arm.length, hull.faces, _HULL)
+            self._surface("/alpha-shape", reach.alpha_shape, reach, look.slice, _HULL)
 
     def draw_axes(self, reach: Reach, look: Appearance) -> None:
         """The box with numbers around cloud and arm."""
@@ -104,7 +99,7 @@ class Scene:
             "/axes/lines", box.lines.astype(np.float32), (170, 170, 175), thickness=0.003
         )
         for k, (text, at) in enumerate(box.labels):
-            self._api.add_label(f"/axes/label {k}", text, position=at, font_screen_scale=0.8)
+            self._label(f"/axes/label {k}", text, at)
 
     def draw_trail(self, tips: Array) -> None:
         """A line through the places where the tip has been [L], shape (n, 3)."""
@@ -136,20 +131,33 @@ class Scene:
         self._api.add_icosphere(path, 0.02, _MARK, position=center)
 
     def draw_reference(self, reach: Reach, look: Appearance, shift: Array) -> None:
-        """Another design's cloud, gray over this one or in color beside it."""
+        """Another design: its boundary in gray around this one's cloud, or its cloud beside it."""
         self.remove("/reference")
-        points = cloud_points(reach, min(look.level, 16))
-        beside = bool(np.any(shift))
-        if beside:
-            colors = sample_colors(reach, min(look.level, 16), look.color).rgb
+        if np.any(shift):
+            self._draw_beside(reach, look, shift)
+        elif reach.exact.dimension == 3:
+            self._surface("/reference", reach.exact.surface(), reach, look.slice, _REFERENCE, 0.3)
         else:
-            colors = np.array(_REFERENCE, np.uint8)
-        self._points("/reference/cloud", points + shift, colors, look.point_size)
-        tip = np.full(reach.arm.bundles, 0.0).tolist()
-        if beside:
-            self.draw_arm(reach.arm, tip, "/reference/arm")
-            for handle in self._arms["/reference/arm"][1]:
-                handle.position = shift
+            points = cloud_points(reach, min(look.level, 16))
+            self._points("/reference", points, np.array(_REFERENCE, np.uint8), look.point_size)
+
+    def _draw_beside(self, reach: Reach, look: Appearance, shift: Array) -> None:
+        level = min(look.level, 16)
+        points, coloring = cloud_points(reach, level), sample_colors(reach, level, look.color)
+        kept = in_slice(points, look.slice)
+        self._points("/reference/cloud", points[kept] + shift, coloring.rgb[kept], look.point_size)
+        above = np.array([0, 0, points[:, 2].max() + 0.12])
+        self._label("/reference/name", "reference", above + shift)
+        self._label("/reference/other", "this design", above)
+
+    def draw_reference_arm(
+        self, arm: Manipulator, activation: Sequence[float], shift: Array
+    ) -> None:
+        """The arm of the design beside this one."""
+        path = "/reference/arm"
+        self.draw_arm(arm, activation, path)
+        for handle in self._arms[path][1]:
+            handle.position = shift
 
     def remove(self, *paths: str) -> None:
         """Take nodes and everything under them out of the scene."""
@@ -186,6 +194,18 @@ class Scene:
             receive_shadow=False,
         )
 
+    def _surface(
+        self, path: str, surface: Any, reach: Reach, cut: Slice, color: Color, opacity: float = 0.35
+    ) -> None:
+        """What a slice leaves of a surface with `vertices` [m] and `faces`."""
+        vertices = surface.vertices / reach.arm.length
+        faces = sliced_faces(vertices, surface.faces, cut)
+        if len(faces):
+            self._mesh(path, vertices, faces, color, opacity)
+
+    def _label(self, path: str, text: str, at: Array) -> None:
+        self._api.add_label(path, text, position=at, font_screen_scale=0.8, anchor="center-center")
+
     def _slab(self, cut: Slice, points: Array) -> None:
         """The middle plane of the slice, as wide as the cloud."""
         self.remove("/slice")
@@ -199,18 +219,6 @@ class Scene:
             corners[list(side), other] = high[other]
         faces = np.array([[0, 1, 2], [0, 2, 3]])
         self._mesh("/slice", corners, faces, (200, 200, 205), opacity=0.25)
-
-
-def cloud_points(reach: Reach, level: int) -> Array:
-    """Tips that a picture of 2^level points shows [L]."""
-    return reach.cloud.tip.values[shown_samples(reach, level)] / reach.arm.length
-
-
-def in_slice(points: Array, cut: Slice) -> NDArray[np.bool_]:
-    """Which points [L] a slice shows."""
-    if cut.axis == "none":
-        return np.ones(len(points), bool)
-    return np.abs(points[:, "xyz".index(cut.axis)] - cut.center) <= cut.thickness / 2
 
 
 def _arm_meshes(arm: Manipulator, shape: Any) -> list[tuple[Array, NDArray[Any], Color]]:

@@ -14,9 +14,10 @@ from softreach.errors import InvalidInput, MissingExtra
 if TYPE_CHECKING:
     from viser import ViserServer
 
-__all__ = ["LOOPBACK", "page_url", "same_origin", "start_server", "stop_server"]
+__all__ = ["LOOPBACK", "asked_path", "page_url", "same_origin", "start_server", "stop_server"]
 
 LOOPBACK = "127.0.0.1"
+_FOV = 0.6  # [rad]; viser's 75 degrees draw a ball at the rim as an egg
 _LOCAL_NAMES = {"localhost", "127.0.0.1", "::1"}
 
 
@@ -47,6 +48,7 @@ def start_server(host: str = LOOPBACK, port: int | None = None) -> ViserServer:
     server.scene.add_light_ambient("/light", intensity=1.6)
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
     server.gui.main_panel.dock_right()
+    server.initial_camera.fov = _FOV
     return server
 
 
@@ -61,6 +63,13 @@ def page_url(server: ViserServer) -> str:
     host = server.get_host()
     shown = LOOPBACK if host in ("0.0.0.0", "::") else host
     return f"http://{f'[{shown}]' if ':' in shown else shown}:{server.get_port()}"
+
+
+def asked_path(server: ViserServer, client_id: int) -> str:
+    """The address that the socket of a page asked for, from the first slash on."""
+    live = server._websock_server._live_connections.get(client_id)
+    request = live.request if live is not None else None
+    return "/" if request is None else request.path
 
 
 def same_origin(headers: Mapping[str, str], host: str) -> bool:

@@ -10,13 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.errors import SoftreachError
+from softreach.manipulator import Manipulator
 from softreach.studio.jobs import Latest, StaleCheck
-from softreach.studio.reach import stages
-from softreach.studio.scene import Scene, cloud_points
+from softreach.studio.map_board import MapBoard
+from softreach.studio.reach import Reach, cloud_points, stages
+from softreach.studio.scene import Scene
 from softreach.studio.source import Start
 from softreach.studio.state import Camera, StudioState, Work, vector, what_follows
 
 if TYPE_CHECKING:
+    import xarray as xr
     from viser import ClientHandle
 
     from softreach.inverse import Solution
@@ -51,10 +54,11 @@ class Session:
         self.trail: list[Array] = []
         self.answer: Solution | None = None
         self.note = ""
-        self.map_image: NDArray[np.uint8] | None = None
+        self.reference: Reach | None = None
+        self.board = _board(self.scene, self.atlas)
         self.revision = 0
         """Number of changes that widgets have to follow."""
-        self._aiming = False
+        self._aiming, self._trail_of = False, start.state.design
         self._changing, self._drawing, self._showing = (threading.RLock() for _ in range(3))
         self._workers = {work: Latest(self._failed) for work in Work}
 
@@ -95,6 +99,16 @@ class Session:
         self._follow(frozenset({Work.INVERSE}))
         self.show()
 
+    def restore(self, state: StudioState) -> None:
+        """Take up a state that was saved, and its view."""
+        self.update(lambda _: state)
+        if state.camera is not None:
+            self.look_from(state.camera)
+
+    def state_now(self) -> StudioState:
+        """The state with the camera, as it is saved."""
+        return self.state.replace(camera=self.camera_now())
+
     def camera_now(self) -> Camera:
         """Where this tab's eye is."""
         camera = self.client.camera
@@ -105,6 +119,16 @@ class Session:
         with self.client.atomic():
             self.client.camera.position = camera.position
             self.client.camera.look_at = camera.look_at
+
+    def step_aside(self, beside: bool) -> None:
+        """Move this tab's eye back, so that two clouds side by side fit; or forth again."""
+        if self.reach is None:
+            return
+        shift = _shift(self.reach)
+        now, way = self.camera_now(), 1 if beside else -1
+        look_at = np.asarray(now.look_at) + way * shift / 2
+        eye = (np.asarray(now.position) - now.look_at) * 1.6**way + look_at
+        self.look_from(Camera(position=vector(eye), look_at=vector(look_at)))
 
     def say(self, note: str) -> None:
         """Show text to the reader."""
@@ -181,6 +205,7 @@ class Session:
         check()
         if self.reach is not None:
             self.scene.draw_surfaces(self.reach, self.state.appearance)
+            self.show()
 
     def _do_arm(self, check: StaleCheck) -> None:
         check()
@@ -192,9 +217,12 @@ class Session:
                 self.tip = self.scene.draw_arm(state.design, state.activation)
             self.trail = [*self.trail[-_LONGEST_TRAIL:], self.tip]
         self._draw_trail()
+        self._draw_reference_arm()
         self.show()
 
     def _draw_trail(self) -> None:
+        if self._trail_of != self.state.design:  # another arm's tip was never there
+            self._trail_of, self.trail = self.state.design, self.trail[-1:]
         if not self.state.appearance.trail:
             self.trail = self.trail[-1:]
         self.scene.draw_trail(np.array(self.trail))
@@ -234,13 +262,51 @@ class Session:
             self.update(lambda state: state.replace(activation=tuple(best.tolist())))
 
     def _do_reference(self, check: StaleCheck) -> None:
-        reference = self.state.reference
+        reference, look = self.state.reference, self.state.appearance
         if reference is None:
+            self.reference = None
             self.scene.remove("/reference")
-            return
-        reach = next(stages(reference, 16, self.quality, check))
-        shift = np.zeros(3)
-        if self.state.side_by_side:
-            shift[0] = 1.2 * float(np.ptp(cloud_points(reach, 14)[:, 0]))
-        with self._drawing, self.client.atomic():
-            self.scene.draw_reference(reach, self.state.appearance, shift)
+        elif self.reference is None or self.reference.arm != reference:
+            self.reference = self._reach_of(reference, check)
+        if self.reference is not None:
+            beside = self.state.side_by_side
+            shift = _shift(self.reference) if beside else np.zeros(3)
+            with self._drawing, self.client.atomic():
+                self.scene.draw_reference(self.reference, look, shift)
+            self._draw_reference_arm()
+        self.show()
+
+    def _reach_of(self, reference: Manipulator, check: StaleCheck) -> Reach:
+        """What is known already, if it is fine."""
+        known = self.reach
+        if known is not None and known.fine and known.arm == reference:
+            return known
+        *_, fine = stages(reference, 16, self.quality, check)
+        return fine
+
+    def _draw_reference_arm(self) -> None:
+        """The arm beside this one pulls as this one does."""
+        with self._drawing:
+            state, reference = self.state, self.reference
+            if reference is not None and state.side_by_side and state.appearance.arm:
+                same = state.replace(design=reference.arm).activation
+                self.scene.draw_reference_arm(reference.arm, same, _shift(reference))
+            else:
+                self.scene.remove("/reference/arm")
+
+    def _do_map(self, check: StaleCheck) -> None:
+        check()
+        if self.board is not None:
+            self.board.draw(self.state.appearance.map, self.state.design)
+
+
+def _board(scene: Scene, atlas: xr.Dataset | None) -> MapBoard | None:
+    """A board, if there is an atlas that a map can be drawn of."""
+    if atlas is None or len(atlas["status"].dims) < 2:
+        return None
+    return MapBoard(scene, atlas)
+
+
+def _shift(reach: Reach) -> Array:
+    """How far a cloud stands beside another [L]."""
+    return np.array([1.3 * float(np.ptp(cloud_points(reach, 14)[:, 0])), 0.0, 0.0])

@@ -17,7 +17,7 @@ from softreach.studio.state import StudioState
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Start", "start_on_design", "start_on_store"]
+__all__ = ["Start", "start_on_design", "start_on_state", "start_on_store"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +33,20 @@ class Start:
 def start_on_design(arm: Manipulator, quality: Quality | None = None) -> Start:
     """Begin with a design."""
     return Start(state=StudioState(design=arm), quality=quality or Quality())
+
+
+def start_on_state(path: str | PathLike[str], quality: Quality | None = None) -> Start:
+    """Begin with a state that a tab was saved as.
+
+    Raises:
+        InvalidInput: There is no such file, or it is no state.
+        InvalidDesign: A design in it cannot exist.
+    """
+    try:
+        text = Path(path).read_bytes()
+    except OSError as error:
+        raise InvalidInput("state file", str(path), "a file that can be read", str(error)) from None
+    return Start(state=StudioState.from_json(text), quality=quality or Quality())
 
 
 def start_on_store(path: str | PathLike[str], quality: Quality | None = None) -> Start:

@@ -17,6 +17,7 @@ __all__ = [
     "LEVELS",
     "Appearance",
     "Camera",
+    "MapView",
     "Slice",
     "StudioState",
     "Work",
@@ -44,6 +45,17 @@ class Slice:
 
 
 @dataclass(frozen=True, kw_only=True)
+class MapView:
+    """What the map of an atlas shows; "" is the first there is."""
+
+    metric: str = ""
+    right: str = ""
+    """The parameter to the right."""
+    up: str = ""
+    shown: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
 class Appearance:
     """What is drawn and how."""
 
@@ -63,6 +75,7 @@ class Appearance:
     """Where the tip has been."""
     ghosts: bool = True
     """The shapes of all solutions of the inverse problem at once."""
+    map: MapView = field(default_factory=MapView)
 
     def __post_init__(self) -> None:
         if self.level not in LEVELS:
@@ -147,7 +160,7 @@ def _parsed(text: str | bytes) -> dict[str, Any]:
 
 def _fields(values: dict[str, Any]) -> dict[str, Any]:
     look = dict(values["appearance"])
-    look["slice"] = Slice(**look["slice"])
+    look["slice"], look["map"] = Slice(**look["slice"]), MapView(**look["map"])
     camera, reference = values["camera"], values["reference"]
     return {
         "design": Manipulator.from_toml(values["design"], "state file"),
@@ -187,6 +200,8 @@ class Work(Enum):
     SURFACES = auto()
     INVERSE = auto()
     REFERENCE = auto()
+    MAP = auto()
+    """Of an atlas."""
 
 
 def what_follows(old: StudioState | None, new: StudioState) -> frozenset[Work]:
@@ -207,7 +222,19 @@ _CAUSES = {
         s.appearance.cloud,
         s.appearance.axes,
     ),
-    Work.SURFACES: lambda s: (s.appearance.surface, s.appearance.alpha_shape),
+    Work.SURFACES: lambda s: (
+        s.appearance.surface,
+        s.appearance.alpha_shape,
+        s.appearance.slice,
+    ),
     Work.INVERSE: lambda s: (s.design, s.target, s.appearance.ghosts),
-    Work.REFERENCE: lambda s: (s.reference, s.side_by_side),
+    Work.REFERENCE: lambda s: (
+        s.reference,
+        s.side_by_side,
+        s.appearance.level,
+        s.appearance.color,
+        s.appearance.point_size,
+        s.appearance.slice,
+    ),
+    Work.MAP: lambda s: (s.design, s.appearance.map),
 }

@@ -1,84 +1,83 @@
-"""The map of an atlas in the scene; a click loads the design under it."""
+"""Which map of an atlas the board shows; a click on it loads the design under it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from softreach.studio.atlas_map import AtlasMap, atlas_map, metric_names
-from softreach.studio.panels.binding import told
-from softreach.studio.picking import plane_crossing
+from softreach.studio.atlas_map import map_choices, metric_names
+from softreach.studio.map_board import MapBoard
+from softreach.studio.panels.binding import bind, told
+from softreach.studio.state import MapView, StudioState
 
 if TYPE_CHECKING:
-    import xarray as xr
     from viser import GuiApi
 
     from softreach.studio.session import Session
 
 __all__ = ["AtlasPanel"]
 
-_CENTER = np.array([-1.7, 0.0, 0.5])
-_SIZE = 1.6  # [L]
-_UPRIGHT = (np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0)  # the picture's down goes to -z
+_HINT = (
+    "Click the map beside the arm to load a design; the ball is the present one. Parameters that "
+    "the map does not show are held at the value nearest to the present design's."
+)
 
 
 class AtlasPanel:
-    """Which metric the map shows."""
+    """Metric and parameters of the map."""
 
-    def __init__(self, gui: GuiApi, tab: Any, session: Session, atlas: xr.Dataset) -> None:
-        """Add the widgets and the map."""
-        self._session, self._atlas = session, atlas
-        self._map: AtlasMap | None = None
-        names = metric_names(atlas)
+    def __init__(self, gui: GuiApi, tab: Any, session: Session, board: MapBoard) -> None:
+        """Add the widgets."""
+        self._session, self._board, self._atlas = session, board, board.atlas
+        self._revision = -1
+        names = tuple(str(dim) for dim in self._atlas["status"].dims)
         with tab:
-            gui.add_markdown("Click the map beside the arm to load a design.")
-            self._metric = gui.add_dropdown("metric", tuple(names), initial_value=names[0])
+            gui.add_markdown(_HINT)
+            self._metric = gui.add_dropdown("metric", tuple(metric_names(self._atlas)))
+            self._right = gui.add_dropdown("to the right", names)
+            self._up = gui.add_dropdown("upward", names)
             self._visible = gui.add_checkbox("show the map", True)
-        self._metric.on_update(lambda _: told(session, self.draw))
-        self._visible.on_update(lambda _: told(session, self.draw))
-        told(session, self.draw)
+        bind(self._metric, session, lambda s, name: _viewed(s, metric=name))
+        bind(self._right, session, lambda s, name: self._turned(s, "right", name))
+        bind(self._up, session, lambda s, name: self._turned(s, "up", name))
+        bind(self._visible, session, lambda s, on: _viewed(s, shown=on))
 
     def show(self, session: Session) -> None:
-        """The map does not depend on the tab's state."""
-
-    def draw(self) -> None:
-        """Put the map into the scene, or take it out."""
-        self._session.scene.remove("/atlas")
-        self._map = self._session.map_image = None
-        if self._visible.value:
-            self._map = atlas_map(self._atlas, self._metric.value)
-            self._session.map_image = self._map.image
-            self._session.scene.draw_picture(
-                "/atlas/map", self._map.image, _SIZE, _CENTER, _UPRIGHT
-            )
+        """Bring the widgets in line with the state."""
+        if session.revision != self._revision:
+            self._revision = session.revision
+            told(session, lambda: self._follow(session.state.appearance.map))
 
     def click(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
         """Load the design under the cursor, and whether the map is there."""
-        if self._map is None:
-            return False
-        hit = plane_crossing(origin, direction, _CENTER, (0.0, 1.0, 0.0))
-        if hit is None:
-            return False
-        right, up = (hit - _CENTER)[[0, 2]] / _SIZE + 0.5
-        if not (0 <= right <= 1 and 0 <= up <= 1):
-            return False
-        at = self._map.parameters_at(float(right), float(up))
-        if at is not None:
+        at = self._board.parameters_under(origin, direction)
+        if at:
             told(self._session, lambda: self._load(at))
-        return True
+        return at is not None
 
-    def place_of(self, **at: float) -> NDArray[np.float64]:
-        """Where in the scene the map shows a design [L]."""
-        assert self._map is not None
-        right, up = self._map.place_of(**at)
-        return _CENTER + _SIZE * np.array([right - 0.5, 0.0, up - 0.5])
+    def _follow(self, view: MapView) -> None:
+        metric, right, up = map_choices(self._atlas, view)
+        self._metric.value, self._right.value, self._up.value = metric, right, up
+        self._visible.value = view.shown
+
+    def _turned(self, state: StudioState, axis: str, name: str) -> StudioState:
+        """A parameter on one axis; the other axis takes what this one had if it is the same."""
+        _, right, up = map_choices(self._atlas, state.appearance.map)
+        axes = {"right": right, "up": up}
+        other = "up" if axis == "right" else "right"
+        if axes[other] == name:
+            axes[other] = axes[axis]
+        axes[axis] = name
+        self._right.value, self._up.value = axes["right"], axes["up"]
+        return _viewed(state, **axes)
 
     def _load(self, at: dict[str, float]) -> None:
         from softreach.atlas import atlas_design
 
         design = atlas_design(self._atlas, **at)
-        self._session.scene.draw_mark("/atlas/here", self.place_of(**at))
         self._session.update(lambda state: state.replace(design=design))
+
+
+def _viewed(state: StudioState, **changes: Any) -> StudioState:
+    return state.showing(map=replace(state.appearance.map, **changes))

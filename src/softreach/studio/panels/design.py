@@ -8,11 +8,13 @@ import threading
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from softreach.atlas.parameter import changed, parameter_units
+from softreach.atlas.parameter import changed
 from softreach.design_file import in_file_terms
 from softreach.errors import InvalidDesign
 from softreach.manipulator import Manipulator
 from softreach.studio.panels.binding import bind, bind_button
+from softreach.studio.panels.status import reach_text
+from softreach.studio.parameter_value import fiber_keys
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -67,16 +69,11 @@ _DEG = math.radians(1)
 
 
 def _fiber_controls(arm: Manipulator) -> Iterator[Control]:
-    for fiber, key, turn in zip(arm.fibers, _keys(arm), arm.revolutions.tolist(), strict=True):
+    for fiber, key, turn in zip(arm.fibers, fiber_keys(arm), arm.revolutions.tolist(), strict=True):
         name = fiber.name or key.replace("_", " ")
         if not turn:
             yield Control(f"bundles_{key}", f"bundles of {name}", fiber.bundles, 1, 6, 1)
         yield Control(f"offset_{key}", f"offset of {name} [deg]", fiber.offset, 0, 360, 1, _DEG)
-
-
-def _keys(arm: Manipulator) -> list[str]:
-    """The names by which the parameters of each fiber end."""
-    return [n.removeprefix("bundles_") for n in parameter_units(arm) if n.startswith("bundles_")]
 
 
 class _Row(NamedTuple):
@@ -101,15 +98,18 @@ class DesignPanel:
         with tab:
             self._folder = gui.add_folder("design")
             with gui.add_folder("compare"):
+                self._reference = gui.add_markdown("")
                 keep = gui.add_button("Keep this design as reference")
                 self._beside = gui.add_checkbox("side by side", False)
                 clear = gui.add_button("Forget the reference")
         bind_button(keep, session, lambda: session.update(lambda s: s.replace(reference=s.design)))
-        bind_button(clear, session, lambda: session.update(lambda s: s.replace(reference=None)))
+        bind_button(clear, session, self._forget)
         bind(self._beside, session, lambda s, on: s.replace(side_by_side=on))
+        self._beside.on_update(self._stepped)
 
     def show(self, session: Session) -> None:
-        """Build the sliders anew for a design that they did not make."""
+        """Tell of the reference; build the sliders anew for a design that they did not make."""
+        self._reference.content = _reference_text(session)
         with self._lock:
             if session.revision == self._revision:
                 return
@@ -117,6 +117,15 @@ class DesignPanel:
             if session.state.design != self._made or self._complaining:
                 self._build(session.state.design)
         self._beside.value = session.state.side_by_side
+
+    def _forget(self) -> None:
+        if self._session.state.side_by_side and self._session.state.reference is not None:
+            self._session.step_aside(False)
+        self._session.update(lambda s: s.replace(reference=None, side_by_side=False))
+
+    def _stepped(self, event: Any) -> None:
+        if event.client_id is not None and self._session.state.reference is not None:
+            self._session.step_aside(self._beside.value)
 
     def _build(self, arm: Manipulator) -> None:
         for row in self._rows:
@@ -159,6 +168,13 @@ class DesignPanel:
         for row in self._rows:
             mine = text if row.control.name == name else ""
             row.message.content, row.message.visible = _warning(mine), bool(mine)
+
+
+def _reference_text(session: Session) -> str:
+    if session.reference is None:
+        return "No reference is kept."
+    where = "reference" if session.state.side_by_side else "reference (gray)"
+    return f"{where}: {reach_text(session.reference)}"
 
 
 def _warning(text: str) -> str:

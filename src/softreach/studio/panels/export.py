@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from softreach.studio.files import (
     state_from,
     surface_file,
 )
+from softreach.studio.link import state_link
 from softreach.studio.page import static_page
 from softreach.studio.panels.binding import bind_button, told
 
@@ -26,14 +28,23 @@ if TYPE_CHECKING:
 __all__ = ["ExportPanel"]
 
 
+_ADDRESS = (
+    '<div style="font-size:0.8em;padding:0 0.8em 0.5em"><a href="{link}" target="_blank">This '
+    "state in a new tab</a>; copy the link to keep it. It holds the state itself, and opens while "
+    "a studio serves at this address.</div>"
+)
+
+
 class ExportPanel:
     """Buttons that send a file to the browser, and one that takes a file back."""
 
-    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
+    def __init__(self, gui: GuiApi, tab: Any, session: Session, url: str) -> None:
         """Add the widgets."""
-        self._session = session
+        self._session, self._url = session, url
         with tab:
             self._button("Save state", self._save_state)
+            self._button("Link to this state", self._link)
+            self._address = gui.add_html("")
             self._button("Save design (TOML)", self._save_design)
             load = gui.add_upload_button("Load state or design")
             self._cloud = gui.add_dropdown("cloud format", CLOUD_FORMATS)
@@ -48,9 +59,11 @@ class ExportPanel:
         """Nothing here depends on the state."""
 
     def _save_state(self) -> None:
-        session = self._session
-        state = session.state.replace(camera=session.camera_now())
-        self._send("softreach-studio.json", state.to_json().encode())
+        self._send("softreach-studio.json", self._session.state_now().to_json().encode())
+
+    def _link(self) -> None:
+        link = html.escape(state_link(self._url, self._session.state_now()))
+        self._address.content = _ADDRESS.format(link=link)
 
     def _save_design(self) -> None:
         self._send("design.toml", self._session.state.design.to_toml().encode())
@@ -67,11 +80,10 @@ class ExportPanel:
         self._send("reachability.png", figure_file(self._reach(), self._session.state))
 
     def _save_page(self) -> None:
-        session = self._session
-        state = session.state.replace(camera=session.camera_now())
-        self._send(
-            "reachability.html", static_page(state, self._reach(), session.map_image).encode()
-        )
+        board = self._session.board
+        picture = None if board is None or board.map is None else board.map.image
+        page = static_page(self._session.state_now(), self._reach(), picture)
+        self._send("reachability.html", page.encode())
 
     def _button(self, label: str, action: Callable[[], None]) -> None:
         bind_button(self._session.client.gui.add_button(label), self._session, action)
@@ -79,9 +91,7 @@ class ExportPanel:
     def _restore(self, file: UploadedFile) -> None:
         session = self._session
         state = state_from(file.name, file.content, session.state)
-        session.update(lambda _: state)
-        if state.camera is not None:
-            session.look_from(state.camera)
+        session.restore(state)
 
     def _reach(self) -> Reach:
         reach = self._session.reach

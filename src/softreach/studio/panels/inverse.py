@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softreach.kinematics import tip_positions
+from softreach.manipulator import Manipulator
 from softreach.studio.panels.binding import bind, bind_button, told
 from softreach.studio.picking import picked_point
-from softreach.studio.reach import shown_samples
-from softreach.studio.scene import cloud_points, in_slice
+from softreach.studio.reach import cloud_points, shown_samples
+from softreach.studio.slicing import in_slice
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -31,7 +33,7 @@ class InversePanel:
         self._gui, self._session = gui, session
         self._revision = -1
         self._shown: Solution | None = None
-        self._buttons: list[Any] = []
+        self._buttons: list[tuple[Any, Any]] = []
         with tab:
             self._text = gui.add_markdown(_HINT)
             self._target = gui.add_vector3("target / L", (0.0, 0.0, 1.0), step=0.001)
@@ -44,23 +46,28 @@ class InversePanel:
         bind(self._ghosts, session, lambda s, on: s.showing(ghosts=on))
 
     def show(self, session: Session) -> None:
-        """List the solutions."""
+        """List the solutions, and mark the one that the arm holds."""
         if session.revision != self._revision:
             self._revision = session.revision
             self._ghosts.value = session.state.appearance.ghosts
-        if session.answer is self._shown:
-            return
-        self._shown = answer = session.answer
-        for button in self._buttons:
+        if session.answer is not self._shown:
+            self._shown = session.answer
+            self._list(session.answer)
+        for activation, button in self._buttons:
+            held = tuple(activation.tolist()) == session.state.activation
+            button.color = "green" if held else None
+
+    def _list(self, answer: Solution | None) -> None:
+        for _, button in self._buttons:
             button.remove()
         self._buttons, self._folder.visible = [], answer is not None and len(answer) > 0
         self._text.content = _HINT
         if answer is not None:
-            length = session.state.design.length
-            self._target.value = answer.target / length
-            self._text.content = _told(answer, length)
+            arm = self._session.state.design
+            self._target.value = answer.target / arm.length
+            self._text.content = _told(answer, arm)
             with self._folder:
-                self._buttons = [self._button(row) for row in answer.activations]
+                self._buttons = [(row, self._button(row)) for row in answer.activations]
 
     def click(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
         """Aim at the point of the cloud under the cursor, and whether there is one."""
@@ -73,8 +80,8 @@ class InversePanel:
         found = picked_point(points[kept], origin, direction)
         if found is None:
             return False
-        tips = reach.cloud.tip.values[shown_samples(reach, look.level)]
-        told(session, lambda: session.aim(tips[kept[found]]))
+        activations = reach.cloud.activation.values[shown_samples(reach, look.level)]
+        told(session, lambda: session.aim(_tip(reach.arm, activations[kept[found]])))
         return True
 
     def _solve_typed(self) -> None:
@@ -89,15 +96,24 @@ class InversePanel:
         return button
 
 
-def _told(answer: Solution, length: float) -> str:
+def _tip(arm: Manipulator, activation: Any) -> Any:
+    """Where a sample really is [m]: its point is rounded, at the rim perhaps to out of reach."""
+    return tip_positions(arm, [activation])[0]
+
+
+def _told(answer: Solution, arm: Manipulator) -> str:
     """What became of the target, in words."""
-    place = _place(answer.target / length)
+    place = _place(answer.target / arm.length)
     if not len(answer):
         certain = "out of reach" if answer.status == 1 else "not reached, perhaps out of reach"
-        near = _place(answer.nearest / length)
-        return f"{place} is {certain}. Nearest: {near}, {answer.gap / length:.4g} L away."
+        near = _place(answer.nearest / arm.length)
+        return f"{place} is {certain}. Nearest: {near}, {answer.gap / arm.length:.4g} L away."
     count = "1 activation reaches" if len(answer) == 1 else f"{len(answer)} activations reach"
-    return f"{count} {place} to {answer.residuals.max() / length:.1e} L."
+    names = ", ".join(arm.bundle_names)
+    return (
+        f"{count} {place} to {answer.residuals.max() / arm.length:.1e} L. "
+        f"Press one (γ of {names}) to move the arm there; green is where it is."
+    )
 
 
 def _place(point: Any) -> str:

@@ -37,7 +37,9 @@ class StatusPanel:
 
 def _told(session: Session, reach: Reach) -> str:
     stale = reach.arm != session.state.design
-    return reach_text(reach) + (" · computing ..." if stale or not reach.fine else "")
+    hull = reach.alpha_volume if session.state.appearance.alpha_shape else None
+    told = f" · α-shape {hull:.4f} L³" if hull is not None else ""
+    return reach_text(reach) + told + (" · computing ..." if stale or not reach.fine else "")
 
 
 def reach_text(reach: Reach) -> str:
