@@ -1,4 +1,4 @@
-"""An atlas beside the sum of its parts, each run alone, in one process per row."""
+"""An atlas beside the sum of its parts, each run alone; one process for each measurement."""
 
 from __future__ import annotations
 
@@ -10,84 +10,180 @@ import sys
 import tempfile
 import time
 import warnings
+from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
 from softreach import designs
 from softreach.atlas import DesignSpace, build_atlas
+from softreach.atlas.command import Command
 from softreach.atlas.metrics import METRICS, hull_metrics, image_metrics
+from softreach.atlas.store import AtlasStore, Result
+from softreach.curvature import QUANTITIES, stream_statistics
 from softreach.errors import SoftreachWarning
 from softreach.kinematics import tip_positions
-from softreach.sampling import sample_cube
+
+ALPHA, ACCURACY, TOL = 0.05, 3e-3, 1e-6
+PARTS = {
+    "tips": "tips",
+    "exact": "exact volume, its hull and UNR",
+    "concave": "α-shape, convex hull and UNR",
+    "convex": "convex hull alone",
+    "curvature": "curvature",
+    "writing": "writing to the store",
+}
+GROUPS = {"concave": tuple(METRICS), "convex": tuple(name for name in METRICS if name != "concave")}
+"""What the atlas holds with α-shapes and without."""
+
+Times = dict[str, list[float]]
 
 
-def space(side: int) -> DesignSpace:
-    turns, tapers = np.radians(np.linspace(0, 108, side)), np.radians(np.linspace(0, 3, side))
+def space(rows: int, columns: int) -> DesignSpace:
+    turns, tapers = np.radians(np.linspace(0, 108, rows)), np.radians(np.linspace(0, 3, columns))
     return DesignSpace.grid(designs.minimal_trunk(), revolution=turns, taper=tapers)
 
 
-def parts(side: int, n: int) -> None:
-    """Every design's tips, volumes and hulls, one after the other, nothing stored."""
-    family, cube = space(side), sample_cube("uniform", n, 3)
-    for index in range(family.size):
-        arm = family.design(index)
-        tips = tip_positions(arm, arm.bounds[:, 0] + cube * np.diff(arm.bounds)[:, 0])
-        image_metrics(arm, 1e-6, 3e-3)
-        hull_metrics(arm, tips, 0.1, ("extent", "concave"))
+def parts(rows: int, columns: int, n: int, _: str = "") -> Times:
+    """Wall and CPU seconds of every part of every design, one after the other."""
+    command = Command(
+        space=space(rows, columns),
+        n=n,
+        seed=0,
+        sampler="uniform",
+        tol=TOL,
+        alpha=ALPHA,
+        accuracy=ACCURACY,
+        metrics=tuple(METRICS),
+        keep_clouds=True,
+    )
+    times: Times = defaultdict(lambda: [0.0, 0.0])
+    with tempfile.TemporaryDirectory() as folder:
+        store = AtlasStore.begin(Path(folder) / "atlas.zarr", command)
+        for index in range(command.space.size):
+            one_design(store, index, times)
+    return dict(times)
 
 
-def whole(side: int, n: int) -> None:
-    groups = tuple(name for name in METRICS if name != "curvature")
+def one_design(store: AtlasStore, index: int, times: Times) -> None:
+    arm = store.command.design(index)
+    low, high = arm.bounds.T
+    activations = low + store.cube * (high - low)
+    with clock(times["tips"]):
+        tips = tip_positions(arm, activations, TOL)
+    with clock(times["exact"]):
+        numbers = image_metrics(arm, TOL, ACCURACY)
+    for kind in ("convex", "concave"):
+        with clock(times[kind]):
+            numbers |= hull_metrics(arm, tips, ALPHA, ("extent", kind))
+    with clock(times["curvature"]):
+        blocks = (activations[k : k + 65_536] for k in range(0, len(activations), 65_536))
+        found = stream_statistics(arm, blocks, np.array(store.command.stations) * arm.length)
+    quantiles = np.stack([found[f"{name}_quantile"].values for name in QUANTITIES])
+    with clock(times["writing"]):
+        store.write(index, Result(numbers, quantiles, tips))
+
+
+@contextmanager
+def clock(total: list[float]) -> Iterator[None]:
+    """Add the wall and CPU seconds of a block."""
+    wall, cpu = time.perf_counter(), time.process_time()
+    yield
+    total[0] += time.perf_counter() - wall
+    total[1] += time.process_time() - cpu
+
+
+def atlas(rows: int, columns: int, n: int, kind: str) -> dict[str, float]:
+    """Seconds, peak memory [MB] and store size [MB per design] of the whole."""
+    total = [0.0, 0.0]
     with tempfile.TemporaryDirectory() as folder:
         store = Path(folder) / "atlas.zarr"
-        build_atlas(space(side), store, n, alpha=0.1, metrics=groups)
+        with clock(total):
+            build_atlas(space(rows, columns), store, n, alpha=ALPHA, metrics=GROUPS[kind])
         size = sum(file.stat().st_size for file in store.rglob("*") if file.is_file())
-    print(json.dumps({"bytes": size / side**2}))
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return {"wall": total[0], "cpu": total[1], "peak": peak, "size": size / 1e6 / (rows * columns)}
 
 
-def row(task: str, side: int, n: int) -> None:
-    """Run one task twice, the first to compile, and report the second."""
-    work = {"parts": parts, "atlas": whole}[task]
+def run(task: str, *arguments: str) -> None:
+    """Run a task in this process, after a small one that loads and compiles."""
+    work, (rows, columns, n, kind) = {"parts": parts, "atlas": atlas}[task], arguments
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SoftreachWarning)
-        parts(1, 1_000) if task == "parts" else whole(2, 1_000)
-        wall, cpu = time.perf_counter(), time.process_time()
-        work(side, n)
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    print(json.dumps({"wall": time.perf_counter() - wall, "cpu": time.process_time() - cpu}))
-    print(json.dumps({"peak": peak}))
+        work(1, 2, 1_000, kind)
+        print(json.dumps(work(int(rows), int(columns), int(n), kind)))
 
 
-def main(side: int = 4, n: int = 10_000) -> None:
-    """Print the table."""
-    print(f"## Atlas: {side} x {side} designs, {n:,} points\n")
-    print("| Threads | What | Wall [s] | CPU [s] | Designs/min | Peak [MB] | Store [kB/design] |")
-    print("|---|---|---|---|---|---|---|")
-    for threads in (1, 2):
-        for task in ("parts", "atlas"):
-            found = measured(task, side, n, threads)
-            rate = 60 * side**2 / found["wall"]
-            size = f"{found['bytes'] / 1e3:.0f}" if "bytes" in found else ""
-            times = f"{found['wall']:.1f} | {found['cpu']:.1f}"
-            print(f"| {threads} | {task} | {times} | {rate:.0f} | {found['peak']:.0f} | {size} |")
-
-
-def measured(task: str, side: int, n: int, threads: int) -> dict[str, float]:
-    command = [sys.executable, "-m", "benchmarks.bench_atlas", task, str(side), str(n)]
+def measured(threads: int, *task: object) -> dict:
+    """What a task says in a process of its own."""
+    command = [sys.executable, "-m", "benchmarks.bench_atlas", *map(str, task)]
     environment = os.environ | {"SOFTREACH_NUM_THREADS": str(threads)}
-    said = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
-    return {k: v for line in said.stdout.splitlines() for k, v in json.loads(line).items()}
+    return json.loads(
+        subprocess.run(
+            command, stdout=subprocess.PIPE, text=True, check=True, env=environment
+        ).stdout
+    )
+
+
+def main(side: int = 4, n: int = 400_000) -> None:
+    """Print the tables."""
+    print(f"## Atlas: {side} x {side} designs of {n:,} points\n")
+    alone = measured(1, "parts", side, side, n, "-")
+    print_parts(alone, side**2)
+    print_atlas(alone, side, n)
+    print_memory(side, n)
+
+
+def print_parts(alone: Times, designs: int) -> None:
+    print("Every part run alone, on one thread:\n")
+    print("| Part | Wall [s/design] | CPU [s/design] |\n|---|---|---|")
+    for name, told in PARTS.items():
+        wall, cpu = (seconds / designs for seconds in alone[name])
+        print(f"| {told} | {wall:.2f} | {cpu:.2f} |")
+
+
+def print_atlas(alone: Times, side: int, n: int) -> None:
+    print("\nThe whole, from the call to the opened atlas, beside the sum of its parts, which is")
+    print("shared evenly among the threads:\n")
+    print(
+        "| α-shapes | Threads | Wall [s] | Sum of parts [s] | Ratio | CPU ratio | Designs/min |",
+        end="",
+    )
+    print(" Store [MB/design] | Peak [MB] |\n|---|---|---|---|---|---|---|---|---|")
+    for kind, left_out in (("concave", "convex"), ("convex", "concave")):
+        used = [alone[name] for name in PARTS if name != left_out]
+        wall, cpu = (sum(times) for times in zip(*used, strict=True))
+        for threads in (1, 2):
+            found = measured(threads, "atlas", side, side, n, kind)
+            print(
+                f"| {'yes' if kind == 'concave' else 'no'} | {threads} | {found['wall']:.1f} |",
+                end="",
+            )
+            print(f" {wall / threads:.1f} | {found['wall'] * threads / wall:.2f} |", end="")
+            print(f" {found['cpu'] / cpu:.2f} | {60 * side**2 / found['wall']:.1f} |", end="")
+            print(f" {found['size']:.2f} | {found['peak']:.0f} |")
+
+
+def print_memory(side: int, n: int) -> None:
+    """Designs of a tenth of the points: what grows with their number would show sooner."""
+    points = n // 10
+    print(f"\nPeak memory with {points:,} points, α-shapes and two threads:\n")
+    print("| Designs | Peak [MB] |\n|---|---|")
+    for rows in (1, side, 4 * side):
+        found = measured(2, "atlas", rows, side, points, "concave")
+        print(f"| {rows * side} | {found['peak']:.0f} |")
 
 
 def test_an_atlas(benchmark, tmp_path):
     stores = (tmp_path / f"{k}.zarr" for k in range(1_000_000))
     options = {"n": 500, "alpha": 1.0, "metrics": ("extent", "concave")}
-    benchmark(lambda: build_atlas(space(2), next(stores), **options))
+    benchmark(lambda: build_atlas(space(2, 2), next(stores), **options))
 
 
 if __name__ == "__main__":
-    if len(sys.argv) == 4:
-        row(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))
+    if sys.argv[1:2] in (["parts"], ["atlas"]):
+        run(*sys.argv[1:])
     else:
         main(*map(int, sys.argv[1:]))

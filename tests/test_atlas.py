@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import os
 import signal
 import subprocess
 import sys
@@ -682,6 +684,43 @@ def test_dask_workers_survive_the_death_of_one(whole, tmp_path):
     assert process.returncode == 0
     assert (tmp_path / "task.died").exists()
     assert_same(open_atlas(store).load(), whole)
+
+
+SBATCH = """#!/bin/sh
+while [ $# -gt 1 ]; do shift; done
+setsid sh "$1" > "$0.log" 2>&1 &
+echo $! > "$0.pid"
+echo Submitted batch job 1
+"""
+
+
+@pytest.mark.slow
+def test_workers_may_come_from_a_job_queue(whole, tmp_path, monkeypatch):
+    """A SLURM of this machine stands in for a cluster."""
+    pytest.importorskip("dask_jobqueue")
+    commands = tmp_path / "bin"
+    commands.mkdir()
+    for name, text in (("sbatch", SBATCH), ("scancel", "#!/bin/sh\nexit 0\n")):
+        (commands / name).write_text(text)
+        (commands / name).chmod(0o755)
+    monkeypatch.setenv("PATH", str(commands), prepend=":")
+    body = """
+        if __name__ == "__main__":
+            from dask_jobqueue import SLURMCluster
+            from distributed import Client
+            options = {"log_directory": sys.argv[2], "local_directory": sys.argv[2]}
+            options |= {"scheduler_options": {"dashboard_address": None}, "interface": "lo"}
+            queue = SLURMCluster(cores=2, processes=2, memory="4GB", walltime="1:00:00", **options)
+            queue.scale(2)
+            with queue, Client(queue) as client:
+                build(sys.argv[1], executor=client)
+    """
+    process = run_script(tmp_path, body, str(tmp_path / "a.zarr"), str(tmp_path / "jobs"))
+    said = process.communicate()[1]
+    with contextlib.suppress(OSError):
+        os.killpg(int((commands / "sbatch.pid").read_text()), signal.SIGKILL)
+    assert process.returncode == 0, said
+    assert_same(open_atlas(tmp_path / "a.zarr").load(), whole)
 
 
 def test_what_is_no_executor_is_refused(tmp_path):
