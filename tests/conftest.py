@@ -20,6 +20,7 @@ import pytest
 
 from softreach import designs
 from softreach.manipulator import Manipulator
+from tests.browser import browser  # noqa: F401  (a fixture)
 
 settings.register_profile(
     "ci",

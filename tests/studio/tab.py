@@ -11,19 +11,6 @@ import numpy as np
 from softreach.studio import Studio
 from softreach.studio.session import Session
 
-FLAGS = [
-    "--no-sandbox",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-default-apps",
-    "--disable-sync",
-    "--metrics-recording-only",
-    "--no-first-run",
-    "--no-pings",
-]
 PATIENCE = 90.0  # a loaded machine compiles shaders slowly
 
 

@@ -63,6 +63,10 @@ _COMMANDS = {
         "Clouds and volumes of whole families of designs.",
         "softreach atlas build a.zarr --vary revolution_deg=0:108:4 --vary taper_deg=0:3:4",
     ),
+    "paper": (
+        "The paper's figures and numbers, recomputed and set beside what it says.",
+        "softreach paper --out paper --quick",
+    ),
     "studio": (
         "The design desk in the browser: move sliders, see what the design can reach.",
         "softreach studio minimal_trunk --no-open",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,6 +38,7 @@ def plot_arm(
     *,
     view: View = "front",
     rest: bool = True,
+    bundles: Collection[int] | None = None,
     box: Array | None = None,
 ) -> Axes:
     """Draw an arm; where both are shown, the arm at rest is pale and behind.
@@ -48,6 +50,7 @@ def plot_arm(
         ax: Axes to draw in; None for a new figure.
         view: A named view, or azimuth and elevation of the eye [rad].
         rest: Whether to draw the arm at rest beside its configurations.
+        bundles: Which to draw, by index; None for all.
         box: What to show, lower and upper corner [L], shape (2, 3).
 
     Returns:
@@ -62,8 +65,9 @@ def plot_arm(
     with figure_style(ax):
         box = bounding_box(*(arm_points(arm, s) for s in shapes + resting)) if box is None else box
         ax = framed_axes(box, view) if ax is None else ax
-        _show(ax, arm, resting, view, box, _FADE if shapes else 0.0)
-        _show(ax, arm, shapes, view, box)
+        drawn = range(arm.bundles) if bundles is None else bundles
+        _show(ax, arm, resting, view, box, drawn, _FADE if shapes else 0.0)
+        _show(ax, arm, shapes, view, box, drawn)
     return ax
 
 
@@ -82,22 +86,37 @@ def arm_points(arm: Manipulator, shape: xr.Dataset) -> Array:
 
 
 def _show(
-    ax: Axes, arm: Manipulator, shapes: list[xr.Dataset], view: View, box: Array, fade: float = 0.0
+    ax: Axes,
+    arm: Manipulator,
+    shapes: list[xr.Dataset],
+    view: View,
+    box: Array,
+    bundles: Collection[int],
+    fade: float = 0.0,
 ) -> None:
     """One image of all shapes, over what the axes hold."""
     if shapes:
         extent = view_extent(box, view)
         buffer = ZBuffer(extent, image_width(ax, extent), oversample=3)
         for shape in shapes:
-            _draw(buffer, arm, shape, view, fade)
+            _draw(buffer, arm, shape, view, bundles, fade)
         show_buffer(ax, buffer, box, view, "/ L")
 
 
-def _draw(buffer: ZBuffer, arm: Manipulator, shape: xr.Dataset, view: View, fade: float) -> None:
+def _draw(
+    buffer: ZBuffer,
+    arm: Manipulator,
+    shape: xr.Dataset,
+    view: View,
+    bundles: Collection[int],
+    fade: float,
+) -> None:
     vertices, faces = arm_mesh(shape, _SIDES)
     caps = 2 * _SIDES  # the last faces; apart, so that light breaks at the rim
     for part in (faces[:-caps], faces[-caps:]):
         draw_mesh(buffer, vertices / arm.length, part, BODY, view, fade)
-    for index, band in enumerate(fiber_bands(arm, shape, lift=0.008)):
+    bands = fiber_bands(arm, shape, lift=0.008)
+    for index in bundles:
+        band = bands[index]
         skin = grid_faces(*band.shape[:2])
         draw_mesh(buffer, band.reshape(-1, 3) / arm.length, skin, bundle_color(index), view, fade)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +20,12 @@ __all__ = ["plot_cross_section"]
 
 
 def plot_cross_section(
-    arm: Manipulator, z: float = 0.0, ax: Axes | None = None, *, reach: float | None = None
+    arm: Manipulator,
+    z: float = 0.0,
+    ax: Axes | None = None,
+    *,
+    bundles: Collection[int] | None = None,
+    reach: float | None = None,
 ) -> Axes:
     """Draw where the bundles lie in the cross-section at Z, seen from the tip (figure 1c).
 
@@ -27,6 +33,7 @@ def plot_cross_section(
         arm: The design, at rest.
         z: Station Z [m].
         ax: Axes to draw in; None for a new figure.
+        bundles: Which to draw, by index; None for all.
         reach: Half width of what is shown [L], to draw several sections at one scale; None for
             this section.
 
@@ -45,8 +52,8 @@ def plot_cross_section(
         _draw_ring(ax, outer, arm.radius_ratio)
         angles = np.degrees(arm.fiber_angles(np.array([z]))[0])
         extents = np.degrees(arm.bundle_extents)
-        for k, (angle, extent) in enumerate(zip(angles, extents, strict=True)):
-            _draw_sector(ax, outer, arm.radius_ratio, angle, extent, k)
+        for k in range(arm.bundles) if bundles is None else bundles:
+            _draw_sector(ax, outer, arm.radius_ratio, angles[k], extents[k], k)
         half = 1.08 * outer if reach is None else reach
         ax.set(aspect="equal", xlim=(-half, half), ylim=(-half, half), xlabel="x / L")
         ax.set_ylabel("y / L")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -28,6 +28,8 @@ class DesignPanel(NamedTuple):
     title: str
     arm: Manipulator
     view: View = "front"
+    bundles: Collection[int] | None = None
+    """Which to draw, by index; None for all."""
 
 
 def plot_designs(
@@ -59,10 +61,11 @@ def plot_designs(
             rows, len(panels), figsize=(width, sum(heights) + 0.1), **shape
         )
         for k, panel in enumerate(panels):
-            plot_arm(panel.arm, ax=axes[0, k], view=panel.view, box=box)
+            plot_arm(panel.arm, ax=axes[0, k], view=panel.view, bundles=panel.bundles, box=box)
             axes[0, k].set_title(panel.title)
             for ax, station in zip(axes[1:, k], stations, strict=True):
-                plot_cross_section(panel.arm, station * panel.arm.length, ax, reach=reach)
+                z = station * panel.arm.length
+                plot_cross_section(panel.arm, z, ax, bundles=panel.bundles, reach=reach)
                 ax.set_title(f"Z = {station:.2g} L" if station else "Z = 0")
         for ax in np.ravel(axes[:, 1:]):
             ax.set(ylabel="", yticklabels=[])

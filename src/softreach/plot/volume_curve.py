@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,24 +19,22 @@ __all__ = ["plot_volume_curve"]
 
 def plot_volume_curve(
     alphas: ArrayLike,
-    volumes: ArrayLike,
+    curves: Mapping[str, ArrayLike],
     ax: Axes | None = None,
     *,
     length: float = 1.0,
     exact: float | None = None,
     convex: float | None = None,
-    label: str = "α-shape",
 ) -> Axes:
-    """Draw V(α) of one cloud; call again with the axes to add another.
+    """Draw V(α) of clouds.
 
     Args:
         alphas: Radii [m], shape (n,).
-        volumes: Volumes [m³] from `volume_curve`, shape (n,).
+        curves: Label -> volumes [m³] from `volume_curve`, shape (n,).
         ax: Axes to draw in; None for a new figure.
         length: L [m], the unit of the axes.
         exact: Volume of the reachable set [m³], drawn as a line.
         convex: Volume of its convex hull [m³], likewise.
-        label: What the curve is called.
 
     Returns:
         The axes, in units of L.
@@ -44,16 +43,17 @@ def plot_volume_curve(
         InvalidInput: Radii and volumes of different shapes.
         MissingExtra: matplotlib is not installed.
     """
-    radii, found = np.asarray(alphas, float), np.asarray(volumes, float)
-    if radii.shape != found.shape or radii.ndim != 1:
-        raise InvalidInput("volumes.shape", found.shape, f"of the radii, {radii.shape}")
+    radii = np.asarray(alphas, float)
     with figure_style(ax):
         if ax is None:
             ax = pyplot().subplots(figsize=(3.4, 2.6), layout="constrained")[1]
-            ax.set(xscale="log", xlabel="radius α / L", ylabel="$V/L^3$")
-        ax.plot(radii / length, found / length**3, linewidth=1.2, label=label)
+        for label, volumes in curves.items():
+            if np.shape(volumes) != radii.shape:
+                raise InvalidInput(label, np.shape(volumes), f"volumes of {radii.shape} radii")
+            ax.plot(radii / length, np.asarray(volumes) / length**3, linewidth=1.2, label=label)
         for value, name, style in ((exact, "exact", "-"), (convex, "convex hull", ":")):
             if value is not None:
                 ax.axhline(value / length**3, color="0.3", lw=0.8, ls=style, label=name)
-        ax.legend()
+        ax.set(xscale="log", xlabel="radius α / L", ylabel="$V/L^3$", ylim=(0, None))
+        ax.legend(loc="lower right")
     return ax

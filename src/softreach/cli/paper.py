@@ -1,0 +1,28 @@
+"""`softreach paper`: every figure and number of the paper, beside what it says."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+__all__ = ["paper"]
+
+
+def paper(
+    *,
+    out: Annotated[Path, Parameter(help="Folder for the report and its figures.")] = Path("paper"),
+    quick: Annotated[
+        bool, Parameter(negative="", help="Small clouds: coarse numbers in under a minute.")
+    ] = False,
+) -> None:
+    """Recompute the paper and write a report (HTML) beside what it says; run again to continue.
+
+    Example: softreach paper --out paper --quick
+    """
+    from softreach.paper import reproduce_paper
+
+    report = reproduce_paper(out, quick=quick, say=lambda line: sys.stderr.write(f"{line}\n"))
+    sys.stdout.write(f"{report}\n")

@@ -1,0 +1,60 @@
+"""Section 2: the model and the minimal design (figures 1b to 1d)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from softreach.designs import minimal_trunk
+from softreach.kinematics import tip_positions
+from softreach.manipulator import Manipulator
+from softreach.paper.notebook import Notebook
+from softreach.paper.settings import Settings
+
+__all__ = ["model"]
+
+
+def model(settings: Settings, folder: Path, notes: Notebook) -> None:
+    """The design, its angles, its symmetry."""
+    del folder
+    arm = minimal_trunk(taper=np.radians(3))
+    corners = [minimal_trunk(np.radians(o), np.radians(p)) for o in (0, 108) for p in (0, 3)]
+    notes.note(
+        narrowing=arm.outer_radius / arm.tip_radius,
+        helical_angle_deg=float(np.degrees(arm.helical_angles[1])),
+        gap_deg=_gap(arm),
+        asymmetry=max(_asymmetry(corner, settings.seed) for corner in corners),
+    )
+    _draw(arm, notes)
+
+
+def _gap(arm: Manipulator) -> float:
+    """Angle between the right-handed bundle and the longitudinal one at the tip [deg]."""
+    angles = arm.fiber_angles(np.array([arm.length]))[0]
+    apart = (angles[1] - angles[2] + np.pi) % (2 * np.pi) - np.pi
+    return float(np.degrees(abs(apart) - arm.bundle_extents[1:].mean()))
+
+
+def _asymmetry(arm: Manipulator, seed: int) -> float:
+    """How far tips of exchanged helical activations are from mirror images [L]."""
+    gamma = np.random.default_rng(seed).uniform(*arm.bounds.T, (2_000, 3))
+    tips, others = tip_positions(arm, gamma), tip_positions(arm, gamma[:, [1, 0, 2]])
+    return float(np.abs(tips * [-1, 1, 1] - others).max() / arm.length)
+
+
+def _draw(arm: Manipulator, notes: Notebook) -> None:
+    from softreach.plot.designs import DesignPanel, plot_designs
+
+    helix = [DesignPanel(side, arm, side, [1]) for side in ("back", "left")]
+    words = "A helical fiber of the tapered arm, and its cross-section at the base and halfway."
+    notes.draw("1b", "figure_1b_fiber", words, plot_designs(helix, (0.0, 0.5)))
+    sides = {0: "back", 1: "back", 2: "front"}
+    singles = [
+        DesignPanel(f"{arm.bundle_names[k]}, {side}", arm, side, [k]) for k, side in sides.items()
+    ]
+    words = "The three architectures alone, each above its bundle's place in the cross-section."
+    notes.draw("1c", "figure_1c_architectures", words, plot_designs(singles))
+    sides = [DesignPanel("front", arm), DesignPanel("back", arm, "back")]
+    words = "The minimal design from the front and the back, above its cross-section at the base."
+    notes.draw("1d", "figure_1d_design", words, plot_designs(sides))

@@ -1,0 +1,103 @@
+"""Section 5: the minimal and the redundant design (figures 4a to 4d)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softreach import designs
+from softreach.cloud import compute_cloud
+from softreach.dexterity import solution_measure
+from softreach.paper.notebook import Notebook
+from softreach.paper.settings import Settings
+from softreach.redundancy import activation_distance, redundancy_summary, tip_density
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from softreach.manipulator import Manipulator
+
+__all__ = ["redundancy"]
+
+_RADIUS = 1 / 60  # L, figure 4d
+
+
+def redundancy(settings: Settings, folder: Path, notes: Notebook) -> None:
+    """Clouds, activation distances, density, and how many activations reach each place."""
+    del folder
+    arms = {"minimal": designs.minimal_trunk(), "redundant": designs.redundant_trunk()}
+    clouds = {name: _cloud(name, arm, settings, notes) for name, arm in arms.items()}
+    distances = {
+        name: activation_distance(cloud, _RADIUS, settings.queries)
+        for name, cloud in clouds.items()
+    }
+    notes.note(
+        samples=settings.redundant_samples,
+        queries=settings.queries,
+        radius=_RADIUS,
+        split_like_ours=_split_matches(arms),
+        **{name: _found(clouds[name], distances[name]) for name in arms},
+    )
+    _draw(arms, clouds, distances, notes)
+
+
+def _cloud(name: str, arm: Manipulator, settings: Settings, notes: Notebook) -> xr.Dataset:
+    start = perf_counter()
+    cloud = compute_cloud(arm, settings.redundant_samples, settings.seed)
+    notes.note(**{f"{name}_seconds": perf_counter() - start})
+    return cloud
+
+
+def _split_matches(arms: dict[str, Manipulator]) -> bool:
+    """Whether splitting the longitudinal fiber in two gives the redundant design."""
+    split = arms["minimal"].split("longitudinal", 2)
+    return bool(np.allclose(split.bundle_angles, arms["redundant"].bundle_angles))
+
+
+def _found(cloud: xr.Dataset, distance: xr.DataArray) -> dict[str, Any]:
+    summary = redundancy_summary(distance, cloud)
+    density, measure = tip_density(cloud), solution_measure(cloud)
+    filled = density["density"].where(density["density"] > 0)
+    size = measure["solution_measure"].where(measure["solution_measure"] > 0)
+    front = distance.values[cloud.tip.values[distance["sample"].values, 1] < 0]
+    behind = distance.values[cloud.tip.values[distance["sample"].values, 1] > 0]
+    return {
+        "median": summary.median,
+        "quantiles": {str(k): v for k, v in summary.quantiles.items()},
+        "isolated": summary.isolated,
+        "redundant_volume": summary.redundant_volume,
+        "threshold": summary.threshold,
+        "heterogeneity": float(density.attrs["heterogeneity"]),
+        "density_front": float(filled.where(filled.y < 0).mean()),
+        "density_behind": float(filled.where(filled.y > 0).mean()),
+        "distance_front": float(np.nanmedian(front)),
+        "distance_behind": float(np.nanmedian(behind)),
+        "solution_median": float(size.median()),
+        "solution_largest": float(size.max()),
+    }
+
+
+def _draw(
+    arms: dict[str, Manipulator],
+    clouds: dict[str, xr.Dataset],
+    distances: dict[str, xr.DataArray],
+    notes: Notebook,
+) -> None:
+    from softreach.plot.designs import DesignPanel, plot_designs
+    from softreach.plot.redundancy import plot_distance_histograms, plot_redundancy
+
+    panels = [DesignPanel(name, arm) for name, arm in arms.items()]
+    words = "The minimal and the redundant design, above their cross-sections at the base."
+    notes.draw("4a", "figure_4a_designs", words, plot_designs(panels))
+    rows = plot_redundancy(clouds, distances)
+    words = (
+        "Clouds colored by |γ| of the last longitudinal bundle (b), slices through the origin in "
+        "the frontal and the right-facing plane (c), and the mean activation-space distance (d); "
+        "isolated points are light gray."
+    )
+    notes.draw("4b-d", "figure_4bcd_redundancy", words, rows["minimal"]["cloud"])
+    words = "Distribution of the mean activation-space distance in both clouds."
+    notes.draw("", "distances", words, plot_distance_histograms(distances)["minimal"])

@@ -1,0 +1,95 @@
+"""Sections 5 and 6: whether three fibers reach every place with one activation only."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.designs import minimal_trunk
+from softreach.inverse import solve_inverse
+from softreach.kinematics import configuration
+from softreach.manipulator import Manipulator
+from softreach.paper.notebook import Notebook
+from softreach.paper.parts.sweep import swept
+from softreach.paper.settings import Settings
+from softreach.workspace import ReachableSet, reachable_set
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["uniqueness"]
+
+Array = NDArray[np.float64]
+
+_TARGETS = 2_000
+_LABEL = "reached more than once / % of the volume"
+
+
+class Pair(NamedTuple):
+    """Activations that share a tip."""
+
+    tip: Array
+    activations: Array
+
+
+def uniqueness(settings: Settings, folder: Path, notes: Notebook) -> None:
+    """The share of the volume that several activations reach, and the clearest example."""
+    atlas = swept(settings, folder)
+    share = atlas["multiple_volume"] / atlas["exact_volume"]
+    worst = share.isel(share.argmax(...))  # pyright: ignore[reportArgumentType]
+    turn, taper = float(worst["revolution"]), float(worst["taper"])
+    arm = minimal_trunk(turn, taper)
+    paper = reachable_set(minimal_trunk(), accuracy=settings.accuracy)
+    pair = _clearest_pair(reachable_set(arm, accuracy=settings.accuracy))
+    notes.note(
+        share=share.transpose("revolution", "taper").values.tolist(),
+        worst=float(worst),
+        revolution_deg=float(np.degrees(turn)),
+        taper_deg=float(np.degrees(taper)),
+        paper_share=1 - paper.multiplicity[1] / paper.volume,
+        tip=pair.tip.tolist(),
+        activations=pair.activations.tolist(),
+        apart=float(np.linalg.norm(pair.activations[0] - pair.activations[-1])),
+        **_fewer_fibers(),
+    )
+    _draw(atlas.assign({_LABEL: 100 * share.assign_attrs(units="1")}), arm, pair, notes)
+
+
+def _clearest_pair(reached: ReachableSet) -> Pair:
+    """Of places in the middle of what several activations reach, where these differ most."""
+    grid = reached.grid
+    count = grid["count"].values
+    places = np.argwhere(count > 1)
+    every = max(1, len(places) // _TARGETS)
+    axes = [grid[axis].values for axis in "xyz"]
+    tips = np.stack([axes[k][places[::every, k]] for k in range(3)], axis=1)
+    found = [s for s in solve_inverse(reached.arm, tips) if len(s) > 1]
+    best = max(found, key=lambda s: float(np.linalg.norm(s.activations[0] - s.activations[-1])))
+    return Pair(best.target, best.activations)
+
+
+def _fewer_fibers() -> dict[str, float]:
+    """Dimension of what two fibers and one fiber reach."""
+    arm = minimal_trunk()
+    names = ("dimension_of_two", "dimension_of_one")
+    sets = [reachable_set(arm.replace(fibers=arm.fibers[:count])) for count in (2, 1)]
+    return {name: reached.dimension for name, reached in zip(names, sets, strict=True)}
+
+
+def _draw(atlas: xr.Dataset, arm: Manipulator, pair: Pair, notes: Notebook) -> None:
+    from softreach.plot.arm import plot_arm
+    from softreach.plot.atlas import plot_metric_map
+
+    ax = plot_metric_map(atlas, _LABEL)
+    words = (
+        "Share of the reachable volume that more than one activation reaches, over revolution and "
+        "taper: where it is 0, three fibers are single-valued."
+    )
+    notes.draw("", "uniqueness", words, ax)
+    shapes = configuration(arm, pair.activations)
+    ax = plot_arm(arm, shapes, view=(-np.pi / 3, np.pi / 9), rest=False)
+    words = f"{len(pair.activations)} activations of one three-fiber arm with the same tip."
+    notes.draw("", "same_tip", words, ax)

@@ -1,0 +1,49 @@
+"""Section 4: what the volume of an α-shape has to do with the volume that can be reached."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from softreach.cloud import compute_cloud
+from softreach.designs import minimal_trunk
+from softreach.paper.notebook import Notebook
+from softreach.paper.settings import Settings
+from softreach.volume import volume_curve
+from softreach.workspace import reachable_set
+
+__all__ = ["volume"]
+
+_RADII = (0.02, 0.03, 0.04, 0.05, 0.07, 0.1)
+_CURVE = np.geomspace(0.008, 1.0, 120)
+
+
+def volume(settings: Settings, folder: Path, notes: Notebook) -> None:
+    """V(α) of the paper's design for two sizes of clouds, and the exact volume."""
+    del folder
+    arm = minimal_trunk()
+    reached = reachable_set(arm, accuracy=settings.accuracy)
+    sizes = (settings.samples // 16, settings.samples)
+    clouds = {n: compute_cloud(arm, n, settings.seed).tip for n in sizes}
+    notes.note(
+        exact=reached.volume,
+        exact_error=reached.volume_error,
+        convex=reached.convex_volume,
+        radii=_RADII,
+        volumes={str(n): volume_curve(tips, np.array(_RADII)).tolist() for n, tips in clouds.items()},
+    )
+    curves = {f"{n:,} tips": volume_curve(tips, _CURVE) for n, tips in clouds.items()}
+    _draw(curves, notes)
+
+
+def _draw(curves: dict[str, np.ndarray], notes: Notebook) -> None:
+    from softreach.plot.volume_curve import plot_volume_curve
+
+    lines = {"exact": notes.numbers["exact"], "convex": notes.numbers["convex"]}
+    ax = plot_volume_curve(_CURVE, curves, **lines)
+    words = (
+        "Volume of the α-shape of the paper's design against its radius, which the paper does not "
+        "state, beside the exact volume of the reachable set and of its convex hull."
+    )
+    notes.draw("", "alpha_dependence", words, ax)

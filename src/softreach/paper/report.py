@@ -1,0 +1,99 @@
+"""The report: one HTML file with its figures inside, to be read offline or printed."""
+
+from __future__ import annotations
+
+import base64
+import os
+import platform
+from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from softreach.atomic import replacing
+from softreach.errors import MissingExtra
+from softreach.paper.claims import CLAIMS, Verdict
+from softreach.paper.notebook import Notebook
+from softreach.paper.settings import Settings
+
+__all__ = ["write_report"]
+
+_NARROW = 900  # pixels; two such figures stand side by side
+
+
+def write_report(
+    path: Path, notebooks: Mapping[str, Notebook], settings: Settings, quick: bool
+) -> Path:
+    """Write what was found beside what the paper says.
+
+    Args:
+        path: The HTML file.
+        notebooks: What each part found, by name.
+        settings: The sizes it was computed with.
+        quick: Whether these are small ones.
+
+    Returns:
+        The file.
+
+    Raises:
+        MissingExtra: Jinja2 is not installed.
+    """
+    rows = list(_rows(notebooks))
+    page = _template().render(
+        rows=rows,
+        counts={verdict: sum(row["verdict"] == verdict for row in rows) for verdict in Verdict},
+        figures=sorted(_figures(notebooks), key=lambda figure: figure["order"]),
+        parts=[(name, notebook.seconds) for name, notebook in notebooks.items()],
+        settings=settings,
+        quick=quick,
+        machine=_machine(),
+        version=version("softreach"),
+        date=f"{datetime.now(UTC):%Y-%m-%d}",
+    )
+    with replacing(path) as lent:
+        lent.write_text(page, encoding="utf-8")
+    return path
+
+
+def _rows(notebooks: Mapping[str, Notebook]) -> Iterator[dict[str, Any]]:
+    """One for each statement of the paper."""
+    for claim in CLAIMS:
+        finding = claim.check(notebooks[claim.part].numbers)
+        yield {
+            "section": claim.section,
+            "says": claim.says,
+            "found": finding.text,
+            "how": claim.how,
+            "verdict": finding.verdict,
+        }
+
+
+def _figures(notebooks: Mapping[str, Notebook]) -> Iterator[dict[str, Any]]:
+    """Figures in the paper's order, our own after them."""
+    for notebook in notebooks.values():
+        for picture in notebook.pictures:
+            image = notebook.png(picture).read_bytes()
+            yield {
+                "wide": int.from_bytes(image[16:20]) > _NARROW,  # its width, in a PNG header
+                "title": f"Figure {picture.label}" if picture.label else "Beyond the paper",
+                "caption": picture.caption,
+                "source": f"data:image/png;base64,{base64.b64encode(image).decode('ascii')}",
+                "order": picture.label or "9",
+            }
+
+
+def _machine() -> str:
+    system = f"{platform.system()} on {platform.machine()}"
+    return f"{os.cpu_count()} cores, {system}, Python {platform.python_version()}"
+
+
+def _template() -> Any:
+    try:
+        from jinja2 import Environment, StrictUndefined
+    except ModuleNotFoundError as error:
+        raise MissingExtra("jinja2", "paper") from error
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    text = files("softreach.paper").joinpath("report.html.jinja").read_text(encoding="utf-8")
+    return environment.from_string(text)

@@ -1,0 +1,80 @@
+"""The whole paper, part by part: what is done stays done, so a rerun continues."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from importlib.metadata import version
+from os import PathLike
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from softreach.paper.notebook import Notebook
+from softreach.paper.parts.misprints import misprints
+from softreach.paper.parts.model import model
+from softreach.paper.parts.redundancy import redundancy
+from softreach.paper.parts.sweep import sweep
+from softreach.paper.parts.uniqueness import uniqueness
+from softreach.paper.parts.volume import volume
+from softreach.paper.report import write_report
+from softreach.paper.settings import FULL, QUICK
+
+__all__ = ["PARTS", "reproduce_paper"]
+
+PARTS: Mapping[str, Callable[..., None]] = {
+    "model": model,
+    "misprints": misprints,
+    "redundancy": redundancy,
+    "volume": volume,
+    "sweep": sweep,
+    "uniqueness": uniqueness,
+}
+"""Name -> what computes it, from the settings, the folder and a notebook; short ones first."""
+
+
+def reproduce_paper(
+    out: str | PathLike[str],
+    *,
+    quick: bool = False,
+    say: Callable[[str], object] = lambda line: None,
+) -> Path:
+    """Recompute every figure and number of the paper and set them beside what it says.
+
+    Interrupted, it continues where it stopped when it is called again with the same arguments.
+
+    Args:
+        out: Folder for figures (PNG and PDF), numbers (JSON), the atlas and the report.
+        quick: Small clouds, in under a minute, in a folder of their own inside `out`.
+        say: Called with a line about each part.
+
+    Returns:
+        The report: one HTML file that needs nothing beside it.
+
+    Raises:
+        MissingExtra: matplotlib or Jinja2 is not installed.
+        OSError: The folder cannot be written to.
+    """
+    settings = QUICK if quick else FULL
+    folder = Path(out) / "quick" if quick else Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    key = {**asdict(settings), "softreach": version("softreach")}
+    notebooks: dict[str, Notebook] = {}
+    for number, (name, part) in enumerate(PARTS.items(), 1):
+        say(f"[{number}/{len(PARTS)}] {name}")
+        notebooks[name] = _computed(name, part, settings, folder, key)
+        say(f"      {notebooks[name].seconds:.1f} s")
+    return write_report(folder / "report.html", notebooks, settings, quick)
+
+
+def _computed(
+    name: str, part: Callable[..., None], settings: Any, folder: Path, key: Mapping[str, Any]
+) -> Notebook:
+    """The notebook of a part: of an earlier run, or written now."""
+    pages = folder / "figures"
+    if (done := Notebook.opened(pages, name, key)) is not None:
+        return done
+    notes, start = Notebook(pages, name, key), perf_counter()
+    part(settings, folder, notes)
+    notes.close(perf_counter() - start)
+    return notes

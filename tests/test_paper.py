@@ -1,0 +1,170 @@
+"""Laws of the report: complete, continued where it stopped, whole in one file."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from softreach.cli.app import run
+from softreach.cross_section import section_integrals
+from softreach.paper import printed, reproduce, reproduce_paper
+from softreach.paper.claims import CLAIMS, Verdict
+from softreach.paper.settings import QUICK
+
+TINY = replace(
+    QUICK, designs=3, samples=5_000, alpha=0.2, panels=2, redundant_samples=30_000, queries=500
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The report of very small clouds, by way of the command line."""
+    out = tmp_path_factory.mktemp("paper")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reproduce, "QUICK", TINY)
+        assert run(["paper", "--out", str(out), "--quick"]) == 0
+    return out
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """The same sizes in other tests."""
+    monkeypatch.setattr(reproduce, "QUICK", TINY)
+
+
+def notebook(folder, part):
+    return json.loads((folder / "quick" / "figures" / f"{part}.json").read_text())
+
+
+def checked(part, numbers, words):
+    """The finding of the one claim whose statement holds these words."""
+    (claim,) = [c for c in CLAIMS if c.part == part and words in c.says]
+    return claim.check(numbers)
+
+
+def test_every_figure_of_the_paper_is_there_as_png_and_pdf(folder):
+    pictures = [p for part in reproduce.PARTS for p in notebook(folder, part)["pictures"]]
+    labels = {picture["label"] for picture in pictures}
+    assert labels == {"1b", "1c", "1d", "2a", "2b", "3a", "3b", "3c", "4a", "4b-d", ""}
+    for picture in pictures:
+        for suffix in (".png", ".pdf"):
+            assert (folder / "quick" / "figures" / f"{picture['name']}{suffix}").stat().st_size > 0
+
+
+def test_every_statement_finds_its_numbers(folder):
+    for claim in CLAIMS:
+        found = claim.check(notebook(folder, claim.part)["numbers"])
+        assert found.verdict in Verdict
+        assert not re.search(r"\bnan\b|\binf\b", found.text), (claim.says, found.text)
+
+
+def test_what_does_not_depend_on_the_size_of_clouds_agrees(folder):
+    for part, words, verdict in (
+        ("model", "6.2-fold", Verdict.AGREES),
+        ("model", "symmetric", Verdict.AGREES),
+        ("model", "meet the longitudinal", Verdict.AGREES),
+        ("misprints", "δ0", Verdict.AGREES),
+        ("misprints", "δ3", Verdict.MISPRINT),
+        ("misprints", "R1(0)", Verdict.MISPRINT),
+        ("sweep", "increases with fiber helicity", Verdict.AGREES),
+        ("uniqueness", "unique activation", Verdict.NEARLY),
+        ("redundancy", "order of 1.0", Verdict.AGREES),
+    ):
+        assert checked(part, notebook(folder, part)["numbers"], words).verdict == verdict, words
+
+
+def test_verdicts_follow_the_numbers(folder):
+    numbers = notebook(folder, "sweep")["numbers"]
+    falling = numbers | {"exact_volume": numbers["exact_volume"][::-1]}
+    assert checked("sweep", falling, "increases with fiber helicity").verdict == Verdict.DIFFERS
+    numbers = notebook(folder, "uniqueness")["numbers"]
+    assert checked("uniqueness", numbers | {"worst": 0}, "unique").verdict == Verdict.AGREES
+    assert checked("uniqueness", numbers | {"worst": 0.5}, "unique").verdict == Verdict.DIFFERS
+    numbers = notebook(folder, "model")["numbers"]
+    assert checked("model", numbers | {"narrowing": 5}, "6.2-fold").verdict == Verdict.DIFFERS
+
+
+def test_both_activations_of_the_example_reach_the_same_tip(folder):
+    from softreach.designs import minimal_trunk
+    from softreach.kinematics import tip_positions
+
+    found = notebook(folder, "uniqueness")["numbers"]
+    arm = minimal_trunk(*np.radians([found["revolution_deg"], found["taper_deg"]]))
+    tips = tip_positions(arm, found["activations"], tol=1e-9)
+    assert len(tips) > 1
+    assert found["apart"] > 0.1
+    np.testing.assert_allclose(tips, [found["tip"]] * len(tips), rtol=0, atol=2e-6)
+
+
+def test_a_finished_report_is_only_written_again(folder, small, monkeypatch):
+    before = (folder / "quick" / "report.html").read_text()
+    monkeypatch.setattr(reproduce, "PARTS", dict.fromkeys(reproduce.PARTS))  # nothing to call
+    assert reproduce_paper(folder, quick=True).read_text() == before
+
+
+def test_an_interrupted_report_keeps_its_finished_parts(tmp_path, small, monkeypatch):
+    calls = []
+
+    def part(name, fails=False):
+        def compute(settings, where, notes):
+            calls.append(name)
+            if fails:
+                raise KeyboardInterrupt
+            notes.note(**{name: 1.0})
+
+        return compute
+
+    monkeypatch.setattr(reproduce, "write_report", lambda path, *_: path)
+    monkeypatch.setattr(reproduce, "PARTS", {"a": part("a"), "b": part("b", fails=True)})
+    with pytest.raises(KeyboardInterrupt):
+        reproduce_paper(tmp_path, quick=True)
+    monkeypatch.setattr(reproduce, "PARTS", {"a": part("a"), "b": part("b")})
+    reproduce_paper(tmp_path, quick=True)
+    assert calls == ["a", "b", "b"]
+    monkeypatch.setattr(reproduce, "QUICK", replace(TINY, seed=1))  # other sizes: all again
+    reproduce_paper(tmp_path, quick=True)
+    assert calls == ["a", "b", "b", "a", "b"]
+
+
+def test_the_report_opens_offline_without_a_missing_picture_and_prints(folder, browser, tmp_path):
+    report, printed_pdf = folder / "quick" / "report.html", tmp_path / "report.pdf"
+    trouble, requests = [], []
+    page = browser.new_page()
+    page.on("console", lambda message: trouble.append(message.text))
+    page.on("pageerror", lambda error: trouble.append(str(error)))
+    page.on("request", lambda request: requests.append(request.url))
+    page.goto(report.as_uri())
+    widths = page.evaluate("[...document.images].map(image => image.naturalWidth)")
+    overflow = page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
+    rows = page.locator("tbody tr").count()
+    page.pdf(path=str(printed_pdf), prefer_css_page_size=True)
+    page.close()
+    assert trouble == []
+    assert [url for url in requests if not url.startswith(("file:", "data:"))] == []
+    assert len(widths) > 12
+    assert min(widths) > 100
+    assert overflow <= 0
+    assert rows >= len(CLAIMS)
+    assert printed_pdf.read_bytes().startswith(b"%PDF")
+
+
+tapers, angles = st.floats(0.02, 0.5), st.floats(0.05, 1.2)
+
+
+@given(st.floats(0.3, 0.95), tapers, angles, st.sampled_from([-1, 1]), st.floats(0, 0.5))
+def test_printed_appendix_a_is_the_integrals_but_for_delta3(ratio, taper, angle, hand, nu):
+    if abs(taper - angle) < 0.02:
+        return
+    exact = section_integrals(ratio, taper, hand * angle, nu)
+    alpha = hand * angle
+    assert printed.delta0(ratio, taper, alpha, nu) == pytest.approx(4 * exact.axial, rel=1e-6)
+    assert printed.delta1(ratio, taper, alpha, nu) == pytest.approx(6 * exact.bending, rel=1e-6)
+    mended = printed.delta3(ratio, taper, alpha, mended=True)
+    assert mended == pytest.approx(6 * exact.torsion, rel=1e-6)
+    assert abs(printed.delta3(ratio, taper, alpha)) > 2 * abs(mended)
