@@ -6,7 +6,7 @@ READY := .venv/.ready
 
 SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 
-.PHONY: help setup demo test browser check format bench atlas docs lock clean
+.PHONY: help setup demo test browser check format bench atlas paper docs lock clean
 
 help:
 	@echo "make demo    set up, then compute the paper's design into out/"
@@ -14,6 +14,7 @@ help:
 	@echo "make check   format, lint, types, layers, documentation"
 	@echo "make bench   the benchmarks; writes docs/benchmarks.md"
 	@echo "make atlas   the paper's 16 x 16 designs of 400,000 points into out/; can be interrupted"
+	@echo "make paper   every figure and statement of the paper, recomputed into out/paper; can be interrupted"
 	@echo "make docs    build the documentation into site/"
 	@echo "make setup   make .venv from requirements.lock"
 	@echo "make lock    renew requirements.lock"
@@ -55,6 +56,9 @@ bench: setup
 atlas: setup
 	$(BIN)/softreach atlas build out/atlas.zarr --vary revolution_deg=0:108:16 --vary taper_deg=0:3:16
 	$(BIN)/softreach atlas figures out/atlas.zarr --out out/atlas
+
+paper: setup
+	$(BIN)/softreach paper --out out/paper
 
 docs: setup
 	$(BIN)/mkdocs build --strict
