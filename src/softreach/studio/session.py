@@ -29,6 +29,7 @@ __all__ = ["Panel", "Session"]
 Array = NDArray[np.float64]
 
 _LONGEST_TRAIL = 2000
+_STEP_BACK = 1.4  # times the distance, for two clouds side by side
 _FAMILY = 6  # shapes offered where infinitely many reach the target
 
 
@@ -127,7 +128,7 @@ class Session:
         shift = _shift(self.reach)
         now, way = self.camera_now(), 1 if beside else -1
         look_at = np.asarray(now.look_at) + way * shift / 2
-        eye = (np.asarray(now.position) - now.look_at) * 1.6**way + look_at
+        eye = (np.asarray(now.position) - now.look_at) * _STEP_BACK**way + look_at
         self.look_from(Camera(position=vector(eye), look_at=vector(look_at)))
 
     def say(self, note: str) -> None:
