@@ -68,7 +68,7 @@ class CellGrid:
 
     def sum(self, values: Array) -> Array:
         """Sum of a value of every point in each cube."""
-        return np.bincount(self.cells, values, self._size).reshape(self.shape)
+        return np.bincount(self.cells, values, self._size).astype(float).reshape(self.shape)
 
     def mean(self, values: Array, points: Index | slice = slice(None)) -> Array:
         """Mean of the finite values of some points in each cube; NaN where there is none."""

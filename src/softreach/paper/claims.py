@@ -64,7 +64,7 @@ class _Sweep:
     def __getitem__(self, name: str) -> Array:
         return np.array(self.numbers[name], float)
 
-    def place(self, flat: int) -> str:
+    def place(self, flat: int | np.intp) -> str:
         """A design by its number."""
         i, j = divmod(int(flat), len(self.taper))
         return f"Ω = {self.revolution[i]:.4g}°, φ = {self.taper[j]:.4g}°"

@@ -45,8 +45,7 @@ def plot_volume_curve(
     """
     radii = np.asarray(alphas, float)
     with figure_style(ax):
-        if ax is None:
-            ax = pyplot().subplots(figsize=(3.4, 2.6), layout="constrained")[1]
+        ax = _small_axes() if ax is None else ax
         for label, volumes in curves.items():
             if np.shape(volumes) != radii.shape:
                 raise InvalidInput(label, np.shape(volumes), f"volumes of {radii.shape} radii")
@@ -57,3 +56,7 @@ def plot_volume_curve(
         ax.set(xscale="log", xlabel="radius α / L", ylabel="$V/L^3$", ylim=(0, None))
         ax.legend(loc="lower right")
     return ax
+
+
+def _small_axes() -> Axes:
+    return pyplot().subplots(figsize=(3.4, 2.6), layout="constrained")[1]

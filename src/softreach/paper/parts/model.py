@@ -38,7 +38,8 @@ def _gap(arm: Manipulator) -> float:
 
 def _asymmetry(arm: Manipulator, seed: int) -> float:
     """How far tips of exchanged helical activations are from mirror images [L]."""
-    gamma = np.random.default_rng(seed).uniform(*arm.bounds.T, (2_000, 3))
+    low, high = arm.bounds.T
+    gamma = np.random.default_rng(seed).uniform(low, high, (2_000, 3))
     tips, others = tip_positions(arm, gamma), tip_positions(arm, gamma[:, [1, 0, 2]])
     return float(np.abs(tips * [-1, 1, 1] - others).max() / arm.length)
 
