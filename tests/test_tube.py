@@ -8,9 +8,7 @@ import pytest
 from softreach.errors import InvalidInput
 from softreach.geometry.tube import (
     grid_faces,
-    polyline_tube,
     ribbon_mesh,
-    rotation_minimizing_frames,
     tube_mesh,
 )
 
@@ -18,6 +16,9 @@ trimesh = pytest.importorskip("trimesh")
 
 TURN = np.linspace(0, 5, 160)
 HELIX = np.column_stack([np.cos(TURN), np.sin(TURN), 0.3 * TURN])
+INWARD = np.column_stack([-np.cos(TURN), -np.sin(TURN), 0 * TURN])
+ALONG = np.column_stack([-np.sin(TURN), np.cos(TURN), 0.3 + 0 * TURN]) / np.hypot(1, 0.3)
+FRENET = INWARD, np.cross(ALONG, INWARD)
 
 
 def solid(vertices, faces):
@@ -60,25 +61,13 @@ def test_a_linear_taper_gives_a_frustum():
 @pytest.mark.parametrize("sides", [3, 8, 33])
 def test_tubes_are_closed_and_outward(sides):
     assert_closed(straight(sides))
-    assert_closed(solid(*polyline_tube(HELIX, 0.05, sides)))
+    assert_closed(solid(*tube_mesh(HELIX, *FRENET, 0.05, sides)))
 
 
 def test_a_tube_along_a_curve_has_the_volume_of_pappus():
     length = TURN[-1] * np.hypot(1, 0.3)
-    mesh = solid(*polyline_tube(HELIX, 0.05, 200))
+    mesh = solid(*tube_mesh(HELIX, *FRENET, 0.05, 200))
     assert mesh.volume == pytest.approx(np.pi * 0.05**2 * length, rel=1e-3)
-
-
-def test_minimizing_frames_are_orthonormal_and_do_not_turn_in_a_plane():
-    arc = np.column_stack([np.sin(TURN / 2), np.zeros_like(TURN), np.cos(TURN / 2)])
-    normals, binormals = rotation_minimizing_frames(arc)
-    assert np.ptp(np.abs(normals[:, 1])) < 1e-12  # the part out of the plane stays what it was
-    for curve in (arc, HELIX):
-        normals, binormals = rotation_minimizing_frames(curve)
-        np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-12)
-        np.testing.assert_allclose((normals * binormals).sum(axis=1), 0, atol=1e-12)
-        along = np.cross(normals, binormals)
-        assert ((along * np.gradient(curve, axis=0)).sum(axis=1) > 0).all()
 
 
 def test_a_ribbon_is_a_closed_slab():
@@ -97,7 +86,7 @@ def test_a_grid_covers_its_points_once():
 
 def test_curves_and_sides_that_enclose_nothing_are_refused():
     with pytest.raises(InvalidInput, match="stations >= 2"):
-        polyline_tube(np.zeros((1, 3)), 0.1)
+        tube_mesh(np.zeros((1, 3)), *np.eye(3)[:2, None], 0.1)
     with pytest.raises(InvalidInput, match="at least 3"):
         straight(2)
     with pytest.raises(InvalidInput, match="two equal"):

@@ -18,8 +18,13 @@ def silent(done: int) -> None:
 
 
 @contextmanager
-def bar(label: str, total: int) -> Iterator[Progress]:
-    """A progress bar with rate and time left on standard error, if that is a terminal."""
+def bar(label: str, total: int | None) -> Iterator[Progress]:
+    """A progress bar with rate and time left on standard error, if that is a terminal.
+
+    Args:
+        label: What is going on.
+        total: Number of items; None if it is known only in the end, for a bar that moves on.
+    """
     if not sys.stderr.isatty():
         yield silent
         return

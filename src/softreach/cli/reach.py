@@ -35,7 +35,7 @@ def reach(
     from softreach.workspace import reachable_set
 
     arm = design_from(design, revolution_deg, taper_deg)
-    with progress.bar("mapping the activation box", 0) as shown:
+    with progress.bar("mapping the activation box", None) as shown:
         found = reachable_set(arm, accuracy=accuracy, report=shown)
     report(f"reachable set of {design}", _rows(found), json)
     if surface is not None:

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.errors import InvalidInput
 
-__all__ = ["grid_faces", "polyline_tube", "ribbon_mesh", "rotation_minimizing_frames", "tube_mesh"]
+__all__ = ["grid_faces", "ribbon_mesh", "tube_mesh"]
 
 Array = NDArray[np.float64]
 Faces = NDArray[np.int64]
@@ -47,47 +47,6 @@ def tube_mesh(
     reach = np.broadcast_to(np.asarray(radii, float), len(center))[:, None]
     rings = (center + reach * spokes).swapaxes(0, 1).reshape(-1, 3)
     return np.concatenate([rings, center[[0, -1]]]), _tube_faces(len(center), sides)
-
-
-def polyline_tube(points: ArrayLike, radius: ArrayLike, sides: int = 12) -> Mesh:
-    """A closed tube along a curve that brings no frame of its own.
-
-    Args:
-        points: The curve [m], shape (stations, 3); consecutive points differ.
-        radius: Radius of each section, or one for all [m].
-        sides: Corners of each section.
-
-    Raises:
-        InvalidInput: Fewer than two points or three sides.
-    """
-    return tube_mesh(points, *rotation_minimizing_frames(points), radius, sides)
-
-
-def rotation_minimizing_frames(points: ArrayLike) -> tuple[Array, Array]:
-    """Normals and binormals that turn about the curve as little as possible.
-
-    Each frame is the one before, reflected twice (Wang, Jüttler, Zheng, Liu, ACM TOG 27, 2008).
-
-    Args:
-        points: The curve [m], shape (stations, 3); consecutive points differ.
-
-    Returns:
-        Normals and binormals, each of shape (stations, 3).
-
-    Raises:
-        InvalidInput: Fewer than two points.
-    """
-    curve = _check_curve(points)
-    tangents = _unit(np.gradient(curve, axis=0))
-    normals = np.zeros_like(curve)
-    # the coordinate axis farthest from the tangent starts a well-conditioned frame
-    seed = np.eye(3)[np.argmin(np.abs(tangents[0]))]
-    normals[0] = _unit(seed - (seed @ tangents[0]) * tangents[0])
-    for k, step in enumerate(np.diff(curve, axis=0)):
-        moved = _reflect(normals[k], step)
-        turn = tangents[k + 1] - _reflect(tangents[k], step)
-        normals[k + 1] = _reflect(moved, turn) if turn @ turn > 0 else moved
-    return normals, np.cross(tangents, normals)
 
 
 def ribbon_mesh(lower: ArrayLike, upper: ArrayLike) -> Mesh:
@@ -149,11 +108,3 @@ def _grid(index: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def _halves(quads: NDArray[np.int64]) -> Faces:
     return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
-
-
-def _unit(vectors: Array) -> Array:
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-
-
-def _reflect(vector: Array, normal: Array) -> Array:
-    return vector - (2 * (vector @ normal) / (normal @ normal)) * normal
