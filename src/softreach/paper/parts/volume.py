@@ -31,7 +31,7 @@ def volume(settings: Settings, folder: Path, notes: Notebook) -> None:
         exact_error=reached.volume_error,
         convex=reached.convex_volume,
         radii=_RADII,
-        volumes={str(n): volume_curve(tips, np.array(_RADII)).tolist() for n, tips in clouds.items()},
+        volumes={str(n): volume_curve(t, np.array(_RADII)).tolist() for n, t in clouds.items()},
     )
     curves = {f"{n:,} tips": volume_curve(tips, _CURVE) for n, tips in clouds.items()}
     _draw(curves, notes)
