@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -139,10 +140,11 @@ def _draw_contours(
     lines = ax.contour(across.values, up.values, values, levels[::2], colors=ink, linewidths=0.5)
     low = np.array([across.values[0], up.values[0]])
     span = np.array([across.values[-1], up.values[-1]]) - low
-    paths = ((path.vertices - low) / span for path in lines.get_paths())
+    paths = ((np.asarray(path.vertices, float) - low) / span for path in lines.get_paths())
     places = [low + span * place for path in paths for place in _label_place(path)]
     if places:
-        ax.clabel(lines, manual=places, fontsize=6, fmt="%.2f")
+        decimals = max(0, math.ceil(-math.log10(levels[1] - levels[0])))
+        ax.clabel(lines, manual=places, fontsize=6, fmt=f"%.{decimals}f")
 
 
 def _label_place(path: Array) -> list[Array]:
