@@ -134,7 +134,7 @@ def figures(
     import sys
 
     from softreach.atlas import open_atlas
-    from softreach.cli.atlas_figures import atlas_figures
+    from softreach.paper.atlas_figures import atlas_figures
     from softreach.plot.style import pyplot, save_figure
 
     for name, figure in atlas_figures(open_atlas(store), panels):

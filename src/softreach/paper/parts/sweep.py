@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softreach.atlas import DesignSpace, atlas_cloud, build_atlas
-from softreach.cli.atlas_figures import atlas_figures
 from softreach.designs import minimal_trunk
 from softreach.geometry.cell_grid import CellGrid
+from softreach.paper.atlas_figures import atlas_figures
 from softreach.paper.notebook import Notebook
 from softreach.paper.settings import Settings
 
