@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from softreach.cli.app import run
 from softreach.cross_section import section_integrals
 from softreach.paper import printed, reproduce, reproduce_paper
-from softreach.paper.claims import CLAIMS, Verdict
+from softreach.paper.claims import CLAIMS
 from softreach.paper.settings import QUICK
+from softreach.paper.verdict import Verdict
 
 TINY = replace(
     QUICK, designs=3, samples=5_000, alpha=0.2, panels=2, redundant_samples=30_000, queries=500

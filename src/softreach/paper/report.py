@@ -14,9 +14,10 @@ from typing import Any
 
 from softreach.atomic import replacing
 from softreach.errors import MissingExtra
-from softreach.paper.claims import CLAIMS, Verdict
+from softreach.paper.claims import CLAIMS
 from softreach.paper.notebook import Notebook
 from softreach.paper.settings import Settings
+from softreach.paper.verdict import Verdict
 
 __all__ = ["write_report"]
 

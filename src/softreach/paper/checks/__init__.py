@@ -1,0 +1,1 @@
+"""What the numbers of each part say about the paper's statements, one short function each."""

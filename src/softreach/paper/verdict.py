@@ -1,0 +1,34 @@
+"""How a statement of the paper fares."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import Any, NamedTuple
+
+__all__ = ["Finding", "Numbers", "Verdict", "judged"]
+
+Numbers = Mapping[str, Any]
+"""What a part of the report computed, by name."""
+
+
+class Verdict(StrEnum):
+    """How a statement fares."""
+
+    AGREES = "agrees"
+    NEARLY = "nearly"
+    DIFFERS = "differs"
+    MISPRINT = "misprint"
+
+
+class Finding(NamedTuple):
+    """What came out."""
+
+    text: str
+    verdict: Verdict
+
+
+def judged(text: str, agrees: bool, nearly: bool = False) -> Finding:
+    """What came out, and whether that agrees, or nearly does."""
+    verdict = Verdict.AGREES if agrees else Verdict.NEARLY if nearly else Verdict.DIFFERS
+    return Finding(text, verdict)
