@@ -86,8 +86,8 @@ def solution_measure(cloud: xr.Dataset, cell: float | None = None) -> xr.Dataset
         Dataset over the centers x, y, z [m] of cells: `solution_measure` [-], 0 where no tip is.
 
     Raises:
-        InvalidInput: The dataset is no cloud, of fewer bundles, or sampled unevenly; cells that
-            are not positive or too many.
+        InvalidInput: The dataset is no cloud, of fewer bundles, of one that cannot be activated, or
+            sampled unevenly; cells that are not positive or too many.
     """
     import xarray as xr
 
@@ -97,9 +97,10 @@ def solution_measure(cloud: xr.Dataset, cell: float | None = None) -> xr.Dataset
         raise InvalidInput("bundles", arm.bundles, "3 or more: fewer fill no cell")
     if (sampler := cloud.attrs.get("sampler")) not in _EVEN:
         raise InvalidInput("sampler", sampler, f"one of {', '.join(_EVEN)}")
+    if not (box := float(np.prod(np.diff(arm.bounds)))):
+        raise InvalidInput("activation_bounds", arm.activation_bounds, "apart for every bundle")
     grid = CellGrid.around(cloud["tip"].values, _CELL * arm.length if cell is None else cell)
-    weight = float(np.prod(np.diff(arm.bounds))) / n / grid.volume
-    total = weight * grid.sum(dexterity(cloud)["manipulability"].values)
+    total = box / n / grid.volume * grid.sum(dexterity(cloud)["manipulability"].values)
     name = {"units": "1", "long_name": "activations that reach a place: number, length, area, ..."}
     centers = zip(AXES, grid.centers(), strict=True)
     axes = {axis: (axis, places, {"units": "m"}) for axis, places in centers}
