@@ -19,7 +19,7 @@ from softreach.paper.notebook import Notebook
 from softreach.paper.settings import Settings
 from softreach.paper.verdict import Verdict
 
-__all__ = ["write_report"]
+__all__ = ["report_template", "write_report"]
 
 _NARROW = 900  # pixels; two such figures stand side by side
 
@@ -42,7 +42,7 @@ def write_report(
         MissingExtra: Jinja2 is not installed.
     """
     rows = list(_rows(notebooks))
-    page = _template().render(
+    page = report_template().render(
         rows=rows,
         counts={verdict: sum(row["verdict"] == verdict for row in rows) for verdict in Verdict},
         figures=sorted(_figures(notebooks), key=lambda figure: figure["order"]),
@@ -90,7 +90,12 @@ def _machine() -> str:
     return f"{os.cpu_count()} cores, {system}, Python {platform.python_version()}"
 
 
-def _template() -> Any:
+def report_template() -> Any:
+    """The page, to be filled.
+
+    Raises:
+        MissingExtra: Jinja2 is not installed.
+    """
     try:
         from jinja2 import Environment, StrictUndefined
     except ModuleNotFoundError as error:

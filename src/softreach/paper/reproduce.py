@@ -17,8 +17,9 @@ from softreach.paper.parts.redundancy import redundancy
 from softreach.paper.parts.sweep import sweep
 from softreach.paper.parts.uniqueness import uniqueness
 from softreach.paper.parts.volume import volume
-from softreach.paper.report import write_report
+from softreach.paper.report import report_template, write_report
 from softreach.paper.settings import FULL, QUICK
+from softreach.plot.style import pyplot
 
 __all__ = ["PARTS", "reproduce_paper"]
 
@@ -55,6 +56,8 @@ def reproduce_paper(
         MissingExtra: matplotlib or Jinja2 is not installed.
         OSError: The folder cannot be written to.
     """
+    pyplot()
+    report_template()  # what is missing is told now, not after a quarter of an hour
     settings = QUICK if quick else FULL
     folder = Path(out) / "quick" if quick else Path(out)
     folder.mkdir(parents=True, exist_ok=True)
