@@ -126,8 +126,9 @@ def test_with_three_bundles_the_measure_is_the_number_of_activations(trunk):
 
 
 def test_the_measure_asks_for_an_even_cloud_of_three_bundles_or_more(trunk):
-    with pytest.raises(InvalidInput, match="sampler = boundary: must be one of uniform"):
-        solution_measure(compute_cloud(trunk, n=100, sampler="boundary"))
+    for sampler, n in (("boundary", 100), ("grid", 125)):
+        with pytest.raises(InvalidInput, match=f"sampler = {sampler}: must be one of uniform"):
+            solution_measure(compute_cloud(trunk, n=n, sampler=sampler))
     flat = trunk.replace(fibers=trunk.fibers[:2])
     with pytest.raises(InvalidInput, match="bundles = 2: must be 3 or more"):
         solution_measure(compute_cloud(flat, n=100))

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 Signs = NDArray[np.int8]
 
 _CELL = 1 / 20  # of the arm's length
-_EVEN = ("uniform", "sobol", "grid")  # samplers that fill the activation box evenly
+_EVEN = ("uniform", "sobol")  # a grid has too many points on its faces
 
 
 def dexterity(cloud: xr.Dataset) -> xr.Dataset:
@@ -79,7 +79,7 @@ def solution_measure(cloud: xr.Dataset, cell: float | None = None) -> xr.Dataset
     noise of so many samples; cells that the border of the cloud cuts count as they are.
 
     Args:
-        cloud: A cloud of three bundles or more, sampled evenly: uniform, sobol or grid.
+        cloud: A cloud of three bundles or more, sampled evenly: uniform or sobol.
         cell: Edge of the cells [m]; None for L/20.
 
     Returns:

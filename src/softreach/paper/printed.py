@@ -1,13 +1,10 @@
-"""Appendix A as it is printed, to be held against the integrals that `cross_section` computes."""
+"""Appendices A and B as they are printed, to be held against what softreach computes."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-__all__ = ["delta0", "delta1", "delta3"]
-
-Complex = NDArray[np.complex128]
+__all__ = ["delta0", "delta1", "delta3", "rotation"]
 
 
 def delta0(ratio: float, taper: float, helical_angle: float, poisson_ratio: float) -> float:
@@ -57,3 +54,16 @@ def delta3(ratio: float, taper: float, helical_angle: float, *, mended: bool = F
     roots = 6 * a * (s(1) - s(ratio))
     whole = 3 * arctangents + roots if mended else 3 * (arctangents + roots)
     return float((whole / (p**2 * a**2 * root)).real)
+
+
+def rotation(radius: float, taper: float, helical_angle: float, z: float) -> float:
+    """Θ̃2 of Appendix B [rad], as printed.
+
+    Args:
+        radius: R2(0) [m].
+        taper: φ [rad], not 0.
+        helical_angle: α [rad].
+        z: Station Z [m].
+    """
+    ratio = 1 - z * np.tan(taper) / radius
+    return float(-np.tan(helical_angle) / np.sin(taper) * np.log(ratio))

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from importlib.metadata import version
+from importlib.resources import files
 from os import PathLike
 from pathlib import Path
 from time import perf_counter
@@ -61,13 +63,21 @@ def reproduce_paper(
     settings = QUICK if quick else FULL
     folder = Path(out) / "quick" if quick else Path(out)
     folder.mkdir(parents=True, exist_ok=True)
-    key = {**asdict(settings), "softreach": version("softreach")}
+    key = {**asdict(settings), "softreach": version("softreach"), "source": _source()}
     notebooks: dict[str, Notebook] = {}
     for number, (name, part) in enumerate(PARTS.items(), 1):
         say(f"[{number}/{len(PARTS)}] {name}")
         notebooks[name] = _computed(name, part, settings, folder, key)
         say(f"      {notebooks[name].seconds:.1f} s")
     return write_report(folder / "report.html", notebooks, settings, quick)
+
+
+def _source() -> str:
+    """A digest of the library's code: what other code computed is computed again."""
+    root = files("softreach")
+    assert isinstance(root, Path)
+    texts = [path.read_bytes() for path in sorted(root.rglob("*.py"))]
+    return hashlib.sha256(b"".join(texts)).hexdigest()
 
 
 def _computed(

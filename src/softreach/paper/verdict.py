@@ -19,6 +19,7 @@ class Verdict(StrEnum):
     NEARLY = "nearly"
     DIFFERS = "differs"
     MISPRINT = "misprint"
+    OPEN = "open"
 
 
 class Finding(NamedTuple):

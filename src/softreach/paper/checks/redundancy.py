@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from softreach.paper.verdict import Finding, Numbers, judged
+from softreach.paper.verdict import Finding, Numbers, Verdict, judged
 
 __all__ = ["cost", "families", "front", "large", "small", "split", "uneven"]
 
@@ -11,17 +11,17 @@ def cost(n: Numbers) -> Finding:
     """Time of the larger cloud."""
     seconds = max(n["minimal_seconds"], n["redundant_seconds"])
     words = f"{n['samples']:,} points in {seconds:.2g} s on this machine"
-    return judged(words, seconds < 60)
+    return judged(words, n["samples"] >= 2_000_000 and seconds < 600, seconds < 600)
 
 
 def split(n: Numbers) -> Finding:
     """Where the two longitudinal fibers lie."""
+    first, second = n["offsets_deg"]
     words = (
-        "where the two lie is not printed; split in place, each keeping its extent, they are "
-        + ("those of" if n["split_like_ours"] else "other than those of")
-        + " our redundant design"
+        "neither their places nor their extents are printed. We keep the extent of "
+        f"{n['extent_deg']:g}° for each and put them side by side, at {first:g}° and {second:g}°"
     )
-    return judged(words, n["split_like_ours"])
+    return Finding(words, Verdict.OPEN)
 
 
 def families(n: Numbers) -> Finding:
@@ -29,10 +29,11 @@ def families(n: Numbers) -> Finding:
     three, four = n["minimal"], n["redundant"]
     words = (
         f"three fibers: {three['solution_median']:.2f} activations reach a place (median over "
-        f"cells); four: curves of activations, {four['solution_median']:.2f} long in the median, "
+        f"inner cells); four: curves of activations, {four['solution_median']:.2f} long in the "
+        f"median, below {four['solution_low']:.2f} in a twentieth of the cells, "
         f"{four['solution_largest']:.1f} at most"
     )
-    return judged(words, four["solution_largest"] > 0)
+    return judged(words, abs(three["solution_median"] - 1) < 0.1 < four["solution_low"])
 
 
 def uneven(n: Numbers) -> Finding:
@@ -50,7 +51,7 @@ def front(n: Numbers) -> Finding:
         f"behind; median D̄ {found['distance_front']:.2f} against {found['distance_behind']:.2f}"
     )
     dense = found["density_front"] > found["density_behind"]
-    return judged(words, dense and found["distance_front"] > found["distance_behind"], dense)
+    return judged(words, dense and found["distance_front"] > found["distance_behind"])
 
 
 def small(n: Numbers) -> Finding:

@@ -7,6 +7,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softreach import designs
 from softreach.cloud import compute_cloud
@@ -38,7 +39,8 @@ def redundancy(settings: Settings, folder: Path, notes: Notebook) -> None:
         samples=settings.redundant_samples,
         queries=settings.queries,
         radius=_RADIUS,
-        split_like_ours=_split_matches(arms),
+        offsets_deg=np.degrees(arms["redundant"].bundle_angles[2:]).round(9).tolist(),
+        extent_deg=float(np.degrees(arms["redundant"].bundle_extents[2]).round(9)),
         **{name: _found(clouds[name], distances[name]) for name in arms},
     )
     _draw(arms, clouds, distances, notes)
@@ -51,17 +53,11 @@ def _cloud(name: str, arm: Manipulator, settings: Settings, notes: Notebook) -> 
     return cloud
 
 
-def _split_matches(arms: dict[str, Manipulator]) -> bool:
-    """Whether splitting the longitudinal fiber in two gives the redundant design."""
-    split = arms["minimal"].split("longitudinal", 2)
-    return bool(np.allclose(split.bundle_angles, arms["redundant"].bundle_angles))
-
-
 def _found(cloud: xr.Dataset, distance: xr.DataArray) -> dict[str, Any]:
     summary = redundancy_summary(distance, cloud)
     density, measure = tip_density(cloud), solution_measure(cloud)
     filled = density["density"].where(density["density"] > 0)
-    size = measure["solution_measure"].where(measure["solution_measure"] > 0)
+    size = _inside(measure["solution_measure"].values)
     front = distance.values[cloud.tip.values[distance["sample"].values, 1] < 0]
     behind = distance.values[cloud.tip.values[distance["sample"].values, 1] > 0]
     return {
@@ -75,9 +71,17 @@ def _found(cloud: xr.Dataset, distance: xr.DataArray) -> dict[str, Any]:
         "density_behind": float(filled.where(filled.y > 0).mean()),
         "distance_front": float(np.nanmedian(front)),
         "distance_behind": float(np.nanmedian(behind)),
-        "solution_median": float(size.median()),
-        "solution_largest": float(size.max()),
+        "solution_median": float(np.median(size)),
+        "solution_low": float(np.quantile(size, 0.05)),
+        "solution_largest": float(size.max(initial=0.0)),
     }
+
+
+def _inside(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values of cells none of whose neighbors is empty: the border cuts others."""
+    from scipy.ndimage import binary_erosion
+
+    return values[binary_erosion(values > 0)]
 
 
 def _draw(

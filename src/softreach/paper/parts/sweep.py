@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.atlas import DesignSpace, atlas_cloud, build_atlas
+from softreach.atlas import DesignSpace, build_atlas
 from softreach.designs import minimal_trunk
-from softreach.geometry.cell_grid import CellGrid
 from softreach.paper.atlas_figures import atlas_figures
 from softreach.paper.notebook import Notebook
+from softreach.paper.parts.shape import ASIDE, shapes
 from softreach.paper.settings import Settings
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ _SCALARS = (
 )
 _CAPTIONS = {
     "clouds": ("2a", "Reachability clouds, colored by the activations of the three bundles."),
-    "corners": ("2b", "The designs at the corners of the atlas, from two opposing sides."),
+    "corners": ("2b", "The corners of the atlas from two opposing sides, the arm drawn in front."),
     "hulls": ("3a", "Concave hulls (α-shapes) of the clouds."),
     "map_volume": ("3b", "Volume of the concave hulls."),
     "map_exact_volume": ("3b", "Exact volume of the reachable sets, for comparison."),
@@ -60,12 +60,13 @@ def sweep(settings: Settings, folder: Path, notes: Notebook) -> None:
     atlas = swept(settings, folder)
     curvature = atlas["bending_quantile"].isel(revolution=-1, taper=[0, -1])
     notes.note(
-        designs=int(atlas["status"].size),
+        designs=int(atlas["volume"].notnull().sum()),
         samples=settings.samples,
         revolution_deg=np.degrees(atlas["revolution"].values).round(6).tolist(),
         taper_deg=np.degrees(atlas["taper"].values).round(6).tolist(),
         alpha=atlas["volume"].attrs["alpha_over_length"],
-        **_shapes(atlas),
+        **shapes(atlas["revolution"].values, atlas["taper"].values, settings.accuracy),
+        aside_from=ASIDE,
         quantiles=curvature["quantile"].values.tolist(),
         curvature=curvature.transpose("taper", "station", "quantile").values.tolist(),
         **{name: _rows(atlas[name]) for name in _SCALARS},
@@ -74,24 +75,6 @@ def sweep(settings: Settings, folder: Path, notes: Notebook) -> None:
         if name in _CAPTIONS:
             label, words = _CAPTIONS[name]
             notes.draw(label, f"figure_{label}_{name}", words, figure)
-
-
-def _shapes(atlas: xr.Dataset) -> dict[str, Any]:
-    """How far clouds reach from the plane of symmetry, and how much lies behind the arm.
-
-    By volume, not by points, which gather: over the cells of L/20 that hold one.
-    """
-    size = atlas.sizes["revolution"], atlas.sizes["taper"]
-    spread, behind = np.empty((2, *size))
-    for i, j in np.ndindex(*size):
-        at = atlas.isel(revolution=i, taper=j)
-        cloud = atlas_cloud(atlas, revolution=float(at.revolution), taper=float(at.taper))
-        grid = CellGrid.around(cloud["tip"].values, atlas.attrs["length"] / 20)
-        x, y, _ = np.meshgrid(*grid.centers(), indexing="ij")
-        filled = grid.count() > 0
-        spread[i, j] = np.sqrt(np.mean(x[filled] ** 2)) / atlas.attrs["length"]
-        behind[i, j] = np.mean(y[filled] > 0)
-    return {"spread": spread.tolist(), "behind": behind.tolist()}
 
 
 def _rows(values: xr.DataArray) -> Any:

@@ -25,7 +25,7 @@ __all__ = ["uniqueness"]
 Array = NDArray[np.float64]
 
 _TARGETS = 2_000
-_LABEL = "reached more than once / % of the volume"
+_LABEL = "reached more than once / %"
 
 
 class Pair(NamedTuple):
@@ -52,7 +52,6 @@ def uniqueness(settings: Settings, folder: Path, notes: Notebook) -> None:
         paper_share=1 - paper.multiplicity[1] / paper.volume,
         tip=pair.tip.tolist(),
         activations=pair.activations.tolist(),
-        apart=float(np.linalg.norm(pair.activations[0] - pair.activations[-1])),
         **_fewer_fibers(),
     )
     _draw(atlas.assign({_LABEL: 100 * share.assign_attrs(units="1")}), arm, pair, notes)
@@ -67,16 +66,22 @@ def _clearest_pair(reached: ReachableSet) -> Pair:
     axes = [grid[axis].values for axis in "xyz"]
     tips = np.stack([axes[k][places[::every, k]] for k in range(3)], axis=1)
     found = [s for s in solve_inverse(reached.arm, tips) if len(s) > 1]
-    best = max(found, key=lambda s: float(np.linalg.norm(s.activations[0] - s.activations[-1])))
-    return Pair(best.target, best.activations)
+    best = max(found, key=lambda s: _apart(s.activations), default=None)
+    return (
+        Pair(np.zeros(3), np.empty((0, 3))) if best is None else Pair(best.target, best.activations)
+    )
+
+
+def _apart(activations: Array) -> float:
+    """How different the first and the last activation are [-]."""
+    return float(np.linalg.norm(activations[0] - activations[-1]))
 
 
 def _fewer_fibers() -> dict[str, float]:
-    """Dimension of what two fibers and one fiber reach."""
+    """Area of what two fibers reach and length of what one does, for L = 1 m."""
     arm = minimal_trunk()
-    names = ("dimension_of_two", "dimension_of_one")
     sets = [reachable_set(arm.replace(fibers=arm.fibers[:count])) for count in (2, 1)]
-    return {name: reached.dimension for name, reached in zip(names, sets, strict=True)}
+    return {name: reached.measure for name, reached in zip(("area", "curve"), sets, strict=True)}
 
 
 def _draw(atlas: xr.Dataset, arm: Manipulator, pair: Pair, notes: Notebook) -> None:
@@ -89,6 +94,8 @@ def _draw(atlas: xr.Dataset, arm: Manipulator, pair: Pair, notes: Notebook) -> N
         "taper: where it is 0, three fibers are single-valued."
     )
     notes.draw("", "uniqueness", words, ax)
+    if not len(pair.activations):
+        return
     shapes = configuration(arm, pair.activations)
     ax = plot_arm(arm, shapes, view=(-np.pi / 3, np.pi / 9), rest=False)
     words = f"{len(pair.activations)} activations of one three-fiber arm with the same tip."
