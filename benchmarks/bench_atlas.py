@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import subprocess
 import sys
 import tempfile
@@ -17,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.memory import peak_bytes
 from softreach import designs
 from softreach.atlas import DesignSpace, build_atlas
 from softreach.atlas.command import Command
@@ -103,7 +103,7 @@ def atlas(rows: int, columns: int, n: int, kind: str) -> dict[str, float]:
         with clock(total):
             build_atlas(space(rows, columns), store, n, alpha=ALPHA, metrics=GROUPS[kind])
         size = sum(file.stat().st_size for file in store.rglob("*") if file.is_file())
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    peak = peak_bytes() / 2**20
     return {"wall": total[0], "cpu": total[1], "peak": peak, "size": size / 1e6 / (rows * columns)}
 
 

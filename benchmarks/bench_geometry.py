@@ -1,6 +1,6 @@
 """Hulls of a cloud: ours beside SciPy's Qhull, in one run.
 
-`python benchmarks/bench_geometry.py [n]` prints a Markdown table of time and peak memory, each row
+`python -m benchmarks.bench_geometry [n]` prints a Markdown table of time and peak memory, each row
 measured in a process of its own; under pytest-benchmark the same work runs on a small cloud.
 """
 
@@ -8,16 +8,15 @@ from __future__ import annotations
 
 import argparse
 import json
-import resource
 import subprocess
 import sys
 import time
 from collections.abc import Callable
-from contextlib import suppress
-from pathlib import Path
 
 import numpy as np
 import pytest
+
+from benchmarks.memory import peak_bytes, reset_peak
 
 ALPHA = 0.03
 
@@ -121,36 +120,16 @@ def measure(name: str, n: int) -> dict[str, float]:
     route = ROUTES[name][1]
     route(arm_cloud(1000))  # compile or load
     points = arm_cloud(n)
-    before = _reset_peak()
+    before = reset_peak()
     wall, cpu = time.perf_counter(), time.process_time()
     volume = route(points)
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    return {"volume": volume, "wall": wall, "cpu": cpu, "memory": _peak_bytes() - before}
-
-
-def _reset_peak() -> int:
-    """Forget the peak of imports and compilation where the system can (Linux) [bytes]."""
-    with suppress(OSError):
-        Path("/proc/self/clear_refs").write_text("5")
-    return _peak_bytes()
-
-
-def _peak_bytes() -> int:
-    status = Path("/proc/self/status")
-    if status.exists():
-        line = next(x for x in status.read_text().splitlines() if x.startswith("VmHWM"))
-        return 1024 * int(line.split()[1])
-    return _rusage_peak_bytes()
-
-
-def _rusage_peak_bytes() -> int:
-    unit = 1 if sys.platform == "darwin" else 1024
-    return unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return {"volume": volume, "wall": wall, "cpu": cpu, "memory": peak_bytes() - before}
 
 
 def measured(name: str, n: int, repeat: int) -> dict[str, float]:
     """The fastest of some runs, each in a fresh process."""
-    command = [sys.executable, __file__, str(n), "--route", name]
+    command = [sys.executable, "-m", "benchmarks.bench_geometry", str(n), "--route", name]
     runs = [
         json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
         for _ in range(repeat)

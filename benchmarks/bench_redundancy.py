@@ -1,6 +1,6 @@
 """Mean activation-space distance: ours beside SciPy's KDTree, in one run.
 
-`python benchmarks/bench_redundancy.py [n]` prints a Markdown table of time per query and peak
+`python -m benchmarks.bench_redundancy [n]` prints a Markdown table of time per query and peak
 memory, each row measured in a process of its own; under pytest-benchmark the same work runs on a
 small cloud. SciPy's time is that of some queries, as its lists of all neighbors would not fit.
 """
@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import resource
 import subprocess
 import sys
 import time
@@ -18,6 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+
+from benchmarks.memory import peak_bytes, reset_peak
 
 RADIUS = 1 / 60
 QUERIES = 10_000
@@ -132,20 +133,24 @@ def measure(name: str, design: str, n: int) -> dict[str, float]:
     route = ROUTES[name][1]
     route(*arm_cloud(design, 1000), time.process_time)  # compile or load
     tip, activation = arm_cloud(design, n)
-    before, wall = _peak_bytes(), time.perf_counter()
+    before, wall = reset_peak(), time.perf_counter()
     cost = route(tip, activation, time.process_time)
     wall = time.perf_counter() - wall
-    return {**cost._asdict(), "wall": wall, "memory": _peak_bytes() - before}
-
-
-def _peak_bytes() -> int:
-    unit = 1 if sys.platform == "darwin" else 1024
-    return unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return {**cost._asdict(), "wall": wall, "memory": peak_bytes() - before}
 
 
 def measured(name: str, design: str, n: int, repeat: int) -> dict[str, float]:
     """The fastest of some runs, each in a fresh process."""
-    command = [sys.executable, __file__, str(n), "--route", name, "--design", design]
+    command = [
+        sys.executable,
+        "-m",
+        "benchmarks.bench_redundancy",
+        str(n),
+        "--route",
+        name,
+        "--design",
+        design,
+    ]
     runs = [
         json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
         for _ in range(repeat)
