@@ -60,6 +60,7 @@ SCRIPT = """
     def die():
         os.kill(os.getpid(), signal.SIGKILL)
 """
+PATIENCE = 300.0  # seconds that a script may take on a loaded machine
 scope: dict = {}
 exec(textwrap.dedent(SCRIPT), scope)
 build16 = scope["build"]
@@ -93,6 +94,14 @@ def run_script(folder: Path, body: str, *arguments: str) -> subprocess.Popen:
     script.write_text(textwrap.dedent(SCRIPT) + "\n" + textwrap.dedent(body))
     command = [sys.executable, "-W", "error", str(script), *arguments]
     return subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+
+
+def ended(process: subprocess.Popen) -> tuple[None, str]:
+    """What a script says until its end, which must come."""
+    try:
+        return process.communicate(timeout=PATIENCE)
+    finally:
+        process.kill()
 
 
 # Designs
@@ -274,7 +283,7 @@ def test_three_kills_leave_the_same_numbers_as_no_kill(whole, tmp_path):
     done = 0
     for count, place in ((2, "after a design"), (5, "within a write"), (3, "after a design")):
         process = run_script(tmp_path, body, str(store), str(count), place)
-        assert process.communicate() == (None, "")
+        assert ended(process) == (None, "")
         assert process.returncode == -signal.SIGKILL
         assert done < atlas_status(store).done < 16
         done = atlas_status(store).done
@@ -576,8 +585,8 @@ def test_a_full_disk_costs_one_line_and_the_rest_can_be_resumed(tmp_path):
         except SoftreachError as error:
             sys.exit(str(error))
     """
-    assert run_script(tmp_path, body, str(store)).communicate() == (None, "")
-    _, said = run_script(tmp_path, body, str(store), "full").communicate()
+    assert ended(run_script(tmp_path, body, str(store))) == (None, "")
+    _, said = ended(run_script(tmp_path, body, str(store), "full"))
     assert said.count("\n") == 1
     assert "cannot be written: File too large; what is done is safe" in said
     assert atlas_status(store).done == 2
@@ -611,7 +620,7 @@ def test_shards_may_start_at_the_same_moment(whole, tmp_path):
     store = tmp_path / "a.zarr"
     body = "build(sys.argv[1], shard=(int(sys.argv[2]), 2))"
     tasks = [run_script(tmp_path, body, str(store), str(k)) for k in range(2)]
-    assert [task.communicate()[1] for task in tasks] == ["", ""]
+    assert [ended(task)[1] for task in tasks] == ["", ""]
     assert_same(open_atlas(store).load(), whole)
 
 
@@ -648,7 +657,7 @@ def test_worker_processes_survive_the_death_of_one(whole, tmp_path):
         if __name__ == "__main__":
             build(sys.argv[1], executor=worker_processes(2))
     """
-    assert run_script(tmp_path, deadly(body), str(store)).communicate() == (None, "")
+    assert ended(run_script(tmp_path, deadly(body), str(store))) == (None, "")
     assert (tmp_path / "task.died").exists()
     assert_same(open_atlas(store).load(), whole)
 
@@ -662,7 +671,7 @@ def test_a_design_that_kills_its_workers_is_given_up_and_the_rest_goes_on(tmp_pa
             warnings.simplefilter("ignore")
             build(sys.argv[1], executor=worker_processes(2), metrics=("extent",))
     """
-    assert run_script(tmp_path, deadly(body, True), str(store)).communicate() == (None, "")
+    assert ended(run_script(tmp_path, deadly(body, True), str(store))) == (None, "")
     status = atlas_status(store)
     assert (status.done, status.messages) == (15, {3: "its worker died, time after time"})
 
@@ -680,7 +689,7 @@ def test_dask_workers_survive_the_death_of_one(whole, tmp_path):
                     build(sys.argv[1], executor=client)
     """
     process = run_script(tmp_path, deadly(body), str(store))
-    process.communicate()
+    ended(process)
     assert process.returncode == 0
     assert (tmp_path / "task.died").exists()
     assert_same(open_atlas(store).load(), whole)
@@ -688,7 +697,8 @@ def test_dask_workers_survive_the_death_of_one(whole, tmp_path):
 
 SBATCH = """#!/bin/sh
 while [ $# -gt 1 ]; do shift; done
-setsid sh "$1" > "$0.log" 2>&1 &
+cp "$1" "$0.job"  # as SLURM does: who submits removes the script at once
+setsid sh "$0.job" > "$0.log" 2>&1 &
 echo $! > "$0.pid"
 echo Submitted batch job 1
 """
@@ -716,9 +726,11 @@ def test_workers_may_come_from_a_job_queue(whole, tmp_path, monkeypatch):
                 build(sys.argv[1], executor=client)
     """
     process = run_script(tmp_path, body, str(tmp_path / "a.zarr"), str(tmp_path / "jobs"))
-    said = process.communicate()[1]
-    with contextlib.suppress(OSError):
-        os.killpg(int((commands / "sbatch.pid").read_text()), signal.SIGKILL)
+    try:
+        said = ended(process)[1]
+    finally:
+        with contextlib.suppress(OSError):
+            os.killpg(int((commands / "sbatch.pid").read_text()), signal.SIGKILL)
     assert process.returncode == 0, said
     assert_same(open_atlas(tmp_path / "a.zarr").load(), whole)
 
