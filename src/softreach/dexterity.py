@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from softreach import parallel
 from softreach.cloud import design_of
 from softreach.errors import InvalidInput
-from softreach.geometry.cell_grid import CellGrid
 from softreach.kinematics import BLOCK, tips_and_jacobians
 from softreach.manipulator import Manipulator
-from softreach.schema import AXES, check_cloud
+from softreach.schema import cell_dataset, check_cloud, tip_cells
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,7 +24,6 @@ __all__ = ["dexterity", "solution_measure"]
 Array = NDArray[np.float64]
 Signs = NDArray[np.int8]
 
-_CELL = 1 / 20  # of the arm's length
 _EVEN = ("uniform", "sobol")  # a grid has too many points on its faces
 
 
@@ -89,8 +87,6 @@ def solution_measure(cloud: xr.Dataset, cell: float | None = None) -> xr.Dataset
         InvalidInput: The dataset is no cloud, of fewer bundles, of one that cannot be activated, or
             sampled unevenly; cells that are not positive or too many.
     """
-    import xarray as xr
-
     check_cloud(cloud)
     arm, n = design_of(cloud), cloud.sizes["sample"]
     if arm.bundles < 3:
@@ -99,12 +95,10 @@ def solution_measure(cloud: xr.Dataset, cell: float | None = None) -> xr.Dataset
         raise InvalidInput("sampler", sampler, f"one of {', '.join(_EVEN)}")
     if not (box := float(np.prod(np.diff(arm.bounds)))):
         raise InvalidInput("activation_bounds", arm.activation_bounds, "apart for every bundle")
-    grid = CellGrid.around(cloud["tip"].values, _CELL * arm.length if cell is None else cell)
+    grid = tip_cells(cloud, cell)
     total = box / n / grid.volume * grid.sum(dexterity(cloud)["manipulability"].values)
     name = {"units": "1", "long_name": "activations that reach a place: number, length, area, ..."}
-    centers = zip(AXES, grid.centers(), strict=True)
-    axes = {axis: (axis, places, {"units": "m"}) for axis, places in centers}
-    return xr.Dataset({"solution_measure": (AXES, total, name)}, axes, {"cell": grid.edge})
+    return cell_dataset(grid, solution_measure=(total, name))
 
 
 def _slopes(arm: Manipulator, gamma: Array, tol: float) -> Array:

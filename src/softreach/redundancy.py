@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.errors import InvalidInput
-from softreach.geometry.cell_grid import CellGrid
 from softreach.geometry.neighbors import mean_value_distance
-from softreach.schema import AXES, check_cloud
+from softreach.schema import cell_dataset, check_cloud, tip_cells
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,7 +28,6 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 THRESHOLD = 0.25  # between a minimal arm's D̄ of some 0.05 and a redundant one's of order 1
-_CELL = 1 / 20  # of the arm's length
 
 
 def activation_distance(
@@ -127,7 +125,7 @@ def redundancy_summary(
         InvalidInput: D̄ of another cloud, or cells that are not positive or too many.
     """
     values = distance.values[np.isfinite(distance.values)]
-    grid, evaluated = _grid(cloud, cell), _samples(distance, cloud)
+    grid, evaluated = tip_cells(cloud, cell), _samples(distance, cloud)
     mean = grid.mean(distance.values, evaluated)
     known = np.isfinite(mean)
     found = np.quantile(values, quantiles) if len(values) else np.full(len(quantiles), np.nan)
@@ -161,12 +159,12 @@ def distance_map(
     Raises:
         InvalidInput: D̄ of another cloud, or cells that are not positive or too many.
     """
-    grid, evaluated = _grid(cloud, cell), _samples(distance, cloud)
+    grid, evaluated = tip_cells(cloud, cell), _samples(distance, cloud)
     count = grid.count(evaluated[np.isfinite(distance.values)])
     name = {"long_name": "mean activation-space distance D̄ in the cell", "units": "1"}
     number = {"long_name": "evaluated points with neighbors", "units": "1"}
     mean = grid.mean(distance.values, evaluated)
-    return _dataset(grid, activation_distance=(mean, name), evaluated=(count, number))
+    return cell_dataset(grid, activation_distance=(mean, name), evaluated=(count, number))
 
 
 def tip_density(cloud: xr.Dataset, cell: float | None = None) -> xr.Dataset:
@@ -187,27 +185,10 @@ def tip_density(cloud: xr.Dataset, cell: float | None = None) -> xr.Dataset:
     Raises:
         InvalidInput: No cloud, or cells that are not positive or too many.
     """
-    grid = _grid(cloud, cell)
+    grid = tip_cells(cloud, cell)
     count = grid.count()
     name = {"long_name": "tips per volume", "units": "m-3"}
-    return _dataset(grid, density=(count / grid.volume, name)).assign_attrs(_unevenness(count))
-
-
-def _grid(cloud: xr.Dataset, edge: float | None) -> CellGrid:
-    tip = check_cloud(cloud)["tip"]
-    return CellGrid.around(tip.values, _CELL * float(tip.attrs["length"]) if edge is None else edge)
-
-
-def _dataset(grid: CellGrid, **variables: tuple[Array | Index, dict[str, str]]) -> xr.Dataset:
-    """Variables over the centers of the cells."""
-    import xarray as xr
-
-    centers = {
-        axis: (axis, places, {"units": "m"})
-        for axis, places in zip(AXES, grid.centers(), strict=True)
-    }
-    data = {name: (AXES, *content) for name, content in variables.items()}
-    return xr.Dataset(data, centers, {"cell": grid.edge})
+    return cell_dataset(grid, density=(count / grid.volume, name)).assign_attrs(_unevenness(count))
 
 
 def _unevenness(count: Index) -> dict[str, float]:

@@ -15,12 +15,24 @@ from softreach.manipulator import Manipulator
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["AXES", "SCHEMA_VERSION", "check_cloud", "cloud_dataset", "configuration_dataset"]
+    from softreach.geometry.cell_grid import CellGrid
+
+__all__ = [
+    "AXES",
+    "SCHEMA_VERSION",
+    "cell_dataset",
+    "check_cloud",
+    "cloud_dataset",
+    "configuration_dataset",
+    "tip_cells",
+]
 
 SCHEMA_VERSION = 1
 AXES = ("x", "y", "z")
 
 Array = NDArray[np.float64]
+
+_CELL = 1 / 20  # of the arm's length
 
 # variable -> (dimensions, unit, meaning)
 _CLOUD = {
@@ -110,3 +122,33 @@ def storable(dataset: xr.Dataset) -> xr.Dataset:
         if coordinate.dtype.kind == "U"
     }
     return dataset.assign_coords(names)
+
+
+def tip_cells(cloud: xr.Dataset, edge: float | None = None) -> CellGrid:
+    """The tips of a cloud sorted into cubes.
+
+    Args:
+        cloud: tip(sample, axis) [m].
+        edge: Of the cubes [m]; None for L/20.
+
+    Raises:
+        InvalidInput: No cloud, or an edge that is not positive or gives too many cubes.
+    """
+    from softreach.geometry.cell_grid import CellGrid
+
+    tip = check_cloud(cloud)["tip"]
+    return CellGrid.around(tip.values, _CELL * float(tip.attrs["length"]) if edge is None else edge)
+
+
+def cell_dataset(
+    grid: CellGrid, **variables: tuple[NDArray[np.generic], dict[str, str]]
+) -> xr.Dataset:
+    """Variables, each with its attributes, over the centers x, y, z [m] of cubes."""
+    import xarray as xr
+
+    centers = {
+        axis: (axis, places, {"units": "m"})
+        for axis, places in zip(AXES, grid.centers(), strict=True)
+    }
+    data = {name: (AXES, *content) for name, content in variables.items()}
+    return xr.Dataset(data, centers, {"cell": grid.edge})
