@@ -15,7 +15,7 @@ from softreach.plot.cloud import plot_cloud
 from softreach.plot.coloring import color_samples, draw_figure_key
 from softreach.plot.projection import OBLIQUE
 from softreach.plot.sheet import SheetAxis
-from softreach.plot.style import figure_style, pyplot
+from softreach.plot.style import figure_style, pyplot, small_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -118,7 +118,7 @@ def plot_metric_map(atlas: xr.Dataset, metric: str, ax: Axes | None = None) -> A
     if min(values.shape) < 2 or not np.isfinite(values).any():
         raise InvalidInput("atlas", f"{values.shape} designs", "2 x 2 or more, one done at least")
     with figure_style(ax):
-        ax = _small_axes() if ax is None else ax
+        ax = small_axes() if ax is None else ax
         shown = np.ma.masked_invalid(values)
         filled = ax.contourf(across.values, up.values, shown, 14, cmap="viridis")
         _draw_contours(ax, across, up, shown, np.asarray(filled.levels))
@@ -126,10 +126,6 @@ def plot_metric_map(atlas: xr.Dataset, metric: str, ax: Axes | None = None) -> A
         _mark_best(ax, across, up, values, smallest="unreachability" in metric)
         ax.set(xlabel=across.label, ylabel=up.label)
     return ax
-
-
-def _small_axes() -> Axes:
-    return pyplot().subplots(figsize=(3.4, 2.8), layout="constrained")[1]
 
 
 def _draw_contours(

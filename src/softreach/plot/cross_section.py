@@ -9,7 +9,7 @@ import numpy as np
 
 from softreach.errors import InvalidInput
 from softreach.palette import BODY, bundle_color
-from softreach.plot.style import figure_style, pyplot
+from softreach.plot.style import figure_style, small_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,7 +48,7 @@ def plot_cross_section(
         raise InvalidInput("z", z, f"within [0, {arm.length:g}] m")
     outer = float(arm.radius(z)) / arm.length
     with figure_style(ax):
-        ax = _small_axes() if ax is None else ax
+        ax = small_axes(2.0, 2.0) if ax is None else ax
         _draw_ring(ax, outer, arm.radius_ratio)
         angles = np.degrees(arm.fiber_angles(np.array([z]))[0])
         extents = np.degrees(arm.bundle_extents)
@@ -59,10 +59,6 @@ def plot_cross_section(
         ax.set_ylabel("y / L")
         ax.locator_params(nbins=3)
     return ax
-
-
-def _small_axes() -> Axes:
-    return pyplot().subplots(figsize=(2.0, 2.0), layout="constrained")[1]
 
 
 def _draw_ring(ax: Axes, outer: float, ratio: float) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.errors import InvalidInput
-from softreach.plot.style import figure_style, pyplot
+from softreach.plot.style import figure_style, small_axes
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -45,7 +45,7 @@ def plot_curvature(
     if quantity not in _LABELS:
         raise InvalidInput("quantity", quantity, f"one of {', '.join(_LABELS)}")
     with figure_style(ax):
-        ax = _small_axes() if ax is None else ax
+        ax = small_axes() if ax is None else ax
         sides = (-1, 1) if len(statistics) == 2 else (0,)
         for (label, found), side, color in zip(statistics.items(), sides, _COLORS, strict=False):
             _draw(ax, found, quantity, side, color, label)
@@ -54,10 +54,6 @@ def plot_curvature(
         ax.set_xticks(range(len(places)), places)
         ax.legend(loc="upper left")
     return ax
-
-
-def _small_axes() -> Axes:
-    return pyplot().subplots(figsize=(3.4, 2.8), layout="constrained")[1]
 
 
 def _places(found: xr.Dataset) -> list[str]:

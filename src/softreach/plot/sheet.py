@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ __all__ = ["SheetAxis", "panel_extent", "plot_cloud_sheet", "plot_hull_sheet"]
 
 Array = NDArray[np.float64]
 Grid = NDArray[np.object_]
+Content = TypeVar("Content")
 
 _STEEL = (0.55, 0.68, 0.82)
 _LEFT, _RIGHT, _BOTTOM, _TOP = 0.75, 0.04, 0.62, 0.08  # inches around a sheet
@@ -58,13 +59,11 @@ def plot_cloud_sheet(
         view: The direction of the eye.
         width: Of the figure [inch].
     """
-    with figure_style():
-        figure, panels = _sheet(across, up, box, view, width)
-        for (row, column), ax in np.ndenumerate(panels):
-            if (cloud := cloud_at(column, row)) is not None:
-                _draw_cloud(ax, cloud, box, view)
-        _draw_scale(figure, panels[0, 0], view)
-    return figure
+
+    def draw(ax: Axes, cloud: xr.Dataset) -> None:
+        _draw_cloud(ax, cloud, box, view)
+
+    return _filled_sheet(cloud_at, draw, across, up, box, view, width)
 
 
 def plot_hull_sheet(
@@ -88,13 +87,30 @@ def plot_hull_sheet(
         view: The direction of the eye.
         width: Of the figure [inch].
     """
+
+    def draw(ax: Axes, hull: SurfaceMesh) -> None:
+        buffer = ZBuffer(panel_extent(box, view), _columns(ax), oversample=3, color_step=4)
+        draw_mesh(buffer, np.asarray(hull.vertices) / length, hull.faces, _STEEL, view)
+        _show(ax, buffer)
+
+    return _filled_sheet(hull_at, draw, across, up, box, view, width)
+
+
+def _filled_sheet(
+    content_at: Callable[[int, int], Content | None],
+    draw: Callable[[Axes, Content], None],
+    across: SheetAxis,
+    up: SheetAxis,
+    box: Array,
+    view: View,
+    width: float,
+) -> Figure:
+    """A sheet with what belongs to each panel drawn in it, one after the other."""
     with figure_style():
         figure, panels = _sheet(across, up, box, view, width)
         for (row, column), ax in np.ndenumerate(panels):
-            if (hull := hull_at(column, row)) is not None:
-                buffer = ZBuffer(panel_extent(box, view), _columns(ax), oversample=3, color_step=4)
-                draw_mesh(buffer, np.asarray(hull.vertices) / length, hull.faces, _STEEL, view)
-                _show(ax, buffer)
+            if (content := content_at(column, row)) is not None:
+                draw(ax, content)
         _draw_scale(figure, panels[0, 0], view)
     return figure
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["DPI", "figure_style", "pyplot", "save_figure"]
+__all__ = ["DPI", "figure_style", "pyplot", "save_figure", "small_axes"]
 
 DPI = 250
 """Pixels per inch of images inside figures, and of saved PNG files."""
@@ -58,6 +58,11 @@ def pyplot() -> Any:
 def figure_style(ax: Axes | None = None) -> AbstractContextManager[None]:
     """Our defaults for a figure of our own; somebody else's axes keep theirs."""
     return pyplot().rc_context(_RC) if ax is None else nullcontext()
+
+
+def small_axes(width: float = 3.4, height: float = 2.8) -> Axes:
+    """Axes in a new figure of that size [inch], by default a journal's column wide."""
+    return pyplot().subplots(figsize=(width, height), layout="constrained")[1]
 
 
 def save_figure(figure: Figure | Axes, path: str | PathLike[str]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.errors import InvalidInput
-from softreach.plot.style import figure_style, pyplot
+from softreach.plot.style import figure_style, small_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,7 +45,7 @@ def plot_volume_curve(
     """
     radii = np.asarray(alphas, float)
     with figure_style(ax):
-        ax = _small_axes() if ax is None else ax
+        ax = small_axes(3.4, 2.6) if ax is None else ax
         for label, volumes in curves.items():
             if np.shape(volumes) != radii.shape:
                 raise InvalidInput(label, np.shape(volumes), f"volumes of {radii.shape} radii")
@@ -56,7 +56,3 @@ def plot_volume_curve(
         ax.set(xscale="log", xlabel="radius α / L", ylabel="$V/L^3$", ylim=(0, None))
         ax.legend(loc="lower right")
     return ax
-
-
-def _small_axes() -> Axes:
-    return pyplot().subplots(figsize=(3.4, 2.6), layout="constrained")[1]
