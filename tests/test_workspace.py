@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from softreach import designs, sampling
+from softreach.arm.actuators import FiberArchitecture
+from softreach.arm.manipulator import Manipulator
 from softreach.cloud import compute_cloud
 from softreach.errors import InvalidInput, SoftreachWarning
-from softreach.fiber import FiberArchitecture
-from softreach.kinematics import tip_positions, tips_and_jacobians
-from softreach.manipulator import Manipulator
+from softreach.rod.kinematics import tip_positions, tips_and_jacobians
 from softreach.workspace import ReachableSet, direction_spread, reachable_set
 from softreach.workspace.surface import Surface
 
