@@ -1,6 +1,6 @@
 """Profiles: how the outer radius changes along an arm.
 
-All that depends on the radius alone is asked here: R2(Z), its slope, S(Z) = ∫ dZ/R2 and its inverse.
+All that depends on the radius alone is asked here: R2(Z), its slope, S(Z) = ∫ dZ/R2, its inverse.
 """
 
 from __future__ import annotations

@@ -37,9 +37,13 @@ class FreeRod(TipMap):
         check_tol(self.tol)
         check_extension(self.arm)
 
-    @cached_property
+    @property
     def box(self) -> ActivationBox:
         """The activations within bounds."""
+        return self._box
+
+    @cached_property
+    def _box(self) -> ActivationBox:
         return ActivationBox.between(self.arm.bounds, self.arm.bundle_names)
 
     @cached_property

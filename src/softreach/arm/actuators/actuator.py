@@ -51,11 +51,8 @@ class Actuator(ABC):
 
     name: str
     """What summaries and pictures call it; unique within an arm."""
-
-    @property
-    @abstractmethod
-    def bundles(self) -> int:
-        """Number of independent activations."""
+    bundles: int
+    """Number of independent activations."""
 
     @property
     @abstractmethod

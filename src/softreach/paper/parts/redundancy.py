@@ -39,7 +39,7 @@ def redundancy(settings: Settings, folder: Path, notes: Notebook) -> None:
         samples=settings.redundant_samples,
         queries=settings.queries,
         radius=_RADIUS,
-        offsets_deg=np.degrees(arms["redundant"].bundle_angles[2:]).round(9).tolist(),
+        offsets_deg=np.degrees(arms["redundant"].outline(0.0).center[0][2:]).round(9).tolist(),
         extent_deg=float(np.degrees(arms["redundant"].outline(0.0).extent[2]).round(9)),
         **{name: _found(clouds[name], distances[name]) for name in arms},
     )
