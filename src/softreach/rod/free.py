@@ -120,5 +120,6 @@ class FreeRod(TipMap):
 
     @cached_property
     def _tip_table(self) -> tuple[Array, NDArray[np.int64]]:
-        nodes, ends = self.rule.station_nodes(np.array([self.length]), self._shape_steps)
+        steps = max(self.steps, self.rule.fewest_for_frames)
+        nodes, ends = self.rule.station_nodes(np.array([self.length]), steps)
         return rod.pack(*nodes), ends

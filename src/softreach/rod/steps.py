@@ -128,6 +128,11 @@ class StepRule:
         """Steps of which none turns by more than `turn`: |ω| = ζ |u| R2 dS at the pilot samples."""
         return max(2, int(np.ceil(self._largest_turn / turn)))
 
+    @property
+    def fewest_for_frames(self) -> int:
+        """Steps short enough for directors to stay orthonormal to rounding."""
+        return self._fewest_steps(_FRAME_TURN)
+
     @cached_property
     def _largest_turn(self) -> float:
         """Largest ζ |u| R2 over the pilot samples and the arm, times S(L) [rad]."""
