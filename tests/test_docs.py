@@ -73,6 +73,13 @@ def test_every_public_name_is_in_the_reference():
     assert functions <= shown
 
 
+def test_every_figure_has_words():
+    pictures = (ROOT / "docs" / "pictures.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (`plot_.+?`) \|", pictures, re.MULTILINE)
+    described = {name for row in rows for name in re.findall(r"`(\w+)`", row)}
+    assert {name for name in sr.plot.__all__ if name.startswith("plot_")} <= described
+
+
 def test_the_navigation_and_the_pages_are_the_same():
     named = re.findall(
         r"(\S+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"), re.MULTILINE
