@@ -40,15 +40,15 @@ browser:
 		|| echo "no chromium: the tests in a browser will be skipped"
 
 check: setup
-	$(BIN)/ruff format --check src tests benchmarks
-	$(BIN)/ruff check src tests benchmarks
+	$(BIN)/ruff format --check src tests benchmarks tools
+	$(BIN)/ruff check src tests benchmarks tools
 	$(BIN)/lint-imports
 	$(BIN)/basedpyright
-	$(BIN)/mkdocs build --strict --quiet
+	$(BIN)/python -m zensical build --strict --clean
 
 format: setup
-	$(BIN)/ruff format src tests benchmarks
-	$(BIN)/ruff check --fix src tests benchmarks
+	$(BIN)/ruff format src tests benchmarks tools
+	$(BIN)/ruff check --fix src tests benchmarks tools
 
 bench: setup
 	$(BIN)/python -m benchmarks
@@ -61,11 +61,11 @@ paper: setup
 	$(BIN)/softreach paper --out out/paper
 
 docs: setup
-	$(BIN)/mkdocs build --strict
+	$(BIN)/python -m zensical build --strict --clean
 
 lock:
 	uv lock --upgrade
 	uv export --quiet --all-extras --all-groups --no-emit-project --no-header --format requirements-txt --output-file requirements.lock
 
 clean:
-	rm -rf .venv out site
+	rm -rf .venv out site .cache

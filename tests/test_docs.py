@@ -73,6 +73,26 @@ def test_every_public_name_is_in_the_reference():
     assert functions <= shown
 
 
+def test_every_figure_has_words():
+    pictures = (ROOT / "docs" / "pictures.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (`plot_.+?`) \|", pictures, re.MULTILINE)
+    described = {name for row in rows for name in re.findall(r"`(\w+)`", row)}
+    assert {name for name in sr.plot.__all__ if name.startswith("plot_")} <= described
+
+
+def test_the_navigation_and_the_pages_are_the_same():
+    named = re.findall(
+        r"(\S+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert sorted(named) == [page.name for page in sorted((ROOT / "docs").rglob("*.md"))]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=on_page)
+def test_every_picture_on_a_page_exists(page):
+    for picture in re.findall(r"!\[[^]]*\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
+        assert (page.parent / picture).is_file(), picture
+
+
 def test_the_readme_is_short():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) < 200
 
