@@ -49,6 +49,7 @@ def checked(part, numbers, words):
     return claim.check(numbers)
 
 
+@pytest.mark.slow
 def test_every_figure_of_the_paper_is_there_as_png_and_pdf(folder):
     pictures = [p for part in reproduce.PARTS for p in notebook(folder, part)["pictures"]]
     labels = {picture["label"] for picture in pictures}
@@ -58,6 +59,7 @@ def test_every_figure_of_the_paper_is_there_as_png_and_pdf(folder):
             assert (folder / "quick" / "figures" / f"{picture['name']}{suffix}").stat().st_size > 0
 
 
+@pytest.mark.slow
 def test_every_statement_finds_its_numbers(folder):
     for claim in CLAIMS:
         found = claim.check(notebook(folder, claim.part)["numbers"])
@@ -65,6 +67,7 @@ def test_every_statement_finds_its_numbers(folder):
         assert not re.search(r"\bnan\b|\binf\b", found.text), (claim.says, found.text)
 
 
+@pytest.mark.slow
 def test_what_does_not_depend_on_the_size_of_clouds_agrees(folder):
     for part, words, verdict in (
         ("model", "6.2-fold", Verdict.AGREES),
@@ -108,6 +111,7 @@ def reversed_rows(values):
         ("Two fibers", {"area": 0.0}, Verdict.DIFFERS),
     ],
 )
+@pytest.mark.slow
 def test_verdicts_follow_the_numbers(folder, words, change, verdict):
     (part,) = {claim.part for claim in CLAIMS if words in claim.says}
     numbers = notebook(folder, part)["numbers"]
@@ -115,6 +119,7 @@ def test_verdicts_follow_the_numbers(folder, words, change, verdict):
     assert checked(part, numbers | changed, words).verdict == verdict
 
 
+@pytest.mark.slow
 def test_both_activations_of_the_example_reach_the_same_tip(folder):
     from softreach.designs import minimal_trunk
     from softreach.kinematics import tip_positions
@@ -127,6 +132,7 @@ def test_both_activations_of_the_example_reach_the_same_tip(folder):
     np.testing.assert_allclose(tips, [found["tip"]] * len(tips), rtol=0, atol=2e-6)
 
 
+@pytest.mark.slow
 def test_a_finished_report_is_only_written_again(folder, small, monkeypatch):
     before = (folder / "quick" / "report.html").read_text()
     monkeypatch.setattr(reproduce, "PARTS", dict.fromkeys(reproduce.PARTS))  # nothing to call

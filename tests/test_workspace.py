@@ -46,6 +46,7 @@ def test_the_best_design_reaches_0691_and_little_of_it_twice(best):
     assert sum(best.multiplicity.values()) == pytest.approx(best.volume)
 
 
+@pytest.mark.slow
 def test_doubled_resolutions_agree_within_the_errors(best, folded):
     for coarse in (best, folded):
         cell = coarse.grid.attrs["cell"] / 2
@@ -77,6 +78,7 @@ def test_volume_is_the_integral_of_det_j_minus_what_is_covered_again(folded):
     assert integral - again == pytest.approx(folded.volume, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_cloud_lies_inside_to_one_cell(best, folded):
     for found in (best, folded):
         tips = compute_cloud(found.arm, n=400_000).tip.values
@@ -104,6 +106,7 @@ def test_the_image_of_a_part_of_the_box_lies_within(best, trunk):
     assert best.distance(outside).max(initial=0.0) < best.grid.attrs["cell"]
 
 
+@pytest.mark.slow
 def test_the_surface_is_closed_outward_and_holds_the_volume(best, folded):
     for found in (best, folded):
         surface = found.surface()
@@ -149,6 +152,7 @@ def redundant() -> ReachableSet:
     return reachable_set(designs.redundant_trunk(), accuracy=1e-2)
 
 
+@pytest.mark.slow
 def test_four_bundles_reach_at_least_what_three_of_them_do(redundant):
     for held in range(4):
         for end in (0, 1):
@@ -167,6 +171,7 @@ def test_four_bundles_agree_with_a_finer_grid_within_the_error(redundant):
     assert "count" not in fine.grid
 
 
+@pytest.mark.slow
 def test_a_cloud_of_four_bundles_lies_inside_to_one_cell(redundant):
     tips = compute_cloud(redundant.arm, n=2_000_000).tip.values
     outside = tips[~redundant.contains(tips)]
@@ -254,6 +259,7 @@ def test_directions_spread_no_wider_than_a_sphere(trunk):
     assert np.isnan(angle.values[number.values == 0]).all()
 
 
+@pytest.mark.slow
 def test_the_cone_of_three_bundles_closes_with_the_cell_and_that_of_four_stays(trunk):
     def shrinks(arm: Manipulator) -> float:
         """Median cone in cells of 0.1 m over that in cells of 0.05 m."""

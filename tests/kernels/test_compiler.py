@@ -6,6 +6,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 SCRIPT = """
 import hashlib
 import numpy as np
@@ -21,6 +23,7 @@ for values in results:
 """
 
 
+@pytest.mark.slow
 def test_the_run_that_compiles_has_the_numbers_of_those_that_load(tmp_path):
     def run() -> str:
         environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}

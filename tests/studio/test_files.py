@@ -36,6 +36,7 @@ def store(trunk, tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_files_are_those_of_the_librarys_own_writers(fine):
     state = StudioState(design=fine.arm).showing(level=14)
     assert cloud_file(fine, ".ply").startswith(b"ply\n")
@@ -45,6 +46,7 @@ def test_files_are_those_of_the_librarys_own_writers(fine):
 
 
 @pytest.mark.parametrize("color", ["rgb", "bundle 1", "manipulability", "multiplicity"])
+@pytest.mark.slow
 def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypatch):
     from softreach import plot
 
