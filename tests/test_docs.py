@@ -134,7 +134,7 @@ def compare_output(example):
     """Hold a text fence against what was printed last."""
     printed = example.namespace.pop("_printed", None)
     assert printed is not None, f"line {example.line}: no executed fence before this output"
-    # compiling is said on the first run only
+    # compilation is announced on the first run only
     found = [line for line in printed.splitlines() if not line.startswith("softreach: compiling")]
     wanted = example.parsed.splitlines()
     assert len(found) == len(wanted), f"line {example.line}: printed {found}"

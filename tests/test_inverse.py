@@ -119,6 +119,7 @@ def test_both_preimages_near_a_fold_are_found(folded, distance):
     inside = ((gamma > folded.bounds[:, 0]) & (gamma < folded.bounds[:, 1])).all(axis=1)
     mirror = fold - 3 * distance * null
     inside &= ((mirror > folded.bounds[:, 0]) & (mirror < folded.bounds[:, 1])).all(axis=1)
+    assert inside.sum() > 100
     solutions = solve_inverse(folded, tip_positions(folded, gamma[inside]))
     assert miss_of_original(solutions, gamma[inside]).max() < 1e-6
     # Nearly all: where two folds meet, the other preimage lies elsewhere or nowhere.

@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 
 from softreach import designs, sampling
+from softreach.actuation import actuation
 from softreach.cloud import compute_cloud
 from softreach.errors import InvalidInput, SoftreachWarning
 from softreach.fiber import FiberArchitecture
-from softreach.kinematics import tip_positions, tips_and_jacobians
+from softreach.kinematics import configuration, tip_positions, tips_and_jacobians
 from softreach.manipulator import Manipulator
 from softreach.workspace import ReachableSet, direction_spread, reachable_set
 from softreach.workspace.surface import Surface
+from tests.laws import arm_of, single
 
 
 def trunk_at(revolution_deg: float, taper_deg: float, **changes) -> Manipulator:
@@ -250,13 +252,59 @@ def test_a_wrong_argument_is_named(trunk, argument, value, told):
     assert caught.value.name == argument
 
 
-def test_directions_spread_no_wider_than_a_sphere(trunk):
-    spread = direction_spread(trunk, n=1 << 16, cell=0.05)
-    angle, number = spread["solid_angle"], spread["samples"]
-    assert int(number.sum()) == 1 << 16
-    known = angle.values[number.values > 1]
-    assert ((known >= 0) & (known <= 4 * np.pi)).all()
-    assert np.isnan(angle.values[number.values == 0]).all()
+def only_cone(arm: Manipulator, n: int) -> float:
+    """The solid angle [sr] of all tip directions, in one cell that holds every tip."""
+    spread = direction_spread(arm, n=n, cell=10 * arm.length)
+    return float(spread["solid_angle"].max())
+
+
+def largest_turn(arm: Manipulator) -> float:
+    """The angle [rad] by which the first bundle, longitudinal, turns the tip when it acts alone."""
+    table, gamma = actuation(arm, [0.0]), arm.bounds[0, 0]
+    stretch = 1 + table.extension[0, 0] * gamma
+    return float(np.linalg.norm(table.curvature[0, :, 0] * gamma) * stretch * arm.length)
+
+
+@pytest.mark.parametrize("gamma", [-0.3, -0.8])
+def test_the_directions_of_a_longitudinal_bundle_lie_in_the_cone_over_their_arc(gamma):
+    arm = single(activation_bounds=(gamma, 0.0))
+    exact = 2 * np.pi * (1 - np.cos(largest_turn(arm) / 2))
+    assert 0.999 * exact < only_cone(arm, 1 << 12) < 1.005 * exact
+
+
+def test_three_equal_longitudinal_bundles_turn_the_tip_within_a_cone_about_the_arm():
+    fiber = FiberArchitecture(revolution=0.0, extent=0.8, bundles=3)
+    arm = arm_of(fiber, activation_bounds=(-0.3, 0.0))
+    exact = 2 * np.pi * (1 - np.cos(largest_turn(arm)))
+    # Samples miss the corners of the box by about n^(-1/3) of its width.
+    assert 0.96 * exact < only_cone(arm, 1 << 16) < 1.005 * exact
+
+
+def test_a_cone_holds_its_widest_pair_and_is_no_wider_than_jungs_theorem_allows(trunk):
+    n, cell = 1 << 12, 0.1
+    spread = direction_spread(trunk, n=n, cell=cell)
+    cloud = compute_cloud(trunk, n=n, sampler="sobol", seed=0)
+    shape = configuration(trunk, cloud.activation.values, [trunk.length])
+    d3 = shape.directors.sel(director="d3").values[:, 0]
+    first = np.array([float(spread[name][0]) for name in "xyz"])
+    cells = np.rint((cloud.tip.values - first) / cell).astype(int)
+    np.testing.assert_array_equal(counted(cells, spread["samples"].shape), spread["samples"])
+    crowded = np.argwhere(spread["samples"].values > 1)
+    assert len(crowded) > 100
+    for place in crowded:
+        inside = d3[(cells == place).all(axis=1)]
+        pair = np.linalg.norm(inside[:, None] - inside, axis=2).max()  # 2 sin(angle / 2)
+        found = np.arccos(1 - float(spread["solid_angle"].values[tuple(place)]) / (2 * np.pi))
+        assert np.sin(found) > pair / 2 * (1 - 1e-9)
+        assert np.sin(found) < 1.03 * pair / np.sqrt(3)
+    assert np.isnan(spread["solid_angle"].values[spread["samples"].values == 0]).all()
+
+
+def counted(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """How many rows name each cell."""
+    counts = np.zeros(shape, int)
+    np.add.at(counts, tuple(cells.T), 1)
+    return counts
 
 
 @pytest.mark.slow
