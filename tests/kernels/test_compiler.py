@@ -8,7 +8,7 @@ import subprocess
 import sys
 
 import pytest
-from numba import njit as kernel_without_cache
+from numba import njit
 
 import softreach.kernels.compiler  # noqa: F401  (it listens to the compiler)
 from softreach.cli.first_run import compilation_announced
@@ -46,7 +46,7 @@ def test_whoever_listens_hears_what_is_compiled(caplog):
 
     made_up.__module__ = "softreach.made_up"
     with caplog.at_level(logging.INFO, "softreach.kernels.compiler"):
-        kernel_without_cache(made_up)(1.0)
+        njit(made_up)(1.0)
     assert "compiling softreach.made_up." in caplog.text
 
 
