@@ -17,14 +17,14 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.memory import peak_bytes
-from softreach import designs
+from softreach.arm import designs
 from softreach.atlas import DesignSpace, build_atlas
 from softreach.atlas.command import Command
 from softreach.atlas.metrics import METRICS, hull_metrics, image_metrics
 from softreach.atlas.store import AtlasStore, Result
 from softreach.curvature import QUANTITIES, stream_statistics
 from softreach.errors import SoftreachWarning
-from softreach.kinematics import tip_positions
+from softreach.rod.kinematics import tip_positions
 
 ALPHA, ACCURACY, TOL = 0.05, 3e-3, 1e-6
 PARTS = {

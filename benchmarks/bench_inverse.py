@@ -29,7 +29,7 @@ def prepared(arm):
     from scipy.spatial import KDTree
 
     from softreach.inverse import InverseSolver
-    from softreach.kinematics import tip_positions
+    from softreach.rod.kinematics import tip_positions
 
     solver = InverseSolver(arm)
     solver(targets_of(arm, 50)[1])
@@ -39,7 +39,7 @@ def prepared(arm):
 
 def targets_of(arm, n: int) -> tuple[np.ndarray, np.ndarray]:
     """Random activations and their tips."""
-    from softreach.kinematics import tip_positions
+    from softreach.rod.kinematics import tip_positions
 
     gamma = np.random.default_rng(0).uniform(*arm.bounds.T, (n, 3))
     return gamma, tip_positions(arm, gamma)

@@ -12,12 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from softreach.steps import steps_for
 
 import softreach as sr
 from benchmarks import tsit5
 from softreach import designs, parallel
 from softreach.kernels.compiler import FAST
-from softreach.steps import steps_for
 
 _WIDTH = 64
 

@@ -15,8 +15,8 @@ import pytest
 
 pytest.importorskip("viser", reason="the studio needs viser")
 
-from softreach import designs
-from softreach.manipulator import Manipulator
+from softreach.arm import designs
+from softreach.arm.manipulator import Manipulator
 from softreach.studio.reach import Quality, stages
 from softreach.studio.scene import Scene
 from softreach.studio.server import start_server, stop_server

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from softreach import taper
-from softreach.actuation import actuation
+from softreach.arm.tables import actuation
 from softreach.kernels.compiler import kernel
 
 LANES = 64

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
-from softreach import designs
-from softreach.manipulator import Manipulator
+from softreach.arm import designs
+from softreach.arm.manipulator import Manipulator
 from tests.browser import MISSING, browser  # noqa: F401  (a fixture)
 
 settings.register_profile(

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from softreach.actuation import actuation
-from softreach.fiber import FiberArchitecture
-from softreach.manipulator import Manipulator
+from softreach.arm.actuators import FiberArchitecture
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.tables import tables
 
 Array = NDArray[np.float64]
 
@@ -20,10 +20,10 @@ def arm_of(*fibers: FiberArchitecture, **changes: object) -> Manipulator:
         "length": 1.0,
         "outer_radius": 1 / 16,
         "inner_radius": 3 / 64,
-        "fibers": fibers,
+        "actuators": fibers,
         "activation_bounds": (-1.0, 0.0),
     }
-    return Manipulator(**(fields | changes))
+    return Manipulator.tapered(**(fields | changes))
 
 
 def single(revolution: float = 0.0, **changes: object) -> Manipulator:
@@ -48,13 +48,13 @@ def arms(draw: st.DrawFn) -> Manipulator:
     length = draw(number(0.05, 20))
     radius = length * draw(number(0.03, 0.1))
     steepest = np.arctan(0.8 * radius / length)
-    return Manipulator(
+    return Manipulator.tapered(
         length=length,
         outer_radius=radius,
         inner_radius=radius * draw(number(0, 0.95)),
         taper=draw(number(-0.1, 1)) * steepest,
         poisson_ratio=draw(number(0, 0.5)),
-        fibers=fibers,
+        actuators=fibers,
         activation_bounds=(-draw(number(0, 0.8)), draw(number(0, 0.3))),
     )
 
@@ -63,7 +63,7 @@ def integrated_tip(arm: Manipulator, gamma: Array) -> Array:
     """The tip by SciPy's eighth-order integrator on the rod's own equations (section 2)."""
 
     def rhs(z: float, state: Array) -> Array:
-        table = actuation(arm, [z])
+        table = tables(arm, [z])
         directors = state[3:].reshape(3, 3)  # rows d1, d2, d3
         zeta = 1.0 + table.extension[0] @ gamma
         u = (table.curvature[0] @ gamma) @ directors

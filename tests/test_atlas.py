@@ -49,7 +49,7 @@ SCRIPT = """
     import sys
     from pathlib import Path
     import numpy as np
-    from softreach import designs
+    from softreach.arm import designs
     from softreach.atlas import DesignSpace, build_atlas, design_task, worker_processes
 
     def build(store, n=3_000, alpha=0.3, accuracy=0.2, **options):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach import designs
+from softreach.arm import designs
 from softreach.errors import InvalidInput
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from softreach import designs
+from softreach.arm import designs
 from softreach.cloud import compute_cloud
 from softreach.dexterity import dexterity, solution_measure
 from softreach.errors import InvalidInput
 from softreach.inverse import solve_inverse
-from softreach.kinematics import tip_jacobian, tip_positions
+from softreach.rod.kinematics import tip_jacobian, tip_positions
 from softreach.workspace import reachable_set
 
 

@@ -69,7 +69,7 @@ class TestCloud:
         with np.load(tmp_path / "cloud.npz", allow_pickle=False) as data:
             np.testing.assert_array_equal(data["tip"], cloud.tip)
             np.testing.assert_array_equal(data["activation"], cloud.activation)
-            assert list(data["fiber"]) == ["left", "right", "longitudinal"]
+            assert list(data["bundle"]) == ["left", "right", "longitudinal"]
             assert str(data["design"]) == cloud.attrs["design"]
             assert int(data["seed"]) == 5
             assert str(data["tip_units"]) == "m"
@@ -79,7 +79,7 @@ class TestCloud:
         data = loadmat(tmp_path / "cloud.mat", simplify_cells=True)
         np.testing.assert_array_equal(data["tip"], cloud.tip)
         np.testing.assert_array_equal(data["activation"], cloud.activation)
-        assert list(data["fiber"]) == ["left", "right", "longitudinal"]
+        assert list(data["bundle"]) == ["left", "right", "longitudinal"]
         assert data["metadata"]["design"] == cloud.attrs["design"]
         assert data["metadata"]["seed"] == 5
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares, minimize
 
-from softreach import designs
+from softreach.arm import designs
+from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
 from softreach.inverse import InverseSolver, Solutions, Status, solve_inverse
 from softreach.inverse.problem import tips_and_slopes
-from softreach.kinematics import configuration, tip_positions
-from softreach.manipulator import Manipulator
+from softreach.rod.kinematics import configuration, tip_positions
 
 DESIGNS = [(108, 2), (75, 3), (36, 3), (0, 0)]
 

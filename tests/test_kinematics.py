@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from softreach.steps import node_tables, packed_nodes, steps_for
 
 import softreach as sr
-from softreach import designs
-from softreach.actuation import actuation
+from softreach.arm import designs
+from softreach.arm.tables import actuation
 from softreach.errors import InvalidInput
 from softreach.kernels import reference
-from softreach.steps import node_tables, packed_nodes, steps_for
 from tests.laws import arm_of, arms, in_box, integrated_tip, single
 
 

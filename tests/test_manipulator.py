@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 
 import softreach as sr
-from softreach import designs
-from softreach.report import describe, design_warnings
+from softreach.arm import designs
+from softreach.arm.summary import describe, design_warnings
 from tests.laws import arm_of, arms, single
 
 FILES = Path(__file__).parent.parent / "designs"
@@ -227,7 +227,7 @@ def test_bending_beyond_the_theory_and_large_activations_are_warned_of():
 
 @pytest.mark.parametrize("bounds", [(-0.8, -0.3), (-0.5, 0.2), (-0.4, -0.4)])
 def test_the_range_of_curvature_is_that_of_all_activations(trunk, bounds):
-    from softreach.actuation import actuation
+    from softreach.arm.tables import actuation
 
     arm = trunk.replace(activation_bounds=bounds)
     ticks = np.linspace(*bounds, 13)

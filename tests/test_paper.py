@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from softreach.cross_section import section_integrals
 
 from softreach.cli.app import run
-from softreach.cross_section import section_integrals
 from softreach.paper import printed, reproduce, reproduce_paper
 from softreach.paper.claims import CLAIMS
 from softreach.paper.settings import QUICK
@@ -134,8 +134,8 @@ def test_verdicts_follow_the_numbers(folder, words, change, verdict):
 
 @pytest.mark.slow
 def test_both_activations_of_the_example_reach_the_same_tip(folder):
-    from softreach.designs import minimal_trunk
-    from softreach.kinematics import tip_positions
+    from softreach.arm.designs import minimal_trunk
+    from softreach.rod.kinematics import tip_positions
 
     found = notebook(folder, "uniqueness")["numbers"]
     arm = minimal_trunk(*np.radians([found["revolution_deg"], found["taper_deg"]]))

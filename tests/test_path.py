@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from softreach import designs
+from softreach.arm import designs
 from softreach.errors import InvalidInput
 from softreach.inverse import Status, solve_inverse
 from softreach.inverse.problem import tips_and_slopes
-from softreach.kinematics import tip_positions
 from softreach.path import PathStatus, track_path
+from softreach.rod.kinematics import tip_positions
 
 BEGIN, END = np.array([-0.3, -0.9, -0.4]), np.array([-1.2, -0.2, -1.1])
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from softreach import designs
+from softreach.arm import designs
 from softreach.errors import InvalidInput
 from softreach.palette import bundle_color
 from softreach.plot import DesignPanel, plot_cross_section, plot_designs, plot_volume_curve

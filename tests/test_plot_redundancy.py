@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from softreach import designs
+from softreach.arm import designs
 from softreach.cloud import compute_cloud
 from softreach.errors import InvalidInput
 from softreach.plot.redundancy import (

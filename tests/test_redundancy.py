@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from softreach import designs
+from softreach.arm import designs
 from softreach.cloud import compute_cloud
 from softreach.errors import InvalidInput
 from softreach.redundancy import (

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softreach import designs
+from softreach.arm import designs
+from softreach.arm.actuators import FiberArchitecture
 from softreach.errors import InvalidDesign, InvalidInput
-from softreach.fiber import FiberArchitecture
-from softreach.kinematics import tip_positions
+from softreach.rod.kinematics import tip_positions
 from tests.laws import arm_of, in_box
 
 

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from softreach import designs, sampling
-from softreach.actuation import actuation
+from softreach.arm.actuators import FiberArchitecture
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.tables import tables
 from softreach.cloud import compute_cloud
 from softreach.errors import InvalidInput, SoftreachWarning
-from softreach.fiber import FiberArchitecture
-from softreach.kinematics import configuration, tip_positions, tips_and_jacobians
-from softreach.manipulator import Manipulator
+from softreach.rod.kinematics import configuration, tip_positions
+from softreach.rod.tip_map import tip_map
 from softreach.workspace import ReachableSet, direction_spread, reachable_set
 from softreach.workspace.surface import Surface
 from tests.laws import arm_of, single
@@ -72,10 +73,9 @@ def test_volume_is_the_integral_of_det_j_minus_what_is_covered_again(folded):
     arm = folded.arm
     cube = sampling.sample_cube("sobol", 1 << 16, 3, seed=1)
     gamma = arm.bounds[:, 0] + cube * np.diff(arm.bounds, axis=1)[:, 0]
-    tips, twists = tips_and_jacobians(arm, gamma)
-    velocity = twists[:, :3] + np.cross(twists[:, 3:], tips[:, :, None], axis=1)
+    slopes = tip_map(arm).tips_and_slopes(gamma)[1]
     box = np.prod(np.diff(arm.bounds, axis=1))
-    integral = np.abs(np.linalg.det(velocity)).mean() * box
+    integral = np.abs(np.linalg.det(slopes)).mean() * box
     again = sum((k - 1) * volume for k, volume in folded.multiplicity.items())
     assert integral - again == pytest.approx(folded.volume, rel=2e-3)
 
@@ -260,7 +260,7 @@ def only_cone(arm: Manipulator, n: int) -> float:
 
 def largest_turn(arm: Manipulator) -> float:
     """The angle [rad] by which the first bundle, longitudinal, turns the tip when it acts alone."""
-    table, gamma = actuation(arm, [0.0]), arm.bounds[0, 0]
+    table, gamma = tables(arm, [0.0]), arm.bounds[0, 0]
     stretch = 1 + table.extension[0, 0] * gamma
     return float(np.linalg.norm(table.curvature[0, :, 0] * gamma) * stretch * arm.length)
 

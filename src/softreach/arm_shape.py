@@ -14,7 +14,7 @@ from softreach.schema import configuration_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-    from softreach.manipulator import Manipulator
+    from softreach.arm.manipulator import Manipulator
 
 __all__ = ["arm_mesh", "band_mesh", "fiber_bands", "fiber_curves", "rest_configuration"]
 
@@ -39,6 +39,7 @@ def rest_configuration(arm: Manipulator, stations: int = 101) -> xr.Dataset:
         directors=np.tile(np.eye(3), (1, stations, 1, 1)),
         curvature=np.zeros((1, stations, 3)),
         extension=np.ones((1, stations)),
+        radius=arm.profile.radius(z),
     )
     return shape.isel(sample=0)
 
@@ -65,7 +66,7 @@ def fiber_curves(arm: Manipulator, configuration: xr.Dataset) -> Array:
     """The center line of every bundle on the surface: r + R2 (cos a d1 + sin a d2).
 
     Args:
-        arm: The design; a = arm.fiber_angles(Z).
+        arm: The design; a = arm.outline(Z).center.
         configuration: One configuration of that arm.
 
     Returns:
@@ -74,7 +75,9 @@ def fiber_curves(arm: Manipulator, configuration: xr.Dataset) -> Array:
     Raises:
         InvalidInput: Several configurations.
     """
-    return _surface(configuration, arm.fiber_angles(configuration["Z"].values)[..., None])[:, :, 0]
+    return _surface(configuration, arm.outline(configuration["Z"].values).center[..., None])[
+        :, :, 0
+    ]
 
 
 def fiber_bands(
@@ -94,9 +97,9 @@ def fiber_bands(
     Raises:
         InvalidInput: Several configurations.
     """
-    centers = arm.fiber_angles(configuration["Z"].values).T
+    outline = arm.outline(configuration["Z"].values)
     bands = []
-    for center, extent in zip(centers, arm.bundle_extents, strict=True):
+    for center, extent in zip(outline.center.T, outline.extent, strict=True):
         across = 2 + int(extent / step)
         angles = center[:, None] + np.linspace(-extent / 2, extent / 2, across)
         bands.append(_surface(configuration, angles[:, None], 1 + lift)[0])

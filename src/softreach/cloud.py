@@ -12,29 +12,30 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach import parallel, progress, schema
+from softreach import parallel, schema
+from softreach.arm.manipulator import Manipulator
 from softreach.atomic import replacing
 from softreach.errors import InvalidInput
-from softreach.kinematics import BLOCK, tip_task
-from softreach.manipulator import Manipulator
+from softreach.progress import Progress, bar, silent
+from softreach.rod.tip_map import BLOCK, TipMap, tip_map
 from softreach.sampling import check_sampler, cube_blocks
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["compute_cloud", "design_of", "open_cloud", "save_cloud"]
+__all__ = ["compute_cloud", "design_of", "open_cloud", "save_cloud", "tip_map_of"]
 
 Array = NDArray[np.float64]
 
 
 def compute_cloud(
-    arm: Manipulator,
+    arm: Manipulator | TipMap,
     n: int = 400_000,
     seed: int = 0,
     sampler: str = "uniform",
     *,
     tol: float = 1e-6,
-    report: progress.Progress | None = None,
+    progress: Progress | None = None,
 ) -> xr.Dataset:
     """Sample the activation box and compute the tip of each sample (section 3).
 
@@ -42,26 +43,30 @@ def compute_cloud(
     Memory is the result's own, (3 + bundles) 8 bytes a sample, and a few blocks.
 
     Args:
-        arm: The design.
+        arm: The design, or its tip map.
         n: Number of samples.
         seed: Seed of the sampler.
         sampler: `uniform` (the paper's), `boundary`, `sobol` or `grid`; see `sampling.sample_cube`.
         tol: Largest tip error, in L.
-        report: Called with the number of samples done since its last call; by default a bar is
+        progress: Called with the number of samples done since its last call; by default a bar is
             shown on a terminal when the cloud is large.
 
     Returns:
-        Dataset with `tip` (sample, axis) [m] and `activation` (sample, fiber) [-]; its attributes
+        Dataset with `tip` (sample, axis) [m] and `activation` (sample, bundle) [-]; its attributes
         hold the design, seed, sampler, tol and versions.
 
     Raises:
         InvalidInput: An argument out of range; the message says what to use instead.
     """
-    check_sampler(sampler, n, arm.bundles, seed)
-    activation, tip = np.empty((n, arm.bundles)), np.empty((n, 3))
-    with _shown(report, n) as shown:
-        _fill(arm, activation, tip, sampler, seed, tol, shown)
-    return schema.cloud_dataset(arm, activation, tip, seed=int(seed), sampler=sampler, tol=tol)
+    rod = tip_map(arm, tol)
+    bundles = rod.box.bundles
+    check_sampler(sampler, n, bundles, seed)
+    activation, tip = np.empty((n, bundles)), np.empty((n, 3))
+    with _shown(progress, n) as shown:
+        _fill(rod, activation, tip, sampler, seed, shown)
+    return schema.cloud_dataset(
+        rod.arm, activation, tip, seed=int(seed), sampler=sampler, tol=rod.tol
+    )
 
 
 def save_cloud(cloud: xr.Dataset, path: str | PathLike[str]) -> None:
@@ -98,40 +103,37 @@ def design_of(cloud: xr.Dataset) -> Manipulator:
     return Manipulator.from_toml(cloud.attrs["design"], source="the cloud's design")
 
 
+def tip_map_of(cloud: xr.Dataset) -> TipMap:
+    """The tip map that a cloud was computed with."""
+    return tip_map(design_of(cloud), float(cloud.attrs["tol"]))
+
+
 _LONG = 5_000_000  # samples from which a bar is worth its lines
 
 
 def _fill(
-    arm: Manipulator,
-    activation: Array,
-    tip: Array,
-    sampler: str,
-    seed: int,
-    tol: float,
-    report: progress.Progress,
+    rod: TipMap, activation: Array, tip: Array, sampler: str, seed: int, progress: Progress
 ) -> None:
     """Draw activations block by block and let the threads turn them into tips meanwhile."""
-    low, width = arm.bounds[:, 0], np.diff(arm.bounds, axis=1)[:, 0]
 
     def tasks() -> Iterator[Callable[[], object]]:
         first = 0
-        for cube in cube_blocks(sampler, len(tip), arm.bundles, seed, BLOCK):
+        for cube in cube_blocks(sampler, len(tip), rod.box.bundles, seed, BLOCK):
             block = slice(first, first := first + len(cube))
-            np.add(low, np.multiply(cube, width, out=cube), out=activation[block])
-            yield partial(
-                _reported, tip_task(arm, tol, activation[block], tip[block]), report, len(cube)
-            )
+            activation[block] = rod.box.from_cube(cube, out=cube)
+            task = rod.tip_task(activation[block], tip[block])
+            yield partial(_reported, task, progress, len(cube))
 
     parallel.run(tasks())
 
 
-def _reported(task: Callable[[], object], report: progress.Progress, count: int) -> None:
+def _reported(task: Callable[[], object], progress: Progress, count: int) -> None:
     task()
-    report(count)
+    progress(count)
 
 
-def _shown(report: progress.Progress | None, n: int) -> AbstractContextManager[progress.Progress]:
+def _shown(progress: Progress | None, n: int) -> AbstractContextManager[Progress]:
     """What the caller wants to hear, or a bar if the cloud is large enough to wait for."""
-    if report is None and n > _LONG:
-        return progress.bar("computing tips", n)
-    return nullcontext(report or progress.silent)
+    if progress is None and n > _LONG:
+        return bar("computing tips", n)
+    return nullcontext(progress or silent)

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.actuation import Actuation, actuation
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.tables import Tables, tables
 from softreach.cloud import design_of
 from softreach.errors import InvalidInput
-from softreach.manipulator import Manipulator
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,7 +70,7 @@ def curvature_statistics(
     Raises:
         InvalidInput: Stations off the arm, or bins or quantiles out of range.
     """
-    activation = cloud["activation"].transpose("sample", "fiber").values
+    activation = cloud["activation"].transpose("sample", "bundle").values
     rows = (activation[first : first + _BLOCK] for first in range(0, len(activation), _BLOCK))
     return stream_statistics(design_of(cloud), rows, stations, bins=bins, quantiles=quantiles)
 
@@ -97,7 +97,7 @@ def stream_statistics(
     """
     z = _checked_stations(arm, stations)
     _check_resolution(bins, quantiles)
-    table = actuation(arm, z)
+    table = tables(arm, z)
     tallies = {name: _Tally.between(*_range(arm, table, name), bins) for name in QUANTITIES}
     for block in activations:
         for k in range(len(z)):
@@ -113,16 +113,16 @@ def distal_stations(arm: Manipulator, count: int = 6) -> Array:
     return np.linspace(0.5, 1.0, count) * arm.length
 
 
-def _bending(table: Actuation, k: int, gamma: Array) -> Array:
+def _bending(table: Tables, k: int, gamma: Array) -> Array:
     u1, u2 = (_response(gamma, row) for row in table.curvature[k, :2])
     return np.hypot(u1, u2)
 
 
-def _torsion(table: Actuation, k: int, gamma: Array) -> Array:
+def _torsion(table: Tables, k: int, gamma: Array) -> Array:
     return _response(gamma, table.curvature[k, 2])
 
 
-def _extension(table: Actuation, k: int, gamma: Array) -> Array:
+def _extension(table: Tables, k: int, gamma: Array) -> Array:
     return 1.0 + _response(gamma, table.extension[k])
 
 
@@ -134,14 +134,14 @@ def _response(gamma: Array, row: Array) -> Array:
     return total
 
 
-_VALUES: dict[str, Callable[[Actuation, int, Array], Array]] = {
+_VALUES: dict[str, Callable[[Tables, int, Array], Array]] = {
     "bending": _bending,
     "torsion": _torsion,
     "extension": _extension,
 }
 
 
-def _range(arm: Manipulator, table: Actuation, name: str) -> tuple[Array, Array]:
+def _range(arm: Manipulator, table: Tables, name: str) -> tuple[Array, Array]:
     """What the activation box allows at each station: lower and upper end, shape (station,)."""
     if name == "bending":
         return np.zeros(len(table.stations)), _most_bending(arm, table)
@@ -151,7 +151,7 @@ def _range(arm: Manipulator, table: Actuation, name: str) -> tuple[Array, Array]
     return offset + ends.min(-1).sum(-1), offset + ends.max(-1).sum(-1)
 
 
-def _most_bending(arm: Manipulator, table: Actuation) -> Array:
+def _most_bending(arm: Manipulator, table: Tables) -> Array:
     """An upper bound of κ, at most 1e-5 too large: the support of (u1, u2) in many directions."""
     heading = np.linspace(0.0, 2.0 * np.pi, _HEADINGS, endpoint=False)
     toward = np.stack([np.cos(heading), np.sin(heading)], axis=1)

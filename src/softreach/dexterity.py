@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach import parallel
-from softreach.cloud import design_of
+from softreach.cloud import tip_map_of
 from softreach.errors import InvalidInput
-from softreach.kinematics import BLOCK, tips_and_jacobians
-from softreach.manipulator import Manipulator
+from softreach.rod.tip_map import BLOCK
 from softreach.schema import cell_dataset, check_cloud, tip_cells
 
 if TYPE_CHECKING:
@@ -47,13 +46,13 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
     import xarray as xr
 
     check_cloud(cloud)
-    arm, n = design_of(cloud), cloud.sizes["sample"]
+    rod, n = tip_map_of(cloud), cloud.sizes["sample"]
     measure, condition = np.empty(n), np.empty(n)
     sign = np.empty(n, np.int8)
     for rows in parallel.blocks(n, 8 * BLOCK):
-        slope = _slopes(arm, cloud.activation[rows].values, float(cloud.attrs["tol"]))
+        _, slope = rod.tips_and_slopes(cloud.activation[rows].values)
         parallel.run(_tasks(slope, measure[rows], condition[rows], sign[rows]))
-    unit = {1: "m", 2: "m2"}.get(arm.bundles, "m3")
+    unit = {1: "m", 2: "m2"}.get(rod.box.bundles, "m3")
     result = xr.Dataset(attrs=cloud.attrs)
     result["manipulability"] = ("sample", measure, {"units": unit, "long_name": "√det(J Jᵀ)"})
     result["condition"] = (
@@ -61,7 +60,7 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
         condition,
         {"units": "1", "long_name": "condition of J"},
     )
-    if arm.bundles == 3:
+    if rod.box.bundles == 3:
         result["orientation"] = ("sample", sign, {"units": "1", "long_name": "sign of det J"})
     return result
 
@@ -88,24 +87,17 @@ def solution_measure(cloud: xr.Dataset, cell: float | None = None) -> xr.Dataset
             sampled unevenly; cells that are not positive or too many.
     """
     check_cloud(cloud)
-    arm, n = design_of(cloud), cloud.sizes["sample"]
-    if arm.bundles < 3:
-        raise InvalidInput("bundles", arm.bundles, "3 or more: fewer fill no cell")
+    space, n = tip_map_of(cloud).box, cloud.sizes["sample"]
+    if space.bundles < 3:
+        raise InvalidInput("bundles", space.bundles, "3 or more: fewer fill no cell")
     if (sampler := cloud.attrs.get("sampler")) not in _EVEN:
         raise InvalidInput("sampler", sampler, f"one of {', '.join(_EVEN)}")
-    if not (box := float(np.prod(np.diff(arm.bounds)))):
-        raise InvalidInput("activation_bounds", arm.activation_bounds, "apart for every bundle")
+    if not (box := float(np.prod(space.widths))):
+        raise InvalidInput("activation_bounds", space.bounds, "apart for every bundle")
     grid = tip_cells(cloud, cell)
     total = box / n / grid.volume * grid.sum(dexterity(cloud)["manipulability"].values)
     name = {"units": "1", "long_name": "activations that reach a place: number, length, area, ..."}
     return cell_dataset(grid, solution_measure=(total, name))
-
-
-def _slopes(arm: Manipulator, gamma: Array, tol: float) -> Array:
-    """∂r/∂γ = v + ω × r [m], shape (n, 3, m)."""
-    tips, jacobians = tips_and_jacobians(arm, gamma, tol)
-    turn = np.cross(jacobians[:, 3:], tips[:, :, None], axis=1)
-    return jacobians[:, :3] + turn
 
 
 def _tasks(slope: Array, measure: Array, condition: Array, sign: Signs) -> Iterator[partial[None]]:

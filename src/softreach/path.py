@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
 from softreach.inverse import solve_inverse
 from softreach.inverse.continuation import Continuation, PathStatus, Stop
 from softreach.inverse.problem import checked_number, checked_targets
-from softreach.kinematics import tip_positions
-from softreach.manipulator import Manipulator
+from softreach.rod.kinematics import tip_positions
+from softreach.rod.tip_map import tip_map
 from softreach.schema import AXES
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ def _first(
     """An activation that puts the tip at the first point, if there is one."""
     arm = tracker.arm
     if start is not None:
-        gamma = arm.check_activations(np.atleast_2d(np.asarray(start, float)))[0]
+        gamma = tip_map(arm, tracker.tip_tol).box.check(np.atleast_2d(np.asarray(start, float)))[0]
         return tracker.begun(np.clip(gamma, *arm.bounds.T), point)
     solution = solve_inverse(arm, point[None], tol=tol, tip_tol=tracker.tip_tol)[0]
     if not len(solution):
@@ -107,13 +108,13 @@ def _dataset(
     return xr.Dataset(
         {
             "position": (("point", "axis"), points, {"units": "m"}),
-            "activation": (("point", "fiber"), activation, {"units": "1"}),
+            "activation": (("point", "bundle"), activation, {"units": "1"}),
             "tip_error": ("point", error, {"units": "m"}),
             "status": ("point", status, {"units": "1", "meanings": _MEANINGS}),
-            "end_activation": ("fiber", stop.gamma, {"units": "1"}),
+            "end_activation": ("bundle", stop.gamma, {"units": "1"}),
             "end_position": ("axis", last, {"units": "m"}),
         },
-        {"axis": list(AXES), "fiber": list(arm.bundle_names)},
+        {"axis": list(AXES), "bundle": list(arm.bundle_names)},
         {
             "design": arm.to_toml(),
             "end": "" if stop.status == PathStatus.FOLLOWED else stop.status.name.lower(),

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
-from softreach.manipulator import Manipulator
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,7 +27,7 @@ __all__ = [
     "tip_cells",
 ]
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 AXES = ("x", "y", "z")
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ _CELL = 1 / 20  # of the arm's length
 # variable -> (dimensions, unit, meaning)
 _CLOUD = {
     "tip": (("sample", "axis"), "m", "tip position"),
-    "activation": (("sample", "fiber"), "1", "activation γ of each bundle; negative contracts"),
+    "activation": (("sample", "bundle"), "1", "activation γ of each bundle; negative contracts"),
 }
 _CONFIGURATION = {
     "position": (("sample", "station", "axis"), "m", "centerline r"),
@@ -45,7 +45,7 @@ _CONFIGURATION = {
     "curvature": (("sample", "station", "component"), "1/m", "Darboux vector u in the directors"),
     "extension": (("sample", "station"), "1", "axial extension ζ"),
     "radius": (("station",), "m", "outer radius R2 before activation"),
-    "activation": (("sample", "fiber"), "1", "activation γ of each bundle; negative contracts"),
+    "activation": (("sample", "bundle"), "1", "activation γ of each bundle; negative contracts"),
 }
 
 
@@ -57,7 +57,7 @@ def cloud_dataset(
 
     attrs = {**_provenance(arm), "seed": seed, "sampler": sampler, "tol": tol}
     variables = _variables(_CLOUD, {"tip": tip, "activation": activation})
-    cloud = xr.Dataset(variables, {"axis": list(AXES), "fiber": list(arm.bundle_names)}, attrs)
+    cloud = xr.Dataset(variables, {"axis": list(AXES), "bundle": list(arm.bundle_names)}, attrs)
     cloud.tip.attrs["length"] = arm.length
     return cloud
 
@@ -68,15 +68,13 @@ def configuration_dataset(
     """Shapes of an arm at stations Z, one for each row of `activation`."""
     import xarray as xr
 
-    variables = _variables(
-        _CONFIGURATION, {**arrays, "radius": arm.radius(z), "activation": activation}
-    )
+    variables = _variables(_CONFIGURATION, {**arrays, "activation": activation})
     coordinates = {
         "Z": ("station", z, {"units": "m", "long_name": "station before activation"}),
         "axis": list(AXES),
         "director": ["d1", "d2", "d3"],
         "component": ["u1", "u2", "u3"],
-        "fiber": list(arm.bundle_names),
+        "bundle": list(arm.bundle_names),
     }
     return xr.Dataset(variables, coordinates, _provenance(arm))
 

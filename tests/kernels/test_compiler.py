@@ -17,7 +17,7 @@ SCRIPT = """
 import hashlib
 import numpy as np
 import softreach as sr
-from softreach.kinematics import tips_and_jacobians
+from softreach.rod.kinematics import tips_and_jacobians
 
 arm = sr.designs.redundant_trunk()
 gamma = np.random.default_rng(0).uniform(-5 / 3, 0, (500, 4))

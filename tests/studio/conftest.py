@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from softreach import designs
+from softreach.arm import designs
 from softreach.studio import Quality, Start, Studio, StudioState
 from tests.studio.tab import Tab
 

@@ -9,7 +9,7 @@ import re
 import numpy as np
 import pytest
 
-from softreach import designs
+from softreach.arm import designs
 from softreach.atlas import DesignSpace, build_atlas, open_atlas
 from softreach.atlas.parameter import changed
 from softreach.cloud import compute_cloud, save_cloud

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from softreach import designs
+from softreach.arm import designs
 from softreach.cloud import compute_cloud
-from softreach.kinematics import tip_positions
 from softreach.plot.coloring import ScalarKey
+from softreach.rod.kinematics import tip_positions
 from softreach.studio.axes import axes_box
 from softreach.studio.colors import color_names, key_html, manipulability, sample_colors
 from softreach.studio.jobs import Dropped

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softreach import designs
+from softreach.arm import designs
 from softreach.errors import InvalidDesign, InvalidInput
 from softreach.studio.state import (
     LEVELS,

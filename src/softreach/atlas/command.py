@@ -10,11 +10,11 @@ from typing import Any, Self
 
 import numpy as np
 
+from softreach.arm.manipulator import Manipulator
 from softreach.atlas.metrics import METRICS
 from softreach.atlas.space import DesignSpace
 from softreach.curvature import QUANTILES
 from softreach.errors import InvalidInput
-from softreach.manipulator import Manipulator
 from softreach.sampling import check_sampler
 
 __all__ = ["ATLAS_VERSION", "Command"]

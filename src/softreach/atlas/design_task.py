@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.atlas.command import Command
 from softreach.atlas.metrics import hull_metrics, image_metrics
 from softreach.atlas.store import AtlasStore, Result, StoreFailed
 from softreach.curvature import QUANTITIES, stream_statistics
 from softreach.errors import SoftreachError, SoftreachWarning
-from softreach.kinematics import tip_positions
-from softreach.manipulator import Manipulator
+from softreach.rod.kinematics import tip_positions
 
 __all__ = ["Outcome", "Remote", "activations_of", "begin_design", "run_remotely"]
 

@@ -6,10 +6,14 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from softreach import designs
+import numpy as np
+from numpy.typing import ArrayLike
+
+from softreach.arm import designs
+from softreach.arm.actuators import FiberArchitecture
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.profile import LinearTaper
 from softreach.errors import InvalidInput
-from softreach.fiber import FiberArchitecture
-from softreach.manipulator import Bounds, Manipulator
 
 __all__ = ["changed", "parameter_units"]
 
@@ -65,15 +69,11 @@ def changed(base: Manipulator, values: Mapping[str, float]) -> Manipulator:
             raise InvalidInput("parameter", name, f"one of {', '.join(known)}")
     fibers = tuple(_fibers(base, values))
     # All at once: a valid design may lie behind an invalid one.
-    return base.replace(
-        **{
-            field: values[field]
-            for field in ("length", "taper", "poisson_ratio")
-            if field in values
-        },
-        **_radii(base, values),
-        fibers=fibers,
-        activation_bounds=_bounds(base, fibers, values),
+    tube = {name: values.get(name, value) for name, value in _tube(base).items()}
+    ratio = tube.pop("radius_ratio")
+    arm = type(base).tapered(**tube, inner_radius=ratio * tube["outer_radius"], actuators=fibers)
+    return arm.replace(section=arm.section.with_inner(ratio)).with_bounds(
+        _bounds(base, fibers, values)
     )
 
 
@@ -83,13 +83,14 @@ def _keys(base: Manipulator) -> list[str]:
     return [re.sub(r"\W+", "_", name) for name in names]
 
 
-def _radii(base: Manipulator, values: Mapping[str, float]) -> dict[str, float]:
-    if not {"outer_radius", "radius_ratio"} & values.keys():
-        return {}
-    outer = values.get("outer_radius", base.outer_radius)
+def _tube(base: Manipulator) -> dict[str, float]:
+    assert isinstance(base.profile, LinearTaper)
     return {
-        "outer_radius": outer,
-        "inner_radius": outer * values.get("radius_ratio", base.radius_ratio),
+        "length": base.profile.length,
+        "outer_radius": base.profile.outer_radius,
+        "taper": base.profile.taper,
+        "radius_ratio": base.section.rings[0].inner_ratio,
+        "poisson_ratio": base.section.rings[0].material.poisson_ratio,
     }
 
 
@@ -106,13 +107,14 @@ def _fibers(base: Manipulator, values: Mapping[str, float]) -> Iterator[FiberArc
 
 def _bounds(
     base: Manipulator, fibers: tuple[FiberArchitecture, ...], values: Mapping[str, float]
-) -> Bounds:
+) -> ArrayLike:
     """Bounds as they were, unless they or the number of bundles they belong to change."""
     ends = [name for name in values if name.startswith(("lower", "upper"))]
     recounted = [fiber.bundles for fiber in fibers] != [fiber.bundles for fiber in base.fibers]
     if not ends and not (recounted and len(set(map(tuple, base.bounds.tolist()))) > 1):
-        return base.activation_bounds
-    first = [int((base.bundle_fiber < k).sum()) for k in range(len(fibers))]
+        pairs = base.bounds.tolist()
+        return pairs[0] if all(pair == pairs[0] for pair in pairs) else pairs
+    first = np.cumsum([0, *(fiber.bundles for fiber in base.fibers)])[:-1].tolist()
     pairs = [
         _pair(base.bounds[j].tolist(), key, values)
         for j, key in zip(first, _keys(base), strict=True)

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softreach.arm.manipulator import Manipulator
 from softreach.atlas.command import Command
 from softreach.atlas.design_task import activations_of
 from softreach.atlas.metrics import METRICS
 from softreach.atlas.store import DONE, FAILED, GAP, TODO, AtlasStore, absolute
 from softreach.curvature import QUANTITIES
 from softreach.errors import InvalidInput
-from softreach.kinematics import tip_positions
-from softreach.manipulator import Manipulator
+from softreach.rod.kinematics import tip_positions
 from softreach.schema import cloud_dataset
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ from typing import Any, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from softreach.arm.manipulator import Manipulator
 from softreach.atlas.parameter import changed, parameter_units
 from softreach.errors import InvalidDesign, InvalidInput
-from softreach.manipulator import Manipulator
 
 __all__ = ["DesignSpace"]
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from softreach.arm.manipulator import Manipulator
 from softreach.atlas.parameter import parameter_units
 from softreach.atlas.space import DesignSpace
 from softreach.errors import InvalidInput
-from softreach.manipulator import Manipulator
 
 __all__ = ["parse_parameter", "parse_space", "written_keys"]
 

@@ -26,9 +26,10 @@ def demo(
     """
     from time import perf_counter
 
-    from softreach import designs, export, plot
+    from softreach import export, plot
+    from softreach.arm import designs
     from softreach.cloud import compute_cloud, save_cloud
-    from softreach.kinematics import configuration
+    from softreach.rod.kinematics import configuration
     from softreach.volume import concave_hull, convex_hull
 
     start = perf_counter()

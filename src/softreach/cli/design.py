@@ -27,7 +27,7 @@ def design(
     """
     import sys
 
-    from softreach.report import describe
+    from softreach.arm.summary import describe
 
     arm = design_from(design, revolution_deg, taper_deg)
     facts = describe(arm)
@@ -39,7 +39,7 @@ def design(
         "helical angle": (_degrees(facts.helical_angles), "deg"),
         "revolution": (_degrees(facts.revolutions), "deg"),
         "length": (arm.length, "m"),
-        "outer radius at base": (arm.outer_radius, "m"),
+        "outer radius at base": (facts.base_radius, "m"),
         "outer radius at tip": (facts.tip_radius, "m"),
         "base to tip ratio": (facts.taper_ratio, ""),
         "inner to outer radius": (facts.radius_ratio, ""),

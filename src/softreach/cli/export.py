@@ -34,7 +34,7 @@ def export(
 
         files.export_cloud(open_cloud(source), out)
     else:
-        from softreach.kinematics import configuration
+        from softreach.rod.kinematics import configuration
 
         arm = design_from(source)
         files.export_arm(arm, configuration(arm, activation_of(activation, arm)), out)

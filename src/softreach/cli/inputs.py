@@ -13,7 +13,7 @@ from softreach.errors import InvalidDesign, InvalidInput
 if TYPE_CHECKING:
     import xarray as xr
 
-    from softreach.manipulator import Manipulator
+    from softreach.arm.manipulator import Manipulator
 
 __all__ = [
     "Activation",
@@ -51,7 +51,8 @@ def design_from(
     text: str, revolution_deg: float | None = None, taper_deg: float | None = None
 ) -> Manipulator:
     """The design of that name or file, varied as asked."""
-    from softreach import design_file, designs
+    from softreach.arm import designs, file
+    from softreach.arm.tables import check_extension
 
     built_in = {name: getattr(designs, name) for name in ("minimal_trunk", "redundant_trunk")}
     if text in built_in:
@@ -61,17 +62,19 @@ def design_from(
     else:
         raise InvalidInput("design", text, f"a .toml file, or one of {', '.join(built_in)}")
     try:
-        return designs.varied(
+        relative = designs.varied(
             arm,
             revolution=None if revolution_deg is None else math.radians(revolution_deg),
             taper=None if taper_deg is None else math.radians(taper_deg),
         )
+        check_extension(relative)
+        return relative
     except InvalidDesign as error:
-        raise design_file.in_file_terms(error, text) from None
+        raise file.in_file_terms(error, text) from None
 
 
 def _loaded(path: str) -> Manipulator:
-    from softreach.manipulator import Manipulator
+    from softreach.arm.manipulator import Manipulator
 
     if not Path(path).is_file():
         raise InvalidInput("design", path, "a file that exists")

@@ -31,7 +31,7 @@ def show(
 
     from softreach import plot
     from softreach.cloud import design_of
-    from softreach.kinematics import configuration
+    from softreach.rod.kinematics import configuration
 
     _check_suffix(out)
     cloud = cloud_of(source, n, seed, sampler)

@@ -12,7 +12,7 @@ from softreach.palette import bundle_color
 if TYPE_CHECKING:
     import xarray as xr
 
-    from softreach.manipulator import Manipulator
+    from softreach.arm.manipulator import Manipulator
 
 __all__ = ["export_arm"]
 

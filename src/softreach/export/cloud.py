@@ -75,7 +75,7 @@ def _write_parquet(table: CloudTable, path: Path) -> None:
 
 def _write_npz(table: CloudTable, path: Path) -> None:
     described = {key: np.array(value) for key, value in table.metadata.items()}
-    arrays = {"tip": table.tip, "activation": table.activation, "fiber": np.array(table.fibers)}
+    arrays = {"tip": table.tip, "activation": table.activation, "bundle": np.array(table.bundles)}
     np.savez(path, **{**described, **arrays})
 
 
@@ -90,7 +90,7 @@ def _write_mat(table: CloudTable, path: Path) -> None:
         {
             "tip": table.tip,
             "activation": table.activation,
-            "fiber": np.array(table.fibers, dtype=object),
+            "bundle": np.array(table.bundles, dtype=object),
             "metadata": table.metadata,
         },
         oned_as="row",

@@ -28,7 +28,7 @@ class CloudTable(NamedTuple):
     """[m], shape (sample, 3)."""
     activation: Array
     """γ [-], shape (sample, fiber)."""
-    fibers: tuple[str, ...]
+    bundles: tuple[str, ...]
     """Names of the bundles as the cloud has them."""
     metadata: dict[str, str | int | float]
     """Design (TOML), seed, tolerance, versions and units."""
@@ -36,7 +36,7 @@ class CloudTable(NamedTuple):
     @property
     def gammas(self) -> list[str]:
         """Names of the activation columns."""
-        return column_names(self.fibers)
+        return column_names(self.bundles)
 
     def columns(self, rows: slice = slice(None)) -> dict[str, Array]:
         """Contiguous columns by name: x, y, z, then the activations."""
@@ -66,7 +66,7 @@ def cloud_table(cloud: xr.Dataset) -> CloudTable:
     tip, activation = cloud["tip"], cloud["activation"]
     return CloudTable(
         tip.transpose("sample", "axis").values.astype(float, copy=False),
-        activation.transpose("sample", "fiber").values.astype(float, copy=False),
+        activation.transpose("sample", "bundle").values.astype(float, copy=False),
         _fiber_names(activation),
         _metadata(cloud),
     )
@@ -87,9 +87,9 @@ def column_names(fibers: Sequence[str]) -> list[str]:
 
 
 def _fiber_names(activation: xr.DataArray) -> tuple[str, ...]:
-    if "fiber" in activation.coords:
-        return tuple(map(str, activation["fiber"].values))
-    return tuple(str(k + 1) for k in range(activation.sizes["fiber"]))
+    if "bundle" in activation.coords:
+        return tuple(map(str, activation["bundle"].values))
+    return tuple(str(k + 1) for k in range(activation.sizes["bundle"]))
 
 
 def _metadata(cloud: xr.Dataset) -> dict[str, str | int | float]:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.inverse.branches import Aim, Found, conditions, distinct, every_branch, starts
 from softreach.inverse.mesh import box_mesh
 from softreach.inverse.nearest import Landmarks, Nearest, descend, landmarks, nearest
@@ -19,7 +20,6 @@ from softreach.inverse.solutions import Solutions, Status
 from softreach.inverse.tree import space_tree
 from softreach.kernels.images import Mesh
 from softreach.kernels.space_tree import SpaceTree
-from softreach.manipulator import Manipulator
 
 __all__ = ["CELLS", "Answer", "Preparation", "Wishes", "answer", "collected"]
 

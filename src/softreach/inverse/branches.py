@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach import parallel
+from softreach.arm.manipulator import Manipulator
 from softreach.inverse.problem import tips_and_slopes
 from softreach.kernels import candidates, folds, newton
 from softreach.kernels.images import Mesh
 from softreach.kernels.newton import CONVERGED, UNDER_WAY, Search
 from softreach.kernels.space_tree import SpaceTree
-from softreach.kinematics import tip_positions
-from softreach.manipulator import Manipulator
+from softreach.rod.kinematics import tip_positions
 
 __all__ = ["Aim", "Found", "conditions", "distinct", "every_branch", "starts"]
 

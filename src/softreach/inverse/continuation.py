@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.inverse.problem import tips_and_slopes
-from softreach.manipulator import Manipulator
 
 __all__ = ["Continuation", "PathStatus", "Stop"]
 

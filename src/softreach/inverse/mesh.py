@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.inverse.problem import position_jacobian
+from softreach.arm.manipulator import Manipulator
+from softreach.inverse.problem import tips_and_slopes
 from softreach.kernels.images import Mesh, blurs
 from softreach.kernels.simplices import corner_bits
-from softreach.kinematics import tips_and_jacobians
-from softreach.manipulator import Manipulator
 
 __all__ = ["box_mesh"]
 
@@ -82,8 +81,7 @@ class _Lattice:
         low, high = self.arm.bounds.T
         part = place / (self.side - 1)
         gamma = low * (1 - part) + high * part
-        tip, jacobian = tips_and_jacobians(self.arm, gamma, self.tol)
-        slope = position_jacobian(tip, jacobian)
+        tip, slope = tips_and_slopes(self.arm, gamma, self.tol)
         self.key = np.concatenate([self.key, key])
         self.gamma = np.concatenate([self.gamma, gamma])
         self.tip = np.concatenate([self.tip, tip])

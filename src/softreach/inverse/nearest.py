@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.inverse.minimum import Minimum, minimum
 from softreach.inverse.objective import Objective
-from softreach.kinematics import tip_positions
-from softreach.manipulator import Manipulator
+from softreach.rod.kinematics import tip_positions
 from softreach.sampling import sample_cube
 
 __all__ = ["Landmarks", "Nearest", "descend", "landmarks", "nearest"]

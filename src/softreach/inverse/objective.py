@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.inverse.problem import position_jacobian
-from softreach.kinematics import configuration, tips_and_jacobians
-from softreach.manipulator import Manipulator
+from softreach.arm.manipulator import Manipulator
+from softreach.rod.tip_map import tip_map
 
 __all__ = ["Objective", "tip_directions"]
 
@@ -44,9 +43,9 @@ class Objective:
 
     def __call__(self, which: Index, gamma: Array) -> tuple[Array, Array]:
         """Values and gradients at activations (k, m) of the chosen targets (k,)."""
-        tips, jacobians = tips_and_jacobians(self.arm, gamma, self.tol)
+        tips, slope = tip_map(self.arm, self.tol).tips_and_slopes(gamma)
         miss = (tips - self.targets[which]) / self.arm.length
-        slope = position_jacobian(tips, jacobians) / self.arm.length
+        slope /= self.arm.length
         force = self.penalty * miss
         value = 0.5 * self.penalty * _squares(miss)
         if self.multiplier is not None:
@@ -62,6 +61,7 @@ class Objective:
             d3 = tip_directions(self.arm, gamma, self.tol)
             value += 0.5 * self.weight**2 * _squares(d3 - wanted)
             # ∂d3 = ω × d3, so that ½|d3 - e|² changes by -(ω × d3)·e = -ω·(d3 × e)
+            jacobians = tip_map(self.arm, self.tol).tip_twists(gamma)[1]
             twist = np.einsum("nij,ni->nj", jacobians[:, 3:], np.cross(d3, wanted))
             gradient -= self.weight**2 * twist
         return value, gradient
@@ -69,8 +69,7 @@ class Objective:
 
 def tip_directions(arm: Manipulator, gamma: Array, tol: float) -> Array:
     """Tangents d3 of the tips, shape (n, 3)."""
-    shape = configuration(arm, gamma, np.array([arm.length]), tol)
-    return np.ascontiguousarray(shape.directors.values[:, 0, 2])
+    return tip_map(arm, tol).tip_directions(gamma)
 
 
 def _squares(rows: Array) -> Array:

@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
-from softreach.kinematics import tips_and_jacobians
-from softreach.manipulator import Manipulator
+from softreach.rod.tip_map import tip_map
 
 __all__ = [
     "checked_direction",
     "checked_near",
     "checked_number",
     "checked_targets",
-    "position_jacobian",
     "tips_and_slopes",
 ]
 
@@ -67,16 +66,6 @@ def checked_number(name: str, value: float, low: float, high: float) -> float:
     return value
 
 
-def position_jacobian(tips: Array, jacobians: Array) -> Array:
-    """∂r/∂γ = v + ω × r [m] from the spatial twists of `tip_jacobian`, shape (n, 3, bundles)."""
-    v, w = jacobians[:, :3], jacobians[:, 3:]
-    slope = v.copy()
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        slope[:, i] += w[:, j] * tips[:, k, None] - w[:, k] * tips[:, j, None]
-    return slope
-
-
 def tips_and_slopes(arm: Manipulator, gamma: Array, tol: float) -> tuple[Array, Array]:
     """Tips [m], shape (n, 3), and their derivatives ∂r/∂γ [m], shape (n, 3, bundles)."""
-    tips, jacobians = tips_and_jacobians(arm, gamma, tol)
-    return tips, position_jacobian(tips, jacobians)
+    return tip_map(arm, tol).tips_and_slopes(gamma)

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.inverse.minimum import minimum
 from softreach.inverse.nearest import Landmarks
 from softreach.inverse.objective import Objective, tip_directions
 from softreach.inverse.problem import tips_and_slopes
-from softreach.manipulator import Manipulator
 
 __all__ = ["LeastChange", "least_change", "least_changes"]
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.manipulator import Manipulator
+from softreach.arm.manipulator import Manipulator
 from softreach.schema import AXES
 
 if TYPE_CHECKING:
@@ -151,17 +151,17 @@ class Solutions(Sequence[Solution]):
                 "status": ("target", self.status, {"units": "1", "meanings": meanings}),
                 "nearest": (("target", "axis"), self.nearest, {"units": "m"}),
                 "nearest_activation": (
-                    ("target", "fiber"),
+                    ("target", "bundle"),
                     self.nearest_activation,
                     {"units": "1"},
                 ),
                 "gap": ("target", self.gap, {"units": "m"}),
                 "target_of": ("solution", np.repeat(np.arange(len(self)), self.counts)),
-                "activation": (("solution", "fiber"), self.activations, {"units": "1"}),
+                "activation": (("solution", "bundle"), self.activations, {"units": "1"}),
                 "residual": ("solution", self.residuals, {"units": "m"}),
                 "condition": ("solution", self.condition, {"units": "1"}),
                 "margin": ("solution", self.margin, {"units": "1"}),
             },
-            {"axis": list(AXES), "fiber": list(self.arm.bundle_names)},
+            {"axis": list(AXES), "bundle": list(self.arm.bundle_names)},
             {"design": self.arm.to_toml()},
         )

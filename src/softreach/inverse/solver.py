@@ -7,6 +7,7 @@ from functools import lru_cache
 from numpy.typing import ArrayLike
 
 from softreach import parallel
+from softreach.arm.manipulator import Manipulator
 from softreach.inverse.answer import CELLS, Preparation, Wishes, answer, collected
 from softreach.inverse.problem import (
     checked_direction,
@@ -15,7 +16,6 @@ from softreach.inverse.problem import (
     checked_targets,
 )
 from softreach.inverse.solutions import Solutions
-from softreach.manipulator import Manipulator
 
 __all__ = ["InverseSolver", "solve_inverse"]
 

@@ -38,7 +38,7 @@ class _Log(event.Listener):
     """Logs what is being compiled; a library prints nothing, the command line listens."""
 
     def on_start(self, event: event.Event) -> None:
-        function = getattr((event.data or {}).get("dispatcher"), "py_func", None)
+        function: Any = getattr((event.data or {}).get("dispatcher"), "py_func", None)
         if getattr(function, "__module__", "").startswith("softreach"):
             _LOG.info("compiling %s.%s", function.__module__, function.__qualname__)
 

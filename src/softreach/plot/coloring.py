@@ -54,7 +54,7 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike = "rgb") -> Co
     Raises:
         InvalidInput: No such bundle, or an array of another length.
     """
-    activation = cloud["activation"].transpose("sample", "fiber")
+    activation = cloud["activation"].transpose("sample", "bundle")
     names = _names(activation)
     if isinstance(color, str) and color == "rgb":
         lights = activation_colors(np.eye(len(names)))
@@ -102,9 +102,9 @@ _ABOVE: dict[str, Any] = {
 
 
 def _names(activation: xr.DataArray) -> list[str]:
-    if "fiber" in activation.coords:
-        return [str(name) for name in activation["fiber"].values]
-    return [str(k + 1) for k in range(activation.sizes["fiber"])]
+    if "bundle" in activation.coords:
+        return [str(name) for name in activation["bundle"].values]
+    return [str(k + 1) for k in range(activation.sizes["bundle"])]
 
 
 def _bundle(names: list[str], color: str | int | np.integer) -> int:

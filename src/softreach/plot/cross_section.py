@@ -14,7 +14,7 @@ from softreach.plot.style import figure_style, small_axes
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from softreach.manipulator import Manipulator
+    from softreach.arm.manipulator import Manipulator
 
 __all__ = ["plot_cross_section"]
 
@@ -46,14 +46,14 @@ def plot_cross_section(
     """
     if not 0 <= z <= arm.length:
         raise InvalidInput("z", z, f"within [0, {arm.length:g}] m")
-    outer = float(arm.radius(z)) / arm.length
+    outer = float(arm.profile.radius(z)) / arm.length
     with figure_style(ax):
         ax = small_axes(2.0, 2.0) if ax is None else ax
-        _draw_ring(ax, outer, arm.radius_ratio)
-        angles = np.degrees(arm.fiber_angles(np.array([z]))[0])
-        extents = np.degrees(arm.bundle_extents)
+        outline = arm.outline(z)
+        _draw_ring(ax, outer, outline.inner_ratio.min())
+        angles, extents = np.degrees(outline.center[0]), np.degrees(outline.extent)
         for k in range(arm.bundles) if bundles is None else bundles:
-            _draw_sector(ax, outer, arm.radius_ratio, angles[k], extents[k], k)
+            _draw_sector(ax, outer, outline.inner_ratio[k], angles[k], extents[k], k)
         half = 1.08 * outer if reach is None else reach
         ax.set(aspect="equal", xlim=(-half, half), ylim=(-half, half), xlabel="x / L")
         ax.set_ylabel("y / L")

@@ -17,7 +17,7 @@ from softreach.plot.style import figure_style, pyplot
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from softreach.manipulator import Manipulator
+    from softreach.arm.manipulator import Manipulator
 
 __all__ = ["DesignPanel", "plot_designs"]
 
@@ -48,7 +48,7 @@ def plot_designs(
     """
     box = bounding_box(*(arm_points(p.arm, rest_configuration(p.arm)) for p in panels))
     reach = 1.08 * max(
-        float(p.arm.radius(s * p.arm.length)) / p.arm.length
+        float(p.arm.profile.radius(s * p.arm.length)) / p.arm.length
         for p in panels
         for s in (*stations, 0.0)
     )

@@ -188,7 +188,7 @@ def plot_redundancy(
     with figure_style():
         axes = _rows(list(clouds), box, width)
         for title, row in axes.items():
-            cloud, last = clouds[title], clouds[title].sizes["fiber"] - 1
+            cloud, last = clouds[title], clouds[title].sizes["bundle"] - 1
             bundle = last if bundles is None else bundles[title]
             shared = {"box": box, "key": False}
             coloring = color_samples(cloud, bundle)

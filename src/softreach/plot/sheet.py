@@ -171,7 +171,7 @@ def _draw_cloud(ax: Axes, cloud: xr.Dataset, box: Array, view: View) -> None:
     tips = tips_in_lengths(cloud)
     pixels = point_size(len(tips), box) * columns / (extent.right - extent.left)
     buffer = ZBuffer(extent, columns, oversample=2, color_step=8)
-    colors = activation_colors(cloud["activation"].transpose("sample", "fiber").values)
+    colors = activation_colors(cloud["activation"].transpose("sample", "bundle").values)
     buffer.draw_points(project(tips, view), colors, max(1.0, pixels))
     _show(ax, buffer)
 

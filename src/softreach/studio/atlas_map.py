@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
-from softreach.manipulator import Manipulator
 from softreach.studio.parameter_value import parameter_value
 from softreach.studio.state import MapView
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.kinematics import tips_and_jacobians
-from softreach.manipulator import Manipulator
+from softreach.arm.manipulator import Manipulator
 from softreach.plot.coloring import BundleKey, Coloring, ScalarKey, color_samples
 from softreach.redundancy import activation_distance
+from softreach.rod.tip_map import tip_map
 from softreach.studio.jobs import kernels
 from softreach.studio.reach import Reach, shown_samples
 
@@ -73,8 +73,7 @@ def manipulability(arm: Manipulator, activation: Array) -> Array:
 
     J = ∂r/∂γ [L]; with fewer than three bundles √det(Jᵀ J): an area or a length.
     """
-    tips, twists = tips_and_jacobians(arm, activation, 1e-5)
-    slope = twists[:, :3] + np.cross(twists[:, 3:], tips[:, :, None], axis=1)
+    _, slope = tip_map(arm, 1e-5).tips_and_slopes(activation)
     return np.prod(np.linalg.svd(slope / arm.length, compute_uv=False), axis=1)
 
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
 from softreach.export import export_cloud, export_mesh
-from softreach.kinematics import configuration
-from softreach.manipulator import Manipulator
+from softreach.rod.kinematics import configuration
 from softreach.studio.colors import color_label, sample_values
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.slicing import in_slice

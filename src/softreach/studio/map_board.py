@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.manipulator import Manipulator
+from softreach.arm.manipulator import Manipulator
 from softreach.studio.atlas_map import AtlasMap, atlas_map, held_places
 from softreach.studio.picking import plane_crossing
 from softreach.studio.scene import Scene

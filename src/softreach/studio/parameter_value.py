@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from softreach.atlas.parameter import parameter_units
+from softreach.arm.manipulator import Manipulator
+from softreach.atlas.parameter import _tube, parameter_units
 from softreach.errors import InvalidInput
-from softreach.manipulator import Manipulator
 
 __all__ = ["fiber_keys", "parameter_value"]
 
@@ -25,20 +25,23 @@ def parameter_value(arm: Manipulator, name: str) -> float:
     if name not in parameter_units(arm):
         raise InvalidInput("parameter", name, f"one of {', '.join(parameter_units(arm))}")
     if name == "revolution":
-        turns = [abs(turn) for turn in arm.revolutions.tolist() if turn]
+        turns = [abs(turn) for turn in _revolutions(arm) if turn]
         return turns[0] if turns else 0.0
     if name in ("extent", "lower", "upper"):
         return _of_fiber(arm, 0, name)
     for number, key in enumerate(fiber_keys(arm)):
         if (field := name.removesuffix(f"_{key}")) in _FIELDS:
             return _of_fiber(arm, number, field)
-    return float(getattr(arm, name))
+    return _tube(arm)[name]
+
+
+def _revolutions(arm: Manipulator) -> list[float]:
+    return [fiber.revolution_on(arm.profile, arm.section) for fiber in arm.fibers]
 
 
 def _of_fiber(arm: Manipulator, number: int, field: str) -> float:
     if field in ("lower", "upper"):
-        first = int((arm.bundle_fiber < number).sum())
-        return float(arm.bounds[first, int(field == "upper")])
+        return float(arm.fibers[number].bounds[0, int(field == "upper")])
     if field == "revolution":
-        return float(arm.revolutions[number])
+        return _revolutions(arm)[number]
     return float(getattr(arm.fibers[number], field))

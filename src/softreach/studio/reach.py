@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.cloud import compute_cloud, design_of
 from softreach.errors import SoftreachWarning
-from softreach.manipulator import Manipulator
 from softreach.studio.jobs import StaleCheck, kernels
 from softreach.volume import concave_hull
 from softreach.workspace import ReachableSet, reachable_set
@@ -99,7 +99,7 @@ def stages(arm: Manipulator, level: int, quality: Quality, check: StaleCheck) ->
         check()
         with kernels:
             cloud = compute_cloud(
-                arm, 1 << points, 0, "sobol", tol=quality.tol, report=lambda _: check()
+                arm, 1 << points, 0, "sobol", tol=quality.tol, progress=lambda _: check()
             )
             exact = _exact(arm, accuracy, quality.tol, check)
         yield Reach(cloud=cloud, exact=exact, fine=stage == 1)

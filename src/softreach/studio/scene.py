@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.arm_shape import arm_mesh, fiber_bands
 from softreach.geometry.tube import grid_faces
-from softreach.kinematics import configuration
-from softreach.manipulator import Manipulator
 from softreach.palette import BODY, bundle_color
+from softreach.rod.kinematics import configuration
 from softreach.studio.axes import axes_box
 from softreach.studio.colors import sample_colors
 from softreach.studio.reach import Reach, cloud_points

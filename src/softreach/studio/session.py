@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.errors import SoftreachError
-from softreach.manipulator import Manipulator
 from softreach.studio.jobs import Latest, StaleCheck
 from softreach.studio.map_board import MapBoard
 from softreach.studio.reach import Reach, cloud_points, stages

@@ -8,8 +8,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
-from softreach.manipulator import Manipulator
 from softreach.studio.atlas_map import metric_names
 from softreach.studio.reach import Quality, Reach, reached
 from softreach.studio.state import StudioState

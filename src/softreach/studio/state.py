@@ -10,8 +10,8 @@ from typing import Any, Self
 
 import numpy as np
 
+from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
-from softreach.manipulator import Manipulator
 
 __all__ = [
     "LEVELS",

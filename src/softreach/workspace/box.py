@@ -8,8 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.kinematics import tip_positions, tips_and_jacobians
-from softreach.manipulator import Manipulator
+from softreach.arm.manipulator import Manipulator
+from softreach.rod.kinematics import tip_positions
+from softreach.rod.tip_map import tip_map
 
 __all__ = ["ActivationBox"]
 
@@ -68,9 +69,8 @@ class ActivationBox:
     def _stretch(self, gamma: Array) -> Array:
         """The change of measure of the map at each activation: det J where J is square."""
         # Far fewer evaluations than on the grids: their steps may be short.
-        tips, twists = tips_and_jacobians(self.arm, gamma, min(self.tol, 1e-9))
-        turning = np.cross(twists[:, 3:], tips[:, :, None], axis=1)
-        velocity = (twists[:, :3] + turning)[:, :, self.axes]
+        _, slopes = tip_map(self.arm, min(self.tol, 1e-9)).tips_and_slopes(gamma)
+        velocity = slopes[:, :, self.axes]
         if self.m == 3:
             return np.linalg.det(velocity)
         return np.sqrt(np.linalg.det(np.swapaxes(velocity, 1, 2) @ velocity).clip(0.0))

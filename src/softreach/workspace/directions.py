@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach import parallel
+from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
-from softreach.kinematics import configuration
-from softreach.manipulator import Manipulator
+from softreach.rod.kinematics import configuration
 from softreach.sampling import sample_cube
 from softreach.workspace.image import Lattice
 

@@ -7,10 +7,10 @@ import warnings
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput, SoftreachWarning
 from softreach.geometry.hull import convex_hull
 from softreach.kernels.simplices import chains, corner_steps
-from softreach.manipulator import Manipulator
 from softreach.progress import Progress, silent
 from softreach.workspace import measure
 from softreach.workspace.box import ActivationBox

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
 from softreach.geometry.delaunay import finite_points
-from softreach.manipulator import Manipulator
 from softreach.workspace.image import Image
 from softreach.workspace.surface import (
     Surface,

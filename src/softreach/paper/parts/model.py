@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from softreach.designs import minimal_trunk
-from softreach.kinematics import tip_positions
-from softreach.manipulator import Manipulator
+from softreach.arm.designs import minimal_trunk
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.summary import describe
 from softreach.paper.notebook import Notebook
 from softreach.paper.settings import Settings
+from softreach.rod.kinematics import tip_positions
 
 __all__ = ["model"]
 
@@ -19,10 +20,11 @@ def model(settings: Settings, folder: Path, notes: Notebook) -> None:
     """The design, its angles, its symmetry."""
     del folder
     arm = minimal_trunk(taper=np.radians(3))
+    facts = describe(arm)
     corners = [minimal_trunk(np.radians(o), np.radians(p)) for o in (0, 108) for p in (0, 3)]
     notes.note(
-        narrowing=arm.outer_radius / arm.tip_radius,
-        helical_angle_deg=float(np.degrees(arm.helical_angles[1])),
+        narrowing=facts.taper_ratio,
+        helical_angle_deg=float(np.degrees(facts.helical_angles[1])),
         gap_deg=_gap(arm),
         asymmetry=max(_asymmetry(corner, settings.seed) for corner in corners),
     )
@@ -31,9 +33,9 @@ def model(settings: Settings, folder: Path, notes: Notebook) -> None:
 
 def _gap(arm: Manipulator) -> float:
     """Angle between the right-handed bundle and the longitudinal one at the tip [deg]."""
-    angles = arm.fiber_angles(np.array([arm.length]))[0]
+    angles = arm.outline(arm.length).center[0]
     apart = (angles[1] - angles[2] + np.pi) % (2 * np.pi) - np.pi
-    return float(np.degrees(abs(apart) - arm.bundle_extents[1:].mean()))
+    return float(np.degrees(abs(apart) - arm.outline(0.0).extent[1:].mean()))
 
 
 def _asymmetry(arm: Manipulator, seed: int) -> float:

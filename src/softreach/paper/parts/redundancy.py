@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach import designs
+from softreach.arm import designs
 from softreach.cloud import compute_cloud
 from softreach.dexterity import solution_measure
 from softreach.paper.notebook import Notebook
@@ -19,7 +19,7 @@ from softreach.redundancy import activation_distance, redundancy_summary, tip_de
 if TYPE_CHECKING:
     import xarray as xr
 
-    from softreach.manipulator import Manipulator
+    from softreach.arm.manipulator import Manipulator
 
 __all__ = ["redundancy"]
 
@@ -39,8 +39,8 @@ def redundancy(settings: Settings, folder: Path, notes: Notebook) -> None:
         samples=settings.redundant_samples,
         queries=settings.queries,
         radius=_RADIUS,
-        offsets_deg=np.degrees(arms["redundant"].bundle_angles[2:]).round(9).tolist(),
-        extent_deg=float(np.degrees(arms["redundant"].bundle_extents[2]).round(9)),
+        offsets_deg=np.degrees(arms["redundant"].outline(0.0).center[0][2:]).round(9).tolist(),
+        extent_deg=float(np.degrees(arms["redundant"].outline(0.0).extent[2]).round(9)),
         **{name: _found(clouds[name], distances[name]) for name in arms},
     )
     _draw(arms, clouds, distances, notes)

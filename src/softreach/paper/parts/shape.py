@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.designs import minimal_trunk
+from softreach.arm.designs import minimal_trunk
 from softreach.workspace import reachable_set
 
 __all__ = ["Shape", "shapes"]

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softreach.arm.designs import minimal_trunk
 from softreach.atlas import DesignSpace, build_atlas
-from softreach.designs import minimal_trunk
 from softreach.paper.atlas_figures import atlas_figures
 from softreach.paper.notebook import Notebook
 from softreach.paper.parts.shape import ASIDE, shapes

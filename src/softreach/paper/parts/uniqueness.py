@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.designs import minimal_trunk
+from softreach.arm.designs import minimal_trunk
+from softreach.arm.manipulator import Manipulator
 from softreach.inverse import solve_inverse
-from softreach.kinematics import configuration
-from softreach.manipulator import Manipulator
 from softreach.paper.notebook import Notebook
 from softreach.paper.parts.sweep import swept
 from softreach.paper.settings import Settings
+from softreach.rod.kinematics import configuration
 from softreach.workspace import ReachableSet, reachable_set
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def _apart(activations: Array) -> float:
 def _fewer_fibers() -> dict[str, float]:
     """Area of what two fibers reach and length of what one does, for L = 1 m."""
     arm = minimal_trunk()
-    sets = [reachable_set(arm.replace(fibers=arm.fibers[:count])) for count in (2, 1)]
+    sets = [reachable_set(arm.replace(actuators=arm.actuators[:count])) for count in (2, 1)]
     return {name: reached.measure for name, reached in zip(("area", "curve"), sets, strict=True)}
 
 

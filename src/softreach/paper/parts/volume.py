@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from softreach.arm.designs import minimal_trunk
 from softreach.cloud import compute_cloud
-from softreach.designs import minimal_trunk
 from softreach.paper.notebook import Notebook
 from softreach.paper.settings import Settings
 from softreach.volume import volume_curve

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING, Any
 
-from softreach.manipulator import Manipulator
+from softreach.arm.manipulator import Manipulator
 from softreach.studio.panels.binding import bind, bind_button
 from softreach.studio.state import StudioState
 

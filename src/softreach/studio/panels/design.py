@@ -8,13 +8,14 @@ import threading
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from softreach.arm.file import in_file_terms
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.summary import describe
 from softreach.atlas.parameter import changed
-from softreach.design_file import in_file_terms
 from softreach.errors import InvalidDesign
-from softreach.manipulator import Manipulator
 from softreach.studio.panels.binding import bind, bind_button
 from softreach.studio.panels.status import reach_text
-from softreach.studio.parameter_value import fiber_keys
+from softreach.studio.parameter_value import fiber_keys, parameter_value
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -49,12 +50,22 @@ class Control(NamedTuple):
 
 def controls(arm: Manipulator) -> list[Control]:
     """The sliders of a design."""
-    helical = [abs(turn) for turn in arm.revolutions.tolist() if turn]
+    helical = [abs(turn) for turn in describe(arm).revolutions.tolist() if turn]
     low, high = arm.bounds[0].tolist()
     found = [
-        Control("taper", "taper φ [deg]", arm.taper, -2, 5, 0.05, _DEG),
-        Control("radius_ratio", "inner / outer radius", arm.radius_ratio, 0, 1, 0.01),
-        Control("outer_radius", "outer radius / L", arm.outer_radius, 0.02, 0.12, 5e-4, arm.length),
+        Control("taper", "taper φ [deg]", parameter_value(arm, "taper"), -2, 5, 0.05, _DEG),
+        Control(
+            "radius_ratio", "inner / outer radius", parameter_value(arm, "radius_ratio"), 0, 1, 0.01
+        ),
+        Control(
+            "outer_radius",
+            "outer radius / L",
+            parameter_value(arm, "outer_radius"),
+            0.02,
+            0.12,
+            5e-4,
+            arm.length,
+        ),
         Control("extent", "extent σ [deg]", arm.fibers[0].extent, 2, 120, 1, _DEG),
         Control("lower", "lowest γ", low, -4, 0, 0.01),
         Control("upper", "highest γ", high, -1, 2, 0.01),
@@ -69,7 +80,9 @@ _DEG = math.radians(1)
 
 
 def _fiber_controls(arm: Manipulator) -> Iterator[Control]:
-    for fiber, key, turn in zip(arm.fibers, fiber_keys(arm), arm.revolutions.tolist(), strict=True):
+    for fiber, key, turn in zip(
+        arm.fibers, fiber_keys(arm), describe(arm).revolutions.tolist(), strict=True
+    ):
         name = fiber.name or key.replace("_", " ")
         if not turn:
             yield Control(f"bundles_{key}", f"bundles of {name}", fiber.bundles, 1, 6, 1)

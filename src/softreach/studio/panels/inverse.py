@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.kinematics import tip_positions
-from softreach.manipulator import Manipulator
+from softreach.arm.manipulator import Manipulator
+from softreach.rod.kinematics import tip_positions
 from softreach.studio.panels.binding import bind, bind_button, told
 from softreach.studio.picking import picked_point
 from softreach.studio.reach import cloud_points, shown_samples

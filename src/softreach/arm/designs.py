@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from softreach.fiber import FiberArchitecture
-from softreach.manipulator import Manipulator
+from softreach.arm.actuators import Actuator, FiberArchitecture
+from softreach.arm.manipulator import Manipulator
 
 __all__ = ["minimal_trunk", "redundant_trunk", "varied"]
 
@@ -63,7 +63,7 @@ def redundant_trunk(
     """
     arm = minimal_trunk(revolution, taper, length=length, radius_ratio=radius_ratio)
     pair = (_longitudinal(246, "longitudinal 1"), _longitudinal(294, "longitudinal 2"))
-    return arm.replace(fibers=(*arm.fibers[:2], *pair))
+    return arm.replace(actuators=(*arm.actuators[:2], *pair))
 
 
 def _longitudinal(offset_deg: float, name: str = "longitudinal") -> FiberArchitecture:
@@ -75,14 +75,13 @@ def _trunk(
     fibers: tuple[FiberArchitecture, ...], taper: float, length: float, radius_ratio: float
 ) -> Manipulator:
     radius = length / 16
-    return Manipulator(
+    return Manipulator.tapered(
         length=length,
         outer_radius=radius,
         inner_radius=radius_ratio * radius,
         taper=taper,
         poisson_ratio=0.5,
-        fibers=fibers,
-        activation_bounds=(-5 / 3, 0.0),
+        actuators=fibers,
     )
 
 
@@ -92,20 +91,23 @@ def varied(
     """A relative of a design: the same arm with another revolution or taper.
 
     Args:
-        arm: The design.
+        arm: The design; its profile is a linear taper where that is to change.
         revolution: |Ω| of every helical architecture, each keeping its own sense [rad];
             longitudinal ones stay longitudinal. None keeps what there is.
         taper: φ [rad]; the revolutions stay what they are, the helical angles follow.
     """
-    turns = zip(arm.fibers, arm.revolutions.tolist(), strict=True)
-    fibers = tuple(_wound(fiber, turn, revolution) for fiber, turn in turns)
-    return arm.replace(fibers=fibers, taper=arm.taper if taper is None else taper)
+    wound = tuple(_wound(one, arm, revolution) for one in arm.actuators)
+    profile = arm.profile if taper is None else arm.profile.replace(taper=taper)
+    return arm.replace(actuators=wound, profile=profile)
 
 
-def _wound(fiber: FiberArchitecture, turn: float, revolution: float | None) -> FiberArchitecture:
-    """The fiber with its revolution stated, as it is or with another size."""
+def _wound(actuator: Actuator, arm: Manipulator, revolution: float | None) -> Actuator:
+    """A fiber with its revolution stated, as it is or with another size."""
+    if not isinstance(actuator, FiberArchitecture):
+        return actuator
+    turn = actuator.revolution_on(arm.profile, arm.section)
     if turn == 0:
-        return fiber
+        return actuator
     if revolution is None:
-        return fiber if fiber.revolution is not None else fiber.replace(revolution=turn)
-    return fiber.replace(revolution=math.copysign(revolution, turn))
+        return actuator if actuator.revolution is not None else actuator.replace(revolution=turn)
+    return actuator.replace(revolution=math.copysign(revolution, turn))

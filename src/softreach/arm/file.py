@@ -6,13 +6,17 @@ import difflib
 import json
 import math
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from softreach.checks import arm_faults, fiber_faults
+from softreach.arm.actuators import Actuator, FiberArchitecture
+from softreach.arm.actuators.actuator import actuator_kinds
+from softreach.arm.checks import fiber_faults, name_faults, tube_faults
+from softreach.arm.profile import LinearTaper, Profile
+from softreach.arm.section import Section
 from softreach.errors import Fault, InvalidDesign, Range
 
 __all__ = ["in_file_terms", "parse", "render"]
@@ -41,11 +45,16 @@ class _DesignTable(_Model):
 
     length_m: float
     outer_radius_m: float
-    inner_radius_m: float
+    inner_radius_m: float | None = None
+    inner_ratio: float | None = None
     taper_deg: float = 0.0
     poisson_ratio: float = 0.5
     activation_bounds: list[float] | list[list[float]] = [-5 / 3, 0.0]
-    fibers: list[_FiberTable]
+    fibers: list[_FiberTable] = []
+    actuators: list[dict[str, Any]] = []
+
+
+_NO_FIBERS = "must hold one [[fibers]] table or more"
 
 
 class _Decimal(float):
@@ -59,8 +68,8 @@ class _Decimal(float):
     text: str
 
 
-def parse(text: str, source: str) -> dict[str, Any]:
-    """The fields of a design, in SI units, from TOML text; `fibers` is a list of such fields.
+def parse(text: str, source: str) -> tuple[dict[str, Any], list[Actuator]]:
+    """The fields of a tapered tube in SI units, and its actuators, from TOML text.
 
     Args:
         text: The text of a design file.
@@ -77,24 +86,98 @@ def parse(text: str, source: str) -> dict[str, Any]:
     faults += _physics_faults(document, {fault.path for fault in faults})
     if faults:
         raise InvalidDesign(faults, source)
-    values = _in_si(document)
-    values["fibers"] = [_in_si(table) for table in document["fibers"]]
-    return values
-
-
-def render(values: Mapping[str, Any]) -> str:
-    """TOML text of the fields of a design, every number such that it reads back to the same one."""
-    lines = [
-        f"length_m = {values['length']!r}",
-        f"outer_radius_m = {values['outer_radius']!r}",
-        f"inner_radius_m = {values['inner_radius']!r}",
-        f"taper_deg = {_degrees_text(values['taper'])}",
-        f"poisson_ratio = {values['poisson_ratio']!r}",
-        f"activation_bounds = {json.dumps(values['activation_bounds'])}",
+    actuators: list[Actuator] = [
+        FiberArchitecture(**_in_si(table)) for table in document.pop("fibers", [])
     ]
-    for fiber in values["fibers"]:
-        lines += ["", "[[fibers]]", *_fiber_lines(fiber)]
+    for k, table in enumerate(document.pop("actuators", [])):
+        actuators.append(_own_kind(table, f"actuators[{k}]", source))
+    tube = _in_si(document)
+    if (ratio := tube.pop("inner_ratio", None)) is not None:
+        tube["inner_radius"] = ratio * tube["outer_radius"]
+        return {**tube, "inner_ratio": ratio}, actuators
+    return tube, actuators
+
+
+def _own_kind(table: dict[str, Any], path: str, source: str) -> Actuator:
+    """An actuator of a kind that the reader's program defines: its fields, in SI units."""
+    fields = {key: _plain(value) for key, value in table.items()}
+    kind, known = fields.pop("kind", None), actuator_kinds()
+    if kind not in known:
+        allowed = f"must be a kind of actuator that is imported: {', '.join(known)}"
+        raise InvalidDesign([Fault(f"{path}.kind", kind, allowed)], source)
+    try:
+        return known[kind](**fields)
+    except TypeError as error:
+        raise InvalidDesign([Fault(path, kind, f"has other fields: {error}")], source) from None
+    except InvalidDesign as error:
+        faults = [fault._replace(path=f"{path}.{fault.path}") for fault in error.faults]
+        raise InvalidDesign(faults, source) from None
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, list):
+        return tuple(_plain(item) for item in value)
+    return float(value) if isinstance(value, _Decimal) else value
+
+
+def render(profile: Profile, section: Section, actuators: Sequence[Actuator]) -> str:
+    """TOML text of a design, every number such that it reads back to the same one.
+
+    Raises:
+        InvalidDesign: A profile that design files have no keys for, or an actuator that is not
+            made of plain values.
+    """
+    if not isinstance(profile, LinearTaper):
+        raise InvalidDesign([Fault("profile", profile, "has no keys in a design file")])
+    ring = section.rings[0]
+    lines = [
+        f"length_m = {profile.length!r}",
+        f"outer_radius_m = {profile.outer_radius!r}",
+        _inner_line(profile.outer_radius, ring.inner_ratio),
+        f"taper_deg = {_degrees_text(profile.taper)}",
+        f"poisson_ratio = {ring.material.poisson_ratio!r}",
+    ]
+    if not all(isinstance(actuator, FiberArchitecture) for actuator in actuators):
+        return "\n".join([*lines, *_actuator_lines(actuators)]) + "\n"
+    lines.append(f"activation_bounds = {json.dumps(_common_bounds(actuators))}")
+    for fiber in actuators:
+        lines += ["", "[[fibers]]", *_fiber_lines(vars(fiber))]
     return "\n".join(lines) + "\n"
+
+
+def _inner_line(outer: float, ratio: float) -> str:
+    """The radius that, over the outer one, gives the ratio to the last bit; else the ratio."""
+    radius = low = high = ratio * outer
+    near = [radius]
+    for _ in range(2):
+        low, high = math.nextafter(low, 0.0), math.nextafter(high, math.inf)
+        near += [low, high]
+    exact = next((value for value in near if value / outer == ratio), None)
+    return f"inner_ratio = {ratio!r}" if exact is None else f"inner_radius_m = {exact!r}"
+
+
+def _common_bounds(actuators: Sequence[Actuator]) -> list[Any]:
+    """One pair if all bundles share it, else one for each."""
+    pairs = [pair for actuator in actuators for pair in actuator.bounds.tolist()]
+    return pairs[0] if all(pair == pairs[0] for pair in pairs) else pairs
+
+
+def _actuator_lines(actuators: Sequence[Actuator]) -> Iterator[str]:
+    """A table for each actuator: its kind and its fields, as they are in Python."""
+    for actuator in actuators:
+        yield from ("", "[[actuators]]", f"kind = {json.dumps(type(actuator).__name__)}")
+        for name, value in vars(actuator).items():
+            if value is not None and not name.startswith("_"):
+                yield f"{name} = {_value_text(actuator, name, value)}"
+
+
+def _value_text(actuator: Actuator, name: str, value: Any) -> str:
+    try:
+        return json.dumps(value, ensure_ascii=False, allow_nan=False)
+    except (TypeError, ValueError):
+        kind = type(actuator).__name__
+        allowed = "must be a number, a text or a sequence of them to stand in a design file"
+        raise InvalidDesign([Fault(f"{kind}.{name}", value, allowed)]) from None
 
 
 def in_file_terms(error: InvalidDesign, source: str) -> InvalidDesign:
@@ -149,12 +232,16 @@ def _physics_faults(document: Mapping[str, Any], blamed: set[str]) -> Iterator[F
     values = _in_si({key: document[key] for key in document if key in _DesignTable.model_fields})
     sound = {name: value for name, value in values.items() if _key(name) not in unsound}
     tables = sound.pop("fibers", None)
-    yield from (_in_file_terms(fault, "") for fault in arm_faults(sound))
-    if tables == []:
-        yield Fault("fibers", [], "must hold one [[fibers]] table or more")
-    for k, table in enumerate(tables if isinstance(tables, list) else []):
+    yield from (_in_file_terms(fault, "") for fault in tube_faults(sound))
+    if not tables and not document.get("actuators"):
+        yield Fault("fibers", None if tables is None else tables, _NO_FIBERS)
+    if (document.get("inner_radius_m") is None) == (document.get("inner_ratio") is None):
+        yield Fault("inner_radius_m", None, "give exactly one of inner_radius_m and inner_ratio")
+    tables = tables if isinstance(tables, list) else []
+    for k, table in enumerate(tables):
         if isinstance(table, dict):
             yield from _fiber_table_faults(table, f"fibers[{k}].", blamed)
+    yield from name_faults([isinstance(t, dict) and t.get("name") for t in tables], "fibers")
 
 
 def _fiber_table_faults(table: dict[str, Any], prefix: str, blamed: set[str]) -> Iterator[Fault]:

@@ -12,13 +12,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["SectionIntegrals", "extension_per_activation", "section_integrals"]
+__all__ = ["RingIntegrals", "ring_integrals"]
 
 # Enough for machine precision while x tan(α) stays below 100 or so (|α| < 89°), any ring.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)
 
 
-class SectionIntegrals(NamedTuple):
+class RingIntegrals(NamedTuple):
     """Integrals over the ring x = R/R2 in [ρ, 1], one value per helical angle [-]."""
 
     axial: NDArray[np.float64]
@@ -29,9 +29,9 @@ class SectionIntegrals(NamedTuple):
     """I3 = ∫ x² t dx."""
 
 
-def section_integrals(
+def ring_integrals(
     radius_ratio: ArrayLike, taper: ArrayLike, helical_angle: ArrayLike, poisson_ratio: ArrayLike
-) -> SectionIntegrals:
+) -> RingIntegrals:
     """Integrate fiber contraction over the ring (Appendix A, as integrals).
 
     Args:
@@ -53,16 +53,6 @@ def section_integrals(
     helix = 1.0 + (x * np.tan(alpha)) ** 2
     k = (1.0 + nu) / (cone * helix) - nu
     t = x * np.tan(alpha) / (helix * np.sqrt(cone))
-    return SectionIntegrals(
+    return RingIntegrals(
         *(np.sum(half * _WEIGHTS * f, axis=-1) for f in (x * k, x**2 * k, x**2 * t))
     )
-
-
-def extension_per_activation(axial: ArrayLike, extent: ArrayLike) -> NDArray[np.float64]:
-    """Z = I0 σ/π of one bundle [-]: ring and core of one modulus (section 2, extension).
-
-    Args:
-        axial: I0 [-].
-        extent: Angular extent σ of the bundle [rad].
-    """
-    return np.asarray(axial) * np.asarray(extent) / np.pi

@@ -9,23 +9,24 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach import taper
-from softreach.actuation import actuation, curvature_range, extension_range
-from softreach.manipulator import Manipulator
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.tables import check_extension, curvature_range, extension_range, tables
 
-__all__ = ["DesignReport", "describe", "design_warnings"]
+__all__ = ["DesignSummary", "describe", "design_warnings"]
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class DesignReport:
+class DesignSummary:
     """The numbers that a design implies."""
 
     helical_angles: Array
     """α of each architecture [rad]."""
     revolutions: Array
     """Ω of each architecture [rad]."""
+    base_radius: float
+    """R2(0) [m]."""
     tip_radius: float
     """R2(L) [m]."""
     radius_ratio: float
@@ -40,15 +41,23 @@ class DesignReport:
     """Limits that the design touches, each with its number."""
 
 
-def describe(arm: Manipulator) -> DesignReport:
-    """Everything that `softreach design` prints."""
+def describe(arm: Manipulator) -> DesignSummary:
+    """Everything that `softreach design` prints.
+
+    Raises:
+        InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
+    """
+    check_extension(arm)
     _, bending = curvature_range(arm)
-    return DesignReport(
-        helical_angles=arm.helical_angles,
-        revolutions=arm.revolutions,
-        tip_radius=arm.tip_radius,
-        radius_ratio=arm.radius_ratio,
-        taper_ratio=arm.outer_radius / arm.tip_radius,
+    tip_radius = float(arm.profile.radius(arm.length))
+    body = arm.profile, arm.section
+    return DesignSummary(
+        helical_angles=np.array([fiber.helical_angle_on(*body) for fiber in arm.fibers]),
+        revolutions=np.array([fiber.revolution_on(*body) for fiber in arm.fibers]),
+        base_radius=float(arm.profile.radius(0.0)),
+        tip_radius=tip_radius,
+        radius_ratio=arm.section.rings[0].inner_ratio,
+        taper_ratio=float(arm.profile.radius(0.0)) / tip_radius,
         extension=extension_range(arm),
         curvature=(_smallest_bending(arm) * arm.length, float(bending.max() * arm.length)),
         warnings=design_warnings(arm),
@@ -68,7 +77,7 @@ def _smallest_bending(arm: Manipulator, stations: int = 11) -> float:
     if (low <= 0).all() and (high >= 0).all():
         return 0.0
     free = high > low
-    table = actuation(arm, np.linspace(0.0, arm.length, stations)).curvature[:, :2]
+    table = tables(arm, np.linspace(0.0, arm.length, stations)).curvature[:, :2]
     fixed = table[:, :, ~free] @ low[~free]
     return min(
         float(
@@ -82,7 +91,7 @@ def _smallest_bending(arm: Manipulator, stations: int = 11) -> float:
 
 def _sharp_bending(arm: Manipulator) -> Iterator[str]:
     stations, bending = curvature_range(arm)
-    slender = bending * arm.radius(stations)
+    slender = bending * arm.profile.radius(stations)
     worst = int(np.argmax(slender))
     if slender[worst] >= 1:
         place = f"Z = {stations[worst] / arm.length:.2f} L"
@@ -116,19 +125,16 @@ def _overlaps(arm: Manipulator) -> Iterator[str]:
 def _overlap(arm: Manipulator, first: int, second: int) -> tuple[float, float]:
     """Largest overlap of two sectors [rad] and the first Z where they overlap [m].
 
-    Their angular distance is linear in the rotation per tangent, hence in S: no sampling is needed.
+    Their angular distance is linear in S: no sampling is needed.
     """
-    extent = arm.bundle_extents[[first, second]].mean()
-    angles = arm.fiber_angles([0.0, arm.length])[:, [first, second]]
-    start, end = angles[:, 1] - angles[:, 0]
+    outline = arm.outline([0.0, arm.length])
+    extent = outline.extent[[first, second]].mean()
+    start, end = outline.center[:, second] - outline.center[:, first]
     if abs(end - start) < 1e-12:
         apart = abs(_wrapped(start))
         return extent - apart, 0.0
-    turns = (
-        2
-        * np.pi
-        * np.arange(np.floor(min(start, end) / (2 * np.pi)), max(start, end) / (2 * np.pi) + 2)
-    )
+    full = 2 * np.pi
+    turns = full * np.arange(np.floor(min(start, end) / full), max(start, end) / full + 2)
     nearest = np.clip(turns, min(start, end), max(start, end))
     depth = float((extent - np.abs(nearest - turns)).max())
     return depth, _first_contact(arm, start, end, extent)
@@ -141,12 +147,8 @@ def _first_contact(arm: Manipulator, start: float, end: float, extent: float) ->
         return 0.0
     toward = np.sign(end - start)
     travel = (2 * np.pi - toward * gap) % (2 * np.pi) - extent
-    s = (
-        taper.slender_coordinate(arm.length, arm.outer_radius, arm.taper)
-        * travel
-        / abs(end - start)
-    )
-    return float(np.clip(taper.station_of(s, arm.outer_radius, arm.taper), 0.0, arm.length))
+    s = arm.profile.slender_length * travel / abs(end - start)
+    return float(np.clip(arm.profile.station(s), 0.0, arm.length))
 
 
 def _wrapped(angle: float) -> float:

@@ -1,0 +1,273 @@
+"""The design of an arm: its profile, its section, and what drives it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.arm import file
+from softreach.arm.actuators import Actuator, FiberArchitecture, Outline
+from softreach.arm.checks import bounds_faults, name_faults, tube_faults
+from softreach.arm.profile import LinearTaper, Profile
+from softreach.arm.section import Material, Ring, Section
+from softreach.atomic import replacing
+from softreach.errors import Fault, InvalidDesign, InvalidInput
+
+__all__ = ["Manipulator"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Manipulator:
+    """A slender arm with actuators, clamped at Z = 0 where its tangent is +z (section 2).
+
+    Values are frozen; `replace` makes a changed copy, which is checked again. What a design does is
+    not computed here: `arm.tables` and everything after it ask it.
+
+    Raises:
+        InvalidDesign: The arm cannot exist; the error names every fault.
+    """
+
+    profile: Profile
+    """R2(Z), the outer radius along the arm, and its length."""
+    section: Section
+    """The core and the ring of actuators, in proportion to R2(Z)."""
+    actuators: tuple[Actuator, ...]
+    """What drives the arm; activations follow their order, bundle by bundle."""
+
+    def __post_init__(self) -> None:
+        if faults := list(_part_faults(self)):
+            raise InvalidDesign(faults)
+        object.__setattr__(self, "actuators", tuple(_named(self.actuators)))
+        if faults := list(_name_faults(self)):
+            raise InvalidDesign(faults)
+
+    @classmethod
+    def tapered(
+        cls,
+        *,
+        length: float,
+        outer_radius: float,
+        inner_radius: float,
+        taper: float = 0.0,
+        poisson_ratio: float = 0.5,
+        actuators: Sequence[Actuator],
+        activation_bounds: ArrayLike | None = None,
+    ) -> Self:
+        """A tapered tube of one material with fibers in its outer ring: the arm of the paper.
+
+        Args:
+            length: L [m].
+            outer_radius: R2(0), at the base [m].
+            inner_radius: R1(0), where the ring of fibers begins, at the base [m]; R1/R2 is the same
+                all along.
+            taper: φ, taper angle [rad].
+            poisson_ratio: ν [-].
+            actuators: What drives the arm.
+            activation_bounds: (lower, upper) of γ for every bundle, or one pair per bundle [-];
+                None for their own.
+
+        Raises:
+            InvalidDesign: The arm cannot exist; the error names every fault.
+        """
+        values = dict(locals())
+        known = all(isinstance(actuator, Actuator) for actuator in actuators)
+        bundles = sum(actuator.bundles for actuator in actuators) if known else None
+        if faults := tube_faults(values, bundles):
+            raise InvalidDesign(faults)
+        ring = Ring(
+            inner_ratio=inner_radius / outer_radius, material=Material(poisson_ratio=poisson_ratio)
+        )
+        arm = cls(
+            profile=LinearTaper(length=length, outer_radius=outer_radius, taper=taper),
+            section=Section(rings=(ring,)),
+            actuators=tuple(actuators),
+        )
+        return arm if activation_bounds is None else arm.with_bounds(activation_bounds)
+
+    def replace(self, **changes: Any) -> Self:
+        """A copy with some fields changed, checked like a new design."""
+        return replace(self, **changes)
+
+    def with_bounds(self, activation_bounds: ArrayLike) -> Self:
+        """A copy with other activation bounds.
+
+        Args:
+            activation_bounds: (lower, upper) for every bundle, or one such pair per bundle.
+
+        Raises:
+            InvalidDesign: No pairs, too few of them, or a lower bound above the upper one.
+        """
+        if faults := bounds_faults(activation_bounds, self.bundles):
+            raise InvalidDesign(faults)
+        pairs = np.broadcast_to(np.asarray(activation_bounds, float), (self.bundles, 2))
+        ends = np.cumsum([actuator.bundles for actuator in self.actuators])[:-1]
+        parts = zip(self.actuators, np.split(pairs, ends), strict=True)
+        return self.replace(actuators=tuple(one.with_bounds(part) for one, part in parts))
+
+    def split(self, fiber: str | int, count: int, *, keep_extent: bool = True) -> Self:
+        """Replace an architecture of one bundle by `count` independent ones beside each other.
+
+        They are spread evenly about the center of the original, one extent apart, and wind as it
+        does. Splitting the longitudinal fiber of `designs.minimal_trunk` in two gives
+        `designs.redundant_trunk`. Overlap is not checked: fibers of different architectures
+        may cross anyway.
+
+        Args:
+            fiber: Name or index of the architecture.
+            count: How many shall take its place; 1 leaves the design as it is.
+            keep_extent: True gives each the extent σ of the original, False its share σ / count, so
+                that together they fill the sector of the original.
+
+        Returns:
+            The new design; the parts are named "NAME 1", "NAME 2", ..., and each has the activation
+            bounds of the original.
+
+        Raises:
+            InvalidInput: No such architecture, one of several bundles, or a count below 1.
+        """
+        index = self._fiber_index(fiber)
+        whole = self.actuators[index]
+        assert isinstance(whole, FiberArchitecture)
+        parts = whole.split(count, keep_extent=keep_extent)
+        return self.replace(
+            actuators=(*self.actuators[:index], *parts, *self.actuators[index + 1 :])
+        )
+
+    @classmethod
+    def from_toml(cls, text: str, source: str = "design") -> Self:
+        """A design from the text of a file; `source` is what errors call it.
+
+        Raises:
+            InvalidDesign: The text's faults, all of them, in the file's own names and units.
+        """
+        tube, actuators = file.parse(text, source)
+        ratio = tube.pop("inner_ratio", None)
+        try:
+            arm = cls.tapered(**tube, actuators=actuators)
+            return arm if ratio is None else arm.replace(section=arm.section.with_inner(ratio))
+        except InvalidDesign as error:
+            raise file.in_file_terms(error, source) from None
+
+    def to_toml(self) -> str:
+        """The design as the text of a file, from which `from_toml` makes an equal one.
+
+        Raises:
+            InvalidDesign: A profile or an actuator that design files have no table for.
+        """
+        return file.render(self.profile, self.section, self.actuators)
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Self:
+        """Read a design file (TOML, lengths in m, angles in degrees).
+
+        Raises:
+            InvalidDesign: The file's faults, all of them, in the file's own names and units.
+            OSError: The file cannot be read.
+        """
+        return cls.from_toml(Path(path).read_text(encoding="utf-8"), source=fspath(path))
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write a design file; an older one is replaced whole."""
+        with replacing(path) as partial:
+            partial.write_text(self.to_toml(), encoding="utf-8")
+
+    @property
+    def length(self) -> float:
+        """L, from base to tip before activation [m]."""
+        return self.profile.length
+
+    @property
+    def fibers(self) -> tuple[FiberArchitecture, ...]:
+        """Those actuators that are fiber architectures."""
+        return tuple(one for one in self.actuators if isinstance(one, FiberArchitecture))
+
+    @property
+    def bundles(self) -> int:
+        """m, number of independent activations."""
+        return sum(actuator.bundles for actuator in self.actuators)
+
+    @cached_property
+    def bundle_names(self) -> tuple[str, ...]:
+        """A readable name for each bundle."""
+        return tuple(name for actuator in self.actuators for name in actuator.bundle_names)
+
+    @cached_property
+    def bounds(self) -> Array:
+        """Lower and upper activation of each bundle [-], shape (bundles, 2), read-only."""
+        bounds = np.concatenate([actuator.bounds for actuator in self.actuators])
+        bounds.setflags(write=False)
+        return bounds
+
+    def outline(self, z: ArrayLike) -> Outline:
+        """Where all bundles lie in the sections at stations Z [m], shape (station,)."""
+        stations = np.atleast_1d(np.asarray(z, float))
+        each = [one.outline(self.profile, self.section, stations) for one in self.actuators]
+        return Outline(
+            center=np.concatenate([one.center for one in each], axis=1),
+            extent=np.concatenate([one.extent for one in each]),
+            inner_ratio=np.concatenate([one.inner_ratio for one in each]),
+            outer_ratio=np.concatenate([one.outer_ratio for one in each]),
+        )
+
+    def _fiber_index(self, fiber: str | int) -> int:
+        names = [actuator.name for actuator in self.actuators]
+        of_fibers = [isinstance(one, FiberArchitecture) for one in self.actuators]
+        if isinstance(fiber, str) and fiber in names and of_fibers[names.index(fiber)]:
+            return names.index(fiber)
+        if not isinstance(fiber, str | bool) and fiber in range(len(names)) and of_fibers[fiber]:
+            return int(fiber)
+        known = ", ".join(
+            f"{k} ({name})"
+            for k, (name, is_fiber) in enumerate(zip(names, of_fibers, strict=True))
+            if is_fiber
+        )
+        raise InvalidInput("fiber", repr(fiber), f"the name or index of one architecture: {known}")
+
+
+def _part_faults(arm: Manipulator) -> Iterator[Fault]:
+    """Parts that are something else than they must be."""
+    if not isinstance(arm.profile, Profile):
+        yield Fault("profile", arm.profile, "must be a Profile, such as LinearTaper")
+    if not isinstance(arm.section, Section):
+        yield Fault("section", arm.section, "must be a Section")
+    parts = arm.actuators
+    if not isinstance(parts, Sequence) or isinstance(parts, str) or not parts:
+        yield Fault("actuators", parts, "must be a sequence of one actuator or more")
+        return
+    for k, part in enumerate(parts):
+        if not isinstance(part, Actuator):
+            yield Fault(f"actuators[{k}]", part, "must be an actuator, such as FiberArchitecture")
+
+
+def _named(actuators: Sequence[Actuator]) -> Iterator[Actuator]:
+    """The actuators, those without a name called "fiber 1", "fiber 2", ... by their places."""
+    taken = {actuator.name for actuator in actuators}
+    for k, actuator in enumerate(actuators):
+        if actuator.name:
+            yield actuator
+        else:
+            number = next(n for n in range(k + 1, 2 * len(taken) + k + 2) if _fiber(n) not in taken)
+            taken.add(_fiber(number))
+            yield actuator.replace(name=_fiber(number))
+
+
+def _fiber(number: int) -> str:
+    return f"fiber {number}"
+
+
+def _name_faults(arm: Manipulator) -> Iterator[Fault]:
+    """Names, of actuators or of their bundles, that two share."""
+    yield from (faults := list(name_faults([one.name for one in arm.actuators], "actuators")))
+    names = arm.bundle_names
+    if not faults and len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        yield Fault("actuators", twice, "names two bundles: rename an architecture")

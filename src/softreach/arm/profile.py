@@ -1,0 +1,129 @@
+"""Profiles: how the outer radius changes along an arm.
+
+All that depends on the radius alone is asked here: R2(Z), its slope, S(Z) = ∫ dZ/R2, its inverse.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.arm.checks import PROFILE_RANGES, plain_number, profile_faults
+from softreach.errors import InvalidDesign
+
+__all__ = ["LinearTaper", "Profile"]
+
+Array = NDArray[np.float64]
+
+
+class Profile(ABC):
+    """The outer radius along the arm, before activation."""
+
+    length: float
+    """L, from base to tip [m]."""
+
+    @property
+    @abstractmethod
+    def breakpoints(self) -> tuple[float, ...]:
+        """Stations inside (0, L) where the slope jumps, ascending [m]."""
+
+    @abstractmethod
+    def radius(self, z: ArrayLike) -> Array:
+        """R2(Z) [m]."""
+
+    @abstractmethod
+    def slope(self, z: ArrayLike) -> Array:
+        """Tan φ(Z) = -R2'(Z) [-]; positive where the arm narrows toward the tip."""
+
+    @abstractmethod
+    def slender_coordinate(self, z: ArrayLike) -> Array:
+        """S(Z) = ∫ dZ / R2 from 0 to Z [-]: length counted in local radii.
+
+        In S the bending of each fiber has constant magnitude and rotates at a constant rate, so
+        that uniform steps in S share the bending evenly.
+        """
+
+    @abstractmethod
+    def station(self, s: ArrayLike) -> Array:
+        """Z(S) [m], the inverse of `slender_coordinate`."""
+
+    @abstractmethod
+    def surface_coordinate(self, z: ArrayLike, ratio: float = 1.0) -> Array:
+        """∫ dZ / (R cos φ) from 0 to Z along the cone R = ratio · R2 [-].
+
+        Its slope there is ratio · tan φ. Times tan α it is the rotation Θ of a fiber of constant
+        helical angle α on that cone (Appendix B).
+        """
+
+    @property
+    def slender_length(self) -> float:
+        """S(L) [-]."""
+        return float(self.slender_coordinate(self.length))
+
+    def replace(self, **changes: Any) -> Self:
+        """A copy with some fields changed, checked like a new one."""
+        return replace(self, **changes)  # pyright: ignore[reportArgumentType]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinearTaper(Profile):
+    """R2(Z) = R2(0) - Z tan φ: a cone, or a cylinder for φ = 0.
+
+    Raises:
+        InvalidDesign: A field is out of its range, or the taper leaves no tip.
+    """
+
+    length: float
+    """L, from base to tip before activation [m]."""
+    outer_radius: float
+    """R2(0), outer radius at the base [m]."""
+    taper: float = 0.0
+    """φ, taper angle [rad]; negative widens toward the tip."""
+
+    def __post_init__(self) -> None:
+        if faults := profile_faults(vars(self)):
+            raise InvalidDesign(faults)
+        for field in PROFILE_RANGES:
+            object.__setattr__(self, field, float(plain_number(getattr(self, field))))
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """None: the slope is constant."""
+        return ()
+
+    def radius(self, z: ArrayLike) -> Array:
+        """R2(Z) [m]."""
+        return self.outer_radius - np.asarray(z, float) * np.tan(self.taper)
+
+    def slope(self, z: ArrayLike) -> Array:
+        """Tan φ, the same everywhere [-]."""
+        return np.full(np.shape(z), np.tan(self.taper))
+
+    def slender_coordinate(self, z: ArrayLike) -> Array:
+        """S(Z) = -log(1 - q)/tan φ [-], with q = Z tan φ / R2(0), the share of the radius lost."""
+        z = np.asarray(z, float)
+        return z / self.outer_radius * _relative_log(z * np.tan(self.taper) / self.outer_radius)
+
+    def station(self, s: ArrayLike) -> Array:
+        """Z(S) = R2(0) (1 - exp(-S tan φ)) / tan φ [m]."""
+        s = np.asarray(s, float)
+        return self.outer_radius * s * _relative_expm1(-s * np.tan(self.taper))
+
+    def surface_coordinate(self, z: ArrayLike, ratio: float = 1.0) -> Array:
+        """S(Z) / (ratio cos φ) with the slope ratio · tan φ of that cone [-] (Appendix B)."""
+        cos = np.cos(np.arctan(ratio * np.tan(self.taper)))
+        return self.slender_coordinate(z) / (ratio * cos)
+
+
+def _relative_log(q: Array) -> Array:
+    """log(1 - q) / (-q), which is 1 at q = 0."""
+    return np.divide(np.log1p(-q), -q, out=np.ones_like(q), where=q != 0)
+
+
+def _relative_expm1(x: Array) -> Array:
+    """(exp(x) - 1) / x, which is 1 at x = 0."""
+    return np.divide(np.expm1(x), x, out=np.ones_like(x), where=x != 0)

@@ -1,0 +1,119 @@
+"""The free rod: no load but its actuators, so that activations alone decide its shape."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach import parallel
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.tables import check_extension, tables
+from softreach.kernels import frames, jacobian, rod
+from softreach.rod.activation_box import ActivationBox
+from softreach.rod.steps import StepRule, check_tol
+from softreach.rod.tip_map import BLOCK, Frames, Strains, TipMap
+
+__all__ = ["FreeRod"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FreeRod(TipMap):
+    """r' = ζ d3, dᵢ' = ζ u × dᵢ with ζ = 1 + z·γ, u = Uγ (section 2), by sixth-order Magnus steps.
+
+    Raises:
+        InvalidInput: `tol` out of range.
+        InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
+    """
+
+    arm: Manipulator
+    tol: float = 1e-6
+
+    def __post_init__(self) -> None:
+        check_tol(self.tol)
+        check_extension(self.arm)
+
+    @property
+    def box(self) -> ActivationBox:
+        """The activations within bounds."""
+        return self._box
+
+    @cached_property
+    def _box(self) -> ActivationBox:
+        return ActivationBox.between(self.arm.bounds, self.arm.bundle_names)
+
+    @cached_property
+    def rule(self) -> StepRule:
+        """How the arm is cut into steps."""
+        return StepRule(self.arm, self.box)
+
+    @cached_property
+    def steps(self) -> int:
+        """The number of steps that `tol` needs."""
+        return self.rule.steps_for(self.tol)
+
+    @cached_property
+    def _table(self) -> Array:
+        return self.rule.packed_nodes(self.steps)
+
+    def fill_tips(self, gamma: Array, out: Array) -> None:
+        """Put the tips [m] of checked activations into `out`, (n, 3), on the calling thread."""
+        rod.tips(self._table, gamma, out)
+
+    def fill_slopes(self, gamma: Array, tips: Array, slopes: Array) -> None:
+        """Put tips (n, 3) and ∂r/∂γ = v + ω × r (n, 3, bundles) [m] into place."""
+        twists = np.empty((len(gamma), 6, self.box.bundles))
+        jacobian.jacobians(self._table, gamma, tips, twists)
+        v, w = twists[:, :3], twists[:, 3:]
+        slopes[:] = v
+        for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            slopes[:, i] += w[:, j] * tips[:, k, None] - w[:, k] * tips[:, j, None]
+
+    def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:
+        """Tips [m] and the spatial twist of the tip frame per unit of each activation."""
+        gamma = self.box.check(activations)
+        tips, twists = np.empty((len(gamma), 3)), np.empty((len(gamma), 6, self.box.bundles))
+        parallel.run(
+            partial(jacobian.jacobians, self._table, gamma[b], tips[b], twists[b])
+            for b in parallel.blocks(len(gamma), BLOCK // 8)
+        )
+        return tips, twists
+
+    def frames(self, activations: ArrayLike, stations: ArrayLike) -> Frames:
+        """Centerline and directors at ascending stations Z [m]."""
+        gamma, z = self.box.check(activations), self.check_stations(stations)
+        table, ends = self._station_table(z)
+        found = Frames(np.empty((len(gamma), len(z), 3)), np.empty((len(gamma), len(z), 3, 3)))
+        parallel.run(
+            partial(frames.frames, table, ends, gamma[b], found.position[b], found.directors[b])
+            for b in parallel.blocks(len(gamma), 1024)
+        )
+        return found
+
+    def strains(self, activations: ArrayLike, stations: ArrayLike) -> Strains:
+        """U = Uγ and ζ = 1 + z·γ at stations Z [m]."""
+        gamma = self.box.check(activations)
+        local = tables(self.arm, stations)
+        return Strains(
+            np.einsum("scb,nb->nsc", local.curvature, gamma), 1.0 + gamma @ local.extension.T
+        )
+
+    def radius(self, stations: ArrayLike) -> Array:
+        """Outer radius R2 before activation at stations Z [m]."""
+        return self.arm.profile.radius(stations)
+
+    def _station_table(self, z: Array) -> tuple[Array, NDArray[np.int64]]:
+        """Packed tables with a step boundary at every station, and the steps up to each."""
+        if len(z) == 1 and z[0] == self.length:
+            return self._tip_table
+        nodes, ends = self.rule.station_nodes(z, self.steps)
+        return rod.pack(*nodes), ends
+
+    @cached_property
+    def _tip_table(self) -> tuple[Array, NDArray[np.int64]]:
+        nodes, ends = self.rule.station_nodes(np.array([self.length]), self.steps)
+        return rod.pack(*nodes), ends

@@ -1,0 +1,107 @@
+"""Forward kinematics: where the tip is, how it moves, what shape the arm takes.
+
+Clamped at Z = 0, tangent d3 = +z there.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach import schema
+from softreach.arm.manipulator import Manipulator
+from softreach.errors import InvalidInput
+from softreach.rod.tip_map import TipMap, tip_map
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["configuration", "tip_jacobian", "tip_positions"]
+
+Array = NDArray[np.float64]
+
+
+def tip_positions(arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6) -> Array:
+    """Tip positions of many activations (section 2; sixth-order Magnus integration).
+
+    Args:
+        arm: The design, or its tip map.
+        activations: γ [-], shape (n, bundles); values outside the bounds are allowed, but `tol` is
+            promised inside them.
+        tol: Largest tip error, in L; it decides the number of steps.
+
+    Returns:
+        Tips [m], shape (n, 3).
+
+    Raises:
+        InvalidInput: Activations of another shape or not finite, or a `tol` out of range.
+        InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
+    """
+    return tip_map(arm, tol).tips(activations)
+
+
+def tip_jacobian(arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6) -> Array:
+    """Spatial twist of the tip per unit of each activation: the exact derivative of the tip.
+
+    Column j is (v, ω): ω [rad] turns the tip frame, and the tip at p moves by v + ω × p [m].
+
+    Args:
+        arm: The design, or its tip map.
+        activations: γ [-], shape (n, bundles).
+        tol: As for `tip_positions`, whose derivative this is to rounding.
+
+    Returns:
+        Jacobians, shape (n, 6, bundles), linear rows first.
+
+    Raises:
+        InvalidInput: As for `tip_positions`.
+    """
+    return tip_map(arm, tol).tip_twists(activations)[1]
+
+
+def configuration(
+    arm: Manipulator | TipMap,
+    activation: ArrayLike,
+    stations: int | ArrayLike = 101,
+    tol: float = 1e-6,
+) -> xr.Dataset:
+    """The whole shape of the arm: centerline, directors, curvature and extension along Z.
+
+    Args:
+        arm: The design, or its tip map.
+        activation: γ [-], shape (bundles,), or (n, bundles) for a leading `sample` dimension.
+        stations: Number of stations, evenly spaced from base to tip, or their Z [m], ascending.
+        tol: Largest error of the tip, in L.
+
+    Returns:
+        Dataset with `position` [m], `directors` (d1, d2, d3), `curvature` u [1/m] in the directors,
+        `extension` ζ and `radius` R2 [m], over `station` (coordinate Z [m]).
+
+    Raises:
+        InvalidInput: Activations or stations of another shape or out of range.
+    """
+    rod = tip_map(arm, tol)
+    gamma = rod.box.check(np.atleast_2d(np.asarray(activation, float)))
+    z = _even_stations(rod, stations) if np.ndim(stations) == 0 else rod.check_stations(stations)
+    position, directors = rod.frames(gamma, z)
+    curvature, extension = rod.strains(gamma, z)
+    dataset = schema.configuration_dataset(
+        rod.arm,
+        gamma,
+        z,
+        position=position,
+        directors=directors,
+        curvature=curvature,
+        extension=extension,
+        radius=rod.radius(z),
+    )
+    return dataset.isel(sample=0) if np.ndim(activation) == 1 else dataset
+
+
+def _even_stations(rod: TipMap, stations: int | ArrayLike) -> Array:
+    count = int(np.asarray(stations))
+    if count < 2:
+        raise InvalidInput("stations", stations, "2 or more, or the stations' Z in m")
+    return np.linspace(0.0, rod.length, count)

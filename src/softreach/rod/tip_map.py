@@ -1,0 +1,177 @@
+"""The tip map: from activations to where the tip is, and everything else that a rod can say.
+
+Left of it there is physics and no sample; right of it there are millions of samples and no physics.
+Whoever asks where an arm can go asks a tip map, never the fields of the arm.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from enum import IntEnum
+from functools import lru_cache, partial
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach import parallel
+from softreach.arm.manipulator import Manipulator
+from softreach.errors import InvalidInput
+from softreach.rod.activation_box import ActivationBox
+
+__all__ = ["BLOCK", "Frames", "Strains", "TipMap", "TipStatus", "tip_map"]
+
+Array = NDArray[np.float64]
+
+BLOCK = 16_384
+"""Samples per task: large against a thread's cost, small enough for Ctrl-C to be prompt."""
+
+
+class TipStatus(IntEnum):
+    """What a tip is worth."""
+
+    STABLE = 0
+    """A stable equilibrium."""
+    UNSTABLE = 1
+    """An equilibrium that the smallest disturbance would end."""
+    NO_EQUILIBRIUM = 2
+    """The branch that starts at the unloaded arm ends before; the tip is NaN."""
+
+
+class Frames(NamedTuple):
+    """Rods in space, at stations."""
+
+    position: Array
+    """Centerline r [m], shape (n, station, 3)."""
+    directors: Array
+    """d1, d2, d3 as rows, shape (n, station, 3, 3)."""
+
+
+class Strains(NamedTuple):
+    """How rods are deformed, at stations."""
+
+    curvature: Array
+    """u in the directors, per unit of activated arclength [1/m], shape (n, station, 3)."""
+    extension: Array
+    """ζ [-], shape (n, station)."""
+
+
+class TipMap(ABC):
+    """The map from the activations of one arm to its tip, to a tolerance; frozen.
+
+    All arrays of activations have shape (n, bundles) and are checked; activations outside the
+    bounds are allowed, but `tol` is promised inside them. Results do not depend on threads.
+    """
+
+    supports_unstable: ClassVar[bool] = False
+    """Whether a tip can have another status than stable."""
+
+    arm: Manipulator
+    """The design, to be stored beside results; what it is made of is nobody's business here."""
+    tol: float
+    """Largest tip error, in L."""
+
+    @property
+    def length(self) -> float:
+        """L [m], the scale of everything in space."""
+        return self.arm.length
+
+    @property
+    @abstractmethod
+    def box(self) -> ActivationBox:
+        """The activations within bounds."""
+
+    @abstractmethod
+    def fill_tips(self, gamma: Array, out: Array) -> None:
+        """Put the tips [m] of checked activations into `out`, (n, 3), on the calling thread."""
+
+    @abstractmethod
+    def fill_slopes(self, gamma: Array, tips: Array, slopes: Array) -> None:
+        """Put tips (n, 3) and ∂r/∂γ (n, 3, bundles) [m] of checked activations into place."""
+
+    @abstractmethod
+    def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:
+        """Tips [m] and the spatial twist of the tip frame per unit of each activation.
+
+        Returns:
+            Tips, shape (n, 3); (v, ω) with v [m] and ω [rad], shape (n, 6, bundles).
+        """
+
+    @abstractmethod
+    def frames(self, activations: ArrayLike, stations: ArrayLike) -> Frames:
+        """Centerline and directors at ascending stations Z [m]."""
+
+    @abstractmethod
+    def strains(self, activations: ArrayLike, stations: ArrayLike) -> Strains:
+        """Curvature and extension at stations Z [m]."""
+
+    @abstractmethod
+    def radius(self, stations: ArrayLike) -> Array:
+        """Outer radius R2 before activation at stations Z [m]."""
+
+    def tips(self, activations: ArrayLike) -> Array:
+        """Tip positions [m], shape (n, 3)."""
+        gamma = self.box.check(activations)
+        out = np.empty((len(gamma), 3))
+        parallel.run(self.tip_task(gamma[b], out[b]) for b in parallel.blocks(len(gamma), BLOCK))
+        return out
+
+    def tip_task(self, gamma: Array, out: Array) -> Callable[[], object]:
+        """The work of filling `out` with the tips of `gamma`, to be run on any thread."""
+        return partial(self.fill_tips, gamma, out)
+
+    def tips_and_slopes(self, activations: ArrayLike) -> tuple[Array, Array]:
+        """Tips [m], shape (n, 3), and their derivatives ∂r/∂γ [m], shape (n, 3, bundles)."""
+        gamma = self.box.check(activations)
+        tips, slopes = np.empty((len(gamma), 3)), np.empty((len(gamma), 3, self.box.bundles))
+        parallel.run(
+            partial(self.fill_slopes, gamma[b], tips[b], slopes[b])
+            for b in parallel.blocks(len(gamma), BLOCK // 8)
+        )
+        return tips, slopes
+
+    def tip_directions(self, activations: ArrayLike) -> Array:
+        """Tangents d3 of the tips [-], shape (n, 3)."""
+        return np.ascontiguousarray(self.frames(activations, [self.length]).directors[:, 0, 2])
+
+    def status(self, activations: ArrayLike) -> NDArray[np.int8]:
+        """`TipStatus` of each activation, shape (n,)."""
+        return np.full(len(self.box.check(activations)), TipStatus.STABLE, np.int8)
+
+    def check_stations(self, stations: ArrayLike) -> Array:
+        """The stations as a float array.
+
+        Raises:
+            InvalidInput: No ascending Z within [0, L].
+        """
+        z = np.asarray(stations, float)
+        inside = z.ndim == 1 and z.size > 0 and np.isfinite(z).all()
+        if not inside or z[0] < 0 or z[-1] > self.length or (np.diff(z) < 0).any():
+            raise InvalidInput("stations", stations, f"ascending Z within [0, {self.length:g}] m")
+        return z
+
+
+def tip_map(arm: Manipulator | TipMap, tol: float = 1e-6) -> TipMap:
+    """The tip map of an arm, remembered for the next call; a tip map is its own.
+
+    Args:
+        arm: The design, or a tip map, whose own tolerance then counts.
+        tol: Largest tip error, in L.
+
+    Raises:
+        InvalidInput: No arm, or `tol` out of range.
+        InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
+    """
+    if isinstance(arm, TipMap):
+        return arm
+    if not isinstance(arm, Manipulator):
+        raise InvalidInput("arm", f"{arm!r:.80}", "a Manipulator or a TipMap")
+    return _of_arm(arm, float(tol))
+
+
+@lru_cache(maxsize=64)
+def _of_arm(arm: Manipulator, tol: float) -> TipMap:
+    from softreach.rod.free import FreeRod
+
+    return FreeRod(arm, tol)
