@@ -43,6 +43,7 @@ def on_page(page: Path) -> str:
 
 @pytest.mark.filterwarnings("always::softreach.errors.SoftreachWarning")
 @pytest.mark.parametrize("page", PAGES, ids=on_page)
+@pytest.mark.slow
 def test_everything_on_a_page_runs_and_prints_what_it_says(page, tmp_path, monkeypatch):
     plt = pytest.importorskip("matplotlib.pyplot")
     monkeypatch.chdir(tmp_path)
@@ -153,7 +154,7 @@ def compare_output(example):
     """Hold a text fence against what was printed last."""
     printed = example.namespace.pop("_printed", None)
     assert printed is not None, f"line {example.line}: no executed fence before this output"
-    # compiling is said on the first run only
+    # compilation is announced on the first run only
     found = [line for line in printed.splitlines() if not line.startswith("softreach: compiling")]
     wanted = example.parsed.splitlines()
     assert len(found) == len(wanted), f"line {example.line}: printed {found}"
