@@ -37,7 +37,7 @@ from softreach.atlas.store import AtlasStore, Result, StoreFailed
 from softreach.cli import atlas as atlas_command
 from softreach.errors import InvalidInput, SoftreachError, SoftreachWarning
 from softreach.plot.atlas import atlas_box, plot_metric_map
-from softreach.plot.projection import OBLIQUE, view_axes
+from softreach.picture.projection import OBLIQUE, view_axes
 from softreach.plot.sheet import panel_extent
 
 SMALL = {"n": 2_000, "alpha": 0.5, "metrics": ("extent", "convex", "concave", "curvature")}

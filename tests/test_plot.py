@@ -12,9 +12,9 @@ from softreach.errors import InvalidInput
 from softreach.palette import activation_colors, bundle_color
 from softreach.plot import plot_arm, plot_cloud, plot_hull, plot_views, save_figure
 from softreach.plot.coloring import BundleKey, ScalarKey, color_samples
-from softreach.plot.projection import OBLIQUE, VIEWS, project, view_axes
-from softreach.plot.shading import shade
-from softreach.plot.zbuffer import Extent, ZBuffer
+from softreach.picture.projection import OBLIQUE, VIEWS, project, view_axes
+from softreach.picture.shading import shade
+from softreach.picture.zbuffer import Extent, ZBuffer
 
 plt = pytest.importorskip("matplotlib.pyplot")
 
@@ -96,7 +96,7 @@ class TestPoints:
     def test_blocks_do_not_show(self, rng, monkeypatch):
         points, colors = rng.uniform(0, 1, (500, 3)), rng.integers(0, 256, (500, 3))
         whole = image(points, colors, 3)
-        monkeypatch.setattr("softreach.plot.zbuffer._BLOCK", 7)
+        monkeypatch.setattr("softreach.picture.zbuffer._BLOCK", 7)
         np.testing.assert_array_equal(image(points, colors, 3), whole)
 
     def test_points_outside_or_not_finite_leave_no_trace(self):

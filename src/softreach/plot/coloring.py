@@ -15,9 +15,19 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["BundleKey", "Coloring", "ScalarKey", "color_samples", "draw_figure_key", "draw_key"]
+__all__ = [
+    "COLORMAP",
+    "BundleKey",
+    "Coloring",
+    "ScalarKey",
+    "bundle_activations",
+    "color_map",
+    "color_samples",
+    "draw_figure_key",
+    "draw_key",
+]
 
-_COLORMAP = "viridis"
+COLORMAP = "viridis"
 _MISSING = 204  # light gray
 
 
@@ -47,14 +57,15 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike = "rgb") -> Co
     """Color samples by all activations, by one bundle's magnitude, or by given values.
 
     Args:
-        cloud: activation(sample, fiber) [-].
+        cloud: activation(sample, bundle) [-].
         color: "rgb" for |γ| / max |γ| of all bundles; the name or index of one bundle; one number
-            per sample; or RGB from 0 to 1 per sample.
+            per sample, whose attributes `long_name` and `units` go to the key if it is a DataArray;
+            or RGB from 0 to 1 per sample.
 
     Raises:
         InvalidInput: No such bundle, or an array of another length.
     """
-    activation = cloud["activation"].transpose("sample", "fiber")
+    activation = bundle_activations(cloud)
     names = _names(activation)
     if isinstance(color, str) and color == "rgb":
         lights = activation_colors(np.eye(len(names)))
@@ -63,7 +74,14 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike = "rgb") -> Co
         bundle = _bundle(names, color)
         magnitude = np.abs(activation.values[:, bundle])
         return _scalar(magnitude, f"|γ| {names[bundle]}", 0.0)
-    return _given(np.asarray(color, float), activation.sizes["sample"])
+    return _given(color, len(activation))
+
+
+def bundle_activations(cloud: xr.Dataset) -> xr.DataArray:
+    """Activations with samples first and bundles second, whatever the dimension is called."""
+    activation = cloud["activation"]
+    (bundle,) = (dim for dim in activation.dims if dim != "sample")
+    return activation.transpose("sample", bundle)
 
 
 def draw_key(ax: Axes, key: BundleKey | ScalarKey | None) -> None:
@@ -72,7 +90,7 @@ def draw_key(ax: Axes, key: BundleKey | ScalarKey | None) -> None:
         ax.legend(handles=_patches(key), **_ABOVE)
     elif key is not None:
         bar = {"label": key.label, "fraction": 0.046, "pad": 0.03}
-        ax.figure.colorbar(_mappable(key), ax=ax, **bar)
+        ax.figure.colorbar(color_map(key), ax=ax, **bar)
 
 
 def draw_figure_key(figure: Figure, key: BundleKey | ScalarKey | None, top: float) -> None:
@@ -88,7 +106,7 @@ def draw_figure_key(figure: Figure, key: BundleKey | ScalarKey | None, top: floa
         figure.legend(handles=_patches(key), **options)
     elif key is not None:
         bar = figure.add_axes((0.4, 1 - 0.5 * top, 0.4, 0.2 * top))
-        figure.colorbar(_mappable(key), cax=bar, orientation="horizontal")
+        figure.colorbar(color_map(key), cax=bar, orientation="horizontal")
         bar.set_ylabel(key.label, rotation=0, ha="right", va="center")
 
 
@@ -102,9 +120,10 @@ _ABOVE: dict[str, Any] = {
 
 
 def _names(activation: xr.DataArray) -> list[str]:
-    if "fiber" in activation.coords:
-        return [str(name) for name in activation["fiber"].values]
-    return [str(k + 1) for k in range(activation.sizes["fiber"])]
+    bundle = activation.dims[1]
+    if bundle in activation.coords:
+        return [str(name) for name in activation[bundle].values]
+    return [str(k + 1) for k in range(activation.shape[1])]
 
 
 def _bundle(names: list[str], color: str | int | np.integer) -> int:
@@ -116,12 +135,20 @@ def _bundle(names: list[str], color: str | int | np.integer) -> int:
     raise InvalidInput("color", color, f'"rgb", a bundle ({known}) or its index, or an array')
 
 
-def _given(values: NDArray[np.float64], samples: int) -> Coloring:
+def _given(color: ArrayLike, samples: int) -> Coloring:
+    values = np.asarray(color, float)
     if values.shape == (samples,):
-        return _scalar(values, "")
+        return _scalar(values, _described(color))
     if values.shape == (samples, 3):
         return Coloring(np.rint(255 * np.clip(values, 0, 1)).astype(np.uint8), None)
     raise InvalidInput("color.shape", values.shape, f"({samples},) or ({samples}, 3)")
+
+
+def _described(color: ArrayLike) -> str:
+    """What an array says of itself: its long name and unit."""
+    attrs = getattr(color, "attrs", {})
+    name, unit = attrs.get("long_name", ""), attrs.get("units")
+    return f"{name} [{'-' if unit == '1' else unit}]" if unit else name
 
 
 def _scalar(values: NDArray[np.float64], label: str, low: float | None = None) -> Coloring:
@@ -131,18 +158,19 @@ def _scalar(values: NDArray[np.float64], label: str, low: float | None = None) -
     some = finite.any()
     start = float(values.min(where=finite, initial=np.inf)) if low is None and some else low or 0.0
     stop = float(values.max(where=finite, initial=start)) if some else start + 1.0
-    table = colormaps[_COLORMAP](np.arange(257), bytes=True)[:, :3]
+    table = colormaps[COLORMAP](np.arange(257), bytes=True)[:, :3]
     table[256] = _MISSING
     share = np.where(finite, (values - start) / ((stop - start) or 1.0), 0.0)
     index = np.minimum(255, (256 * share).astype(np.int16))
     return Coloring(table[np.where(finite, index, 256)], ScalarKey(label, start, stop))
 
 
-def _mappable(key: ScalarKey) -> Any:
+def color_map(key: ScalarKey) -> Any:
+    """What matplotlib draws a color bar of."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    return ScalarMappable(Normalize(key.low, key.high), _COLORMAP)
+    return ScalarMappable(Normalize(key.low, key.high), COLORMAP)
 
 
 def _patches(key: BundleKey) -> list[Any]:

@@ -1,0 +1,1 @@
+"""Pixels from points and triangles in NumPy alone: views, light, a z-buffer, small PNG pictures."""
