@@ -33,7 +33,7 @@ def atlas_figures(atlas: xr.Dataset, panels: int = 7) -> Iterator[tuple[str, Any
             yield f"map_{metric}", plot.plot_metric_map(atlas, metric)
     if "x_min" not in atlas:
         return
-    box = {"box_over_length": plot.box_over_length(atlas)}
+    box: dict[str, Any] = {"box_over_length": plot.box_over_length(atlas)}
     picked = _thinned(atlas, panels)
     edges = plot.sheet_axes(picked)
     yield "clouds", plot.plot_cloud_sheet(_clouds(picked), *edges, **box)

@@ -46,4 +46,5 @@ __all__ = [
     "plot_views",
     "plot_volume_curve",
     "save_figure",
+    "sheet_axes",
 ]

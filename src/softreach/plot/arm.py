@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm_shape import arm_mesh, fiber_bands, rest_configuration
 from softreach.geometry.tube import grid_faces
 from softreach.palette import BODY, bundle_color
-from softreach.plot.frame import Panel
-from softreach.plot.lengths import in_lengths
 from softreach.picture.projection import View
 from softreach.picture.shading import draw_mesh
-from softreach.plot.style import figure_style
 from softreach.picture.zbuffer import ZBuffer
+from softreach.plot.frame import Panel
+from softreach.plot.lengths import in_lengths
+from softreach.plot.style import figure_style
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -72,6 +72,5 @@ def _axis(values: xr.DataArray) -> SheetAxis:
 
 
 def plain(name: str) -> str:
+    """A name of the atlas as words."""
     return name.replace("_", " ")
-
-

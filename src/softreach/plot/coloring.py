@@ -21,6 +21,7 @@ __all__ = [
     "Coloring",
     "ScalarKey",
     "bundle_activations",
+    "bundle_names",
     "color_map",
     "color_samples",
     "draw_figure_key",
@@ -29,12 +30,13 @@ __all__ = [
 
 COLORMAP = "viridis"
 _MISSING = 204  # light gray
+_LINE = 44  # characters above axes of a column's width
 
 
 class BundleKey(NamedTuple):
     """Each bundle adds a color."""
 
-    names: list[str]
+    names: tuple[str, ...]
     colors: NDArray[np.uint8]
 
 
@@ -66,7 +68,7 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike = "rgb") -> Co
         InvalidInput: No such bundle, or an array of another length.
     """
     activation = bundle_activations(cloud)
-    names = _names(activation)
+    names = bundle_names(cloud)
     if isinstance(color, str) and color == "rgb":
         lights = activation_colors(np.eye(len(names)))
         return Coloring(activation_colors(activation.values), BundleKey(names, lights))
@@ -84,10 +86,20 @@ def bundle_activations(cloud: xr.Dataset) -> xr.DataArray:
     return activation.transpose("sample", bundle)
 
 
+def bundle_names(cloud: xr.Dataset) -> tuple[str, ...]:
+    """Names of the bundles, or their numbers from 1 up if the cloud has none."""
+    activation = bundle_activations(cloud)
+    bundle = activation.dims[1]
+    if bundle in activation.coords:
+        return tuple(str(name) for name in activation[bundle].values)
+    return tuple(str(k + 1) for k in range(activation.shape[1]))
+
+
 def draw_key(ax: Axes, key: BundleKey | ScalarKey | None) -> None:
     """Explain the colors in axes, by a legend above them or a color bar beside them."""
     if isinstance(key, BundleKey):
-        ax.legend(handles=_patches(key), **_ABOVE)
+        fits = sum(len(name) + 6 for name in key.names) <= _LINE
+        ax.legend(handles=_patches(key), **_ABOVE | {"ncols": 4 if fits else 2})
     elif key is not None:
         bar = {"label": key.label, "fraction": 0.046, "pad": 0.03}
         ax.figure.colorbar(color_map(key), ax=ax, **bar)
@@ -119,14 +131,7 @@ _ABOVE: dict[str, Any] = {
 }
 
 
-def _names(activation: xr.DataArray) -> list[str]:
-    bundle = activation.dims[1]
-    if bundle in activation.coords:
-        return [str(name) for name in activation[bundle].values]
-    return [str(k + 1) for k in range(activation.shape[1])]
-
-
-def _bundle(names: list[str], color: str | int | np.integer) -> int:
+def _bundle(names: tuple[str, ...], color: str | int | np.integer) -> int:
     if isinstance(color, str) and color in names:
         return names.index(color)
     if not isinstance(color, str) and 0 <= color < len(names):

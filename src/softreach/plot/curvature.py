@@ -65,7 +65,9 @@ def _common_places(statistics: Mapping[str, xr.Dataset]) -> Array:
     places = [unit_of(found).of(found["Z"].values) for found in statistics.values()]
     for other in places[1:]:
         if other.shape != places[0].shape or not np.allclose(other, places[0]):
-            raise InvalidInput("stations", other.tolist(), f"those of the first: {places[0].tolist()}")
+            raise InvalidInput(
+                "stations", other.tolist(), f"those of the first: {places[0].tolist()}"
+            )
     return places[0]
 
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from softreach.arm_shape import rest_configuration
+from softreach.picture.projection import View
 from softreach.plot.arm import arm_points, plot_arm
 from softreach.plot.cross_section import plot_cross_section
 from softreach.plot.frame import bounding_box
-from softreach.picture.projection import View
 from softreach.plot.style import figure_style, pyplot
 
 if TYPE_CHECKING:
@@ -65,12 +65,12 @@ def plot_designs(
         )
         for k, panel in enumerate(panels):
             arm, length = panel.arm, panel.arm.length
-            drawn = {"bundles": panel.bundles}
-            plot_arm(arm, ax=axes[0, k], view=panel.view, box=length * box, **drawn)
+            drawn, shown = panel.bundles, length * box
+            plot_arm(arm, ax=axes[0, k], view=panel.view, bundles=drawn, box=shown)
             axes[0, k].set_title(panel.title)
             for ax, station in zip(axes[1:, k], stations_over_length, strict=True):
                 z, half = station * length, reach * length
-                plot_cross_section(arm, z, ax=ax, half_width=half, **drawn)
+                plot_cross_section(arm, z, ax=ax, bundles=drawn, half_width=half)
                 ax.set_title(f"Z = {station:.2g} L" if station else "Z = 0")
         for ax in np.ravel(axes[:, 1:]):
             ax.set(ylabel="", yticklabels=[])

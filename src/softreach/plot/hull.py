@@ -6,18 +6,17 @@ from typing import TYPE_CHECKING, Protocol
 
 from numpy.typing import ArrayLike
 
+from softreach.palette import STEEL
+from softreach.picture.projection import View
+from softreach.picture.shading import draw_mesh
 from softreach.plot.frame import Panel
 from softreach.plot.lengths import in_lengths
-from softreach.picture.projection import View
-from softreach.palette import STEEL
-from softreach.picture.shading import draw_mesh
 from softreach.plot.style import figure_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = ["SurfaceMesh", "plot_hull"]
-
 
 
 class SurfaceMesh(Protocol):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,7 +117,7 @@ def _bar_above(ax: Axes, key: ScalarKey) -> None:
     from matplotlib.ticker import MaxNLocator
 
     bar = ax.inset_axes((0.05, 1.05, 0.9, 0.035))
-    options = {"orientation": "horizontal", "label": key.label}
+    options: dict[str, Any] = {"orientation": "horizontal", "label": key.label}
     shown = ax.figure.colorbar(color_map(key), cax=bar, **options)
     shown.locator = MaxNLocator(4)
     shown.ax.xaxis.set_ticks_position("top")

@@ -13,7 +13,7 @@ from softreach.errors import InvalidInput
 from softreach.picture.projection import View, view_angles
 from softreach.plot.arm import plot_arm
 from softreach.plot.cloud import drawn_tips, plot_cloud
-from softreach.plot.coloring import color_samples, draw_figure_key
+from softreach.plot.coloring import bundle_names, color_samples, draw_figure_key
 from softreach.plot.frame import bounding_box
 from softreach.plot.style import figure_style, pyplot
 
@@ -41,11 +41,12 @@ def plot_opposite_sides(
         width: Of the figure [inch].
 
     Raises:
-        InvalidInput: No clouds, an unknown view, or no finite tip.
+        InvalidInput: No clouds, clouds of different bundles, an unknown view, or no finite tip.
         MissingExtra: matplotlib is not installed.
     """
-    if not clouds:
-        raise InvalidInput("clouds", "none", "one at least")
+    bundles = {bundle_names(cloud) for cloud in clouds.values()}
+    if len(bundles) != 1:
+        raise InvalidInput("clouds", f"of bundles {sorted(bundles)}", "one or more of one set")
     azimuth, elevation = view_angles(view)
     sides = ((azimuth, elevation), (azimuth + np.pi, elevation))
     shown = np.asarray(_around(clouds) if box_over_length is None else box_over_length, float)
@@ -67,5 +68,3 @@ def plot_opposite_sides(
 
 def _around(clouds: Mapping[str, xr.Dataset]) -> ArrayLike:
     return bounding_box(*(drawn_tips(cloud) for cloud in clouds.values()))
-
-

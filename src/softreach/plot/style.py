@@ -82,4 +82,5 @@ def write_note(ax: Axes, text: str, right: float, up: float) -> None:
     """Small text in axes, at a place from 0 to 1 to the right and up, within the nearer edges."""
     across, along = ("right" if right > 0.5 else "left"), ("top" if up > 0.5 else "bottom")
     place = {"ha": across, "va": along, "transform": ax.transAxes}
-    ax.text(right, up, text, fontsize=7, color="0.25", zorder=5, **place)
+    paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
+    ax.text(right, up, text, fontsize=7, color="0.25", zorder=5, bbox=paper, **place)

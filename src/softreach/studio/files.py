@@ -90,7 +90,9 @@ def _shown(reach: Reach, look: Appearance) -> tuple[xr.Dataset, str | int | xr.D
     color = sample_values(reach, look.level, look.color)
     kept = in_slice(cloud_points(reach, look.level), look.slice)
     if isinstance(color, np.ndarray):
-        color = xr.DataArray(color[kept], dims="sample", attrs={"long_name": color_label(look.color)})
+        color = xr.DataArray(
+            color[kept], dims="sample", attrs={"long_name": color_label(look.color)}
+        )
     return cloud.isel(sample=kept), color
 
 
