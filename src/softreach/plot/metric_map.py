@@ -27,7 +27,8 @@ _METRICS = {
     "unreachability": "UNR (α-shape)",
     "exact_unreachability": "UNR (exact)",
 }
-_POWERS = {"m": 1, "m3": 3}
+# units -> power of L that a metric is divided by, and what the label says of it
+_POWERS = {"m": (1, " / L"), "m2": (2, " / L²"), "m3": (3, " / L³"), "1/m": (-1, " · L")}
 
 
 def plot_metric_map(atlas: xr.Dataset, metric: str, *, ax: Axes | None = None) -> Axes:
@@ -47,7 +48,8 @@ def plot_metric_map(atlas: xr.Dataset, metric: str, *, ax: Axes | None = None) -
     across, up = sheet_axes(atlas)
     if metric not in atlas or atlas[metric].dims != atlas["status"].dims:
         raise InvalidInput("metric", metric, "a metric of the atlas")
-    relative = atlas[metric] / design_lengths(atlas) ** _power(atlas[metric])
+    power, suffix = _POWERS.get(atlas[metric].attrs.get("units", "1"), (0, ""))
+    relative = atlas[metric] / design_lengths(atlas) ** power
     values = relative.transpose(*reversed(atlas["status"].dims)).values
     if min(values.shape) < 2 or not np.isfinite(values).any():
         raise InvalidInput("atlas", f"{values.shape} designs", "2 x 2 or more, one done at least")
@@ -56,7 +58,7 @@ def plot_metric_map(atlas: xr.Dataset, metric: str, *, ax: Axes | None = None) -
         shown = np.ma.masked_invalid(values)
         filled = ax.contourf(across.values, up.values, shown, 14, cmap="viridis")
         _draw_contours(ax, across, up, shown, np.asarray(filled.levels))
-        ax.figure.colorbar(filled, ax=ax, label=_METRICS.get(metric, plain(metric)))
+        ax.figure.colorbar(filled, ax=ax, label=_METRICS.get(metric, plain(metric) + suffix))
         _mark_best(ax, across, up, values, smallest="unreachability" in metric)
         ax.set(xlabel=across.label, ylabel=up.label)
     return ax
@@ -102,10 +104,6 @@ def _mark_best(ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, smalle
         fontsize=7,
         bbox={"fc": "w", "ec": "none", "pad": 1.2, "alpha": 0.8},
     )
-
-
-def _power(metric: xr.DataArray) -> int:
-    return _POWERS.get(metric.attrs.get("units", "1"), 0)
 
 
 def _best(values: Array, smallest: bool) -> tuple[int, int]:
