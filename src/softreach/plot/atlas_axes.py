@@ -12,11 +12,13 @@ from softreach.errors import InvalidInput
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["SheetAxis", "box_over_length", "design_lengths", "plain", "sheet_axes"]
+__all__ = ["SheetAxis", "box_over_length", "design_lengths", "over_length", "plain", "sheet_axes"]
 
 Array = NDArray[np.float64]
 
 _SYMBOLS = {"revolution": "Ω", "taper": "φ", "poisson_ratio": "ν", "radius_ratio": "$R_1/R_2$"}
+
+_POWERS = {"m": 1, "m2": 2, "m3": 3, "1/m": -1}
 
 
 class SheetAxis(NamedTuple):
@@ -30,6 +32,13 @@ def design_lengths(atlas: xr.Dataset) -> xr.DataArray:
     """L of every design [m], over the dimensions of the atlas: a parameter, or that of its base."""
     length = atlas["length"] if "length" in atlas.coords else float(atlas.attrs["length"])
     return 0.0 * atlas["status"] + length
+
+
+def over_length(atlas: xr.Dataset, metric: str) -> xr.DataArray:
+    """A metric relative to each design's own length: V / L³, heights over L, curvatures times L."""
+    values = atlas[metric]
+    power = _POWERS.get(values.attrs.get("units", "1"), 0)
+    return values / design_lengths(atlas) ** power
 
 
 def sheet_axes(atlas: xr.Dataset) -> tuple[SheetAxis, SheetAxis]:
@@ -53,9 +62,8 @@ def box_over_length(atlas: xr.Dataset) -> Array:
     """
     if "x_min" not in atlas:
         raise InvalidInput("atlas", "without bounding boxes", 'built with the metrics "extent"')
-    lengths = design_lengths(atlas)
-    low = [float((atlas[f"{axis}_min"] / lengths).min()) for axis in "xyz"]
-    high = [float((atlas[f"{axis}_max"] / lengths).max()) for axis in "xyz"]
+    low = [float(over_length(atlas, f"{axis}_min").min()) for axis in "xyz"]
+    high = [float(over_length(atlas, f"{axis}_max").max()) for axis in "xyz"]
     if not np.isfinite([low, high]).all():
         raise InvalidInput("atlas", "no design is done", "one design at least")
     return np.array([low, high])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.errors import InvalidInput
-from softreach.plot.atlas_axes import SheetAxis, design_lengths, plain, sheet_axes
+from softreach.plot.atlas_axes import SheetAxis, over_length, plain, sheet_axes
 from softreach.plot.style import figure_style, small_axes
 
 if TYPE_CHECKING:
@@ -27,8 +27,7 @@ _METRICS = {
     "unreachability": "UNR (α-shape)",
     "exact_unreachability": "UNR (exact)",
 }
-# units -> power of L that a metric is divided by, and what the label says of it
-_POWERS = {"m": (1, " / L"), "m2": (2, " / L²"), "m3": (3, " / L³"), "1/m": (-1, " · L")}
+_RELATIVE = {"m": " / L", "m2": " / L²", "m3": " / L³", "1/m": " · L"}
 
 
 def plot_metric_map(atlas: xr.Dataset, metric: str, *, ax: Axes | None = None) -> Axes:
@@ -48,9 +47,8 @@ def plot_metric_map(atlas: xr.Dataset, metric: str, *, ax: Axes | None = None) -
     across, up = sheet_axes(atlas)
     if metric not in atlas or atlas[metric].dims != atlas["status"].dims:
         raise InvalidInput("metric", metric, "a metric of the atlas")
-    power, suffix = _POWERS.get(atlas[metric].attrs.get("units", "1"), (0, ""))
-    relative = atlas[metric] / design_lengths(atlas) ** power
-    values = relative.transpose(*reversed(atlas["status"].dims)).values
+    values = over_length(atlas, metric).values.T
+    suffix = _RELATIVE.get(atlas[metric].attrs.get("units", "1"), "")
     if min(values.shape) < 2 or not np.isfinite(values).any():
         raise InvalidInput("atlas", f"{values.shape} designs", "2 x 2 or more, one done at least")
     with figure_style(ax):
