@@ -36,8 +36,8 @@ from softreach.atlas.space_file import parse_space
 from softreach.atlas.store import AtlasStore, Result, StoreFailed
 from softreach.cli import atlas as atlas_command
 from softreach.errors import InvalidInput, SoftreachError, SoftreachWarning
-from softreach.plot.atlas import atlas_box, plot_metric_map
-from softreach.plot.projection import OBLIQUE, view_axes
+from softreach.picture.projection import view_axes
+from softreach.plot import box_over_length, plot_metric_map
 from softreach.plot.sheet import panel_extent
 
 SMALL = {"n": 2_000, "alpha": 0.5, "metrics": ("extent", "convex", "concave", "curvature")}
@@ -829,8 +829,8 @@ def test_every_figure_is_written_as_png_and_pdf(paper, tmp_path, capsys):
 
 def test_no_tip_lies_outside_its_panel_of_the_sheet(paper):
     pytest.importorskip("matplotlib")
-    extent = panel_extent(atlas_box(paper), OBLIQUE)
-    seen = np.moveaxis(paper.tip.values, 2, -1).reshape(-1, 3) @ view_axes(OBLIQUE)[:2].T
+    extent = panel_extent(box_over_length(paper), "oblique")
+    seen = np.moveaxis(paper.tip.values, 2, -1).reshape(-1, 3) @ view_axes("oblique")[:2].T
     assert extent.left < seen[:, 0].min() < seen[:, 0].max() < extent.right
     assert extent.bottom < seen[:, 1].min() < seen[:, 1].max() < extent.top
 

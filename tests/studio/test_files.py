@@ -61,8 +61,8 @@ def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypat
     plotted, views = {}, plot.plot_views
 
     def watched(cloud, *rest, color):
-        plotted.update(cloud=cloud, color=color, axes=views(cloud, *rest, color=color))
-        return plotted["axes"]
+        plotted.update(cloud=cloud, color=color, figure=views(cloud, *rest, color=color))
+        return plotted["figure"]
 
     monkeypatch.setattr(plot, "plot_views", watched)
     cut = Slice(axis="y", center=0.1, thickness=0.3)
@@ -73,7 +73,7 @@ def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypat
     wanted = wanted[kept] if isinstance(wanted, np.ndarray) else wanted
     np.testing.assert_array_equal(plotted["color"], wanted)
     if isinstance(wanted, np.ndarray):
-        bar = plotted["axes"]["front"].get_figure().axes[-1]
+        bar = plotted["figure"].axes[-1]
         assert bar.get_ylabel().startswith(color)
 
 

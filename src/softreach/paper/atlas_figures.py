@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from softreach.geometry.hull import Hull
-    from softreach.plot.sheet import SheetAxis
+    from softreach.plot import SheetAxis
 
 __all__ = ["atlas_figures"]
 
@@ -25,22 +25,22 @@ def atlas_figures(atlas: xr.Dataset, panels: int = 7) -> Iterator[tuple[str, Any
         atlas: A grid of two parameters, from `open_atlas`.
         panels: Columns and rows of the sheets at most.
     """
-    from softreach.plot.atlas import atlas_box, plot_corners, plot_metric_map, sheet_axes
-    from softreach.plot.sheet import plot_cloud_sheet, plot_hull_sheet
+    from softreach import plot
+    from softreach.plot.atlas_axes import design_lengths
 
     for metric in _METRICS:
         if metric in atlas and np.isfinite(atlas[metric].values).any():
-            yield f"map_{metric}", plot_metric_map(atlas, metric)
+            yield f"map_{metric}", plot.plot_metric_map(atlas, metric)
     if "x_min" not in atlas:
         return
-    box = atlas_box(atlas)
+    box: dict[str, Any] = {"box_over_length": plot.box_over_length(atlas)}
     picked = _thinned(atlas, panels)
-    edges = sheet_axes(picked)
-    yield "clouds", plot_cloud_sheet(_clouds(picked), *edges, box=box)
-    yield "corners", plot_corners(_corners(atlas), box=box)
+    edges = plot.sheet_axes(picked)
+    yield "clouds", plot.plot_cloud_sheet(_clouds(picked), *edges, **box)
+    yield "corners", plot.plot_opposite_sides(_corners(atlas), **box)
     yield "curvature", _curvature(atlas)
-    length = atlas.attrs["length"]
-    yield "hulls", plot_hull_sheet(_hulls(picked), *edges, box=box, length=length)
+    lengths = design_lengths(picked)
+    yield "hulls", plot.plot_hull_sheet(_hulls(picked), *edges, length=lengths, **box)
 
 
 def _thinned(atlas: xr.Dataset, panels: int) -> xr.Dataset:
@@ -86,16 +86,16 @@ def _alpha(atlas: xr.Dataset) -> float:
     return float(atlas["volume"].attrs["alpha_over_length"]) if "volume" in atlas else 0.05
 
 
-def _corners(atlas: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
+def _corners(atlas: xr.Dataset) -> dict[str, xr.Dataset]:
     """Title and cloud at the ends of both parameters, in the paper's order."""
-    from softreach.plot.atlas import sheet_axes
+    from softreach.plot import sheet_axes
 
     ends = _thinned(atlas, 2)
     across, up = sheet_axes(ends)
     cloud_at = _clouds(ends)
     places = [(column, row) for column in range(2) for row in range(2)]
     found = ((f"{_at(across, j)}, {_at(up, i)}", cloud_at(j, i)) for j, i in places)
-    return [(title, cloud) for title, cloud in found if cloud is not None]
+    return {title: cloud for title, cloud in found if cloud is not None}
 
 
 def _at(axis: SheetAxis, k: int) -> str:
@@ -106,8 +106,7 @@ def _at(axis: SheetAxis, k: int) -> str:
 def _curvature(atlas: xr.Dataset) -> Any:
     """The first against the last value of the second parameter, at the last of the first."""
     from softreach.curvature import curvature_statistics
-    from softreach.plot.atlas import sheet_axes
-    from softreach.plot.curvature import plot_curvature
+    from softreach.plot import plot_curvature, sheet_axes
 
     ends = _thinned(atlas, 2)
     across, up = sheet_axes(ends)

@@ -85,8 +85,7 @@ def _fewer_fibers() -> dict[str, float]:
 
 
 def _draw(atlas: xr.Dataset, arm: Manipulator, pair: Pair, notes: Notebook) -> None:
-    from softreach.plot.arm import plot_arm
-    from softreach.plot.atlas import plot_metric_map
+    from softreach.plot import plot_arm, plot_metric_map
 
     ax = plot_metric_map(atlas, _LABEL)
     words = (
@@ -97,6 +96,6 @@ def _draw(atlas: xr.Dataset, arm: Manipulator, pair: Pair, notes: Notebook) -> N
     if not len(pair.activations):
         return
     shapes = configuration(arm, pair.activations)
-    ax = plot_arm(arm, shapes, view=(-np.pi / 3, np.pi / 9), rest=False)
+    ax = plot_arm(arm, shapes, view="oblique", rest=False)
     words = f"{len(pair.activations)} activations of one three-fiber arm with the same tip."
     notes.draw("", "same_tip", words, ax)
