@@ -34,7 +34,7 @@ def test_sectors_stand_where_the_bundles_are_at_that_station(share):
     for k, wedge in enumerate(sectors(ax)):
         assert (wedge.theta1 + wedge.theta2) / 2 == pytest.approx(angles[k])
         assert wedge.theta2 - wedge.theta1 == pytest.approx(48)
-        assert wedge.r == pytest.approx(float(arm.radius(share * arm.length)) / arm.length)
+        assert wedge.r == pytest.approx(float(arm.profile.radius(share * arm.length)) / arm.length)
         assert wedge.width == pytest.approx(0.25 * wedge.r)
         assert wedge.get_facecolor()[:3] == bundle_color(k)
 
