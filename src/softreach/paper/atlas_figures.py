@@ -39,8 +39,7 @@ def atlas_figures(atlas: xr.Dataset, panels: int = 7) -> Iterator[tuple[str, Any
     yield "clouds", plot_cloud_sheet(_clouds(picked), *edges, box=box)
     yield "corners", plot_corners(_corners(atlas), box=box)
     yield "curvature", _curvature(atlas)
-    length = atlas.attrs["length"]
-    yield "hulls", plot_hull_sheet(_hulls(picked), *edges, box=box, length=length)
+    yield "hulls", plot_hull_sheet(_hulls(picked), *edges, box=box)
 
 
 def _thinned(atlas: xr.Dataset, panels: int) -> xr.Dataset:
@@ -70,19 +69,22 @@ def _clouds(atlas: xr.Dataset) -> Callable[[int, int], xr.Dataset | None]:
 
 
 def _hulls(atlas: xr.Dataset) -> Callable[[int, int], Hull | None]:
+    """(column, row) -> the hull of the design there in lengths of its own, if it is done."""
     from softreach.volume import concave_hull
 
-    cloud_at, share = _clouds(atlas), _alpha(atlas)
+    cloud_at, alpha_over_length = _clouds(atlas), _alpha_over_length(atlas)
 
     def hull_at(column: int, row: int) -> Hull | None:
         cloud = cloud_at(column, row)
-        return None if cloud is None else concave_hull(cloud.tip, share * cloud.tip.attrs["length"])
+        if cloud is None:
+            return None
+        return concave_hull(cloud.tip.values / cloud.tip.attrs["length"], alpha_over_length)
 
     return hull_at
 
 
-def _alpha(atlas: xr.Dataset) -> float:
-    """The radius that the atlas was measured with, in L."""
+def _alpha_over_length(atlas: xr.Dataset) -> float:
+    """The radius that the atlas was measured with, over the length of each design."""
     return float(atlas["volume"].attrs["alpha_over_length"]) if "volume" in atlas else 0.05
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.atlas import over_length
 from softreach.cloud import design_of
 from softreach.errors import InvalidInput
 from softreach.plot.arm import plot_arm
@@ -35,7 +36,6 @@ _METRICS = {
     "unreachability": "UNR (α-shape)",
     "exact_unreachability": "UNR (exact)",
 }
-_POWERS = {"m": 1, "m3": 3}
 
 
 def sheet_axes(atlas: xr.Dataset) -> tuple[SheetAxis, SheetAxis]:
@@ -52,18 +52,18 @@ def sheet_axes(atlas: xr.Dataset) -> tuple[SheetAxis, SheetAxis]:
 
 
 def atlas_box(atlas: xr.Dataset) -> Array:
-    """Corners around all clouds [L], shape (2, 3).
+    """Corners around all clouds, each in lengths of its own design [L], shape (2, 3).
 
     Raises:
         InvalidInput: The atlas has no bounding boxes, or no design is done.
     """
     if "x_min" not in atlas:
         raise InvalidInput("atlas", "without bounding boxes", 'built with the metrics "extent"')
-    low = [float(atlas[f"{axis}_min"].min()) for axis in "xyz"]
-    high = [float(atlas[f"{axis}_max"].max()) for axis in "xyz"]
+    low = [float(over_length(atlas, f"{axis}_min").min()) for axis in "xyz"]
+    high = [float(over_length(atlas, f"{axis}_max").max()) for axis in "xyz"]
     if not np.isfinite([low, high]).all():
         raise InvalidInput("atlas", "no design is done", "one design at least")
-    return np.array([low, high]) / atlas.attrs["length"]
+    return np.array([low, high])
 
 
 def plot_corners(
@@ -100,8 +100,8 @@ def plot_corners(
 def plot_metric_map(atlas: xr.Dataset, metric: str, ax: Axes | None = None) -> Axes:
     """Contours of a metric over the two parameters of an atlas (figure 3b); its best is marked.
 
-    Volumes and lengths are shown in L. The best is the largest value, of unreachability the
-    smallest. Designs without a value stay white.
+    Volumes and lengths are relative to each design's own length. The best is the largest value, of
+    unreachability the smallest. Designs without a value stay white.
 
     Args:
         atlas: From `open_atlas`, a grid of two parameters.
@@ -114,7 +114,7 @@ def plot_metric_map(atlas: xr.Dataset, metric: str, ax: Axes | None = None) -> A
     across, up = sheet_axes(atlas)
     if metric not in atlas or atlas[metric].dims != atlas["status"].dims:
         raise InvalidInput("metric", metric, "a metric of the atlas")
-    values = atlas[metric].values.T / atlas.attrs["length"] ** _power(atlas[metric])
+    values = over_length(atlas, metric).values.T
     if min(values.shape) < 2 or not np.isfinite(values).any():
         raise InvalidInput("atlas", f"{values.shape} designs", "2 x 2 or more, one done at least")
     with figure_style(ax):
@@ -182,10 +182,6 @@ def _axis(values: xr.DataArray) -> SheetAxis:
 
 def _plain(name: str) -> str:
     return name.replace("_", " ")
-
-
-def _power(metric: xr.DataArray) -> int:
-    return _POWERS.get(metric.attrs.get("units", "1"), 0)
 
 
 def _best(values: Array, smallest: bool) -> tuple[int, int]:

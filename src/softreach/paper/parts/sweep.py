@@ -17,7 +17,7 @@ from softreach.paper.settings import Settings
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["sweep", "swept"]
+__all__ = ["atlas_place", "sweep"]
 
 _SCALARS = (
     "volume",
@@ -40,24 +40,29 @@ _CAPTIONS = {
 }
 
 
-def swept(settings: Settings, folder: Path) -> xr.Dataset:
+def atlas_place(folder: Path) -> Path:
+    """Where the atlas is, in the folder of all results."""
+    return folder / "atlas.zarr"
+
+
+def _swept(settings: Settings, folder: Path) -> xr.Dataset:
     """The atlas of section 3, computed or continued: revolution from 0 to 108°, taper to 3°."""
     turns = np.radians(np.linspace(0, 108, settings.designs))
     tapers = np.radians(np.linspace(0, 3, settings.designs))
     space = DesignSpace.grid(minimal_trunk(), revolution=turns, taper=tapers)
     return build_atlas(
         space,
-        folder / "atlas.zarr",
+        atlas_place(folder),
         settings.samples,
         settings.seed,
-        alpha=settings.alpha,
+        alpha_over_length=settings.alpha,
         accuracy=settings.accuracy,
     )
 
 
 def sweep(settings: Settings, folder: Path, notes: Notebook) -> None:
     """Volumes, unreachability, widths and curvatures of every design."""
-    atlas = swept(settings, folder)
+    atlas = _swept(settings, folder)
     curvature = atlas["bending_quantile"].isel(revolution=-1, taper=[0, -1])
     notes.note(
         designs=int(atlas["volume"].notnull().sum()),
