@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.atlas import DesignSpace, build_atlas
+from softreach.atlas import DesignSpace, build_atlas, open_atlas
 from softreach.designs import minimal_trunk
+from softreach.errors import InvalidInput
 from softreach.paper.atlas_figures import atlas_figures
 from softreach.paper.notebook import Notebook
 from softreach.paper.parts.shape import ASIDE, shapes
@@ -17,8 +18,9 @@ from softreach.paper.settings import Settings
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["atlas_place", "sweep"]
+__all__ = ["sweep", "swept_atlas"]
 
+_STORE = "atlas.zarr"
 _SCALARS = (
     "volume",
     "unreachability",
@@ -40,9 +42,17 @@ _CAPTIONS = {
 }
 
 
-def atlas_place(folder: Path) -> Path:
-    """Where the atlas is, in the folder of all results."""
-    return folder / "atlas.zarr"
+def swept_atlas(folder: Path) -> xr.Dataset:
+    """The atlas that the sweep left in the folder of all results.
+
+    Raises:
+        InvalidInput: It was removed.
+    """
+    try:
+        return open_atlas(folder / _STORE)
+    except InvalidInput as error:
+        notes = folder / "figures" / "sweep.json"
+        raise InvalidInput("atlas", error.value, error.allowed, f"remove {notes} too") from None
 
 
 def _swept(settings: Settings, folder: Path) -> xr.Dataset:
@@ -52,7 +62,7 @@ def _swept(settings: Settings, folder: Path) -> xr.Dataset:
     space = DesignSpace.grid(minimal_trunk(), revolution=turns, taper=tapers)
     return build_atlas(
         space,
-        atlas_place(folder),
+        folder / _STORE,
         settings.samples,
         settings.seed,
         alpha_over_length=settings.alpha,

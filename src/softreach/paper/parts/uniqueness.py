@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.atlas import open_atlas
 from softreach.designs import minimal_trunk
 from softreach.inverse import solve_inverse
 from softreach.kinematics import configuration
 from softreach.manipulator import Manipulator
 from softreach.paper.notebook import Notebook
-from softreach.paper.parts.sweep import atlas_place
+from softreach.paper.parts.sweep import swept_atlas
 from softreach.paper.settings import Settings
 from softreach.workspace import ReachableSet, reachable_set
 
@@ -38,7 +37,7 @@ class Pair(NamedTuple):
 
 def uniqueness(settings: Settings, folder: Path, notes: Notebook) -> None:
     """The share of the volume that several activations reach, and the clearest example."""
-    atlas = open_atlas(atlas_place(folder))
+    atlas = swept_atlas(folder)
     share = atlas["multiple_volume"] / atlas["exact_volume"]
     worst = share.isel(share.argmax(...))  # pyright: ignore[reportArgumentType]
     turn, taper = float(worst["revolution"]), float(worst["taper"])
