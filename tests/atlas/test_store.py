@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import asyncio
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 
 import softreach as sr
 from softreach.atlas import (
+    DesignSpace,
     StoreFailed,
     atlas_cloud,
     atlas_status,
@@ -20,7 +22,7 @@ from softreach.atlas import (
     open_atlas,
 )
 from softreach.atlas.store import AtlasStore, Result
-from softreach.errors import InvalidInput, SoftreachError
+from softreach.errors import InvalidInput, SoftreachError, SoftreachWarning
 from tests.atlas.families import SMALL, TINY, assert_same, command, gapped_space, small_space
 
 
@@ -73,6 +75,7 @@ def begun(tmp_path_factory) -> Begun:
     return Begun(stored_files(place), store.count)
 
 
+@pytest.mark.slow
 def test_a_creator_killed_at_any_write_leaves_a_store_that_another_completes(begun, tmp_path):
     def dies():
         raise Interrupted
@@ -90,6 +93,7 @@ def test_a_creator_killed_at_any_write_leaves_a_store_that_another_completes(beg
         assert stored_files(place) == begun.files
 
 
+@pytest.mark.slow
 def test_whoever_overtakes_a_creator_between_two_writes_keeps_its_designs(begun, tmp_path):
     asked = command(gapped_space(), **TINY)
     sizes = asked.profile_sizes
@@ -111,6 +115,7 @@ def test_whoever_overtakes_a_creator_between_two_writes_keeps_its_designs(begun,
         assert begun.files.items() <= stored_files(place).items()
 
 
+@pytest.mark.slow
 def test_of_two_different_commands_at_one_moment_one_is_refused(begun, tmp_path):
     def begin(store, n):
         try:
@@ -128,6 +133,7 @@ def test_of_two_different_commands_at_one_moment_one_is_refused(begun, tmp_path)
         assert AtlasStore.open(place).command.n == accepted[0]
 
 
+@pytest.mark.slow
 def test_many_creators_may_start_at_one_moment(begun, tmp_path):
     start = Barrier(8)
 
@@ -200,3 +206,54 @@ def test_damaged_activations_are_noticed(tmp_path):
     store.group["unit_activation"][0, 0] = 0.5
     with pytest.raises(SoftreachError, match="damaged"):
         build_atlas(small_space(), tmp_path / "a.zarr", **SMALL)
+
+
+def test_only_public_names_of_zarr_are_used():
+    """Private ones would tie softreach to one release of Zarr."""
+    root = Path(sr.__file__).parent
+    private = [
+        f"{file.relative_to(root)}: {name}"
+        for file in root.rglob("*.py")
+        for name in imported_from_zarr(ast.parse(file.read_text()))
+        if name.startswith("zarr.core") or any(part.startswith("_") for part in name.split("."))
+    ]
+    assert private == []
+
+
+def imported_from_zarr(tree: ast.AST) -> list[str]:
+    found = [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
+    names = [
+        f"{node.module}.{alias.name}" if isinstance(node, ast.ImportFrom) else alias.name
+        for node in found
+        for alias in node.names
+    ]
+    return [name for name in names if name.split(".")[0] == "zarr"]
+
+
+def test_a_store_of_another_version_is_refused_in_one_line(tmp_path):
+    store = AtlasStore.begin(tmp_path / "a.zarr", command(small_space(), **SMALL))
+    text = store.group.attrs["command"].replace('"atlas_version": 2', '"atlas_version": 1')
+    store.group.attrs["command"] = text
+    for ask in (open_atlas, lambda at: build_atlas(small_space(), at, **SMALL)):
+        with pytest.raises(
+            InvalidInput, match="version of the atlas = 1: must be 2; build"
+        ) as told:
+            ask(tmp_path / "a.zarr")
+        assert "\n" not in str(told.value)
+
+
+def test_a_store_says_how_long_each_design_is_and_steps_by_the_shortest(tmp_path):
+    space = DesignSpace.grid(sr.designs.minimal_trunk(), length=[0.0, 0.8, 1.5])
+    with pytest.warns(SoftreachWarning, match="1 of 3 designs"):
+        atlas = build_atlas(space, tmp_path / "a.zarr", **SMALL)
+    assert atlas.length.values.tolist() == [0.0, 0.8, 1.5]
+    for length in (0.8, 1.5):
+        alone = sr.compute_cloud(space.base.replace(length=length), n=2_000)
+        off = np.abs(atlas_cloud(atlas, length=length).tip.values - alone.tip.values).max()
+        assert 0 < off <= 0.5e-5 * 0.8 * (1 + 1e-9)
+
+
+def test_lengths_that_cannot_share_a_step_are_refused(tmp_path):
+    space = DesignSpace.grid(sr.designs.minimal_trunk(taper=0.0), length=[0.5, 1e4])
+    with pytest.raises(InvalidInput, match=r"length = 0\.5 to 10000 m: .*pass keep_clouds=False"):
+        build_atlas(space, tmp_path / "a.zarr", **SMALL)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from softreach.geometry.hull import Hull
     from softreach.plot.sheet import SheetAxis
 
-__all__ = ["atlas_figures"]
+__all__ = ["atlas_figures", "hulls_of"]
 
 _METRICS = ("volume", "exact_volume", "unreachability", "exact_unreachability")
 
@@ -39,7 +39,7 @@ def atlas_figures(atlas: xr.Dataset, panels: int = 7) -> Iterator[tuple[str, Any
     yield "clouds", plot_cloud_sheet(_clouds(picked), *edges, box=box)
     yield "corners", plot_corners(_corners(atlas), box=box)
     yield "curvature", _curvature(atlas)
-    yield "hulls", plot_hull_sheet(_hulls(picked), *edges, box=box)
+    yield "hulls", plot_hull_sheet(hulls_of(picked), *edges, box=box)
 
 
 def _thinned(atlas: xr.Dataset, panels: int) -> xr.Dataset:
@@ -68,7 +68,7 @@ def _clouds(atlas: xr.Dataset) -> Callable[[int, int], xr.Dataset | None]:
     return cloud_at
 
 
-def _hulls(atlas: xr.Dataset) -> Callable[[int, int], Hull | None]:
+def hulls_of(atlas: xr.Dataset) -> Callable[[int, int], Hull | None]:
     """(column, row) -> the hull of the design there in lengths of its own, if it is done."""
     from softreach.volume import concave_hull
 
