@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
+from softreach.atlas import over_length
 from softreach.errors import InvalidInput
 from softreach.studio.parameter_value import parameter_value
 from softreach.studio.state import MapView
@@ -109,12 +110,10 @@ def atlas_map(atlas: xr.Dataset, view: MapView, held: dict[str, int]) -> AtlasMa
         InvalidInput: There is no such map.
     """
     metric, *names = map_choices(atlas, view)
-    shown = atlas[metric].isel(held).transpose(names[1], names[0]).values
-    if atlas[metric].attrs.get("units") == "m3":
-        shown = shown / float(atlas.attrs["length"]) ** 3
+    shown = over_length(atlas, metric).isel(held).transpose(names[1], names[0]).values
     x, y = (atlas[name].values.astype(float) for name in names)
     labels = [_label(atlas, name) for name in names]
-    title = "\n".join([_title(metric), *_held_text(atlas, held)])
+    title = "\n".join([_title(atlas, metric), *_held_text(atlas, held)])
     return AtlasMap(
         image=_drawn(_shown(atlas, names[0]), _shown(atlas, names[1]), shown, labels, title),
         x=x,
@@ -178,6 +177,7 @@ def _end(values: NDArray[np.float64]) -> float:
     return float(values[-1]) if len(values) > 1 else float(values[0]) + 1.0
 
 
-def _title(metric: str) -> str:
+def _title(atlas: xr.Dataset, metric: str) -> str:
+    """The metric in words, relative to the length of each design."""
     text = metric.replace("_", " ")
-    return f"{text} / L³" if "volume" in metric else text
+    return text + {"m": " / L", "m3": " / L³"}.get(atlas[metric].attrs.get("units", "1"), "")

@@ -12,7 +12,7 @@ from softreach.arm.designs import minimal_trunk
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse import solve_inverse
 from softreach.paper.notebook import Notebook
-from softreach.paper.parts.sweep import swept
+from softreach.paper.parts.sweep import swept_atlas
 from softreach.paper.settings import Settings
 from softreach.rod.kinematics import configuration
 from softreach.workspace import ReachableSet, reachable_set
@@ -37,7 +37,7 @@ class Pair(NamedTuple):
 
 def uniqueness(settings: Settings, folder: Path, notes: Notebook) -> None:
     """The share of the volume that several activations reach, and the clearest example."""
-    atlas = swept(settings, folder)
+    atlas = swept_atlas(folder)
     share = atlas["multiple_volume"] / atlas["exact_volume"]
     worst = share.isel(share.argmax(...))  # pyright: ignore[reportArgumentType]
     turn, taper = float(worst["revolution"]), float(worst["taper"])
