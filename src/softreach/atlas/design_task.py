@@ -34,7 +34,7 @@ def begin_design(store: AtlasStore, metrics: Sequence[Metric], index: int) -> Ca
     try:
         arm = store.command.design(index)
         found = Intermediates(arm, store.cube, store.command, metrics)
-        found[Need.TIPS]
+        found[Need.TIPS]  # found now, by all threads
         threaded = [metric for metric in metrics if Need.REACHABLE_SET in metric.needs]
         values = _values(threaded, found)
         found.forget(Need.REACHABLE_SET)
