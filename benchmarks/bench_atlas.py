@@ -25,7 +25,6 @@ from softreach.atlas.metric import Need
 from softreach.atlas.metrics import METRIC_GROUPS, chosen_metrics
 from softreach.atlas.store import AtlasStore, Result
 from softreach.errors import SoftreachWarning
-from softreach.rod.kinematics import tip_positions
 
 ALPHA, ACCURACY, TOL = 0.05, 3e-3, 1e-6
 PARTS = {

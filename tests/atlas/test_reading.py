@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from softreach.plot.atlas import atlas_box, plot_metric_map
+from softreach.plot.projection import OBLIQUE, view_axes
 
 import softreach as sr
 from softreach.atlas import (
@@ -24,8 +26,6 @@ from softreach.atlas.design_task import begin_design
 from softreach.atlas.store import AtlasStore
 from softreach.errors import InvalidInput
 from softreach.paper.atlas_figures import hulls_of
-from softreach.plot.atlas import atlas_box, plot_metric_map
-from softreach.plot.projection import OBLIQUE, view_axes
 from softreach.plot.sheet import panel_extent
 from tests.atlas.families import (
     SMALL,
@@ -91,7 +91,7 @@ def test_what_is_not_there_is_not_opened(tmp_path):
 
 def test_no_tip_lies_outside_its_panel_of_the_sheet(paper):
     pytest.importorskip("matplotlib")
-    extent = panel_extent(atlas_box(paper), OBLIQUE)
+    extent = panel_extent(box_over_length(paper), OBLIQUE)
     seen = np.moveaxis(paper.tip.values, 2, -1).reshape(-1, 3) @ view_axes(OBLIQUE)[:2].T
     assert extent.left < seen[:, 0].min() < seen[:, 0].max() < extent.right
     assert extent.bottom < seen[:, 1].min() < seen[:, 1].max() < extent.top
@@ -171,9 +171,9 @@ def test_figures_show_each_design_in_lengths_of_its_own(tmp_path):
         build_atlas(similar_designs(length), tmp_path / f"{length}.zarr", **SMALL)
         for length in (1.0, 2.0)
     )
-    np.testing.assert_allclose(atlas_box(large), atlas_box(small), rtol=1e-12)
+    np.testing.assert_allclose(box_over_length(large), box_over_length(small), rtol=1e-12)
     both = build_atlas(similar_designs(2.0, 1.0, 0.5), tmp_path / "a.zarr", **SMALL)
-    np.testing.assert_allclose(atlas_box(both), atlas_box(small), rtol=1e-12)
+    np.testing.assert_allclose(box_over_length(both), box_over_length(small), rtol=1e-12)
 
 
 def test_maps_and_hulls_of_an_atlas_over_length_are_relative_to_each_length(tmp_path):

@@ -147,15 +147,16 @@ def test_many_creators_may_start_at_one_moment(begun, tmp_path):
         assert stored_files(tmp_path / f"{turn}.zarr") == begun.files
 
 
-@pytest.fixture(params=["a URL", "a URL of a file", "a Zarr store"])
+@pytest.fixture(params=["a URL", "a URL of a file", "a Zarr store", "a place in a Zarr store"])
 def elsewhere(request, tmp_path) -> Any:
     """Places that are no paths."""
     if request.param == "a URL of a file":
         return f"file://{tmp_path}/a.zarr"
-    if request.param == "a Zarr store":
-        from zarr.storage import MemoryStore
+    if "Zarr" in request.param:
+        from zarr.storage import MemoryStore, StorePath
 
-        return MemoryStore()
+        store = MemoryStore()
+        return store if request.param == "a Zarr store" else StorePath(store, "folder/a")
     fsspec = pytest.importorskip("fsspec")
     fsspec.filesystem("memory").store.clear()
     return "memory://folder/a.zarr"

@@ -11,12 +11,11 @@ from typing import Any, Self
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.atlas.metrics import METRICS
 from softreach.atlas.metric import Metric
 from softreach.atlas.metrics import known_metric
 from softreach.atlas.space import DesignSpace
 from softreach.curvature import QUANTILES
-from softreach.errors import InvalidInput
+from softreach.errors import InvalidInput, counted
 from softreach.sampling import check_sampler
 
 __all__ = ["ATLAS_VERSION", "Command"]
@@ -120,7 +119,7 @@ def _faults(command: Command) -> Iterator[InvalidInput]:
         yield InvalidInput("name of a metric", name, "no name that the atlas uses for something")
     if not space.bundles:
         why = next(iter(space.gaps.values()))
-        yield InvalidInput("space", f"{space.size} designs", "valid for one at least", why)
+        yield InvalidInput("space", counted(space.size, "design"), "valid for one at least", why)
     shortest, longest = space.length_range
     if command.keep_clouds and longest > _LONGEST * shortest:
         allowed = f"within a factor of {_LONGEST:g} of each other if clouds are kept"

@@ -12,13 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.manipulator import Manipulator
-from softreach.atlas.command import Command
-from softreach.atlas.metrics import hull_metrics, image_metrics
-from softreach.atlas.store import AtlasStore, Result, StoreFailed
-from softreach.curvature import QUANTITIES, stream_statistics
-from softreach.errors import SoftreachError, SoftreachWarning
-from softreach.rod.kinematics import tip_positions
 from softreach.atlas.intermediates import Intermediates
 from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import AtlasStore, Result
@@ -41,7 +34,7 @@ def begin_design(store: AtlasStore, metrics: Sequence[Metric], index: int) -> Ca
     try:
         arm = store.command.design(index)
         found = Intermediates(arm, store.cube, store.command, metrics)
-        found[Need.TIPS]
+        found[Need.TIPS]  # found now, by all threads
         threaded = [metric for metric in metrics if Need.REACHABLE_SET in metric.needs]
         values = _values(threaded, found)
         found.forget(Need.REACHABLE_SET)

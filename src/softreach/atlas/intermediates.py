@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.atlas.command import Command
 from softreach.atlas.metric import Metric, Need
 from softreach.curvature import stream_statistics
 from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.geometry.delaunay import delaunay
 from softreach.geometry.hull import convex_hull
-from softreach.kinematics import tip_positions
-from softreach.manipulator import Manipulator
+from softreach.rod.kinematics import tip_positions
 
 __all__ = ["Intermediates", "activations_of"]
 

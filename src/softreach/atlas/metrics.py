@@ -11,10 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.manipulator import Manipulator
-from softreach.geometry.alpha_shape import AlphaComplex
-from softreach.geometry.delaunay import delaunay
-from softreach.geometry.hull import convex_hull
 from softreach.atlas.metric import PROFILE, Metric, Need
 from softreach.curvature import QUANTITIES
 from softreach.errors import InvalidInput

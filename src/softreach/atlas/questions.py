@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from softreach.arm.manipulator import Manipulator
 from softreach.atlas.intermediates import activations_of
 from softreach.atlas.reading import command_of, opened_atlas
 from softreach.atlas.store import DONE, FAILED, GAP, TODO
 from softreach.errors import InvalidInput
-from softreach.kinematics import tip_positions
-from softreach.manipulator import Manipulator
+from softreach.rod.kinematics import tip_positions
 from softreach.schema import cloud_dataset
 
 if TYPE_CHECKING:

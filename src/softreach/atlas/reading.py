@@ -6,14 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.arm.manipulator import Manipulator
 from softreach.atlas.command import Command
 from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import DONE, AtlasStore
 from softreach.atlas.store_root import absolute
 from softreach.errors import InvalidInput
-from softreach.rod.kinematics import tip_positions
-from softreach.schema import cloud_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

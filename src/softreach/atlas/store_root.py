@@ -75,20 +75,19 @@ def claim(location: StoreLike, attributes: Mapping[str, Any]) -> None:
     import zarr
     from zarr.errors import ContainsGroupError
 
-    root = _first_wins(location)
+    place = _store_path(location)
+    store = _first_wins(place.store, location)
     with suppress(ContainsGroupError):
-        zarr.create_group(root, zarr_format=3, attributes=dict(attributes))
+        zarr.create_group(store, path=place.path, zarr_format=3, attributes=dict(attributes))
 
 
-def _first_wins(location: StoreLike) -> StorePath:
-    """The same place, to which only what is missing is written, and nothing beside strange files.
+def _first_wins(store: Store, location: StoreLike) -> Store:
+    """The same store, to which only what is missing is written, and nothing beside strange files.
 
     Zarr's groups have no exclusive mode, its stores have: whatever is set is set only if it does
     not exist.
     """
-    from zarr.storage import StorePath, WrapperStore
-
-    place = _store_path(location)
+    from zarr.storage import WrapperStore
 
     class FirstWins(WrapperStore):
         async def set(self, key: str, value: Any) -> None:
@@ -99,7 +98,7 @@ def _first_wins(location: StoreLike) -> StorePath:
                 raise InvalidInput("store", location, "a new folder, or an atlas")
             await self.set_if_not_exists(key, value)
 
-    return StorePath(FirstWins(place.store), place.path)
+    return FirstWins(store)
 
 
 def _strange(name: str) -> bool:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from softreach.geometry.hull import Hull
     from softreach.plot import SheetAxis
 
-__all__ = ["atlas_figures"]
+__all__ = ["atlas_figures", "hulls_of"]
 
 _METRICS = ("volume", "exact_volume", "unreachability", "exact_unreachability")
 
@@ -26,7 +26,6 @@ def atlas_figures(atlas: xr.Dataset, panels: int = 7) -> Iterator[tuple[str, Any
         panels: Columns and rows of the sheets at most.
     """
     from softreach import plot
-    from softreach.plot.atlas_axes import design_lengths
 
     for metric in _METRICS:
         if metric in atlas and np.isfinite(atlas[metric].values).any():
@@ -39,8 +38,7 @@ def atlas_figures(atlas: xr.Dataset, panels: int = 7) -> Iterator[tuple[str, Any
     yield "clouds", plot.plot_cloud_sheet(_clouds(picked), *edges, **box)
     yield "corners", plot.plot_opposite_sides(_corners(atlas), **box)
     yield "curvature", _curvature(atlas)
-    lengths = design_lengths(picked)
-    yield "hulls", plot.plot_hull_sheet(_hulls(picked), *edges, length=lengths, **box)
+    yield "hulls", plot.plot_hull_sheet(hulls_of(picked), *edges, length=1.0, **box)
 
 
 def _thinned(atlas: xr.Dataset, panels: int) -> xr.Dataset:
@@ -69,20 +67,23 @@ def _clouds(atlas: xr.Dataset) -> Callable[[int, int], xr.Dataset | None]:
     return cloud_at
 
 
-def _hulls(atlas: xr.Dataset) -> Callable[[int, int], Hull | None]:
+def hulls_of(atlas: xr.Dataset) -> Callable[[int, int], Hull | None]:
+    """(column, row) -> the hull of the design there in lengths of its own, if it is done."""
     from softreach.volume import concave_hull
 
-    cloud_at, share = _clouds(atlas), _alpha(atlas)
+    cloud_at, alpha_over_length = _clouds(atlas), _alpha_over_length(atlas)
 
     def hull_at(column: int, row: int) -> Hull | None:
         cloud = cloud_at(column, row)
-        return None if cloud is None else concave_hull(cloud.tip, share * cloud.tip.attrs["length"])
+        if cloud is None:
+            return None
+        return concave_hull(cloud.tip.values / cloud.tip.attrs["length"], alpha_over_length)
 
     return hull_at
 
 
-def _alpha(atlas: xr.Dataset) -> float:
-    """The radius that the atlas was measured with, in L."""
+def _alpha_over_length(atlas: xr.Dataset) -> float:
+    """The radius that the atlas was measured with, over the length of each design."""
     return float(atlas["volume"].attrs["alpha_over_length"]) if "volume" in atlas else 0.05
 
 

@@ -7,18 +7,17 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.atlas import over_length
 from softreach.errors import InvalidInput
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["SheetAxis", "box_over_length", "design_lengths", "over_length", "plain", "sheet_axes"]
+__all__ = ["SheetAxis", "box_over_length", "plain", "sheet_axes"]
 
 Array = NDArray[np.float64]
 
 _SYMBOLS = {"revolution": "Ω", "taper": "φ", "poisson_ratio": "ν", "radius_ratio": "$R_1/R_2$"}
-
-_POWERS = {"m": 1, "m2": 2, "m3": 3, "1/m": -1}
 
 
 class SheetAxis(NamedTuple):
@@ -26,19 +25,6 @@ class SheetAxis(NamedTuple):
 
     label: str
     values: tuple[float, ...]
-
-
-def design_lengths(atlas: xr.Dataset) -> xr.DataArray:
-    """L of every design [m], over the dimensions of the atlas: a parameter, or that of its base."""
-    length = atlas["length"] if "length" in atlas.coords else float(atlas.attrs["length"])
-    return 0.0 * atlas["status"] + length
-
-
-def over_length(atlas: xr.Dataset, metric: str) -> xr.DataArray:
-    """A metric relative to each design's own length: V / L³, heights over L, curvatures times L."""
-    values = atlas[metric]
-    power = _POWERS.get(values.attrs.get("units", "1"), 0)
-    return values / design_lengths(atlas) ** power
 
 
 def sheet_axes(atlas: xr.Dataset) -> tuple[SheetAxis, SheetAxis]:

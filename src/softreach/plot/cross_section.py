@@ -15,7 +15,7 @@ from softreach.plot.style import figure_style, small_axes
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from softreach.manipulator import Manipulator
+    from softreach.arm.manipulator import Manipulator
 
 __all__ = ["plot_cross_section"]
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.atlas import over_length
 from softreach.errors import InvalidInput
-from softreach.plot.atlas_axes import SheetAxis, over_length, plain, sheet_axes
+from softreach.plot.atlas_axes import SheetAxis, plain, sheet_axes
 from softreach.plot.style import figure_style, small_axes
 
 if TYPE_CHECKING:

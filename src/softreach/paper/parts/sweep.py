@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softreach.arm.designs import minimal_trunk
-from softreach.atlas import DesignSpace, build_atlas
 from softreach.atlas import DesignSpace, build_atlas, open_atlas
-from softreach.designs import minimal_trunk
 from softreach.errors import InvalidInput
 from softreach.paper.atlas_figures import atlas_figures
 from softreach.paper.notebook import Notebook
