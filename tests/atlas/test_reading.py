@@ -8,8 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from softreach.plot.atlas import atlas_box, plot_metric_map
-from softreach.plot.projection import OBLIQUE, view_axes
 
 import softreach as sr
 from softreach.atlas import (
@@ -26,6 +24,8 @@ from softreach.atlas.design_task import begin_design
 from softreach.atlas.store import AtlasStore
 from softreach.errors import InvalidInput
 from softreach.paper.atlas_figures import hulls_of
+from softreach.picture.projection import view_axes
+from softreach.plot import box_over_length, plot_metric_map
 from softreach.plot.sheet import panel_extent
 from tests.atlas.families import (
     SMALL,
@@ -91,8 +91,8 @@ def test_what_is_not_there_is_not_opened(tmp_path):
 
 def test_no_tip_lies_outside_its_panel_of_the_sheet(paper):
     pytest.importorskip("matplotlib")
-    extent = panel_extent(box_over_length(paper), OBLIQUE)
-    seen = np.moveaxis(paper.tip.values, 2, -1).reshape(-1, 3) @ view_axes(OBLIQUE)[:2].T
+    extent = panel_extent(box_over_length(paper), "oblique")
+    seen = np.moveaxis(paper.tip.values, 2, -1).reshape(-1, 3) @ view_axes("oblique")[:2].T
     assert extent.left < seen[:, 0].min() < seen[:, 0].max() < extent.right
     assert extent.bottom < seen[:, 1].min() < seen[:, 1].max() < extent.top
 
