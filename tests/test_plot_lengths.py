@@ -385,3 +385,14 @@ def test_stations_of_two_designs_stand_at_the_same_places(everything):
     other = sr.curvature_statistics(everything.cloud, [0.1, 0.2])
     with pytest.raises(InvalidInput, match="stations"):
         plot.plot_curvature({"a": everything.curvature, "b": other})
+
+
+def test_a_single_row_of_designs_is_drawn_as_cells_and_an_empty_atlas_stays_white(everything):
+    row = everything.atlas.isel(length=[0])
+    (cells,) = plot.plot_metric_map(row, "reach_height", key=False).collections
+    np.testing.assert_allclose(np.ravel(cells.get_array()), row.reach_height[0] / LENGTH)
+    nothing = everything.atlas.assign(volume=np.nan * everything.atlas.volume)
+    ax = plot.plot_metric_map(nothing, "volume", designs=True, key=False)
+    assert ax.collections[0].get_array().mask.all()
+    (dots,) = ax.lines
+    assert len(dots.get_xdata()) == nothing.status.size
