@@ -74,11 +74,21 @@ def test_histograms_share_their_scale_and_count_every_point(drawn):
 
 def test_all_designs_stand_in_one_figure_at_one_scale(drawn):
     cloud, distance = drawn
-    figure = plot_redundancy({"a": cloud, "b": cloud}, {"a": distance, "b": distance})
+    small = cloud.assign(tip=cloud.tip.copy(data=0.5 * cloud.tip.values))
+    figure = plot_redundancy({"a": cloud, "b": small}, {"a": distance, "b": 0.5 * distance})
     panels = np.reshape([ax for ax in figure.axes if ax.images], (2, 4))
-    assert panels[0, 0].get_xlim() == panels[1, 3].get_xlim()
     assert [ax.get_xlabel() for ax in panels[1]] == ["x / L", "x / L", "y / L", "x / L"]
     assert [ax.get_ylabel() for ax in panels[:, 0]] == ["a\nz / L", "b\nz / L"]
+    for above, below in panels.T:
+        assert above.get_xlim() == below.get_xlim()
+        assert above.get_ylim() == below.get_ylim()
+    left, right = panels[1, 0].get_xlim()
+    assert left < float(cloud.tip[:, 0].min())
+    assert right > float(cloud.tip[:, 0].max())
+    # The scale of D̄ is shared as well: half of the largest is green, not yellow.
+    yellow = [{c for c in image_colors(ax) if c[0] > 150 and c[2] < 100} for ax in panels[:, 3]]
+    assert yellow[0]
+    assert not yellow[1]
 
 
 def test_what_cannot_be_drawn_is_refused(drawn):
