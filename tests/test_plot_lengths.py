@@ -87,7 +87,9 @@ def everything(tmp_path_factory) -> SimpleNamespace:
     space = sr.DesignSpace.grid(arm, length=[LENGTH, 2 * LENGTH], taper=np.radians([0.0, 1.0]))
     store = tmp_path_factory.mktemp("lengths") / "atlas.zarr"
     with pytest.warns(sr.SoftreachWarning):
-        atlas = sr.build_atlas(space, store, n=500, metrics=("extent", "concave"), alpha=0.4)
+        atlas = sr.build_atlas(
+            space, store, n=500, metrics=("extent", "concave"), alpha_over_length=0.4
+        )
     return SimpleNamespace(
         known=True,
         length=LENGTH,
