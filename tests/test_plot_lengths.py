@@ -86,10 +86,7 @@ def everything(tmp_path_factory) -> SimpleNamespace:
     cloud = sr.compute_cloud(arm, n=3000, seed=1)
     space = sr.DesignSpace.grid(arm, length=[LENGTH, 2 * LENGTH], taper=np.radians([0.0, 1.0]))
     store = tmp_path_factory.mktemp("lengths") / "atlas.zarr"
-    with pytest.warns(sr.SoftreachWarning):
-        atlas = sr.build_atlas(
-            space, store, n=500, metrics=("extent", "concave"), alpha_over_length=0.4
-        )
+    atlas = sr.build_atlas(space, store, n=500, metrics=("extent",))
     return SimpleNamespace(
         known=True,
         length=LENGTH,
@@ -393,8 +390,8 @@ def test_a_single_row_of_designs_is_drawn_as_cells_and_an_empty_atlas_stays_whit
     row = everything.atlas.isel(length=[0])
     (cells,) = plot.plot_metric_map(row, "reach_height", key=False).collections
     np.testing.assert_allclose(np.ravel(cells.get_array()), row.reach_height[0] / LENGTH)
-    nothing = everything.atlas.assign(volume=np.nan * everything.atlas.volume)
-    ax = plot.plot_metric_map(nothing, "volume", designs=True, key=False)
+    nothing = everything.atlas.assign(reach_height=np.nan * everything.atlas.reach_height)
+    ax = plot.plot_metric_map(nothing, "reach_height", designs=True, key=False)
     assert ax.collections[0].get_array().mask.all()
     (dots,) = ax.lines
     assert len(dots.get_xdata()) == nothing.status.size
