@@ -86,8 +86,7 @@ def everything(tmp_path_factory) -> SimpleNamespace:
     cloud = sr.compute_cloud(arm, n=3000, seed=1)
     space = sr.DesignSpace.grid(arm, length=[LENGTH, 2 * LENGTH], taper=np.radians([0.0, 1.0]))
     store = tmp_path_factory.mktemp("lengths") / "atlas.zarr"
-    with pytest.warns(sr.SoftreachWarning):
-        atlas = sr.build_atlas(space, store, n=500, metrics=("extent", "concave"), alpha=0.4)
+    atlas = sr.build_atlas(space, store, n=500, metrics=("extent",))
     return SimpleNamespace(
         known=True,
         length=LENGTH,
@@ -385,3 +384,14 @@ def test_stations_of_two_designs_stand_at_the_same_places(everything):
     other = sr.curvature_statistics(everything.cloud, [0.1, 0.2])
     with pytest.raises(InvalidInput, match="stations"):
         plot.plot_curvature({"a": everything.curvature, "b": other})
+
+
+def test_a_single_row_of_designs_is_drawn_as_cells_and_an_empty_atlas_stays_white(everything):
+    row = everything.atlas.isel(length=[0])
+    (cells,) = plot.plot_metric_map(row, "reach_height", key=False).collections
+    np.testing.assert_allclose(np.ravel(cells.get_array()), row.reach_height[0] / LENGTH)
+    nothing = everything.atlas.assign(reach_height=np.nan * everything.atlas.reach_height)
+    ax = plot.plot_metric_map(nothing, "reach_height", designs=True, key=False)
+    assert ax.collections[0].get_array().mask.all()
+    (dots,) = ax.lines
+    assert len(dots.get_xdata()) == nothing.status.size

@@ -74,22 +74,21 @@ def test_histograms_share_their_scale_and_count_every_point(drawn):
 
 def test_all_designs_stand_in_one_figure_at_one_scale(drawn):
     cloud, distance = drawn
-    small = cloud.assign(tip=(cloud.tip.dims, cloud.tip.values * 0.5, cloud.tip.attrs))
+    small = cloud.assign(tip=cloud.tip.copy(data=0.5 * cloud.tip.values))
     figure = plot_redundancy({"a": cloud, "b": small}, {"a": distance, "b": 0.5 * distance})
     panels = np.reshape([ax for ax in figure.axes if ax.images], (2, 4))
-    for large, other in panels.T:
-        assert large.get_xlim() == other.get_xlim()
-        assert large.get_ylim() == other.get_ylim()
+    assert [ax.get_xlabel() for ax in panels[1]] == ["x / L", "x / L", "y / L", "x / L"]
+    assert [ax.get_ylabel() for ax in panels[:, 0]] == ["a\nz / L", "b\nz / L"]
+    for above, below in panels.T:
+        assert above.get_xlim() == below.get_xlim()
+        assert above.get_ylim() == below.get_ylim()
     left, right = panels[1, 0].get_xlim()
     assert left < float(cloud.tip[:, 0].min())
     assert right > float(cloud.tip[:, 0].max())
     # The scale of D̄ is shared as well: half of the largest is green, not yellow.
-    colors = [image_colors(row[3]) for row in panels]
-    yellow = [{(r, g, b) for r, g, b in seen if r > 150 and b < 100} for seen in colors]
+    yellow = [{c for c in image_colors(ax) if c[0] > 150 and c[2] < 100} for ax in panels[:, 3]]
     assert yellow[0]
     assert not yellow[1]
-    assert [ax.get_xlabel() for ax in panels[1]] == ["x / L", "x / L", "y / L", "x / L"]
-    assert [ax.get_ylabel() for ax in panels[:, 0]] == ["a\nz / L", "b\nz / L"]
 
 
 def test_what_cannot_be_drawn_is_refused(drawn):

@@ -101,7 +101,9 @@ def _corners(atlas: xr.Dataset) -> dict[str, xr.Dataset]:
 
 def _at(axis: SheetAxis, k: int) -> str:
     symbol, _, unit = axis.label.partition(" (")
-    return f"{symbol} = {axis.values[k]:.4g}{unit.rstrip(')')}"
+    unit = unit.rstrip(")")
+    space = " " if unit.isalpha() else ""
+    return f"{symbol} = {axis.values[k]:.4g}{space}{unit}"
 
 
 def _curvature(atlas: xr.Dataset) -> Any:

@@ -54,7 +54,7 @@ def _cloud(name: str, arm: Manipulator, settings: Settings, notes: Notebook) -> 
 
 
 def _found(cloud: xr.Dataset, distance: xr.DataArray) -> dict[str, Any]:
-    summary = redundancy_summary(distance, cloud)
+    summary = redundancy_summary(cloud, distance)
     density, measure = tip_density(cloud), solution_measure(cloud)
     filled = density["density"].where(density["density"] > 0)
     size = _inside(measure["solution_measure"].values)
