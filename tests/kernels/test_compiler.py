@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
+import importlib
 import os
+import pkgutil
+import re
 import subprocess
 import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from numba.core.dispatcher import Dispatcher
+
+import softreach
+from softreach import kernels
+from softreach.kernels.compiler import FAST
 
 SCRIPT = """
 import hashlib
@@ -30,3 +42,41 @@ def test_the_run_that_compiles_has_the_numbers_of_those_that_load(tmp_path):
         ).stdout
 
     assert run() == run()
+
+
+def compiled() -> Iterator[tuple[str, Dispatcher]]:
+    """Every compiled function of the kernels."""
+    for module in pkgutil.iter_modules(kernels.__path__, "softreach.kernels."):
+        names = vars(importlib.import_module(module.name))
+        yield from (
+            (f"{module.name}.{n}", f) for n, f in names.items() if isinstance(f, Dispatcher)
+        )
+
+
+def kind(function: Dispatcher) -> str:
+    options = function.targetoptions
+    if not options["fastmath"]:
+        return "strict"
+    assert options["fastmath"] == FAST
+    return "inline" if options.get("forceinline") else "kernel"
+
+
+def callees(function: Dispatcher) -> Iterator[Dispatcher]:
+    source = function.py_func
+    for name in source.__code__.co_names:
+        if isinstance(found := source.__globals__.get(name), Dispatcher):
+            yield found
+
+
+@pytest.mark.parametrize(("name", "function"), [pytest.param(n, f, id=n) for n, f in compiled()])
+def test_kernels_call_only_what_is_inlined_and_strict_functions_only_their_like(name, function):
+    allowed = {"strict"} if kind(function) == "strict" else {"inline"}
+    wrong = [f.py_func.__name__ for f in callees(function) if kind(f) not in allowed]
+    assert not wrong, f"{name}, {kind(function)}, calls {wrong}"
+
+
+def test_only_the_compiler_module_asks_numba_to_compile():
+    root = Path(softreach.__file__).parent
+    asks = re.compile(r"\b(n?jit|vectorize|guvectorize|cfunc|stencil)\b")
+    found = [p for p in root.rglob("*.py") if asks.search(p.read_text(encoding="utf-8"))]
+    assert found == [root / "kernels" / "compiler.py"]
