@@ -1,0 +1,63 @@
+"""Where Newton's method starts: at every root of a map that is affine or quadratic."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from softreach.inverse.tree import space_tree
+from softreach.kernels import candidates
+from softreach.kernels.candidates import MOST_STARTS, find_starts
+from tests.kernels.maps import Quadratic, mesh_of, random_fold
+
+SEEDS = st.integers(0, 2**32 - 1)
+LOW, HIGH = np.full(3, -1.0), np.full(3, 1.0)
+
+
+def starts_of(f: Quadratic, targets: np.ndarray, cells: int, with_root: bool = True):
+    """Number of the target and activation of every start."""
+    mesh = mesh_of(f, cells)
+    tree = space_tree(mesh)
+    room = MOST_STARTS * (1 + len(targets))
+    target, cell, start = np.empty(room, int), np.empty(room, int), np.empty((room, 3))
+    done, found = find_starts(mesh, tree, targets, LOW, HIGH, with_root, target, cell, start)
+    assert done == len(targets)
+    return target[:found], start[:found]
+
+
+@given(seed=SEEDS, with_root=st.booleans())
+@settings(max_examples=5)
+def test_the_root_of_an_affine_map_is_found_exactly(seed, with_root):
+    rng = np.random.default_rng(seed)
+    b = np.linalg.qr(rng.normal(size=(3, 3)))[0] @ np.diag(rng.uniform(0.1, 1, 3))
+    f = Quadratic(rng.normal(size=3), b, np.zeros((3, 3, 3)))
+    gamma = rng.uniform(-1, 1, (60, 3))
+    target, start = starts_of(f, f.values(gamma), 4, with_root)
+    assert set(target) == set(range(60))
+    assert start == pytest.approx(gamma[target], abs=1e-10)
+
+
+@given(seed=SEEDS)
+@settings(max_examples=5)
+def test_both_roots_of_a_fold_have_a_start(seed):
+    rng = np.random.default_rng(seed)
+    fold = random_fold(rng)
+    f, y = fold.quadratic(), rng.uniform(-0.2, 0.2, (60, 3))
+    y[:, 0] += np.where(y[:, 0] < 0, -0.25, 0.25)
+    gamma = y @ fold.r  # inside the box, and so are the mirror images
+    target, start = starts_of(f, f.values(gamma), 5)
+    for roots in (gamma, fold.mirrored(gamma)):
+        apart = np.abs(start - roots[target]).max(axis=1)
+        nearest = np.full(60, np.inf)
+        np.minimum.at(nearest, target, apart)
+        assert np.median(nearest) < 1e-4
+        # a start that another one stands for is as near to it as that, in widths of cells
+        assert nearest.max() <= candidates._DISTINCT * (2 / 5) + 1e-3
+
+
+def test_a_target_out_of_reach_has_no_start():
+    f = Quadratic(np.zeros(3), np.eye(3), np.zeros((3, 3, 3)))
+    target, _ = starts_of(f, np.array([[1.1, 0.0, 0.0], [0.0, -2.0, 0.0], [9.0, 9.0, 9.0]]), 4)
+    assert len(target) == 0
