@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 
 from softreach.kernels.compiler import inline
+from softreach.kernels.vector import cross
 
-__all__ = ["act", "add", "bracket", "cross", "dexp", "exp_coefficients", "scaled"]
+__all__ = ["act", "add", "bracket", "dexp", "exp_coefficients", "scaled"]
 
 _TERMS = range(8)
 """Terms kept of each series in θ²: exact to rounding for θ <= 1, to 1e-13 for θ <= 1.5."""
@@ -33,20 +34,14 @@ _DEXP1, _DEXP2, _DEXP3, _DEXP4 = _DEXP
 
 
 @inline
-def cross(a, b):
-    """A × b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@inline
 def add(a, b):
-    """A + b of two twists."""
+    """a + b of two twists."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5]
 
 
 @inline
 def scaled(s, a):
-    """S a."""
+    """s a."""
     return s * a[0], s * a[1], s * a[2], s * a[3], s * a[4], s * a[5]
 
 
@@ -68,7 +63,7 @@ def _series(t, c):
 
 @inline
 def exp_coefficients(a):
-    """Sin θ/θ, (1 - cos θ)/θ² and (θ - sin θ)/θ³ of a twist's rotation."""
+    """sin θ/θ, (1 - cos θ)/θ² and (θ - sin θ)/θ³ of a twist's rotation."""
     t = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
     return _series(t, _SINC), _series(t, _COSC), _series(t, _SINC3)
 
@@ -88,7 +83,7 @@ def act(a, p):
 
 @inline
 def dexp(a, x):
-    """D exp(a) exp(-a) along x: Σ ad_aᵏ x/(k+1)!, summed in closed form."""
+    """d exp(a) exp(-a) along x: Σ ad_aᵏ x/(k+1)!, summed in closed form."""
     t = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
     total = add(x, scaled(_series(t, _DEXP1), bracket(a, x)))
     second = bracket(a, bracket(a, x))
