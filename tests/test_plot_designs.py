@@ -30,6 +30,7 @@ def test_sectors_stand_where_the_bundles_are_at_that_station(share):
     arm = designs.redundant_trunk(length=2.0)
     ax = plot_cross_section(arm, share * arm.length)
     angles = np.degrees(arm.fiber_angles(np.array([share * arm.length]))[0])
+    assert len(sectors(ax)) == arm.bundles
     for k, wedge in enumerate(sectors(ax)):
         assert (wedge.theta1 + wedge.theta2) / 2 == pytest.approx(angles[k])
         assert wedge.theta2 - wedge.theta1 == pytest.approx(48)

@@ -72,9 +72,22 @@ def test_histograms_share_their_scale_and_count_every_point(drawn):
 
 def test_all_designs_stand_in_one_figure_at_one_scale(drawn):
     cloud, distance = drawn
-    axes = plot_redundancy({"a": cloud, "b": cloud}, {"a": distance, "b": distance})
-    assert axes["a"]["cloud"].get_xlim() == axes["b"]["distance"].get_xlim()
+    small = cloud.assign(tip=cloud.tip * 0.5)
+    axes = plot_redundancy({"a": cloud, "b": small}, {"a": distance, "b": 0.5 * distance})
     assert list(axes["b"]) == ["cloud", "front", "right", "distance"]
+    for name, large in axes["a"].items():
+        assert large.get_xlim() == axes["b"][name].get_xlim()
+        assert large.get_ylim() == axes["b"][name].get_ylim()
+    left, right = axes["b"]["cloud"].get_xlim()
+    assert left < float(cloud.tip[:, 0].min())
+    assert right > float(cloud.tip[:, 0].max())
+    # The scale of D̄ is shared as well: half of the largest is green, not yellow.
+    yellow = {
+        title: {(r, g, b) for r, g, b in image_colors(row["distance"]) if r > 150 and b < 100}
+        for title, row in axes.items()
+    }
+    assert yellow["a"]
+    assert not yellow["b"]
 
 
 def test_what_cannot_be_drawn_is_refused(drawn):

@@ -33,7 +33,7 @@ THRESHOLD = 0.25  # between a minimal arm's D̄ of some 0.05 and a redundant one
 def activation_distance(
     cloud: xr.Dataset, radius: float, queries: int | ArrayLike | None = None
 ) -> xr.DataArray:
-    """Mean activation-space distance of tips to their neighbors (section 5).
+    """Mean activation-space distance of tips to their neighbors (section 5; theory (44)).
 
     D̄(p_i, r) = Σ_j ‖Γ_j - Γ_i‖₂ / K over the K *other* points j with |p_j - p_i| <= r. Point i
     itself is not counted; another point at the same place is. Where K = 0 the point is isolated

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import base64
+import io
+import re
+
 import numpy as np
 import pytest
 
@@ -10,6 +14,8 @@ from softreach.atlas import DesignSpace, build_atlas, open_atlas
 from softreach.atlas.parameter import changed
 from softreach.cloud import compute_cloud, save_cloud
 from softreach.errors import InvalidInput
+from softreach.export import export_cloud
+from softreach.plot.style import pyplot
 from softreach.studio.atlas_map import atlas_map, held_places, map_choices, metric_names
 from softreach.studio.colors import sample_values
 from softreach.studio.files import cloud_file, figure_file, state_from, surface_file
@@ -36,15 +42,19 @@ def store(trunk, tmp_path_factory):
     return path
 
 
-def test_files_are_those_of_the_librarys_own_writers(fine):
+@pytest.mark.slow
+def test_files_are_those_of_the_librarys_own_writers(fine, tmp_path):
     state = StudioState(design=fine.arm).showing(level=14)
-    assert cloud_file(fine, ".ply").startswith(b"ply\n")
-    pytest.importorskip("trimesh")
-    assert surface_file(fine, ".ply").startswith(b"ply\n")
+    export_cloud(fine.cloud, tmp_path / "cloud.ply")
+    assert cloud_file(fine, ".ply") == (tmp_path / "cloud.ply").read_bytes()
+    trimesh = pytest.importorskip("trimesh")
+    saved = trimesh.load(io.BytesIO(surface_file(fine, ".ply")), file_type="ply")
+    assert saved.volume == pytest.approx(fine.exact.surface().volume, rel=1e-6)
     assert figure_file(fine, state).startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("color", ["rgb", "bundle 1", "manipulability", "multiplicity"])
+@pytest.mark.slow
 def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypatch):
     from softreach import plot
 
@@ -76,9 +86,12 @@ def test_a_saved_page_holds_everything_itself(fine):
 
 
 def test_a_saved_page_carries_the_map(fine):
-    red = np.zeros((4, 4, 3), np.uint8)
+    red = np.full((4, 4, 3), (255, 0, 0), np.uint8)
     page = static_page(StudioState(design=fine.arm), fine, red)
-    assert "data:image/png;base64," in page
+    (data,) = re.findall(r'alt="map".*?data:image/png;base64,([^"]+)', page)
+    drawn = pyplot().imread(io.BytesIO(base64.b64decode(data)), format="png")
+    np.testing.assert_array_equal(255 * drawn[..., :3], red)
+    assert 'alt="map"' not in static_page(StudioState(design=fine.arm), fine)
 
 
 def test_a_design_file_changes_the_design_alone(trunk):
@@ -154,8 +167,12 @@ def test_a_map_holds_what_it_does_not_show_nearest_to_the_design(trunk, tmp_path
     assert shown.parameters_at(*shown.place_of(**at)) == at | {"taper": 0.02}
     assert shown.values_of(changed(trunk, at)) == pytest.approx(at)
     assert shown.values_of(changed(trunk, {"revolution": 3.0})) is None
-    for wrong in (MapView(right="taper", up="taper"), MapView(up="x"), MapView(metric="x")):
-        with pytest.raises(InvalidInput):
+    for wrong, named in (
+        (MapView(right="taper", up="taper"), "map = taper and taper"),
+        (MapView(up="x"), "map = .* and x"),
+        (MapView(metric="x"), "metric = x: must be one of convex_volume"),
+    ):
+        with pytest.raises(InvalidInput, match=named):
             map_choices(atlas, wrong)
 
 

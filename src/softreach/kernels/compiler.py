@@ -8,7 +8,7 @@ nothing else calls it.
 
 from __future__ import annotations
 
-import sys
+import logging
 from collections.abc import Callable
 from typing import Any
 
@@ -16,6 +16,8 @@ from numba import njit
 from numba.core import event
 
 __all__ = ["FAST", "inline", "kernel", "strict"]
+
+_LOG = logging.getLogger(__name__)
 
 FAST = {"contract", "reassoc", "nsz", "arcp", "nnan", "ninf"}
 """Freedoms of the compiler in `kernel` and `inline`.
@@ -51,20 +53,16 @@ def strict(function: Callable[..., Any]) -> Callable[..., Any]:
     return njit(cache=True, nogil=True, fastmath=False, error_model="numpy")(source)
 
 
-class _FirstRun(event.Listener):
-    """Says once that kernels are being compiled, so that a first run is not taken for a hang."""
-
-    def __init__(self) -> None:
-        self.said = False
+class _Log(event.Listener):
+    """Logs what is being compiled; a library prints nothing, the command line listens."""
 
     def on_start(self, event: event.Event) -> None:
-        function = getattr((event.data or {}).get("dispatcher"), "py_func", None)
-        if not self.said and getattr(function, "__module__", "").startswith("softreach"):
-            self.said = True
-            sys.stderr.write("softreach: compiling kernels (first run only, then cached on disk)\n")
+        function: Any = getattr((event.data or {}).get("dispatcher"), "py_func", None)
+        if getattr(function, "__module__", "").startswith("softreach"):
+            _LOG.info("compiling %s.%s", function.__module__, function.__qualname__)
 
     def on_end(self, event: event.Event) -> None:
         pass
 
 
-event.register("numba:compile", _FirstRun())
+event.register("numba:compile", _Log())

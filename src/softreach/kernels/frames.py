@@ -1,4 +1,4 @@
-"""Whole configurations: frames along the rod, walked from the base to the tip."""
+"""Whole configurations: frames along the rod, walked from base to tip, theory (26)."""
 
 from __future__ import annotations
 

@@ -17,13 +17,13 @@ __all__ = ["act", "add", "bracket", "dexp", "exp_coefficients", "scaled"]
 _TERMS = range(8)
 """Terms kept of each series in θ²: exact to rounding for θ <= 1, to 1e-13 for θ <= 1.5."""
 
-# sin θ/θ, (1 - cos θ)/θ², (θ - sin θ)/θ³ as power series in θ².
+# sin θ/θ, (1 - cos θ)/θ², (θ - sin θ)/θ³ as power series in θ², theory (24).
 _SINC, _COSC, _SINC3 = (
     tuple((-1) ** k / math.factorial(2 * k + shift) for k in _TERMS) for shift in (1, 2, 3)
 )
 
-# Coefficients of ad .. ad⁴ in the left-trivialised differential of exp (Selig 2005): reducing
-# Σ adᵏ/(k+1)! with ad⁵ = -2θ² ad³ - θ⁴ ad leaves four functions of θ alone, here as their series.
+# Coefficients of ad .. ad⁴ in the left-trivialised differential of exp [Selig2005]: reducing
+# Σ adᵏ/(k+1)! with ad⁵ = -2θ² ad³ - θ⁴ ad leaves four functions of θ alone, theory (30), as series.
 _DEXP = (
     tuple((-1) ** k * (1 - k) / math.factorial(2 * k + 2) for k in _TERMS),
     tuple((-1) ** k * (1 - k) / math.factorial(2 * k + 3) for k in _TERMS),
@@ -47,7 +47,7 @@ def scaled(s, a):
 
 @inline
 def bracket(a, b):
-    """[(ω1, v1), (ω2, v2)] = (ω1 × ω2, ω1 × v2 - ω2 × v1)."""
+    """[(ω1, v1), (ω2, v2)] = (ω1 × ω2, ω1 × v2 - ω2 × v1), theory (20)."""
     x, y, z = cross(a[:3], b[:3])
     p, q, r = cross(a[:3], b[3:])
     s, t, u = cross(b[:3], a[3:])
@@ -70,7 +70,7 @@ def exp_coefficients(a):
 
 @inline
 def act(a, p):
-    """exp(a) applied to a point: p + v + ω × (s p + c v + ω × (c p + k v))."""
+    """exp(a) applied to a point: p + v + ω × (s p + c v + ω × (c p + k v)), theory (23)."""
     s, c, k = exp_coefficients(a)
     w, v = a[:3], a[3:]
     inner = cross(w, (c * p[0] + k * v[0], c * p[1] + k * v[1], c * p[2] + k * v[2]))
