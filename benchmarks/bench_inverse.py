@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 import time
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 import pytest
@@ -28,10 +28,10 @@ def prepared(arm):
     """Solver and cloud: neither's preparation is timed with the targets."""
     from scipy.spatial import KDTree
 
-    from softreach.inverse import InverseSolver
+    from softreach.inverse import prepared_map, solve_inverse
     from softreach.rod.kinematics import tip_positions
 
-    solver = InverseSolver(arm)
+    solver = partial(solve_inverse, prepared_map(arm))
     solver(targets_of(arm, 50)[1])
     cloud = np.random.default_rng(9).uniform(*arm.bounds.T, (100_000, 3))
     return solver, cloud, KDTree(tip_positions(arm, cloud))
@@ -49,16 +49,17 @@ def by_scipy(arm, targets: np.ndarray) -> np.ndarray:
     """One solution for each target: least_squares with the exact Jacobian."""
     from scipy.optimize import least_squares
 
-    from softreach.inverse.problem import tips_and_slopes
+    from softreach.rod import tip_map
 
+    rod = tip_map(arm)
     _, cloud, tree = prepared(arm)
     starts = cloud[tree.query(targets)[1]]
     found = np.empty_like(starts)
     for i, (start, target) in enumerate(zip(starts, targets, strict=True)):
         found[i] = least_squares(
-            lambda x, target=target: tips_and_slopes(arm, x[None], 1e-6)[0][0] - target,
+            lambda x, target=target: rod.tips_and_slopes(x[None])[0][0] - target,
             start,
-            jac=lambda x: tips_and_slopes(arm, x[None], 1e-6)[1][0],
+            jac=lambda x: rod.tips_and_slopes(x[None])[1][0],
             bounds=arm.bounds.T,
             xtol=1e-12,
             ftol=1e-12,

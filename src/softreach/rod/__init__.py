@@ -7,8 +7,8 @@ from softreach.rod.tip_map import Frames, Strains, TipMap, TipStatus, tip_map
 
 __all__ = [
     "ActivationBox",
-    "FreeBundles",
     "Frames",
+    "FreeBundles",
     "Strains",
     "TipMap",
     "TipStatus",
