@@ -101,12 +101,46 @@ HEAD = """### Inverse: every branch, against least_squares from the nearest of 1
 |---|--:|--:|--:|--:|--:|--:|--:|--:|"""
 
 
+REDUNDANT = [
+    ("least change", {}),
+    ("least change, direction", {"direction": (0.0, 0.6, 0.8)}),
+    ("family of three", {"family": 3}),
+]
+
+
+def redundant_row(name: str, options: dict, n: int) -> str:
+    """One question asked of four bundles."""
+    import softreach as sr
+    from softreach.inverse import prepared_map, solve_inverse
+
+    arm = sr.designs.redundant_trunk()
+    gamma = np.random.default_rng(0).uniform(*arm.bounds.T, (n, 4))
+    targets = sr.tip_positions(arm, gamma)
+    solver = partial(solve_inverse, prepared_map(arm), **options)
+    solver(targets[:2])
+    solutions, wall, cpu = timed(lambda: solver(targets))
+    return (
+        f"| {name} | {1e3 * cpu / n:.2f} | {1e3 * wall / n:.2f} | {solutions.counts.mean():.2f} | "
+        f"{solutions.residuals.max() / arm.length:.0e} |"
+    )
+
+
+REDUNDANT_HEAD = """
+### Inverse: four bundles
+
+| question | CPU ms/target | wall ms/target | activations | residual, L |
+|---|--:|--:|--:|--:|"""
+
+
 def main() -> None:
-    """Print the table."""
+    """Print the tables."""
     n = int(sys.argv[1]) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 100_000
     print(HEAD)
     for revolution, taper in DESIGNS:
         print(row(revolution, taper, n), flush=True)
+    print(REDUNDANT_HEAD)
+    for name, options in REDUNDANT:
+        print(redundant_row(name, options, min(n, 1000)), flush=True)
 
 
 @pytest.mark.benchmark(group="inverse")
@@ -115,6 +149,15 @@ def test_every_branch(benchmark):
     solver, *_ = prepared(arm)
     targets = targets_of(arm, 2000)[1]
     assert (benchmark(solver, targets).counts >= 1).all()
+
+
+@pytest.mark.benchmark(group="inverse")
+def test_least_change_with_a_direction(benchmark):
+    import softreach as sr
+
+    arm = sr.designs.redundant_trunk()
+    targets = sr.tip_positions(arm, np.random.default_rng(0).uniform(*arm.bounds.T, (20, 4)))
+    assert (benchmark(sr.solve_inverse, arm, targets, direction=(0.0, 0.6, 0.8)).counts == 1).all()
 
 
 @pytest.mark.benchmark(group="inverse")

@@ -217,8 +217,47 @@ def test_solutions_read_like_a_list_and_as_a_dataset(folded):
         solutions[51]
 
 
-def test_no_targets_give_no_solutions(trunk):
-    assert len(solve_inverse(trunk, np.empty((0, 3)))) == 0
+def test_solutions_print_how_many_targets_were_reached_and_how_well(folded):
+    gamma = random_activations(folded, 3)
+    targets = np.concatenate([tip_positions(folded, gamma), [[0.0, 0.0, 2.0]]])
+    solutions = solve_inverse(folded, targets)
+    number, worst = len(solutions.activations), solutions.residuals.max()
+    assert repr(solutions) == (
+        f"<Solutions for 4 targets: 3 reached, 1 unreachable, {number} activations, "
+        f"largest residual {worst:.1e} m>"
+    )
+    assert repr(solutions[-1]) == (
+        f"<Solution for (0, 0, 2) m: unreachable, nearest point {solutions[-1].gap:.3g} m away>"
+    )
+    assert repr(solutions[0]).endswith(f"largest residual {solutions[0].residuals.max():.1e} m>")
+
+
+def test_blocks_of_targets_change_no_solution(folded, monkeypatch):
+    targets = tip_positions(folded, random_activations(folded, 50))
+    targets[::10] += [0.0, 0.0, 2.0]
+    whole = solve_inverse(folded, targets)
+    monkeypatch.setattr("softreach.inverse.solver._BLOCK", 7)
+    parts = solve_inverse(folded, targets)
+    assert (whole.statuses == Status.UNREACHABLE).any()
+    assert whole.to_dataset().identical(parts.to_dataset())
+
+
+@pytest.mark.parametrize("design", [designs.minimal_trunk, designs.redundant_trunk])
+def test_no_targets_give_no_solutions(design):
+    arm = design()
+    solutions = solve_inverse(arm, np.empty((0, 3)))
+    assert len(solutions) == 0
+    assert solutions.activations.shape == (0, arm.bundles)
+    assert repr(solutions) == "<Solutions for 0 targets>"
+
+
+def test_an_arm_its_tip_map_and_what_was_prepared_of_it_give_equal_answers(folded):
+    targets = tip_positions(folded, random_activations(folded, 20))
+    answers = [
+        solve_inverse(arm, targets).to_dataset()
+        for arm in (folded, tip_map(folded), prepared_map(folded))
+    ]
+    assert all(answer.identical(answers[0]) for answer in answers)
 
 
 @pytest.mark.parametrize(
@@ -226,6 +265,7 @@ def test_no_targets_give_no_solutions(trunk):
     [
         ([0.0, 0.0, 1.0], "targets.shape"),
         ([[0.0, 1.0]], "targets.shape"),
+        ([["far", "away", "up"]], "targets"),
         ([[0.0, 0.0, 1.0], [0.0, np.nan, 1.0]], r"targets\[1\]"),
     ],
 )
@@ -318,14 +358,6 @@ def test_fewer_bundles_come_as_near_as_a_dense_cloud(trunk, kept):
     assert (solutions.gaps <= cloud.query(targets)[0] + 1e-12).all()
     back = solve_inverse(arm, tip_positions(arm, random_activations(arm, 20)))
     assert (back.statuses == Status.REACHED).all()
-
-
-def test_a_bundle_without_room_stays_where_it_is(trunk):
-    arm = trunk.with_bounds(((-5 / 3, 0.0), (-0.5, -0.5), (-5 / 3, 0.0)))
-    gamma = random_activations(arm, 20)
-    solutions = solve_inverse(arm, tip_positions(arm, gamma))
-    assert (solutions.statuses == Status.REACHED).all()
-    assert (solutions.activations[:, 1] == -0.5).all()
 
 
 def direction_error(arm: Manipulator, gamma: np.ndarray, wanted: np.ndarray) -> float:

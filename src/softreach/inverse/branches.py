@@ -3,9 +3,9 @@
 1. The activation box is cut into cells of six tetrahedra each; tips and Jacobians are computed at
    their corners, once for an arm (`cells`).
 2. A tetrahedron is mapped linearly by its corners. Its true image lies within an interpolation
-   error of the linear one, estimated from how the Jacobian changes along the edges: in the
-   quadratic ½ Σ λi λj f''[eij, eij], f''[e, e] ≈ ΔJ e (`kernels.activation_mesh`). So every root
-   lies in a tetrahedron whose linear image, inflated by its error, contains the target.
+   error of the linear one, estimated from how the Jacobian changes along the edges: theory (38),
+   `kernels.activation_mesh`. So every root lies in a tetrahedron whose linear image, inflated by
+   its error, contains the target.
 3. An octree over space lists the inflated images that may cover a place (`image_tree`).
 4. In each tetrahedron listed at the target, the quadratic through tips and Jacobians says whether
    and where it is reached: a start (`kernels.candidates`).

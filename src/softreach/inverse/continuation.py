@@ -176,5 +176,5 @@ class Continuation:
 
 
 def _least_norm(slope: Array, moving: Mask) -> Array:
-    """Pseudoinverse of the Jacobian of the moving bundles, shape (m, 3)."""
+    """Pseudoinverse of the Jacobian of the moving bundles, shape (m, 3): theory (39)."""
     return np.asarray(np.linalg.pinv(slope * moving, rcond=_SINGULAR), np.float64)

@@ -90,8 +90,8 @@ def _cost(rod: TipMap, request: Request, gamma: Array) -> Array:
 def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Array, Array]:
     """Minimize ½|γ - near|² + ½ w²|d3 - direction|² subject to tip = target, from each start.
 
-    Augmented Lagrangian (Hestenes, Powell) whose inner searches respect the bounds, then Newton on
-    the position alone among the activations that are not at a bound.
+    Augmented Lagrangian, theory (40) [Hestenes1969] [Powell1969], whose inner searches respect the
+    bounds, then Newton on the position alone among the activations that are not at a bound.
 
     Args:
         rod: The tip map.
@@ -119,7 +119,7 @@ def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Arr
         )
         gamma[rows] = minimize(lagrangian, gamma[rows], rod.box).gamma
         error = (rod.tips_and_slopes(gamma[rows])[0] - part.targets) / rod.length
-        multiplier[rows] += penalty * error
+        multiplier[rows] += penalty * error  # theory (40)
         residual[rows] = np.linalg.norm(error, axis=1) * rod.length
     return _projected(rod, request.targets, gamma)
 
@@ -132,7 +132,7 @@ def _multipliers(rod: TipMap, request: Request, gamma: Array) -> Array:
 
 
 def _projected(rod: TipMap, targets: Array, gamma: Array) -> tuple[Array, Array]:
-    """A few least-norm Newton steps on the position, of activations that are off their bounds."""
+    """A few least-norm Newton steps, theory (39), of the activations that are off their bounds."""
     box = rod.box
     best, least = gamma.copy(), np.full(len(gamma), np.inf)
     for _ in range(_PROJECTIONS):

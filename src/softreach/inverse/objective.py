@@ -17,10 +17,10 @@ Index = NDArray[np.int64]
 
 @dataclass(frozen=True, kw_only=True)
 class Objective:
-    """½ μ |c|² + λ·c + ½ |γ - near|² + ½ w² |d3 - direction|² with the miss c = (tip - target)/L.
+    """½ |γ - near|² + λ·c + ½ μ |c|² + ½ w² |d3 - direction|² with the miss c = (tip - target)/L.
 
-    Without λ and near its minimum is the nearest reachable point; with near and the right λ it is
-    the least change that reaches the target (an augmented Lagrangian).
+    Theory (40). Without near and λ its minimum is the nearest reachable point; with near and the
+    right λ it is the least change that reaches the target (an augmented Lagrangian).
     """
 
     rod: TipMap
