@@ -38,7 +38,7 @@ def fine(trunk):
 def store(trunk, tmp_path_factory):
     space = DesignSpace.grid(trunk, revolution=[0.5, 1.5, 2.5], taper=[0.0, 0.02])
     path = tmp_path_factory.mktemp("atlas") / "atlas.zarr"
-    build_atlas(space, path, n=200, metrics=("convex",), report=lambda _: None)
+    build_atlas(space, path, n=200, metrics=("convex",), progress=lambda _: None)
     return path
 
 
@@ -61,8 +61,8 @@ def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypat
     plotted, views = {}, plot.plot_views
 
     def watched(cloud, *rest, color):
-        plotted.update(cloud=cloud, color=color, axes=views(cloud, *rest, color=color))
-        return plotted["axes"]
+        plotted.update(cloud=cloud, color=color, figure=views(cloud, *rest, color=color))
+        return plotted["figure"]
 
     monkeypatch.setattr(plot, "plot_views", watched)
     cut = Slice(axis="y", center=0.1, thickness=0.3)
@@ -73,7 +73,7 @@ def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypat
     wanted = wanted[kept] if isinstance(wanted, np.ndarray) else wanted
     np.testing.assert_array_equal(plotted["color"], wanted)
     if isinstance(wanted, np.ndarray):
-        bar = plotted["axes"]["front"].get_figure().axes[-1]
+        bar = plotted["figure"].axes[-1]
         assert bar.get_ylabel().startswith(color)
 
 
@@ -146,7 +146,7 @@ def test_a_click_on_the_map_finds_the_design_that_was_drawn_there(store):
 def test_a_map_needs_two_parameters(trunk, tmp_path):
     space = DesignSpace.grid(trunk, taper=[0.0, 0.02])
     atlas = build_atlas(
-        space, tmp_path / "a.zarr", n=100, metrics=("convex",), report=lambda _: None
+        space, tmp_path / "a.zarr", n=100, metrics=("convex",), progress=lambda _: None
     )
     with pytest.raises(InvalidInput, match="two parameters"):
         atlas_map(atlas, MapView(), {})
@@ -157,7 +157,7 @@ def test_a_map_holds_what_it_does_not_show_nearest_to_the_design(trunk, tmp_path
         trunk, revolution=[0.5, 1.5], taper=[0.0, 0.02], radius_ratio=[0.5, 0.7]
     )
     path = tmp_path / "a.zarr"
-    build_atlas(space, path, n=100, metrics=("convex",), report=lambda _: None)
+    build_atlas(space, path, n=100, metrics=("convex",), progress=lambda _: None)
     atlas, view = open_atlas(path), MapView(right="radius_ratio", up="revolution")
     held = held_places(atlas, view, changed(trunk, {"taper": 0.013}))
     assert held == {"taper": 1}

@@ -42,7 +42,7 @@ def demo(
     export.export_cloud(cloud, out / "cloud.ply")
     export.export_mesh(concave, out / "hull.ply")
     shape = configuration(arm, [-1.0, 0.0, -0.4])
-    plot.save_figure(plot.plot_views(cloud, arm, shape)["front"], out / "cloud.png")
+    plot.save_figure(plot.plot_views(cloud, arm, shape), out / "cloud.png")
 
     rows = volume_rows(concave, convex, arm.length)
     rows["time to compute the cloud"] = (round(computed, 3), "s")

@@ -66,11 +66,6 @@ def _rows(found: ReachableSet) -> dict[str, tuple[Any, str]]:
 
 
 def _draw(found: ReachableSet, path: Path) -> None:
-    from softreach.plot import plot_slice, save_figure
-    from softreach.plot.style import figure_style, pyplot
+    from softreach.plot import plot_slices, save_figure
 
-    with figure_style():
-        figure, axes = pyplot().subplots(1, 3, figsize=(9.6, 3.6), layout="constrained")
-        for ax, normal in zip(axes, "xyz", strict=True):
-            plot_slice(found.grid, ax, normal=normal, length=found.arm.length)
-        save_figure(figure, path)
+    save_figure(plot_slices(found.grid), path)
