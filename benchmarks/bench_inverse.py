@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 import time
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 import pytest
@@ -28,10 +28,10 @@ def prepared(arm):
     """Solver and cloud: neither's preparation is timed with the targets."""
     from scipy.spatial import KDTree
 
-    from softreach.inverse import InverseSolver
+    from softreach.inverse import prepared_map, solve_inverse
     from softreach.rod.kinematics import tip_positions
 
-    solver = InverseSolver(arm)
+    solver = partial(solve_inverse, prepared_map(arm))
     solver(targets_of(arm, 50)[1])
     cloud = np.random.default_rng(9).uniform(*arm.bounds.T, (100_000, 3))
     return solver, cloud, KDTree(tip_positions(arm, cloud))
@@ -49,16 +49,17 @@ def by_scipy(arm, targets: np.ndarray) -> np.ndarray:
     """One solution for each target: least_squares with the exact Jacobian."""
     from scipy.optimize import least_squares
 
-    from softreach.inverse.problem import tips_and_slopes
+    from softreach.rod import tip_map
 
+    rod = tip_map(arm)
     _, cloud, tree = prepared(arm)
     starts = cloud[tree.query(targets)[1]]
     found = np.empty_like(starts)
     for i, (start, target) in enumerate(zip(starts, targets, strict=True)):
         found[i] = least_squares(
-            lambda x, target=target: tips_and_slopes(arm, x[None], 1e-6)[0][0] - target,
+            lambda x, target=target: rod.tips_and_slopes(x[None])[0][0] - target,
             start,
-            jac=lambda x: tips_and_slopes(arm, x[None], 1e-6)[1][0],
+            jac=lambda x: rod.tips_and_slopes(x[None])[1][0],
             bounds=arm.bounds.T,
             xtol=1e-12,
             ftol=1e-12,
@@ -100,12 +101,46 @@ HEAD = """### Inverse: every branch, against least_squares from the nearest of 1
 |---|--:|--:|--:|--:|--:|--:|--:|--:|"""
 
 
+REDUNDANT = [
+    ("least change", {}),
+    ("least change, direction", {"direction": (0.0, 0.6, 0.8)}),
+    ("family of three", {"family": 3}),
+]
+
+
+def redundant_row(name: str, options: dict, n: int) -> str:
+    """One question asked of four bundles."""
+    import softreach as sr
+    from softreach.inverse import prepared_map, solve_inverse
+
+    arm = sr.designs.redundant_trunk()
+    gamma = np.random.default_rng(0).uniform(*arm.bounds.T, (n, 4))
+    targets = sr.tip_positions(arm, gamma)
+    solver = partial(solve_inverse, prepared_map(arm), **options)
+    solver(targets[:2])
+    solutions, wall, cpu = timed(lambda: solver(targets))
+    return (
+        f"| {name} | {1e3 * cpu / n:.2f} | {1e3 * wall / n:.2f} | {solutions.counts.mean():.2f} | "
+        f"{solutions.residuals.max() / arm.length:.0e} |"
+    )
+
+
+REDUNDANT_HEAD = """
+### Inverse: four bundles
+
+| question | CPU ms/target | wall ms/target | activations | residual, L |
+|---|--:|--:|--:|--:|"""
+
+
 def main() -> None:
-    """Print the table."""
+    """Print the tables."""
     n = int(sys.argv[1]) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 100_000
     print(HEAD)
     for revolution, taper in DESIGNS:
         print(row(revolution, taper, n), flush=True)
+    print(REDUNDANT_HEAD)
+    for name, options in REDUNDANT:
+        print(redundant_row(name, options, min(n, 1000)), flush=True)
 
 
 @pytest.mark.benchmark(group="inverse")
@@ -114,6 +149,15 @@ def test_every_branch(benchmark):
     solver, *_ = prepared(arm)
     targets = targets_of(arm, 2000)[1]
     assert (benchmark(solver, targets).counts >= 1).all()
+
+
+@pytest.mark.benchmark(group="inverse")
+def test_least_change_with_a_direction(benchmark):
+    import softreach as sr
+
+    arm = sr.designs.redundant_trunk()
+    targets = sr.tip_positions(arm, np.random.default_rng(0).uniform(*arm.bounds.T, (20, 4)))
+    assert (benchmark(sr.solve_inverse, arm, targets, direction=(0.0, 0.6, 0.8)).counts == 1).all()
 
 
 @pytest.mark.benchmark(group="inverse")

@@ -8,8 +8,8 @@ import pytest
 from softreach.arm import designs
 from softreach.errors import InvalidInput
 from softreach.inverse import Status, solve_inverse
-from softreach.inverse.problem import tips_and_slopes
 from softreach.path import PathStatus, track_path
+from softreach.rod import tip_map
 from softreach.rod.kinematics import tip_positions
 
 BEGIN, END = np.array([-0.3, -0.9, -0.4]), np.array([-1.2, -0.2, -1.1])
@@ -43,7 +43,7 @@ def test_a_branch_ends_where_a_bundle_reaches_its_bound(trunk, images):
     path = np.linspace(begin, begin + [0.0, 0.0, 2.0], 20)
     track = track_path(trunk, path)
     assert track.attrs["end"] == "bound"
-    bundle = list(track.fiber.values).index(track.attrs["end_bundle"])
+    bundle = list(track.bundle.values).index(track.attrs["end_bundle"])
     bound = trunk.bounds[bundle, 1 if track.attrs["end_bound"] == "upper" else 0]
     assert track.end_activation.values[bundle] == pytest.approx(bound, abs=1e-7)
     followed = track.status.values == PathStatus.FOLLOWED
@@ -63,8 +63,8 @@ def test_a_branch_ends_at_a_fold():
         track = track_path(arm, path, start=gamma)
         ends.append(track.attrs["end"])
         if ends[-1] == "fold":
-            slopes = tips_and_slopes(arm, track.end_activation.values[None], 1e-6)[1][0]
-            first = tips_and_slopes(arm, gamma[None], 1e-6)[1][0]
+            slopes = tip_map(arm).tips_and_slopes(track.end_activation.values[None])[1][0]
+            first = tip_map(arm).tips_and_slopes(gamma[None])[1][0]
             assert abs(np.linalg.det(slopes)) < 0.05 * abs(np.linalg.det(first))
     assert "fold" in ends
     assert "bound" in ends
@@ -97,4 +97,4 @@ def test_what_is_no_path_is_refused(trunk, path):
 
 def test_two_bundles_follow_no_path_in_space(trunk):
     with pytest.raises(InvalidInput, match="bundles"):
-        track_path(trunk.replace(fibers=trunk.fibers[:2]), [[0.0, 0.0, 1.0]])
+        track_path(trunk.replace(actuators=trunk.actuators[:2]), [[0.0, 0.0, 1.0]])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from itertools import chain, islice
 
 __all__ = ["blocks", "run", "thread_count"]
 
@@ -33,12 +34,19 @@ def run(tasks: Iterable[Callable[[], object]]) -> None:
     """Call every task on the threads; at most twice as many are drawn ahead as are running.
 
     The first exception (Ctrl-C too) stops the drawing of further tasks and is raised once the
-    tasks already begun have ended.
+    tasks already begun have ended. A task that is alone is called on the calling thread, because
+    starting threads takes longer than a small block of samples.
     """
+    drawn = iter(tasks)
+    first = list(islice(drawn, 2))
+    if len(first) < 2:
+        for task in first:
+            task()
+        return
     threads = thread_count()
     pending: set[Future[object]] = set()
     with ThreadPoolExecutor(threads) as pool:
-        for task in tasks:
+        for task in chain(first, drawn):
             pending.add(pool.submit(task))
             if len(pending) >= 2 * threads:
                 pending = _drain(pending)

@@ -9,11 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
-from softreach.inverse import solve_inverse
-from softreach.inverse.continuation import Continuation, PathStatus, Stop
-from softreach.inverse.problem import checked_number, checked_targets
-from softreach.rod.kinematics import tip_positions
-from softreach.rod.tip_map import tip_map
+from softreach.inverse import PathStatus, solve_inverse
+from softreach.inverse.continuation import BranchEnd, BranchPoint, Continuation
+from softreach.inverse.request import checked_activations, checked_residual, checked_targets
+from softreach.rod.free_bundles import free_bundles
+from softreach.rod.tip_map import TipMap, tip_map
 from softreach.schema import AXES
 
 if TYPE_CHECKING:
@@ -23,29 +23,31 @@ __all__ = ["PathStatus", "track_path"]
 
 Array = NDArray[np.float64]
 
+_MEANINGS = " ".join(f"{status.value}={status.name.lower()}" for status in PathStatus)
+
 
 def track_path(
-    arm: Manipulator,
+    arm: Manipulator | TipMap,
     path: ArrayLike,
     start: ArrayLike | None = None,
     *,
-    tol: float = 1e-10,
-    tip_tol: float = 1e-6,
+    residual_over_length: float = 1e-10,
+    tol: float = 1e-6,
 ) -> xr.Dataset:
     """Follow a path of tip positions, straight between its points, on one branch.
 
     Each substep is predicted by the Jacobian and corrected by Newton's method; it is halved while
-    the correction is large, while det J changes sign (three bundles) or while a bound is
-    overstepped. With more bundles the change of activation is least in every substep, and bundles
-    wait at their bounds.
+    the correction is large, while det J changes sign (three free bundles) or while a bound is
+    overstepped. With more free bundles the change of activation is least in every substep, and
+    bundles wait at their bounds.
 
     Args:
-        arm: A design of three bundles or more.
+        arm: A design with three free bundles or more, or its tip map.
         path: Tip positions in order [m], shape (k, 3).
         start: Activation to begin with [-], shape (bundles,); it is corrected to the first point.
             By default the best-conditioned of all solutions there.
-        tol: Largest |tip - point|, in L.
-        tip_tol: Largest error of the tips themselves, in L.
+        residual_over_length: Largest |tip - point|, in L.
+        tol: Largest error of the tips themselves, in L. A tip map keeps its own.
 
     Returns:
         Dataset over `point` with `activation` [-] and `tip_error` [m], NaN beyond the end of the
@@ -54,74 +56,83 @@ def track_path(
         followed), `end_bundle` and `end_bound`.
 
     Raises:
-        InvalidInput: Arguments of another shape or not finite, or fewer than three bundles.
+        InvalidInput: Arguments of another shape or not finite, or fewer than three free bundles.
     """
     points = checked_targets("path", path)
-    if arm.bundles < 3:
-        raise InvalidInput("arm.bundles", arm.bundles, "3 or more, to follow a path in space")
+    rod = tip_map(arm, tol)
+    if rod.box.dimension < 3:
+        raise InvalidInput("free bundles", rod.box.dimension, "3 or more to follow a path in space")
     if not len(points):
         raise InvalidInput("path.shape", points.shape, "of shape (k, 3) with one point or more")
-    tracker = Continuation(arm, checked_number("tol", tol, 1e-13, 1e-2) * arm.length, tip_tol)
-    activation = np.full((len(points), arm.bundles), np.nan)
-    gamma = _first(tracker, points[0], start, tol)
-    if gamma is None:
-        return _dataset(tracker, points, activation, 0, Stop(PathStatus.NO_START, activation[0]))
-    activation[0] = gamma
-    for k in range(1, len(points)):
-        stop = tracker.follow(activation[k - 1], points[k - 1], points[k])
-        if stop.status != PathStatus.FOLLOWED:
-            return _dataset(tracker, points, activation, k, stop)
-        activation[k] = stop.gamma
-    stop = Stop(PathStatus.FOLLOWED, activation[-1])
-    return _dataset(tracker, points, activation, len(points), stop)
-
-
-def _first(
-    tracker: Continuation, point: Array, start: ArrayLike | None, tol: float
-) -> Array | None:
-    """An activation that puts the tip at the first point, if there is one."""
-    arm = tracker.arm
+    residual = checked_residual(residual_over_length)
+    tracker = Continuation(free_bundles(rod), residual * rod.length)
     if start is not None:
-        gamma = tip_map(arm, tracker.tip_tol).box.check(np.atleast_2d(np.asarray(start, float)))[0]
-        return tracker.begun(np.clip(gamma, *arm.bounds.T), point)
-    solution = solve_inverse(arm, point[None], tol=tol, tip_tol=tracker.tip_tol)[0]
+        gamma = checked_activations("start", start, rod.box, 1)[0]
+        first = tracker.corrected_start(tracker.box.clip(gamma), points[0])
+    else:
+        first = _best_start(rod, tracker, points[0], residual)
+    followed, end = ([], None) if first is None else _followed(tracker, first, points)
+    return _dataset(rod, points, followed, end)
+
+
+def _best_start(
+    rod: TipMap, tracker: Continuation, target: Array, residual: float
+) -> BranchPoint | None:
+    """The best-conditioned solution for the first target, if there is one."""
+    solution = solve_inverse(rod, target[None], residual_over_length=residual)[0]
     if not len(solution):
         return None
-    return solution.activations[solution.condition.argmin()]
+    return tracker.at(solution.activations[solution.conditions.argmin()][rod.box.free])
+
+
+def _followed(
+    tracker: Continuation, first: BranchPoint, points: Array
+) -> tuple[list[Array], BranchEnd]:
+    """Activations of the free bundles at the points that the branch leads to, and its end."""
+    end = BranchEnd(PathStatus.FOLLOWED, first)
+    followed = [first.gamma]
+    for k in range(1, len(points)):
+        end = tracker.follow(end.point, points[k - 1], points[k])
+        if end.status != PathStatus.FOLLOWED:
+            break
+        followed.append(end.point.gamma)
+    return followed, end
 
 
 def _dataset(
-    tracker: Continuation, points: Array, activation: Array, reached: int, stop: Stop
+    rod: TipMap, points: Array, followed: list[Array], end: BranchEnd | None
 ) -> xr.Dataset:
+    """The result; `end` is None if there was nothing to begin with."""
     import xarray as xr
 
-    arm = tracker.arm
-    status = np.full(len(points), int(stop.status), np.int8)
-    status[:reached] = PathStatus.FOLLOWED
+    box, n = rod.box, len(followed)
+    outcome = PathStatus.NO_START if end is None else end.status
+    status = np.full(len(points), int(outcome), np.int8)
+    status[:n] = PathStatus.FOLLOWED
+    activation = np.full((len(points), box.bundles), np.nan)
     error = np.full(len(points), np.nan)
-    tips = tip_positions(arm, activation[:reached], tracker.tip_tol)
-    error[:reached] = np.linalg.norm(tips - points[:reached], axis=1)
-    last = np.full(3, np.nan)
-    if np.isfinite(stop.gamma).all():
-        last = tip_positions(arm, stop.gamma[None], tracker.tip_tol)[0]
-    ended = stop.status == PathStatus.BOUND
+    end_activation, end_position = np.full(box.bundles, np.nan), np.full(3, np.nan)
+    bundle = bound = ""
+    if end is not None:
+        activation[:n] = box.with_held(np.array(followed))
+        error[:n] = np.linalg.norm(rod.tips(activation[:n]) - points[:n], axis=1)
+        end_activation, end_position = box.with_held(end.point.gamma[None])[0], end.point.tip
+        if end.status == PathStatus.BOUND:
+            bundle, bound = box.names[box.free[end.bundle]], "upper" if end.upper else "lower"
     return xr.Dataset(
         {
             "position": (("point", "axis"), points, {"units": "m"}),
             "activation": (("point", "bundle"), activation, {"units": "1"}),
             "tip_error": ("point", error, {"units": "m"}),
             "status": ("point", status, {"units": "1", "meanings": _MEANINGS}),
-            "end_activation": ("bundle", stop.gamma, {"units": "1"}),
-            "end_position": ("axis", last, {"units": "m"}),
+            "end_activation": ("bundle", end_activation, {"units": "1"}),
+            "end_position": ("axis", end_position, {"units": "m"}),
         },
-        {"axis": list(AXES), "bundle": list(arm.bundle_names)},
+        {"axis": list(AXES), "bundle": list(box.names)},
         {
-            "design": arm.to_toml(),
-            "end": "" if stop.status == PathStatus.FOLLOWED else stop.status.name.lower(),
-            "end_bundle": arm.bundle_names[stop.bundle] if ended else "",
-            "end_bound": ("upper" if stop.upper else "lower") if ended else "",
+            "design": rod.arm.to_toml(),
+            "end": "" if outcome == PathStatus.FOLLOWED else outcome.name.lower(),
+            "end_bundle": bundle,
+            "end_bound": bound,
         },
     )
-
-
-_MEANINGS = " ".join(f"{status.value}={status.name.lower()}" for status in PathStatus)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from softreach.fiber import FiberArchitecture
-from softreach.kinematics import tip_positions
-from softreach.manipulator import Manipulator
+from softreach.arm.actuators import FiberArchitecture
+from softreach.rod.kinematics import tip_positions
+from softreach.arm.manipulator import Manipulator
 
 from softreach import designs
 from softreach.errors import InvalidDesign

@@ -26,7 +26,7 @@ def solve(
     ] = None,
     targets: Annotated[Path | None, Parameter(help="CSV file with columns x, y, z [m].")] = None,
     family: Annotated[
-        int, Parameter(help="With more than three bundles: solutions for each target.")
+        int, Parameter(help="With more than three free bundles: solutions for each target.")
     ] = 1,
     revolution_deg: RevolutionDeg = None,
     taper_deg: TaperDeg = None,
@@ -54,8 +54,8 @@ def _as_json(solution: Solution) -> dict[str, object]:
         "status": solution.status.name.lower(),
         "activations": solution.activations.tolist(),
         "residuals_m": solution.residuals.tolist(),
-        "condition": [value if value < 1e300 else None for value in solution.condition.tolist()],
-        "margin": solution.margin.tolist(),
+        "conditions": [value if value < 1e300 else None for value in solution.conditions.tolist()],
+        "margins": solution.margins.tolist(),
         "nearest_m": solution.nearest.tolist(),
         "nearest_activation": solution.nearest_activation.tolist(),
         "gap_m": solution.gap,
@@ -68,8 +68,8 @@ def _lines(solution: Solution, names: tuple[str, ...]) -> list[str]:
     for gamma, residual, condition, margin in zip(
         solution.activations,
         solution.residuals,
-        solution.condition,
-        solution.margin,
+        solution.conditions,
+        solution.margins,
         strict=True,
     ):
         shown = ", ".join(f"{name} {g:.6f}" for name, g in zip(names, gamma, strict=True))

@@ -1,4 +1,20 @@
-"""Every activation of three bundles that puts the tip at a target."""
+"""How every activation that puts the tip at a target is found, with three free bundles.
+
+1. The activation box is cut into cells of six tetrahedra each; tips and Jacobians are computed at
+   their corners, once for an arm (`cells`).
+2. A tetrahedron is mapped linearly by its corners. Its true image lies within an interpolation
+   error of the linear one, estimated from how the Jacobian changes along the edges: theory (38),
+   `kernels.activation_mesh`. So every root lies in a tetrahedron whose linear image, inflated by
+   its error, contains the target.
+3. An octree over space lists the inflated images that may cover a place (`image_tree`).
+4. In each tetrahedron listed at the target, the quadratic through tips and Jacobians says whether
+   and where it is reached: a start (`kernels.candidates`).
+5. Damped Newton with the exact Jacobian leads from each start to a root (`kernels.newton`).
+6. A tetrahedron that folds within itself holds two roots and gave one start: the other root lies
+   opposite, along the null direction of the Jacobian (`kernels.folds`), and is searched as well.
+7. Roots between which the tip hardly leaves the target are one.
+8. Targets left without a root are searched by descent, for Newton fails where J is singular.
+"""
 
 from __future__ import annotations
 
@@ -9,121 +25,119 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach import parallel
-from softreach.arm.manipulator import Manipulator
-from softreach.inverse.problem import tips_and_slopes
+from softreach.inverse.nearest import local_minima
+from softreach.inverse.prepared_map import PreparedMap
+from softreach.inverse.request import Request
+from softreach.inverse.roots import Roots, no_roots, roots_at, smallest_singular_values
 from softreach.kernels import candidates, folds, newton
-from softreach.kernels.activation_mesh import ActivationMesh
 from softreach.kernels.newton import CONVERGED, RUNNING, Search
-from softreach.kernels.space_tree import SpaceTree
-from softreach.rod.kinematics import tip_positions
 
-__all__ = ["Aim", "Found", "conditions", "distinct", "every_branch", "starts"]
+__all__ = ["every_branch"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _ROUNDING = 1e-13  # of a tip, in L, with room to spare
-
 _BLOCK = 1024
-_ROUNDS = 40
-_PARTNER_RANGE = 1.5  # widths of a cell within which a fold's other preimage is looked for
+_MOST_ITERATIONS = 40
+_PARTNER_RANGE = 1.5  # widths of a cell within which a fold's other root is looked for
 
 
-class Aim(NamedTuple):
-    """What is to be reached."""
-
-    arm: Manipulator
-    """The design."""
-    targets: Array
-    """Targets [m], shape (t, 3)."""
-    tol: float
-    """Largest tip error, in L."""
-    residual: float
-    """Largest |tip - target| of a solution [m]."""
-
-
-class Found(NamedTuple):
-    """Activations found, each for one of the targets."""
+class _Starts(NamedTuple):
+    """Where searches begin."""
 
     target: Index
     """Number of the target, shape (n,)."""
-    gamma: Array
-    """Activations [-], shape (n, 3)."""
-    slope: Array
-    """Position Jacobians [m], shape (n, 3, 3)."""
-    residual: Array
-    """|tip - target| [m], shape (n,)."""
     cell: Index
-    """Cell of the mesh where the search began, shape (n,)."""
-
-    def where(self, chosen: NDArray[np.bool_] | Index) -> Found:
-        """Those chosen by a mask or an index."""
-        return Found(
-            self.target[chosen],
-            self.gamma[chosen],
-            self.slope[chosen],
-            self.residual[chosen],
-            self.cell[chosen],
-        )
-
-    def and_also(self, other: Found) -> Found:
-        """Both, sorted by target."""
-        both = Found(
-            np.concatenate([self.target, other.target]),
-            np.concatenate([self.gamma, other.gamma]),
-            np.concatenate([self.slope, other.slope]),
-            np.concatenate([self.residual, other.residual]),
-            np.concatenate([self.cell, other.cell]),
-        )
-        return both.where(np.argsort(both.target, kind="stable"))
+    """Cell of the mesh, shape (n,)."""
+    gamma: Array
+    """Activation [-], shape (n, 3)."""
 
 
-def every_branch(aim: Aim, mesh: ActivationMesh, tree: SpaceTree) -> Found:
-    """All solutions inside the bounds, sorted by target.
+def every_branch(prepared: PreparedMap, request: Request) -> Roots:
+    """All roots inside the bounds, sorted by target.
 
     Args:
-        aim: What is to be reached, by a design of three bundles.
-        mesh: Its `box_mesh`.
-        tree: The mesh's `space_tree`.
+        prepared: A tip map of three free bundles.
+        request: Targets, and the residual that makes a root.
     """
-    every = np.arange(len(aim.targets))
-    found = _searched(aim, *starts(aim, mesh, tree, every))
+    count = len(request.targets)
+    if not count:
+        return no_roots(prepared.rod)
+    roots = _newton(prepared, request, _starts(prepared, request, np.arange(count)))
     # Where the quadratics say that nothing leads there, look once more without believing them.
-    missing = np.flatnonzero(np.bincount(found.target, minlength=len(every)) == 0)
-    found = found.and_also(_searched(aim, *starts(aim, mesh, tree, missing, strict=False)))
-    found = fresh = distinct(aim, found)
-    for _ in range(2):  # a partner may have a partner of its own where two folds meet
-        fresh = _searched(aim, *_partners(aim, mesh, fresh))
-        before = len(found.target)
-        found = distinct(aim, found.and_also(fresh))
-        if len(found.target) == before:
-            break
-    return found
+    again = _starts(prepared, request, roots.missing(count), with_root=False)
+    roots = _distinct(prepared, request, roots.joined(_newton(prepared, request, again)))
+    roots = _with_partners(prepared, request, roots)
+    return roots.joined(_singular_roots(prepared, request, roots.missing(count)))
 
 
-def _searched(aim: Aim, target: Index, cell: Index, start: Array) -> Found:
-    """Damped Newton from every start (n, 3); the solutions that arrive within the bounds."""
-    low, high = aim.arm.bounds.T.copy()
-    state = _begun(aim.targets[target], start)
-    for _ in range(_ROUNDS):
-        active = np.flatnonzero(state.state == RUNNING)
+def _starts(
+    prepared: PreparedMap, request: Request, rows: Index, with_root: bool = True
+) -> _Starts:
+    """Steps 3 and 4: starts for some of the targets, sorted by target.
+
+    Args:
+        prepared: The tip map, with its cells and their tree.
+        request: What is asked.
+        rows: Numbers of the targets.
+        with_root: Whether to leave out tetrahedra whose quadratic does not reach the target.
+    """
+    box, targets = prepared.rod.box, request.targets[rows]
+    blocks = list(parallel.blocks(len(targets), _BLOCK))
+    parts: list[list[_Starts]] = [[] for _ in blocks]
+
+    def fill(part: list[_Starts], first: int, last: int) -> None:
+        room = candidates.MOST_STARTS + 4 * _BLOCK
+        out = _Starts(np.empty(room, np.int64), np.empty(room, np.int64), np.empty((room, 3)))
+        while first < last:
+            done, n = candidates.find_starts(
+                prepared.mesh, prepared.tree, targets[first:last], low, high, with_root, *out
+            )
+            target = rows[out.target[:n] + first]
+            part.append(_Starts(target, out.cell[:n].copy(), out.gamma[:n].copy()))
+            first += done
+
+    low, high = box.low.copy(), box.high.copy()
+    parallel.run(
+        partial(fill, part, block.start, block.stop)
+        for part, block in zip(parts, blocks, strict=True)
+    )
+    none = _Starts(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 3)))
+    pieces = [none, *(piece for part in parts for piece in part)]
+    return _Starts(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))
+
+
+def _newton(prepared: PreparedMap, request: Request, starts: _Starts) -> Roots:
+    """Step 5: damped Newton from every start; the roots that are within the bounds."""
+    rod, goal = prepared.rod, request.targets[starts.target]
+    low, high = rod.box.low.copy(), rod.box.high.copy()
+    search = _search(goal, starts.gamma)
+    for _ in range(_MOST_ITERATIONS):
+        active = np.flatnonzero(search.state == RUNNING)
         if not len(active):
             break
-        tips, slopes = tips_and_slopes(aim.arm, state.trial[active], aim.tol)
-        newton.newton_step(state, active, tips, slopes, low, high, aim.residual)
-    arrived = np.flatnonzero(state.state == CONVERGED)
+        tips, slopes = rod.tips_and_slopes(search.trial[active])
+        newton.newton_step(search, active, tips, slopes, low, high, request.residual)
+    converged = np.flatnonzero(search.state == CONVERGED)
     # The trial holds the step that convergence left untaken; it may overstep a bound a little.
-    gamma, target = np.clip(state.trial[arrived], low, high), target[arrived]
-    tips = tip_positions(aim.arm, gamma, aim.tol)
-    missed = np.linalg.norm(tips - aim.targets[target], axis=1)
-    found = Found(target, gamma, state.slope[arrived], missed, cell[arrived])
-    return found.where(missed <= aim.residual)
+    gamma = rod.box.clip(search.trial[converged])
+    residual = np.linalg.norm(rod.tips(gamma) - goal[converged], axis=1)
+    roots = Roots(
+        starts.target[converged],
+        gamma,
+        search.slope[converged],
+        residual,
+        starts.cell[converged],
+    )
+    return roots.where(residual <= request.residual)
 
 
-def _begun(target: Array, start: Array) -> Search:
+def _search(goal: Array, start: Array) -> Search:
+    """The state of Newton's method before its first step."""
     n = len(start)
     return Search(
-        target=target,
+        target=goal,
         gamma=start.copy(),
         slope=np.zeros((n, 3, 3)),
         residual=np.full(n, 1e300),
@@ -134,64 +148,52 @@ def _begun(target: Array, start: Array) -> Search:
     )
 
 
-def starts(
-    aim: Aim, mesh: ActivationMesh, tree: SpaceTree, rows: Index, strict: bool = True
-) -> tuple[Index, Index, Array]:
-    """Target, cell and activation of every start for some of the targets, sorted."""
-    targets = aim.targets[rows]
-    low, high = aim.arm.bounds.T.copy()
-    blocks = list(parallel.blocks(len(targets), _BLOCK))
-    parts: list[list[tuple[Index, Index, Array]]] = [[] for _ in blocks]
-
-    def fill(part: list[tuple[Index, Index, Array]], first: int, last: int) -> None:
-        room = candidates.MOST_STARTS + 4 * _BLOCK
-        target, cell, start = (
-            np.empty(room, np.int64),
-            np.empty(room, np.int64),
-            np.empty((room, 3)),
-        )
-        while first < last:
-            done, found = candidates.find_starts(
-                mesh, tree, targets[first:last], low, high, strict, target, cell, start
-            )
-            part.append((rows[target[:found] + first], cell[:found].copy(), start[:found].copy()))
-            first += done
-
-    parallel.run(
-        partial(fill, part, b.start, b.stop) for part, b in zip(parts, blocks, strict=True)
-    )
-    everything = [_no_starts(), *(piece for part in parts for piece in part)]
-    target, cell, start = (np.concatenate(pieces) for pieces in zip(*everything, strict=True))
-    return target, cell, start
+def _with_partners(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
+    """Step 6: the roots and their partners beyond a fold."""
+    fresh = roots
+    for _ in range(2):  # a partner may have a partner of its own where two folds meet
+        fresh = _newton(prepared, request, _partner_starts(prepared, fresh))
+        before = len(roots.target)
+        roots = _distinct(prepared, request, roots.joined(fresh))
+        if len(roots.target) == before:
+            break
+    return roots
 
 
-def _no_starts() -> tuple[Index, Index, Array]:
-    return np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 3))
-
-
-def distinct(aim: Aim, found: Found) -> Found:
-    """Every solution once."""
-    offsets = np.searchsorted(found.target, np.arange(len(aim.targets) + 1))
-    smallest, _ = conditions(found.slope)
-    kept = np.ones(len(found.target), bool)
-    rounding = _ROUNDING * aim.arm.length
-    newton.merge_equal(offsets, found.gamma, found.residual, smallest, rounding, kept)
-    return found.where(kept)
-
-
-def _partners(aim: Aim, mesh: ActivationMesh, found: Found) -> tuple[Index, Index, Array]:
-    """Target, cell and start of the second preimage of every solution with a fold near."""
-    low, high = aim.arm.bounds.T.copy()
-    smallest, _ = conditions(found.slope)
-    start, near = np.empty_like(found.gamma), np.zeros(len(found.target), bool)
+def _partner_starts(prepared: PreparedMap, roots: Roots) -> _Starts:
+    """Near the second preimage of every root that has a fold near."""
+    box, smallest = prepared.rod.box, smallest_singular_values(roots.slope)
+    start, near = np.empty_like(roots.gamma), np.zeros(len(roots.target), bool)
     folds.second_preimages(
-        mesh, found.cell, found.gamma, found.slope, smallest, _PARTNER_RANGE, low, high, start, near
+        prepared.mesh,
+        roots.cell,
+        roots.gamma,
+        roots.slope,
+        smallest,
+        _PARTNER_RANGE,
+        box.low.copy(),
+        box.high.copy(),
+        start,
+        near,
     )
-    return found.target[near], found.cell[near], start[near]
+    return _Starts(roots.target[near], roots.cell[near], start[near])
 
 
-def conditions(slope: Array) -> tuple[Array, Array]:
-    """Smallest singular values [m] and condition numbers of 3x3 Jacobians."""
-    smallest, condition = np.empty(len(slope)), np.empty(len(slope))
-    newton.conditions(slope, smallest, condition)
-    return smallest, condition
+def _distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
+    """Step 7: every root once."""
+    offsets = np.searchsorted(roots.target, np.arange(len(request.targets) + 1))
+    smallest = smallest_singular_values(roots.slope)
+    kept, rounding = np.ones(len(roots.target), bool), _ROUNDING * prepared.rod.length
+    newton.merge_equal(offsets, roots.gamma, roots.residual, smallest, rounding, kept)
+    return roots.where(kept)
+
+
+def _singular_roots(prepared: PreparedMap, request: Request, rows: Index) -> Roots:
+    """Step 8: what descent finds for targets where Newton's method found nothing."""
+    starts = _starts(prepared, request, rows)
+    by_position = Request(
+        targets=request.targets[starts.target], residual=request.residual, near=starts.gamma
+    )
+    gamma = local_minima(prepared.rod, by_position, starts.gamma).gamma
+    roots = roots_at(prepared.rod, request.targets, starts.target, gamma)
+    return _distinct(prepared, request, roots.where(roots.residual <= request.residual))

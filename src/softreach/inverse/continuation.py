@@ -8,24 +8,23 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.manipulator import Manipulator
-from softreach.inverse.problem import tips_and_slopes
+from softreach.rod.tip_map import TipMap
 
-__all__ = ["Continuation", "PathStatus", "Stop"]
+__all__ = ["BranchEnd", "BranchPoint", "Continuation", "PathStatus"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _LONGEST = 0.1  # predicted change of activation in one substep, in ranges
 _SHORTEST = 1e-10  # substep at which a branch is at its end, in L
-_STRAY = 0.25  # correction against prediction beyond which the branch may have been left
+_CORRECTION = 0.25  # against the prediction, beyond which the branch may have been left
 _AT_BOUND = 1e-9  # in ranges
-_CORRECTIONS = 10
+_MOST_CORRECTIONS = 10
 _SINGULAR = 1e-10  # singular values below this part of the largest do not count
 
 
 class PathStatus(IntEnum):
-    """How a point of the path fared."""
+    """Outcome for a point of the path."""
 
     FOLLOWED = 0
     """The tip is there, on the branch of the start."""
@@ -37,130 +36,145 @@ class PathStatus(IntEnum):
     """The first point cannot be reached, or not from the start given."""
 
 
-class Stop(NamedTuple):
-    """Where a branch was left."""
+class BranchPoint(NamedTuple):
+    """An activation with the tip map linearized there."""
+
+    gamma: Array
+    """Activation of the free bundles [-], shape (m,)."""
+    tip: Array
+    """Tip [m], shape (3,)."""
+    slope: Array
+    """∂r/∂γ [m], shape (3, m)."""
+
+
+class BranchEnd(NamedTuple):
+    """How far a branch was followed."""
 
     status: PathStatus
-    gamma: Array
-    """The last activation on it [-], shape (m,)."""
+    point: BranchPoint
+    """The last point on it."""
     bundle: int = -1
     """The bundle at its bound."""
     upper: bool = False
     """Which bound that is."""
 
 
-class _Try(NamedTuple):
-    """A substep: where it led, or by how much to shorten it, or the end."""
+class _Substep(NamedTuple):
+    """A substep: where it led, or by how much to shorten it, or the end of the branch."""
 
-    gamma: Array | None = None
+    point: BranchPoint | None = None
     shorten: float = 1.0
-    stop: Stop | None = None
+    end: BranchEnd | None = None
 
 
 class Continuation:
-    """Following one branch of one design."""
+    """Following branches of solutions of one tip map, all of whose bundles are free."""
 
-    def __init__(self, arm: Manipulator, residual: float, tip_tol: float) -> None:
-        """Set up for tips within `residual` [m] of their points, tips themselves to `tip_tol` L."""
-        self.arm, self.residual, self.tip_tol = arm, residual, tip_tol
-        self.low, self.high = arm.bounds.T
-        self.width = np.where(self.high > self.low, self.high - self.low, 1.0)
+    def __init__(self, rod: TipMap, residual: float) -> None:
+        """Set up for tips within `residual` [m] of their points."""
+        self.rod, self.box, self.residual = rod, rod.box, residual
 
-    def begun(self, gamma: Array, point: Array) -> Array | None:
-        """The activation corrected to a first point, if it can be within the bounds."""
-        found = self._corrected(gamma, point, self.high > self.low)
-        if found is None or (self._overstep(found) > _AT_BOUND).any():
+    def at(self, gamma: Array) -> BranchPoint:
+        """The tip map linearized at an activation (m,)."""
+        tips, slopes = self.rod.tips_and_slopes(gamma[None])
+        return BranchPoint(gamma, tips[0], slopes[0])
+
+    def corrected_start(self, gamma: Array, target: Array) -> BranchPoint | None:
+        """The activation corrected to a first target, if it can be within the bounds."""
+        found = self._corrected(gamma, target, self.box.is_free)
+        if found is None or (self.box.excess(found.gamma) > _AT_BOUND).any():
             return None
-        return np.clip(found, self.low, self.high)
+        return self._clipped(found)
 
-    def follow(self, gamma: Array, begin: Array, goal: Array) -> Stop:
-        """Move the tip from one point straight to another, as far as the branch goes."""
+    def follow(self, point: BranchPoint, begin: Array, end: Array) -> BranchEnd:
+        """Move the tip from one place straight to another, as far as the branch goes."""
         done, part = 0.0, 1.0
-        distance = float(np.linalg.norm(goal - begin))
+        distance = float(np.linalg.norm(end - begin))
         if distance == 0.0:
-            return Stop(PathStatus.FOLLOWED, gamma)
-        shortest = _SHORTEST * self.arm.length / distance
+            return BranchEnd(PathStatus.FOLLOWED, point)
+        shortest = _SHORTEST * self.rod.length / distance
         while done < 1.0:
             part = min(part, 1.0 - done)
             last = part >= 1.0 - done
-            attempt = self._substep(gamma, goal if last else begin + (done + part) * (goal - begin))
-            if attempt.stop is not None:
-                return attempt.stop
-            if attempt.gamma is not None:
-                gamma, done, part = attempt.gamma, 1.0 if last else done + part, 2 * part
-            elif (part := part * attempt.shorten) < shortest:
-                return Stop(PathStatus.FOLD, gamma)
-        return Stop(PathStatus.FOLLOWED, gamma)
+            substep = self._substep(point, end if last else begin + (done + part) * (end - begin))
+            if substep.end is not None:
+                return substep.end
+            if substep.point is not None:
+                point, done, part = substep.point, 1.0 if last else done + part, 2 * part
+            elif (part := part * substep.shorten) < shortest:
+                return BranchEnd(PathStatus.FOLD, point)
+        return BranchEnd(PathStatus.FOLLOWED, point)
 
-    def _substep(self, gamma: Array, aim: Array) -> _Try:
+    def _substep(self, point: BranchPoint, target: Array) -> _Substep:
         """Predict and correct; bundles that would leave their bounds are held there."""
-        tips, slopes = tips_and_slopes(self.arm, gamma[None], self.tip_tol)
-        free, bundle, upper = self.high > self.low, -1, False
-        while free.sum() >= 3:
-            step = _least_norm(slopes[0], free) @ (aim - tips[0])
-            size = np.abs(step / self.width).max()
+        gamma, bundle, upper = point.gamma, -1, False
+        moving = self.box.is_free
+        while moving.sum() >= 3:
+            step = _least_norm(point.slope, moving) @ (target - point.tip)
+            size = np.abs(step / self.box.scales).max()
             ahead = gamma + step
-            blocked = free & self._at_bound(gamma) & (self._overstep(ahead) > _AT_BOUND)
+            blocked = moving & self._at_bound(gamma) & (self.box.excess(ahead) > _AT_BOUND)
             if not blocked.any():
                 if size > _LONGEST:
-                    return _Try(shorten=0.9 * _LONGEST / size)
-                found = self._corrected(ahead, aim, free)
-                if found is None or self._strayed(slopes[0], gamma, ahead, found):
-                    return _Try(shorten=0.5)
-                over = self._overstep(found) > _AT_BOUND
+                    return _Substep(shorten=0.9 * _LONGEST / size)
+                found = self._corrected(ahead, target, moving)
+                if found is None or self._left_branch(point, ahead, found):
+                    return _Substep(shorten=0.5)
+                over = self.box.excess(found.gamma) > _AT_BOUND
                 if not over.any():
-                    return _Try(gamma=np.clip(found, self.low, self.high))
+                    return _Substep(point=self._clipped(found))
                 blocked = over & self._at_bound(gamma)
                 if not blocked.any():
-                    return _Try(shorten=self._room(gamma, found, over))
-                ahead = found
+                    return _Substep(shorten=self._part_within(gamma, found.gamma, over))
+                ahead = found.gamma
             bundle = int(np.flatnonzero(blocked)[0])
-            upper = bool(ahead[bundle] > self.high[bundle])
-            free = free & ~blocked
-        return _Try(stop=Stop(PathStatus.BOUND, gamma, bundle, upper))
+            upper = bool(ahead[bundle] > self.box.high[bundle])
+            moving = moving & ~blocked
+        return _Substep(end=BranchEnd(PathStatus.BOUND, point, bundle, upper))
 
-    def _corrected(self, gamma: Array, aim: Array, free: Mask) -> Array | None:
-        """Newton's method with the least-norm step of the free bundles; None if it fails."""
+    def _corrected(self, gamma: Array, target: Array, moving: Mask) -> BranchPoint | None:
+        """Newton's method with the least-norm step of the moving bundles; None if it fails."""
         least = np.inf
-        for _ in range(_CORRECTIONS):
-            tips, slopes = tips_and_slopes(self.arm, gamma[None], self.tip_tol)
-            error = aim - tips[0]
-            miss = float(np.linalg.norm(error))
-            if miss <= 0.1 * self.residual:
-                return gamma
-            if miss > 2 * least:
+        for _ in range(_MOST_CORRECTIONS):
+            point = self.at(gamma)
+            error = target - point.tip
+            residual = float(np.linalg.norm(error))
+            if residual <= 0.1 * self.residual:
+                return point
+            if residual > 2 * least:
                 return None
-            least = min(least, miss)
-            gamma = gamma + _least_norm(slopes[0], free) @ error
-            if (self._overstep(gamma) > 0.1).any():
+            least = min(least, residual)
+            gamma = gamma + _least_norm(point.slope, moving) @ error
+            if (self.box.excess(gamma) > 0.1).any():
                 return None
         return None
 
-    def _strayed(self, slope: Array, gamma: Array, ahead: Array, found: Array) -> bool:
+    def _left_branch(self, point: BranchPoint, ahead: Array, found: BranchPoint) -> bool:
         """Whether the correction was large, or passed a fold."""
-        predicted = np.linalg.norm((ahead - gamma) / self.width)
-        if np.linalg.norm((found - ahead) / self.width) > _STRAY * predicted + 1e-9:
+        predicted = np.linalg.norm((ahead - point.gamma) / self.box.scales)
+        correction = np.linalg.norm((found.gamma - ahead) / self.box.scales)
+        if correction > _CORRECTION * predicted + 1e-9:
             return True
-        if slope.shape[1] > 3:
+        if point.slope.shape[1] > 3:
             return False
-        after = tips_and_slopes(self.arm, found[None], self.tip_tol)[1][0]
-        return bool(np.linalg.det(slope) * np.linalg.det(after) <= 0)
+        return bool(np.linalg.det(point.slope) * np.linalg.det(found.slope) <= 0)
 
-    def _overstep(self, gamma: Array) -> Array:
-        """How far each bundle is outside its bounds, in ranges."""
-        return np.maximum(self.low - gamma, gamma - self.high) / self.width
+    def _clipped(self, point: BranchPoint) -> BranchPoint:
+        """The point moved inside the bounds."""
+        gamma = self.box.clip(point.gamma)
+        return point if np.array_equal(gamma, point.gamma) else self.at(gamma)
 
     def _at_bound(self, gamma: Array) -> Mask:
-        return self._overstep(gamma) >= -2 * _AT_BOUND
+        return self.box.excess(gamma) >= -2 * _AT_BOUND
 
-    def _room(self, gamma: Array, found: Array, over: Mask) -> float:
+    def _part_within(self, gamma: Array, found: Array, over: Mask) -> float:
         """The part of a substep that ends just inside the bounds."""
-        bound = np.where(found > self.high, self.high, self.low)
-        inside = 1.0 - 0.5 * _AT_BOUND * self.width / np.abs(found - gamma).clip(1e-300)
+        bound = np.where(found > self.box.high, self.box.high, self.box.low)
+        inside = 1.0 - 0.5 * _AT_BOUND * self.box.scales / np.abs(found - gamma).clip(1e-300)
         part = (bound - gamma)[over] / (found - gamma)[over] * np.minimum(inside[over], 1 - 1e-6)
         return float(np.clip(part.min(), 1e-6, 0.9999))
 
 
-def _least_norm(slope: Array, free: Mask) -> Array:
-    """Pseudoinverse of the Jacobian of the free bundles, shape (m, 3)."""
-    return np.asarray(np.linalg.pinv(slope * free, rcond=_SINGULAR), np.float64)
+def _least_norm(slope: Array, moving: Mask) -> Array:
+    """Pseudoinverse of the Jacobian of the moving bundles, shape (m, 3): theory (39)."""
+    return np.asarray(np.linalg.pinv(slope * moving, rcond=_SINGULAR), np.float64)

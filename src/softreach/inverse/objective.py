@@ -1,4 +1,4 @@
-"""What the activations should minimize: the miss of the target, their change, the direction."""
+"""What a search for activations minimizes: miss of the target, change, error of direction."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.manipulator import Manipulator
-from softreach.rod.tip_map import tip_map
+from softreach.rod.tip_map import TipMap
 
-__all__ = ["Objective", "tip_directions"]
+__all__ = ["Objective"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -18,58 +17,55 @@ Index = NDArray[np.int64]
 
 @dataclass(frozen=True, kw_only=True)
 class Objective:
-    """½ s |γ - near|² + λ·c + ½ μ |c|² + ½ w² |d3 - direction|² with the miss c = (tip - target)/L.
+    """½ |γ - near|² + λ·c + ½ μ |c|² + ½ w² |d3 - direction|² with the miss c = (tip - target)/L.
 
-    With s = 0 and λ = 0 its minimum is the nearest reachable point; with s = 1 and the right λ it
-    is the least change that reaches the target (an augmented Lagrangian).
+    Theory (40). Without near and λ its minimum is the nearest reachable point; with near and the
+    right λ it is the least change that reaches the target (an augmented Lagrangian).
     """
 
-    arm: Manipulator
-    tol: float
+    rod: TipMap
     targets: Array
-    """Shape (n, 3) [m]."""
-    softness: float = 0.0
-    """s [-]."""
-    near: Array | None = None
-    """Shape (n, m) [-]."""
-    multiplier: Array | None = None
-    """λ, shape (n, 3)."""
+    """One for each search [m], shape (n, 3)."""
     penalty: float = 1.0
     """μ [-]."""
+    multiplier: Array | None = None
+    """λ, shape (n, 3)."""
+    near: Array | None = None
+    """Shape (n, m) [-]; None for no term of change."""
     direction: Array | None = None
-    """Unit vectors, shape (n, 3)."""
-    weight: float = 0.0
+    """Unit vectors, shape (n, 3); None for no term of direction."""
+    direction_weight: float = 0.0
     """w [-]."""
 
     def __call__(self, which: Index, gamma: Array) -> tuple[Array, Array]:
-        """Values and gradients at activations (k, m) of the chosen targets (k,)."""
-        tips, slope = tip_map(self.arm, self.tol).tips_and_slopes(gamma)
-        miss = (tips - self.targets[which]) / self.arm.length
-        slope /= self.arm.length
+        """Values (k,) and gradients (k, m) at activations (k, m) of searches `which` (k,)."""
+        if self.direction is None or not self.direction_weight:
+            return self._of_position(which, gamma, *self.rod.tips_and_slopes(gamma))
+        motions = self.rod.tip_motions(gamma)
+        value, gradient = self._of_position(which, gamma, motions.tips, motions.slopes)
+        wanted, squared_weight = self.direction[which], self.direction_weight**2
+        value += 0.5 * squared_weight * _squares(motions.directions - wanted)
+        # ∂d3 = ω × d3, so that ½|d3 - e|² changes by -(ω × d3)·e = -ω·(d3 × e)
+        turn = np.cross(motions.directions, wanted)
+        gradient -= squared_weight * np.einsum("nij,ni->nj", motions.rotations, turn)
+        return value, gradient
+
+    def _of_position(
+        self, which: Index, gamma: Array, tips: Array, slopes: Array
+    ) -> tuple[Array, Array]:
+        """Value and gradient of all terms but that of the direction."""
+        miss = (tips - self.targets[which]) / self.rod.length
         force = self.penalty * miss
         value = 0.5 * self.penalty * _squares(miss)
         if self.multiplier is not None:
             force += self.multiplier[which]
             value += np.einsum("ni,ni->n", self.multiplier[which], miss)
-        gradient = np.einsum("ni,nij->nj", force, slope)
-        if self.near is not None and self.softness:
+        gradient = np.einsum("ni,nij->nj", force, slopes / self.rod.length)
+        if self.near is not None:
             change = gamma - self.near[which]
-            value += 0.5 * self.softness * _squares(change)
-            gradient += self.softness * change
-        if self.direction is not None and self.weight:
-            wanted = self.direction[which]
-            d3 = tip_directions(self.arm, gamma, self.tol)
-            value += 0.5 * self.weight**2 * _squares(d3 - wanted)
-            # ∂d3 = ω × d3, so that ½|d3 - e|² changes by -(ω × d3)·e = -ω·(d3 × e)
-            jacobians = tip_map(self.arm, self.tol).tip_twists(gamma)[1]
-            twist = np.einsum("nij,ni->nj", jacobians[:, 3:], np.cross(d3, wanted))
-            gradient -= self.weight**2 * twist
+            value += 0.5 * _squares(change)
+            gradient += change
         return value, gradient
-
-
-def tip_directions(arm: Manipulator, gamma: Array, tol: float) -> Array:
-    """Tangents d3 of the tips, shape (n, 3)."""
-    return tip_map(arm, tol).tip_directions(gamma)
 
 
 def _squares(rows: Array) -> Array:

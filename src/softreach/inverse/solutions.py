@@ -1,11 +1,11 @@
-"""What solving the inverse problem yields: flat arrays that read like a list of solutions."""
+"""What the inverse problem answers, readable as a list of solutions."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Self, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,44 +23,52 @@ Index = NDArray[np.int64]
 
 
 class Status(IntEnum):
-    """How a target fared."""
+    """Outcome of the search for a target."""
 
     REACHED = 0
     """Some activation within the bounds puts the tip there."""
     UNREACHABLE = 1
     """None does; the nearest point that was found is given."""
     NOT_CONVERGED = 2
-    """The search did not come to rest: what is given is the best so far, not certain."""
+    """The search did not converge: what is given is the best found, not certain."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Solution:
     """The activations that reach one target, or come nearest to it."""
 
     target: Array
     """Where the tip should be [m], shape (3,)."""
     status: Status
-    """How the target fared."""
+    """Outcome of the search."""
     activations: Array
-    """Each activation that reaches the target [-], shape (k, m); k = 0 if it is out of reach."""
+    """Each activation that reaches the target [-], shape (k, bundles); k = 0 if none does."""
     residuals: Array
     """|tip - target| [m], shape (k,)."""
-    condition: Array
-    """Condition number of the position Jacobian ∂r/∂γ, infinite on a fold, shape (k,)."""
-    margin: Array
-    """Distance to the nearest bound, relative to its range, shape (k,)."""
+    conditions: Array
+    """Condition numbers of ∂r/∂γ of the free bundles, infinite on a fold, shape (k,)."""
+    margins: Array
+    """Distance to the nearest bound of a free bundle, relative to its range, shape (k,)."""
     nearest: Array
     """The reachable point nearest to the target [m], shape (3,)."""
     nearest_activation: Array
-    """An activation that leads there [-], shape (m,)."""
+    """An activation that leads there [-], shape (bundles,)."""
     gap: float
     """|nearest - target| [m]."""
 
     def __len__(self) -> int:
         return len(self.activations)
 
+    def __repr__(self) -> str:
+        place = ", ".join(f"{x:.6g}" for x in self.target)
+        outcome = self.status.name.lower().replace("_", " ")
+        if not len(self):
+            return f"<Solution for ({place}) m: {outcome}, nearest point {self.gap:.3g} m away>"
+        count, worst = _counted(len(self), "activation"), self.residuals.max()
+        return f"<Solution for ({place}) m: {outcome}, {count}, largest residual {worst:.1e} m>"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Solutions(Sequence[Solution]):
     """One `Solution` for each target, stored as flat arrays so that a million cost little."""
 
@@ -71,21 +79,36 @@ class Solutions(Sequence[Solution]):
     offsets: Index
     """Activations of target i are rows offsets[i]:offsets[i + 1], shape (t + 1,)."""
     activations: Array
-    """Shape (n, m) [-]."""
+    """Shape (n, bundles) [-]."""
     residuals: Array
     """Shape (n,) [m]."""
-    condition: Array
+    conditions: Array
     """Shape (n,) [-]."""
-    margin: Array
+    margins: Array
     """Shape (n,) [-]."""
-    status: NDArray[np.int8]
+    statuses: NDArray[np.int8]
     """`Status` of each target, shape (t,)."""
     nearest: Array
-    """Shape (t, 3) [m]."""
-    nearest_activation: Array
-    """Shape (t, m) [-]."""
-    gap: Array
+    """The nearest reachable points, shape (t, 3) [m]."""
+    nearest_activations: Array
+    """Shape (t, bundles) [-]."""
+    gaps: Array
     """Shape (t,) [m]."""
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """The solutions for consecutive blocks of targets, one block or more, as one."""
+        if len(parts) == 1:
+            return parts[0]
+        counts = np.concatenate([part.counts for part in parts])
+        return cls(
+            arm=parts[0].arm,
+            offsets=np.concatenate([[0], np.cumsum(counts)]),
+            **{
+                name: np.concatenate([getattr(part, name) for part in parts])
+                for name in (*_PER_TARGET, *_PER_SOLUTION)
+            },
+        )
 
     @property
     def counts(self) -> Index:
@@ -107,18 +130,31 @@ class Solutions(Sequence[Solution]):
     def __iter__(self) -> Iterator[Solution]:
         return (self._one(i) for i in range(len(self)))
 
+    def __repr__(self) -> str:
+        outcomes = np.bincount(self.statuses, minlength=len(Status))
+        parts = [
+            f"{outcomes[status]} {status.name.lower().replace('_', ' ')}"
+            for status in Status
+            if outcomes[status]
+        ]
+        if len(self.residuals):
+            parts.append(_counted(len(self.residuals), "activation"))
+            parts.append(f"largest residual {self.residuals.max():.1e} m")
+        targets = _counted(len(self), "target")
+        return f"<Solutions for {targets}{': ' if parts else ''}{', '.join(parts)}>"
+
     def _one(self, i: int) -> Solution:
         rows = slice(self.offsets[i], self.offsets[i + 1])
         return Solution(
             target=self.targets[i],
-            status=Status(self.status[i]),
+            status=Status(self.statuses[i]),
             activations=self.activations[rows],
             residuals=self.residuals[rows],
-            condition=self.condition[rows],
-            margin=self.margin[rows],
+            conditions=self.conditions[rows],
+            margins=self.margins[rows],
             nearest=self.nearest[i],
-            nearest_activation=self.nearest_activation[i],
-            gap=float(self.gap[i]),
+            nearest_activation=self.nearest_activations[i],
+            gap=float(self.gaps[i]),
         )
 
     def _several(self, chosen: Index) -> Solutions:
@@ -128,16 +164,9 @@ class Solutions(Sequence[Solution]):
         rows = np.repeat(self.offsets[chosen], counts) + inside
         return Solutions(
             arm=self.arm,
-            targets=self.targets[chosen],
             offsets=offsets,
-            activations=self.activations[rows],
-            residuals=self.residuals[rows],
-            condition=self.condition[rows],
-            margin=self.margin[rows],
-            status=self.status[chosen],
-            nearest=self.nearest[chosen],
-            nearest_activation=self.nearest_activation[chosen],
-            gap=self.gap[chosen],
+            **{name: getattr(self, name)[chosen] for name in _PER_TARGET},
+            **{name: getattr(self, name)[rows] for name in _PER_SOLUTION},
         )
 
     def to_dataset(self) -> xr.Dataset:
@@ -145,23 +174,28 @@ class Solutions(Sequence[Solution]):
         import xarray as xr
 
         meanings = " ".join(f"{status.value}={status.name.lower()}" for status in Status)
+        per_target, per_solution = ("target", "bundle"), ("solution", "bundle")
         return xr.Dataset(
             {
                 "position": (("target", "axis"), self.targets, {"units": "m"}),
-                "status": ("target", self.status, {"units": "1", "meanings": meanings}),
+                "status": ("target", self.statuses, {"units": "1", "meanings": meanings}),
                 "nearest": (("target", "axis"), self.nearest, {"units": "m"}),
-                "nearest_activation": (
-                    ("target", "bundle"),
-                    self.nearest_activation,
-                    {"units": "1"},
-                ),
-                "gap": ("target", self.gap, {"units": "m"}),
+                "nearest_activation": (per_target, self.nearest_activations, {"units": "1"}),
+                "gap": ("target", self.gaps, {"units": "m"}),
                 "target_of": ("solution", np.repeat(np.arange(len(self)), self.counts)),
-                "activation": (("solution", "bundle"), self.activations, {"units": "1"}),
+                "activation": (per_solution, self.activations, {"units": "1"}),
                 "residual": ("solution", self.residuals, {"units": "m"}),
-                "condition": ("solution", self.condition, {"units": "1"}),
-                "margin": ("solution", self.margin, {"units": "1"}),
+                "condition": ("solution", self.conditions, {"units": "1"}),
+                "margin": ("solution", self.margins, {"units": "1"}),
             },
             {"axis": list(AXES), "bundle": list(self.arm.bundle_names)},
             {"design": self.arm.to_toml()},
         )
+
+
+_PER_TARGET = ("targets", "statuses", "nearest", "nearest_activations", "gaps")
+_PER_SOLUTION = ("activations", "residuals", "conditions", "margins")
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

@@ -1,62 +1,75 @@
-"""Solving for activations: a design is prepared once, then any number of targets."""
+"""Solving for activations: an arm is prepared once, then any number of targets."""
 
 from __future__ import annotations
 
-from functools import lru_cache
+from dataclasses import replace
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.answer import CELLS, Preparation, Wishes, answer, collected
-from softreach.inverse.problem import (
+from softreach.inverse.branches import every_branch
+from softreach.inverse.least_change import least_changes
+from softreach.inverse.nearest import Nearest, nearest
+from softreach.inverse.prepared_map import PreparedMap, prepared_map
+from softreach.inverse.request import (
+    Request,
+    checked_activations,
     checked_direction,
-    checked_near,
     checked_number,
+    checked_residual,
     checked_targets,
+    checked_whole_number,
 )
-from softreach.inverse.solutions import Solutions
+from softreach.inverse.roots import Roots, conditions, no_roots, roots_at
+from softreach.inverse.solutions import Solutions, Status
+from softreach.rod.tip_map import TipMap
 
-__all__ = ["InverseSolver", "solve_inverse"]
+__all__ = ["solve_inverse"]
 
-_CHUNK = 32_768  # targets at once: bounds the memory of a call
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_BLOCK = 32_768  # targets at once: bounds the memory of a call
 
 
 def solve_inverse(
-    arm: Manipulator,
+    arm: Manipulator | TipMap | PreparedMap,
     targets: ArrayLike,
     *,
-    tol: float = 1e-10,
+    residual_over_length: float = 1e-10,
     near: ArrayLike | None = None,
     direction: ArrayLike | None = None,
     direction_weight: float = 0.1,
     family: int = 1,
     seed: int = 0,
-    tip_tol: float = 1e-6,
+    tol: float = 1e-6,
 ) -> Solutions:
     """The activations that put the tip at each target, or as near to it as the arm can reach.
 
-    With three bundles: every activation within the bounds, by Newton's method from every cell of
-    the activation box whose image covers the target. With more: the one of least |γ - near|, and
-    `family - 1` others on request. With fewer, or out of reach: the nearest reachable point.
-    The design is prepared at the first call and remembered.
+    Bundles with equal bounds are held there; the others are free. With three free bundles: every
+    activation within the bounds, by Newton's method from every cell of the activation box whose
+    image covers the target. With more: the one of least |γ - near|, and `family - 1` others on
+    request. With fewer, or out of reach: the nearest reachable point. The arm is prepared at the
+    first call and remembered.
 
     Args:
-        arm: The design.
+        arm: The design, its tip map, or what `prepared_map` made of it.
         targets: Tip positions to reach [m], shape (t, 3).
-        tol: Largest |tip - target| of a solution, in L.
-        near: With more than three bundles: the activation to stay near to [-], shape (m,) or
-            (t, m); by default rest.
+        residual_over_length: Largest |tip - target| of a solution, in L.
+        near: With more than three free bundles: the activation to stay near to [-], shape
+            (bundles,) or (t, bundles); by default rest.
         direction: Wanted tip tangents d3, shape (3,) or (t, 3), of any length. With more than
-            three bundles the freedom left by the position goes to least
+            three free bundles the freedom left by the position goes to least
             |γ - near|² + w² |d3 - direction|²; with three or fewer the position yields too:
             least |tip - target|²/L² + w² |d3 - direction|².
         direction_weight: w [-].
-        family: With more than three bundles: how many activations to give for each target,
+        family: With more than three free bundles: how many activations to give for each target,
             the others being those nearest to random activations.
         seed: Seed of these.
-        tip_tol: Largest error of the tips themselves, in L; the residual refers to
-            `tip_positions` with this tolerance.
+        tol: Largest error of the tips themselves, in L; residuals refer to `tip_positions` with
+            this tolerance. A tip map keeps its own.
 
     Returns:
         One `Solution` for each target; failures are its status, never an exception.
@@ -64,60 +77,96 @@ def solve_inverse(
     Raises:
         InvalidInput: Arguments of another shape, not finite, or out of range.
     """
-    return _prepared(arm, float(tip_tol))(
-        targets,
-        tol=tol,
-        near=near,
-        direction=direction,
-        direction_weight=direction_weight,
-        family=family,
-        seed=seed,
+    prepared = prepared_map(arm, tol)
+    points, box = checked_targets("targets", targets), prepared.whole.box
+    rest = np.zeros(box.bundles)
+    request = Request(
+        targets=points,
+        residual=checked_residual(residual_over_length) * prepared.whole.length,
+        near=checked_activations("near", rest if near is None else near, box, len(points)),
+        direction=checked_direction(direction, len(points)),
+        direction_weight=checked_number("direction_weight", direction_weight, 0.0, 1e6),
+        family=checked_whole_number("family", family, 1, 10_000),
+        seed=checked_whole_number("seed", seed, 0, 2**63),
     )
+    blocks = list(parallel.blocks(len(points), _BLOCK)) or [slice(0)]
+    return Solutions.joined([_solved(prepared, request.of(rows)) for rows in blocks])
 
 
-class InverseSolver:
-    """A design prepared for `solve_inverse`; what is not needed is not prepared."""
-
-    def __init__(
-        self, arm: Manipulator, *, tip_tol: float = 1e-6, cells: int = CELLS, depth: int = 0
-    ) -> None:
-        """Prepare a design.
-
-        Args:
-            arm: The design.
-            tip_tol: Largest error of the tips, in L.
-            cells: With three bundles: cells along each axis of the activation box.
-            depth: How often a cell is halved where det J changes sign or is uneven.
-        """
-        self.preparation = Preparation(arm, tip_tol, cells, depth)
-
-    def __call__(
-        self,
-        targets: ArrayLike,
-        *,
-        tol: float = 1e-10,
-        near: ArrayLike | None = None,
-        direction: ArrayLike | None = None,
-        direction_weight: float = 0.1,
-        family: int = 1,
-        seed: int = 0,
-    ) -> Solutions:
-        """As `solve_inverse`."""
-        arm, points = self.preparation.arm, checked_targets("targets", targets)
-        tol = checked_number("tol", tol, 1e-13, 1e-2)
-        wishes = Wishes(
-            residual=tol * arm.length,
-            near=checked_near(arm, near, len(points)),
-            direction=None if direction is None else checked_direction(direction, len(points)),
-            weight=checked_number("direction_weight", direction_weight, 0.0, 1e6),
-            family=int(checked_number("family", family, 1, 10_000)),
-            seed=int(checked_number("seed", seed, 0, 2**63)),
-        )
-        rows = parallel.blocks(len(points), _CHUNK)
-        answers = [answer(self.preparation, points[r], wishes.of(r)) for r in rows]
-        return collected(arm, points, answers)
+def _solved(prepared: PreparedMap, request: Request) -> Solutions:
+    """Solve for one block of targets."""
+    if prepared.dimension > 3:
+        return _by_least_change(prepared, request)
+    if prepared.dimension == 3 and request.direction is None:
+        return _by_branches(prepared, request)
+    return _by_distance(prepared, request)
 
 
-@lru_cache(maxsize=4)
-def _prepared(arm: Manipulator, tip_tol: float) -> InverseSolver:
-    return InverseSolver(arm, tip_tol=tip_tol)
+def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
+    """All roots, and the nearest points to the targets that have none."""
+    roots = every_branch(prepared, request)
+    missing = roots.missing(len(request.targets))
+    return _solutions(prepared, request, roots, missing, nearest(prepared, request.of(missing)))
+
+
+def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
+    """Nearest points, or compromises between distance and direction."""
+    roots = every_branch(prepared, request) if prepared.dimension == 3 else None
+    everything = np.arange(len(request.targets))
+    closest = nearest(prepared, request, roots)
+    return _solutions(prepared, request, no_roots(prepared.rod), everything, closest)
+
+
+def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
+    """Least changes among the activations that reach the targets that can be reached."""
+    closest = nearest(prepared, replace(request, direction=None))
+    distance = np.linalg.norm(closest.tip - request.targets, axis=1)
+    rows = np.flatnonzero(distance <= request.residual)
+    target, gamma = least_changes(prepared, request.of(rows), closest.gamma[rows])
+    roots = roots_at(prepared.rod, request.targets, rows[target], gamma)
+    missing = roots.missing(len(request.targets))
+    return _solutions(prepared, request, roots, missing, closest.of(missing))
+
+
+def _solutions(
+    prepared: PreparedMap, request: Request, roots: Roots, missing: Index, closest: Nearest
+) -> Solutions:
+    """Put together the roots and, for targets without one, the nearest points.
+
+    Args:
+        prepared: The tip map.
+        request: What was asked.
+        roots: The roots found, sorted by target.
+        missing: Numbers of the targets without a root.
+        closest: The nearest points to these; some may prove to be roots.
+    """
+    rod, count = prepared.rod, len(request.targets)
+    at_closest = roots_at(rod, request.targets, missing, closest.gamma)
+    hit = at_closest.residual <= request.residual
+    roots = roots.joined(at_closest.where(hit))
+    statuses = np.full(count, Status.REACHED, np.int8)
+    statuses[missing] = np.where(closest.converged, Status.UNREACHABLE, Status.NOT_CONVERGED)
+    # With more bundles than needed a root is there, but the least change was not found.
+    statuses[missing[hit]] = Status.NOT_CONVERGED if prepared.dimension > 3 else Status.REACHED
+    gamma, gaps = np.empty((count, rod.box.bundles)), np.empty(count)
+    reached, first = np.unique(roots.target, return_index=True)
+    gamma[reached], gaps[reached] = roots.gamma[first], roots.residual[first]
+    points = request.targets.copy()
+    points[missing], gamma[missing], gaps[missing] = (
+        closest.tip,
+        closest.gamma,
+        at_closest.residual,
+    )
+    return Solutions(
+        arm=prepared.whole.arm,
+        targets=request.targets,
+        offsets=np.searchsorted(roots.target, np.arange(count + 1)),
+        activations=prepared.whole.box.with_held(roots.gamma),
+        residuals=roots.residual,
+        conditions=conditions(roots.slope),
+        margins=rod.box.margin(roots.gamma),
+        statuses=statuses,
+        nearest=points,
+        nearest_activations=prepared.whole.box.with_held(gamma),
+        gaps=gaps,
+    )

@@ -1,16 +1,19 @@
 """The rod: activation box, tip map, and the kinematics that a user asks."""
 
 from softreach.rod.activation_box import ActivationBox
+from softreach.rod.free_bundles import FreeBundles, free_bundles
 from softreach.rod.kinematics import configuration, tip_jacobian, tip_positions
 from softreach.rod.tip_map import Frames, Strains, TipMap, TipStatus, tip_map
 
 __all__ = [
     "ActivationBox",
     "Frames",
+    "FreeBundles",
     "Strains",
     "TipMap",
     "TipStatus",
     "configuration",
+    "free_bundles",
     "tip_jacobian",
     "tip_map",
     "tip_positions",

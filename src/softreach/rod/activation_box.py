@@ -99,6 +99,24 @@ class ActivationBox:
         whole[:, self.free] = cube
         return self.from_cube(whole, out=whole)
 
+    def of_free_bundles(self) -> ActivationBox:
+        """The box of the free bundles alone."""
+        return ActivationBox(
+            tuple(self.bounds[j] for j in self.free), tuple(self.names[j] for j in self.free)
+        )
+
+    def with_held(self, activations: Array) -> Array:
+        """Activations of all bundles from those of the free ones; the others stay held.
+
+        Args:
+            activations: Shape (n, dimension).
+        """
+        if self.dimension == self.bundles:
+            return activations
+        whole = np.tile(self.low, (len(activations), 1))
+        whole[:, self.free] = activations
+        return whole
+
     def to_cube(self, activations: Array) -> Array:
         """Where activations lie in the unit cube, shape (n, bundles); held bundles at 0."""
         return (activations - self.low) / self.scales

@@ -14,7 +14,7 @@ from softreach.arm.tables import check_extension, tables
 from softreach.kernels import frames, jacobian, rod
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.steps import StepRule, check_tol
-from softreach.rod.tip_map import BLOCK, Frames, Strains, TipMap
+from softreach.rod.tip_map import BLOCK, Frames, Strains, TipMap, position_slopes
 
 __all__ = ["FreeRod"]
 
@@ -70,13 +70,10 @@ class FreeRod(TipMap):
         rod.tips(self._table, gamma, out)
 
     def fill_slopes(self, gamma: Array, tips: Array, slopes: Array) -> None:
-        """Put tips (n, 3) and ∂r/∂γ = v + ω × r (n, 3, bundles) [m] into place."""
+        """Put tips (n, 3) and ∂r/∂γ (n, 3, bundles) [m] into place."""
         twists = np.empty((len(gamma), 6, self.box.bundles))
         jacobian.jacobians(self._table, gamma, tips, twists)
-        v, w = twists[:, :3], twists[:, 3:]
-        slopes[:] = v
-        for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-            slopes[:, i] += w[:, j] * tips[:, k, None] - w[:, k] * tips[:, j, None]
+        position_slopes(tips, twists, slopes)
 
     def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:
         """Tips [m] and the spatial twist of the tip frame per unit of each activation."""

@@ -20,7 +20,16 @@ from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
 from softreach.rod.activation_box import ActivationBox
 
-__all__ = ["BLOCK", "Frames", "Strains", "TipMap", "TipStatus", "tip_map"]
+__all__ = [
+    "BLOCK",
+    "Frames",
+    "Strains",
+    "TipMap",
+    "TipMotions",
+    "TipStatus",
+    "position_slopes",
+    "tip_map",
+]
 
 Array = NDArray[np.float64]
 
@@ -55,6 +64,19 @@ class Strains(NamedTuple):
     """u in the directors, per unit of activated arclength [1/m], shape (n, station, 3)."""
     extension: Array
     """ζ [-], shape (n, station)."""
+
+
+class TipMotions(NamedTuple):
+    """Where tips are and point, and how both change with each activation."""
+
+    tips: Array
+    """r [m], shape (n, 3)."""
+    slopes: Array
+    """∂r/∂γ [m], shape (n, 3, bundles)."""
+    directions: Array
+    """Tangents d3 [-], shape (n, 3)."""
+    rotations: Array
+    """ω [rad], shape (n, 3, bundles): ∂d3/∂γ = ω × d3."""
 
 
 class TipMap(ABC):
@@ -135,6 +157,13 @@ class TipMap(ABC):
         """Tangents d3 of the tips [-], shape (n, 3)."""
         return np.ascontiguousarray(self.frames(activations, [self.length]).directors[:, 0, 2])
 
+    def tip_motions(self, activations: ArrayLike) -> TipMotions:
+        """Positions and directions of the tips with their derivatives, in two passes over rods."""
+        tips, twists = self.tip_twists(activations)
+        slopes = np.empty_like(twists[:, :3])
+        position_slopes(tips, twists, slopes)
+        return TipMotions(tips, slopes, self.tip_directions(activations), twists[:, 3:])
+
     def status(self, activations: ArrayLike) -> NDArray[np.int8]:
         """`TipStatus` of each activation, shape (n,)."""
         return np.full(len(self.box.check(activations)), TipStatus.STABLE, np.int8)
@@ -150,6 +179,14 @@ class TipMap(ABC):
         if not inside or z[0] < 0 or z[-1] > self.length or (np.diff(z) < 0).any():
             raise InvalidInput("stations", stations, f"ascending Z within [0, {self.length:g}] m")
         return z
+
+
+def position_slopes(tips: Array, twists: Array, slopes: Array) -> None:
+    """Put ∂r/∂γ = v + ω × r (n, 3, bundles) into place, from tips and spatial twists (v, ω)."""
+    v, w = twists[:, :3], twists[:, 3:]
+    slopes[:] = v
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        slopes[:, i] += w[:, j] * tips[:, k, None] - w[:, k] * tips[:, j, None]
 
 
 def tip_map(arm: Manipulator | TipMap, tol: float = 1e-6) -> TipMap:

@@ -8,18 +8,18 @@ from numpy.typing import NDArray
 from softreach.kernels.activation_mesh import ActivationMesh, face_planes
 from softreach.kernels.space_tree import SpaceTree, sort_into_children
 
-__all__ = ["space_tree"]
+__all__ = ["image_tree"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_FEW = 24  # a node with no more tetrahedra is not divided
-_DEEPEST = 10
+_LEAF = 24  # a node with no more tetrahedra is not divided
+_MOST_LEVELS = 10
 _MOST_ITEMS = 8_000_000
 _OCTANTS = np.array([[o >> 2 & 1, o >> 1 & 1, o & 1] for o in range(8)])
 
 
-def space_tree(mesh: ActivationMesh) -> SpaceTree:
+def image_tree(mesh: ActivationMesh) -> SpaceTree:
     """Divide space until few tetrahedra remain in each place."""
     planes = np.empty((6 * len(mesh.corner), 4, 4))
     face_planes(mesh, 1e-9 * float(np.ptp(mesh.tip)), planes)
@@ -27,7 +27,7 @@ def space_tree(mesh: ActivationMesh) -> SpaceTree:
     low = boxes[:, 0].min(axis=0)
     size = float((boxes[:, 1].max(axis=0) - low).max())
     growing = _Growing(planes, boxes, low, size)
-    for _ in range(_DEEPEST):
+    for _ in range(_MOST_LEVELS):
         if not growing.divide():
             break
     return growing.finished()
@@ -56,7 +56,7 @@ class _Growing:
 
     def divide(self) -> bool:
         """Divide every node of the last depth that holds many items; return whether any did."""
-        many = self.count > self._threshold()
+        many = self.count > self._largest_leaf()
         if not many.any():
             return False
         self._close(many)
@@ -73,12 +73,12 @@ class _Growing:
         self.first, self.count, self.item = starts.ravel(), counts.ravel(), item
         return True
 
-    def _threshold(self) -> int:
+    def _largest_leaf(self) -> int:
         """Divide the fullest nodes, as many as leave room for the lists (four times as long)."""
         counts = np.sort(self.count)[::-1]
         affordable = self.listed + 3 * np.cumsum(counts) + counts.sum() <= _MOST_ITEMS
         first_left = int(np.argmin(affordable)) if not affordable.all() else len(counts)
-        return max(_FEW, int(counts[first_left]) if first_left < len(counts) else 0)
+        return max(_LEAF, int(counts[first_left]) if first_left < len(counts) else 0)
 
     def _close(self, open_nodes: NDArray[np.bool_]) -> None:
         """Number the children of open nodes; list the items of the others for good."""

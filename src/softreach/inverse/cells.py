@@ -1,16 +1,15 @@
-"""The activation box of three bundles in cells, finer where it folds."""
+"""The activation box of three bundles in cells, finer where the tip map folds."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.manipulator import Manipulator
-from softreach.inverse.problem import tips_and_slopes
 from softreach.kernels.activation_mesh import ActivationMesh, interpolation_errors
 from softreach.kernels.simplices import corner_bits
+from softreach.rod.tip_map import TipMap
 
-__all__ = ["box_mesh"]
+__all__ = ["activation_cells"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -20,16 +19,15 @@ _EVEN = 0.3  # ratio of det J at a cell's corners below which the cell is cut in
 _MOST_CELLS = 300_000
 
 
-def box_mesh(arm: Manipulator, tol: float, cells: int, depth: int) -> ActivationMesh:
+def activation_cells(rod: TipMap, cells: int, depth: int = 0) -> ActivationMesh:
     """Cells of the activation box with tips and Jacobians at their corners.
 
     Args:
-        arm: A design of three bundles, each free to move.
-        tol: Largest tip error, in L.
+        rod: A tip map of three bundles, each free to move.
         cells: Cells along each axis of the box.
         depth: How often a cell may be halved where det J is uneven or changes sign.
     """
-    lattice = _Lattice(arm, tol, cells << depth)
+    lattice = _Lattice(rod, cells << depth)
     low, width = _even_cells(cells, depth)
     kept: list[Index] = []
     total = len(low)
@@ -42,7 +40,7 @@ def box_mesh(arm: Manipulator, tol: float, cells: int, depth: int) -> Activation
         total += 7 * int(uneven.sum())
         width //= 2
         low = (low[uneven, None] + width * _CORNERS).reshape(-1, 3)
-    return _finished(lattice, np.concatenate(kept))
+    return _mesh(lattice, np.concatenate(kept))
 
 
 def _even_cells(cells: int, depth: int) -> tuple[Index, int]:
@@ -60,8 +58,8 @@ def _uneven(det: Array) -> NDArray[np.bool_]:
 class _Lattice:
     """Vertices asked for so far, each computed once, found by their place on the finest lattice."""
 
-    def __init__(self, arm: Manipulator, tol: float, cells: int) -> None:
-        self.arm, self.tol, self.side = arm, tol, cells + 1
+    def __init__(self, rod: TipMap, cells: int) -> None:
+        self.rod, self.side = rod, cells + 1
         self.key = np.empty(0, np.int64)
         self.gamma, self.tip = np.empty((0, 3)), np.empty((0, 3))
         self.slope, self.det = np.empty((0, 3, 3)), np.empty(0)
@@ -78,10 +76,10 @@ class _Lattice:
 
     def _compute(self, key: Index) -> None:
         place = np.stack(np.unravel_index(key, (self.side,) * 3), -1)
-        low, high = self.arm.bounds.T
+        low, high = self.rod.box.low, self.rod.box.high
         part = place / (self.side - 1)
         gamma = low * (1 - part) + high * part
-        tip, slope = tips_and_slopes(self.arm, gamma, self.tol)
+        tip, slope = self.rod.tips_and_slopes(gamma)
         self.key = np.concatenate([self.key, key])
         self.gamma = np.concatenate([self.gamma, gamma])
         self.tip = np.concatenate([self.tip, tip])
@@ -89,10 +87,10 @@ class _Lattice:
         self.det = np.concatenate([self.det, np.linalg.det(slope)])
 
 
-def _finished(lattice: _Lattice, corner: Index) -> ActivationMesh:
+def _mesh(lattice: _Lattice, corner: Index) -> ActivationMesh:
     error = np.empty(len(corner))
     interpolation_errors(lattice.gamma, lattice.slope, corner, error)
-    error += 1e-9 * lattice.arm.length  # rounding must not put a target between two tetrahedra
+    error += 1e-9 * lattice.rod.length  # rounding must not put a target between two tetrahedra
     change = np.sqrt(((lattice.slope[corner[:, 7]] - lattice.slope[corner[:, 0]]) ** 2).sum((1, 2)))
     for bit in (1, 2, 4):
         step = lattice.slope[corner[:, bit]] - lattice.slope[corner[:, 0]]

@@ -1,0 +1,73 @@
+"""Activations all over the box with their tips: where searches for a minimum begin."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.rod.tip_map import TipMap
+from softreach.sampling import sample_cube
+
+__all__ = ["Landmarks", "landmarks"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_MOST = 150_000  # landmarks on a grid of the box
+_DIMENSIONS = 6  # from which on a grid is too coarse to be worth more than a low-discrepancy set
+_SOBOL = 1 << 17
+_CANDIDATES = 24
+_STARTS = 3
+_APART = 0.15  # of the ranges: two starts lead to different minima
+
+
+class Landmarks:
+    """Activations with known tips."""
+
+    def __init__(self, gamma: Array, tip: Array, scales: Array) -> None:
+        """Index the tips.
+
+        Args:
+            gamma: Activations [-], shape (n, m).
+            tip: Their tips [m], shape (n, 3).
+            scales: By which distances of activations are measured, shape (m,).
+        """
+        from scipy.spatial import KDTree
+
+        self.gamma, self.tip, self.scales = gamma, tip, scales
+        self.tree = KDTree(tip)
+
+    def nearest(self, targets: Array, count: int = _CANDIDATES) -> Array:
+        """Activations whose tips are nearest to each target, nearest first, (t, count, m)."""
+        count = min(count, len(self.tip))
+        rows = np.asarray(self.tree.query(targets, k=count)[1], np.int64)
+        return self.gamma[rows.reshape(-1, count)]
+
+    def starts(self, candidates: Array) -> tuple[Index, Array]:
+        """Up to three candidates for each target that lie far from each other in the box.
+
+        Args:
+            candidates: Activations for each target, best first, shape (t, k, m).
+
+        Returns:
+            Number of the target and activation of each start, sorted by target.
+        """
+        chosen = np.zeros(candidates.shape[:2], bool)
+        chosen[:, 0] = True
+        for k in range(1, candidates.shape[1]):
+            apart = np.abs(candidates[:, :k] - candidates[:, k : k + 1]) / self.scales
+            distinct = (~chosen[:, :k] | (apart.max(axis=2) > _APART)).all(axis=1)
+            chosen[:, k] = distinct & (chosen.sum(axis=1) < _STARTS)
+        return np.nonzero(chosen)[0], candidates[chosen]
+
+
+def landmarks(rod: TipMap) -> Landmarks:
+    """Landmarks on a grid over the box, or a low-discrepancy set where a grid is too coarse."""
+    box, m = rod.box, rod.box.dimension
+    if m == 0:
+        gamma = np.empty((1, 0))
+    elif m <= _DIMENSIONS:
+        gamma = box.from_cube(np.array(sample_cube("grid", int(_MOST ** (1 / m)) ** m, m)))
+    else:
+        gamma = box.from_cube(np.array(sample_cube("sobol", _SOBOL, m)))
+    return Landmarks(gamma, rod.tips(gamma), box.scales)

@@ -1,0 +1,81 @@
+"""A tip map prepared for the inverse problem: what is computed once and serves all targets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+from softreach.arm.manipulator import Manipulator
+from softreach.inverse.cells import activation_cells
+from softreach.inverse.image_tree import image_tree
+from softreach.inverse.landmarks import Landmarks, landmarks
+from softreach.kernels.activation_mesh import ActivationMesh
+from softreach.kernels.space_tree import SpaceTree
+from softreach.rod.free_bundles import free_bundles
+from softreach.rod.tip_map import TipMap, tip_map
+
+__all__ = ["PreparedMap", "prepared_map"]
+
+_CELLS = 32
+
+
+@dataclass(frozen=True)
+class PreparedMap:
+    """A tip map with cells, tree and landmarks, each computed when first needed."""
+
+    whole: TipMap
+    """The tip map of all bundles."""
+    cells: int = _CELLS
+    """With three free bundles: cells along each axis of the activation box."""
+    depth: int = 0
+    """How often a cell may be halved where det ∂r/∂γ changes sign or is uneven."""
+
+    @cached_property
+    def rod(self) -> TipMap:
+        """The tip map of the free bundles; held ones are no variables of any search."""
+        return free_bundles(self.whole)
+
+    @property
+    def dimension(self) -> int:
+        """Number of free bundles."""
+        return self.whole.box.dimension
+
+    @cached_property
+    def mesh(self) -> ActivationMesh:
+        """The cells of the activation box of three free bundles."""
+        return activation_cells(self.rod, self.cells, self.depth)
+
+    @cached_property
+    def tree(self) -> SpaceTree:
+        """The tetrahedra of the cells whose images may cover a place."""
+        return image_tree(self.mesh)
+
+    @cached_property
+    def landmarks(self) -> Landmarks:
+        """Where searches for a minimum begin."""
+        return landmarks(self.rod)
+
+
+def prepared_map(
+    arm: Manipulator | TipMap | PreparedMap,
+    tol: float = 1e-6,
+    *,
+    cells: int = _CELLS,
+    depth: int = 0,
+) -> PreparedMap:
+    """Prepare an arm for `solve_inverse`; the last four are remembered.
+
+    Args:
+        arm: The design, or its tip map; what is prepared already is returned as it is.
+        tol: Largest tip error, in L.
+        cells: With three free bundles: cells along each axis of the activation box.
+        depth: How often a cell is halved where det ∂r/∂γ changes sign or is uneven.
+    """
+    if isinstance(arm, PreparedMap):
+        return arm
+    return _of_map(tip_map(arm, tol), cells, depth)
+
+
+@lru_cache(maxsize=4)
+def _of_map(rod: TipMap, cells: int, depth: int) -> PreparedMap:
+    return PreparedMap(rod, cells, depth)

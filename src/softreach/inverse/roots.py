@@ -1,0 +1,92 @@
+"""Roots of tip(γ) = target, and how well the tip can be moved there."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.kernels import newton
+from softreach.rod.tip_map import TipMap
+
+__all__ = ["Roots", "conditions", "no_roots", "roots_at", "smallest_singular_values"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+class Roots(NamedTuple):
+    """Activations of the free bundles, each a root for one of the targets."""
+
+    target: Index
+    """Number of the target, shape (n,)."""
+    gamma: Array
+    """Activations [-], shape (n, m)."""
+    slope: Array
+    """∂r/∂γ there [m], shape (n, 3, m)."""
+    residual: Array
+    """|tip - target| [m], shape (n,)."""
+    cell: Index
+    """Cell of the mesh where the search began; 0 if in none, shape (n,)."""
+
+    def where(self, chosen: NDArray[np.bool_] | Index) -> Roots:
+        """Those chosen by a mask or an index."""
+        return Roots(
+            self.target[chosen],
+            self.gamma[chosen],
+            self.slope[chosen],
+            self.residual[chosen],
+            self.cell[chosen],
+        )
+
+    def joined(self, other: Roots) -> Roots:
+        """Both, sorted by target."""
+        both = Roots(
+            np.concatenate([self.target, other.target]),
+            np.concatenate([self.gamma, other.gamma]),
+            np.concatenate([self.slope, other.slope]),
+            np.concatenate([self.residual, other.residual]),
+            np.concatenate([self.cell, other.cell]),
+        )
+        return both.where(np.argsort(both.target, kind="stable"))
+
+    def missing(self, targets: int) -> Index:
+        """Which of so many targets have no root."""
+        return np.flatnonzero(np.bincount(self.target, minlength=targets) == 0)
+
+
+def no_roots(rod: TipMap) -> Roots:
+    """An empty set of roots."""
+    none, m = np.empty(0, np.int64), rod.box.bundles
+    return Roots(none, np.empty((0, m)), np.empty((0, 3, m)), np.empty(0), none)
+
+
+def roots_at(rod: TipMap, targets: Array, target: Index, gamma: Array) -> Roots:
+    """Activations (n, m) as roots for targets `target` (n,), whatever their residual."""
+    tips, slopes = rod.tips_and_slopes(gamma)
+    residual = np.linalg.norm(tips - targets[target], axis=1)
+    return Roots(target, gamma, slopes, residual, np.zeros(len(target), np.int64))
+
+
+def smallest_singular_values(slope: Array) -> Array:
+    """Smallest singular values of 3x3 Jacobians [m], shape (n,)."""
+    return _closed_form(slope)[0]
+
+
+def conditions(slope: Array) -> Array:
+    """Condition numbers of Jacobians (n, 3, m), infinite where singular; NaN for m = 0."""
+    m = slope.shape[2]
+    if m == 0:
+        return np.full(len(slope), np.nan)
+    if m == 3:
+        return _closed_form(slope)[1]
+    sigma = np.linalg.svd(slope, compute_uv=False)
+    with np.errstate(divide="ignore"):
+        return sigma[:, 0] / sigma[:, -1]
+
+
+def _closed_form(slope: Array) -> tuple[Array, Array]:
+    smallest, condition = np.empty(len(slope)), np.empty(len(slope))
+    newton.conditions(slope, smallest, condition)
+    return smallest, condition

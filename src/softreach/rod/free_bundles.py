@@ -1,0 +1,77 @@
+"""The tip map of the bundles that are free to move, the others held where they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.arm.manipulator import Manipulator
+from softreach.rod.activation_box import ActivationBox
+from softreach.rod.tip_map import Frames, Strains, TipMap
+
+__all__ = ["FreeBundles", "free_bundles"]
+
+Array = NDArray[np.float64]
+
+
+def free_bundles(rod: TipMap) -> TipMap:
+    """The restriction of a tip map to its free bundles; the map itself if all are free."""
+    if rod.box.dimension == rod.box.bundles:
+        return rod
+    return FreeBundles(rod.arm, rod.tol, rod)
+
+
+@dataclass(frozen=True)
+class FreeBundles(TipMap):
+    """A tip map of which some bundles are held: activations and derivatives are of the others."""
+
+    arm: Manipulator
+    tol: float
+    whole: TipMap
+    """The map of all bundles."""
+
+    @property
+    def box(self) -> ActivationBox:
+        """The activations within bounds, of the free bundles."""
+        return self._box
+
+    @cached_property
+    def _box(self) -> ActivationBox:
+        return self.whole.box.of_free_bundles()
+
+    def fill_tips(self, gamma: Array, out: Array) -> None:
+        """Put the tips [m] of checked activations into `out`, (n, 3), on the calling thread."""
+        self.whole.fill_tips(self._all(gamma), out)
+
+    def fill_slopes(self, gamma: Array, tips: Array, slopes: Array) -> None:
+        """Put tips (n, 3) and ∂r/∂γ (n, 3, bundles) [m] into place."""
+        of_all = np.empty((len(gamma), 3, self.whole.box.bundles))
+        self.whole.fill_slopes(self._all(gamma), tips, of_all)
+        slopes[:] = of_all[:, :, self.whole.box.free]
+
+    def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:
+        """Tips [m] and the spatial twist of the tip frame per unit of each activation."""
+        tips, twists = self.whole.tip_twists(self._all(self.box.check(activations)))
+        return tips, np.ascontiguousarray(twists[:, :, self.whole.box.free])
+
+    def frames(self, activations: ArrayLike, stations: ArrayLike) -> Frames:
+        """Centerline and directors at ascending stations Z [m]."""
+        return self.whole.frames(self._all(self.box.check(activations)), stations)
+
+    def strains(self, activations: ArrayLike, stations: ArrayLike) -> Strains:
+        """Curvature and extension at stations Z [m]."""
+        return self.whole.strains(self._all(self.box.check(activations)), stations)
+
+    def radius(self, stations: ArrayLike) -> Array:
+        """Outer radius R2 before activation at stations Z [m]."""
+        return self.whole.radius(stations)
+
+    def status(self, activations: ArrayLike) -> NDArray[np.int8]:
+        """`TipStatus` of each activation, shape (n,)."""
+        return self.whole.status(self._all(self.box.check(activations)))
+
+    def _all(self, gamma: Array) -> Array:
+        return self.whole.box.with_held(gamma)

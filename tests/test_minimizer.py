@@ -1,0 +1,95 @@
+"""Minima inside bounds, and the gradients that lead there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from softreach.arm import designs
+from softreach.inverse.minimizer import minimize
+from softreach.inverse.objective import Objective
+from softreach.rod import ActivationBox, configuration, tip_map
+from tests.laws import in_box
+
+
+def unit_box(m: int) -> ActivationBox:
+    return ActivationBox.between([[0.0, 1.0]] * m, [str(j) for j in range(m)])
+
+
+@pytest.mark.parametrize("m", [1, 2, 4])
+def test_a_quadratic_has_the_minimum_in_the_box_that_scipy_finds(m):
+    rng = np.random.default_rng(m)
+    factor, center = rng.normal(size=(30, m + 1, m)), rng.normal(0.5, 1.0, (30, m))
+
+    def evaluate(which, gamma):
+        residual = np.einsum("nij,nj->ni", factor[which], gamma - center[which])
+        return 0.5 * (residual**2).sum(axis=1), np.einsum("nij,ni->nj", factor[which], residual)
+
+    found = minimize(evaluate, rng.random((30, m)), unit_box(m))
+    assert found.converged.all()
+    for i in range(30):
+        best = lsq_linear(factor[i], factor[i] @ center[i], (0, 1), tol=1e-14, method="bvls")
+        assert np.allclose(found.gamma[i], best.x, atol=1e-7)
+        assert found.value[i] == pytest.approx(best.cost, abs=1e-12)
+
+
+def test_searches_do_not_depend_on_each_other():
+    def evaluate(which, gamma):
+        x = 4 * gamma - which[:, None] / 10
+        return (x**4 - x**2).sum(axis=1), 4 * (4 * x**3 - 2 * x)
+
+    start = np.random.default_rng(0).random((12, 2))
+    together = minimize(evaluate, start, unit_box(2))
+    for i in (0, 5, 11):
+        alone = minimize(
+            lambda which, gamma, i=i: evaluate(which + i, gamma), start[[i]], unit_box(2)
+        )
+        assert np.array_equal(alone.gamma[0], together.gamma[i])
+
+
+def differences(function, gamma: np.ndarray, step: float = 1e-6) -> np.ndarray:
+    """Central differences of a function of (n, m) activations along each axis, last."""
+    shifts = step * np.eye(gamma.shape[1])
+    return np.stack([(function(gamma + s) - function(gamma - s)) / (2 * step) for s in shifts], -1)
+
+
+@pytest.mark.parametrize(
+    "terms",
+    [
+        {},
+        {"penalty": 1e3, "multiplier": True},
+        {"near": True},
+        {"direction": True, "direction_weight": 0.7},
+        {"near": True, "multiplier": True, "direction": True, "direction_weight": 3.0},
+    ],
+)
+def test_the_gradient_of_an_objective_is_its_derivative(terms):
+    # Directions and Jacobians have steps of their own; the finer they are, the nearer they agree.
+    rod, rng = tip_map(designs.redundant_trunk(), tol=1e-10), np.random.default_rng(2)
+    gamma = in_box(rod.arm, 9)
+    direction = rng.normal(size=(9, 3))
+    arrays = {
+        "multiplier": rng.normal(size=(9, 3)),
+        "near": in_box(rod.arm, 9, seed=5),
+        "direction": direction / np.linalg.norm(direction, axis=1)[:, None],
+    }
+    chosen = {name: arrays.get(name, value) for name, value in terms.items()}
+    objective = Objective(rod=rod, targets=rng.normal(size=(9, 3)), **chosen)
+    which = np.array([3, 3, 0, 8, 1, 2, 7, 5, 4])
+    expected = differences(lambda x: objective(which, x)[0], gamma)
+    gradient = objective(which, gamma)[1]
+    assert np.allclose(gradient, expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max())
+
+
+def test_tip_motions_are_tips_slopes_tangents_and_the_turn_of_tangents():
+    arm = designs.redundant_trunk()
+    rod, gamma = tip_map(arm), in_box(arm, 30)
+    motions = rod.tip_motions(gamma)
+    tips, slopes = rod.tips_and_slopes(gamma)
+    assert np.array_equal(motions.tips, tips)
+    assert np.array_equal(motions.slopes, slopes)
+    d3 = configuration(arm, gamma, [arm.length]).directors.values[:, 0, 2]
+    assert np.allclose(motions.directions, d3, atol=1e-6)
+    turn = np.cross(motions.rotations, motions.directions[:, :, None], axis=1)
+    assert np.allclose(turn, differences(rod.tip_directions, gamma), atol=1e-6)
