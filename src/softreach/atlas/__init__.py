@@ -4,7 +4,6 @@ from softreach.atlas.best import best_designs
 from softreach.atlas.build import build_atlas
 from softreach.atlas.executor import worker_processes
 from softreach.atlas.metrics import METRICS
-from softreach.atlas.parameter import parameter_units
 from softreach.atlas.reading import (
     AtlasStatus,
     atlas_cloud,
@@ -26,6 +25,5 @@ __all__ = [
     "best_designs",
     "build_atlas",
     "open_atlas",
-    "parameter_units",
     "worker_processes",
 ]
