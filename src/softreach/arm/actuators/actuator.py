@@ -82,7 +82,7 @@ class Actuator(ABC):
         return tuple(f"{self.name} {k + 1}" for k in range(self.bundles))
 
     def value_on(self, field: str, profile: Profile, section: Section) -> float:
-        """What this actuator has of a variable when it drives an arm of this profile and section."""
+        """Value of a variable when this actuator drives an arm of such profile and section."""
         del profile, section
         return getattr(self, field)
 

@@ -68,9 +68,8 @@ class Draft:
         """State the revolutions of helical fibers, so that their angles follow the profile."""
         for name, draft in self.actuators.items():
             fiber = draft.start
-            if isinstance(fiber, FiberArchitecture) and fiber.revolution is None:
-                if turn := fiber.revolution_on(self.arm.profile, self.arm.section):
-                    self.wind(name, turn)
+            if isinstance(fiber, FiberArchitecture) and fiber.helical_angle:
+                self.wind(name, fiber.revolution_on(self.arm.profile, self.arm.section))
 
     def made(self) -> Manipulator:
         """The changed arm.
