@@ -173,10 +173,7 @@ def test_a_design_that_cannot_exist_shows_the_librarys_message(tab):
 
 def test_bounds_that_would_shorten_the_arm_to_nothing_are_refused(tab):
     tab.open("Design")
-    wide = tab.session.state.design
-    for name in ("left", "right", "longitudinal"):
-        wide = changed(wide, {f"{name}.extent": 2.0})
-    tab.session.update(lambda s: s.replace(design=wide))
+    tab.session.update(lambda s: s.replace(design=changed(s.design, {"extent": 2.0})))
     tab.settle()
     tab.drag("lowest γ", -300)
     alert = tab.page.get_by_role("alert").filter(has_text="must keep ζ > 0")
