@@ -4,13 +4,12 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
-
-.PHONY: help setup demo test browser check format bench atlas paper docs lock clean
+.PHONY: help setup demo test browser quick fast-tests check lint types format bench atlas paper docs lock clean
 
 help:
 	@echo "make demo    set up, then compute the paper's design into out/"
 	@echo "make test    set up, then run every check and test"
+	@echo "make quick   format, lint, layers, types and the fast tests: for every edit"
 	@echo "make check   format, lint, types, layers, documentation"
 	@echo "make bench   the benchmarks; writes docs/benchmarks.md"
 	@echo "make atlas   the paper's 16 x 16 designs of 400,000 points into out/; can be interrupted"
@@ -34,21 +33,34 @@ demo: setup
 test: check browser
 	$(BIN)/python -m pytest -q
 
-# The studio is tested in a real browser: Debian's, where there is none yet.
+# The studio is tested in a real browser. Only root installs one; whoever has none is told at the end
+# of the tests what to type.
 browser:
-	@command -v chromium >/dev/null || { $(SUDO) apt-get update -qq && $(SUDO) apt-get install -y -qq chromium >/dev/null; } \
-		|| echo "no chromium: the tests in a browser will be skipped"
+	@command -v chromium >/dev/null || [ "$$(id -u)" != 0 ] || ! command -v apt-get >/dev/null \
+		|| { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq chromium >/dev/null; } \
+		|| true
 
-check: setup
-	$(BIN)/ruff format --check src tests benchmarks
-	$(BIN)/ruff check src tests benchmarks
+# For every edit: types and fast tests side by side. What is not fast is marked slow.
+quick: lint
+	$(MAKE) --no-print-directory -j2 --output-sync=target types fast-tests
+
+fast-tests: setup
+	$(BIN)/python -m pytest -q -m "not slow" tests
+
+check: lint types
+	$(BIN)/python -m zensical build --strict --clean
+
+lint: setup
+	$(BIN)/ruff format --check src tests benchmarks tools
+	$(BIN)/ruff check src tests benchmarks tools
 	$(BIN)/lint-imports
+
+types: setup
 	$(BIN)/basedpyright
-	$(BIN)/mkdocs build --strict --quiet
 
 format: setup
-	$(BIN)/ruff format src tests benchmarks
-	$(BIN)/ruff check --fix src tests benchmarks
+	$(BIN)/ruff format src tests benchmarks tools
+	$(BIN)/ruff check --fix src tests benchmarks tools
 
 bench: setup
 	$(BIN)/python -m benchmarks
@@ -61,11 +73,11 @@ paper: setup
 	$(BIN)/softreach paper --out out/paper
 
 docs: setup
-	$(BIN)/mkdocs build --strict
+	$(BIN)/python -m zensical build --strict --clean
 
 lock:
 	uv lock --upgrade
 	uv export --quiet --all-extras --all-groups --no-emit-project --no-header --format requirements-txt --output-file requirements.lock
 
 clean:
-	rm -rf .venv out site
+	rm -rf .venv out site .cache

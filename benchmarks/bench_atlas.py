@@ -20,11 +20,11 @@ from benchmarks.memory import peak_bytes
 from softreach.arm import designs
 from softreach.atlas import DesignSpace, build_atlas
 from softreach.atlas.command import Command
-from softreach.atlas.metrics import METRICS, hull_metrics, image_metrics
+from softreach.atlas.intermediates import Intermediates
+from softreach.atlas.metric import Need
+from softreach.atlas.metrics import METRIC_GROUPS, chosen_metrics
 from softreach.atlas.store import AtlasStore, Result
-from softreach.curvature import QUANTITIES, stream_statistics
 from softreach.errors import SoftreachWarning
-from softreach.rod.kinematics import tip_positions
 
 ALPHA, ACCURACY, TOL = 0.05, 3e-3, 1e-6
 PARTS = {
@@ -35,7 +35,10 @@ PARTS = {
     "curvature": "curvature",
     "writing": "writing to the store",
 }
-GROUPS = {"concave": tuple(METRICS), "convex": tuple(name for name in METRICS if name != "concave")}
+GROUPS = {
+    "concave": tuple(METRIC_GROUPS),
+    "convex": tuple(name for name in METRIC_GROUPS if name != "concave"),
+}
 """What the atlas holds with α-shapes and without."""
 
 Times = dict[str, list[float]]
@@ -54,9 +57,9 @@ def parts(rows: int, columns: int, n: int, _: str = "") -> Times:
         seed=0,
         sampler="uniform",
         tol=TOL,
-        alpha=ALPHA,
+        alpha_over_length=ALPHA,
         accuracy=ACCURACY,
-        metrics=tuple(METRICS),
+        metrics=chosen_metrics(tuple(METRIC_GROUPS)),
         keep_clouds=True,
     )
     times: Times = defaultdict(lambda: [0.0, 0.0])
@@ -68,22 +71,26 @@ def parts(rows: int, columns: int, n: int, _: str = "") -> Times:
 
 
 def one_design(store: AtlasStore, index: int, times: Times) -> None:
-    arm = store.command.design(index)
-    low, high = arm.bounds.T
-    activations = low + store.cube * (high - low)
+    command = store.command
+    arm, sizes = command.design(index), command.profile_sizes
+    found = Intermediates(arm, store.cube, command, ())  # the convex hull by itself
+    shared = Intermediates(arm, store.cube, command, command.metrics)
+    values = {}
+
+    def measure(part: str, results: Intermediates, *groups: str) -> None:
+        with clock(times[part]):
+            for metric in chosen_metrics(groups):
+                values[metric.name] = metric.value(results, sizes)
+
     with clock(times["tips"]):
-        tips = tip_positions(arm, activations, TOL)
-    with clock(times["exact"]):
-        numbers = image_metrics(arm, TOL, ACCURACY)
-    for kind in ("convex", "concave"):
-        with clock(times[kind]):
-            numbers |= hull_metrics(arm, tips, ALPHA, ("extent", kind))
-    with clock(times["curvature"]):
-        blocks = (activations[k : k + 65_536] for k in range(0, len(activations), 65_536))
-        found = stream_statistics(arm, blocks, np.array(store.command.stations) * arm.length)
-    quantiles = np.stack([found[f"{name}_quantile"].values for name in QUANTITIES])
+        tips = found[Need.TIPS]
+    shared[Need.TIPS]
+    measure("exact", found, "exact")
+    measure("convex", found, "extent", "convex")
+    measure("concave", shared, "extent", "convex", "concave")
+    measure("curvature", found, "curvature")
     with clock(times["writing"]):
-        store.write(index, Result(numbers, quantiles, tips))
+        store.write(index, Result(values, tips))
 
 
 @contextmanager
@@ -101,7 +108,9 @@ def atlas(rows: int, columns: int, n: int, kind: str) -> dict[str, float]:
     with tempfile.TemporaryDirectory() as folder:
         store = Path(folder) / "atlas.zarr"
         with clock(total):
-            build_atlas(space(rows, columns), store, n, alpha=ALPHA, metrics=GROUPS[kind])
+            build_atlas(
+                space(rows, columns), store, n, alpha_over_length=ALPHA, metrics=GROUPS[kind]
+            )
         size = sum(file.stat().st_size for file in store.rglob("*") if file.is_file())
     peak = peak_bytes() / 2**20
     return {"wall": total[0], "cpu": total[1], "peak": peak, "size": size / 1e6 / (rows * columns)}
@@ -178,7 +187,7 @@ def print_memory(side: int, n: int) -> None:
 
 def test_an_atlas(benchmark, tmp_path):
     stores = (tmp_path / f"{k}.zarr" for k in range(1_000_000))
-    options = {"n": 500, "alpha": 1.0, "metrics": ("extent", "concave")}
+    options = {"n": 500, "alpha_over_length": 1.0, "metrics": ("extent", "concave")}
     benchmark(lambda: build_atlas(space(2, 2), next(stores), **options))
 
 

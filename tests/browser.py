@@ -8,9 +8,10 @@ from collections.abc import Iterator
 
 import pytest
 
-__all__ = ["browser"]
+__all__ = ["MISSING", "browser"]
 
 CHROMIUM = shutil.which("chromium")
+MISSING = "no chromium on this machine"
 
 FLAGS = [
     "--no-sandbox",
@@ -32,8 +33,8 @@ def browser() -> Iterator[object]:
     """Software rendering, and nothing that calls home."""
     if CHROMIUM is None:
         if os.environ.get("CI"):
-            pytest.fail("chromium is missing: apt-get install chromium")
-        pytest.skip("no chromium on this machine: apt-get install chromium")
+            pytest.fail(MISSING)
+        pytest.skip(MISSING)
     sync_api = pytest.importorskip("playwright.sync_api")
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)

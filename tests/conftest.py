@@ -1,26 +1,19 @@
-"""Shared fixtures, and shape checks that only tests pay for."""
+"""Shared fixtures, what is slow by its nature, and what is said of tests that were skipped."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 
 os.environ.setdefault("MPLBACKEND", "agg")
 
-from hypothesis import HealthCheck, settings
-from jaxtyping import install_import_hook
-
-import tests.shape_check  # noqa: F401  (the hook looks it up by attribute)
-
-# Kernels are left out: a check wrapped around them would have to be compiled with them.
-CHECKED = ["volume"]
-install_import_hook([f"softreach.{name}" for name in CHECKED], "tests.shape_check.check")
-
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, settings
 
 from softreach.arm import designs
 from softreach.arm.manipulator import Manipulator
-from tests.browser import browser  # noqa: F401  (a fixture)
+from tests.browser import MISSING, browser  # noqa: F401  (a fixture)
 
 settings.register_profile(
     "ci",
@@ -41,3 +34,23 @@ def trunk() -> Manipulator:
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(7)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Whatever asks for a browser is slow."""
+    for item in items:
+        if "browser" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.slow)
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> Iterator[None]:
+    """Say in the end how many tests had no browser, and what to type."""
+    yield
+    skipped = terminalreporter.stats.get("skipped", [])
+    if count := sum(MISSING in str(report.longrepr) for report in skipped):
+        terminalreporter.write_line(
+            f"{count} tests of the studio and the report were skipped: {MISSING}. "
+            "To run them, type: sudo apt-get install chromium",
+            yellow=True,
+        )

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from softreach.cross_section import section_integrals
 
 from softreach import designs, taper
 from softreach.arm.tables import actuation, curvature_range, extension_range

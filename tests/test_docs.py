@@ -43,6 +43,7 @@ def on_page(page: Path) -> str:
 
 @pytest.mark.filterwarnings("always::softreach.errors.SoftreachWarning")
 @pytest.mark.parametrize("page", PAGES, ids=on_page)
+@pytest.mark.slow
 def test_everything_on_a_page_runs_and_prints_what_it_says(page, tmp_path, monkeypatch):
     plt = pytest.importorskip("matplotlib.pyplot")
     monkeypatch.chdir(tmp_path)
@@ -71,6 +72,26 @@ def test_every_public_name_is_in_the_reference():
     shown = set(re.findall(r"^::: softreach\.(?:\w+\.)*(\w+)", reference, re.MULTILINE))
     functions = {name for name in sr.__all__ if not isinstance(getattr(sr, name), ModuleType)}
     assert functions <= shown
+
+
+def test_every_figure_has_words():
+    pictures = (ROOT / "docs" / "pictures.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (`plot_.+?`) \|", pictures, re.MULTILINE)
+    described = {name for row in rows for name in re.findall(r"`(\w+)`", row)}
+    assert {name for name in sr.plot.__all__ if name.startswith("plot_")} <= described
+
+
+def test_the_navigation_and_the_pages_are_the_same():
+    named = re.findall(
+        r"(\S+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert sorted(named) == [page.name for page in sorted((ROOT / "docs").rglob("*.md"))]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=on_page)
+def test_every_picture_on_a_page_exists(page):
+    for picture in re.findall(r"!\[[^]]*\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
+        assert (page.parent / picture).is_file(), picture
 
 
 def test_the_readme_is_short():
@@ -133,7 +154,7 @@ def compare_output(example):
     """Hold a text fence against what was printed last."""
     printed = example.namespace.pop("_printed", None)
     assert printed is not None, f"line {example.line}: no executed fence before this output"
-    # compiling is said on the first run only
+    # compilation is announced on the first run only
     found = [line for line in printed.splitlines() if not line.startswith("softreach: compiling")]
     wanted = example.parsed.splitlines()
     assert len(found) == len(wanted), f"line {example.line}: printed {found}"

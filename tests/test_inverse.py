@@ -90,6 +90,7 @@ def coincident_activations(arm: Manipulator) -> tuple[np.ndarray, np.ndarray]:
     return np.array([a for a, _ in pairs]), np.array([b for _, b in pairs])
 
 
+@pytest.mark.slow
 def test_two_activations_with_one_tip_are_both_found(folded):
     one, other = coincident_activations(folded)
     assert len(one) >= 5
@@ -118,6 +119,7 @@ def test_both_preimages_near_a_fold_are_found(folded, distance):
     inside = ((gamma > folded.bounds[:, 0]) & (gamma < folded.bounds[:, 1])).all(axis=1)
     mirror = fold - 3 * distance * null
     inside &= ((mirror > folded.bounds[:, 0]) & (mirror < folded.bounds[:, 1])).all(axis=1)
+    assert inside.sum() > 100
     solutions = solve_inverse(folded, tip_positions(folded, gamma[inside]))
     assert miss_of_original(solutions, gamma[inside]).max() < 1e-6
     # Nearly all: where two folds meet, the other preimage lies elsewhere or nowhere.
@@ -131,6 +133,7 @@ def test_a_target_on_a_fold_is_solved_to_the_root_of_the_tolerance(folded):
     assert miss_of_original(solutions, fold).max() < 10 * np.sqrt(1e-10)
 
 
+@pytest.mark.slow
 def test_a_finer_search_finds_the_same_number_of_solutions(folded):
     targets = tip_positions(folded, random_activations(folded, 2000, seed=3))
     coarse, fine = solve_inverse(folded, targets), InverseSolver(folded, cells=40, depth=1)(targets)
@@ -268,6 +271,7 @@ def least_norm_by_slsqp(arm, target, near, starts):
 
 
 @pytest.mark.parametrize("near", [None, [-0.8, -0.2, -1.0, -0.5]])
+@pytest.mark.slow
 def test_four_bundles_change_as_little_as_scipy_finds(near):
     arm = designs.redundant_trunk()
     gamma = random_activations(arm, 6)

@@ -29,11 +29,12 @@ def sectors(ax):
 def test_sectors_stand_where_the_bundles_are_at_that_station(share):
     arm = designs.redundant_trunk(length=2.0)
     ax = plot_cross_section(arm, share * arm.length)
-    angles = np.degrees(arm.fiber_angles(np.array([share * arm.length]))[0])
+    angles = np.degrees(arm.outline(share * arm.length).center[0])
+    assert len(sectors(ax)) == arm.bundles
     for k, wedge in enumerate(sectors(ax)):
         assert (wedge.theta1 + wedge.theta2) / 2 == pytest.approx(angles[k])
         assert wedge.theta2 - wedge.theta1 == pytest.approx(48)
-        assert wedge.r == pytest.approx(float(arm.radius(share * arm.length)) / arm.length)
+        assert wedge.r == pytest.approx(float(arm.profile.radius(share * arm.length)) / arm.length)
         assert wedge.width == pytest.approx(0.25 * wedge.r)
         assert wedge.get_facecolor()[:3] == bundle_color(k)
 
@@ -47,7 +48,7 @@ def test_designs_and_their_sections_share_one_scale():
     panels = [
         DesignPanel(name, getattr(designs, f"{name}_trunk")()) for name in ("minimal", "redundant")
     ]
-    figure = plot_designs(panels, (0.0, 0.5))
+    figure = plot_designs(panels, stations_over_length=(0.0, 0.5))
     arms, base, middle = np.array(figure.axes).reshape(3, 2)
     assert [ax.get_title() for ax in arms] == ["minimal", "redundant"]
     assert len({(*ax.get_xlim(), *ax.get_ylim()) for ax in arms}) == 1
@@ -61,7 +62,7 @@ def test_stations_off_the_arm_are_refused(trunk):
 
 
 def test_volume_curves_are_drawn_in_lengths():
-    ax = plot_volume_curve([0.1, 0.2], {"a": [0.8, 1.6]}, length=2.0, exact=4.0)
+    ax = plot_volume_curve({"a": [0.8, 1.6]}, [0.1, 0.2], length=2.0, exact=4.0)
     curve, exact = ax.lines
     np.testing.assert_allclose(curve.get_xydata(), [[0.05, 0.1], [0.1, 0.2]])
     np.testing.assert_allclose(exact.get_ydata(), 0.5)
@@ -69,4 +70,4 @@ def test_volume_curves_are_drawn_in_lengths():
 
 def test_volumes_of_other_radii_are_refused():
     with pytest.raises(InvalidInput, match=r"a = \(3,\): must be volumes of \(2,\) radii"):
-        plot_volume_curve([0.1, 0.2], {"a": [1, 2, 3]})
+        plot_volume_curve({"a": [1, 2, 3]}, [0.1, 0.2])

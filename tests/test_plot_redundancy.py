@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from softreach.arm import designs
+from softreach import designs
 from softreach.cloud import compute_cloud
 from softreach.errors import InvalidInput
-from softreach.plot.redundancy import (
+from softreach.plot import (
     plot_distance,
     plot_distance_histograms,
     plot_redundancy,
@@ -44,11 +44,11 @@ def shown_pixels(ax) -> int:
 
 
 def test_a_slice_shows_the_slab_and_states_it(drawn):
-    ax = plot_slab(drawn[0], plane="right", thickness=0.1, color=3)
+    ax = plot_slab(drawn[0], view="side", thickness=0.1, color=3)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("y / L", "z / L")
     assert "|x| ≤ 0.05 L" in [text.get_text() for text in ax.texts]
-    whole = plot_slab(drawn[0], plane="right", thickness=10.0, size=1.0, key=False)
-    thin = plot_slab(drawn[0], plane="right", thickness=0.01, size=1.0, key=False)
+    whole = plot_slab(drawn[0], view="side", thickness=10.0, size=1.0, key=False)
+    thin = plot_slab(drawn[0], view="side", thickness=0.01, size=1.0, key=False)
     assert 0 < shown_pixels(thin) < 0.2 * shown_pixels(whole)
 
 
@@ -64,23 +64,37 @@ def test_isolated_points_are_gray_and_never_hide_others(drawn):
 
 def test_histograms_share_their_scale_and_count_every_point(drawn):
     _, distance = drawn
-    axes = plot_distance_histograms({"some": distance[:500], "all": distance}, bins=20)
-    assert axes["some"].get_xlim() == axes["all"].get_xlim()
-    drawn_share = sum(bar.get_height() for bar in axes["all"].patches)
+    figure = plot_distance_histograms({"some": distance[:500], "all": distance}, bins=20)
+    some, every = figure.axes
+    assert (some.get_title(), every.get_title()) == ("some", "all")
+    assert some.get_xlim() == every.get_xlim()
+    drawn_share = sum(bar.get_height() for bar in every.patches)
     assert drawn_share == pytest.approx(100 * float(distance.notnull().mean()))
 
 
 def test_all_designs_stand_in_one_figure_at_one_scale(drawn):
     cloud, distance = drawn
-    axes = plot_redundancy({"a": cloud, "b": cloud}, {"a": distance, "b": distance})
-    assert axes["a"]["cloud"].get_xlim() == axes["b"]["distance"].get_xlim()
-    assert list(axes["b"]) == ["cloud", "front", "right", "distance"]
+    small = cloud.assign(tip=cloud.tip.copy(data=0.5 * cloud.tip.values))
+    figure = plot_redundancy({"a": cloud, "b": small}, {"a": distance, "b": 0.5 * distance})
+    panels = np.reshape([ax for ax in figure.axes if ax.images], (2, 4))
+    assert [ax.get_xlabel() for ax in panels[1]] == ["x / L", "x / L", "y / L", "x / L"]
+    assert [ax.get_ylabel() for ax in panels[:, 0]] == ["a\nz / L", "b\nz / L"]
+    for above, below in panels.T:
+        assert above.get_xlim() == below.get_xlim()
+        assert above.get_ylim() == below.get_ylim()
+    left, right = panels[1, 0].get_xlim()
+    assert left < float(cloud.tip[:, 0].min())
+    assert right > float(cloud.tip[:, 0].max())
+    # The scale of D̄ is shared as well: half of the largest is green, not yellow.
+    yellow = [{c for c in image_colors(ax) if c[0] > 150 and c[2] < 100} for ax in panels[:, 3]]
+    assert yellow[0]
+    assert not yellow[1]
 
 
 def test_what_cannot_be_drawn_is_refused(drawn):
     cloud, distance = drawn
-    with pytest.raises(InvalidInput, match="plane = 'top'"):
-        plot_slab(cloud, plane="top")
+    with pytest.raises(InvalidInput, match="view = oblique"):
+        plot_slab(cloud, view="oblique")
     with pytest.raises(InvalidInput, match="a tip lies in the slab"):
         plot_slab(cloud, thickness=-1.0)
     with pytest.raises(InvalidInput, match="distances = none"):

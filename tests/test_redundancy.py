@@ -111,7 +111,7 @@ def test_minimal_and_redundant_trunk_differ_as_in_the_paper():
     for design in (designs.minimal_trunk, designs.redundant_trunk):
         cloud = compute_cloud(design(), n=2_000_000, tol=1e-4)
         distance = activation_distance(cloud, 1 / 60, 10_000)
-        found[design] = redundancy_summary(distance, cloud)
+        found[design] = redundancy_summary(cloud, distance)
     minimal, redundant = found.values()
     assert minimal.median == pytest.approx(0.05, abs=0.01)
     assert redundant.median == pytest.approx(0.5, abs=0.05)
@@ -125,7 +125,7 @@ def test_the_summary_counts_points_and_cells():
     gamma = np.zeros((6, 3))
     gamma[0, 0] = 1.0
     cloud = made_up(tip, gamma)
-    found = redundancy_summary(activation_distance(cloud, 0.05), cloud, 0.5, cell=0.1)
+    found = redundancy_summary(cloud, activation_distance(cloud, 0.05), threshold=0.5, cell=0.1)
     assert found.evaluated == 6
     assert found.isolated == pytest.approx(1 / 6)
     assert found.redundant_points == pytest.approx(2 / 5)
@@ -138,7 +138,7 @@ def test_the_summary_counts_points_and_cells():
 
 def test_where_all_points_are_isolated_there_is_nothing_to_summarize():
     cloud = made_up(np.eye(3))
-    found = redundancy_summary(activation_distance(cloud, 0.0), cloud)
+    found = redundancy_summary(cloud, activation_distance(cloud, 0.0))
     assert found.isolated == 1.0
     assert found.measured_volume == 0.0
     assert np.isnan([found.median, found.redundant_points, found.redundant_volume]).all()
@@ -170,7 +170,7 @@ def test_distances_of_another_cloud_are_refused(strewn):
     with pytest.raises(InvalidInput, match=r"distance.sample = indices from 0 to 3999"):
         distance_map(small, distance)
     with pytest.raises(InvalidInput, match="made by activation_distance"):
-        redundancy_summary(distance.drop_vars("sample"), strewn)
+        redundancy_summary(strewn, distance.drop_vars("sample"))
 
 
 def test_density_adds_up_to_the_number_of_tips(trunk):

@@ -10,11 +10,14 @@ import pytest
 from softreach import designs, sampling
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.tables import tables
 from softreach.cloud import compute_cloud
 from softreach.errors import InvalidInput, SoftreachWarning
-from softreach.rod.kinematics import tip_positions, tips_and_jacobians
+from softreach.rod.kinematics import configuration, tip_positions
+from softreach.rod.tip_map import tip_map
 from softreach.workspace import ReachableSet, direction_spread, reachable_set
 from softreach.workspace.surface import Surface
+from tests.laws import arm_of, single
 
 
 def trunk_at(revolution_deg: float, taper_deg: float, **changes) -> Manipulator:
@@ -46,6 +49,7 @@ def test_the_best_design_reaches_0691_and_little_of_it_twice(best):
     assert sum(best.multiplicity.values()) == pytest.approx(best.volume)
 
 
+@pytest.mark.slow
 def test_doubled_resolutions_agree_within_the_errors(best, folded):
     for coarse in (best, folded):
         cell = coarse.grid.attrs["cell"] / 2
@@ -69,14 +73,14 @@ def test_volume_is_the_integral_of_det_j_minus_what_is_covered_again(folded):
     arm = folded.arm
     cube = sampling.sample_cube("sobol", 1 << 16, 3, seed=1)
     gamma = arm.bounds[:, 0] + cube * np.diff(arm.bounds, axis=1)[:, 0]
-    tips, twists = tips_and_jacobians(arm, gamma)
-    velocity = twists[:, :3] + np.cross(twists[:, 3:], tips[:, :, None], axis=1)
+    slopes = tip_map(arm).tips_and_slopes(gamma)[1]
     box = np.prod(np.diff(arm.bounds, axis=1))
-    integral = np.abs(np.linalg.det(velocity)).mean() * box
+    integral = np.abs(np.linalg.det(slopes)).mean() * box
     again = sum((k - 1) * volume for k, volume in folded.multiplicity.items())
     assert integral - again == pytest.approx(folded.volume, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_cloud_lies_inside_to_one_cell(best, folded):
     for found in (best, folded):
         tips = compute_cloud(found.arm, n=400_000).tip.values
@@ -104,6 +108,7 @@ def test_the_image_of_a_part_of_the_box_lies_within(best, trunk):
     assert best.distance(outside).max(initial=0.0) < best.grid.attrs["cell"]
 
 
+@pytest.mark.slow
 def test_the_surface_is_closed_outward_and_holds_the_volume(best, folded):
     for found in (best, folded):
         surface = found.surface()
@@ -149,6 +154,7 @@ def redundant() -> ReachableSet:
     return reachable_set(designs.redundant_trunk(), accuracy=1e-2)
 
 
+@pytest.mark.slow
 def test_four_bundles_reach_at_least_what_three_of_them_do(redundant):
     for held in range(4):
         for end in (0, 1):
@@ -167,6 +173,7 @@ def test_four_bundles_agree_with_a_finer_grid_within_the_error(redundant):
     assert "count" not in fine.grid
 
 
+@pytest.mark.slow
 def test_a_cloud_of_four_bundles_lies_inside_to_one_cell(redundant):
     tips = compute_cloud(redundant.arm, n=2_000_000).tip.values
     outside = tips[~redundant.contains(tips)]
@@ -245,15 +252,62 @@ def test_a_wrong_argument_is_named(trunk, argument, value, told):
     assert caught.value.name == argument
 
 
-def test_directions_spread_no_wider_than_a_sphere(trunk):
-    spread = direction_spread(trunk, n=1 << 16, cell=0.05)
-    angle, number = spread["solid_angle"], spread["samples"]
-    assert int(number.sum()) == 1 << 16
-    known = angle.values[number.values > 1]
-    assert ((known >= 0) & (known <= 4 * np.pi)).all()
-    assert np.isnan(angle.values[number.values == 0]).all()
+def only_cone(arm: Manipulator, n: int) -> float:
+    """The solid angle [sr] of all tip directions, in one cell that holds every tip."""
+    spread = direction_spread(arm, n=n, cell=10 * arm.length)
+    return float(spread["solid_angle"].max())
 
 
+def largest_turn(arm: Manipulator) -> float:
+    """The angle [rad] by which the first bundle, longitudinal, turns the tip when it acts alone."""
+    table, gamma = tables(arm, [0.0]), arm.bounds[0, 0]
+    stretch = 1 + table.extension[0, 0] * gamma
+    return float(np.linalg.norm(table.curvature[0, :, 0] * gamma) * stretch * arm.length)
+
+
+@pytest.mark.parametrize("gamma", [-0.3, -0.8])
+def test_the_directions_of_a_longitudinal_bundle_lie_in_the_cone_over_their_arc(gamma):
+    arm = single(activation_bounds=(gamma, 0.0))
+    exact = 2 * np.pi * (1 - np.cos(largest_turn(arm) / 2))
+    assert 0.999 * exact < only_cone(arm, 1 << 12) < 1.005 * exact
+
+
+def test_three_equal_longitudinal_bundles_turn_the_tip_within_a_cone_about_the_arm():
+    fiber = FiberArchitecture(revolution=0.0, extent=0.8, bundles=3)
+    arm = arm_of(fiber, activation_bounds=(-0.3, 0.0))
+    exact = 2 * np.pi * (1 - np.cos(largest_turn(arm)))
+    # Samples miss the corners of the box by about n^(-1/3) of its width.
+    assert 0.96 * exact < only_cone(arm, 1 << 16) < 1.005 * exact
+
+
+def test_a_cone_holds_its_widest_pair_and_is_no_wider_than_jungs_theorem_allows(trunk):
+    n, cell = 1 << 12, 0.1
+    spread = direction_spread(trunk, n=n, cell=cell)
+    cloud = compute_cloud(trunk, n=n, sampler="sobol", seed=0)
+    shape = configuration(trunk, cloud.activation.values, [trunk.length])
+    d3 = shape.directors.sel(director="d3").values[:, 0]
+    first = np.array([float(spread[name][0]) for name in "xyz"])
+    cells = np.rint((cloud.tip.values - first) / cell).astype(int)
+    np.testing.assert_array_equal(counted(cells, spread["samples"].shape), spread["samples"])
+    crowded = np.argwhere(spread["samples"].values > 1)
+    assert len(crowded) > 100
+    for place in crowded:
+        inside = d3[(cells == place).all(axis=1)]
+        pair = np.linalg.norm(inside[:, None] - inside, axis=2).max()  # 2 sin(angle / 2)
+        found = np.arccos(1 - float(spread["solid_angle"].values[tuple(place)]) / (2 * np.pi))
+        assert np.sin(found) > pair / 2 * (1 - 1e-9)
+        assert np.sin(found) < 1.03 * pair / np.sqrt(3)
+    assert np.isnan(spread["solid_angle"].values[spread["samples"].values == 0]).all()
+
+
+def counted(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """How many rows name each cell."""
+    counts = np.zeros(shape, int)
+    np.add.at(counts, tuple(cells.T), 1)
+    return counts
+
+
+@pytest.mark.slow
 def test_the_cone_of_three_bundles_closes_with_the_cell_and_that_of_four_stays(trunk):
     def shrinks(arm: Manipulator) -> float:
         """Median cone in cells of 0.1 m over that in cells of 0.05 m."""

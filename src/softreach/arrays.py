@@ -1,24 +1,14 @@
-"""Names for array shapes; checked at run time in the tests only."""
+"""Names for arrays of which the shape says what they are."""
 
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float, Int
+from numpy.typing import NDArray
 
-__all__ = [
-    "Activations",
-    "Faces",
-    "Jacobians",
-    "PerStation",
-    "Points",
-    "StationMap",
-    "StationVectors",
-]
+__all__ = ["Faces", "Points"]
 
-Points = Float[np.ndarray, "point 3"]
-Activations = Float[np.ndarray, "sample fiber"]
-Jacobians = Float[np.ndarray, "sample 6 fiber"]
-PerStation = Float[np.ndarray, " station"]
-StationMap = Float[np.ndarray, "station fiber"]
-StationVectors = Float[np.ndarray, "station 3 fiber"]
-Faces = Int[np.ndarray, "face 3"]
+Points = NDArray[np.float64]
+"""Places [m], shape (n, 3)."""
+
+Faces = NDArray[np.integer]
+"""Triangles as rows of three vertices, shape (n, 3)."""

@@ -115,15 +115,15 @@ def distal_stations(arm: Manipulator, count: int = 6) -> Array:
 
 def _bending(table: Tables, k: int, gamma: Array) -> Array:
     u1, u2 = (_response(gamma, row) for row in table.curvature[k, :2])
-    return np.hypot(u1, u2)
+    return np.hypot(u1, u2)  # theory (45)
 
 
 def _torsion(table: Tables, k: int, gamma: Array) -> Array:
-    return _response(gamma, table.curvature[k, 2])
+    return _response(gamma, table.curvature[k, 2])  # theory (7)
 
 
 def _extension(table: Tables, k: int, gamma: Array) -> Array:
-    return 1.0 + _response(gamma, table.extension[k])
+    return 1.0 + _response(gamma, table.extension[k])  # theory (7)
 
 
 def _response(gamma: Array, row: Array) -> Array:

@@ -29,7 +29,7 @@ _EVEN = ("uniform", "sobol")  # a grid has too many points on its faces
 def dexterity(cloud: xr.Dataset) -> xr.Dataset:
     """Manipulability, condition number and orientation of the tip map at each sample.
 
-    With J = ∂r/∂γ, of shape (3, m): manipulability is √det(J Jᵀ) (Yoshikawa 1985), for three
+    With J = ∂r/∂γ, of shape (3, m): manipulability is √det(J Jᵀ) [Yoshikawa1985], for three
     bundles |det J|, the volume that the tip sweeps per unit of activations; with fewer bundles
     √det(Jᵀ J), the area or length. It vanishes, and the condition number is infinite, on a fold.
 
@@ -70,7 +70,7 @@ def solution_measure(cloud: xr.Dataset, cell: float | None = None) -> xr.Dataset
 
     For three bundles it is the number of activations that reach a place; with four they form
     curves in the activation box, whose length this is; with five surfaces, whose area; and so on.
-    No inverse problem is solved: by the coarea formula (Federer 1969, 3.2.12) the integral of that
+    No inverse problem is solved: by the coarea formula ([Federer1969], 3.2.12) the integral of that
     measure over a cell is ∫ √det(J Jᵀ) dγ over the activations that lead into it, here the mean
     over a cloud that fills the activation box evenly. Values are means over a cell, with the
     noise of so many samples; cells that the border of the cloud cuts count as they are.
@@ -95,6 +95,7 @@ def solution_measure(cloud: xr.Dataset, cell: float | None = None) -> xr.Dataset
     if not (box := float(np.prod(space.widths))):
         raise InvalidInput("activation_bounds", space.bounds, "apart for every bundle")
     grid = tip_cells(cloud, cell)
+    # theory (43)
     total = box / n / grid.volume * grid.sum(dexterity(cloud)["manipulability"].values)
     name = {"units": "1", "long_name": "activations that reach a place: number, length, area, ..."}
     return cell_dataset(grid, solution_measure=(total, name))
@@ -107,7 +108,7 @@ def _tasks(slope: Array, measure: Array, condition: Array, sign: Signs) -> Itera
 
 def _measure(slope: Array, measure: Array, condition: Array, sign: Signs) -> None:
     sigma = np.linalg.svd(slope, compute_uv=False)
-    measure[:] = sigma.prod(axis=1)
+    measure[:] = sigma.prod(axis=1)  # theory (41)
     with np.errstate(divide="ignore"):
         condition[:] = sigma[:, 0] / sigma[:, -1]
     if slope.shape[2] == 3:

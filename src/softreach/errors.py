@@ -14,7 +14,13 @@ __all__ = [
     "Range",
     "SoftreachError",
     "SoftreachWarning",
+    "counted",
 ]
+
+
+def counted(number: int, noun: str) -> str:
+    """A number of things in words: "1 design", "2 designs"."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 class SoftreachError(Exception):

@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["BODY", "Color", "activation_colors", "bundle_color"]
+__all__ = ["BODY", "STEEL", "Color", "activation_colors", "bundle_color"]
 
 Color = tuple[float, float, float]
 
 BODY: Color = (0.87, 0.85, 0.82)
 """The passive body of an arm."""
+
+STEEL: Color = (0.55, 0.68, 0.82)
+"""The surface of a hull or reachable set."""
 
 # The paper's red, green, blue and yellow come first; lightness differs along the list, so that the
 # order survives most color deficiencies and gray print.

@@ -33,7 +33,7 @@ THRESHOLD = 0.25  # between a minimal arm's D̄ of some 0.05 and a redundant one
 def activation_distance(
     cloud: xr.Dataset, radius: float, queries: int | ArrayLike | None = None
 ) -> xr.DataArray:
-    """Mean activation-space distance of tips to their neighbors (section 5).
+    """Mean activation-space distance of tips to their neighbors (section 5; theory (44)).
 
     D̄(p_i, r) = Σ_j ‖Γ_j - Γ_i‖₂ / K over the K *other* points j with |p_j - p_i| <= r. Point i
     itself is not counted; another point at the same place is. Where K = 0 the point is isolated
@@ -102,10 +102,10 @@ class RedundancySummary:
 
 
 def redundancy_summary(
-    distance: xr.DataArray,
     cloud: xr.Dataset,
-    threshold: float = THRESHOLD,
+    distance: xr.DataArray,
     *,
+    threshold: float = THRESHOLD,
     cell: float | None = None,
     quantiles: Sequence[float] = (0.05, 0.25, 0.75, 0.95),
 ) -> RedundancySummary:
@@ -115,8 +115,8 @@ def redundancy_summary(
     that of grid cells: evaluate enough points that `measured_volume` is near `occupied_volume`.
 
     Args:
+        cloud: The cloud that D̄ was computed from.
         distance: D̄ from `activation_distance`.
-        cloud: The cloud that it was computed from.
         threshold: The D̄ [-] above which a place counts as redundant.
         cell: Edge of the grid cells [m]; None for L/20.
         quantiles: Probabilities.

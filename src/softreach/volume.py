@@ -64,7 +64,7 @@ def concave_hull(
             half of a quarter of them when the bias is asked for.
 
     References:
-        Edelsbrunner, Mücke (1994), Three-dimensional alpha shapes, ACM Trans. Graphics 13, 43-72.
+        [EdelsbrunnerMuecke1994]
     """
     positions = _positions(points)
     radius = _radius(alpha, points)
@@ -117,7 +117,7 @@ def unreachability(
         raise InvalidInput("points", "a cloud of volume 0", "spread in all three directions")
     hull = shape.hull(shape.critical_alpha() if radius == "critical" else float(radius))
     _warn_if_fine(hull, convex)
-    return 1.0 - hull.volume / convex
+    return 1.0 - hull.volume / convex  # theory (37)
 
 
 def volume_curve(
@@ -219,4 +219,5 @@ def _corrected(hull: Hull, positions: np.ndarray, method: Method) -> Hull:
             stacklevel=3,
         )
         return hull
+    # theory (47)
     return replace(hull, volume_corrected=2.0 * hull.volume - quarter.volume)

@@ -13,9 +13,9 @@ from softreach.errors import InvalidInput
 from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.geometry.delaunay import Delaunay, delaunay, unit_scale
 from softreach.geometry.hull import convex_hull
-from softreach.kernels.cells import FACES
 from softreach.kernels.expansions import scratch
 from softreach.kernels.predicates import insphere, orient
+from softreach.kernels.triangulation import FACES
 from tests.geometry.clouds import DEGENERATE, FLAT, arc_tips, random_points
 from tests.geometry.exact import exact_insphere, exact_orient, rational
 
@@ -89,6 +89,7 @@ def test_cells_of_small_random_clouds_equal_those_of_qhull(n, seed):
 
 
 @every_degenerate
+@pytest.mark.slow
 def test_degenerate_clouds_give_an_exact_delaunay_triangulation(name):
     mesh = delaunay(DEGENERATE[name])
     assert_adjacency(mesh)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softreach.kernels import contour, raster, stab
+from softreach.kernels import contour, point_cover, raster
 from softreach.kernels.simplices import chains, corner_bits, corner_steps, kuhn_simplices, strides
 
 UNIT = 64.0
@@ -164,8 +164,8 @@ def test_any_map_covers_what_its_tetrahedra_hold(seed, m):
     triangles = critical(vertices, cells)
     where = rng.integers(0, 768, (5, 3)).astype(float)
     where[0] = UNIT * np.floor(where[0] / UNIT)
-    members, starts = stab.bin_triangles(vertices, triangles, UNIT, (12, 12))
+    members, starts = point_cover.bin_triangles(vertices, triangles, UNIT, (12, 12))
     found = np.empty(5, np.int64)
-    stab.counts_at(vertices, triangles, UNIT, (12, 12), members, starts, where, found)
+    point_cover.cover_at(vertices, triangles, UNIT, (12, 12), members, starts, where, found)
     assert found.tolist() == [covering(vertices, tets, p) for p in where]
     assert found[0] == cover[tuple((where[0] / UNIT).astype(int))]

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import base64
+import io
+import re
+
 import numpy as np
 import pytest
 
@@ -10,6 +14,8 @@ from softreach.arm.parameters import changed, find_parameter
 from softreach.atlas import DesignSpace, build_atlas, open_atlas
 from softreach.cloud import compute_cloud, save_cloud
 from softreach.errors import InvalidDesign, InvalidInput
+from softreach.export import export_cloud
+from softreach.plot.style import pyplot
 from softreach.studio.atlas_map import atlas_map, held_places, map_choices, metric_names
 from softreach.studio.colors import sample_values
 from softreach.studio.files import cloud_file, figure_file, state_from, surface_file
@@ -32,27 +38,31 @@ def fine(trunk):
 def store(trunk, tmp_path_factory):
     space = DesignSpace.grid(trunk, revolution=[0.5, 1.5, 2.5], taper=[0.0, 0.02])
     path = tmp_path_factory.mktemp("atlas") / "atlas.zarr"
-    build_atlas(space, path, n=200, metrics=("convex",), report=lambda _: None)
+    build_atlas(space, path, n=200, metrics=("convex",), progress=lambda _: None)
     return path
 
 
-def test_files_are_those_of_the_librarys_own_writers(fine):
+@pytest.mark.slow
+def test_files_are_those_of_the_librarys_own_writers(fine, tmp_path):
     state = StudioState(design=fine.arm).showing(level=14)
-    assert cloud_file(fine, ".ply").startswith(b"ply\n")
-    pytest.importorskip("trimesh")
-    assert surface_file(fine, ".ply").startswith(b"ply\n")
+    export_cloud(fine.cloud, tmp_path / "cloud.ply")
+    assert cloud_file(fine, ".ply") == (tmp_path / "cloud.ply").read_bytes()
+    trimesh = pytest.importorskip("trimesh")
+    saved = trimesh.load(io.BytesIO(surface_file(fine, ".ply")), file_type="ply")
+    assert saved.volume == pytest.approx(fine.exact.surface().volume, rel=1e-6)
     assert figure_file(fine, state).startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("color", ["rgb", "bundle 1", "manipulability", "multiplicity"])
+@pytest.mark.slow
 def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypatch):
     from softreach import plot
 
     plotted, views = {}, plot.plot_views
 
     def watched(cloud, *rest, color):
-        plotted.update(cloud=cloud, color=color, axes=views(cloud, *rest, color=color))
-        return plotted["axes"]
+        plotted.update(cloud=cloud, color=color, figure=views(cloud, *rest, color=color))
+        return plotted["figure"]
 
     monkeypatch.setattr(plot, "plot_views", watched)
     cut = Slice(axis="y", center=0.1, thickness=0.3)
@@ -63,7 +73,7 @@ def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypat
     wanted = wanted[kept] if isinstance(wanted, np.ndarray) else wanted
     np.testing.assert_array_equal(plotted["color"], wanted)
     if isinstance(wanted, np.ndarray):
-        bar = plotted["axes"]["front"].get_figure().axes[-1]
+        bar = plotted["figure"].axes[-1]
         assert bar.get_ylabel().startswith(color)
 
 
@@ -76,9 +86,12 @@ def test_a_saved_page_holds_everything_itself(fine):
 
 
 def test_a_saved_page_carries_the_map(fine):
-    red = np.zeros((4, 4, 3), np.uint8)
+    red = np.full((4, 4, 3), (255, 0, 0), np.uint8)
     page = static_page(StudioState(design=fine.arm), fine, red)
-    assert "data:image/png;base64," in page
+    (data,) = re.findall(r'alt="map".*?data:image/png;base64,([^"]+)', page)
+    drawn = pyplot().imread(io.BytesIO(base64.b64decode(data)), format="png")
+    np.testing.assert_array_equal(255 * drawn[..., :3], red)
+    assert 'alt="map"' not in static_page(StudioState(design=fine.arm), fine)
 
 
 def test_a_design_file_changes_the_design_alone(trunk):
@@ -137,7 +150,7 @@ def test_a_click_on_the_map_finds_the_design_that_was_drawn_there(store):
 def test_a_map_needs_two_parameters(trunk, tmp_path):
     space = DesignSpace.grid(trunk, taper=[0.0, 0.02])
     atlas = build_atlas(
-        space, tmp_path / "a.zarr", n=100, metrics=("convex",), report=lambda _: None
+        space, tmp_path / "a.zarr", n=100, metrics=("convex",), progress=lambda _: None
     )
     with pytest.raises(InvalidInput, match="two parameters"):
         atlas_map(atlas, MapView(), {})
@@ -148,7 +161,7 @@ def test_a_map_holds_what_it_does_not_show_nearest_to_the_design(trunk, tmp_path
         trunk, revolution=[0.5, 1.5], taper=[0.0, 0.02], radius_ratio=[0.5, 0.7]
     )
     path = tmp_path / "a.zarr"
-    build_atlas(space, path, n=100, metrics=("convex",), report=lambda _: None)
+    build_atlas(space, path, n=100, metrics=("convex",), progress=lambda _: None)
     atlas, view = open_atlas(path), MapView(right="radius_ratio", up="revolution")
     held = held_places(atlas, view, changed(trunk, {"taper": 0.013}))
     assert held == {"taper": 1}
@@ -158,8 +171,12 @@ def test_a_map_holds_what_it_does_not_show_nearest_to_the_design(trunk, tmp_path
     assert shown.parameters_at(*shown.place_of(**at)) == at | {"taper": 0.02}
     assert shown.values_of(changed(trunk, at)) == pytest.approx(at)
     assert shown.values_of(changed(trunk, {"revolution": 3.0})) is None
-    for wrong in (MapView(right="taper", up="taper"), MapView(up="x"), MapView(metric="x")):
-        with pytest.raises(InvalidInput):
+    for wrong, named in (
+        (MapView(right="taper", up="taper"), "map = taper and taper"),
+        (MapView(up="x"), "map = .* and x"),
+        (MapView(metric="x"), "metric = x: must be one of convex_volume"),
+    ):
+        with pytest.raises(InvalidInput, match=named):
             map_choices(atlas, wrong)
 
 

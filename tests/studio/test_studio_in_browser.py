@@ -247,7 +247,7 @@ def test_a_click_on_the_map_of_an_atlas_loads_the_design(browser, tmp_path):
     trunk = sr.designs.minimal_trunk()
     space = DesignSpace.grid(trunk, revolution=[0.5, 1.5, 2.5], taper=[0.0, 0.01, 0.02])
     store = tmp_path / "atlas.zarr"
-    build_atlas(space, store, n=200, metrics=("exact",), report=lambda _: None)
+    build_atlas(space, store, n=200, metrics=("exact",), progress=lambda _: None)
     with Studio(start_on_store(store, SMALL)) as studio:
         tab = Tab(browser, studio)
         board = tab.session.board

@@ -3,21 +3,20 @@
 from softreach.atlas.best import best_designs
 from softreach.atlas.build import build_atlas
 from softreach.atlas.executor import worker_processes
-from softreach.atlas.metrics import METRICS
-from softreach.atlas.reading import (
-    AtlasStatus,
-    atlas_cloud,
-    atlas_design,
-    atlas_status,
-    open_atlas,
-)
+from softreach.atlas.metric import Metric, MetricFailed, Need
+from softreach.atlas.metrics import METRIC_GROUPS
+from softreach.atlas.questions import AtlasStatus, atlas_cloud, atlas_design, atlas_status
+from softreach.atlas.reading import open_atlas, over_length
 from softreach.atlas.space import DesignSpace
-from softreach.atlas.store import StoreFailed
+from softreach.atlas.store_root import StoreFailed
 
 __all__ = [
-    "METRICS",
+    "METRIC_GROUPS",
     "AtlasStatus",
     "DesignSpace",
+    "Metric",
+    "MetricFailed",
+    "Need",
     "StoreFailed",
     "atlas_cloud",
     "atlas_design",
@@ -25,5 +24,6 @@ __all__ = [
     "best_designs",
     "build_atlas",
     "open_atlas",
+    "over_length",
     "worker_processes",
 ]

@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from softreach.atlas.reading import opened_atlas
 from softreach.errors import InvalidInput
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from softreach.atlas.reading import AtlasLike
 
 __all__ = ["Interval", "best_designs"]
 
@@ -18,7 +21,7 @@ Interval = tuple[float | None, float | None]
 
 
 def best_designs(
-    atlas: xr.Dataset,
+    atlas: AtlasLike,
     metric: str,
     *,
     smallest: bool = False,
@@ -28,7 +31,7 @@ def best_designs(
     """The designs with the largest or smallest metric among those that meet the constraints.
 
     Args:
-        atlas: From `open_atlas`.
+        atlas: A store, or a dataset from `open_atlas`.
         metric: What to compare.
         smallest: Whether small is good.
         where: Metric or parameter -> (lowest, highest) allowed; None leaves an end open.
@@ -40,10 +43,11 @@ def best_designs(
     Raises:
         InvalidInput: No such metric or parameter.
     """
-    dims = atlas["status"].dims
-    scalars = [name for name in atlas.data_vars if atlas[name].dims == dims]
-    _check_known(metric, [str(name) for name in scalars if atlas[name].dtype.kind == "f"])
-    stacked = atlas[[*scalars, *_parameters(atlas)]].stack(rank=dims, create_index=False)
+    opened = opened_atlas(atlas)
+    dims = opened["status"].dims
+    numbers = [name for name in opened.data_vars if opened[name].dims == dims]
+    _check_known(metric, [str(name) for name in numbers if opened[name].dtype.kind == "f"])
+    stacked = opened[[*numbers, *_parameters(opened)]].stack(rank=dims, create_index=False)
     allowed = np.isfinite(stacked[metric].values)
     for name, (low, high) in (where or {}).items():
         _check_known(name, [str(known) for known in stacked.variables])

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softreach import progress
 from softreach.atlas.command import Command
 from softreach.atlas.executor import ExecutorLike, run_designs
-from softreach.atlas.metrics import METRICS
-from softreach.atlas.reading import open_atlas
+from softreach.atlas.metric import Metric
+from softreach.atlas.metrics import METRIC_GROUPS, chosen_metrics
+from softreach.atlas.reading import open_atlas, over_length
 from softreach.atlas.space import DesignSpace
 from softreach.atlas.store import DONE, GAP, AtlasStore
-from softreach.errors import InvalidInput, SoftreachWarning
+from softreach.errors import InvalidInput, SoftreachWarning, counted
+from softreach.progress import Progress, bar
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,24 +33,24 @@ def build_atlas(
     seed: int = 0,
     *,
     sampler: str = "uniform",
-    metrics: Sequence[str] = tuple(METRICS),
-    alpha: float = 0.05,
+    metrics: Sequence[str | Metric] = tuple(METRIC_GROUPS),
+    alpha_over_length: float = 0.05,
     accuracy: float = 3e-3,
     tol: float = 1e-6,
     keep_clouds: bool = True,
     executor: ExecutorLike = None,
     shard: tuple[int, int] = (0, 1),
-    report: progress.Progress | None = None,
+    progress: Progress | None = None,
 ) -> xr.Dataset:
     """Compute the cloud and the metrics of every design (sections 3 and 4), or what is missing.
 
     All designs share one set of unit activations, scaled to each one's bounds. Every design is
-    stored when it is done: after an interruption, however rude, the same call continues and ends
+    stored when it is done: after an interruption, even by kill -9, the same call continues and ends
     with the same numbers. A design that fails is recorded with its error, the rest goes on, and the
     next call tries it again. Combinations that no arm can have stay gaps.
 
-    Stored clouds are rounded to 1e-5 L, an error of 5e-6 L at most in each coordinate, which halves
-    their size; metrics are computed before.
+    Stored clouds are rounded to 1e-5 of the shortest length, an error of half of that at most in
+    each coordinate, which halves their size; metrics are computed before.
 
     Args:
         space: The designs.
@@ -57,8 +58,9 @@ def build_atlas(
         n: Samples of each design.
         seed: Seed of the sampler.
         sampler: As `compute_cloud` has it.
-        metrics: Groups of metrics: extent, convex, concave, exact, curvature.
-        alpha: Radius of the alpha shapes, in L.
+        metrics: Groups of metrics (extent, convex, concave, exact, curvature), or a `Metric` of
+            your own.
+        alpha_over_length: Radius of the alpha shapes over the length of each design.
         accuracy: Relative error asked of the exact volumes; see `reachable_set`.
         tol: Largest tip error, in L.
         keep_clouds: Whether to store the tips, 6.2 bytes each.
@@ -69,7 +71,7 @@ def build_atlas(
             ``SOFTREACH_NUM_THREADS`` says otherwise.
         shard: (i, k) computes every k-th design from the i-th on, i from 0: k processes share a
             store without knowing of each other.
-        report: Called with the number of designs done since its last call; by default a bar is
+        progress: Called with the number of designs done since its last call; by default a bar is
             shown on a terminal.
 
     Returns:
@@ -90,15 +92,15 @@ def build_atlas(
         seed=seed,
         sampler=sampler,
         tol=tol,
-        alpha=alpha,
+        alpha_over_length=alpha_over_length,
         accuracy=accuracy,
-        metrics=tuple(metrics),
+        metrics=chosen_metrics(metrics),
         keep_clouds=keep_clouds,
     )
     indices = _checked_shard(shard, space.size)
     _tell_gaps(space)
     atlas = AtlasStore.begin(store, command)
-    _run(atlas, indices[~np.isin(atlas.status()[indices], (DONE, GAP))], executor, report)
+    _run(atlas, indices[~np.isin(atlas.status()[indices], (DONE, GAP))], executor, progress)
     built = open_atlas(store)
     _tell_sparse(built)
     return built
@@ -108,25 +110,25 @@ def _run(
     atlas: AtlasStore,
     indices: np.ndarray,
     executor: ExecutorLike,
-    report: progress.Progress | None,
+    progress: Progress | None,
 ) -> None:
     failures: dict[int, str] = {}
     lock = Lock()
-    with progress.bar("computing designs", len(indices)) as shown, warnings.catch_warnings():
+    with bar("computing designs", len(indices)) as shown, warnings.catch_warnings():
         # The metrics hold what these say: the spacing of the points, the error of the volume.
         warnings.simplefilter("ignore", SoftreachWarning)
 
-        def came(outcome: tuple[int, str]) -> None:
+        def on_outcome(outcome: tuple[int, str]) -> None:
             index, failure = outcome
             with lock:
                 if failure:
                     failures[index] = failure
-                (report or shown)(1)
+                (progress or shown)(1)
 
-        run_designs(atlas, indices.tolist(), executor, came)
+        run_designs(atlas, indices.tolist(), executor, on_outcome)
     if failures:
         index, message = next(iter(failures.items()))
-        _warn(f"{len(failures)} designs failed, first number {index}: {message}")
+        _warn(f"{counted(len(failures), 'design')} failed, first number {index}: {message}")
 
 
 def _checked_shard(shard: tuple[int, int], size: int) -> np.ndarray:
@@ -139,8 +141,9 @@ def _checked_shard(shard: tuple[int, int], size: int) -> np.ndarray:
 def _tell_gaps(space: DesignSpace) -> None:
     if space.gaps and len(space.gaps) < space.size:
         index, reason = next(iter(space.gaps.items()))
+        stay = "stays a gap" if len(space.gaps) == 1 else "stay gaps"
         _warn(
-            f"{len(space.gaps)} of {space.size} designs cannot exist and stay gaps, first "
+            f"{len(space.gaps)} of {space.size} designs cannot exist and {stay}, first "
             f"{space.values(index)}: {reason}"
         )
 
@@ -149,12 +152,13 @@ def _tell_sparse(atlas: xr.Dataset) -> None:
     """Say where the alpha shapes have holes between points."""
     if "spacing" not in atlas:
         return
-    radius = atlas.volume.attrs["alpha_over_length"] * atlas.attrs["length"]
-    sparse = int((radius < 3.0 * atlas.spacing).sum())
+    radius = atlas.volume.attrs["alpha_over_length"]
+    sparse = int((radius < 3.0 * over_length(atlas, "spacing")).sum())
     if sparse:
+        whose = "its volume is" if sparse == 1 else "their volumes are"
         _warn(
-            f"alpha = {radius:.4g} m is below three mean spacings of the points of {sparse} "
-            "designs and their volume too small; use more points or a larger alpha"
+            f"alpha = {radius:.4g} L is below three mean spacings of the points of "
+            f"{counted(sparse, 'design')} and {whose} too small; use more points or a larger alpha"
         )
 
 

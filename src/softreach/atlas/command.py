@@ -4,23 +4,32 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, fields
 from importlib.metadata import version
 from typing import Any, Self
 
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.atlas.metrics import METRICS
+from softreach.atlas.metric import Metric
+from softreach.atlas.metrics import known_metric
 from softreach.atlas.space import DesignSpace
 from softreach.curvature import QUANTILES
-from softreach.errors import InvalidInput
+from softreach.errors import InvalidInput, counted
 from softreach.sampling import check_sampler
 
 __all__ = ["ATLAS_VERSION", "Command"]
 
-ATLAS_VERSION = 1
+ATLAS_VERSION = 2
+"""Version of the layout of a store."""
 STATIONS = tuple(np.linspace(0.5, 1.0, 6).tolist())
+
+_RESERVED = frozenset(
+    ("status", "message", "number", "tip", "axis", "unit_activation", "sample", "bundle", "length")
+    + ("design", "metric", "metrics", "curvature", "quantity", "station", "quantile", "rank")
+)
+"""Names that are no metric's, as an atlas or a question about it uses them for something else."""
+_LONGEST = 1e3  # ratio of the lengths of designs whose tips share one fixed-point step
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,31 +45,38 @@ class Command:
     seed: int
     sampler: str
     tol: float
-    alpha: float
-    """Radius of the alpha shapes, in L."""
+    alpha_over_length: float
+    """Radius of the alpha shapes over the length of each design."""
     accuracy: float
     """Relative error asked of the exact volumes."""
-    metrics: tuple[str, ...]
-    """Groups of metrics, in the order of `metrics.METRICS`."""
+    metrics: tuple[Metric, ...]
+    """As `chosen_metrics` has them."""
     keep_clouds: bool
     stations: tuple[float, ...] = STATIONS
-    """Where curvature is measured, in L."""
+    """Where curvature is measured, over the length of each design."""
     quantiles: tuple[float, ...] = QUANTILES
     softreach_version: str = field(default_factory=lambda: version("softreach"))
     atlas_version: int = ATLAS_VERSION
 
     def __post_init__(self) -> None:
-        unknown = [name for name in self.metrics if name not in METRICS]
-        if unknown or not self.metrics:
-            raise InvalidInput("metrics", self.metrics, f"some of {', '.join(METRICS)}")
-        if not 0 < self.alpha < np.inf:
-            raise InvalidInput("alpha", self.alpha, "a radius > 0 (in L)")
-        object.__setattr__(self, "metrics", tuple(name for name in METRICS if name in self.metrics))
-        if not self.space.bundles:
-            raise InvalidInput(
-                "space", f"{self.space.size} designs", "valid for one at least", _why(self.space)
-            )
+        for fault in _faults(self):
+            raise fault
         check_sampler(self.sampler, self.n, self.space.bundles, self.seed)
+
+    @property
+    def numbers(self) -> tuple[Metric, ...]:
+        """The metrics that are single numbers."""
+        return tuple(metric for metric in self.metrics if not metric.over)
+
+    @property
+    def profiles(self) -> tuple[Metric, ...]:
+        """The metrics over stations and quantiles."""
+        return tuple(metric for metric in self.metrics if metric.over)
+
+    @property
+    def profile_sizes(self) -> dict[str, int]:
+        """Number of stations and quantiles of a profile."""
+        return {"station": len(self.stations), "quantile": len(self.quantiles)}
 
     def design(self, index: int) -> Manipulator:
         """The design with this number."""
@@ -68,28 +84,59 @@ class Command:
 
     def to_json(self) -> str:
         """The command as text, from which `from_json` makes an equal one."""
-        values = {name: value for name, value in vars(self).items() if name != "space"}
-        return json.dumps({"space": self.space.to_dict(), **values})
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        metrics = [metric.to_dict() for metric in self.metrics]
+        return json.dumps({**values, "space": self.space.to_dict(), "metrics": metrics})
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """The command that `to_json` wrote."""
+        """The command that `to_json` wrote; metrics that are not softreach's lack their function.
+
+        Raises:
+            InvalidInput: The store has another version.
+        """
         values = json.loads(text)
-        values |= {name: tuple(values[name]) for name in ("metrics", "stations", "quantiles")}
+        if (found := values.get("atlas_version")) != ATLAS_VERSION:
+            hint = "build the atlas again in a new folder"
+            raise InvalidInput("version of the atlas", found, str(ATLAS_VERSION), hint)
+        values |= {name: tuple(values[name]) for name in ("stations", "quantiles")}
+        values["metrics"] = tuple(_recorded(metric) for metric in values["metrics"])
         return cls(**values | {"space": DesignSpace.from_dict(values["space"])})
 
     def differences(self, other: Command) -> list[str]:
         """What differs between this command and another, one line each."""
-        return list(_differences(_flat(self), _flat(other)))
+        metrics = _metric_differences(self.metrics, other.metrics)
+        return [*_differences(_flat(self), _flat(other)), *metrics]
 
 
-def _why(space: DesignSpace) -> str:
-    return next(iter(space.gaps.values()))
+def _faults(command: Command) -> Iterator[InvalidInput]:
+    space = command.space
+    if not 0 < command.alpha_over_length < np.inf:
+        value, allowed = command.alpha_over_length, "a radius > 0 over the length of each design"
+        yield InvalidInput("alpha_over_length", value, allowed)
+    taken = _RESERVED | {*space.names}
+    for name in (metric.name for metric in command.metrics if metric.name in taken):
+        yield InvalidInput("name of a metric", name, "no name that the atlas uses for something")
+    if not space.bundles:
+        why = next(iter(space.gaps.values()))
+        yield InvalidInput("space", counted(space.size, "design"), "valid for one at least", why)
+    shortest, longest = space.length_range
+    if command.keep_clouds and longest > _LONGEST * shortest:
+        allowed = f"within a factor of {_LONGEST:g} of each other if clouds are kept"
+        hint = "stored tips share one step; pass keep_clouds=False, or build two atlases"
+        yield InvalidInput("length", f"{shortest:g} to {longest:g} m", allowed, hint)
+
+
+def _recorded(values: Mapping[str, Any]) -> Metric:
+    """The metric of a store: softreach's own where it is the same, with its function."""
+    known = known_metric(values["name"])
+    return known if known and known.to_dict() == values else Metric.from_dict(values)
 
 
 def _flat(command: Command) -> dict[str, Any]:
     """Every setting by its name; the base design line by line."""
-    values = {name: getattr(command, name) for name in asdict(command) if name != "space"}
+    values = {f.name: getattr(command, f.name) for f in fields(command)}
+    del values["space"], values["metrics"]
     space = command.space
     return values | {
         "layout": space.layout,
@@ -103,6 +150,16 @@ def _differences(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> Iterator
         here, there = mine.get(name), theirs.get(name)
         if here != there:
             yield f"{name}: {_shown(there, here)} there, {_shown(here, there)} here"
+
+
+def _metric_differences(mine: tuple[Metric, ...], theirs: tuple[Metric, ...]) -> Iterator[str]:
+    here, there = ({m.name: m.to_dict() for m in metrics} for metrics in (mine, theirs))
+    if only := [name for name in there if name not in here]:
+        yield f"metrics: {', '.join(only)} there and not here"
+    if only := [name for name in here if name not in there]:
+        yield f"metrics: {', '.join(only)} here and not there"
+    for name in here.keys() & there.keys():
+        yield from (f"metric {name}, {line}" for line in _differences(here[name], there[name]))
 
 
 def _shown(value: Any, other: Any) -> str:

@@ -14,12 +14,15 @@ from concurrent.futures import (
     CancelledError,
     Executor,
     Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
     wait,
 )
 from typing import Any, Protocol, Self
 
 from softreach import parallel
 from softreach.atlas.design_task import Outcome, Remote, begin_design, run_remotely
+from softreach.atlas.metric import Metric, check_travels
 from softreach.atlas.store import AtlasStore
 from softreach.errors import InvalidInput, SoftreachError
 
@@ -37,6 +40,8 @@ class DaskClient(Protocol):
         ...
 
 
+OnOutcome = Callable[[Outcome], None]
+
 Workers = Callable[[], Executor]
 """Starts a pool; called again when a dead worker has broken the one before."""
 
@@ -52,7 +57,6 @@ def worker_processes(count: int) -> Workers:
 
     def start() -> Executor:
         import multiprocessing
-        from concurrent.futures import ProcessPoolExecutor
 
         context = multiprocessing.get_context("spawn")  # threads and forks do not mix
         return ProcessPoolExecutor(count, mp_context=context)
@@ -64,7 +68,7 @@ def run_designs(
     store: AtlasStore,
     indices: Sequence[int],
     executor: ExecutorLike,
-    report: Callable[[Outcome], None],
+    on_outcome: OnOutcome,
 ) -> None:
     """Compute designs and store them.
 
@@ -72,25 +76,26 @@ def run_designs(
         store: Where they go.
         indices: Which designs.
         executor: None for the threads of this process; else who runs the designs, one a task.
-        report: Called with each outcome as it comes.
+        on_outcome: Called with each outcome as it comes.
 
     Raises:
+        InvalidInput: Not an executor, or a metric that its workers cannot get.
         StoreFailed: The store cannot be written.
         SoftreachError: An executor that cannot be begun anew has lost a worker.
     """
     if executor is None:
         # Drawing a task computes the tips, so at most a few clouds per thread are held at once.
-        parallel.run(_reporting(begin_design(store, index), report) for index in indices)
+        metrics = store.command.metrics
+        parallel.run(_told(begin_design(store, metrics, index), on_outcome) for index in indices)
         return
     with _Pool(executor) as pool:
-        for index in _run_in_pool(pool, Remote(store), deque(indices), report):
-            report(_given_up(store, index))
+        pool.check_metrics(store.command.metrics)
+        for index in _run_in_pool(pool, Remote(store), deque(indices), on_outcome):
+            on_outcome(_given_up(store, index))
 
 
-def _reporting(
-    task: Callable[[], Outcome], report: Callable[[Outcome], None]
-) -> Callable[[], None]:
-    return lambda: report(task())
+def _told(task: Callable[[], Outcome], on_outcome: OnOutcome) -> Callable[[], None]:
+    return lambda: on_outcome(task())
 
 
 class _Pool:
@@ -117,6 +122,14 @@ class _Pool:
         if self._start is not None:
             self._now.shutdown(wait=True, cancel_futures=True)
 
+    def check_metrics(self, metrics: Sequence[Metric]) -> None:
+        """Refuse metrics whose functions a worker process cannot get."""
+        if isinstance(self._now, ThreadPoolExecutor):
+            return
+        by_import = isinstance(self._now, ProcessPoolExecutor)
+        for metric in metrics:
+            check_travels(metric, by_import=by_import)
+
     @property
     def window(self) -> int:
         """Tasks to have in the pool at a time: few, as any of them may have broken it."""
@@ -138,24 +151,24 @@ class _Pool:
 
 
 def _run_in_pool(
-    pool: _Pool, remote: Remote, waiting: deque[int], report: Callable[[Outcome], None]
+    pool: _Pool, remote: Remote, waiting: deque[int], on_outcome: OnOutcome
 ) -> list[int]:
     """Run the designs; those that kill their workers again and again are returned."""
     lost: list[int] = []
     while waiting:
-        suspects = _run_until_broken(pool, remote, waiting, report)
+        suspects = _run_until_broken(pool, remote, waiting, on_outcome)
         # One at a time, so that the guilty design is told from its neighbors.
-        lost += [index for index in suspects if not _survives(pool, remote, index, report)]
+        lost += [index for index in suspects if not _survives(pool, remote, index, on_outcome)]
     return lost
 
 
-def _survives(pool: _Pool, remote: Remote, index: int, report: Callable[[Outcome], None]) -> bool:
-    tries = (_run_until_broken(pool, remote, deque([index]), report) for _ in range(ATTEMPTS))
+def _survives(pool: _Pool, remote: Remote, index: int, on_outcome: OnOutcome) -> bool:
+    tries = (_run_until_broken(pool, remote, deque([index]), on_outcome) for _ in range(ATTEMPTS))
     return any(not died for died in tries)
 
 
 def _run_until_broken(
-    pool: _Pool, remote: Remote, waiting: deque[int], report: Callable[[Outcome], None]
+    pool: _Pool, remote: Remote, waiting: deque[int], on_outcome: OnOutcome
 ) -> list[int]:
     """Take designs from `waiting` until all are done, or a worker has died: who was there then."""
     pending: dict[Future[Outcome], int] = {}
@@ -165,13 +178,13 @@ def _run_until_broken(
         while (waiting or pending) and not broken:
             broken = not _fill(pool, remote, waiting, pending)
             done = wait(pending, return_when=FIRST_COMPLETED).done
-            suspects += _settle(pending, done, remote, report)
+            suspects += _settle(pending, done, remote, on_outcome)
             broken = broken or bool(suspects)
     finally:
         for future in pending:
             future.cancel()
     if broken:
-        suspects += _settle(pending, wait(pending).done, remote, report)
+        suspects += _settle(pending, wait(pending).done, remote, on_outcome)
         pool.renew()
     return suspects
 
@@ -193,25 +206,25 @@ def _settle(
     pending: dict[Future[Outcome], int],
     done: set[Future[Outcome]],
     remote: Remote,
-    report: Callable[[Outcome], None],
+    on_outcome: OnOutcome,
 ) -> list[int]:
-    """Report what has ended; designs that ended with their worker are returned."""
+    """Tell what has ended; designs that ended with their worker are returned."""
     ended = [(future, pending.pop(future)) for future in done]
-    return [index for future, index in ended if not _reported(future, index, remote, report)]
+    return [index for future, index in ended if not _told_result(future, index, remote, on_outcome)]
 
 
-def _reported(
-    future: Future[Outcome], index: int, remote: Remote, report: Callable[[Outcome], None]
+def _told_result(
+    future: Future[Outcome], index: int, remote: Remote, on_outcome: OnOutcome
 ) -> bool:
-    """Report an outcome; False if there is none, as the worker died."""
+    """Tell an outcome; False if there is none, as the worker died."""
     try:
-        report(future.result())
+        on_outcome(future.result())
     except (BrokenExecutor, CancelledError):
         return False
     except Exception as error:
         if type(error).__name__ != "KilledWorker":
             raise
-        report(_given_up(remote.store(), index))  # Dask has tried it again by then
+        on_outcome(_given_up(remote.store(), index))  # Dask has tried it again by then
     return True
 
 

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from softreach.atlas.command import Command
-from softreach.atlas.metrics import METRICS, scalar_names
-from softreach.curvature import QUANTITIES
+from softreach.atlas.metric import Metric
 from softreach.schema import AXES
 
 __all__ = ["RESOLUTION", "SEAL", "Plan", "array_plans"]
 
 RESOLUTION = 1e-5
-"""Step of stored tips, in the shortest L: coordinates are off by half of it at most."""
+"""Step of stored tips over the shortest length: no coordinate is off by more than half of it."""
 
 SEAL = "metrics"
 """The array that is created last: where it is, all others are."""
@@ -49,19 +48,19 @@ class Plan:
 def array_plans(command: Command, cube: np.ndarray) -> Iterator[Plan]:
     """Every array of an atlas, the seal last; `cube` are its unit activations, (n, bundles)."""
     yield from _parameters(command)
-    yield _labels("metric", list(scalar_names(command.metrics)))
+    yield _labels("metric", [metric.name for metric in command.numbers])
     yield _labels("axis", list(AXES))
-    yield _shared("unit_activation", cube, ("sample", "fiber"), _CUBE)
+    yield _shared("unit_activation", cube, ("sample", "bundle"), _CUBE)
     yield _per_design(command, "status", np.uint8, 0, attrs=_STATUS)
     yield _per_design(
         command, "message", str, "", attrs={"long_name": "why a design has no numbers"}
     )
-    if "curvature" in command.metrics:
-        yield from _curvature(command)
+    if command.profiles:
+        yield from _profiles(command)
     if command.keep_clouds:
         yield _tips(command)
-    names = {"metric": len(scalar_names(command.metrics))}
-    yield _per_design(command, SEAL, np.float64, np.nan, names, _units(command))
+    sizes = {"metric": len(command.numbers)}
+    yield _per_design(command, SEAL, np.float64, np.nan, sizes, _described(command))
 
 
 _CUBE = {
@@ -82,44 +81,39 @@ def _parameters(command: Command) -> Iterator[Plan]:
         yield _shared(name, np.array(values), dims, {"units": space.units()[name]})
 
 
-def _curvature(command: Command) -> Iterator[Plan]:
-    yield _labels("quantity", list(QUANTITIES))
-    place = {"units": "1", "long_name": "station Z before activation, in L"}
+def _profiles(command: Command) -> Iterator[Plan]:
+    yield _labels("quantity", [metric.name for metric in command.profiles])
+    place = {"units": "1", "long_name": "station Z before activation, over the design's length"}
     yield _shared("station", np.array(command.stations), ("station",), place)
     yield _shared("quantile", np.array(command.quantiles), ("quantile",), {"units": "1"})
-    sizes = {
-        "quantity": len(QUANTITIES),
-        "station": len(command.stations),
-        "quantile": len(command.quantiles),
-    }
-    attrs = {"long_name": "quantiles of bending [1/m], torsion [1/m] and extension [1]"}
+    sizes = {"quantity": len(command.profiles), **command.profile_sizes}
+    attrs = {"long_name": "metrics over stations and quantiles", "metrics": _told(command.profiles)}
     yield _per_design(command, "curvature", np.float64, np.nan, sizes, attrs)
 
 
 def _tips(command: Command) -> Plan:
     """Fixed-point tips: half the size of floats, with an error that is the same everywhere."""
-    lengths = dict(command.space.parameters).get("length", (command.space.base.length,))
     attrs = {
         "units": "m",
         "long_name": "tip position",
-        "scale_factor": RESOLUTION * min(lengths),
+        "scale_factor": RESOLUTION * command.space.length_range[0],
         "_FillValue": _MISSING,
     }
     sizes = {"axis": len(AXES), "sample": command.n}
     return _per_design(command, "tip", np.int32, _MISSING, sizes, attrs)
 
 
-def _units(command: Command) -> dict[str, Any]:
-    """What each number is, for readers without softreach."""
-    metrics = {k: v for group in command.metrics for k, v in METRICS[group].items()}
-    told = "; ".join(
-        f"{name} [{metric.unit}]: {metric.meaning}" for name, metric in metrics.items()
-    )
+def _described(command: Command) -> dict[str, Any]:
     return {
         "long_name": "metrics of the designs",
-        "metrics": told,
-        "alpha_over_length": command.alpha,
+        "metrics": _told(command.numbers),
+        "alpha_over_length": command.alpha_over_length,
     }
+
+
+def _told(metrics: Sequence[Metric]) -> str:
+    """What each number is, for readers without softreach."""
+    return "; ".join(f"{metric.name} [{metric.unit}]: {metric.meaning}" for metric in metrics)
 
 
 def _per_design(

@@ -1,131 +1,262 @@
-"""The numbers that an atlas holds of every design: their names, units and how they are found."""
+"""The metrics that softreach knows, in groups."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from functools import partial
+from operator import attrgetter
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.manipulator import Manipulator
+from softreach.atlas.metric import PROFILE, Metric, Need
+from softreach.curvature import QUANTITIES
+from softreach.errors import InvalidInput
 from softreach.geometry.alpha_shape import AlphaComplex
-from softreach.geometry.delaunay import delaunay
-from softreach.geometry.hull import convex_hull
 
-__all__ = ["METRICS", "Metric", "hull_metrics", "image_metrics", "scalar_names"]
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from softreach.workspace import ReachableSet
+
+__all__ = ["METRIC_GROUPS", "chosen_metrics", "known_metric"]
 
 Array = NDArray[np.float64]
-Numbers = dict[str, float]
 
 
-class Metric(NamedTuple):
-    """What one number means."""
-
-    unit: str
-    meaning: str
+def _lowest(axis: int, tips: Array) -> float:
+    return tips[:, axis].min()
 
 
-def _box() -> dict[str, Metric]:
-    ends = {"min": "lower", "max": "upper"}
-    return {
-        f"{axis}_{end}": Metric("m", f"{word} end of the cloud's bounding box along {axis}")
-        for axis in "xyz"
-        for end, word in ends.items()
-    }
+def _highest(axis: int, tips: Array) -> float:
+    return tips[:, axis].max()
 
 
-METRICS: dict[str, dict[str, Metric]] = {
-    "extent": {
-        **_box(),
-        "reach_height": Metric("m", "largest height of a tip above the base plane"),
-        "reach_radius": Metric("m", "largest distance of a tip from the base axis"),
-    },
-    "convex": {"convex_volume": Metric("m3", "volume of the cloud's convex hull")},
-    "concave": {
-        "volume": Metric("m3", "volume of the cloud's alpha shape"),
-        "unreachability": Metric("1", "UNR = 1 - volume / convex_volume"),
-        "regions": Metric("1", "parts of the alpha shape that hang together"),
-        "spacing": Metric("m", "mean distance between neighboring tips, (volume / n)^(1/3)"),
-    },
-    "exact": {
-        "exact_volume": Metric("m3", "volume of the reachable set, without sampling"),
-        "exact_volume_error": Metric("m3", "estimated error of exact_volume"),
-        "exact_convex_volume": Metric("m3", "volume of the reachable set's convex hull"),
-        "exact_unreachability": Metric("1", "UNR = 1 - exact_volume / exact_convex_volume"),
-        "multiplicity": Metric("1", "mean number of activations that reach a place, if finite"),
-        "multiple_volume": Metric("m3", "volume that more than one activation reaches, if finite"),
-        "fold_volume": Metric("m3", "volume reached with both orientations of the map"),
-    },
-    "curvature": {},
-}
-"""Group -> name -> metric. `curvature` holds quantiles at stations instead of single numbers."""
+def _reach_radius(tips: Array) -> float:
+    return math.sqrt(float((tips[:, 0] ** 2 + tips[:, 1] ** 2).max()))
 
 
-def scalar_names(groups: tuple[str, ...]) -> tuple[str, ...]:
-    """The names of the single numbers in these groups, in order."""
-    return tuple(name for group in groups for name in METRICS[group])
+def _box() -> Iterator[Metric]:
+    for k, axis in enumerate("xyz"):
+        for end, word, find in (("min", "lower", _lowest), ("max", "upper", _highest)):
+            yield Metric(
+                name=f"{axis}_{end}",
+                unit="m",
+                meaning=f"{word} end of the cloud's bounding box along {axis}",
+                needs=(Need.TIPS,),
+                compute=partial(find, k),
+            )
 
 
-def hull_metrics(arm: Manipulator, tips: Array, alpha: float, groups: tuple[str, ...]) -> Numbers:
-    """Metrics of the points themselves; serial, so several designs can run side by side.
+_EXTENT = (
+    *_box(),
+    Metric(
+        name="reach_height",
+        unit="m",
+        meaning="largest height of a tip above the base plane",
+        needs=(Need.TIPS,),
+        compute=partial(_highest, 2),
+    ),
+    Metric(
+        name="reach_radius",
+        unit="m",
+        meaning="largest distance of a tip from the base axis",
+        needs=(Need.TIPS,),
+        compute=_reach_radius,
+    ),
+)
 
-    Args:
-        arm: The design.
-        tips: Positions [m], shape (n, 3).
-        alpha: Radius of the alpha shape, in L.
-        groups: Which groups are wanted.
-    """
-    found = _extent(tips) if "extent" in groups else {}
-    if "concave" in groups:
-        found |= _concave(tips, alpha * arm.length)
-    elif "convex" in groups:
-        found["convex_volume"] = convex_hull(tips).volume
-    return found
-
-
-def image_metrics(arm: Manipulator, tol: float, accuracy: float) -> Numbers:
-    """Metrics of the exact reachable set; uses all threads by itself."""
-    from softreach.workspace import reachable_set
-
-    reached = reachable_set(arm, accuracy=accuracy, tol=tol)
-    return {
-        "exact_volume": reached.volume,
-        "exact_volume_error": reached.volume_error,
-        "exact_convex_volume": reached.convex_volume,
-        "exact_unreachability": reached.unreachability,
-        "multiplicity": _mean_multiplicity(reached.multiplicity),
-        "multiple_volume": _multiple_volume(reached.multiplicity),
-        "fold_volume": reached.fold_volume,
-    }
+_CONVEX = (
+    Metric(
+        name="convex_volume",
+        unit="m3",
+        meaning="volume of the cloud's convex hull",
+        needs=(Need.CONVEX_VOLUME,),
+        compute=float,
+    ),
+)
 
 
-def _extent(tips: Array) -> Numbers:
-    low, high = tips.min(axis=0), tips.max(axis=0)
-    ends = {f"{axis}_min": low[k] for k, axis in enumerate("xyz")}
-    ends |= {f"{axis}_max": high[k] for k, axis in enumerate("xyz")}
-    radius = math.sqrt(float((tips[:, 0] ** 2 + tips[:, 1] ** 2).max()))
-    return {**ends, "reach_height": high[2], "reach_radius": radius}
+def _alpha_volume(shape: AlphaComplex, alpha: float) -> float:
+    return float(shape.volume(alpha))
 
 
-def _concave(tips: Array, radius: float) -> Numbers:
-    """Both volumes from one triangulation."""
-    shape = AlphaComplex(triangulation=delaunay(tips))
-    volume, convex = float(shape.volume(radius)), float(shape.volumes.sum())
-    return {
-        "convex_volume": convex,
-        "volume": volume,
-        "unreachability": 1.0 - volume / convex if convex > 0 else math.nan,
-        "regions": shape.regions(radius),
-        "spacing": math.cbrt(volume / len(tips)),
-    }
+def _unreachability(shape: AlphaComplex, alpha: float, convex: float) -> float:
+    return 1.0 - _alpha_volume(shape, alpha) / convex if convex > 0 else math.nan
 
 
-def _mean_multiplicity(volumes: Mapping[int, float]) -> float:
+def _spacing(shape: AlphaComplex, alpha: float, tips: Array) -> float:
+    return math.cbrt(_alpha_volume(shape, alpha) / len(tips))
+
+
+_CONCAVE = (
+    Metric(
+        name="volume",
+        unit="m3",
+        meaning="volume of the cloud's alpha shape",
+        needs=(Need.ALPHA_COMPLEX, Need.ALPHA),
+        compute=_alpha_volume,
+    ),
+    Metric(
+        name="unreachability",
+        unit="1",
+        meaning="UNR = 1 - volume / convex_volume",
+        needs=(Need.ALPHA_COMPLEX, Need.ALPHA, Need.CONVEX_VOLUME),
+        compute=_unreachability,
+        nan_if="the cloud is flat",
+    ),
+    Metric(
+        name="regions",
+        unit="1",
+        meaning="parts of the alpha shape that hang together",
+        needs=(Need.ALPHA_COMPLEX, Need.ALPHA),
+        compute=AlphaComplex.regions,
+    ),
+    Metric(
+        name="spacing",
+        unit="m",
+        meaning="mean distance between neighboring tips, (volume / n)^(1/3)",
+        needs=(Need.ALPHA_COMPLEX, Need.ALPHA, Need.TIPS),
+        compute=_spacing,
+    ),
+)
+
+
+def _mean_multiplicity(reached: ReachableSet) -> float:
+    volumes = reached.multiplicity
     whole = sum(volumes.values())
     return sum(k * volume for k, volume in volumes.items()) / whole if whole > 0 else math.nan
 
 
-def _multiple_volume(volumes: Mapping[int, float]) -> float:
+def _multiple_volume(reached: ReachableSet) -> float:
+    volumes = reached.multiplicity
     return sum(volume for k, volume in volumes.items() if k > 1) if volumes else math.nan
+
+
+_FINITE_ONLY = "the design has other than three bundles"
+
+_EXACT = (
+    Metric(
+        name="exact_volume",
+        unit="m3",
+        meaning="volume of the reachable set, without sampling",
+        needs=(Need.REACHABLE_SET,),
+        compute=attrgetter("volume"),
+    ),
+    Metric(
+        name="exact_volume_error",
+        unit="m3",
+        meaning="estimated error of exact_volume",
+        needs=(Need.REACHABLE_SET,),
+        compute=attrgetter("volume_error"),
+    ),
+    Metric(
+        name="exact_convex_volume",
+        unit="m3",
+        meaning="volume of the reachable set's convex hull",
+        needs=(Need.REACHABLE_SET,),
+        compute=attrgetter("convex_volume"),
+    ),
+    Metric(
+        name="exact_unreachability",
+        unit="1",
+        meaning="UNR = 1 - exact_volume / exact_convex_volume",
+        needs=(Need.REACHABLE_SET,),
+        compute=attrgetter("unreachability"),
+        nan_if="the reachable set is flat",
+    ),
+    Metric(
+        name="multiplicity",
+        unit="1",
+        meaning="mean number of activations that reach a place, if finite",
+        needs=(Need.REACHABLE_SET,),
+        compute=_mean_multiplicity,
+        nan_if=_FINITE_ONLY,
+    ),
+    Metric(
+        name="multiple_volume",
+        unit="m3",
+        meaning="volume that more than one activation reaches, if finite",
+        needs=(Need.REACHABLE_SET,),
+        compute=_multiple_volume,
+        nan_if=_FINITE_ONLY,
+    ),
+    Metric(
+        name="fold_volume",
+        unit="m3",
+        meaning="volume reached with both orientations of the map",
+        needs=(Need.REACHABLE_SET,),
+        compute=attrgetter("fold_volume"),
+    ),
+)
+
+
+def _quantiles(name: str, statistics: xr.Dataset) -> Array:
+    return statistics[name].values
+
+
+_CURVATURE = tuple(
+    Metric(
+        name=f"{quantity}_quantile",
+        unit=unit,
+        meaning=meaning,
+        needs=(Need.STRAIN_STATISTICS,),
+        compute=partial(_quantiles, f"{quantity}_quantile"),
+        over=PROFILE,
+    )
+    for quantity, (unit, meaning) in QUANTITIES.items()
+)
+
+METRIC_GROUPS: dict[str, tuple[Metric, ...]] = {
+    "extent": _EXTENT,
+    "convex": _CONVEX,
+    "concave": _CONCAVE,
+    "exact": _EXACT,
+    "curvature": _CURVATURE,
+}
+"""Group -> its metrics. Those of `curvature` are quantiles at stations, the others numbers."""
+
+_KNOWN = {metric.name: metric for group in METRIC_GROUPS.values() for metric in group}
+
+
+def known_metric(name: str) -> Metric | None:
+    """The metric of softreach with this name, if there is one."""
+    return _KNOWN.get(name)
+
+
+def chosen_metrics(asked: Sequence[str | Metric]) -> tuple[Metric, ...]:
+    """The metrics asked for, each once: those of softreach as in its table, then others by name.
+
+    Args:
+        asked: Names of groups, and metrics.
+
+    Raises:
+        InvalidInput: Nothing, an unknown group, or two metrics of one name.
+    """
+    if isinstance(asked, str) or not asked:
+        raise InvalidInput("metrics", asked or "none", _ALLOWED)
+    found: dict[str, Metric] = {}
+    for metric in (metric for choice in asked for metric in _metrics_of(choice)):
+        if found.setdefault(metric.name, metric) != metric or _taken(metric):
+            raise InvalidInput("name of a metric", metric.name, "of one metric only")
+    order = list(_KNOWN)
+    own = sorted(name for name in found if name not in _KNOWN)
+    return tuple(found[name] for name in [*order, *own] if name in found)
+
+
+_ALLOWED = f"some of {', '.join(METRIC_GROUPS)}, or metrics of your own"
+
+
+def _metrics_of(choice: str | Metric) -> tuple[Metric, ...]:
+    if isinstance(choice, Metric):
+        return (choice,)
+    if choice not in METRIC_GROUPS:
+        raise InvalidInput("metrics", choice, _ALLOWED)
+    return METRIC_GROUPS[choice]
+
+
+def _taken(metric: Metric) -> bool:
+    """Whether softreach has another metric of this name."""
+    return metric.name in _KNOWN and _KNOWN[metric.name] != metric

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from math import prod
-from typing import Any, Literal, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -107,7 +107,7 @@ class DesignSpace:
     @property
     def size(self) -> int:
         """Number of designs, gaps included."""
-        return prod(self.shape)
+        return math.prod(self.shape)
 
     def units(self) -> dict[str, str]:
         """Unit of each parameter."""
@@ -132,17 +132,20 @@ class DesignSpace:
         check_extension(arm)
         return arm
 
-    @cached_property
+    @property
     def gaps(self) -> Mapping[int, str]:
         """Combinations that no arm can have: number -> why not."""
-        return {index: reason for index, reason in self._judged() if isinstance(reason, str)}
+        return self._survey.gaps
 
-    @cached_property
+    @property
     def bundles(self) -> int:
-        """The largest number of bundles of any design."""
-        return max(
-            (arm.bundles for _, arm in self._judged() if not isinstance(arm, str)), default=0
-        )
+        """The largest number of bundles of any design; 0 if there is no design."""
+        return self._survey.bundles
+
+    @property
+    def length_range(self) -> tuple[float, float]:
+        """Length of the shortest and of the longest design [m]."""
+        return self._survey.lengths
 
     def to_dict(self) -> dict[str, Any]:
         """The space in plain values, from which `from_dict` makes an equal one."""
@@ -155,12 +158,27 @@ class DesignSpace:
         base = Manipulator.from_toml(space["design"], source="the base design")
         return cls(base=base, parameters=_plain(space["parameters"]), layout=space["layout"])
 
-    def _judged(self) -> Iterator[tuple[int, Manipulator | str]]:
+    @cached_property
+    def _survey(self) -> _Survey:
+        gaps: dict[int, str] = {}
+        found: list[tuple[int, float]] = []
         for index in range(self.size):
             try:
-                yield index, self.design(index)
+                arm = self.design(index)
             except InvalidDesign as error:
-                yield index, "; ".join(str(error).splitlines())
+                gaps[index] = "; ".join(str(error).splitlines())
+            else:
+                found.append((arm.bundles, arm.length))
+        bundles, lengths = zip(*found, strict=True) if found else ((0,), (math.nan,))
+        return _Survey(gaps, max(bundles), (min(lengths), max(lengths)))
+
+
+class _Survey(NamedTuple):
+    """What is known of all designs of a space once each has been made."""
+
+    gaps: dict[int, str]
+    bundles: int
+    lengths: tuple[float, float]
 
 
 def _plain(values: Mapping[str, ArrayLike]) -> tuple[tuple[str, tuple[float, ...]], ...]:

@@ -14,44 +14,42 @@ nobody reads a store or adds designs without it.
 from __future__ import annotations
 
 import hashlib
-import json
-import os
-from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from softreach.atlas.command import Command
 from softreach.atlas.layout import SEAL, Plan, array_plans
-from softreach.errors import InvalidInput, SoftreachError
+from softreach.atlas.store_root import (
+    StoreFailed,
+    absolute,
+    claim,
+    opened_root,
+    trouble,
+    writing,
+)
+from softreach.errors import InvalidInput
 from softreach.sampling import sample_cube
 
 if TYPE_CHECKING:
     import zarr
-    from zarr.storage import StoreLike, StorePath
+    from zarr.storage import StoreLike
 
-__all__ = ["DONE", "FAILED", "GAP", "TODO", "AtlasStore", "Result", "StoreFailed"]
+__all__ = ["DONE", "FAILED", "GAP", "TODO", "AtlasStore", "Result"]
 
 TODO, DONE, FAILED, GAP = range(4)
-
-
-class StoreFailed(SoftreachError):
-    """The store cannot be written to, because the disk is full for instance; it can be resumed."""
 
 
 class Result(NamedTuple):
     """What is stored of one design."""
 
-    metrics: Mapping[str, float]
-    """Single numbers by name; absent ones are NaN."""
-    quantiles: NDArray[np.float64] | None
-    """Quantiles of curvature, shape (quantity, station, quantile)."""
+    metrics: Mapping[str, ArrayLike]
+    """Every metric of the command by name."""
     tips: NDArray[np.float64] | None
     """Tips [m], shape (n, 3); None if clouds are not kept."""
 
@@ -75,12 +73,13 @@ class AtlasStore:
         """
         location = absolute(location)
         with writing(location):
-            if _root(location) is None:
-                _claim(location, command)
-        store = cls._begun(location)
-        if differences := command.differences(store.command):
+            if opened_root(location) is None:
+                claim(location, _attributes(command))
+        begun = cls._begun(location)
+        if differences := command.differences(begun.command):
             hint = f"it differs in {'; '.join(differences)}"
             raise InvalidInput("store", location, "new, or begun by the same command", hint)
+        store = cls(location, command, begun.group)  # this command has all functions
         if SEAL not in store.group:
             with writing(location):
                 store._complete()
@@ -98,7 +97,7 @@ class AtlasStore:
             InvalidInput: There is none, or of another version.
         """
         location = absolute(location)
-        group = _root(location, mode)
+        group = opened_root(location, mode)
         text = None if group is None or SEAL not in group else group.attrs.get("command")
         if group is None or not isinstance(text, str):
             raise InvalidInput("store", location, "an atlas written by build_atlas")
@@ -107,7 +106,7 @@ class AtlasStore:
     @classmethod
     def _begun(cls, location: StoreLike) -> Self:
         """The store, though its arrays may be missing."""
-        group = _root(location)
+        group = opened_root(location)
         text = None if group is None else group.attrs.get("command")
         if group is None or not isinstance(text, str):
             allowed = "a new folder, or an atlas; it holds something else"
@@ -158,11 +157,12 @@ class AtlasStore:
             StoreFailed: It cannot be written.
         """
         place = np.unravel_index(index, self.command.space.shape)
-        row = [result.metrics.get(name, np.nan) for name in self._metric_names]
+        numbers = [result.metrics[metric.name] for metric in self.command.numbers]
+        profiles = [result.metrics[metric.name] for metric in self.command.profiles]
         with writing(self.location):
-            self._array("metrics")[place] = np.array(row, float)
-            if result.quantiles is not None:
-                self._array("curvature")[place] = result.quantiles
+            self._array("metrics")[place] = np.array(numbers, float)
+            if profiles:
+                self._array("curvature")[place] = np.array(profiles, float)
             if result.tips is not None:
                 tip = self._array("tip")
                 tip[place] = fixed_point(result.tips, float(str(tip.attrs["scale_factor"])))
@@ -177,10 +177,6 @@ class AtlasStore:
         with writing(self.location):
             _tell(self.group, self.command, index, message, status)
 
-    @cached_property
-    def _metric_names(self) -> tuple[str, ...]:
-        return tuple(map(str, self._array("metric")[...]))
-
     def _array(self, name: str) -> Any:
         return self.group[name]
 
@@ -190,78 +186,12 @@ def fixed_point(tips: NDArray[np.float64], scale: float) -> NDArray[np.int32]:
     return np.rint(tips.T / scale).astype(np.int32)
 
 
-def absolute(location: StoreLike) -> StoreLike:
-    """The same place for a process elsewhere."""
-    if isinstance(location, str):
-        # A path, so that files are written beside their place and renamed.
-        location = location.removeprefix("file://")
-    if isinstance(location, os.PathLike) or (isinstance(location, str) and "://" not in location):
-        return str(Path(location).absolute())
-    return location
-
-
-def writing(location: StoreLike) -> AbstractContextManager[None]:
-    """Turn trouble of the disk or the network into one line that says what to do."""
-    return trouble(
-        f"{location} cannot be written",
-        "; what is done is safe, and the same command continues once that is mended",
-    )
-
-
-@contextmanager
-def trouble(what: str, then: str = "") -> Iterator[None]:
-    """Raise what a store raises, whatever kind of store it is, as `StoreFailed`."""
-    try:
-        yield
-    except SoftreachError:
-        raise
-    except Exception as error:
-        reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
-        raise StoreFailed(f"{what}: {reason}{then}") from error
-
-
-def _root(location: StoreLike, mode: Literal["r", "r+"] = "r+") -> zarr.Group | None:
-    """The root group of a store, if there is one."""
-    import zarr
-
-    with trouble(f"{location} cannot be opened"):
-        try:
-            return zarr.open_group(location, mode=mode, zarr_format=3)
-        except FileNotFoundError:
-            return None
-        except (FileExistsError, ImportError, ValueError) as error:
-            allowed = "a new folder, or an atlas"
-            raise InvalidInput("store", location, allowed, str(error)) from None
-
-
-def _claim(location: StoreLike, command: Command) -> None:
-    """Write the root of a store, whole and never again: of several who try, the first does."""
-    from zarr.core.buffer import default_buffer_prototype
-    from zarr.core.sync import sync
-    from zarr.storage._common import make_store_path
-
-    root = sync(make_store_path(location, mode="a"))
-    # In this order: a claim by somebody else in between makes its files no strangers.
-    if sync(_holds_files(root)) and _root(location) is None:
-        raise InvalidInput("store", location, "a new folder, or an atlas")
-    document = {"zarr_format": 3, "node_type": "group", "attributes": _attributes(command)}
-    text = default_buffer_prototype().buffer.from_bytes(json.dumps(document).encode())
-    sync((root / "zarr.json").set_if_not_exists(text))
-
-
-async def _holds_files(root: StorePath) -> bool:
-    """Whether there is anything but what a killed writer leaves behind."""
-    names = [name async for name in root.store.list_dir(root.path)]
-    return any(not name.endswith(".partial") for name in names)
-
-
-def _attributes(command: Command) -> dict[str, str | float]:
+def _attributes(command: Command) -> dict[str, str]:
     """What the root says about the atlas."""
     versions = {name: version(name) for name in ("numpy", "scipy", "zarr", "xarray", "numba")}
     return {
         "title": "reachability cloud atlas",
         "design": command.space.base.to_toml(),
-        "length": command.space.base.length,
         "unit_activation_sha256": _digest(_cube(command)),
         "versions": ", ".join(f"{name} {number}" for name, number in versions.items()),
         "command": command.to_json(),

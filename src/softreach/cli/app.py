@@ -8,6 +8,7 @@ from importlib.metadata import version
 
 from cyclopts import App, CycloptsError
 
+from softreach.cli.first_run import compilation_announced
 from softreach.errors import SoftreachError, SoftreachWarning
 
 __all__ = ["app", "main"]
@@ -96,7 +97,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 def run(arguments: list[str]) -> int:
     """Run the command line and return its exit code; wrong input costs one line, no traceback."""
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), compilation_announced():
         warnings.showwarning = _show_warning
         try:
             app(arguments, result_action="return_value")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
 from softreach.cli.inputs import AsJson, Sampler, design_from
-from softreach.cli.output import report
+from softreach.cli.output import print_rows
 from softreach.errors import InvalidInput, MissingExtra
 
 if TYPE_CHECKING:
@@ -37,7 +38,9 @@ def build(
     n: Annotated[int, Parameter(help="Samples of each design.")] = 400_000,
     seed: Annotated[int, Parameter(help="Seed of the sampler.")] = 0,
     sampler: Sampler = "uniform",
-    alpha: Annotated[float, Parameter(help="Radius of the α-shapes, in L.")] = 0.05,
+    alpha: Annotated[
+        str, Parameter(help="Radius of the α-shapes over the length of each design, as in 0.05L.")
+    ] = "0.05L",
     metrics: Annotated[
         str, Parameter(help="Groups of metrics, comma-separated.")
     ] = "extent,convex,concave,exact,curvature",
@@ -65,7 +68,7 @@ def build(
         n,
         seed,
         sampler=sampler,
-        alpha=alpha,
+        alpha_over_length=_over_length(alpha),
         metrics=tuple(metrics.split(",")),
         keep_clouds=keep_clouds,
         executor=_executor(workers, scheduler, scheduler_file),
@@ -89,7 +92,7 @@ def status(store: Store, *, json: AsJson = False) -> None:
         rows["messages"] = ({str(k): text for k, text in found.messages.items()}, "")
     else:
         rows |= {f"number {k}": (text, "") for k, text in list(found.messages.items())[:10]}
-    report(f"atlas {store}", rows, json)
+    print_rows(f"atlas {store}", rows, json)
 
 
 @atlas.command
@@ -109,15 +112,14 @@ def best(
 
     Example: softreach atlas best atlas.zarr exact_volume --where "taper_deg<=1" --count 3
     """
-    from softreach.atlas import best_designs, open_atlas
+    from softreach.atlas import best_designs
 
-    opened = open_atlas(store)
     limits = dict(_constraint(text) for text in where or ())
-    found = best_designs(opened, metric, smallest=smallest, where=limits, count=count)
+    found = best_designs(store, metric, smallest=smallest, where=limits, count=count)
     names = [name for name in found.variables if found[name].dtype.kind in "fi"]
     columns = [_written(found[name]) for name in names]
     rows: dict[str, tuple[Any, str]] = {name: (values, unit) for name, values, unit in columns}
-    report(f"best {metric} of {store}", rows, json)
+    print_rows(f"best {metric} of {store}", rows, json)
 
 
 @atlas.command
@@ -182,6 +184,17 @@ def _executor(
     return Client(scheduler) if scheduler else Client(scheduler_file=str(scheduler_file))
 
 
+def _over_length(text: str) -> float:
+    """0.05 from `0.05L`: what is no multiple of L could not fit designs of every length."""
+    try:
+        radius = float(text.removesuffix("L")) if text.endswith("L") else 0.0
+    except ValueError:
+        radius = 0.0
+    if not 0 < radius < math.inf:
+        raise InvalidInput("alpha", text, "a radius > 0 over the length of each design, like 0.05L")
+    return radius
+
+
 def _shard(text: str) -> tuple[int, int]:
     first, _, count = text.partition("/")
     if not (first.isdigit() and count.isdigit()):
@@ -191,8 +204,6 @@ def _shard(text: str) -> tuple[int, int]:
 
 def _constraint(text: str) -> tuple[str, tuple[float | None, float | None]]:
     """`taper_deg<=1` -> taper between anything and 1 degree."""
-    import math
-
     for sign in ("<=", ">=", "<", ">"):
         name, found, number = text.partition(sign)
         if found:

@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from softreach.cli.inputs import AsJson
-from softreach.cli.output import report
+from softreach.cli.output import print_rows
 from softreach.cli.volume import volume_rows
 
 __all__ = ["demo"]
@@ -42,11 +42,11 @@ def demo(
     export.export_cloud(cloud, out / "cloud.ply")
     export.export_mesh(concave, out / "hull.ply")
     shape = configuration(arm, [-1.0, 0.0, -0.4])
-    plot.save_figure(plot.plot_views(cloud, arm, shape)["front"], out / "cloud.png")
+    plot.save_figure(plot.plot_views(cloud, arm, shape), out / "cloud.png")
 
     rows = volume_rows(concave, convex, arm.length)
     rows["time to compute the cloud"] = (round(computed, 3), "s")
     rows["time in all"] = (round(perf_counter() - start, 3), "s")
     files = ("design.toml", "cloud.zarr", "cloud.ply", "hull.ply", "cloud.png")
     rows["written"] = ([str(out / name) for name in files], "")
-    report("minimal trunk, revolution 108°, taper 2°", rows, json)
+    print_rows("minimal trunk, revolution 108°, taper 2°", rows, json)

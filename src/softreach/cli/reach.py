@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from softreach.cli.inputs import AsJson, Design, RevolutionDeg, TaperDeg, design_from
-from softreach.cli.output import report
+from softreach.cli.output import print_rows
 
 if TYPE_CHECKING:
     from softreach.workspace import ReachableSet
@@ -37,7 +37,7 @@ def reach(
     arm = design_from(design, revolution_deg, taper_deg)
     with progress.bar("mapping the activation box", None) as shown:
         found = reachable_set(arm, accuracy=accuracy, report=shown)
-    report(f"reachable set of {design}", _rows(found), json)
+    print_rows(f"reachable set of {design}", _rows(found), json)
     if surface is not None:
         from softreach.export import export_mesh
 
@@ -66,11 +66,6 @@ def _rows(found: ReachableSet) -> dict[str, tuple[Any, str]]:
 
 
 def _draw(found: ReachableSet, path: Path) -> None:
-    from softreach.plot import plot_slice, save_figure
-    from softreach.plot.style import figure_style, pyplot
+    from softreach.plot import plot_slices, save_figure
 
-    with figure_style():
-        figure, axes = pyplot().subplots(1, 3, figsize=(9.6, 3.6), layout="constrained")
-        for ax, normal in zip(axes, "xyz", strict=True):
-            plot_slice(found.grid, ax, normal=normal, length=found.arm.length)
-        save_figure(figure, path)
+    save_figure(plot_slices(found.grid), path)

@@ -37,8 +37,7 @@ def show(
     cloud = cloud_of(source, n, seed, sampler)
     arm = design_of(cloud)
     shape = None if activation is None else configuration(arm, activation_of(activation, arm))
-    axes = plot.plot_views(cloud, arm, shape, color=color)
-    plot.save_figure(axes["front"], out)
+    plot.save_figure(plot.plot_views(cloud, arm, shape, color=color), out)
     sys.stdout.write(f"{out}\n")
 
 

@@ -47,6 +47,18 @@ class Hull:
         """By how much the volume is estimated to be off [m³], below zero if it is too small."""
         return None if self.volume_corrected is None else self.volume - self.volume_corrected
 
+    def __repr__(self) -> str:
+        shape = "convex hull" if np.isinf(self.alpha) else f"alpha shape of {self.alpha:.4g} m"
+        size = f"volume {self.volume:.6g} m³, area {self.area:.6g} m²"
+        parts = f"{self.regions} region{'s' * (self.regions != 1)}, {len(self.faces)} faces"
+        return f"<Hull: {shape} around {self.n} points, {size}, {parts}>"
+
+    def _repr_html_(self) -> str:
+        """What `repr` says below a small picture, for notebooks."""
+        from softreach.picture import Skin, html_card
+
+        return html_card(repr(self), Skin(self.vertices, self.faces))
+
 
 def convex_hull(points: np.ndarray) -> Hull:
     """The convex hull of a cloud by Qhull.

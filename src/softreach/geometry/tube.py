@@ -11,7 +11,7 @@ __all__ = ["grid_faces", "ribbon_mesh", "tube_mesh"]
 
 Array = NDArray[np.float64]
 Faces = NDArray[np.int64]
-Mesh = tuple[Array, Faces]
+TriangleMesh = tuple[Array, Faces]
 
 
 def tube_mesh(
@@ -20,7 +20,7 @@ def tube_mesh(
     binormal: ArrayLike,
     radii: ArrayLike,
     sides: int = 32,
-) -> Mesh:
+) -> TriangleMesh:
     """A tube of circular sections, capped at both ends, with outward faces.
 
     Args:
@@ -49,7 +49,7 @@ def tube_mesh(
     return np.concatenate([rings, center[[0, -1]]]), _tube_faces(len(center), sides)
 
 
-def ribbon_mesh(lower: ArrayLike, upper: ArrayLike) -> Mesh:
+def ribbon_mesh(lower: ArrayLike, upper: ArrayLike) -> TriangleMesh:
     """The closed skin between two surface patches: a ribbon with a thickness.
 
     Args:

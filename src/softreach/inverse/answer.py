@@ -18,7 +18,7 @@ from softreach.inverse.problem import tips_and_slopes
 from softreach.inverse.redundant import least_changes
 from softreach.inverse.solutions import Solutions, Status
 from softreach.inverse.tree import space_tree
-from softreach.kernels.images import Mesh
+from softreach.kernels.activation_mesh import ActivationMesh
 from softreach.kernels.space_tree import SpaceTree
 
 __all__ = ["CELLS", "Answer", "Preparation", "Wishes", "answer", "collected"]
@@ -49,7 +49,7 @@ class Preparation:
         return landmarks(self.arm, self.tip_tol)
 
     @cached_property
-    def index(self) -> tuple[Mesh, SpaceTree]:
+    def index(self) -> tuple[ActivationMesh, SpaceTree]:
         """The cells of the activation box and where their images lie."""
         mesh = box_mesh(self.arm, self.tip_tol, self.cells, self.depth)
         return mesh, space_tree(mesh)

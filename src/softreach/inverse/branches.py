@@ -12,8 +12,8 @@ from softreach import parallel
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.problem import tips_and_slopes
 from softreach.kernels import candidates, folds, newton
-from softreach.kernels.images import Mesh
-from softreach.kernels.newton import CONVERGED, UNDER_WAY, Search
+from softreach.kernels.activation_mesh import ActivationMesh
+from softreach.kernels.newton import CONVERGED, RUNNING, Search
 from softreach.kernels.space_tree import SpaceTree
 from softreach.rod.kinematics import tip_positions
 
@@ -78,7 +78,7 @@ class Found(NamedTuple):
         return both.where(np.argsort(both.target, kind="stable"))
 
 
-def every_branch(aim: Aim, mesh: Mesh, tree: SpaceTree) -> Found:
+def every_branch(aim: Aim, mesh: ActivationMesh, tree: SpaceTree) -> Found:
     """All solutions inside the bounds, sorted by target.
 
     Args:
@@ -106,7 +106,7 @@ def _searched(aim: Aim, target: Index, cell: Index, start: Array) -> Found:
     low, high = aim.arm.bounds.T.copy()
     state = _begun(aim.targets[target], start)
     for _ in range(_ROUNDS):
-        active = np.flatnonzero(state.state == UNDER_WAY)
+        active = np.flatnonzero(state.state == RUNNING)
         if not len(active):
             break
         tips, slopes = tips_and_slopes(aim.arm, state.trial[active], aim.tol)
@@ -120,22 +120,22 @@ def _searched(aim: Aim, target: Index, cell: Index, start: Array) -> Found:
     return found.where(missed <= aim.residual)
 
 
-def _begun(goal: Array, start: Array) -> Search:
+def _begun(target: Array, start: Array) -> Search:
     n = len(start)
     return Search(
-        goal=goal,
+        target=target,
         gamma=start.copy(),
         slope=np.zeros((n, 3, 3)),
         residual=np.full(n, 1e300),
         step=np.zeros((n, 3)),
-        part=np.ones(n),
+        damping=np.ones(n),
         trial=start.copy(),
-        state=np.full(n, UNDER_WAY),
+        state=np.full(n, RUNNING),
     )
 
 
 def starts(
-    aim: Aim, mesh: Mesh, tree: SpaceTree, rows: Index, strict: bool = True
+    aim: Aim, mesh: ActivationMesh, tree: SpaceTree, rows: Index, strict: bool = True
 ) -> tuple[Index, Index, Array]:
     """Target, cell and activation of every start for some of the targets, sorted."""
     targets = aim.targets[rows]
@@ -144,7 +144,7 @@ def starts(
     parts: list[list[tuple[Index, Index, Array]]] = [[] for _ in blocks]
 
     def fill(part: list[tuple[Index, Index, Array]], first: int, last: int) -> None:
-        room = candidates.MOST + 4 * _BLOCK
+        room = candidates.MOST_STARTS + 4 * _BLOCK
         target, cell, start = (
             np.empty(room, np.int64),
             np.empty(room, np.int64),
@@ -175,16 +175,16 @@ def distinct(aim: Aim, found: Found) -> Found:
     smallest, _ = conditions(found.slope)
     kept = np.ones(len(found.target), bool)
     rounding = _ROUNDING * aim.arm.length
-    newton.merge(offsets, found.gamma, found.residual, smallest, rounding, kept)
+    newton.merge_equal(offsets, found.gamma, found.residual, smallest, rounding, kept)
     return found.where(kept)
 
 
-def _partners(aim: Aim, mesh: Mesh, found: Found) -> tuple[Index, Index, Array]:
+def _partners(aim: Aim, mesh: ActivationMesh, found: Found) -> tuple[Index, Index, Array]:
     """Target, cell and start of the second preimage of every solution with a fold near."""
     low, high = aim.arm.bounds.T.copy()
     smallest, _ = conditions(found.slope)
     start, near = np.empty_like(found.gamma), np.zeros(len(found.target), bool)
-    folds.partners(
+    folds.second_preimages(
         mesh, found.cell, found.gamma, found.slope, smallest, _PARTNER_RANGE, low, high, start, near
     )
     return found.target[near], found.cell[near], start[near]

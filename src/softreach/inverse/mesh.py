@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.problem import tips_and_slopes
-from softreach.kernels.images import Mesh, blurs
+from softreach.kernels.activation_mesh import ActivationMesh, interpolation_errors
 from softreach.kernels.simplices import corner_bits
 
 __all__ = ["box_mesh"]
@@ -20,7 +20,7 @@ _EVEN = 0.3  # ratio of det J at a cell's corners below which the cell is cut in
 _MOST_CELLS = 300_000
 
 
-def box_mesh(arm: Manipulator, tol: float, cells: int, depth: int) -> Mesh:
+def box_mesh(arm: Manipulator, tol: float, cells: int, depth: int) -> ActivationMesh:
     """Cells of the activation box with tips and Jacobians at their corners.
 
     Args:
@@ -89,12 +89,12 @@ class _Lattice:
         self.det = np.concatenate([self.det, np.linalg.det(slope)])
 
 
-def _finished(lattice: _Lattice, corner: Index) -> Mesh:
-    blur = np.empty(len(corner))
-    blurs(lattice.gamma, lattice.slope, corner, blur)
-    blur += 1e-9 * lattice.arm.length  # rounding must not put a target between two tetrahedra
+def _finished(lattice: _Lattice, corner: Index) -> ActivationMesh:
+    error = np.empty(len(corner))
+    interpolation_errors(lattice.gamma, lattice.slope, corner, error)
+    error += 1e-9 * lattice.arm.length  # rounding must not put a target between two tetrahedra
     change = np.sqrt(((lattice.slope[corner[:, 7]] - lattice.slope[corner[:, 0]]) ** 2).sum((1, 2)))
     for bit in (1, 2, 4):
         step = lattice.slope[corner[:, bit]] - lattice.slope[corner[:, 0]]
         change += np.sqrt((step**2).sum((1, 2)))
-    return Mesh(lattice.gamma, lattice.tip, lattice.slope, corner, blur, change)
+    return ActivationMesh(lattice.gamma, lattice.tip, lattice.slope, corner, error, change)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.kernels.images import Mesh, face_planes
-from softreach.kernels.space_tree import SpaceTree, children
+from softreach.kernels.activation_mesh import ActivationMesh, face_planes
+from softreach.kernels.space_tree import SpaceTree, sort_into_children
 
 __all__ = ["space_tree"]
 
@@ -19,7 +19,7 @@ _MOST_ITEMS = 8_000_000
 _OCTANTS = np.array([[o >> 2 & 1, o >> 1 & 1, o & 1] for o in range(8)])
 
 
-def space_tree(mesh: Mesh) -> SpaceTree:
+def space_tree(mesh: ActivationMesh) -> SpaceTree:
     """Divide space until few tetrahedra remain in each place."""
     planes = np.empty((6 * len(mesh.corner), 4, 4))
     face_planes(mesh, 1e-9 * float(np.ptp(mesh.tip)), planes)
@@ -33,10 +33,10 @@ def space_tree(mesh: Mesh) -> SpaceTree:
     return growing.finished()
 
 
-def _image_boxes(mesh: Mesh) -> Array:
+def _image_boxes(mesh: ActivationMesh) -> Array:
     images = mesh.tip[mesh.corner]
-    blur = mesh.blur[:, None]
-    return np.stack([images.min(axis=1) - blur, images.max(axis=1) + blur], 1)
+    error = mesh.interpolation_error[:, None]
+    return np.stack([images.min(axis=1) - error, images.max(axis=1) + error], 1)
 
 
 class _Growing:
@@ -65,10 +65,10 @@ class _Growing:
         first, count = self.first[many], self.count[many]
         counts = np.zeros((len(first), 8), np.int64)
         arguments = (self.planes, self.boxes, corner + self.edge / 2, self.edge / 2, first, count)
-        children(*arguments, self.item, counts, counts, np.empty(0, np.int32))
+        sort_into_children(*arguments, self.item, counts, counts, np.empty(0, np.int32))
         starts = (np.cumsum(counts) - counts.ravel()).reshape(counts.shape)
         item = np.empty(int(counts.sum()), np.int32)
-        children(*arguments, self.item, np.empty_like(counts), starts, item)
+        sort_into_children(*arguments, self.item, np.empty_like(counts), starts, item)
         self.corner = corner.reshape(-1, 3)
         self.first, self.count, self.item = starts.ravel(), counts.ravel(), item
         return True

@@ -10,11 +10,12 @@ References:
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from softreach.kernels.cells import FACES, corners
+from softreach.kernels.compiler import strict
 from softreach.kernels.expansions import BOTTOM, scratch, value
 from softreach.kernels.predicates import EPS, ORIENT_BOUND, dot3, edge, end, minor
+from softreach.kernels.strict_vector import cross, difference, dot
+from softreach.kernels.triangulation import FACES, corners
 
 __all__ = [
     "boundary_faces",
@@ -28,7 +29,7 @@ DIGITS = 2.0**26  # a value this many times its rounding error is good to eight 
 LENGTH_BOUND = 48 * EPS  # three products of a square and a minor of two products
 
 
-@njit(cache=True, nogil=True)
+@strict
 def measure_cells(points, cells, radii, volumes):
     """Write the radius of the circumscribed sphere and the volume of every cell.
 
@@ -51,26 +52,20 @@ def measure_cells(points, cells, radii, volumes):
         radii[t] = length / (2.0 * abs(det)) if det != 0.0 else np.inf
 
 
-@njit(cache=True)
+@strict
 def sphere(points, i, j, k, m):
     """The numerator |...| of R and 6V, and whether rounding left them good to eight digits."""
-    ax, ay, az = arrow(points, i, m)
-    bx, by, bz = arrow(points, j, m)
-    cx, cy, cz = arrow(points, k, m)
-    a2 = ax * ax + ay * ay + az * az
-    b2 = bx * bx + by * by + bz * bz
-    c2 = cx * cx + cy * cy + cz * cz
-    bc_x, bc_y, bc_z = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
-    ca_x, ca_y, ca_z = cy * az - cz * ay, cz * ax - cx * az, cx * ay - cy * ax
-    ab_x, ab_y, ab_z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-    x = a2 * bc_x + b2 * ca_x + c2 * ab_x
-    y = a2 * bc_y + b2 * ca_y + c2 * ab_y
-    z = a2 * bc_z + b2 * ca_z + c2 * ab_z
-    det = ax * bc_x + ay * bc_y + az * bc_z
+    a, b, c = difference(points, i, m), difference(points, j, m), difference(points, k, m)
+    a2, b2, c2 = dot(a, a), dot(b, b), dot(c, c)
+    bc, ca, ab = cross(b, c), cross(c, a), cross(a, b)
+    x = a2 * bc[0] + b2 * ca[0] + c2 * ab[0]
+    y = a2 * bc[1] + b2 * ca[1] + c2 * ab[1]
+    z = a2 * bc[2] + b2 * ca[2] + c2 * ab[2]
+    det = dot(a, bc)
     length = np.sqrt(x * x + y * y + z * z)
-    u = max(abs(ax), abs(bx), abs(cx))
-    v = max(abs(ay), abs(by), abs(cy))
-    w = max(abs(az), abs(bz), abs(cz))
+    u = max(abs(a[0]), abs(b[0]), abs(c[0]))
+    v = max(abs(a[1]), abs(b[1]), abs(c[1]))
+    w = max(abs(a[2]), abs(b[2]), abs(c[2]))
     length_size = max(a2, b2, c2) * (u * v + v * w + w * u)
     sure = (
         abs(det) > DIGITS * ORIENT_BOUND * u * v * w
@@ -79,13 +74,7 @@ def sphere(points, i, j, k, m):
     return length, det, sure
 
 
-@njit(cache=True)
-def arrow(points, i, m):
-    """The edge from point m to point i."""
-    return points[i, 0] - points[m, 0], points[i, 1] - points[m, 1], points[i, 2] - points[m, 2]
-
-
-@njit(cache=True)
+@strict
 def sphere_exact(points, i, j, k, m, w):
     """`sphere` with each sum exact until its last rounding: a flat cell cancels most digits."""
     a = edge(w, BOTTOM, points, i, m)
@@ -105,7 +94,7 @@ def sphere_exact(points, i, j, k, m, w):
     return np.sqrt(square), det
 
 
-@njit(cache=True, nogil=True)
+@strict
 def boundary_faces(cells, neighbors, kept):
     """The faces between kept cells and the rest, normals outwards, shape (f, 3).
 
@@ -129,13 +118,13 @@ def boundary_faces(cells, neighbors, kept):
     return faces
 
 
-@njit(cache=True)
+@strict
 def is_boundary(neighbors, kept, t, i):
     """Whether cell t is kept and its neighbor i is not."""
     return kept[t] and (neighbors[t, i] < 0 or not kept[neighbors[t, i]])
 
 
-@njit(cache=True)
+@strict
 def merges(neighbors, parent, t):
     """Join cell t, new, to the cells around it that have a region; how many regions that cost.
 
@@ -157,7 +146,7 @@ def merges(neighbors, parent, t):
     return merged
 
 
-@njit(cache=True, nogil=True)
+@strict
 def join_regions(neighbors, kept):
     """The regions of the kept cells: `merges`' parent of every cell (-1 if not kept), how many."""
     parent = np.full(len(neighbors), -1, np.int32)
@@ -169,7 +158,7 @@ def join_regions(neighbors, kept):
     return parent, regions
 
 
-@njit(cache=True, nogil=True)
+@strict
 def covering_radius(cells, radii, n_points):
     """The smallest radius at which every vertex belongs to a kept cell."""
     smallest = np.full(n_points, -1.0)
@@ -181,7 +170,7 @@ def covering_radius(cells, radii, n_points):
     return smallest.max()
 
 
-@njit(cache=True, nogil=True)
+@strict
 def radius_of_one_region(neighbors, radii, parent, regions, order):
     """The first radius at which one region is left, adding further cells one after the other.
 

@@ -1,30 +1,31 @@
-"""Where to start looking: which tetrahedra of the activation box map onto a target, nearly.
+"""Starting points of Newton's method: tetrahedra of the activation box that map onto a target.
 
-A target's solutions all lie in tetrahedra whose linear image, inflated by its blur, contains it. In
-each of them the quadratic through tips and Jacobians says whether and where.
+A target's solutions lie in tetrahedra whose linear image, inflated by its interpolation error,
+contains it. In each of them the quadratic through tips and Jacobians says whether and where.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from softreach.kernels.activation_mesh import image_faces, tetrahedron
 from softreach.kernels.compiler import inline, kernel
-from softreach.kernels.images import cross, dot, faces, minus, tetrahedron
-from softreach.kernels.space_tree import holds, leaf_at
+from softreach.kernels.space_tree import leaf_at, may_meet
+from softreach.kernels.vector import cofactors, combination, dot, minus, row
 
-__all__ = ["MOST", "find_starts"]
+__all__ = ["MOST_STARTS", "find_starts"]
 
-MOST = 1024
+MOST_STARTS = 1024
 """Starts kept for one target; a fold to a point has a whole curve of them."""
 
-_SAME = 0.1  # starts nearer than this, in widths of their cells, lead to one solution
-_ROUNDS = 6
-_BEYOND = 0.5  # how far outside a tetrahedron its quadratic is followed, in barycentric units
-_CLOSE, _REST = 0.01, 0.4  # of the blur: good enough to end, good enough to keep
+_DISTINCT = 0.1  # starts nearer than this, in widths of their cells, lead to one solution
+_ITERATIONS = 6
+_OUTSIDE = 0.5  # how far outside a tetrahedron its quadratic is followed, in barycentric units
+_CONVERGED, _ACCEPTED = 0.01, 0.4  # residuals at which to end and to keep, in interpolation errors
 
 
 @kernel
-def find_starts(mesh, tree, targets, low, high, strict, target, cell, start):
+def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start):
     """Activations near each solution of the targets, until the arrays are full.
 
     Args:
@@ -33,7 +34,7 @@ def find_starts(mesh, tree, targets, low, high, strict, target, cell, start):
         targets: Targets [m], shape (t, 3).
         low: Lower bounds, shape (3,).
         high: Upper bounds, shape (3,).
-        strict: Whether to leave out tetrahedra whose quadratic does not reach the target.
+        with_root: Whether to leave out tetrahedra whose quadratic does not reach the target.
         target: Filled with the number of each start's target.
         cell: Filled with its cell.
         start: Filled with the activation, shape (room, 3).
@@ -42,23 +43,25 @@ def find_starts(mesh, tree, targets, low, high, strict, target, cell, start):
         How many targets are done, and how many starts were found.
     """
     guess = np.empty(3)
-    gamma, tip, slope, corner, blur = mesh.gamma, mesh.tip, mesh.slope, mesh.corner, mesh.blur
+    gamma, tip, slope, corner = mesh.gamma, mesh.tip, mesh.slope, mesh.corner
     planes, item = tree.planes, tree.item
     found = 0
     for t in range(targets.shape[0]):
-        if found + MOST > start.shape[0]:
+        if found + MOST_STARTS > start.shape[0]:
             return t, found
         first = found
-        p = (targets[t, 0], targets[t, 1], targets[t, 2])
+        p = row(targets, t)
         begin, end = leaf_at(tree.low, tree.size, tree.child, tree.first, tree.length, p)
         for entry in range(begin, end):
             k = item[entry]
-            if found - first < MOST and holds(planes, k, p, (0.0, 0.0, 0.0)):
+            if found - first < MOST_STARTS and may_meet(planes, k, p, (0.0, 0.0, 0.0)):
                 c = k // 6
                 v = tetrahedron(corner, c, k % 6)
                 weights = _linear_weights(tip, v, p)
-                reached = _refine(gamma, tip, slope, v, weights, p, blur[c], guess)
-                if (reached or not strict) and _is_new(
+                reached = _refine(
+                    gamma, tip, slope, v, weights, p, mesh.interpolation_error[c], guess
+                )
+                if (reached or not with_root) and _is_new(
                     gamma, corner, c, guess, start, first, found
                 ):
                     for axis in range(3):
@@ -71,7 +74,7 @@ def find_starts(mesh, tree, targets, low, high, strict, target, cell, start):
 @inline
 def _linear_weights(tip, v, p):
     """Barycentric coordinates of p in a linear image, moved into it."""
-    base, det, normals = faces(tip, v)
+    base, det, normals = image_faces(tip, v)
     q = minus(p, base)
     b0, b1 = max(det + dot(q, normals[0]), 0.0), max(dot(q, normals[1]), 0.0)
     b2, b3 = max(dot(q, normals[2]), 0.0), max(dot(q, normals[3]), 0.0)
@@ -82,7 +85,7 @@ def _linear_weights(tip, v, p):
 
 
 @inline
-def _refine(gamma, tip, slope, v, weights, p, blur, guess):
+def _refine(gamma, tip, slope, v, weights, p, error, guess):
     """Solve the quadratic through a tetrahedron's tips and slopes, near the tetrahedron.
 
     At x the average of the corners' expansions, Σ λi (fi + ½ Ji (x - xi)), is exact for quadratics.
@@ -96,9 +99,9 @@ def _refine(gamma, tip, slope, v, weights, p, blur, guess):
             + weights[3] * gamma[v[3], k]
         )
     last = False
-    for _ in range(_ROUNDS):
+    for _ in range(_ITERATIONS):
         r, a = _model(gamma, tip, slope, v, weights, p, guess)
-        if dot(r, r) <= (_CLOSE * blur) ** 2:
+        if dot(r, r) <= (_CONVERGED * error) ** 2:
             if last:
                 return True
             last = True  # close enough, and once more to be closer
@@ -106,7 +109,7 @@ def _refine(gamma, tip, slope, v, weights, p, blur, guess):
         if not moved:
             break
     r, a = _model(gamma, tip, slope, v, weights, p, guess)
-    return dot(r, r) <= (_REST * blur) ** 2
+    return dot(r, r) <= (_ACCEPTED * error) ** 2
 
 
 @inline
@@ -131,20 +134,17 @@ def _model(gamma, tip, slope, v, weights, p, guess):
 @inline
 def _step(gamma, v, weights, r, a, guess):
     """A Newton step, cut short where it leaves the neighborhood of the tetrahedron."""
-    c0, c1, c2 = cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1])
-    det = dot(a[0], c0)
+    c = cofactors(a)
+    det = dot(a[0], c[0])
     if det == 0.0:
         return weights, False
-    y = (
-        (c0[0] * r[0] + c1[0] * r[1] + c2[0] * r[2]) / det,
-        (c0[1] * r[0] + c1[1] * r[1] + c2[1] * r[2]) / det,
-        (c0[2] * r[0] + c1[2] * r[1] + c2[2] * r[2]) / det,
-    )
+    y = combination(r, c)
+    y = (y[0] / det, y[1] / det, y[2] / det)
     ahead = _weights(gamma, v, (guess[0] + y[0], guess[1] + y[1], guess[2] + y[2]))
     part = 1.0
     for i in range(4):
-        if ahead[i] < -_BEYOND:
-            part = min(part, (weights[i] + _BEYOND) / (weights[i] - ahead[i]))
+        if ahead[i] < -_OUTSIDE:
+            part = min(part, (weights[i] + _OUTSIDE) / (weights[i] - ahead[i]))
     if part < 1e-3:
         return weights, False
     for k in range(3):
@@ -161,13 +161,13 @@ def _weights(gamma, v, x):
         (x[1] - gamma[a, 1]) / (gamma[b, 1] - gamma[a, 1]),
         (x[2] - gamma[a, 2]) / (gamma[b, 2] - gamma[a, 2]),
     )
-    first, second = _moved(gamma, v[0], v[1], u), _moved(gamma, v[1], v[2], u)
-    third = _moved(gamma, v[2], v[3], u)
+    first, second = _along_edge(gamma, v[0], v[1], u), _along_edge(gamma, v[1], v[2], u)
+    third = _along_edge(gamma, v[2], v[3], u)
     return 1.0 - first, first - second, second - third, third
 
 
 @inline
-def _moved(gamma, a, b, u):
+def _along_edge(gamma, a, b, u):
     """The coordinate along the axis on which vertices a and b differ."""
     if gamma[a, 0] != gamma[b, 0]:
         return u[0]
@@ -183,6 +183,6 @@ def _is_new(gamma, corner, c, guess, start, begin, end):
         for k in range(3):
             width = gamma[last, k] - gamma[first, k]
             apart = max(apart, abs(start[i, k] - guess[k]) / width)
-        if apart < _SAME:
+        if apart < _DISTINCT:
             return False
     return True

@@ -1,25 +1,31 @@
-"""How every kernel is compiled: once, cached on disk, without the interpreter lock.
+"""How every kernel is compiled: without the interpreter lock, with loops cached on disk.
 
-`FAST` lets the compiler fuse multiply-add and reassociate, which rounds differently from the order
-written here (a few units in the last place) and is the same for every block and thread. It assumes
-finite numbers: callers check. The predicates of the triangulation must not use it.
-
-A `kernel` never calls a `kernel`, only what is inlined: the process that compiles links a callee
-compiled by itself, later ones load the copy optimized with its caller, and the two round apart.
+A `kernel` calls nothing but what is inlined: the process that compiles links a callee compiled by
+itself, later ones load the copy optimized with its caller, and the two round apart. What is
+`strict` rounds as written in every process and may call its like; it calls nothing else, and
+nothing else calls it.
 """
 
 from __future__ import annotations
 
-import sys
+import logging
 from collections.abc import Callable
 from typing import Any
 
 from numba import njit
 from numba.core import event
 
-__all__ = ["FAST", "inline", "kernel"]
+__all__ = ["FAST", "inline", "kernel", "strict"]
+
+_LOG = logging.getLogger(__name__)
 
 FAST = {"contract", "reassoc", "nsz", "arcp", "nnan", "ninf"}
+"""Freedoms of the compiler in `kernel` and `inline`.
+
+It may fuse multiply-add and reassociate, which rounds differently from the order written (a few
+units in the last place), the same for every block and thread. It assumes finite numbers: callers
+check.
+"""
 
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -32,20 +38,31 @@ def inline(function: Callable[..., Any]) -> Callable[..., Any]:
     return njit(forceinline=True, nogil=True, fastmath=FAST, error_model="numpy")(function)
 
 
-class _FirstRun(event.Listener):
-    """Says once that kernels are being compiled, so that a first run is not taken for a hang."""
+def strict(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile with every operation rounded by itself, in the order written.
 
-    def __init__(self) -> None:
-        self.said = False
+    Exact predicates rest on it: a compiler free to reassociate finds that the rounding error of a
+    sum, b - ((a + b) - a), is zero; one that fuses multiply-add computes another error than that of
+    the product; and the bounds that say when a sign is sure are proved for one order of roundings.
+    So do keys that must grow with their coordinate.
+
+    What is `inline` already is compiled once more from its source. `fastmath` is set, not left out:
+    what is compiled on behalf of a caller inherits its flags.
+    """
+    source = getattr(function, "py_func", function)
+    return njit(cache=True, nogil=True, fastmath=False, error_model="numpy")(source)
+
+
+class _Log(event.Listener):
+    """Logs what is being compiled; a library prints nothing, the command line listens."""
 
     def on_start(self, event: event.Event) -> None:
-        function = getattr((event.data or {}).get("dispatcher"), "py_func", None)
-        if not self.said and getattr(function, "__module__", "").startswith("softreach"):
-            self.said = True
-            sys.stderr.write("softreach: compiling kernels (first run only, then cached on disk)\n")
+        function: Any = getattr((event.data or {}).get("dispatcher"), "py_func", None)
+        if getattr(function, "__module__", "").startswith("softreach"):
+            _LOG.info("compiling %s.%s", function.__module__, function.__qualname__)
 
     def on_end(self, event: event.Event) -> None:
         pass
 
 
-event.register("numba:compile", _FirstRun())
+event.register("numba:compile", _Log())

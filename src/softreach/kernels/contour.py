@@ -15,10 +15,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from softreach.kernels.compiler import strict
 from softreach.kernels.simplices import chains, corner_bits, corner_steps
+from softreach.kernels.strict_vector import cross, difference, dot
 
 __all__ = ["EXACT_BITS", "Star", "critical_triangles", "stars"]
 
@@ -74,7 +75,7 @@ def _inside(small: int, large: int) -> bool:
     return small & large == small and small != large
 
 
-@njit(cache=True, nogil=True)
+@strict
 def critical_triangles(points, cells, first, last, star, out):
     """Triangles with least vertex in first..last around which the mapped tetrahedra do not balance.
 
@@ -98,12 +99,13 @@ def critical_triangles(points, cells, first, last, star, out):
             if triangles[t, 0] & ~above:
                 continue
             b, c = v + triangles[t, 1], v + triangles[t, 2]
-            normal = cross(points, v, b, c)
+            normal = cross(difference(points, b, v), difference(points, c, v))
             balance, turns = 0, 0
             for k in range(ranges[t], ranges[t + 1]):
                 if apexes[k, 0] & ~above or apexes[k, 1] & ~below:
                     continue
-                side = side_of(points, v, normal, v + apexes[k, 2])
+                height = dot(normal, difference(points, v + apexes[k, 2], v))
+                side = (height > 0) - (height < 0)
                 balance += side
                 turns += apexes[k, 3] * side * side
             if balance != 0 or turns != 0:
@@ -113,7 +115,7 @@ def critical_triangles(points, cells, first, last, star, out):
     return count
 
 
-@njit(cache=True, nogil=True)
+@strict
 def room(cells, v):
     """Axes (as bits) along which vertex v has a cell above it, and one below it."""
     above, below = 0, 0
@@ -123,30 +125,3 @@ def room(cells, v):
         above |= (at < cells[j]) << j
         below |= (at > 0) << j
     return above, below
-
-
-@njit(cache=True, nogil=True)
-def cross(points, a, b, c):
-    """(b - a) × (c - a), exactly."""
-    ux, uy, uz = (
-        points[b, 0] - points[a, 0],
-        points[b, 1] - points[a, 1],
-        points[b, 2] - points[a, 2],
-    )
-    vx, vy, vz = (
-        points[c, 0] - points[a, 0],
-        points[c, 1] - points[a, 1],
-        points[c, 2] - points[a, 2],
-    )
-    return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-
-
-@njit(cache=True, nogil=True)
-def side_of(points, a, normal, p):
-    """The sign of normal · (p - a)."""
-    height = (
-        normal[0] * (points[p, 0] - points[a, 0])
-        + normal[1] * (points[p, 1] - points[a, 1])
-        + normal[2] * (points[p, 2] - points[a, 2])
-    )
-    return (height > 0) - (height < 0)

@@ -11,7 +11,7 @@ always a valid Delaunay triangulation, whatever is cospherical or coplanar. The 
 star-shaped: a wall in one plane with the point would have the point inside the circle of that wall,
 hence inside the spheres on both its sides, and would not be a wall. So every cell has volume.
 
-The arrays and their conventions are in `kernels.cells`.
+The arrays and their conventions are in `kernels.triangulation`.
 
 References:
     Bowyer (1981), Computing Dirichlet tessellations, The Computer Journal 24, 162-166.
@@ -21,20 +21,8 @@ References:
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from softreach.kernels.cells import (
-    DEAD,
-    GHOST,
-    compact,
-    corners,
-    empty_mesh,
-    face,
-    fill,
-    ghost_slot,
-    grown_mesh,
-    set_first_cell,
-)
+from softreach.kernels.compiler import strict
 from softreach.kernels.expansions import scratch
 from softreach.kernels.predicates import (
     collinear,
@@ -43,13 +31,25 @@ from softreach.kernels.predicates import (
     orient,
     orient_filter,
 )
+from softreach.kernels.triangulation import (
+    DEAD,
+    GHOST,
+    compact,
+    corners,
+    empty_triangulation,
+    enlarged,
+    face,
+    fill,
+    ghost_slot,
+    set_first_cell,
+)
 
 __all__ = ["triangulate"]
 
 INSIDE, UNSURE = np.intp(-1), np.intp(-2)
 
 
-@njit(cache=True, nogil=True)
+@strict
 def triangulate(points):
     """Insert points in the given order.
 
@@ -65,7 +65,7 @@ def triangulate(points):
     start = first_cell(points, w)
     if start[3] < 0:
         return np.empty((0, 4), np.int32), np.empty((0, 4), np.int32), same
-    mesh = empty_mesh(8 * len(points) + 64)
+    mesh = empty_triangulation(8 * len(points) + 64)
     used = set_first_cell(mesh, start)
     free, last = DEAD, np.intp(0)
     table = np.empty((2, 2048), np.int64)
@@ -79,7 +79,7 @@ def triangulate(points):
             continue
         dug, walls = dig(points, mesh, p, found, w)
         if used + walls > len(mesh.mark):
-            mesh = grown_mesh(mesh, walls)
+            mesh = enlarged(mesh, walls)
         if 8 * walls > table.shape[1]:
             table = np.empty((2, 32 * walls), np.int64)
         used, free, last = fill(mesh, p, dug, walls, used, free, table)
@@ -87,7 +87,7 @@ def triangulate(points):
     return mesh.cells[:count], mesh.neighbors[:count], same
 
 
-@njit(cache=True)
+@strict
 def first_cell(points, w):
     """Four points that span space, positively oriented; (0, 0, 0, -1) if there are none."""
     n = len(points)
@@ -107,7 +107,7 @@ def first_cell(points, w):
     return a, c, b, d
 
 
-@njit(cache=True)
+@strict
 def equal(points, a, b):
     """Whether two points are the same."""
     return (
@@ -117,7 +117,7 @@ def equal(points, a, b):
     )
 
 
-@njit(cache=True)
+@strict
 def locate(points, mesh, p, t, w):
     """Walk from cell t to the finite cell that holds p, or a ghost cell whose base p is beyond.
 
@@ -141,7 +141,7 @@ def locate(points, mesh, p, t, w):
     return t
 
 
-@njit(cache=True)
+@strict
 def sure_exit(points, cells, neighbors, p, t, came_from, first):
     """A face of finite cell t with p beyond it, INSIDE, or UNSURE because of rounding."""
     answer = INSIDE
@@ -157,7 +157,7 @@ def sure_exit(points, cells, neighbors, p, t, came_from, first):
     return answer
 
 
-@njit(cache=True)
+@strict
 def exact_exit(points, cells, p, t, first, w):
     """A face of finite cell t with p strictly beyond it, or INSIDE."""
     for k in range(4):
@@ -167,14 +167,14 @@ def exact_exit(points, cells, p, t, first, w):
     return INSIDE
 
 
-@njit(cache=True)
+@strict
 def beyond(points, cells, p, t, i, w):
     """+1 if p lies beyond face i of cell t, 0 in its plane, -1 on the side of the cell."""
     a, b, c = face(cells, t, i)
     return orient(points, a, b, c, p, w)
 
 
-@njit(cache=True)
+@strict
 def twin_in(points, mesh, p, t):
     """The vertex of cell t that equals p; -1 if none."""
     for i in range(4):
@@ -184,14 +184,14 @@ def twin_in(points, mesh, p, t):
     return -1
 
 
-@njit(cache=True)
+@strict
 def sure_conflict(points, cells, p, t):
     """+1 if p lies inside the sphere of cell t, -1 if outside, 0 if unsure or a ghost cell."""
     a, b, c, d = corners(cells, t)
     return insphere_filter(points, a, b, c, d, p) if (a | b | c | d) >= 0 else 0.0
 
 
-@njit(cache=True)
+@strict
 def exact_conflict(points, cells, neighbors, p, t, w):
     """+1 if p lies strictly inside the sphere of cell t (see the module on ghosts and ties)."""
     slot = ghost_slot(cells, t)
@@ -205,7 +205,7 @@ def exact_conflict(points, cells, neighbors, p, t, w):
     return insphere(points, a, b, c, d, p, w)
 
 
-@njit(cache=True)
+@strict
 def dig(points, mesh, p, start, w):
     """Find the cells in conflict with p, from one of them outwards; return how many, and walls."""
     cells, neighbors, mark, dug, walls = mesh

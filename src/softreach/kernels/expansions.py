@@ -5,7 +5,7 @@ is a pair ``(start, length)`` into one scratch array ``w``, so that no memory is
 operation writes its result at ``top``, above its operands.
 
 Exact as long as nothing overflows or underflows and the compiler neither reorders nor fuses
-operations: no ``fastmath`` here.
+operations: all of it is `strict`.
 
 References:
     Shewchuk (1997), Adaptive precision floating-point arithmetic and fast robust geometric
@@ -15,7 +15,8 @@ References:
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from softreach.kernels.compiler import strict
 
 __all__ = [
     "BOTTOM",
@@ -34,13 +35,13 @@ BOTTOM = np.intp(0)  # typed: a literal 0 would compile every function once more
 SPLITTER = 134_217_729.0  # 2^27 + 1, cuts 53 bits in two halves
 
 
-@njit(cache=True)
+@strict
 def scratch():
     """A work array large enough for every predicate."""
     return np.empty(SCRATCH)
 
 
-@njit(cache=True)
+@strict
 def two_sum(a, b):
     """Return a + b as rounded sum and exact rest (Theorem 7)."""
     total = a + b
@@ -48,7 +49,7 @@ def two_sum(a, b):
     return total, (a - (total - b_seen)) + (b - b_seen)
 
 
-@njit(cache=True)
+@strict
 def split(a):
     """The high and the low half of the bits of a (Theorem 17)."""
     shifted = SPLITTER * a
@@ -56,7 +57,7 @@ def split(a):
     return high, a - high
 
 
-@njit(cache=True)
+@strict
 def two_product(a, b):
     """Return a · b as rounded product and exact rest (Theorem 18)."""
     product = a * b
@@ -66,14 +67,14 @@ def two_product(a, b):
     return product, rest + a_low * b_low
 
 
-@njit(cache=True)
+@strict
 def push(w, at, term):
     """Append a term unless it is zero; return where the next one goes."""
     w[at] = term
     return at + (term != 0.0)
 
 
-@njit(cache=True)
+@strict
 def difference(w, top, a, b):
     """The expansion of a - b, at most two terms."""
     high, low = two_sum(a, -b)
@@ -81,7 +82,7 @@ def difference(w, top, a, b):
     return top, at - top
 
 
-@njit(cache=True)
+@strict
 def merge_add(w, top, e, f, factor):
     """The expansion e + factor·f for a factor of +1 or -1 (Theorem 13, zeros dropped)."""
     i, j, i_end, j_end = e[0], f[0], e[0] + e[1], f[0] + f[1]
@@ -99,19 +100,19 @@ def merge_add(w, top, e, f, factor):
     return top, at - top
 
 
-@njit(cache=True)
+@strict
 def add(w, top, e, f):
     """The expansion e + f."""
     return merge_add(w, top, e, f, 1.0)
 
 
-@njit(cache=True)
+@strict
 def subtract(w, top, e, f):
     """The expansion e - f."""
     return merge_add(w, top, e, f, -1.0)
 
 
-@njit(cache=True)
+@strict
 def scale(w, top, e, b):
     """The expansion e · b for one float b (Theorem 19, zeros dropped)."""
     at, total = top, 0.0
@@ -125,7 +126,7 @@ def scale(w, top, e, b):
     return top, at - top
 
 
-@njit(cache=True)
+@strict
 def move_down(w, top, e):
     """Move an expansion down to ``top``, over what is no longer needed."""
     for i in range(e[1]):
@@ -133,7 +134,7 @@ def move_down(w, top, e):
     return top, e[1]
 
 
-@njit(cache=True)
+@strict
 def multiply(w, top, e, f):
     """The expansion e · f: the sum of e scaled by every term of f."""
     if f[1] == 0:
@@ -146,13 +147,13 @@ def multiply(w, top, e, f):
     return total
 
 
-@njit(cache=True)
+@strict
 def sign(w, e):
     """The sign of an expansion: that of its last, largest term."""
     return 0.0 if e[1] == 0 else np.sign(w[e[0] + e[1] - 1])
 
 
-@njit(cache=True)
+@strict
 def value(w, e):
     """The float nearest to an expansion, to within one rounding."""
     total = 0.0

@@ -1,10 +1,11 @@
-"""Whole configurations: frames along the rod, walked from the base to the tip."""
+"""Whole configurations: frames along the rod, walked from base to tip, theory (26)."""
 
 from __future__ import annotations
 
 from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.magnus import exponent
-from softreach.kernels.twist import act, cross, exp_coefficients
+from softreach.kernels.twist import act, exp_coefficients
+from softreach.kernels.vector import combination, cross
 
 __all__ = ["frames"]
 
@@ -66,22 +67,15 @@ def frames(table, ends, gamma, position, directors):
 
 @inline
 def _moved(r, d1, d2, d3, step):
-    """R + step, the step given in the directors."""
-    return (
-        r[0] + d1[0] * step[0] + d2[0] * step[1] + d3[0] * step[2],
-        r[1] + d1[1] * step[0] + d2[1] * step[1] + d3[1] * step[2],
-        r[2] + d1[2] * step[0] + d2[2] * step[1] + d3[2] * step[2],
-    )
+    """r + step, the step given in the directors."""
+    x, y, z = combination(step, (d1, d2, d3))
+    return r[0] + x, r[1] + y, r[2] + z
 
 
 @inline
 def _rotated(d1, d2, d3, omega):
     """The directors after the rotation exp(ω), ω given in the directors themselves."""
-    w = (
-        d1[0] * omega[0] + d2[0] * omega[1] + d3[0] * omega[2],
-        d1[1] * omega[0] + d2[1] * omega[1] + d3[1] * omega[2],
-        d1[2] * omega[0] + d2[2] * omega[1] + d3[2] * omega[2],
-    )
+    w = combination(omega, (d1, d2, d3))
     s, c, _ = exp_coefficients(omega)
     return _turned(w, d1, s, c), _turned(w, d2, s, c), _turned(w, d3, s, c)
 

@@ -1,7 +1,7 @@
 """Tip Jacobians of many rods: the exact derivative of `rod.tips`, in the same walk.
 
 With g = exp(Ω1) ... exp(ΩK), the spatial twist dg g⁻¹ of the part of the rod beyond a step obeys
-ξ <- dexp(dΩ) + Ad(exp Ω) ξ = ξ + dexp(dΩ + [Ω, ξ]): one column per bundle, no finite differences.
+ξ <- dexp(dΩ) + Ad(exp Ω) ξ = ξ + dexp(dΩ + [Ω, ξ]): one column per bundle, theory (29).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ __all__ = ["jacobians"]
 def _change(length, weights, a):
     """Change of A = (ζu, e3 ζ) dZ per unit of one activation, from its column of the table.
 
-    Product rule on ω = ℓu, with u = ω/ℓ.
+    Product rule on ω = ℓu, with u = ω/ℓ, theory (28).
     """
     d_length, ratio = weights[0], weights[0] / length
     return (

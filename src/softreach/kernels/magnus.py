@@ -1,6 +1,6 @@
 """One step of the rod: the sixth-order Magnus exponent from three Gauss nodes, and its derivative.
 
-Blanes, Casas, Ros, BIT 40 (2000) 434. Written for the point y seen from the moving frame, which
+[Blanes2000], theory (21) and (22). Written for the point y seen from the moving frame, which
 obeys y' = -A y from base to tip, hence y' = A y walking from the tip to the base: the nodes come in
 the order of that walk, and the commutators have their textbook signs.
 """

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from softreach.kernels.compiler import strict
+from softreach.kernels.strict_vector import dot, minus, row, times
 
 __all__ = ["distances_to_faces"]
 
 
-@njit(cache=True, nogil=True)
+@strict
 def distances_to_faces(points, vertices, faces, incident, starts, near, out):
     """Distance of each point to the nearest triangle around some vertices near it.
 
@@ -24,43 +26,35 @@ def distances_to_faces(points, vertices, faces, incident, starts, near, out):
         out: Result, shape (n,).
     """
     for i in range(len(points)):
-        best = np.inf
+        best, p = np.inf, row(points, i)
         for v in near[i]:
             for e in range(starts[v], starts[v + 1]):
                 a, b, c = faces[incident[e]]
-                best = min(best, squared_distance(points[i], vertices[a], vertices[b], vertices[c]))
+                corners = row(vertices, a), row(vertices, b), row(vertices, c)
+                best = min(best, squared_distance(p, *corners))
         out[i] = np.sqrt(best)
 
 
-@njit(cache=True, nogil=True)
+@strict
 def squared_distance(p, a, b, c):
     """Squared distance of p to triangle abc: to its plane if p lies above it, else to its edges."""
-    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    wx, wy, wz = p[0] - a[0], p[1] - a[1], p[2] - a[2]
-    uu, uv, vv = (
-        ux * ux + uy * uy + uz * uz,
-        ux * vx + uy * vy + uz * vz,
-        vx * vx + vy * vy + vz * vz,
-    )
-    uw, vw = ux * wx + uy * wy + uz * wz, vx * wx + vy * wy + vz * wz
+    u, v, w = minus(b, a), minus(c, a), minus(p, a)
+    uu, uv, vv, uw, vw = dot(u, u), dot(u, v), dot(v, v), dot(u, w), dot(v, w)
     scale = uu * vv - uv * uv
     s, t = vv * uw - uv * vw, uu * vw - uv * uw
     if scale > 0.0 and s >= 0.0 and t >= 0.0 and s + t <= scale:
-        s, t = s / scale, t / scale
-        dx, dy, dz = wx - s * ux - t * vx, wy - s * uy - t * vy, wz - s * uz - t * vz
-        return dx * dx + dy * dy + dz * dz
+        apart = minus(minus(w, times(s / scale, u)), times(t / scale, v))
+        return dot(apart, apart)
     return min(segment(p, a, b), segment(p, b, c), segment(p, c, a))
 
 
-@njit(cache=True, nogil=True)
+@strict
 def segment(p, a, b):
     """Squared distance of p to segment ab."""
-    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    wx, wy, wz = p[0] - a[0], p[1] - a[1], p[2] - a[2]
-    square = ux * ux + uy * uy + uz * uz
+    u, w = minus(b, a), minus(p, a)
+    square = dot(u, u)
     t = 0.0
     if square > 0.0:
-        t = min(max((ux * wx + uy * wy + uz * wz) / square, 0.0), 1.0)
-    dx, dy, dz = wx - t * ux, wy - t * uy, wz - t * uz
-    return dx * dx + dy * dy + dz * dz
+        t = min(max(dot(u, w) / square, 0.0), 1.0)
+    apart = minus(w, times(t, u))
+    return dot(apart, apart)

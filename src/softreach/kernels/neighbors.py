@@ -12,9 +12,8 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numba import njit
 
-from softreach.kernels.compiler import kernel
+from softreach.kernels.compiler import kernel, strict
 
 __all__ = ["PLACE_BITS", "SHIFTS", "find_windows", "neighbor_sums", "sort_keys", "window_keys"]
 
@@ -24,17 +23,14 @@ _COLUMN = 1 << PLACE_BITS
 SHIFTS = tuple(row * _ROW + column * _COLUMN for row in (-1, 0, 1) for column in (-1, 0, 1))
 """What takes a key to the same place in each of the nine columns around."""
 
-# keys must not be reassociated: no neighbor is missed because their rounding is monotone
-_exact = njit(cache=True, nogil=True, error_model="numpy")
 
-
-@_exact
+@strict
 def _place(x, low, scale):
     """Cell of a coordinate: from 1, as a window may begin one cell below the lowest point."""
     return np.int64((x - low) * scale) + 1
 
 
-@_exact
+@strict
 def sort_keys(points, low, scale, keys):
     """Keys of points.
 
@@ -50,7 +46,7 @@ def sort_keys(points, low, scale, keys):
         keys[i] = y * _ROW + z * _COLUMN + _place(points[2, i], low[2], scale[2])
 
 
-@_exact
+@strict
 def window_keys(along, keys, reach, low, scale, first, last):
     """Keys between which the neighbors of each query lie in its own column.
 
@@ -71,7 +67,7 @@ def window_keys(along, keys, reach, low, scale, first, last):
         last[i] = column + min(_place(along[i] + reach, low, scale), places)
 
 
-@_exact
+@strict
 def _first_at_least(keys, start, wanted):
     """The first index from `start` on whose key is not below `wanted`, by steps that double."""
     n, step = len(keys), 1
@@ -88,7 +84,7 @@ def _first_at_least(keys, start, wanted):
     return low
 
 
-@_exact
+@strict
 def find_windows(keys, first, last, start, stop):
     """Where the windows of queries lie among the points.
 

@@ -1,6 +1,6 @@
 """Newton's method for tip(γ) = p with three bundles, one step for many starts at a time.
 
-The rod itself is evaluated in between, for all starts that are still under way.
+The rod itself is evaluated in between, for all starts that still run.
 """
 
 from __future__ import annotations
@@ -11,37 +11,46 @@ from typing import NamedTuple
 import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.vector import cofactors, combination, difference, dot, matrix, minus, row
 
-__all__ = ["CONVERGED", "LOST", "UNDER_WAY", "Search", "conditions", "merge", "newton_step"]
+__all__ = [
+    "CONVERGED",
+    "RUNNING",
+    "STAGNATED",
+    "Search",
+    "conditions",
+    "merge_equal",
+    "newton_step",
+]
 
-UNDER_WAY, CONVERGED, LOST = 0, 1, 2
+RUNNING, CONVERGED, STAGNATED = 0, 1, 2
 
-_LONGEST = 0.25  # step, in ranges of the bounds
+_LONGEST_STEP = 0.25  # in ranges of the bounds
 _OUTSIDE = 0.05  # how far a search may leave the bounds, in ranges
-_PROGRESS = 0.2  # least part of the promised decrease that is progress
-_SETTLED = 1e-7  # a last step that is small enough, in ranges
-_SHORTEST = 1 / 32  # part of a step below which a search is lost
+_SUFFICIENT = 0.2  # least part of the predicted decrease that is accepted
+_STEP_TOL = 1e-7  # a last step that is small enough, in ranges
+_LEAST_DAMPING = 1 / 32  # part of a step below which a search stagnates
 
 
 class Search(NamedTuple):
     """The state of every search."""
 
-    goal: np.ndarray
+    target: np.ndarray
     """Targets [m], shape (n, 3)."""
     gamma: np.ndarray
     """Best activations so far [-], shape (n, 3)."""
     slope: np.ndarray
     """Position Jacobians there [m], shape (n, 3, 3)."""
     residual: np.ndarray
-    """|tip - goal| there [m], shape (n,)."""
+    """|tip - target| there [m], shape (n,)."""
     step: np.ndarray
     """Newton step from there [-], shape (n, 3)."""
-    part: np.ndarray
-    """The part of the step under trial, shape (n,)."""
+    damping: np.ndarray
+    """The damping factor of the step under trial, (0, 1], shape (n,)."""
     trial: np.ndarray
     """Activations to evaluate next [-], shape (n, 3)."""
     state: np.ndarray
-    """UNDER_WAY, CONVERGED or LOST, shape (n,)."""
+    """RUNNING, CONVERGED or STAGNATED, shape (n,)."""
 
 
 @kernel
@@ -49,61 +58,49 @@ def newton_step(search, active, tips, slopes, low, high, tol):
     """Take in the tips and slopes of the active searches' trials and set their next trials."""
     for k in range(active.shape[0]):
         n = active[k]
-        d0 = search.goal[n, 0] - tips[k, 0]
-        d1 = search.goal[n, 1] - tips[k, 1]
-        d2 = search.goal[n, 2] - tips[k, 2]
-        residual = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+        miss = minus(row(search.target, n), row(tips, k))
+        residual = math.sqrt(dot(miss, miss))
         # A search that creeps toward a fold it cannot cross is given up; a double root is not:
         # each full step quarters its residual.
-        if residual < (1.0 - _PROGRESS * search.part[n]) * search.residual[n]:
+        if residual < (1.0 - _SUFFICIENT * search.damping[n]) * search.residual[n]:
             search.residual[n] = residual
             search.gamma[n] = search.trial[n]
             search.slope[n] = slopes[k]
-            _solve(slopes[k], d0, d1, d2, search.step[n])
+            x, y, z = _solution(matrix(slopes, k), miss)
+            search.step[n, 0], search.step[n, 1], search.step[n, 2] = x, y, z
             _shorten(search.step, n, low, high)
-            search.part[n] = 1.0
+            search.damping[n] = 1.0
         else:
-            search.part[n] *= 0.25
+            search.damping[n] *= 0.25
         for j in range(3):
             margin = _OUTSIDE * (high[j] - low[j])
-            next_one = search.gamma[n, j] + search.part[n] * search.step[n, j]
+            next_one = search.gamma[n, j] + search.damping[n] * search.step[n, j]
             search.trial[n, j] = min(max(next_one, low[j] - margin), high[j] + margin)
         # Near a fold a small residual says little about γ: there the search goes on while it can.
-        if search.part[n] < _SHORTEST:
-            search.state[n] = CONVERGED if search.residual[n] <= tol else LOST
+        if search.damping[n] < _LEAST_DAMPING:
+            search.state[n] = CONVERGED if search.residual[n] <= tol else STAGNATED
             search.trial[n] = search.gamma[n]
-        elif search.residual[n] <= tol and _length(search.step, n, low, high) <= _SETTLED:
+        elif search.residual[n] <= tol and _length(search.step, n, low, high) <= _STEP_TOL:
             search.state[n] = CONVERGED
 
 
 @inline
-def _solve(a, r0, r1, r2, out):
-    """Write A⁻¹ r, by cofactors; the gradient's direction where A is singular."""
-    c00 = a[1, 1] * a[2, 2] - a[1, 2] * a[2, 1]
-    c01 = a[1, 2] * a[2, 0] - a[1, 0] * a[2, 2]
-    c02 = a[1, 0] * a[2, 1] - a[1, 1] * a[2, 0]
-    det = a[0, 0] * c00 + a[0, 1] * c01 + a[0, 2] * c02
+def _solution(a, r):
+    """A⁻¹ r, by cofactors; the direction of the gradient, Aᵀ r, where A is singular."""
+    c = cofactors(a)
+    det = dot(a[0], c[0])
     if det == 0.0:
-        for j in range(3):
-            out[j] = a[0, j] * r0 + a[1, j] * r1 + a[2, j] * r2
-        return
-    c10 = a[0, 2] * a[2, 1] - a[0, 1] * a[2, 2]
-    c11 = a[0, 0] * a[2, 2] - a[0, 2] * a[2, 0]
-    c12 = a[0, 1] * a[2, 0] - a[0, 0] * a[2, 1]
-    c20 = a[0, 1] * a[1, 2] - a[0, 2] * a[1, 1]
-    c21 = a[0, 2] * a[1, 0] - a[0, 0] * a[1, 2]
-    c22 = a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0]
-    out[0] = (c00 * r0 + c10 * r1 + c20 * r2) / det
-    out[1] = (c01 * r0 + c11 * r1 + c21 * r2) / det
-    out[2] = (c02 * r0 + c12 * r1 + c22 * r2) / det
+        return combination(r, a)
+    x = combination(r, c)
+    return x[0] / det, x[1] / det, x[2] / det
 
 
 @inline
 def _shorten(step, n, low, high):
     longest = _length(step, n, low, high)
-    if longest > _LONGEST:
+    if longest > _LONGEST_STEP:
         for j in range(3):
-            step[n, j] *= _LONGEST / longest
+            step[n, j] *= _LONGEST_STEP / longest
 
 
 @inline
@@ -121,40 +118,36 @@ def conditions(slopes, smallest, condition):
 
     Largest eigenvalues alone are accurate in closed form, so σ_min is 1/σ_max of the inverse.
     """
-    cofactors = np.empty((3, 3))
     for n in range(slopes.shape[0]):
-        a = slopes[n]
-        for i in range(3):
-            for j in range(3):
-                i1, i2, j1, j2 = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3
-                cofactors[i, j] = a[i1, j1] * a[i2, j2] - a[i1, j2] * a[i2, j1]
-        det = abs(a[0, 0] * cofactors[0, 0] + a[0, 1] * cofactors[0, 1] + a[0, 2] * cofactors[0, 2])
-        spread = _largest(cofactors)
-        smallest[n] = det / spread if spread > 0 else 0.0
+        a = matrix(slopes, n)
+        c = cofactors(a)
+        largest = _largest(c)
+        smallest[n] = abs(dot(a[0], c[0])) / largest if largest > 0 else 0.0
         condition[n] = _largest(a) / smallest[n] if smallest[n] > 0 else math.inf
 
 
 @inline
 def _largest(a):
     """Largest singular value, from the trigonometric roots of the cubic of AᵀA."""
-    xx = a[0, 0] * a[0, 0] + a[1, 0] * a[1, 0] + a[2, 0] * a[2, 0]
-    yy = a[0, 1] * a[0, 1] + a[1, 1] * a[1, 1] + a[2, 1] * a[2, 1]
-    zz = a[0, 2] * a[0, 2] + a[1, 2] * a[1, 2] + a[2, 2] * a[2, 2]
-    xy = a[0, 0] * a[0, 1] + a[1, 0] * a[1, 1] + a[2, 0] * a[2, 1]
-    xz = a[0, 0] * a[0, 2] + a[1, 0] * a[1, 2] + a[2, 0] * a[2, 2]
-    yz = a[0, 1] * a[0, 2] + a[1, 1] * a[1, 2] + a[2, 1] * a[2, 2]
+    x, y, z = (
+        (a[0][0], a[1][0], a[2][0]),
+        (a[0][1], a[1][1], a[2][1]),
+        (a[0][2], a[1][2], a[2][2]),
+    )
+    xx, yy, zz = dot(x, x), dot(y, y), dot(z, z)
+    xy, xz, yz = dot(x, y), dot(x, z), dot(y, z)
     mean = (xx + yy + zz) / 3
-    x, y, z = xx - mean, yy - mean, zz - mean
-    p = math.sqrt((x * x + y * y + z * z + 2 * (xy * xy + xz * xz + yz * yz)) / 6)
+    u, v, w = xx - mean, yy - mean, zz - mean
+    p = math.sqrt((u * u + v * v + w * w + 2 * (xy * xy + xz * xz + yz * yz)) / 6)
     if p <= 1e-300:
         return math.sqrt(mean)
-    det = x * (y * z - yz * yz) - xy * (xy * z - yz * xz) + xz * (xy * yz - y * xz)
+    det = u * (v * w - yz * yz) - xy * (xy * w - yz * xz) + xz * (xy * yz - v * xz)
     angle = math.acos(min(max(det / (2 * p * p * p), -1.0), 1.0)) / 3
     return math.sqrt(mean + 2 * p * math.cos(angle))
 
 
 @kernel
-def merge(offsets, gamma, residual, smallest, rounding, kept):
+def merge_equal(offsets, gamma, residual, smallest, rounding, kept):
     """Keep one of each set of equal solutions of a target, the one of least residual.
 
     Two solutions are one if the tip between them is about as near to the target as theirs: at a
@@ -164,9 +157,7 @@ def merge(offsets, gamma, residual, smallest, rounding, kept):
         for i in range(offsets[t], offsets[t + 1]):
             for j in range(offsets[t], i):
                 if kept[i] and kept[j]:
-                    square = 0.0
-                    for k in range(3):
-                        square += (gamma[i, k] - gamma[j, k]) ** 2
+                    apart = difference(gamma, i, j)
                     same = 16.0 * max(residual[i], residual[j]) + rounding
-                    if min(smallest[i], smallest[j]) * math.sqrt(square) <= same:
+                    if min(smallest[i], smallest[j]) * math.sqrt(dot(apart, apart)) <= same:
                         kept[i if residual[i] >= residual[j] else j] = False

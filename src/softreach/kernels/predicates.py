@@ -13,8 +13,7 @@ then every product of five of them is a multiple of 2^-1000, and nothing under- 
 
 from __future__ import annotations
 
-from numba import njit
-
+from softreach.kernels.compiler import strict
 from softreach.kernels.expansions import (
     BOTTOM,
     add,
@@ -31,27 +30,27 @@ ORIENT_BOUND = 6 * 7.1 * EPS  # permanent <= 6 x y z
 INSPHERE_BOUND = 24 * 16.1 * EPS  # permanent <= 24 x y z lift
 
 
-@njit(cache=True, inline="always")
+@strict
 def max4(a, b, c, d):
     """The largest magnitude of four numbers."""
     return max(max(abs(a), abs(b)), max(abs(c), abs(d)))
 
 
-@njit(cache=True)
+@strict
 def orient(points, a, b, c, d, w):
     """Sign of det[b-a, c-a, d-a]: +1 if d lies on the side to which the normal of abc points."""
     sure = orient_filter(points, a, b, c, d)
     return sure if sure != 0.0 else orient_exact(points, a, b, c, d, w)
 
 
-@njit(cache=True)
+@strict
 def insphere(points, a, b, c, d, e, w):
     """+1 if e lies inside the sphere through a positively oriented abcd, 0 on it, -1 outside."""
     sure = insphere_filter(points, a, b, c, d, e)
     return sure if sure != 0.0 else insphere_exact(points, a, b, c, d, e, w)
 
 
-@njit(cache=True)
+@strict
 def outside(x, bound):
     """Sign of x if it is beyond the bound of its error, else 0."""
     if abs(x) > bound:
@@ -59,7 +58,7 @@ def outside(x, bound):
     return 0.0
 
 
-@njit(cache=True)
+@strict
 def orient_filter(points, a, b, c, d):
     """`orient` where rounding cannot change it, else 0."""
     ax = points[a, 0] - points[d, 0]
@@ -78,7 +77,7 @@ def orient_filter(points, a, b, c, d):
     return outside(det, ORIENT_BOUND * x * y * z)
 
 
-@njit(cache=True)
+@strict
 def insphere_filter(points, a, b, c, d, e):
     """`insphere` where rounding cannot change it, else 0."""
     ax = points[a, 0] - points[e, 0]
@@ -112,13 +111,13 @@ def insphere_filter(points, a, b, c, d, e):
     return outside(det, INSPHERE_BOUND * size * max(max(a2, b2), max(c2, d2)))
 
 
-@njit(cache=True)
+@strict
 def end(e):
     """The first free place above an expansion."""
     return e[0] + e[1]
 
 
-@njit(cache=True)
+@strict
 def minor(w, top, ax, ay, bx, by):
     """The expansion ax·by - bx·ay."""
     left = multiply(w, top, ax, by)
@@ -126,7 +125,7 @@ def minor(w, top, ax, ay, bx, by):
     return subtract(w, end(right), left, right)
 
 
-@njit(cache=True)
+@strict
 def dot3(w, top, az, bc, bz, ca, cz, ab):
     """The expansion az·bc + bz·ca + cz·ab."""
     first = multiply(w, top, az, bc)
@@ -136,7 +135,7 @@ def dot3(w, top, az, bc, bz, ca, cz, ab):
     return add(w, end(third), both, third)
 
 
-@njit(cache=True)
+@strict
 def edge(w, top, points, a, e):
     """The three expansions of a - e."""
     x = difference(w, top, points[a, 0], points[e, 0])
@@ -145,7 +144,7 @@ def edge(w, top, points, a, e):
     return x, y, z
 
 
-@njit(cache=True)
+@strict
 def orient_exact(points, a, b, c, d, w):
     """`orient` without rounding."""
     ax, ay, az = edge(w, BOTTOM, points, a, d)
@@ -157,7 +156,7 @@ def orient_exact(points, a, b, c, d, w):
     return -sign(w, dot3(w, end(ab), az, bc, bz, ca, cz, ab))
 
 
-@njit(cache=True)
+@strict
 def insphere_exact(points, a, b, c, d, e, w):
     """`insphere` without rounding."""
     ax, ay, az = edge(w, BOTTOM, points, a, e)
@@ -185,7 +184,7 @@ def insphere_exact(points, a, b, c, d, e, w):
     return sign(w, add(w, end(bd_part), ac_part, bd_part))
 
 
-@njit(cache=True)
+@strict
 def collinear(points, a, b, c, w):
     """Whether three points lie on one line, exactly."""
     ax, ay, az = edge(w, BOTTOM, points, a, c)

@@ -12,19 +12,21 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from softreach.kernels.compiler import strict
 
 __all__ = [
     "Crossings",
     "add_counts",
     "crossings",
     "empty_crossings",
+    "extent",
     "first_crossings",
-    "hits",
     "joined_crossings",
+    "left_of_edge",
     "most_crossings",
-    "turn",
+    "twice_area",
     "upward",
 ]
 
@@ -63,18 +65,18 @@ def joined_crossings(parts: Sequence[Crossings]) -> Crossings:
     return Crossings(*(np.concatenate(rows) for rows in fields))
 
 
-@njit(cache=True, nogil=True)
+@strict
 def most_crossings(points, triangles, unit, p, q):
     """An upper bound of the number of crossings, from the triangles' bounding boxes."""
     count = 0
     for t in range(len(triangles)):
-        low_p, high_p = span(points, triangles, t, unit, p)
-        low_q, high_q = span(points, triangles, t, unit, q)
+        low_p, high_p = centers_within(points, triangles, t, unit, p)
+        low_q, high_q = centers_within(points, triangles, t, unit, q)
         count += max(0, high_p - low_p) * max(0, high_q - low_q)
     return count
 
 
-@njit(cache=True, nogil=True)
+@strict
 def crossings(points, triangles, unit, axis, width, out):
     """Cross all triangles with the lines of sight through the cell centers, parallel to an axis.
 
@@ -95,18 +97,19 @@ def crossings(points, triangles, unit, axis, width, out):
         a, b, c, side = upward(points, triangles, t, p, q)
         if side == 0:
             continue
-        low, high = span(points, triangles, t, unit, q)
-        area = turn(points, a, b, points[c, p], points[c, q], p, q)
+        low, high = centers_within(points, triangles, t, unit, q)
+        area = twice_area(points, a, b, points[c, p], points[c, q], p, q)
         rise_b, rise_c = points[b, axis] - points[a, axis], points[c, axis] - points[a, axis]
-        for i in range(*span(points, triangles, t, unit, p)):
+        for i in range(*centers_within(points, triangles, t, unit, p)):
             for j in range(low, high):
                 x, y = i * unit, j * unit
-                at_c, at_a = turn(points, a, b, x, y, p, q), turn(points, b, c, x, y, p, q)
+                at_c = twice_area(points, a, b, x, y, p, q)
+                at_a = twice_area(points, b, c, x, y, p, q)
                 at_b = area - at_a - at_c
                 if (
-                    hits(points, a, b, at_c, p, q)
-                    and hits(points, b, c, at_a, p, q)
-                    and hits(points, c, a, at_b, p, q)
+                    left_of_edge(points, a, b, at_c, p, q)
+                    and left_of_edge(points, b, c, at_a, p, q)
+                    and left_of_edge(points, c, a, at_b, p, q)
                 ):
                     rise = at_b * rise_b + at_c * rise_c
                     out.column[count] = i * width + j
@@ -118,37 +121,44 @@ def crossings(points, triangles, unit, axis, width, out):
     return count
 
 
-@njit(cache=True, nogil=True)
-def span(points, triangles, t, unit, axis):
+@strict
+def centers_within(points, triangles, t, unit, axis):
     """Centers from the first to one past the last within a triangle's extent along an axis."""
+    low, high = extent(points, triangles, t, axis)
+    return int(np.ceil(low / unit)), int(np.floor(high / unit)) + 1
+
+
+@strict
+def extent(points, triangles, t, axis):
+    """Least and largest coordinate of a triangle along an axis."""
     a = points[triangles[t, 0], axis]
     b = points[triangles[t, 1], axis]
     c = points[triangles[t, 2], axis]
-    return int(np.ceil(min(a, b, c) / unit)), int(np.floor(max(a, b, c) / unit)) + 1
+    return min(a, b, c), max(a, b, c)
 
 
-@njit(cache=True, nogil=True)
+@strict
 def upward(points, triangles, t, p, q):
     """A triangle's vertices, counterclockwise as seen along the line, and which way its normal was.
 
     1 along the line, -1 against it, 0 if the line grazes it.
     """
     a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-    area = turn(points, a, b, points[c, p], points[c, q], p, q)
+    area = twice_area(points, a, b, points[c, p], points[c, q], p, q)
     if area < 0:
         return a, c, b, -1
     return a, b, c, int(area > 0)
 
 
-@njit(cache=True, nogil=True)
-def turn(points, a, b, x, y, p, q):
+@strict
+def twice_area(points, a, b, x, y, p, q):
     """Twice the area of the triangle of vertices a, b and (x, y), positive if counterclockwise."""
     along, across = points[b, p] - points[a, p], points[b, q] - points[a, q]
     return along * (y - points[a, q]) - across * (x - points[a, p])
 
 
-@njit(cache=True, nogil=True)
-def hits(points, a, b, area, p, q):
+@strict
+def left_of_edge(points, a, b, area, p, q):
     """Whether (x + ε, y + ε²) is on the left of edge ab, given twice the area at ε = 0."""
     if area != 0:
         return area > 0
@@ -156,7 +166,7 @@ def hits(points, a, b, area, p, q):
     return across < 0 or (across == 0 and points[b, p] > points[a, p])
 
 
-@njit(cache=True, nogil=True)
+@strict
 def center_behind(base, rise, area, unit):
     """The smallest k with k · unit >= base + rise / area, exactly."""
     k = int(np.ceil((base + rise / area) / unit))
@@ -167,7 +177,7 @@ def center_behind(base, rise, area, unit):
     return k
 
 
-@njit(cache=True, nogil=True)
+@strict
 def add_counts(crossing, counts, degrees):
     """Cover counts at the cell centers: what was crossed on the way there.
 

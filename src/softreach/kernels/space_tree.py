@@ -8,7 +8,7 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 
-__all__ = ["SpaceTree", "children", "holds", "leaf_at"]
+__all__ = ["SpaceTree", "leaf_at", "may_meet", "sort_into_children"]
 
 
 class SpaceTree(NamedTuple):
@@ -31,7 +31,7 @@ class SpaceTree(NamedTuple):
 
 
 @inline
-def holds(planes, k, p, half):
+def may_meet(planes, k, p, half):
     """Whether a box round p, of half-sizes, meets tetrahedron k as far as its face planes tell."""
     for i in range(4):
         a, b, c = planes[k, i, 0], planes[k, i, 1], planes[k, i, 2]
@@ -57,7 +57,7 @@ def leaf_at(low, size, child, first, length, p):
 
 
 @kernel
-def children(planes, boxes, centers, half, first, count, item, counts, starts, out):
+def sort_into_children(planes, boxes, centers, half, first, count, item, counts, starts, out):
     """Sort the items of nodes into their eight children.
 
     Args:
@@ -78,7 +78,7 @@ def children(planes, boxes, centers, half, first, count, item, counts, starts, o
             found = 0
             for entry in range(first[n], first[n] + count[n]):
                 k = item[entry]
-                if _near(boxes, k, p, half) and holds(planes, k, p, (half, half, half)):
+                if _boxes_meet(boxes, k, p, half) and may_meet(planes, k, p, (half, half, half)):
                     if out.shape[0]:
                         out[starts[n, o] + found] = k
                     found += 1
@@ -86,7 +86,8 @@ def children(planes, boxes, centers, half, first, count, item, counts, starts, o
 
 
 @inline
-def _near(boxes, k, p, half):
+def _boxes_meet(boxes, k, p, half):
+    """Whether the box of tetrahedron k meets the cube round p."""
     for axis in range(3):
         if p[axis] + half < boxes[k, 0, axis] or p[axis] - half > boxes[k, 1, axis]:
             return False

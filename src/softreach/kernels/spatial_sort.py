@@ -12,7 +12,8 @@ References:
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from softreach.kernels.compiler import strict
 
 __all__ = ["insertion_order"]
 
@@ -43,7 +44,7 @@ def _crowding_scale(x):
     return np.interp(x, sample, level * (2**BITS - 1)).astype(np.uint16)
 
 
-@njit(cache=True, nogil=True)
+@strict
 def _sort_keys(places):
     """One integer per point: its round, then its place on the Hilbert curve."""
     keys = np.empty(len(places), np.uint64)
@@ -54,7 +55,7 @@ def _sort_keys(places):
     return keys
 
 
-@njit(cache=True)
+@strict
 def _round_from_end(i):
     """0 for seven points of eight, 1 for seven eighths of the rest, ...: a hash of the index."""
     bits = np.uint64(i + 1) * np.uint64(0x9E3779B97F4A7C15)
@@ -67,7 +68,7 @@ def _round_from_end(i):
     return early
 
 
-@njit(cache=True)
+@strict
 def _hilbert(x, y, z):
     """Position of the cell (x, y, z) along the Hilbert curve through 2^(3 BITS) cells."""
     x, y, z = _untwist(x, y, z)
@@ -79,7 +80,7 @@ def _hilbert(x, y, z):
     return position
 
 
-@njit(cache=True)
+@strict
 def _untwist(x, y, z):
     """Skilling's transform of axes to the transposed Hilbert index."""
     for bit in range(BITS - 1, 0, -1):
@@ -99,7 +100,7 @@ def _untwist(x, y, z):
     return x ^ flip, y ^ flip, z ^ flip
 
 
-@njit(cache=True)
+@strict
 def _reflect(x, other, q, low):
     """Invert the low bits of x where the other axis has bit q set, else exchange them."""
     if other & q:

@@ -10,19 +10,20 @@ from __future__ import annotations
 import math
 
 from softreach.kernels.compiler import inline
+from softreach.kernels.vector import cross
 
-__all__ = ["act", "add", "bracket", "cross", "dexp", "exp_coefficients", "scaled"]
+__all__ = ["act", "add", "bracket", "dexp", "exp_coefficients", "scaled"]
 
 _TERMS = range(8)
 """Terms kept of each series in θ²: exact to rounding for θ <= 1, to 1e-13 for θ <= 1.5."""
 
-# sin θ/θ, (1 - cos θ)/θ², (θ - sin θ)/θ³ as power series in θ².
+# sin θ/θ, (1 - cos θ)/θ², (θ - sin θ)/θ³ as power series in θ², theory (24).
 _SINC, _COSC, _SINC3 = (
     tuple((-1) ** k / math.factorial(2 * k + shift) for k in _TERMS) for shift in (1, 2, 3)
 )
 
-# Coefficients of ad .. ad⁴ in the left-trivialised differential of exp (Selig 2005): reducing
-# Σ adᵏ/(k+1)! with ad⁵ = -2θ² ad³ - θ⁴ ad leaves four functions of θ alone, here as their series.
+# Coefficients of ad .. ad⁴ in the left-trivialised differential of exp [Selig2005]: reducing
+# Σ adᵏ/(k+1)! with ad⁵ = -2θ² ad³ - θ⁴ ad leaves four functions of θ alone, theory (30), as series.
 _DEXP = (
     tuple((-1) ** k * (1 - k) / math.factorial(2 * k + 2) for k in _TERMS),
     tuple((-1) ** k * (1 - k) / math.factorial(2 * k + 3) for k in _TERMS),
@@ -33,26 +34,20 @@ _DEXP1, _DEXP2, _DEXP3, _DEXP4 = _DEXP
 
 
 @inline
-def cross(a, b):
-    """A × b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@inline
 def add(a, b):
-    """A + b of two twists."""
+    """a + b of two twists."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5]
 
 
 @inline
 def scaled(s, a):
-    """S a."""
+    """s a."""
     return s * a[0], s * a[1], s * a[2], s * a[3], s * a[4], s * a[5]
 
 
 @inline
 def bracket(a, b):
-    """[(ω1, v1), (ω2, v2)] = (ω1 × ω2, ω1 × v2 - ω2 × v1)."""
+    """[(ω1, v1), (ω2, v2)] = (ω1 × ω2, ω1 × v2 - ω2 × v1), theory (20)."""
     x, y, z = cross(a[:3], b[:3])
     p, q, r = cross(a[:3], b[3:])
     s, t, u = cross(b[:3], a[3:])
@@ -68,14 +63,14 @@ def _series(t, c):
 
 @inline
 def exp_coefficients(a):
-    """Sin θ/θ, (1 - cos θ)/θ² and (θ - sin θ)/θ³ of a twist's rotation."""
+    """sin θ/θ, (1 - cos θ)/θ² and (θ - sin θ)/θ³ of a twist's rotation."""
     t = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
     return _series(t, _SINC), _series(t, _COSC), _series(t, _SINC3)
 
 
 @inline
 def act(a, p):
-    """exp(a) applied to a point: p + v + ω × (s p + c v + ω × (c p + k v))."""
+    """exp(a) applied to a point: p + v + ω × (s p + c v + ω × (c p + k v)), theory (23)."""
     s, c, k = exp_coefficients(a)
     w, v = a[:3], a[3:]
     inner = cross(w, (c * p[0] + k * v[0], c * p[1] + k * v[1], c * p[2] + k * v[2]))
@@ -88,7 +83,7 @@ def act(a, p):
 
 @inline
 def dexp(a, x):
-    """D exp(a) exp(-a) along x: Σ ad_aᵏ x/(k+1)!, summed in closed form."""
+    """d exp(a) exp(-a) along x: Σ ad_aᵏ x/(k+1)!, summed in closed form."""
     t = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
     total = add(x, scaled(_series(t, _DEXP1), bracket(a, x)))
     second = bracket(a, bracket(a, x))

@@ -11,9 +11,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from softreach.geometry.hull import Hull
-    from softreach.plot.sheet import SheetAxis
+    from softreach.plot import SheetAxis
 
-__all__ = ["atlas_figures"]
+__all__ = ["atlas_figures", "hulls_of"]
 
 _METRICS = ("volume", "exact_volume", "unreachability", "exact_unreachability")
 
@@ -25,22 +25,20 @@ def atlas_figures(atlas: xr.Dataset, panels: int = 7) -> Iterator[tuple[str, Any
         atlas: A grid of two parameters, from `open_atlas`.
         panels: Columns and rows of the sheets at most.
     """
-    from softreach.plot.atlas import atlas_box, plot_corners, plot_metric_map, sheet_axes
-    from softreach.plot.sheet import plot_cloud_sheet, plot_hull_sheet
+    from softreach import plot
 
     for metric in _METRICS:
         if metric in atlas and np.isfinite(atlas[metric].values).any():
-            yield f"map_{metric}", plot_metric_map(atlas, metric)
+            yield f"map_{metric}", plot.plot_metric_map(atlas, metric)
     if "x_min" not in atlas:
         return
-    box = atlas_box(atlas)
+    box: dict[str, Any] = {"box_over_length": plot.box_over_length(atlas)}
     picked = _thinned(atlas, panels)
-    edges = sheet_axes(picked)
-    yield "clouds", plot_cloud_sheet(_clouds(picked), *edges, box=box)
-    yield "corners", plot_corners(_corners(atlas), box=box)
+    edges = plot.sheet_axes(picked)
+    yield "clouds", plot.plot_cloud_sheet(_clouds(picked), *edges, **box)
+    yield "corners", plot.plot_opposite_sides(_corners(atlas), **box)
     yield "curvature", _curvature(atlas)
-    length = atlas.attrs["length"]
-    yield "hulls", plot_hull_sheet(_hulls(picked), *edges, box=box, length=length)
+    yield "hulls", plot.plot_hull_sheet(hulls_of(picked), *edges, length=1.0, **box)
 
 
 def _thinned(atlas: xr.Dataset, panels: int) -> xr.Dataset:
@@ -69,45 +67,49 @@ def _clouds(atlas: xr.Dataset) -> Callable[[int, int], xr.Dataset | None]:
     return cloud_at
 
 
-def _hulls(atlas: xr.Dataset) -> Callable[[int, int], Hull | None]:
+def hulls_of(atlas: xr.Dataset) -> Callable[[int, int], Hull | None]:
+    """(column, row) -> the hull of the design there in lengths of its own, if it is done."""
     from softreach.volume import concave_hull
 
-    cloud_at, share = _clouds(atlas), _alpha(atlas)
+    cloud_at, alpha_over_length = _clouds(atlas), _alpha_over_length(atlas)
 
     def hull_at(column: int, row: int) -> Hull | None:
         cloud = cloud_at(column, row)
-        return None if cloud is None else concave_hull(cloud.tip, share * cloud.tip.attrs["length"])
+        if cloud is None:
+            return None
+        return concave_hull(cloud.tip.values / cloud.tip.attrs["length"], alpha_over_length)
 
     return hull_at
 
 
-def _alpha(atlas: xr.Dataset) -> float:
-    """The radius that the atlas was measured with, in L."""
+def _alpha_over_length(atlas: xr.Dataset) -> float:
+    """The radius that the atlas was measured with, over the length of each design."""
     return float(atlas["volume"].attrs["alpha_over_length"]) if "volume" in atlas else 0.05
 
 
-def _corners(atlas: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
+def _corners(atlas: xr.Dataset) -> dict[str, xr.Dataset]:
     """Title and cloud at the ends of both parameters, in the paper's order."""
-    from softreach.plot.atlas import sheet_axes
+    from softreach.plot import sheet_axes
 
     ends = _thinned(atlas, 2)
     across, up = sheet_axes(ends)
     cloud_at = _clouds(ends)
     places = [(column, row) for column in range(2) for row in range(2)]
     found = ((f"{_at(across, j)}, {_at(up, i)}", cloud_at(j, i)) for j, i in places)
-    return [(title, cloud) for title, cloud in found if cloud is not None]
+    return {title: cloud for title, cloud in found if cloud is not None}
 
 
 def _at(axis: SheetAxis, k: int) -> str:
     symbol, _, unit = axis.label.partition(" (")
-    return f"{symbol} = {axis.values[k]:.4g}{unit.rstrip(')')}"
+    unit = unit.rstrip(")")
+    space = " " if unit.isalpha() else ""
+    return f"{symbol} = {axis.values[k]:.4g}{space}{unit}"
 
 
 def _curvature(atlas: xr.Dataset) -> Any:
     """The first against the last value of the second parameter, at the last of the first."""
     from softreach.curvature import curvature_statistics
-    from softreach.plot.atlas import sheet_axes
-    from softreach.plot.curvature import plot_curvature
+    from softreach.plot import plot_curvature, sheet_axes
 
     ends = _thinned(atlas, 2)
     across, up = sheet_axes(ends)

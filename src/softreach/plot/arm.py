@@ -6,16 +6,17 @@ from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm_shape import arm_mesh, fiber_bands, rest_configuration
 from softreach.geometry.tube import grid_faces
 from softreach.palette import BODY, bundle_color
-from softreach.plot.frame import bounding_box, framed_axes, image_width, show_buffer, view_extent
-from softreach.plot.projection import View
-from softreach.plot.shading import draw_mesh
+from softreach.picture.projection import View
+from softreach.picture.shading import draw_mesh
+from softreach.picture.zbuffer import ZBuffer
+from softreach.plot.frame import Panel
+from softreach.plot.lengths import in_lengths
 from softreach.plot.style import figure_style
-from softreach.plot.zbuffer import ZBuffer
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,12 +35,12 @@ _FADE = 0.62  # how far the colors of the arm at rest go toward white
 def plot_arm(
     arm: Manipulator,
     configuration: xr.Dataset | None = None,
-    ax: Axes | None = None,
     *,
+    ax: Axes | None = None,
     view: View = "front",
     rest: bool = True,
     bundles: Collection[int] | None = None,
-    box: Array | None = None,
+    box: ArrayLike | None = None,
 ) -> Axes:
     """Draw an arm; where both are shown, the arm at rest is pale and behind.
 
@@ -48,13 +49,13 @@ def plot_arm(
         configuration: One configuration of that arm or several along `sample`; None for the arm at
             rest alone.
         ax: Axes to draw in; None for a new figure.
-        view: A named view, or azimuth and elevation of the eye [rad].
+        view: As in `plot_cloud`.
         rest: Whether to draw the arm at rest beside its configurations.
         bundles: Which to draw, by index; None for all.
-        box: What to show, lower and upper corner [L], shape (2, 3).
+        box: What to show, lower and upper corner [m], shape (2, 3); None for all that is drawn.
 
     Returns:
-        The axes, in units of L.
+        The axes, in L.
 
     Raises:
         InvalidInput: Unknown view.
@@ -63,12 +64,12 @@ def plot_arm(
     shapes = shapes_of(configuration)
     resting = [rest_configuration(arm)] if rest or not shapes else []
     with figure_style(ax):
-        box = bounding_box(*(arm_points(arm, s) for s in shapes + resting)) if box is None else box
-        ax = framed_axes(box, view) if ax is None else ax
+        points = np.concatenate([arm_points(arm, shape) for shape in shapes + resting])
+        panel = Panel.opened(points, in_lengths(arm.length), ax, view, box)
         drawn = range(arm.bundles) if bundles is None else bundles
-        _show(ax, arm, resting, view, box, drawn, _FADE if shapes else 0.0)
-        _show(ax, arm, shapes, view, box, drawn)
-    return ax
+        _show(panel, arm, resting, drawn, _FADE if shapes else 0.0)
+        _show(panel, arm, shapes, drawn)
+    return panel.ax
 
 
 def shapes_of(configuration: xr.Dataset | None) -> list[xr.Dataset]:
@@ -86,21 +87,18 @@ def arm_points(arm: Manipulator, shape: xr.Dataset) -> Array:
 
 
 def _show(
-    ax: Axes,
+    panel: Panel,
     arm: Manipulator,
     shapes: list[xr.Dataset],
-    view: View,
-    box: Array,
     bundles: Collection[int],
     fade: float = 0.0,
 ) -> None:
     """One image of all shapes, over what the axes hold."""
     if shapes:
-        extent = view_extent(box, view)
-        buffer = ZBuffer(extent, image_width(ax, extent), oversample=3)
+        buffer = panel.buffer(oversample=3)
         for shape in shapes:
-            _draw(buffer, arm, shape, view, bundles, fade)
-        show_buffer(ax, buffer, box, view, "/ L")
+            _draw(buffer, arm, shape, panel.view, bundles, fade)
+        panel.show(buffer)
 
 
 def _draw(

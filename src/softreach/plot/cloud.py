@@ -7,71 +7,70 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.picture.projection import View, project
 from softreach.plot.coloring import color_samples, draw_key
-from softreach.plot.frame import bounding_box, framed_axes, image_width, show_buffer, view_extent
-from softreach.plot.projection import View, project
+from softreach.plot.frame import Panel
+from softreach.plot.lengths import unit_of
 from softreach.plot.style import figure_style
-from softreach.plot.zbuffer import ZBuffer
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["plot_cloud", "point_size", "tips_in_lengths"]
+__all__ = ["drawn_tips", "plot_cloud", "point_size"]
 
 _LARGEST = 8.0  # pixels
 
 
 def plot_cloud(
     cloud: xr.Dataset,
-    ax: Axes | None = None,
     *,
+    ax: Axes | None = None,
     view: View = "front",
     color: str | int | ArrayLike = "rgb",
     size: float | None = None,
     key: bool = True,
-    box: NDArray[np.float64] | None = None,
+    box: ArrayLike | None = None,
 ) -> Axes:
-    """Draw a cloud in one view; the nearest point shows in each pixel.
+    """Draw a cloud in one view.
 
     Args:
-        cloud: tip(sample, axis) [m] with attribute `length` [m], activation(sample, fiber) [-].
+        cloud: tip(sample, axis) [m], with the attribute `length` [m] if known, and
+            activation(sample, bundle) [-].
         ax: Axes to draw in; None for a new figure.
-        view: "front", "back", "right", "left", "top", or azimuth and elevation of the eye [rad].
+        view: "front", "side", "top", "oblique", "back", "left", or azimuth and elevation of the eye
+            [rad].
         color: "rgb", the name or index of a bundle, or an array; see `color_samples`.
         size: Diameter of a point [pixels at 250 per inch]; None chooses by their number.
         key: Whether to explain the colors.
-        box: What to show, lower and upper corner [L], shape (2, 3); None for all points.
+        box: What to show, lower and upper corner [m], shape (2, 3); None for all points.
 
     Returns:
-        The axes, in units of L.
+        The axes, in L if the cloud knows it, else in meters.
 
     Raises:
         InvalidInput: Unknown view, bundle or color, or no finite tip.
         MissingExtra: matplotlib is not installed.
     """
     with figure_style(ax):
-        tips = tips_in_lengths(cloud)
-        box = bounding_box(tips) if box is None else box
-        ax = framed_axes(box, view) if ax is None else ax
+        tips = drawn_tips(cloud)
+        panel = Panel.opened(tips, unit_of(cloud["tip"]), ax, view, box)
         coloring = color_samples(cloud, color)
-        extent = view_extent(box, view)
-        width = image_width(ax, extent)
-        scale = width / (extent.right - extent.left)
-        pixels = size or min(_LARGEST, point_size(len(tips), box) * scale)
+        spread = point_size(len(tips), panel.box) * panel.pixels_per_unit
+        pixels = size or min(_LARGEST, spread)
         # small points gain nothing from smoothing; fine steps of color drown in their noise
-        buffer = ZBuffer(extent, width, oversample=1 if pixels < 3.5 else 2, color_step=8)
+        buffer = panel.buffer(oversample=1 if pixels < 3.5 else 2, color_step=8)
         buffer.draw_points(project(tips, view), coloring.rgb, pixels)
-        show_buffer(ax, buffer, box, view, "/ L")
+        panel.show(buffer)
         if key:
-            draw_key(ax, coloring.key)
-    return ax
+            draw_key(panel.ax, coloring.key)
+    return panel.ax
 
 
-def tips_in_lengths(cloud: xr.Dataset) -> NDArray[np.float64]:
-    """Tip positions [L], shape (sample, 3)."""
+def drawn_tips(cloud: xr.Dataset) -> NDArray[np.float64]:
+    """Tip positions in the units of the axes, shape (sample, 3)."""
     tip = cloud["tip"].transpose("sample", "axis")
-    return tip.values / float(tip.attrs.get("length", 1.0))
+    return unit_of(tip).of(tip.values)
 
 
 def point_size(samples: int, box: NDArray[np.float64]) -> float:

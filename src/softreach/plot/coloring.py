@@ -15,16 +15,28 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["BundleKey", "Coloring", "ScalarKey", "color_samples", "draw_figure_key", "draw_key"]
+__all__ = [
+    "COLORMAP",
+    "BundleKey",
+    "Coloring",
+    "ScalarKey",
+    "bundle_activations",
+    "bundle_names",
+    "color_map",
+    "color_samples",
+    "draw_figure_key",
+    "draw_key",
+]
 
-_COLORMAP = "viridis"
+COLORMAP = "viridis"
 _MISSING = 204  # light gray
+_LINE = 44  # characters above axes of a column's width
 
 
 class BundleKey(NamedTuple):
     """Each bundle adds a color."""
 
-    names: list[str]
+    names: tuple[str, ...]
     colors: NDArray[np.uint8]
 
 
@@ -47,15 +59,16 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike = "rgb") -> Co
     """Color samples by all activations, by one bundle's magnitude, or by given values.
 
     Args:
-        cloud: activation(sample, fiber) [-].
+        cloud: activation(sample, bundle) [-].
         color: "rgb" for |γ| / max |γ| of all bundles; the name or index of one bundle; one number
-            per sample; or RGB from 0 to 1 per sample.
+            per sample, whose attributes `long_name` and `units` go to the key if it is a DataArray;
+            or RGB from 0 to 1 per sample.
 
     Raises:
         InvalidInput: No such bundle, or an array of another length.
     """
-    activation = cloud["activation"].transpose("sample", "bundle")
-    names = _names(activation)
+    activation = bundle_activations(cloud)
+    names = bundle_names(cloud)
     if isinstance(color, str) and color == "rgb":
         lights = activation_colors(np.eye(len(names)))
         return Coloring(activation_colors(activation.values), BundleKey(names, lights))
@@ -63,16 +76,33 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike = "rgb") -> Co
         bundle = _bundle(names, color)
         magnitude = np.abs(activation.values[:, bundle])
         return _scalar(magnitude, f"|γ| {names[bundle]}", 0.0)
-    return _given(np.asarray(color, float), activation.sizes["sample"])
+    return _given(color, len(activation))
+
+
+def bundle_activations(cloud: xr.Dataset) -> xr.DataArray:
+    """Activations with samples first and bundles second, whatever the dimension is called."""
+    activation = cloud["activation"]
+    (bundle,) = (dim for dim in activation.dims if dim != "sample")
+    return activation.transpose("sample", bundle)
+
+
+def bundle_names(cloud: xr.Dataset) -> tuple[str, ...]:
+    """Names of the bundles, or their numbers from 1 up if the cloud has none."""
+    activation = bundle_activations(cloud)
+    bundle = activation.dims[1]
+    if bundle in activation.coords:
+        return tuple(str(name) for name in activation[bundle].values)
+    return tuple(str(k + 1) for k in range(activation.shape[1]))
 
 
 def draw_key(ax: Axes, key: BundleKey | ScalarKey | None) -> None:
     """Explain the colors in axes, by a legend above them or a color bar beside them."""
     if isinstance(key, BundleKey):
-        ax.legend(handles=_patches(key), **_ABOVE)
+        fits = sum(len(name) + 6 for name in key.names) <= _LINE
+        ax.legend(handles=_patches(key), **_ABOVE | {"ncols": 4 if fits else 2})
     elif key is not None:
         bar = {"label": key.label, "fraction": 0.046, "pad": 0.03}
-        ax.figure.colorbar(_mappable(key), ax=ax, **bar)
+        ax.figure.colorbar(color_map(key), ax=ax, **bar)
 
 
 def draw_figure_key(figure: Figure, key: BundleKey | ScalarKey | None, top: float) -> None:
@@ -88,7 +118,7 @@ def draw_figure_key(figure: Figure, key: BundleKey | ScalarKey | None, top: floa
         figure.legend(handles=_patches(key), **options)
     elif key is not None:
         bar = figure.add_axes((0.4, 1 - 0.5 * top, 0.4, 0.2 * top))
-        figure.colorbar(_mappable(key), cax=bar, orientation="horizontal")
+        figure.colorbar(color_map(key), cax=bar, orientation="horizontal")
         bar.set_ylabel(key.label, rotation=0, ha="right", va="center")
 
 
@@ -101,13 +131,7 @@ _ABOVE: dict[str, Any] = {
 }
 
 
-def _names(activation: xr.DataArray) -> list[str]:
-    if "bundle" in activation.coords:
-        return [str(name) for name in activation["bundle"].values]
-    return [str(k + 1) for k in range(activation.sizes["bundle"])]
-
-
-def _bundle(names: list[str], color: str | int | np.integer) -> int:
+def _bundle(names: tuple[str, ...], color: str | int | np.integer) -> int:
     if isinstance(color, str) and color in names:
         return names.index(color)
     if not isinstance(color, str) and 0 <= color < len(names):
@@ -116,12 +140,20 @@ def _bundle(names: list[str], color: str | int | np.integer) -> int:
     raise InvalidInput("color", color, f'"rgb", a bundle ({known}) or its index, or an array')
 
 
-def _given(values: NDArray[np.float64], samples: int) -> Coloring:
+def _given(color: ArrayLike, samples: int) -> Coloring:
+    values = np.asarray(color, float)
     if values.shape == (samples,):
-        return _scalar(values, "")
+        return _scalar(values, _described(color))
     if values.shape == (samples, 3):
         return Coloring(np.rint(255 * np.clip(values, 0, 1)).astype(np.uint8), None)
     raise InvalidInput("color.shape", values.shape, f"({samples},) or ({samples}, 3)")
+
+
+def _described(color: ArrayLike) -> str:
+    """What an array says of itself: its long name and unit."""
+    attrs = getattr(color, "attrs", {})
+    name, unit = attrs.get("long_name", ""), attrs.get("units")
+    return f"{name} [{'-' if unit == '1' else unit}]" if unit else name
 
 
 def _scalar(values: NDArray[np.float64], label: str, low: float | None = None) -> Coloring:
@@ -131,18 +163,19 @@ def _scalar(values: NDArray[np.float64], label: str, low: float | None = None) -
     some = finite.any()
     start = float(values.min(where=finite, initial=np.inf)) if low is None and some else low or 0.0
     stop = float(values.max(where=finite, initial=start)) if some else start + 1.0
-    table = colormaps[_COLORMAP](np.arange(257), bytes=True)[:, :3]
+    table = colormaps[COLORMAP](np.arange(257), bytes=True)[:, :3]
     table[256] = _MISSING
     share = np.where(finite, (values - start) / ((stop - start) or 1.0), 0.0)
     index = np.minimum(255, (256 * share).astype(np.int16))
     return Coloring(table[np.where(finite, index, 256)], ScalarKey(label, start, stop))
 
 
-def _mappable(key: ScalarKey) -> Any:
+def color_map(key: ScalarKey) -> Any:
+    """What matplotlib draws a color bar of."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    return ScalarMappable(Normalize(key.low, key.high), _COLORMAP)
+    return ScalarMappable(Normalize(key.low, key.high), COLORMAP)
 
 
 def _patches(key: BundleKey) -> list[Any]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from softreach.errors import InvalidInput
 from softreach.palette import BODY, bundle_color
+from softreach.plot.lengths import in_lengths
 from softreach.plot.style import figure_style, small_axes
 
 if TYPE_CHECKING:
@@ -22,10 +23,10 @@ __all__ = ["plot_cross_section"]
 def plot_cross_section(
     arm: Manipulator,
     z: float = 0.0,
-    ax: Axes | None = None,
     *,
+    ax: Axes | None = None,
     bundles: Collection[int] | None = None,
-    reach: float | None = None,
+    half_width: float | None = None,
 ) -> Axes:
     """Draw where the bundles lie in the cross-section at Z, seen from the tip (figure 1c).
 
@@ -34,11 +35,11 @@ def plot_cross_section(
         z: Station Z [m].
         ax: Axes to draw in; None for a new figure.
         bundles: Which to draw, by index; None for all.
-        reach: Half width of what is shown [L], to draw several sections at one scale; None for
-            this section.
+        half_width: Of what is shown [m], to draw several sections at one scale; None for this
+            section.
 
     Returns:
-        The axes, in units of L.
+        The axes, in L.
 
     Raises:
         InvalidInput: A station off the arm.
@@ -46,17 +47,17 @@ def plot_cross_section(
     """
     if not 0 <= z <= arm.length:
         raise InvalidInput("z", z, f"within [0, {arm.length:g}] m")
-    outer = float(arm.profile.radius(z)) / arm.length
+    unit = in_lengths(arm.length)
+    outer, outline = float(unit.of(arm.profile.radius(z))), arm.outline(z)
     with figure_style(ax):
         ax = small_axes(2.0, 2.0) if ax is None else ax
-        outline = arm.outline(z)
-        _draw_ring(ax, outer, outline.inner_ratio.min())
+        _draw_ring(ax, outer, float(outline.inner_ratio.min()))
         angles, extents = np.degrees(outline.center[0]), np.degrees(outline.extent)
         for k in range(arm.bundles) if bundles is None else bundles:
-            _draw_sector(ax, outer, outline.inner_ratio[k], angles[k], extents[k], k)
-        half = 1.08 * outer if reach is None else reach
-        ax.set(aspect="equal", xlim=(-half, half), ylim=(-half, half), xlabel="x / L")
-        ax.set_ylabel("y / L")
+            _draw_sector(ax, outer, float(outline.inner_ratio[k]), angles[k], extents[k], k)
+        half = 1.08 * outer if half_width is None else float(unit.of(half_width))
+        ax.set(aspect="equal", xlim=(-half, half), ylim=(-half, half))
+        ax.set(xlabel=unit.label("x"), ylabel=unit.label("y"))
         ax.locator_params(nbins=3)
     return ax
 

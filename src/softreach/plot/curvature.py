@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.errors import InvalidInput
+from softreach.plot.lengths import LengthUnit, common_unit, unit_of
 from softreach.plot.style import figure_style, small_axes
 
 if TYPE_CHECKING:
@@ -20,16 +21,17 @@ __all__ = ["plot_curvature"]
 Array = NDArray[np.float64]
 
 _COLORS = ("#2f6db5", "#e8a020")  # the paper's blue and yellow
-_LABELS = {"bending": "κL", "torsion": "$u_3 L$", "extension": "ζ"}
+_SYMBOLS = {"bending": "κ", "torsion": "$u_3$", "extension": "ζ"}
 _BINS = 64
 
 
 def plot_curvature(
-    statistics: Mapping[str, xr.Dataset], ax: Axes | None = None, *, quantity: str = "bending"
+    statistics: Mapping[str, xr.Dataset], *, ax: Axes | None = None, quantity: str = "bending"
 ) -> Axes:
     """Distributions at the stations of one or two designs (figure 3c); dots are medians.
 
-    Each distribution is drawn to the same width. Curvatures are shown times L.
+    Each distribution is drawn to the same width. Curvatures are shown times L, or in 1/m if the
+    statistics do not know L.
 
     Args:
         statistics: Label -> what `curvature_statistics` returned; the first is drawn to the left
@@ -38,30 +40,46 @@ def plot_curvature(
         quantity: "bending", "torsion" or "extension".
 
     Raises:
-        InvalidInput: Not one or two designs, or an unknown quantity.
+        InvalidInput: Not one or two designs, an unknown quantity, stations at other places along
+            the arm, or designs of which only one knows L.
     """
     if not 1 <= len(statistics) <= 2:
         raise InvalidInput("statistics", f"of {len(statistics)} designs", "of one or two")
-    if quantity not in _LABELS:
-        raise InvalidInput("quantity", quantity, f"one of {', '.join(_LABELS)}")
+    if quantity not in _SYMBOLS:
+        raise InvalidInput("quantity", quantity, f"one of {', '.join(_SYMBOLS)}")
+    unit = common_unit([unit_of(found) for found in statistics.values()])
+    places = _common_places(statistics)
     with figure_style(ax):
         ax = small_axes() if ax is None else ax
         sides = (-1, 1) if len(statistics) == 2 else (0,)
         for (label, found), side, color in zip(statistics.items(), sides, _COLORS, strict=False):
             _draw(ax, found, quantity, side, color, label)
-        places = _places(next(iter(statistics.values())))
-        ax.set(xlabel="station Z / L", ylabel=_LABELS[quantity])
-        ax.set_xticks(range(len(places)), places)
+        ax.set(xlabel=unit.label("station Z"), ylabel=_label(quantity, unit))
+        ax.set_xticks(range(len(places)), [f"{place:.2g}" for place in places])
         ax.legend(loc="upper left")
     return ax
 
 
-def _places(found: xr.Dataset) -> list[str]:
-    return [f"{z / found.attrs['length']:.2g}" for z in found["Z"].values]
+def _common_places(statistics: Mapping[str, xr.Dataset]) -> Array:
+    """The stations on the axis, which all designs share."""
+    places = [unit_of(found).of(found["Z"].values) for found in statistics.values()]
+    for other in places[1:]:
+        if other.shape != places[0].shape or not np.allclose(other, places[0]):
+            raise InvalidInput(
+                "stations", other.tolist(), f"those of the first: {places[0].tolist()}"
+            )
+    return places[0]
+
+
+def _label(quantity: str, unit: LengthUnit) -> str:
+    symbol = _SYMBOLS[quantity]
+    if quantity == "extension":
+        return symbol
+    return f"{symbol}L" if unit.relative else f"{symbol} [1/m]"
 
 
 def _draw(ax: Axes, found: xr.Dataset, quantity: str, side: int, color: str, label: str) -> None:
-    scale = 1.0 if quantity == "extension" else found.attrs["length"]
+    scale = 1.0 if quantity == "extension" else unit_of(found).size
     medians = found[f"{quantity}_quantile"].sel(quantile=0.5).values * scale
     for k in range(len(medians)):
         edges, density = _coarse(found.isel(station=k), quantity)

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from softreach.arm_shape import rest_configuration
+from softreach.picture.projection import View
 from softreach.plot.arm import arm_points, plot_arm
 from softreach.plot.cross_section import plot_cross_section
 from softreach.plot.frame import bounding_box
-from softreach.plot.projection import View
 from softreach.plot.style import figure_style, pyplot
 
 if TYPE_CHECKING:
@@ -33,13 +33,16 @@ class DesignPanel(NamedTuple):
 
 
 def plot_designs(
-    panels: Sequence[DesignPanel], stations: Sequence[float] = (0.0,), *, width: float | None = None
+    panels: Sequence[DesignPanel],
+    *,
+    stations_over_length: Sequence[float] = (0.0,),
+    width: float | None = None,
 ) -> Figure:
     """Draw arms at rest, and under each its cross-sections, all at one scale (figures 1b-d, 4a).
 
     Args:
         panels: The arms, from left to right.
-        stations: Z / L of the cross-sections [-], from 0 to 1; none for the arms alone.
+        stations_over_length: Z / L of the cross-sections [-], from 0 to 1; none for the arms alone.
         width: Of the figure [inch]; None for 1.5 a panel.
 
     Raises:
@@ -50,22 +53,24 @@ def plot_designs(
     reach = 1.08 * max(
         float(p.arm.profile.radius(s * p.arm.length)) / p.arm.length
         for p in panels
-        for s in (*stations, 0.0)
+        for s in (*stations_over_length, 0.0)
     )
     width = 1.5 * len(panels) if width is None else width
-    rows = 1 + len(stations)
+    rows = 1 + len(stations_over_length)
     with figure_style():
-        heights = [2.6, *[width / len(panels)] * len(stations)]
+        heights = [2.6, *[width / len(panels)] * len(stations_over_length)]
         shape = {"height_ratios": heights, "layout": "constrained", "squeeze": False}
         figure, axes = pyplot().subplots(
             rows, len(panels), figsize=(width, sum(heights) + 0.1), **shape
         )
         for k, panel in enumerate(panels):
-            plot_arm(panel.arm, ax=axes[0, k], view=panel.view, bundles=panel.bundles, box=box)
+            arm, length = panel.arm, panel.arm.length
+            drawn, shown = panel.bundles, length * box
+            plot_arm(arm, ax=axes[0, k], view=panel.view, bundles=drawn, box=shown)
             axes[0, k].set_title(panel.title)
-            for ax, station in zip(axes[1:, k], stations, strict=True):
-                z = station * panel.arm.length
-                plot_cross_section(panel.arm, z, ax, bundles=panel.bundles, reach=reach)
+            for ax, station in zip(axes[1:, k], stations_over_length, strict=True):
+                z, half = station * length, reach * length
+                plot_cross_section(arm, z, ax=ax, bundles=drawn, half_width=half)
                 ax.set_title(f"Z = {station:.2g} L" if station else "Z = 0")
         for ax in np.ravel(axes[:, 1:]):
             ax.set(ylabel="", yticklabels=[])

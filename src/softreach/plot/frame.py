@@ -1,22 +1,24 @@
-"""The axes around an image: labeled coordinates of a named view, or a box in space for another."""
+"""The axes around an image: labeled coordinates of a view along an axis, or a box in space."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.errors import InvalidInput
-from softreach.plot.projection import View, plane_of, project, view_axes
+from softreach.picture.projection import View, is_mirrored, plane_of, project
+from softreach.picture.zbuffer import Extent, ZBuffer
+from softreach.plot.lengths import LengthUnit
 from softreach.plot.space_box import draw_box
 from softreach.plot.style import DPI, pyplot
-from softreach.plot.zbuffer import Extent, ZBuffer
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["bounding_box", "framed_axes", "image_width", "show_buffer", "view_extent"]
+__all__ = ["Panel", "bounding_box", "view_extent"]
 
 Array = NDArray[np.float64]
 
@@ -24,6 +26,75 @@ _MARGIN = 0.04
 _ROOM = np.array([2.8, 3.2])  # inches for the image
 _AROUND = np.array([0.6, 0.7])  # inches for labels and key
 _TICK_ROOM = 0.42  # inches between ticks at least
+_UNIT_MARK = "_counted in "  # the label of an image, which no legend shows
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Axes that show a box in space from one side, at print resolution."""
+
+    ax: Axes
+    box: Array
+    """What they show: lower and upper corner in the units of the axes, shape (2, 3)."""
+    view: View
+    unit: LengthUnit
+
+    @classmethod
+    def opened(
+        cls, points: ArrayLike, unit: LengthUnit, ax: Axes | None, view: View, box: ArrayLike | None
+    ) -> Self:
+        """Axes for points.
+
+        Args:
+            points: What is going to be shown, in the units of the axes, shape (..., 3).
+            unit: The units of the axes.
+            ax: Axes to draw in; None for a new figure.
+            view: The direction of sight.
+            box: What to show, lower and upper corner [m], shape (2, 3); None for all points.
+
+        Raises:
+            InvalidInput: Unknown view, a box of another shape, or no finite point to show.
+        """
+        shown = bounding_box(points) if box is None else unit.of(_checked(box))
+        return cls(_framed_axes(shown, view) if ax is None else ax, shown, view, unit)
+
+    @property
+    def extent(self) -> Extent:
+        """The part of the projection plane that the box fills."""
+        return view_extent(self.box, self.view)
+
+    @property
+    def pixels_per_unit(self) -> float:
+        """At print resolution."""
+        return self._columns() / (self.extent.right - self.extent.left)
+
+    def buffer(self, oversample: int, color_step: int = 1) -> ZBuffer:
+        """An empty image of the panel; see `ZBuffer`."""
+        return ZBuffer(self.extent, self._columns(), oversample, color_step)
+
+    def show(self, buffer: ZBuffer) -> None:
+        """Place the finished image in the axes and label them; what is there stays in view.
+
+        Raises:
+            InvalidInput: What is there is counted in another unit.
+        """
+        _check_unit(self.ax, self.unit)
+        ax, first, plane = self.ax, not self.ax.images, plane_of(self.view)
+        mirror = -1 if is_mirrored(self.view) else 1
+        left, right, bottom, top = buffer.extent
+        extent, order = (mirror * left, mirror * right, bottom, top), 2 + len(ax.images) / 100
+        # "none": vector files get the pixels as they are
+        image = ax.imshow(buffer.rgba(), extent=extent, interpolation="none", zorder=order)
+        image.set_label(_UNIT_MARK + self.unit.symbol)
+        _widen(ax, extent, first, mirror)
+        if plane:
+            ax.set(xlabel=self.unit.label(plane[0]), ylabel=self.unit.label(plane[1]))
+            _set_ticks(ax, _inches(ax, buffer.extent))
+        elif first:
+            draw_box(ax, self.box, self.view, self.unit)
+
+    def _columns(self) -> int:
+        return max(16, round(_inches(self.ax, self.extent)[0] * DPI))
 
 
 def bounding_box(*points: ArrayLike) -> Array:
@@ -42,50 +113,36 @@ def bounding_box(*points: ArrayLike) -> Array:
 
 def view_extent(box: Array, view: View) -> Extent:
     """The part of the projection plane that a box fills."""
-    seen = project(box_corners(box), view)
+    seen = project(_box_corners(box), view)
     low, high = seen.min(axis=0), seen.max(axis=0)
     return Extent(low[0], high[0], low[1], high[1])
 
 
-def box_corners(box: Array) -> Array:
+def _box_corners(box: Array) -> Array:
     """The eight corners, shape (8, 3)."""
     return np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def framed_axes(box: Array, view: View) -> Axes:
+def _checked(box: ArrayLike) -> Array:
+    corners = np.asarray(box, float)
+    if corners.shape != (2, 3) or not (corners[0] < corners[1]).all():
+        raise InvalidInput("box", corners.tolist(), "a lower and an upper corner [m], shape (2, 3)")
+    return corners
+
+
+def _framed_axes(box: Array, view: View) -> Axes:
     """Axes in a new figure of the shape of what they show, about a journal's column wide."""
     span = _span(view_extent(box, view))
     inches = span * (_ROOM / span).min() + _AROUND
     return pyplot().subplots(figsize=tuple(inches), layout="constrained")[1]
 
 
-def image_width(ax: Axes, extent: Extent) -> int:
-    """Columns of an image of that extent at print resolution in the axes."""
-    return max(16, round(_inches(ax, extent)[0] * DPI))
-
-
-def show_buffer(ax: Axes, buffer: ZBuffer, box: Array, view: View, unit: str) -> None:
-    """Place the image in the axes and label them; what is there already stays in view.
-
-    Args:
-        ax: Where to.
-        buffer: The finished image.
-        box: What the view shows, shape (2, 3).
-        view: The view of the image.
-        unit: What coordinates are counted in: "/ L" or "[m]".
-    """
-    first, plane = not ax.images, plane_of(view)
-    mirror = -1 if plane and view_axes(view)[0].sum() < 0 else 1
-    left, right, bottom, top = buffer.extent
-    extent = (mirror * left, mirror * right, bottom, top)
-    # "none": vector files get the pixels as they are
-    ax.imshow(buffer.rgba(), extent=extent, interpolation="none", zorder=2 + len(ax.images) / 100)
-    _widen(ax, extent, first, mirror)
-    if plane:
-        ax.set(xlabel=f"{plane[0]} {unit}", ylabel=f"{plane[1]} {unit}")
-        _set_ticks(ax, _inches(ax, buffer.extent))
-    elif first:
-        draw_box(ax, box, view, unit)
+def _check_unit(ax: Axes, unit: LengthUnit) -> None:
+    marks = (str(image.get_label()) for image in ax.images)
+    found = {mark.removeprefix(_UNIT_MARK) for mark in marks if mark.startswith(_UNIT_MARK)}
+    if found - {unit.symbol}:
+        hint = "give length= or data with attrs['length'] to all that shares axes, or to none"
+        raise InvalidInput("ax", f"counted in {', '.join(found)}", f"in {unit.symbol}", hint)
 
 
 def _span(extent: Extent) -> Array:

@@ -3,40 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from softreach.palette import activation_colors
-from softreach.plot.cloud import point_size, tips_in_lengths
+from softreach.errors import InvalidInput
+from softreach.palette import STEEL, activation_colors
+from softreach.picture.projection import View, project, view_axes
+from softreach.picture.shading import draw_mesh
+from softreach.picture.zbuffer import Extent, ZBuffer
+from softreach.plot.atlas_axes import SheetAxis
+from softreach.plot.cloud import drawn_tips, point_size
+from softreach.plot.coloring import bundle_activations
 from softreach.plot.frame import view_extent
 from softreach.plot.hull import SurfaceMesh
-from softreach.plot.projection import OBLIQUE, View, project, view_axes
-from softreach.plot.shading import draw_mesh
+from softreach.plot.lengths import unit_of
 from softreach.plot.style import DPI, figure_style, pyplot
-from softreach.plot.zbuffer import Extent, ZBuffer
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["SheetAxis", "panel_extent", "plot_cloud_sheet", "plot_hull_sheet"]
+__all__ = ["panel_extent", "plot_cloud_sheet", "plot_hull_sheet"]
 
 Array = NDArray[np.float64]
 Grid = NDArray[np.object_]
 Content = TypeVar("Content")
 
-_STEEL = (0.55, 0.68, 0.82)
 _LEFT, _RIGHT, _BOTTOM, _TOP = 0.75, 0.04, 0.62, 0.08  # inches around a sheet
-
-
-class SheetAxis(NamedTuple):
-    """A parameter along an edge of a sheet, in the units of people."""
-
-    label: str
-    values: tuple[float, ...]
 
 
 def plot_cloud_sheet(
@@ -44,8 +40,8 @@ def plot_cloud_sheet(
     across: SheetAxis,
     up: SheetAxis,
     *,
-    box: Array,
-    view: View = OBLIQUE,
+    box_over_length: ArrayLike,
+    view: View = "oblique",
     width: float = 6.9,
 ) -> Figure:
     """A sheet of clouds at one scale, colored by activation (figure 2a).
@@ -55,10 +51,15 @@ def plot_cloud_sheet(
             each, so that one cloud at a time is held.
         across: Parameter along the horizontal edge.
         up: Parameter along the vertical edge.
-        box: What each panel shows, lower and upper corner [L], shape (2, 3).
-        view: The direction of the eye.
+        box_over_length: What each panel shows, lower and upper corner in L [-], shape (2, 3).
+        view: As in `plot_cloud`.
         width: Of the figure [inch].
+
+    Raises:
+        InvalidInput: A cloud that does not know L, or an unknown view.
+        MissingExtra: matplotlib is not installed.
     """
+    box = np.asarray(box_over_length, float)
 
     def draw(ax: Axes, cloud: xr.Dataset) -> None:
         _draw_cloud(ax, cloud, box, view)
@@ -71,9 +72,9 @@ def plot_hull_sheet(
     across: SheetAxis,
     up: SheetAxis,
     *,
-    box: Array,
-    length: float = 1.0,
-    view: View = OBLIQUE,
+    length: ArrayLike,
+    box_over_length: ArrayLike,
+    view: View = "oblique",
     width: float = 6.9,
 ) -> Figure:
     """A sheet of lit hulls at one scale (figure 3a).
@@ -82,18 +83,29 @@ def plot_hull_sheet(
         hull_at: (column, row) -> surface [m], row 0 at the bottom; None leaves a gap.
         across: As for `plot_cloud_sheet`.
         up: As for `plot_cloud_sheet`.
-        box: As for `plot_cloud_sheet`.
-        length: L [m].
-        view: The direction of the eye.
+        length: L [m], one for all or one for each panel, shape (columns, rows).
+        box_over_length: As for `plot_cloud_sheet`.
+        view: As in `plot_cloud`.
         width: Of the figure [inch].
-    """
 
-    def draw(ax: Axes, hull: SurfaceMesh) -> None:
+    Raises:
+        InvalidInput: An unknown view.
+        MissingExtra: matplotlib is not installed.
+    """
+    box = np.asarray(box_over_length, float)
+    lengths = np.broadcast_to(np.asarray(length, float), (len(across.values), len(up.values)))
+
+    def relative(column: int, row: int) -> tuple[Array, ArrayLike] | None:
+        if (hull := hull_at(column, row)) is None:
+            return None
+        return np.asarray(hull.vertices) / lengths[column, row], hull.faces
+
+    def draw(ax: Axes, surface: tuple[Array, ArrayLike]) -> None:
         buffer = ZBuffer(panel_extent(box, view), _columns(ax), oversample=3, color_step=4)
-        draw_mesh(buffer, np.asarray(hull.vertices) / length, hull.faces, _STEEL, view)
+        draw_mesh(buffer, *surface, STEEL, view)
         _show(ax, buffer)
 
-    return _filled_sheet(hull_at, draw, across, up, box, view, width)
+    return _filled_sheet(relative, draw, across, up, box, view, width)
 
 
 def _filled_sheet(
@@ -168,10 +180,12 @@ def _columns(ax: Axes) -> int:
 
 def _draw_cloud(ax: Axes, cloud: xr.Dataset, box: Array, view: View) -> None:
     extent, columns = panel_extent(box, view), _columns(ax)
-    tips = tips_in_lengths(cloud)
+    if not unit_of(cloud["tip"]).relative:
+        raise InvalidInput("cloud.tip.attrs['length']", None, "L [m], the unit of the sheet")
+    tips = drawn_tips(cloud)
     pixels = point_size(len(tips), box) * columns / (extent.right - extent.left)
     buffer = ZBuffer(extent, columns, oversample=2, color_step=8)
-    colors = activation_colors(cloud["activation"].transpose("sample", "bundle").values)
+    colors = activation_colors(bundle_activations(cloud).values)
     buffer.draw_points(project(tips, view), colors, max(1.0, pixels))
     _show(ax, buffer)
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.plot.projection import View, project, view_axes
+from softreach.picture.projection import View, project, view_axes
+from softreach.plot.lengths import LengthUnit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +22,7 @@ _TICK_GAP = 4.0  # points between an edge and its numbers
 _LABEL_GAP = np.array([23.0, 15.0])  # points between an edge beside or above its label and that
 
 
-def draw_box(ax: Axes, box: Array, view: View, unit: str) -> None:
+def draw_box(ax: Axes, box: Array, view: View, unit: LengthUnit) -> None:
     """Draw the walls of a box that lie behind what it holds, and label its edges.
 
     Args:
@@ -40,7 +41,7 @@ def draw_box(ax: Axes, box: Array, view: View, unit: str) -> None:
     walls = LineCollection(lines, colors="0.85", linewidths=0.5, zorder=1, clip_on=False)
     ax.add_collection(walls)
     for axis in range(3):
-        _label_edge(ax, box, view, edges[axis], ticks[axis], f"{'xyz'[axis]} {unit}")
+        _label_edge(ax, box, view, edges[axis], ticks[axis], unit.label("xyz"[axis]))
     ax.set_axis_off()
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["DPI", "figure_style", "pyplot", "save_figure", "small_axes"]
+__all__ = ["DPI", "figure_style", "pyplot", "save_figure", "small_axes", "write_note"]
 
 DPI = 250
 """Pixels per inch of images inside figures, and of saved PNG files."""
@@ -76,3 +76,11 @@ def save_figure(figure: Figure | Axes, path: str | PathLike[str]) -> None:
         whole = figure.get_figure(root=True)
         if whole is not None:
             whole.savefig(lent, dpi=DPI)
+
+
+def write_note(ax: Axes, text: str, right: float, up: float) -> None:
+    """Small text in axes, at a place from 0 to 1 to the right and up, within the nearer edges."""
+    across, along = ("right" if right > 0.5 else "left"), ("top" if up > 0.5 else "bottom")
+    place = {"ha": across, "va": along, "transform": ax.transAxes}
+    paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
+    ax.text(right, up, text, fontsize=7, color="0.25", zorder=5, bbox=paper, **place)

@@ -57,6 +57,11 @@ class FreeRod(TipMap):
         return self.rule.steps_for(self.tol)
 
     @cached_property
+    def _shape_steps(self) -> int:
+        """Steps with which `tol` holds all along the arm, and directors lose no digits."""
+        return max(self.steps, self.rule.steps_for_shapes(self.tol))
+
+    @cached_property
     def _table(self) -> Array:
         return self.rule.packed_nodes(self.steps)
 
@@ -110,10 +115,11 @@ class FreeRod(TipMap):
         """Packed tables with a step boundary at every station, and the steps up to each."""
         if len(z) == 1 and z[0] == self.length:
             return self._tip_table
-        nodes, ends = self.rule.station_nodes(z, self.steps)
+        nodes, ends = self.rule.station_nodes(z, self._shape_steps)
         return rod.pack(*nodes), ends
 
     @cached_property
     def _tip_table(self) -> tuple[Array, NDArray[np.int64]]:
-        nodes, ends = self.rule.station_nodes(np.array([self.length]), self.steps)
+        steps = max(self.steps, self.rule.fewest_for_frames)
+        nodes, ends = self.rule.station_nodes(np.array([self.length]), steps)
         return rod.pack(*nodes), ends

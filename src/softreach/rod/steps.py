@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -12,17 +13,18 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
 from softreach.errors import InvalidInput
-from softreach.kernels import magnus, rod
+from softreach.kernels import frames, magnus, rod
 from softreach.rod.activation_box import ActivationBox
+from softreach.rod.pilot import pilot_activations, worsened
 
 __all__ = ["Nodes", "StepRule", "check_tol"]
 
 Array = NDArray[np.float64]
+Differences = Callable[[int, Array], Array]
 
 _SAFETY = 2.0
 _SMALLEST_TOL = 1e-12
 _MOST_STEPS = 4096
-_MOST_CORNERS = 1024
 # Rotation of one step [rad] up to which the kernels' series are good to 1e-10 (tips), and to
 # rounding (frames, whose directors must stay orthonormal).
 _TIP_TURN, _FRAME_TURN = 2.0, 1.0
@@ -73,12 +75,10 @@ class StepRule:
     def station_nodes(self, stations: Array, steps: int) -> tuple[Nodes, NDArray[np.int64]]:
         """Nodes of a grid with a step boundary at every station, and the steps up to each.
 
-        No step is longer in S than those of `steps` uniform ones, so their tolerance holds, nor so
-        long that directors would lose digits.
+        No step is longer in S than those of `steps` uniform ones, so their tolerance holds.
         """
         s = self.arm.profile.slender_coordinate(stations)
         gaps = np.diff(s, prepend=0.0)
-        steps = max(steps, self._fewest_steps(_FRAME_TURN))
         counts = np.ceil(gaps / (self.arm.profile.slender_length / steps)).astype(np.int64)
         starts = s - gaps
         pieces = zip(starts, gaps, counts, strict=True)
@@ -88,11 +88,11 @@ class StepRule:
     def steps_for(self, tol: float) -> int:
         """The number of uniform steps in S for which no tip is off by more than `tol`.
 
-        The rule: every corner of the activation box (1,024 drawn at random when there are more),
-        256 points on its faces and 256 inside are run with n and with 2n steps; n is the smallest
-        number whose largest difference, doubled for safety, is within `tol`, and for which no step
-        of theirs turns by more than 2 rad. Halving is sharp at sixth order: it sees 63/64 of the
-        error.
+        The rule: a pilot of activations is run with n and with 2n steps; n is the smallest number
+        whose largest difference, doubled for safety, is within `tol`, and for which no step turns
+        by more than 2 rad. Halving is sharp at sixth order: it sees 63/64 of the error. The pilot
+        holds corners, faces and the inside of the activation box, the corners that bend the arm
+        most, and what a search for larger differences finds from there.
 
         Args:
             tol: Largest tip error, in L.
@@ -101,12 +101,25 @@ class StepRule:
             InvalidInput: `tol` below 1e-12, or not reached within 4,096 steps.
         """
         check_tol(tol)
+        return self._fewest(tol, self.pilot, self._tip_differences, _TIP_TURN)
+
+    def steps_for_shapes(self, tol: float) -> int:
+        """As `steps_for`, for the largest error of the centerline anywhere along the arm."""
+        return self._fewest(tol, self.pilot, self._shape_differences, _FRAME_TURN)
+
+    def _fewest(self, tol: float, pilot: Array, differences: Differences, turn: float) -> int:
+        """The fewest steps whose differences on the pilot, and on what it leads to, are allowed."""
         allowed = tol * self.arm.length / _SAFETY
-        steps = self._fewest_steps(_TIP_TURN)
+        steps = self._fewest_steps(turn)
         while steps <= _MOST_STEPS:
-            error = self._halving_error(steps)
+            found = differences(steps, pilot)
+            error = float(found.max())
             if error <= allowed:
-                return steps
+                worse = worsened(lambda gamma: differences(steps, gamma), pilot, found, self.box)  # noqa: B023
+                error = float(differences(steps, worse).max())
+                if error <= allowed:
+                    return steps
+                pilot = np.concatenate([pilot, worse])
             # Undershoot the sixth-order prediction a little, so that the smallest number is found.
             steps = max(steps + 1, int(0.97 * steps * (error / allowed) ** (1 / 6)))
         raise InvalidInput("tol", tol, f"reachable within {_MOST_STEPS} steps", "use a larger one")
@@ -115,10 +128,15 @@ class StepRule:
         """Steps of which none turns by more than `turn`: |ω| = ζ |u| R2 dS at the pilot samples."""
         return max(2, int(np.ceil(self._largest_turn / turn)))
 
+    @property
+    def fewest_for_frames(self) -> int:
+        """Steps short enough for directors to stay orthonormal to rounding."""
+        return self._fewest_steps(_FRAME_TURN)
+
     @cached_property
     def _largest_turn(self) -> float:
-        """Max ζ |u| R2 over the pilot samples and the arm, times S(L) [rad]."""
-        profile, gamma = self.arm.profile, self._pilot
+        """Largest ζ |u| R2 over the pilot samples and the arm, times S(L) [rad]."""
+        profile, gamma = self.arm.profile, self.pilot
         z = profile.station(np.linspace(0.0, profile.slender_length, 65))
         table = tables(self.arm, z)
         bend = np.linalg.norm(np.einsum("scb,nb->nsc", table.curvature, gamma), axis=-1)
@@ -126,24 +144,25 @@ class StepRule:
         return float(rate.max() * profile.slender_length)
 
     @cached_property
-    def _pilot(self) -> Array:
-        """Corners, points on faces and points inside; the same places of the box for all arms."""
-        m, rng = self.box.bundles, np.random.default_rng(0)
-        if 2**m <= _MOST_CORNERS:
-            corners = np.indices((2,) * m).reshape(m, -1).T.astype(float)
-        else:
-            corners = rng.integers(0, 2, (_MOST_CORNERS, m)).astype(float)
-            corners[:2] = [[0.0], [1.0]]
-        inside, faces = rng.random((256, m)), rng.random((256, m))
-        faces[np.arange(256), rng.integers(0, m, 256)] = rng.integers(0, 2, 256)
-        return np.ascontiguousarray(self.box.from_cube(np.concatenate([corners, faces, inside])))
+    def pilot(self) -> Array:
+        """Activations on which steps are judged, shape (n, bundles)."""
+        return pilot_activations(self.arm, self.box)
 
-    def _halving_error(self, steps: int) -> float:
-        gamma = self._pilot
+    def _tip_differences(self, steps: int, gamma: Array) -> Array:
+        """Distances of the tips with n and with 2n steps [m], shape (n,)."""
         coarse, fine = np.empty((len(gamma), 3)), np.empty((len(gamma), 3))
         rod.tips(self.packed_nodes(steps), gamma, coarse)
         rod.tips(self.packed_nodes(2 * steps), gamma, fine)
-        return float(np.linalg.norm(coarse - fine, axis=1).max())
+        return np.linalg.norm(coarse - fine, axis=1)
+
+    def _shape_differences(self, steps: int, gamma: Array) -> Array:
+        """Largest distances along the centerlines with n and with 2n steps [m], shape (n,)."""
+        ends = np.arange(1, steps + 1)
+        places = np.empty((2, len(gamma), steps, 3))
+        directors = np.empty((len(gamma), steps, 3, 3))
+        frames.frames(self.packed_nodes(steps), ends, gamma, places[0], directors)
+        frames.frames(self.packed_nodes(2 * steps), 2 * ends, gamma, places[1], directors)
+        return np.linalg.norm(places[0] - places[1], axis=-1).max(axis=1)
 
 
 def check_tol(tol: float) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import find_parameter
 from softreach.errors import InvalidInput
+from softreach.plot.metric_map import metric_label, plot_metric_map
 from softreach.studio.state import MapView
 
 if TYPE_CHECKING:
@@ -109,14 +110,12 @@ def atlas_map(atlas: xr.Dataset, view: MapView, held: dict[str, int]) -> AtlasMa
         InvalidInput: There is no such map.
     """
     metric, *names = map_choices(atlas, view)
-    shown = atlas[metric].isel(held).transpose(names[1], names[0]).values
-    if atlas[metric].attrs.get("units") == "m3":
-        shown = shown / float(atlas.attrs["length"]) ** 3
+    shown = atlas[["status", metric]].isel(held).transpose(*names)
     x, y = (atlas[name].values.astype(float) for name in names)
     labels = [_label(atlas, name) for name in names]
-    title = "\n".join([_title(metric), *_held_text(atlas, held)])
+    title = "\n".join([metric_label(atlas[metric]), *_held_text(atlas, held)])
     return AtlasMap(
-        image=_drawn(_shown(atlas, names[0]), _shown(atlas, names[1]), shown, labels, title),
+        image=_drawn(shown, metric, labels, title),
         x=x,
         y=y,
         names=(names[0], names[1]),
@@ -146,38 +145,22 @@ def _label(atlas: xr.Dataset, name: str) -> str:
     return f"{name.replace('_', ' ')} [{unit}]" if unit else name.replace("_", " ")
 
 
-def _drawn(x: Any, y: Any, values: Any, labels: list[str], title: str) -> NDArray[np.uint8]:
+def _drawn(atlas: xr.Dataset, metric: str, labels: list[str], title: str) -> NDArray[np.uint8]:
     # Not through pyplot, which belongs to one thread.
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(_INCHES, _INCHES), dpi=_DPI)
     canvas = FigureCanvasAgg(figure)
-    ax = figure.add_axes(_FRAME)
-    filled = _fill(ax, x, y, np.ma.masked_invalid(values))
-    ax.plot(*(grid.ravel() for grid in np.meshgrid(x, y)), ".", color="k", ms=2, alpha=0.35)
+    ax = plot_metric_map(atlas, metric, ax=figure.add_axes(_FRAME), designs=True, key=False)
     ax.set(xlabel=labels[0], ylabel=labels[1], title=title)
+    x, y = (_shown(atlas, str(name)) for name in atlas["status"].dims)
     ax.set_xlim(x[0], _end(x))
     ax.set_ylim(y[0], _end(y))
-    figure.colorbar(filled, cax=figure.add_axes(_BAR))
+    figure.colorbar(ax.collections[0], cax=figure.add_axes(_BAR))
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
-def _fill(ax: Any, x: Any, y: Any, values: Any) -> Any:
-    known = values.compressed()
-    if min(values.shape) < 2 or not len(known) or np.ptp(known) == 0:
-        return ax.pcolormesh(x, y, values, shading="nearest")
-    filled = ax.contourf(x, y, values, 14)
-    lines = ax.contour(x, y, values, 7, colors="w", linewidths=0.7)
-    ax.clabel(lines, fontsize=7)
-    return filled
-
-
 def _end(values: NDArray[np.float64]) -> float:
     return float(values[-1]) if len(values) > 1 else float(values[0]) + 1.0
-
-
-def _title(metric: str) -> str:
-    text = metric.replace("_", " ")
-    return f"{text} / L³" if "volume" in metric else text

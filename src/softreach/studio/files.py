@@ -75,23 +75,25 @@ def figure_file(reach: Reach, state: StudioState) -> bytes:
     cloud, color = _shown(reach, look)
 
     def write(path: Path) -> None:
-        axes = plot.plot_views(cloud, state.design, shape, color=color)
-        figure = axes["front"].get_figure(root=True)
-        assert figure is not None
-        if label := color_label(look.color):
-            figure.axes[-1].yaxis.label.set_text(label)  # of the color bar
-        plot.save_figure(axes["front"], path)
+        figure = plot.plot_views(cloud, state.design, shape, color=color)
+        plot.save_figure(figure, path)
         pyplot().close(figure)
 
     return _written("figure.png", write)
 
 
-def _shown(reach: Reach, look: Appearance) -> tuple[xr.Dataset, str | int | Array]:
-    """The samples within the slice, and what they are colored by."""
+def _shown(reach: Reach, look: Appearance) -> tuple[xr.Dataset, str | int | xr.DataArray]:
+    """The samples within the slice, and what they are colored by, with its name."""
+    import xarray as xr
+
     cloud = reach.cloud[["tip", "activation"]].isel(sample=shown_samples(reach, look.level))
     color = sample_values(reach, look.level, look.color)
     kept = in_slice(cloud_points(reach, look.level), look.slice)
-    return cloud.isel(sample=kept), color[kept] if isinstance(color, np.ndarray) else color
+    if isinstance(color, np.ndarray):
+        color = xr.DataArray(
+            color[kept], dims="sample", attrs={"long_name": color_label(look.color)}
+        )
+    return cloud.isel(sample=kept), color
 
 
 def _surface(reach: Reach):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach import parallel
-from softreach.kernels import contour, raster, stab
+from softreach.kernels import contour, point_cover, raster
 from softreach.progress import Progress, silent
 
 __all__ = ["Image", "Lattice", "Spans", "image_of"]
@@ -110,7 +110,7 @@ class Image:
         shape = self.lattice.shape[:2]
         parallel.run(
             partial(
-                stab.counts_at,
+                point_cover.cover_at,
                 *(self.vertices, self.triangles, self.unit, shape, *self._bins),
                 *(where[block], out[block]),
             )
@@ -120,7 +120,8 @@ class Image:
 
     @cached_property
     def _bins(self) -> tuple[Ints, Ints]:
-        return stab.bin_triangles(self.vertices, self.triangles, self.unit, self.lattice.shape[:2])
+        shape = self.lattice.shape[:2]
+        return point_cover.bin_triangles(self.vertices, self.triangles, self.unit, shape)
 
     def boundary_crossings(self, axis: int) -> tuple[tuple[Ints, Ints, Ints], Array]:
         """Where the boundary of the image cuts the edges between cell centers along an axis.

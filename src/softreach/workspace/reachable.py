@@ -102,7 +102,8 @@ class ReachableSet:
         if self.multiplicity:
             fields |= {"count": counts, "degree": degrees}
         variables = {name: (tuple("xyz"), values) for name, values in fields.items()}
-        attrs = {"cell": image.lattice.cell, "design": self.arm.to_toml()}
+        cell, length = image.lattice.cell, self.arm.length
+        attrs = {"cell": cell, "length": length, "design": self.arm.to_toml()}
         return xr.Dataset(variables, image.lattice.centers(), attrs)
 
     def surface(self) -> Surface:

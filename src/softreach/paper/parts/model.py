@@ -47,11 +47,12 @@ def _asymmetry(arm: Manipulator, seed: int) -> float:
 
 
 def _draw(arm: Manipulator, notes: Notebook) -> None:
-    from softreach.plot.designs import DesignPanel, plot_designs
+    from softreach.plot import DesignPanel, plot_designs
 
     helix = [DesignPanel("back", arm, "back", [1])]
     words = "A helical fiber of the tapered arm, and its cross-section at the base and halfway."
-    notes.draw("1b", "figure_1b_fiber", words, plot_designs(helix, (0.0, 0.5), width=1.8))
+    figure = plot_designs(helix, stations_over_length=(0.0, 0.5), width=1.8)
+    notes.draw("1b", "figure_1b_fiber", words, figure)
     sides = {0: "back", 1: "back", 2: "front"}
     singles = [
         DesignPanel(f"{arm.bundle_names[k]}, {side}", arm, side, [k]) for k, side in sides.items()

@@ -54,7 +54,7 @@ def _cloud(name: str, arm: Manipulator, settings: Settings, notes: Notebook) -> 
 
 
 def _found(cloud: xr.Dataset, distance: xr.DataArray) -> dict[str, Any]:
-    summary = redundancy_summary(distance, cloud)
+    summary = redundancy_summary(cloud, distance)
     density, measure = tip_density(cloud), solution_measure(cloud)
     filled = density["density"].where(density["density"] > 0)
     size = _inside(measure["solution_measure"].values)
@@ -90,18 +90,21 @@ def _draw(
     distances: dict[str, xr.DataArray],
     notes: Notebook,
 ) -> None:
-    from softreach.plot.designs import DesignPanel, plot_designs
-    from softreach.plot.redundancy import plot_distance_histograms, plot_redundancy
+    from softreach.plot import (
+        DesignPanel,
+        plot_designs,
+        plot_distance_histograms,
+        plot_redundancy,
+    )
 
     panels = [DesignPanel(name, arm) for name, arm in arms.items()]
     words = "The minimal and the redundant design, above their cross-sections at the base."
     notes.draw("4a", "figure_4a_designs", words, plot_designs(panels))
-    rows = plot_redundancy(clouds, distances)
     words = (
         "Clouds colored by |γ| of the last longitudinal bundle (b), slices through the origin in "
         "the frontal and the right-facing plane (c), and the mean activation-space distance (d); "
         "isolated points are light gray."
     )
-    notes.draw("4b-d", "figure_4bcd_redundancy", words, rows["minimal"]["cloud"])
+    notes.draw("4b-d", "figure_4bcd_redundancy", words, plot_redundancy(clouds, distances))
     words = "Distribution of the mean activation-space distance in both clouds."
-    notes.draw("", "distances", words, plot_distance_histograms(distances)["minimal"])
+    notes.draw("", "distances", words, plot_distance_histograms(distances))

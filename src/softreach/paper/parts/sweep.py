@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softreach.arm.designs import minimal_trunk
-from softreach.atlas import DesignSpace, build_atlas
+from softreach.atlas import DesignSpace, build_atlas, open_atlas
+from softreach.errors import InvalidInput
 from softreach.paper.atlas_figures import atlas_figures
 from softreach.paper.notebook import Notebook
 from softreach.paper.parts.shape import ASIDE, shapes
@@ -17,8 +18,9 @@ from softreach.paper.settings import Settings
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["sweep", "swept"]
+__all__ = ["sweep", "swept_atlas"]
 
+_STORE = "atlas.zarr"
 _SCALARS = (
     "volume",
     "unreachability",
@@ -40,24 +42,37 @@ _CAPTIONS = {
 }
 
 
-def swept(settings: Settings, folder: Path) -> xr.Dataset:
+def swept_atlas(folder: Path) -> xr.Dataset:
+    """The atlas that the sweep left in the folder of all results.
+
+    Raises:
+        InvalidInput: It was removed.
+    """
+    try:
+        return open_atlas(folder / _STORE)
+    except InvalidInput as error:
+        notes = folder / "figures" / "sweep.json"
+        raise InvalidInput("atlas", error.value, error.allowed, f"remove {notes} too") from None
+
+
+def _swept(settings: Settings, folder: Path) -> xr.Dataset:
     """The atlas of section 3, computed or continued: revolution from 0 to 108°, taper to 3°."""
     turns = np.radians(np.linspace(0, 108, settings.designs))
     tapers = np.radians(np.linspace(0, 3, settings.designs))
     space = DesignSpace.grid(minimal_trunk(), revolution=turns, taper=tapers)
     return build_atlas(
         space,
-        folder / "atlas.zarr",
+        folder / _STORE,
         settings.samples,
         settings.seed,
-        alpha=settings.alpha,
+        alpha_over_length=settings.alpha,
         accuracy=settings.accuracy,
     )
 
 
 def sweep(settings: Settings, folder: Path, notes: Notebook) -> None:
     """Volumes, unreachability, widths and curvatures of every design."""
-    atlas = swept(settings, folder)
+    atlas = _swept(settings, folder)
     curvature = atlas["bending_quantile"].isel(revolution=-1, taper=[0, -1])
     notes.note(
         designs=int(atlas["volume"].notnull().sum()),

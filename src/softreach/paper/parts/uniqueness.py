@@ -12,7 +12,7 @@ from softreach.arm.designs import minimal_trunk
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse import solve_inverse
 from softreach.paper.notebook import Notebook
-from softreach.paper.parts.sweep import swept
+from softreach.paper.parts.sweep import swept_atlas
 from softreach.paper.settings import Settings
 from softreach.rod.kinematics import configuration
 from softreach.workspace import ReachableSet, reachable_set
@@ -37,7 +37,7 @@ class Pair(NamedTuple):
 
 def uniqueness(settings: Settings, folder: Path, notes: Notebook) -> None:
     """The share of the volume that several activations reach, and the clearest example."""
-    atlas = swept(settings, folder)
+    atlas = swept_atlas(folder)
     share = atlas["multiple_volume"] / atlas["exact_volume"]
     worst = share.isel(share.argmax(...))  # pyright: ignore[reportArgumentType]
     turn, taper = float(worst["revolution"]), float(worst["taper"])
@@ -85,8 +85,7 @@ def _fewer_fibers() -> dict[str, float]:
 
 
 def _draw(atlas: xr.Dataset, arm: Manipulator, pair: Pair, notes: Notebook) -> None:
-    from softreach.plot.arm import plot_arm
-    from softreach.plot.atlas import plot_metric_map
+    from softreach.plot import plot_arm, plot_metric_map
 
     ax = plot_metric_map(atlas, _LABEL)
     words = (
@@ -97,6 +96,6 @@ def _draw(atlas: xr.Dataset, arm: Manipulator, pair: Pair, notes: Notebook) -> N
     if not len(pair.activations):
         return
     shapes = configuration(arm, pair.activations)
-    ax = plot_arm(arm, shapes, view=(-np.pi / 3, np.pi / 9), rest=False)
+    ax = plot_arm(arm, shapes, view="oblique", rest=False)
     words = f"{len(pair.activations)} activations of one three-fiber arm with the same tip."
     notes.draw("", "same_tip", words, ax)

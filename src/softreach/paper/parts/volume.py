@@ -38,10 +38,10 @@ def volume(settings: Settings, folder: Path, notes: Notebook) -> None:
 
 
 def _draw(curves: dict[str, np.ndarray], notes: Notebook) -> None:
-    from softreach.plot.volume_curve import plot_volume_curve
+    from softreach.plot import plot_volume_curve
 
     lines = {"exact": notes.numbers["exact"], "convex": notes.numbers["convex"]}
-    ax = plot_volume_curve(_CURVE, curves, **lines)
+    ax = plot_volume_curve(curves, _CURVE, length=minimal_trunk().length, **lines)
     words = (
         "Volume of the α-shape of the paper's design against its radius, which the paper does not "
         "state, beside the exact volume of the reachable set and of its convex hull."

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from softreach.kernels.raster import hits, turn, upward
+from softreach.kernels.compiler import strict
+from softreach.kernels.raster import extent, left_of_edge, twice_area, upward
 
-__all__ = ["bin_triangles", "counts_at"]
+__all__ = ["bin_triangles", "cover_at"]
 
 
-@njit(cache=True, nogil=True)
+@strict
 def bin_triangles(points, triangles, unit, shape):
     """Triangles over each square of a grid in x and y.
 
@@ -43,17 +43,15 @@ def bin_triangles(points, triangles, unit, shape):
     return members, starts
 
 
-@njit(cache=True, nogil=True)
+@strict
 def squares(points, triangles, t, unit, axis):
     """Squares from the first to one past the last that a triangle touches along an axis."""
-    a = points[triangles[t, 0], axis]
-    b = points[triangles[t, 1], axis]
-    c = points[triangles[t, 2], axis]
-    return int(np.floor(min(a, b, c) / unit)), int(np.floor(max(a, b, c) / unit)) + 1
+    low, high = extent(points, triangles, t, axis)
+    return int(np.floor(low / unit)), int(np.floor(high / unit)) + 1
 
 
-@njit(cache=True, nogil=True)
-def counts_at(points, triangles, unit, shape, members, starts, where, out):
+@strict
+def cover_at(points, triangles, unit, shape, members, starts, where, out):
     """Number of tetrahedra that cover each point.
 
     Args:
@@ -77,17 +75,17 @@ def counts_at(points, triangles, unit, shape, members, starts, where, out):
             out[n] += triangles[t, 3] * side_below(points, triangles, t, x, y, z)
 
 
-@njit(cache=True, nogil=True)
+@strict
 def side_below(points, triangles, t, x, y, z):
     """0 unless a triangle lies below (x, y, z) or holds it; 1 if its normal points up, else -1."""
     a, b, c, side = upward(points, triangles, t, 0, 1)
     if side == 0:
         return 0
-    at_c, at_a = turn(points, a, b, x, y, 0, 1), turn(points, b, c, x, y, 0, 1)
-    area = turn(points, a, b, points[c, 0], points[c, 1], 0, 1)
+    at_c, at_a = twice_area(points, a, b, x, y, 0, 1), twice_area(points, b, c, x, y, 0, 1)
+    area = twice_area(points, a, b, points[c, 0], points[c, 1], 0, 1)
     at_b = area - at_a - at_c
-    inside = hits(points, a, b, at_c, 0, 1) and hits(points, b, c, at_a, 0, 1)
-    if not inside or not hits(points, c, a, at_b, 0, 1):
+    inside = left_of_edge(points, a, b, at_c, 0, 1) and left_of_edge(points, b, c, at_a, 0, 1)
+    if not inside or not left_of_edge(points, c, a, at_b, 0, 1):
         return 0
     base = points[a, 2]
     rise = at_b * (points[b, 2] - base) + at_c * (points[c, 2] - base)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.plot.projection import View, project
-from softreach.plot.zbuffer import ZBuffer
+from softreach.picture.projection import View, project
+from softreach.picture.zbuffer import ZBuffer
 
 __all__ = ["draw_mesh", "shade"]
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.plot.scanline import filled_pixels
+from softreach.picture.scanline import filled_pixels
 
 __all__ = ["Extent", "ZBuffer"]
 

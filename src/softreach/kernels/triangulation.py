@@ -1,4 +1,4 @@
-"""The mesh that a triangulation grows: cells, who neighbors whom, and cavities dug and filled.
+"""A triangulation that grows: cells, who neighbors whom, and cavities dug and filled.
 
 A cell abcd has det[b-a, c-a, d-a] > 0; its neighbor i lies opposite vertex i. The ghost vertex
 stands for all of space beyond the convex hull, so that every face has a cell on both its sides.
@@ -9,20 +9,21 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from softreach.kernels.compiler import strict
 
 __all__ = [
     "DEAD",
     "FACES",
     "GHOST",
-    "Mesh",
+    "Triangulation",
     "compact",
     "corners",
-    "empty_mesh",
+    "empty_triangulation",
+    "enlarged",
     "face",
     "fill",
     "ghost_slot",
-    "grown_mesh",
     "set_first_cell",
 ]
 
@@ -31,7 +32,7 @@ GHOST, DEAD = np.intp(-1), np.intp(-2)  # typed: a literal compiles its function
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 
-class Mesh(NamedTuple):
+class Triangulation(NamedTuple):
     """Cells in their slots, and room to note a cavity.
 
     A freed slot holds DEAD and, as neighbor 0, the next freed slot. ``dug`` lists the cells of the
@@ -45,10 +46,10 @@ class Mesh(NamedTuple):
     walls: np.ndarray
 
 
-@njit(cache=True)
-def empty_mesh(size):
-    """A mesh with room for ``size`` cells; memory is touched only as cells come."""
-    return Mesh(
+@strict
+def empty_triangulation(size):
+    """One with room for ``size`` cells; memory is touched only as cells come."""
+    return Triangulation(
         np.empty((size, 4), np.int32),
         np.empty((size, 4), np.int32),
         np.empty(size, np.int32),
@@ -57,22 +58,22 @@ def empty_mesh(size):
     )
 
 
-@njit(cache=True)
-def grown_mesh(mesh, more):
+@strict
+def enlarged(mesh, more):
     """A copy with at least ``more`` further slots."""
     size = len(mesh.mark)
-    grown = empty_mesh(size + size // 2 + more)
+    larger = empty_triangulation(size + size // 2 + more)
     for t in range(size):  # loops, as slices of arrays take seconds to compile
         for i in range(4):
-            grown.cells[t, i] = mesh.cells[t, i]
-            grown.neighbors[t, i] = mesh.neighbors[t, i]
-        grown.mark[t] = mesh.mark[t]
-        grown.dug[t] = mesh.dug[t]
-        grown.walls[2 * t], grown.walls[2 * t + 1] = mesh.walls[2 * t], mesh.walls[2 * t + 1]
-    return grown
+            larger.cells[t, i] = mesh.cells[t, i]
+            larger.neighbors[t, i] = mesh.neighbors[t, i]
+        larger.mark[t] = mesh.mark[t]
+        larger.dug[t] = mesh.dug[t]
+        larger.walls[2 * t], larger.walls[2 * t + 1] = mesh.walls[2 * t], mesh.walls[2 * t + 1]
+    return larger
 
 
-@njit(cache=True)
+@strict
 def set_first_cell(mesh, start):
     """The first cell and the ghost cells on its four faces; return the number of slots used."""
     mesh.mark[0] = -1
@@ -88,20 +89,20 @@ def set_first_cell(mesh, start):
     return np.intp(5)
 
 
-@njit(cache=True)
+@strict
 def corners(cells, t):
     """The four vertices of cell t."""
     return np.intp(cells[t, 0]), np.intp(cells[t, 1]), np.intp(cells[t, 2]), np.intp(cells[t, 3])
 
 
-@njit(cache=True)
+@strict
 def face(cells, t, i):
     """The vertices of the face of cell t opposite its vertex i, normal outwards."""
     a, b, c = cells[t, FACES[i, 0]], cells[t, FACES[i, 1]], cells[t, FACES[i, 2]]
     return np.intp(a), np.intp(b), np.intp(c)
 
 
-@njit(cache=True)
+@strict
 def ghost_slot(cells, t):
     """Which vertex of cell t is the ghost; -1 if none."""
     for i in range(4):
@@ -110,7 +111,7 @@ def ghost_slot(cells, t):
     return -1
 
 
-@njit(cache=True)
+@strict
 def slot_of(neighbors, u, t):
     """Which neighbor of u is t."""
     for i in range(3):
@@ -119,7 +120,7 @@ def slot_of(neighbors, u, t):
     return 3
 
 
-@njit(cache=True)
+@strict
 def fill(mesh, p, n_dug, n_walls, used, free, table):
     """Join p to every wall; return slots used, the head of the freed slots, and the last cell."""
     size = 1
@@ -144,7 +145,7 @@ def fill(mesh, p, n_dug, n_walls, used, free, table):
     return used, free, t
 
 
-@njit(cache=True)
+@strict
 def join(mesh, old, i, p, t):
     """Make cell t of p and face i of an old cell, and tie it to the cell behind that face."""
     # the outward face turned round: p is on its inner side, so (face, p) is positive
@@ -155,14 +156,14 @@ def join(mesh, old, i, p, t):
     mesh.neighbors[behind, slot_of(mesh.neighbors, behind, old)] = t
 
 
-@njit(cache=True)
+@strict
 def bury(mesh, t, free):
     """Put slot t on the list of freed ones."""
     mesh.cells[t, 0] = DEAD
     mesh.neighbors[t, 0] = free
 
 
-@njit(cache=True)
+@strict
 def link(mesh, t, i, table, size):
     """Tie face i of new cell t to the new cell on the same edge of the cavity, once both exist.
 
@@ -183,7 +184,7 @@ def link(mesh, t, i, table, size):
     table[1, at] = (t << 2) | i
 
 
-@njit(cache=True)
+@strict
 def compact(mesh, used):
     """Move the finite cells to the front, in place; return how many there are."""
     cells, neighbors, renumbered = mesh.cells, mesh.neighbors, mesh.mark

@@ -1,0 +1,105 @@
+"""What the metrics of one design are computed from; each result is found once and shared."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.manipulator import Manipulator
+from softreach.atlas.command import Command
+from softreach.atlas.metric import Metric, Need
+from softreach.curvature import stream_statistics
+from softreach.geometry.alpha_shape import AlphaComplex
+from softreach.geometry.delaunay import delaunay
+from softreach.geometry.hull import convex_hull
+from softreach.rod.kinematics import tip_positions
+
+__all__ = ["Intermediates", "activations_of"]
+
+Array = NDArray[np.float64]
+
+_BLOCK = 65_536  # samples at a time, where not all of them are needed at once
+
+
+class Intermediates(Mapping[Need, Any]):
+    """Need -> its value for one design, computed at first use.
+
+    Args:
+        arm: The design.
+        cube: Unit activations that all designs share, shape (n, bundles).
+        command: Radius, accuracy, tolerance, stations and quantiles.
+        metrics: The metrics that will be computed.
+    """
+
+    def __init__(
+        self, arm: Manipulator, cube: Array, command: Command, metrics: Sequence[Metric]
+    ) -> None:
+        self.arm, self.cube, self.command = arm, cube, command
+        self.wanted = frozenset(need for metric in metrics for need in metric.needs)
+        self._found: dict[Need, Any] = {}
+
+    def __getitem__(self, need: Need) -> Any:
+        if need not in self._found:
+            self._found[need] = _COMPUTE[need](self)
+        return self._found[need]
+
+    def __iter__(self) -> Iterator[Need]:
+        return iter(_COMPUTE)
+
+    def __len__(self) -> int:
+        return len(_COMPUTE)
+
+    def forget(self, *needs: Need) -> None:
+        """Free the memory of results that are no longer needed."""
+        for need in needs:
+            self._found.pop(need, None)
+
+
+def activations_of(arm: Manipulator, cube: Array) -> Array:
+    """The shared unit activations in the arm's own bounds, shape (n, bundles)."""
+    low, high = arm.bounds.T
+    return low + cube[:, : arm.bundles] * (high - low)
+
+
+def _tips(of: Intermediates) -> Array:
+    return tip_positions(of.arm, activations_of(of.arm, of.cube), of.command.tol)
+
+
+def _alpha_complex(of: Intermediates) -> AlphaComplex:
+    return AlphaComplex(triangulation=delaunay(of[Need.TIPS]))
+
+
+def _convex_volume(of: Intermediates) -> float:
+    """From the triangulation, if there has to be one anyway."""
+    if Need.ALPHA_COMPLEX in of.wanted:
+        return float(of[Need.ALPHA_COMPLEX].volumes.sum())
+    return convex_hull(of[Need.TIPS]).volume
+
+
+def _reachable_set(of: Intermediates) -> Any:
+    from softreach.workspace import reachable_set
+
+    return reachable_set(of.arm, accuracy=of.command.accuracy, tol=of.command.tol)
+
+
+def _strain_statistics(of: Intermediates) -> Any:
+    arm, cube = of.arm, of.cube
+    blocks = (activations_of(arm, cube[k : k + _BLOCK]) for k in range(0, len(cube), _BLOCK))
+    stations = np.array(of.command.stations) * arm.length
+    return stream_statistics(arm, blocks, stations, quantiles=of.command.quantiles)
+
+
+_COMPUTE: dict[Need, Callable[[Intermediates], Any]] = {
+    Need.ARM: lambda of: of.arm,
+    Need.LENGTH: lambda of: of.arm.length,
+    Need.ACTIVATIONS: lambda of: activations_of(of.arm, of.cube),
+    Need.TIPS: _tips,
+    Need.ALPHA: lambda of: of.command.alpha_over_length * of.arm.length,
+    Need.ALPHA_COMPLEX: _alpha_complex,
+    Need.CONVEX_VOLUME: _convex_volume,
+    Need.REACHABLE_SET: _reachable_set,
+    Need.STRAIN_STATISTICS: _strain_statistics,
+}

@@ -1,0 +1,168 @@
+"""A number that an atlas holds of every design: its name, unit and meaning, and how it is found."""
+
+from __future__ import annotations
+
+import pickle
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.errors import InvalidInput, SoftreachError
+
+__all__ = ["Metric", "MetricFailed", "Need", "check_travels"]
+
+Array = NDArray[np.float64]
+
+PROFILE = ("station", "quantile")
+
+
+class Need(Enum):
+    """What a metric can be computed from; each is found once per design, for all metrics."""
+
+    ARM = "the design, a Manipulator"
+    LENGTH = "its length L [m]"
+    ACTIVATIONS = "activations of the samples [-], shape (n, bundles)"
+    TIPS = "tips of the samples [m], shape (n, 3)"
+    ALPHA = "radius of the alpha shape of this design [m]"
+    ALPHA_COMPLEX = "alpha shapes of every radius, an AlphaComplex of the tips"
+    CONVEX_VOLUME = "volume of the convex hull of the tips [m³]"
+    REACHABLE_SET = "the exact ReachableSet; it is computed with all threads"
+    STRAIN_STATISTICS = "dataset of bending, torsion and extension, as of curvature_statistics"
+
+
+class MetricFailed(SoftreachError):
+    """A metric could not be computed, or gave what it must not."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Metric:
+    """A number that an atlas holds of every design.
+
+    Raises:
+        InvalidInput: A name that is no identifier, needs that are no `Need`, or no function.
+    """
+
+    name: str
+    """Name of the variable in the atlas."""
+    unit: str
+    """As in "m", "m3", "1/m"; "1" if there is none."""
+    meaning: str
+    needs: tuple[Need, ...]
+    """What `compute` takes, in this order."""
+    compute: Callable[..., Any]
+    """Returns the number. Worker processes can use functions of a module only, no lambdas."""
+    over: tuple[str, ...] = ()
+    """Dimensions of the result: () for a number, ("station", "quantile") for a profile."""
+    nan_if: str = ""
+    """When NaN is the right answer; empty if never. A design with any other NaN has failed."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "needs", tuple(self.needs))
+        if not self.name.isidentifier():
+            raise InvalidInput("name of the metric", self.name, "letters, digits and underscores")
+        if not all(isinstance(need, Need) for need in self.needs):
+            allowed = f"some of Need.{', Need.'.join(Need.__members__)}"
+            raise InvalidInput(f"needs of metric {self.name}", self.needs, allowed)
+        if not callable(self.compute):
+            raise InvalidInput(f"compute of metric {self.name}", self.compute, "a function")
+        if self.over not in ((), PROFILE):
+            raise InvalidInput(f"over of metric {self.name}", self.over, f"() or {PROFILE}")
+
+    def value(self, found: Mapping[Need, Any], sizes: Mapping[str, int]) -> Array:
+        """The metric of one design, shape () or that of a profile.
+
+        Args:
+            found: Gives what the metric needs.
+            sizes: Number of stations and quantiles.
+
+        Raises:
+            MetricFailed: The function failed, or returned something that is not finite or of
+                another shape.
+        """
+        arguments = [found[need] for need in self.needs]
+        try:
+            value = np.asarray(self.compute(*arguments), dtype=np.float64)
+        except Exception as error:
+            raise MetricFailed(f"{self.name}: {type(error).__name__}: {error}") from error
+        shape = tuple(sizes[dim] for dim in self.over)
+        if value.shape != shape:
+            raise MetricFailed(f"{self.name}: of shape {value.shape}, must be of shape {shape}")
+        if np.isinf(value).any() or (np.isnan(value).any() and not self.nan_if):
+            raise MetricFailed(f"{self.name} = {value}: must be finite")
+        return value
+
+    def to_dict(self) -> dict[str, Any]:
+        """The metric in plain values: all of it but the function, of which only the place is kept.
+
+        Two metrics with equal values here are the same to a store.
+        """
+        return {
+            "name": self.name,
+            "unit": self.unit,
+            "meaning": self.meaning,
+            "needs": [need.name for need in self.needs],
+            "over": list(self.over),
+            "nan_if": self.nan_if,
+            "compute": place_of(self.compute),
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """The metric that `to_dict` described; to compute it, the real one has to be passed."""
+        known = {
+            "needs": tuple(Need[name] for name in values["needs"]),
+            "over": tuple(values["over"]),
+            "compute": _Elsewhere(values["compute"]),
+        }
+        return cls(**{**values, **known})
+
+
+@dataclass(frozen=True)
+class _Elsewhere:
+    """A function of which only the place is known."""
+
+    place: str
+
+    def __call__(self, *_: Any) -> float:
+        raise MetricFailed(f"{self.place} is known by name only; pass the metric to build_atlas")
+
+
+def place_of(compute: Callable[..., Any]) -> str:
+    """Module and name of a function."""
+    if isinstance(compute, _Elsewhere):
+        return compute.place
+    named: Any = compute if hasattr(compute, "__qualname__") else type(compute)
+    return f"{named.__module__}:{named.__qualname__}"
+
+
+def check_travels(metric: Metric, *, by_import: bool) -> None:
+    """Check that a metric can be sent to another process.
+
+    Args:
+        metric: Which one.
+        by_import: Whether that process imports what it is sent, as those of Python's pools do, and
+            so has nothing that was typed into a session.
+
+    Raises:
+        InvalidInput: It cannot.
+    """
+    main = sys.modules["__main__"]
+    typed = getattr(metric.compute, "__module__", "") == "__main__" and not hasattr(
+        main, "__file__"
+    )
+    try:
+        pickle.dumps(metric.compute)
+    except Exception:
+        typed = by_import = True
+    if typed and by_import:
+        raise InvalidInput(
+            f"compute of metric {metric.name}",
+            place_of(metric.compute),
+            "a function of a module where worker processes compute it",
+            "lambdas and functions inside of functions cannot be sent to them",
+        )

@@ -1,0 +1,120 @@
+"""Questions asked of an atlas: how far it is, which design is where, and its cloud."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from softreach.arm.manipulator import Manipulator
+from softreach.atlas.intermediates import activations_of
+from softreach.atlas.reading import command_of, opened_atlas
+from softreach.atlas.store import DONE, FAILED, GAP, TODO
+from softreach.errors import InvalidInput
+from softreach.rod.kinematics import tip_positions
+from softreach.schema import cloud_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from softreach.atlas.reading import AtlasLike
+
+__all__ = ["AtlasStatus", "atlas_cloud", "atlas_design", "atlas_status"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class AtlasStatus:
+    """How far an atlas is."""
+
+    designs: int
+    done: int
+    failed: int
+    gaps: int
+    todo: int
+    messages: dict[int, str]
+    """Why designs failed or cannot exist: number -> message."""
+
+
+def atlas_status(atlas: AtlasLike) -> AtlasStatus:
+    """How many designs of an atlas are done, and what is wrong with the others.
+
+    Args:
+        atlas: A store; or a dataset from `open_atlas`, which has the status of when it was opened.
+
+    Raises:
+        InvalidInput: There is no atlas.
+    """
+    opened = opened_atlas(atlas, metrics=False)
+    status = opened["status"].values.ravel()
+    counts = np.bincount(status, minlength=4).tolist()
+    return AtlasStatus(
+        designs=status.size,
+        done=counts[DONE],
+        failed=counts[FAILED],
+        gaps=counts[GAP],
+        todo=counts[TODO],
+        messages=_messages(opened, np.isin(status, (FAILED, GAP))),
+    )
+
+
+def atlas_design(atlas: AtlasLike, **at: float) -> Manipulator:
+    """The design at, or nearest to, these parameters.
+
+    Args:
+        atlas: A store, or a dataset from `open_atlas`.
+        **at: Every parameter [SI units], or `design` and its number.
+
+    Raises:
+        InvalidInput: A parameter is missing or unknown.
+        InvalidDesign: The place is a gap.
+    """
+    opened = opened_atlas(atlas, metrics=False)
+    return command_of(opened).design(int(_nearest(opened[["number"]], at)["number"]))
+
+
+def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
+    """The cloud of the design at, or nearest to, these parameters, like those of `compute_cloud`.
+
+    Stored tips are rounded to 1e-5 of the shortest length; without them the cloud is computed
+    again, exactly as it was.
+
+    Args:
+        atlas: A store, or a dataset from `open_atlas`.
+        **at: Every parameter [SI units], or `design` and its number.
+
+    Raises:
+        InvalidInput: A parameter is missing or unknown, or the design is not done.
+    """
+    opened = opened_atlas(atlas, metrics=False)
+    command = command_of(opened)
+    kept = [name for name in ("status", "number", "tip") if name in opened]
+    row = _nearest(opened[kept], at)
+    if (status := int(row["status"])) != DONE:
+        raise InvalidInput("design", at, "done", f"its status is {status}")
+    arm = command.design(int(row["number"]))
+    activation = activations_of(arm, opened["unit_activation"].values)
+    if "tip" in opened:
+        tip = np.ascontiguousarray(row["tip"].values.T, dtype=float)
+    else:
+        tip = tip_positions(arm, activation, command.tol)
+    return cloud_dataset(
+        arm, activation, tip, seed=command.seed, sampler=command.sampler, tol=command.tol
+    )
+
+
+def _messages(atlas: xr.Dataset, told: np.ndarray) -> dict[int, str]:
+    numbers = atlas["number"].values.ravel()[told].tolist()
+    texts = atlas["message"].values.ravel()[told].tolist() if told.any() else []
+    return dict(zip(numbers, map(str, texts), strict=True))
+
+
+def _nearest(atlas: xr.Dataset, at: Mapping[str, float]) -> xr.Dataset:
+    """One design of an atlas or of a part of it."""
+    dims = [str(dim) for dim in atlas["number"].dims]
+    if set(at) != set(dims):
+        raise InvalidInput("parameters", ", ".join(at) or "none", f"all of {', '.join(dims)}")
+    if "design" in at:
+        return atlas.isel(design=int(at["design"]))
+    return atlas.sel(at, method="nearest")

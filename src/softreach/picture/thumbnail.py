@@ -1,0 +1,115 @@
+"""Small pictures for notebooks: what a value looks like, beside what it says of itself."""
+
+from __future__ import annotations
+
+import base64
+import html
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.palette import STEEL, Color
+from softreach.picture.png import png_bytes
+from softreach.picture.projection import View, project
+from softreach.picture.shading import draw_mesh
+from softreach.picture.zbuffer import Extent, ZBuffer
+
+__all__ = ["Dots", "Skin", "html_card", "thumbnail"]
+
+_WIDTH = 220  # pixels
+_MARGIN = 0.03
+_MOST = 100_000  # points; more do not show at this size
+_FINE = 20_000  # faces; more are about a pixel each, whose edges need no smoothing
+
+
+class Skin(NamedTuple):
+    """A lit surface."""
+
+    vertices: ArrayLike
+    """Shape (v, 3)."""
+    faces: ArrayLike
+    """Shape (f, 3)."""
+    color: Color = STEEL
+
+
+class Dots(NamedTuple):
+    """Points."""
+
+    points: ArrayLike
+    """Shape (n, 3)."""
+    colors: ArrayLike = (64, 100, 150)
+    """RGB from 0 to 255, shape (n, 3) or (3,)."""
+
+
+def html_card(text: str, *parts: Skin | Dots, view: View = "oblique") -> str:
+    """HTML that shows parts above a text, for `_repr_html_`; the text alone if they are empty.
+
+    Args:
+        text: What the value says of itself, such as its `repr`; not yet HTML.
+        *parts: What to show, in common units.
+        view: The direction of sight.
+    """
+    shown = thumbnail(*parts, view=view)
+    said = f"<pre>{html.escape(text)}</pre>"
+    if shown is None:
+        return said
+    data = base64.b64encode(shown).decode("ascii")
+    return f'<div><img alt="" src="data:image/png;base64,{data}" width="{_WIDTH}"/>{said}</div>'
+
+
+def thumbnail(*parts: Skin | Dots, view: View = "oblique", width: int = _WIDTH) -> bytes | None:
+    """A small PNG of surfaces and points in one view, transparent around them.
+
+    Args:
+        *parts: What to show, in common units.
+        view: The direction of sight.
+        width: Columns and rows [pixels].
+
+    Returns:
+        The content of a PNG file; None if there is nothing finite to show.
+
+    Raises:
+        InvalidInput: An unknown view.
+    """
+    parts = tuple(_thinned(part) if isinstance(part, Dots) else part for part in parts)
+    seen = [project(np.reshape(part[0], (-1, 3)), view) for part in parts]
+    extent = _square_around(seen)
+    if extent is None:
+        return None
+    faces = sum(len(np.asarray(part.faces)) for part in parts if isinstance(part, Skin))
+    buffer = ZBuffer(extent, width, oversample=1 if faces > _FINE else 2, color_step=4)
+    for part, points in zip(parts, seen, strict=True):
+        if isinstance(part, Skin):
+            _draw_skin(buffer, part, view)
+        else:
+            _draw_dots(buffer, points, part.colors)
+    return png_bytes(buffer.rgba())
+
+
+def _square_around(seen: list[NDArray[np.float64]]) -> Extent | None:
+    """A square of the projection plane with a margin around all finite points."""
+    flat = np.concatenate([points[:, :2] for points in seen]) if seen else np.empty((0, 2))
+    flat = flat[np.isfinite(flat).all(axis=1)]
+    if not len(flat):
+        return None
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    middle = (low + high) / 2
+    half = (0.5 + _MARGIN) * max(float((high - low).max()), 1e-9)
+    return Extent(middle[0] - half, middle[0] + half, middle[1] - half, middle[1] + half)
+
+
+def _thinned(dots: Dots) -> Dots:
+    points, colors = np.reshape(dots.points, (-1, 3)), np.asarray(dots.colors)
+    every = 1 + len(points) // _MOST
+    return Dots(points[::every], colors[::every] if colors.ndim == 2 else colors)
+
+
+def _draw_skin(buffer: ZBuffer, skin: Skin, view: View) -> None:
+    if np.size(skin.faces):
+        draw_mesh(buffer, skin.vertices, skin.faces, skin.color, view)
+
+
+def _draw_dots(buffer: ZBuffer, points: NDArray[np.float64], colors: ArrayLike) -> None:
+    size = float(np.clip(0.8 * buffer.shape[1] / np.cbrt(max(len(points), 1)), 1.0, 6.0))
+    buffer.draw_points(points, colors, size)

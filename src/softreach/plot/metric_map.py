@@ -1,0 +1,153 @@
+"""Maps of the metrics of an atlas over its two parameters."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.atlas import over_length
+from softreach.errors import InvalidInput
+from softreach.plot.atlas_axes import SheetAxis, plain, sheet_axes
+from softreach.plot.coloring import COLORMAP
+from softreach.plot.style import figure_style, small_axes
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+__all__ = ["metric_label", "plot_metric_map"]
+
+Array = NDArray[np.float64]
+
+_METRICS = {
+    "volume": "$V/L^3$ (α-shape)",
+    "exact_volume": "$V/L^3$ (exact)",
+    "convex_volume": "$V_{conv}/L^3$",
+    "exact_convex_volume": "$V_{conv}/L^3$ (exact)",
+    "unreachability": "UNR (α-shape)",
+    "exact_unreachability": "UNR (exact)",
+}
+_RELATIVE = {"m": " / L", "m2": " / L²", "m3": " / L³", "1/m": " · L"}
+
+
+def plot_metric_map(
+    atlas: xr.Dataset,
+    metric: str,
+    *,
+    ax: Axes | None = None,
+    designs: bool = False,
+    key: bool = True,
+) -> Axes:
+    """Contours of a metric over the two parameters of an atlas (figure 3b); its best is marked.
+
+    Volumes and lengths are relative to each design's own L. The best is the largest value, of
+    unreachability the smallest. Designs without a value stay white; where there are no contours, as
+    in a single row of designs, each design is a cell.
+
+    Args:
+        atlas: From `open_atlas`, a grid of two parameters.
+        metric: Which one.
+        ax: Axes to draw in; None for a new figure.
+        designs: Whether to mark every design by a dot.
+        key: Whether to explain the colors.
+
+    Returns:
+        The axes.
+
+    Raises:
+        InvalidInput: No such metric, or no two parameters.
+        MissingExtra: matplotlib is not installed.
+    """
+    across, up = sheet_axes(atlas)
+    if metric not in atlas or atlas[metric].dims != atlas["status"].dims:
+        raise InvalidInput("metric", metric, "a metric of the atlas")
+    values = over_length(atlas, metric).values.T
+    with figure_style(ax):
+        ax = small_axes() if ax is None else ax
+        filled = _fill(ax, across, up, np.ma.masked_invalid(values))
+        if designs:
+            places = (grid.ravel() for grid in np.meshgrid(across.values, up.values))
+            ax.plot(*places, ".", color="k", ms=2, alpha=0.35)
+        if np.isfinite(values).any():
+            _mark_best(ax, across, up, values, smallest="unreachability" in metric)
+        if key:
+            ax.figure.colorbar(filled, ax=ax, label=metric_label(atlas[metric]))
+        ax.set(xlabel=across.label, ylabel=up.label)
+    return ax
+
+
+def metric_label(metric: xr.DataArray) -> str:
+    """What is drawn of a metric, in words or symbols, with what it is relative to."""
+    name = str(metric.name)
+    relative = _RELATIVE.get(metric.attrs.get("units", "1"), "")
+    return _METRICS.get(name, plain(name) + relative)
+
+
+def _fill(ax: Axes, across: SheetAxis, up: SheetAxis, values: Any) -> Any:
+    """Filled contours with lines, or cells where there are none; what a color bar explains."""
+    known = values.compressed()
+    if min(values.shape) < 2 or not len(known) or np.ptp(known) == 0:
+        return ax.pcolormesh(_edges(across), _edges(up), values, cmap=COLORMAP)
+    filled = ax.contourf(across.values, up.values, values, 14, cmap=COLORMAP)
+    _draw_contours(ax, across, up, values, np.asarray(filled.levels))
+    return filled
+
+
+def _edges(axis: SheetAxis) -> Array:
+    """Of cells around the values, the outer ones like their neighbors; around one value 1 wide."""
+    values = np.asarray(axis.values, float)
+    if len(values) == 1:
+        return values + [-0.5, 0.5]
+    middle = (values[1:] + values[:-1]) / 2
+    return np.array([2 * values[0] - middle[0], *middle, 2 * values[-1] - middle[-1]])
+
+
+def _draw_contours(
+    ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, levels: Array
+) -> None:
+    """Every second level as a line, white on dark and dark on bright, with its value."""
+    ink = ["w" if k < 0.65 * len(levels) else "0.15" for k in range(0, len(levels), 2)]
+    lines = ax.contour(across.values, up.values, values, levels[::2], colors=ink, linewidths=0.5)
+    low = np.array([across.values[0], up.values[0]])
+    span = np.array([across.values[-1], up.values[-1]]) - low
+    paths = ((np.asarray(path.vertices, float) - low) / span for path in lines.get_paths())
+    places = [low + span * place for path in paths for place in _label_place(path)]
+    if places:
+        decimals = max(0, math.ceil(-math.log10(levels[1] - levels[0])))
+        ax.clabel(lines, manual=places, fontsize=6, fmt=f"%.{decimals}f")
+
+
+def _label_place(path: Array) -> list[Array]:
+    """Where on a contour, from 0 to 1 across and up, its label is far from every edge."""
+    inside = path[((path > 0.1) & (path < 0.86)).all(axis=1)]
+    distance = np.abs(inside - (0.5, 0.35)).sum(axis=1)
+    return [inside[distance.argmin()]] if len(inside) else []
+
+
+def _mark_best(ax: Axes, across: SheetAxis, up: SheetAxis, values: Array, smallest: bool) -> None:
+    row, column = _best(values, smallest)
+    place = across.values[column], up.values[row]
+    dot = {"ms": 5, "mfc": "w", "mec": "k", "mew": 0.8, "clip_on": False, "zorder": 5}
+    ax.plot(*place, "o", **dot)
+    # inside the axes, whichever edge the best lies at
+    left = column > (len(across.values) - 1) / 2
+    down = row > (len(up.values) - 1) / 2
+    ax.annotate(
+        f"{values[row, column]:.3f}",
+        place,
+        (-7 if left else 7, -6 if down else 6),
+        textcoords="offset points",
+        ha="right" if left else "left",
+        va="top" if down else "bottom",
+        fontsize=7,
+        bbox={"fc": "w", "ec": "none", "pad": 1.2, "alpha": 0.8},
+    )
+
+
+def _best(values: Array, smallest: bool) -> tuple[int, int]:
+    flat = np.nanargmin(values) if smallest else np.nanargmax(values)
+    row, column = np.unravel_index(flat, values.shape)
+    return int(row), int(column)

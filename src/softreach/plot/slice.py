@@ -1,0 +1,142 @@
+"""Slices of a reachable set: how many activations reach each place, and where the map folds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from softreach.errors import InvalidInput
+from softreach.picture.projection import View, is_mirrored, plane_of, sight_axis
+from softreach.plot.lengths import LengthUnit, unit_of
+from softreach.plot.style import figure_style, pyplot, small_axes
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["plot_slice", "plot_slices"]
+
+_COLORS = ("white", "#cfe3f2", "#f2a65a", "#c8553d", "#6b2737")
+_LABELS = ("out of reach", "one activation", "two", "three", "four or more")
+
+
+def plot_slice(
+    grid: xr.Dataset,
+    *,
+    ax: Axes | None = None,
+    view: View = "front",
+    at: float = 0.0,
+    key: bool = True,
+) -> Axes:
+    """Draw one plane of a reachable set: the number of activations that reach each place.
+
+    A black line surrounds the places that the map reaches with both orientations: they lie behind a
+    fold. A set of more than three bundles has no such numbers and shows what is reachable.
+
+    Args:
+        grid: `ReachableSet.grid`: `count` and `degree`, or `occupied`, over x, y, z [m].
+        ax: Axes to draw in; None for a new figure.
+        view: A view along an axis: "front" for a plane y = at, "side" for x = at, "top" for z = at.
+        at: Where the plane cuts that axis [m]; the nearest layer of cells is shown.
+        key: Whether to explain the colors.
+
+    Returns:
+        The axes, in L if the grid knows it (attribute `length`), else in meters.
+
+    Raises:
+        InvalidInput: Not a view along an axis, or a plane that misses the grid.
+        MissingExtra: matplotlib is not installed.
+    """
+    axis, unit = sight_axis(view), unit_of(grid)
+    layer = _layer(grid, axis, at)
+    with figure_style(ax):
+        ax = small_axes(3.4, 4.2) if ax is None else ax
+        highest = _draw(ax, layer, view, unit)
+        ax.set_title(f"{axis} = {unit.of(at):.3g} {unit.symbol}")
+        if key:
+            _draw_key(ax, highest, "count" in layer)
+    return ax
+
+
+def plot_slices(
+    grid: xr.Dataset, *, at: Sequence[float] = (0.0, 0.0, 0.0), width: float = 9.6
+) -> Figure:
+    """Draw the three planes of a reachable set that meet at a point: from the side, front and top.
+
+    Args:
+        grid: As in `plot_slice`.
+        at: The point [m].
+        width: Of the figure [inch].
+
+    Raises:
+        InvalidInput: A point that is none, or outside the grid.
+        MissingExtra: matplotlib is not installed.
+    """
+    if np.shape(at) != (3,):
+        raise InvalidInput("at", at, "a point (x, y, z) [m]")
+    with figure_style():
+        size = (width, 0.375 * width)
+        figure, axes = pyplot().subplots(1, 3, figsize=size, layout="constrained")
+        for ax, view, place in zip(axes, ("side", "front", "top"), at, strict=True):
+            plot_slice(grid, ax=ax, view=view, at=place)
+    return figure
+
+
+def _layer(grid: xr.Dataset, axis: str, at: float) -> xr.Dataset:
+    centers, half = grid[axis].values, grid.attrs["cell"] / 2
+    if not centers[0] - half <= at <= centers[-1] + half:
+        raise InvalidInput("at", at, f"between {centers[0]:.4g} and {centers[-1]:.4g} m")
+    return grid.sel({axis: at}, method="nearest")
+
+
+def _draw(ax: Axes, layer: xr.Dataset, view: View, unit: LengthUnit) -> int:
+    """The layer, seen from there; returns the largest number that is shown."""
+    plane = plane_of(view)
+    assert plane is not None  # the view is along an axis
+    across, up = plane
+    name = "count" if "count" in layer else "occupied"
+    shown = np.minimum(layer[name].transpose(up, across).values.astype(int), len(_COLORS) - 1)
+    centers = unit.of(layer[across].values), unit.of(layer[up].values)
+    _draw_cells(ax, shown, *centers, half=float(unit.of(layer.attrs["cell"])) / 2)
+    if "degree" in layer:
+        folded = (layer["count"] > abs(layer["degree"])).transpose(up, across).values
+        _draw_folds(ax, folded, *centers)
+    ax.set(xlabel=unit.label(across), ylabel=unit.label(up), aspect="equal")
+    if is_mirrored(view) and not ax.xaxis_inverted():
+        ax.invert_xaxis()
+    return int(shown.max())
+
+
+def _draw_cells(
+    ax: Axes, shown: np.ndarray, across: np.ndarray, up: np.ndarray, half: float
+) -> None:
+    from matplotlib.colors import ListedColormap
+
+    ax.imshow(
+        shown,
+        origin="lower",
+        extent=(across[0] - half, across[-1] + half, up[0] - half, up[-1] + half),
+        cmap=ListedColormap(_COLORS),
+        vmin=-0.5,
+        vmax=len(_COLORS) - 0.5,
+        interpolation="nearest",
+    )
+
+
+def _draw_folds(ax: Axes, folded: np.ndarray, across: np.ndarray, up: np.ndarray) -> None:
+    if folded.any():
+        line = {"levels": [0.5], "colors": "black", "linewidths": 0.6}
+        ax.contour(across, up, folded.astype(float), **line)
+
+
+def _draw_key(ax: Axes, highest: int, counted: bool) -> None:
+    from matplotlib.patches import Patch
+
+    labels = _LABELS[1 : highest + 1] if counted else ("reachable",)
+    patches = [Patch(color=c, label=t) for c, t in zip(_COLORS[1:], labels, strict=False)]
+    title = "reached by" if counted else None
+    place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.2), "ncols": 2}
+    ax.legend(handles=patches, title=title, **place)

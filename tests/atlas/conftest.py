@@ -1,0 +1,31 @@
+"""Atlases that several tests ask."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from tests.atlas.scripts import build16
+
+
+@pytest.fixture(scope="session")
+def paper(tmp_path_factory) -> xr.Dataset:
+    """A coarse atlas of the paper's designs."""
+    store = tmp_path_factory.mktemp("atlas") / "paper.zarr"
+    return build16(store, n=20_000, alpha_over_length=0.1, accuracy=0.02).load()
+
+
+@pytest.fixture(scope="session")
+def whole(tmp_path_factory) -> xr.Dataset:
+    """The atlas of the subprocesses, without interruption."""
+    return build16(tmp_path_factory.mktemp("atlas") / "whole.zarr").load()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what asks these atlases as slow: they take seconds to build."""
+    for item in items:
+        asked = {"paper", "whole"} & set(getattr(item, "fixturenames", ()))
+        if asked and item.path.is_relative_to(Path(__file__).parent):
+            item.add_marker("slow")

@@ -1,0 +1,49 @@
+"""Small families of designs and what is built of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+import softreach as sr
+from softreach.atlas import DesignSpace
+from softreach.atlas.command import Command
+from softreach.atlas.metrics import chosen_metrics
+
+SMALL = {
+    "n": 2_000,
+    "alpha_over_length": 0.5,
+    "metrics": ("extent", "convex", "concave", "curvature"),
+}
+
+
+def small_space(**more) -> DesignSpace:
+    tapers = np.radians([0.0, 2.0])
+    return DesignSpace.grid(sr.designs.minimal_trunk(), revolution=[0.5, 1.5], taper=tapers, **more)
+
+
+TINY = {"n": 10, "alpha_over_length": 0.5, "metrics": ("extent", "curvature")}
+
+
+def gapped_space() -> DesignSpace:
+    """Four designs, of which the third cannot exist."""
+    taper, radius = np.radians([2.0, 4.0]), [1 / 16, 0.1]
+    return DesignSpace.grid(sr.designs.minimal_trunk(), taper=taper, outer_radius=radius)
+
+
+def similar_designs(*lengths: float) -> DesignSpace:
+    """Designs of one shape and different size."""
+    base = sr.designs.minimal_trunk()
+    radii = np.array(lengths) * base.outer_radius
+    return DesignSpace.listed(base, length=lengths, outer_radius=radii)
+
+
+def command(space: DesignSpace, **options) -> Command:
+    rest = {"seed": 0, "sampler": "uniform", "tol": 1e-6, "accuracy": 3e-3, "keep_clouds": True}
+    metrics = chosen_metrics(options.pop("metrics"))
+    return Command(space=space, metrics=metrics, **rest | options)
+
+
+def assert_same(found: xr.Dataset, truth: xr.Dataset) -> None:
+    """Value for value, to the last bit."""
+    xr.testing.assert_identical(found, truth)

@@ -1,0 +1,51 @@
+"""Scripts that build an atlas in processes of their own, to be killed."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+SCRIPT = """
+    import os
+    import signal
+    import sys
+    from pathlib import Path
+    import numpy as np
+    from softreach import designs
+    from softreach.atlas import DesignSpace, build_atlas, design_task, worker_processes
+
+    def build(store, n=3_000, alpha_over_length=0.3, accuracy=0.2, **options):
+        turns, tapers = np.radians([0, 36, 72, 108]), np.radians([0, 1, 2, 3])
+        space = DesignSpace.grid(designs.minimal_trunk(), revolution=turns, taper=tapers)
+        return build_atlas(
+            space, store, n, 1, alpha_over_length=alpha_over_length, accuracy=accuracy, **options
+        )
+
+    def die():
+        os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+PATIENCE = 300.0  # seconds that a script may take on a loaded machine
+
+
+scope: dict = {}
+exec(textwrap.dedent(SCRIPT), scope)
+build16 = scope["build"]
+
+
+def run_script(folder: Path, body: str, *arguments: str) -> subprocess.Popen:
+    script = folder / "task.py"
+    script.write_text(textwrap.dedent(SCRIPT) + "\n" + textwrap.dedent(body))
+    command = [sys.executable, "-W", "error", str(script), *arguments]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+
+
+def ended(process: subprocess.Popen) -> tuple[None, str]:
+    """What a script says until its end, which must come."""
+    try:
+        return process.communicate(timeout=PATIENCE)
+    finally:
+        process.kill()

@@ -1,0 +1,175 @@
+"""Whoever computes an atlas, threads, processes or a cluster, the numbers are the same."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import textwrap
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from softreach.atlas import StoreFailed, atlas_status, build_atlas, open_atlas, worker_processes
+from softreach.errors import InvalidInput
+from tests.atlas.families import SMALL, assert_same, small_space
+from tests.atlas.scripts import build16, ended, run_script
+
+
+def test_shards_share_a_store_and_together_make_the_whole(whole, tmp_path):
+    store = tmp_path / "a.zarr"
+    part = build16(store, shard=(0, 2))
+    assert int(part.volume.notnull().sum()) == 8
+    assert_same(build16(store, shard=(1, 2)).load(), whole)
+    with pytest.raises(InvalidInput, match="shard = 2/2"):
+        build16(store, shard=(2, 2))
+
+
+@pytest.mark.slow
+def test_shards_may_start_at_the_same_moment(whole, tmp_path):
+    store = tmp_path / "a.zarr"
+    body = "build(sys.argv[1], shard=(int(sys.argv[2]), 2))"
+    tasks = [run_script(tmp_path, body, str(store), str(k)) for k in range(2)]
+    assert [ended(task)[1] for task in tasks] == ["", ""]
+    assert_same(open_atlas(store).load(), whole)
+
+
+def test_an_executor_of_threads_gives_the_same_numbers(whole, tmp_path):
+    with ThreadPoolExecutor(2) as pool:
+        assert_same(build16(tmp_path / "a.zarr", executor=pool).load(), whole)
+
+
+DEADLY = """
+    right = design_task.Intermediates
+
+    def deadly(arm, *rest):
+        guilty = arm.taper > 0.05 and abs(arm.revolutions[0]) < 1e-9
+        mark = Path(sys.argv[0]).with_suffix(".died")
+        if guilty and (ALWAYS or not mark.exists()):
+            mark.touch()
+            die()
+        return right(arm, *rest)
+
+    design_task.Intermediates = deadly
+"""
+
+
+def deadly(body: str, always: bool = False) -> str:
+    """A script in which a worker dies over design number 3, once or always."""
+    return f"ALWAYS = {always}\n" + textwrap.dedent(DEADLY) + textwrap.dedent(body)
+
+
+@pytest.mark.slow
+def test_worker_processes_survive_the_death_of_one(whole, tmp_path):
+    store = tmp_path / "a.zarr"
+    body = """
+        if __name__ == "__main__":
+            build(sys.argv[1], executor=worker_processes(2))
+    """
+    assert ended(run_script(tmp_path, deadly(body), str(store))) == (None, "")
+    assert (tmp_path / "task.died").exists()
+    assert_same(open_atlas(store).load(), whole)
+
+
+@pytest.mark.slow
+def test_a_design_that_kills_its_workers_is_given_up_and_the_rest_goes_on(tmp_path):
+    store = tmp_path / "a.zarr"
+    body = """
+        if __name__ == "__main__":
+            import warnings
+            warnings.simplefilter("ignore")
+            build(sys.argv[1], executor=worker_processes(2), metrics=("extent",))
+    """
+    assert ended(run_script(tmp_path, deadly(body, True), str(store))) == (None, "")
+    status = atlas_status(store)
+    assert (status.done, status.messages) == (15, {3: "its worker died, time after time"})
+
+
+@pytest.mark.slow
+def test_dask_workers_survive_the_death_of_one(whole, tmp_path):
+    pytest.importorskip("distributed")
+    store = tmp_path / "a.zarr"
+    body = """
+        if __name__ == "__main__":
+            from distributed import Client, LocalCluster
+            options = {"dashboard_address": None, "silence_logs": 50}
+            with LocalCluster(2, threads_per_worker=1, **options) as cluster:
+                with Client(cluster) as client:
+                    build(sys.argv[1], executor=client)
+    """
+    process = run_script(tmp_path, deadly(body), str(store))
+    ended(process)
+    assert process.returncode == 0
+    assert (tmp_path / "task.died").exists()
+    assert_same(open_atlas(store).load(), whole)
+
+
+SBATCH = """#!/bin/sh
+while [ $# -gt 1 ]; do shift; done
+cp "$1" "$0.job"  # as SLURM does: who submits removes the script at once
+setsid sh "$0.job" > "$0.log" 2>&1 &
+echo $! > "$0.pid"
+echo Submitted batch job 1
+"""
+
+
+@pytest.mark.slow
+def test_workers_may_come_from_a_job_queue(whole, tmp_path, monkeypatch):
+    """A SLURM of this machine stands in for a cluster."""
+    pytest.importorskip("dask_jobqueue")
+    commands = tmp_path / "bin"
+    commands.mkdir()
+    for name, text in (("sbatch", SBATCH), ("scancel", "#!/bin/sh\nexit 0\n")):
+        (commands / name).write_text(text)
+        (commands / name).chmod(0o755)
+    monkeypatch.setenv("PATH", str(commands), prepend=":")
+    body = """
+        if __name__ == "__main__":
+            from dask_jobqueue import SLURMCluster
+            from distributed import Client
+            options = {"log_directory": sys.argv[2], "local_directory": sys.argv[2]}
+            options |= {"scheduler_options": {"dashboard_address": None}, "interface": "lo"}
+            queue = SLURMCluster(cores=2, processes=2, memory="4GB", walltime="1:00:00", **options)
+            queue.scale(2)
+            with queue, Client(queue) as client:
+                build(sys.argv[1], executor=client)
+    """
+    process = run_script(tmp_path, body, str(tmp_path / "a.zarr"), str(tmp_path / "jobs"))
+    try:
+        said = ended(process)[1]
+    finally:
+        with contextlib.suppress(OSError):
+            os.killpg(int((commands / "sbatch.pid").read_text()), signal.SIGKILL)
+    assert process.returncode == 0, said
+    assert_same(open_atlas(tmp_path / "a.zarr").load(), whole)
+
+
+@pytest.mark.slow
+def test_workers_refuse_a_store_in_the_memory_of_another_process():
+    from zarr.storage import MemoryStore
+
+    with pytest.raises(StoreFailed, match="in the memory of another process"):
+        build_atlas(small_space(), MemoryStore(), executor=worker_processes(1), **SMALL)
+
+
+def test_what_is_no_executor_is_refused(tmp_path):
+    with pytest.raises(InvalidInput, match=r"executor = 3: must be a concurrent\.futures executor"):
+        build_atlas(small_space(), tmp_path / "a.zarr", executor=3, **SMALL)
+
+
+def test_worker_processes_start_when_called_and_not_before(monkeypatch):
+    started = []
+    monkeypatch.setattr(
+        "softreach.atlas.executor.ProcessPoolExecutor", lambda count, **_: started.append(count)
+    )
+    start = worker_processes(3)
+    assert started == []
+    start()
+    start()
+    assert started == [3, 3]
+
+
+def test_progress_counts_every_design_once(tmp_path):
+    seen = []
+    build_atlas(small_space(), tmp_path / "a.zarr", progress=seen.append, **SMALL)
+    assert seen == [1] * 4

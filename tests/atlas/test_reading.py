@@ -1,0 +1,191 @@
+"""An atlas that is read: its clouds, designs, best designs, and its figures."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import softreach as sr
+from softreach.atlas import (
+    DesignSpace,
+    atlas_cloud,
+    atlas_design,
+    atlas_status,
+    best_designs,
+    build_atlas,
+    open_atlas,
+    over_length,
+)
+from softreach.atlas.design_task import begin_design
+from softreach.atlas.store import AtlasStore
+from softreach.errors import InvalidInput
+from softreach.paper.atlas_figures import hulls_of
+from softreach.picture.projection import view_axes
+from softreach.plot import box_over_length, plot_metric_map
+from softreach.plot.sheet import panel_extent
+from tests.atlas.families import (
+    SMALL,
+    assert_same,
+    command,
+    gapped_space,
+    similar_designs,
+    small_space,
+)
+
+
+def test_stored_clouds_are_those_of_the_cloud_alone_to_half_a_step(paper):
+    at = {"revolution": 0.0, "taper": np.radians(3)}
+    stored = atlas_cloud(paper, **at)
+    alone = sr.compute_cloud(sr.design_of(stored), n=20_000, seed=1)
+    assert stored.activation.equals(alone.activation)
+    assert np.abs(stored.tip.values - alone.tip.values).max() <= 0.5e-5 * (1 + 1e-9)
+    assert stored.attrs == alone.attrs
+
+
+def test_clouds_that_were_not_kept_are_computed_again(tmp_path):
+    atlas = build_atlas(small_space(), tmp_path / "a.zarr", keep_clouds=False, **SMALL)
+    assert "tip" not in atlas
+    again = atlas_cloud(atlas, revolution=0.5, taper=0.0)
+    alone = sr.compute_cloud(sr.design_of(again), n=2_000)
+    assert again.tip.equals(alone.tip)
+
+
+def test_any_reader_of_zarr_and_cf_understands_the_store(tmp_path):
+    build_atlas(small_space(length=[1.0, 1.5]), tmp_path / "a.zarr", **SMALL)
+    raw = xr.open_zarr(tmp_path / "a.zarr", consolidated=False, zarr_format=3, chunks=None)
+    tips = raw.tip.isel(revolution=1, taper=1, length=1).T.values
+    alone = sr.compute_cloud(sr.designs.minimal_trunk(1.5).replace(length=1.5), n=2_000)
+    np.testing.assert_allclose(tips, alone.tip, atol=0.6e-5)
+    assert raw.taper.attrs["units"] == "rad"
+    assert raw.status.attrs["flag_meanings"].split()[1] == "done"
+
+
+def test_designs_with_more_bundles_share_the_activations_of_the_others(tmp_path):
+    space = DesignSpace.listed(sr.designs.minimal_trunk(), **{"left.bundles": [1, 2]})
+    atlas = build_atlas(space, tmp_path / "a.zarr", **SMALL)
+    few, more = atlas_cloud(atlas, design=0), atlas_cloud(atlas, design=1)
+    assert (few.activation.shape[1], more.activation.shape[1]) == (3, 4)
+    np.testing.assert_array_equal(few.activation, more.activation[:, :3])
+
+
+def test_best_designs_are_the_best_that_meet_the_constraints(paper):
+    found = best_designs(paper, "volume", where={"taper": (None, 0.01)}, count=3)
+    truth = np.sort(paper.volume.sel(taper=0.0).values)[::-1]
+    np.testing.assert_array_equal(found.volume, truth[:3])
+    least = best_designs(paper, "unreachability", smallest=True)
+    np.testing.assert_allclose(least.unreachability, [paper.unreachability.min()])
+    assert best_designs(paper, "volume", where={"volume": (9.0, None)}).sizes["rank"] == 0
+    with pytest.raises(InvalidInput, match="metric = volumes: must be one of"):
+        best_designs(paper, "volumes")
+
+
+def test_what_is_not_there_is_not_opened(tmp_path):
+    with pytest.raises(InvalidInput, match="an atlas written by build_atlas"):
+        open_atlas(tmp_path / "nothing.zarr")
+    assert not (tmp_path / "nothing.zarr").exists()
+
+
+def test_no_tip_lies_outside_its_panel_of_the_sheet(paper):
+    pytest.importorskip("matplotlib")
+    extent = panel_extent(box_over_length(paper), "oblique")
+    seen = np.moveaxis(paper.tip.values, 2, -1).reshape(-1, 3) @ view_axes("oblique")[:2].T
+    assert extent.left < seen[:, 0].min() < seen[:, 0].max() < extent.right
+    assert extent.bottom < seen[:, 1].min() < seen[:, 1].max() < extent.top
+
+
+def test_maps_need_two_parameters(paper):
+    pytest.importorskip("matplotlib")
+    with pytest.raises(InvalidInput, match="a grid of two parameters"):
+        plot_metric_map(paper.isel(taper=0), "volume")
+    with pytest.raises(InvalidInput, match="metric = volumes"):
+        plot_metric_map(paper, "volumes")
+
+
+@pytest.fixture(scope="module")
+def some(tmp_path_factory) -> Path:
+    """A store with a design that is done, one that is not, one that failed and a gap."""
+    place = tmp_path_factory.mktemp("some") / "a.zarr"
+    asked = command(gapped_space(), **SMALL)
+    store = AtlasStore.begin(place, asked)
+    begin_design(store, asked.metrics, 1)()
+    store.write_failure(3, "no luck")
+    return place
+
+
+def test_every_question_takes_a_store_or_what_was_opened_of_it(some):
+    at = {"taper": np.radians(2), "outer_radius": 0.1}
+    for ask in (
+        atlas_status,
+        partial(best_designs, metric="volume"),
+        partial(atlas_design, **at),
+        partial(atlas_cloud, **at),
+    ):
+        answers = [ask(place) for place in (some, str(some), open_atlas(some))]
+        for answer in answers[1:]:
+            if isinstance(answer, xr.Dataset):
+                assert_same(answer, answers[0])
+            else:
+                assert answer == answers[0]
+
+
+def test_what_is_no_atlas_is_refused_by_every_question(trunk):
+    cloud = sr.compute_cloud(trunk, n=10)
+    for ask in (atlas_status, partial(best_designs, metric="x"), atlas_design, atlas_cloud):
+        with pytest.raises(InvalidInput, match="a store, or a dataset from open_atlas"):
+            ask(cloud)
+
+
+def test_the_status_counts_every_design_once(some):
+    status = atlas_status(some)
+    counts = (status.designs, status.done, status.todo, status.failed, status.gaps)
+    assert counts == (4, 1, 1, 1, 1)
+    assert status.messages[3] == "no luck"
+    assert "leaves no tip" in status.messages[2]
+
+
+def test_a_part_of_an_atlas_keeps_the_numbers_of_its_designs(some):
+    part = open_atlas(some).isel(outer_radius=[1])
+    assert part.number.values.tolist() == [[1], [3]]
+    assert atlas_status(part).messages == {3: "no luck"}
+    assert atlas_design(part, taper=np.radians(4), outer_radius=0.1).taper == np.radians(4)
+
+
+def test_questions_about_a_design_name_the_parameters_they_need(some):
+    for ask in (atlas_design, atlas_cloud):
+        with pytest.raises(InvalidInput, match="parameters = taper: must be all of taper, outer_r"):
+            ask(some, taper=0.0)
+    with pytest.raises(InvalidInput, match="must be done; its status is 3"):
+        atlas_cloud(some, taper=np.radians(4), outer_radius=1 / 16)
+
+
+# Figures
+
+
+def test_figures_show_each_design_in_lengths_of_its_own(tmp_path):
+    """Similar designs of any size fill the same box and have the same hull."""
+    small, large = (
+        build_atlas(similar_designs(length), tmp_path / f"{length}.zarr", **SMALL)
+        for length in (1.0, 2.0)
+    )
+    np.testing.assert_allclose(box_over_length(large), box_over_length(small), rtol=1e-12)
+    both = build_atlas(similar_designs(2.0, 1.0, 0.5), tmp_path / "a.zarr", **SMALL)
+    np.testing.assert_allclose(box_over_length(both), box_over_length(small), rtol=1e-12)
+
+
+def test_maps_and_hulls_of_an_atlas_over_length_are_relative_to_each_length(tmp_path):
+    pytest.importorskip("matplotlib")
+    base = sr.designs.minimal_trunk(taper=0.0)
+    space = DesignSpace.grid(base, revolution=[0.5, 1.5], length=[0.5, 2.0])
+    atlas = build_atlas(space, tmp_path / "a.zarr", **SMALL)
+    best = float((atlas.volume / np.array([0.5, 2.0]) ** 3).max())
+    marked = plot_metric_map(atlas, "volume").texts[-1].get_text()
+    assert marked == f"{best:.3f}"
+    hull_at = hulls_of(atlas)
+    for column in range(2):
+        for row in range(2):
+            volume = float(over_length(atlas, "volume")[column, row])
+            np.testing.assert_allclose(hull_at(column, row).volume, volume, rtol=1e-3)

@@ -1,0 +1,145 @@
+"""The designs of a space: every combination, lists, samples, and how they are written."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import softreach as sr
+from softreach.arm.actuators import FiberArchitecture
+from softreach.arm.parameters import changed
+from softreach.atlas import DesignSpace
+from softreach.atlas.space_file import parse_space
+from softreach.errors import InvalidInput
+from tests.atlas.families import small_space
+
+
+def builtin(name: str) -> sr.Manipulator:
+    return getattr(sr.designs, name)()
+
+
+def test_a_grid_has_every_combination_in_c_order():
+    space = small_space()
+    assert (space.dims, space.shape, space.size) == (("revolution", "taper"), (2, 2), 4)
+    assert space.values(1) == {"revolution": 0.5, "taper": np.radians(2.0)}
+    assert space.design(1) == changed(sr.designs.minimal_trunk(), space.values(1))
+
+
+def test_a_list_takes_values_together():
+    space = DesignSpace.listed(
+        sr.designs.minimal_trunk(), taper=[0.0, 0.01], **{"left.offset": [1, 2]}
+    )
+    assert (space.dims, space.size) == (("design",), 2)
+    assert space.design(1).fibers[0].offset == 2
+
+
+@pytest.mark.parametrize("method", ["sobol", "latin"])
+def test_sampled_designs_fill_each_stratum_once(method):
+    arm = sr.designs.minimal_trunk()
+    space = DesignSpace.sampled(arm, 16, method=method, taper=(0.0, 0.04), extent=(0.5, 1.0))
+    for name, values in space.parameters:
+        low, high = {"taper": (0.0, 0.04), "extent": (0.5, 1.0)}[name]
+        strata = np.floor((np.array(values) - low) / (high - low) * 16)
+        assert sorted(strata) == list(range(16))
+
+
+def test_counts_that_are_sampled_are_whole():
+    arm = sr.designs.minimal_trunk()
+    space = DesignSpace.sampled(arm, 8, **{"left.bundles": (1, 3), "left.offset": (0.0, 1.0)})
+    counts, offsets = (np.array(values) for _, values in space.parameters)
+    assert set(counts) == {1.0, 2.0, 3.0}
+    assert (offsets % 1 != 0).any()
+
+
+def test_designs_that_would_be_shortened_to_nothing_are_gaps():
+    space = DesignSpace.listed(sr.designs.minimal_trunk(), lower=[-1.0, -30.0])
+    assert list(space.gaps) == [1]
+    assert "must keep ζ > 0" in space.gaps[1]
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({}, "parameters = none"),
+        ({"tapper": [0]}, "parameter = tapper: must be one of revolution, taper.*did you mean"),
+        ({"taper": []}, "taper = .*: must be one finite value"),
+        ({"taper": [np.nan]}, "taper = .*: must be one finite value"),
+        ({"taper": [0.01, 0.01]}, "taper = .*: must be values that differ"),
+    ],
+)
+def test_faulty_spaces_are_refused_in_one_line(values, message):
+    with pytest.raises(InvalidInput, match=message) as caught:
+        DesignSpace.grid(sr.designs.minimal_trunk(), **values)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_space_survives_being_written():
+    space = small_space(**{"left.offset": [1.0, 2.0]})
+    assert DesignSpace.from_dict(space.to_dict()) == space
+
+
+def test_written_spaces_speak_in_degrees_and_ranges():
+    text = """
+        design = "minimal_trunk"
+        [parameters]
+        revolution_deg = "0:108:4"
+        taper_deg = [0, 1.5]
+        outer_radius_m = 0.0625
+    """
+    space = parse_space(text, builtin)
+    assert space.shape == (4, 2, 1)
+    np.testing.assert_allclose(np.degrees(space.values(3)["revolution"]), 36)
+    np.testing.assert_allclose(np.degrees(space.values(3)["taper"]), 1.5)
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        "[parameters]\nleft.offset_deg = [60]\n'longitudinal 1'.bundles = 2",
+        "[parameters]\n'left.offset_deg' = [60]\n'longitudinal 1.bundles' = 2",
+        "[parameters.left]\noffset_deg = [60]\n[parameters.'longitudinal 1']\nbundles = 2",
+    ],
+)
+def test_parameters_of_one_fiber_are_written_with_its_name_and_a_dot(table):
+    space = parse_space(f"design = 'redundant_trunk'\n{table}", builtin)
+    wanted = {"left.offset": np.radians(60), "longitudinal 1.bundles": 2}
+    assert space.values(0) == pytest.approx(wanted)
+
+
+def test_the_dot_of_a_name_is_matched_exactly():
+    fibers = (FiberArchitecture(name=name, revolution=0, extent=0.1) for name in ("a.b", "a_b"))
+    base = sr.designs.minimal_trunk().replace(actuators=tuple(fibers))
+    space = parse_space("[parameters]\na.b.offset_deg = [90]", lambda _: base)
+    assert [fiber.offset for fiber in space.design(0).fibers] == pytest.approx([np.pi / 2, 0])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            'layout = "circle"\n[parameters]\ntaper_deg = [0]',
+            "layout = circle: must be one of grid",
+        ),
+        (
+            "[parameters]\ntaper = [0]",
+            "parameter = taper: must be one of revolution_deg, taper_deg",
+        ),
+        ('[parameters]\ntaper_deg = "0:3"', "taper_deg = 0:3: must be numbers"),
+        ('layout = "sobol"\n[parameters]\ntaper_deg = [0]', "taper = .*: must be two ends"),
+        (
+            "[parameters]\n'left.lower' = [-1]\nleft.lower = [-2]",
+            "left.lower = .*: must be given once",
+        ),
+        ("lay_out = 1", "key = lay_out: must be one of design"),
+        ("=", "must be valid TOML"),
+    ],
+)
+def test_faulty_space_files_are_refused(text, message):
+    with pytest.raises(InvalidInput, match=message):
+        parse_space(text, builtin)
+
+
+def test_sampled_spaces_can_be_written_too():
+    text = 'layout = "latin"\ndesigns = 5\n[parameters]\ntaper_deg = [0, 3]'
+    space = parse_space(text, builtin)
+    assert (space.dims, space.shape) == (("design",), (5,))

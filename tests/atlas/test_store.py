@@ -1,0 +1,260 @@
+"""The store of an atlas: begun by several at once, killed, elsewhere, damaged."""
+
+from __future__ import annotations
+
+import ast
+import asyncio
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from threading import Barrier
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+import softreach as sr
+from softreach.atlas import (
+    DesignSpace,
+    StoreFailed,
+    atlas_cloud,
+    atlas_status,
+    build_atlas,
+    open_atlas,
+)
+from softreach.atlas.store import AtlasStore, Result
+from softreach.errors import InvalidInput, SoftreachError, SoftreachWarning
+from tests.atlas.families import SMALL, TINY, assert_same, command, gapped_space, small_space
+
+
+class Interrupted(Exception):
+    """Stands for the end of a process."""
+
+
+def interrupting_store(place: Path, write: int, interruption):
+    """A store that calls something else before a write, counted from 0."""
+    from zarr.storage import LocalStore, WrapperStore
+
+    class Store(WrapperStore):
+        count = 0
+
+        async def _pause(self):
+            if self.count == write:
+                await asyncio.to_thread(interruption)
+            self.count += 1
+
+        async def set(self, key, value):
+            await self._pause()
+            await super().set(key, value)
+
+        async def set_if_not_exists(self, key, value):
+            if not self.count:  # Zarr tries to write the root again with each array
+                await self._pause()
+            await super().set_if_not_exists(key, value)
+
+    return Store(LocalStore(place))
+
+
+def stored_files(place: Path) -> dict[str, bytes]:
+    files = (file for file in place.rglob("*") if file.is_file() and file.suffix != ".partial")
+    return {str(file.relative_to(place)): file.read_bytes() for file in files}
+
+
+class Begun(NamedTuple):
+    """A store that is begun."""
+
+    files: dict[str, bytes]
+    writes: int
+
+
+@pytest.fixture(scope="module")
+def begun(tmp_path_factory) -> Begun:
+    """As one creator leaves it whom nobody disturbs."""
+    place = tmp_path_factory.mktemp("begun")
+    store = interrupting_store(place, -1, None)
+    AtlasStore.begin(store, command(gapped_space(), **TINY))
+    return Begun(stored_files(place), store.count)
+
+
+@pytest.mark.slow
+def test_a_creator_killed_at_any_write_leaves_a_store_that_another_completes(begun, tmp_path):
+    def dies():
+        raise Interrupted
+
+    for write in range(begun.writes):
+        place = tmp_path / f"{write}.zarr"
+        store = interrupting_store(place, write, dies)
+        with pytest.raises(StoreFailed) as caught:
+            AtlasStore.begin(store, command(gapped_space(), **TINY))
+        assert isinstance(caught.value.__cause__, Interrupted)
+        with pytest.raises(InvalidInput, match="written by build_atlas"):
+            open_atlas(place)
+        (place / "zarr.0123.partial").touch()  # what a write leaves that is killed itself
+        AtlasStore.begin(place, command(gapped_space(), **TINY))
+        assert stored_files(place) == begun.files
+
+
+@pytest.mark.slow
+def test_whoever_overtakes_a_creator_between_two_writes_keeps_its_designs(begun, tmp_path):
+    asked = command(gapped_space(), **TINY)
+    sizes = asked.profile_sizes
+    ones = {m.name: np.ones([sizes[dim] for dim in m.over]) for m in asked.metrics}
+    result = Result(ones, np.ones((10, 3)))
+
+    def overtakes():
+        other = AtlasStore.begin(place, command(gapped_space(), **TINY))
+        other.write(1, result)
+        other.write_failure(3, "no luck")
+
+    for write in range(begun.writes):
+        place = tmp_path / f"{write}.zarr"
+        slow = interrupting_store(place, write, overtakes)
+        AtlasStore.begin(slow, command(gapped_space(), **TINY))
+        store = AtlasStore.open(place)
+        assert store.status().tolist() == [0, 1, 3, 2]
+        assert store.messages()[3] == "no luck"
+        assert begun.files.items() <= stored_files(place).items()
+
+
+@pytest.mark.slow
+def test_of_two_different_commands_at_one_moment_one_is_refused(begun, tmp_path):
+    def begin(store, n):
+        try:
+            AtlasStore.begin(store, command(gapped_space(), **TINY | {"n": n}))
+        except InvalidInput as error:
+            return str(error)
+        accepted.append(n)
+        return ""
+
+    for write in range(begun.writes):
+        accepted, place = [], tmp_path / f"{write}.zarr"
+        said = begin(interrupting_store(place, write, lambda at=place: begin(at, 11)), 10)
+        assert ("n: 11 there, 10 here" in said) == (write == 0)
+        assert accepted == ([11] if write == 0 else [10])
+        assert AtlasStore.open(place).command.n == accepted[0]
+
+
+@pytest.mark.slow
+def test_many_creators_may_start_at_one_moment(begun, tmp_path):
+    start = Barrier(8)
+
+    def begin(place: Path) -> None:
+        start.wait()
+        AtlasStore.begin(place, command(gapped_space(), **TINY))
+
+    for turn in range(5):
+        with ThreadPoolExecutor(8) as pool:
+            list(pool.map(begin, [tmp_path / f"{turn}.zarr"] * 8))
+        assert stored_files(tmp_path / f"{turn}.zarr") == begun.files
+
+
+@pytest.fixture(params=["a URL", "a URL of a file", "a Zarr store", "a place in a Zarr store"])
+def elsewhere(request, tmp_path) -> Any:
+    """Places that are no paths."""
+    if request.param == "a URL of a file":
+        return f"file://{tmp_path}/a.zarr"
+    if "Zarr" in request.param:
+        from zarr.storage import MemoryStore, StorePath
+
+        store = MemoryStore()
+        return store if request.param == "a Zarr store" else StorePath(store, "folder/a")
+    fsspec = pytest.importorskip("fsspec")
+    fsspec.filesystem("memory").store.clear()
+    return "memory://folder/a.zarr"
+
+
+def test_an_atlas_elsewhere_is_built_resumed_and_asked_as_one_on_disk(elsewhere, tmp_path):
+    here = build_atlas(small_space(), tmp_path / "here.zarr", **SMALL)
+    build_atlas(small_space(), elsewhere, shard=(0, 2), **SMALL)
+    assert atlas_status(elsewhere).todo == 2
+    assert_same(build_atlas(small_space(), elsewhere, **SMALL).load(), here.load())
+    assert atlas_status(elsewhere).done == 4
+    at = {"revolution": 1.5, "taper": 0.0}
+    assert_same(atlas_cloud(open_atlas(elsewhere), **at), atlas_cloud(here, **at))
+    with pytest.raises(InvalidInput, match="n: 2000 there, 3000 here"):
+        build_atlas(small_space(), elsewhere, **SMALL | {"n": 3_000})
+
+
+def test_a_url_that_holds_other_things_is_left_alone():
+    memory = pytest.importorskip("fsspec").filesystem("memory")
+    memory.pipe("/other/thesis.tex", b"precious")
+    with pytest.raises(InvalidInput, match="a new folder, or an atlas"):
+        build_atlas(small_space(), "memory://other", **SMALL)
+    assert memory.find("/other") == ["/other/thesis.tex"]
+
+
+def test_what_cannot_be_reached_is_said_in_one_line(tmp_path):
+    pytest.importorskip("fsspec")
+    (tmp_path / "file").touch()
+    for place in ("nothing://a.zarr", str(tmp_path / "file")):
+        for ask in (open_atlas, lambda at: build_atlas(small_space(), at, **SMALL)):
+            with pytest.raises(SoftreachError, match="an atlas") as caught:
+                ask(place)
+            assert "\n" not in str(caught.value)
+
+
+def test_a_folder_with_other_things_is_left_alone(tmp_path):
+    (tmp_path / "thesis.tex").write_text("precious")
+    with pytest.raises(InvalidInput, match="a new folder, or an atlas"):
+        build_atlas(small_space(), tmp_path, **SMALL)
+    cloud = sr.compute_cloud(sr.designs.minimal_trunk(), n=100)
+    sr.save_cloud(cloud, tmp_path / "cloud.zarr")
+    with pytest.raises(InvalidInput, match="holds something else"):
+        build_atlas(small_space(), tmp_path / "cloud.zarr", **SMALL)
+
+
+def test_damaged_activations_are_noticed(tmp_path):
+    store = AtlasStore.begin(tmp_path / "a.zarr", command(small_space(), **SMALL))
+    store.group["unit_activation"][0, 0] = 0.5
+    with pytest.raises(SoftreachError, match="damaged"):
+        build_atlas(small_space(), tmp_path / "a.zarr", **SMALL)
+
+
+def test_only_public_names_of_zarr_are_used():
+    """Private ones would tie softreach to one release of Zarr."""
+    root = Path(sr.__file__).parent
+    private = [
+        f"{file.relative_to(root)}: {name}"
+        for file in root.rglob("*.py")
+        for name in imported_from_zarr(ast.parse(file.read_text()))
+        if name.startswith("zarr.core") or any(part.startswith("_") for part in name.split("."))
+    ]
+    assert private == []
+
+
+def imported_from_zarr(tree: ast.AST) -> list[str]:
+    found = [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
+    names = [
+        f"{node.module}.{alias.name}" if isinstance(node, ast.ImportFrom) else alias.name
+        for node in found
+        for alias in node.names
+    ]
+    return [name for name in names if name.split(".")[0] == "zarr"]
+
+
+def test_a_store_of_another_version_is_refused_in_one_line(tmp_path):
+    store = AtlasStore.begin(tmp_path / "a.zarr", command(small_space(), **SMALL))
+    text = store.group.attrs["command"].replace('"atlas_version": 2', '"atlas_version": 1')
+    store.group.attrs["command"] = text
+    for ask in (open_atlas, lambda at: build_atlas(small_space(), at, **SMALL)):
+        with pytest.raises(
+            InvalidInput, match="version of the atlas = 1: must be 2; build"
+        ) as told:
+            ask(tmp_path / "a.zarr")
+        assert "\n" not in str(told.value)
+
+
+def test_a_store_says_how_long_each_design_is_and_steps_by_the_shortest(tmp_path):
+    space = DesignSpace.grid(sr.designs.minimal_trunk(), length=[0.0, 0.8, 1.5])
+    with pytest.warns(SoftreachWarning, match="1 of 3 designs"):
+        atlas = build_atlas(space, tmp_path / "a.zarr", **SMALL)
+    assert atlas.length.values.tolist() == [0.0, 0.8, 1.5]
+    for length in (0.8, 1.5):
+        alone = sr.compute_cloud(space.base.replace(length=length), n=2_000)
+        off = np.abs(atlas_cloud(atlas, length=length).tip.values - alone.tip.values).max()
+        assert 0 < off <= 0.5e-5 * 0.8 * (1 + 1e-9)
+
+
+def test_lengths_that_cannot_share_a_step_are_refused(tmp_path):
+    space = DesignSpace.grid(sr.designs.minimal_trunk(taper=0.0), length=[0.5, 1e4])
+    with pytest.raises(InvalidInput, match=r"length = 0\.5 to 10000 m: .*pass keep_clouds=False"):
+        build_atlas(space, tmp_path / "a.zarr", **SMALL)

@@ -1,0 +1,241 @@
+"""Laws of the rasterizer: what is nearest shows, where the projection says, whatever the order."""
+
+from __future__ import annotations
+
+import base64
+import re
+import zlib
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from softreach.errors import InvalidInput
+from softreach.geometry.hull import convex_hull
+from softreach.picture import Dots, Skin, html_card, thumbnail
+from softreach.picture.png import png_bytes
+from softreach.picture.projection import VIEWS, is_mirrored, project, sight_axis, view_axes
+from softreach.picture.shading import shade
+from softreach.picture.zbuffer import Extent, ZBuffer
+
+UNIT = Extent(0.0, 1.0, 0.0, 1.0)
+RED, BLUE = (255, 0, 0), (0, 0, 255)
+
+
+def image(points, colors, size=1.0, width=8, oversample=1, extent=UNIT):
+    buffer = ZBuffer(extent, width, oversample)
+    buffer.draw_points(points, colors, size)
+    return buffer.rgba()
+
+
+class TestPoints:
+    @pytest.mark.parametrize("depths", [(1.0, 2.0), (-2.0, -1.0), (-1.0, 1e-9), (0.0, 1e-6)])
+    def test_the_nearer_point_wins(self, depths):
+        points = [[0.5, 0.5, depths[0]], [0.5, 0.5, depths[1]]]
+        for order in ([0, 1], [1, 0]):
+            drawn = image(np.array(points)[order], np.array([RED, BLUE])[order])
+            assert drawn[4, 4, :3].tolist() == list(BLUE)
+
+    @given(seed=st.integers(0, 1000), size=st.sampled_from([1.0, 2.5, 5.0]))
+    def test_the_order_of_points_does_not_matter(self, seed, size):
+        rng = np.random.default_rng(seed)
+        points = rng.integers(0, 4, (300, 3)) / 4  # many in one place, at one depth
+        colors = rng.integers(0, 256, (300, 3))
+        order = rng.permutation(300)
+        np.testing.assert_array_equal(
+            image(points, colors, size, oversample=2),
+            image(points[order], colors[order], size, oversample=2),
+        )
+
+    def test_each_point_lands_in_its_pixel(self, rng):
+        extent = Extent(-1.0, 3.0, 2.0, 4.0)
+        for x, y in rng.uniform([-1, 2], [3, 4], (50, 2)):
+            drawn = image([[x, y, 0.0]], RED, width=40, extent=extent)
+            assert drawn.shape == (20, 40, 4)
+            (row,), (column,) = np.nonzero(drawn[..., 3])
+            assert -1 + column / 10 <= x <= -1 + (column + 1) / 10
+            assert 4 - (row + 1) / 10 <= y <= 4 - row / 10
+
+    def test_a_large_point_is_a_disc_of_its_diameter(self):
+        drawn = image([[0.5 + 1e-9, 0.5, 0.0]], RED, size=40, width=100)
+        rows, columns = np.nonzero(drawn[..., 3])
+        assert np.hypot(rows - rows.mean(), columns - columns.mean()).max() <= 20
+        assert len(rows) == pytest.approx(np.pi * 20**2, rel=0.03)
+
+    @given(diameter=st.floats(1, 30), place=st.tuples(st.floats(0, 1), st.floats(0, 1)))
+    def test_points_grow_into_the_pixels_within_their_radius(self, diameter, place):
+        drawn = image([[*place, 0.0]], RED, size=diameter, width=20)
+        inside = [min(int(20 * place[0]), 20), min(int(20 * (1 - place[1])), 20)]
+        column, row = np.meshgrid(np.arange(20), np.arange(20))
+        near = np.hypot(column - inside[0], row - inside[1]) <= diameter / 2
+        if max(inside) < 20:  # on the outer edge it is not in the image
+            np.testing.assert_array_equal(drawn[..., 3] > 0, near)
+
+    def test_blocks_do_not_show(self, rng, monkeypatch):
+        points, colors = rng.uniform(0, 1, (500, 3)), rng.integers(0, 256, (500, 3))
+        whole = image(points, colors, 3)
+        monkeypatch.setattr("softreach.picture.zbuffer._BLOCK", 7)
+        np.testing.assert_array_equal(image(points, colors, 3), whole)
+
+    def test_points_outside_or_not_finite_leave_no_trace(self):
+        points = [[2, 0.5, 0], [0.5, -1, 0], [np.nan, 0.5, 0], [0.5, 0.5, np.nan], [0.5, np.inf, 0]]
+        assert not image(points, RED, size=1).any()
+
+    def test_smoothing_keeps_the_color_and_spreads_the_opacity(self):
+        drawn = image([[0.51, 0.51, 0.0]], RED, size=0.5, oversample=2)
+        assert drawn[3, 4].tolist() == [255, 0, 0, 63]
+
+
+class TestTriangles:
+    def draw(self, corners, colors, width=400):
+        buffer = ZBuffer(UNIT, width, oversample=1)
+        buffer.draw_triangles(corners, colors)
+        return buffer.rgba()
+
+    def test_the_area_is_that_of_the_triangle(self, rng):
+        for corners in rng.uniform(0.02, 0.98, (20, 3, 3)):
+            (ax, ay), (bx, by) = corners[1:, :2] - corners[0, :2]
+            covered = np.count_nonzero(self.draw([corners], np.full((1, 3, 3), 255))[..., 3])
+            assert covered / 400**2 == pytest.approx(abs(ax * by - ay * bx) / 2, abs=4e-3)
+
+    def test_neighbors_leave_no_gap(self, rng):
+        """A fan of triangles about any point covers the whole square."""
+        square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+        for center in rng.uniform(0, 1, (10, 3)):
+            fan = [[center, square[k - 1], square[k]] for k in range(4)]
+            assert self.draw(fan, np.full((4, 3, 3), 255), 64)[..., 3].all()
+
+    def test_colors_blend_linearly(self):
+        corners = [[[0, 0, 0], [1, 0, 0], [0, 1, 0]]]
+        drawn = self.draw(corners, [[[0, 0, 0], [255, 0, 0], [0, 255, 0]]], 100)
+        column, row = np.meshgrid(np.arange(100), np.arange(100))
+        inside = drawn[..., 3] > 0
+        red, green = 2.55 * (column + 0.5), 2.55 * (99.5 - row)
+        np.testing.assert_allclose(drawn[..., 0][inside], red[inside], atol=0.51)
+        np.testing.assert_allclose(drawn[..., 1][inside], green[inside], atol=0.51)
+
+    def test_intersecting_triangles_show_the_nearer_part_of_each(self):
+        flat = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+        tilted = [[0, 0, 1], [1, 0, -1], [0, 1, 1]]  # before the flat one where x < 1/2
+        drawn = self.draw([flat, tilted], np.repeat([[RED], [BLUE]], 3, axis=1), 100)
+        assert drawn[90, 20, :3].tolist() == list(BLUE)
+        assert drawn[90, 80, :3].tolist() == list(RED)
+
+    def test_slivers_and_missing_corners_are_harmless(self):
+        edge_on = [[0.1, 0.1, 0], [0.9, 0.9, 0], [0.5, 0.5, 1]]
+        point = [[0.5, 0.5, 0]] * 3
+        missing = [[0.5, 0.5, np.nan], [1, 0, 0], [0, 1, 0]]
+        drawn = self.draw([edge_on, point, missing], np.full((3, 3, 3), 255), 50)
+        assert np.count_nonzero(drawn[..., 3]) <= 100
+
+    def test_what_sticks_out_of_the_image_is_cut(self):
+        huge = [[[-9, -9, 0], [9, -9, 0], [0, 9, 0]]]
+        assert self.draw(huge, np.full((1, 3, 3), 255), 30)[..., 3].all()
+
+
+class TestProjection:
+    @given(st.floats(-7, 7), st.floats(-1.5, 1.5))
+    def test_views_are_right_handed_frames(self, azimuth, elevation):
+        axes = view_axes((azimuth, elevation))
+        np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
+        assert np.linalg.det(axes) == pytest.approx(1)
+        assert axes[1, 2] >= 0  # z goes up the paper
+
+    @pytest.mark.parametrize("name", VIEWS)
+    def test_named_views_are_their_angles(self, name):
+        np.testing.assert_allclose(view_axes(name), view_axes(VIEWS[name]), atol=1e-12)
+
+    def test_views_along_an_axis_look_along_what_they_do_not_show(self):
+        for name in ("front", "back", "side", "left", "top"):
+            axes = np.abs(view_axes(name))
+            assert axes[2].tolist() == [float(axis == sight_axis(name)) for axis in "xyz"]
+        assert [name for name in VIEWS if is_mirrored(name)] == ["back", "left"]
+        for view in ("oblique", "behind", (0.0, 0.0)):
+            with pytest.raises(InvalidInput, match="one of front, back, side, left, top"):
+                sight_axis(view)
+
+    def test_named_views_show_plain_coordinates(self):
+        point = [1.0, 2.0, 3.0]
+        assert project(point, "front").tolist() == [1, 3, -2]
+        assert project(point, "side").tolist() == [2, 3, 1]
+        assert project(point, "top").tolist() == [1, 2, 3]
+
+    @pytest.mark.parametrize("view", ["right", (1.0,), (0.0, np.nan)])
+    def test_other_views_are_refused(self, view):
+        with pytest.raises(InvalidInput, match="front, side, top, oblique, back, left, or"):
+            view_axes(view)
+
+
+def test_light_falls_alike_on_both_sides(rng):
+    normals = rng.normal(size=(20, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    lit = shade(normals, (0.5, 0.5, 0.5))
+    np.testing.assert_allclose(lit, shade(-normals, (0.5, 0.5, 0.5)))
+    assert lit.min() > 0
+    assert lit.max() <= 255
+
+
+def pixels_of(png: bytes) -> np.ndarray:
+    """The image in a PNG file of unfiltered rows, as the format specifies it."""
+    assert png.startswith(b"\x89PNG\r\n\x1a\n")
+    columns, rows = (int.from_bytes(png[k : k + 4], "big") for k in (16, 20))
+    channels = {2: 3, 6: 4}[png[25]]
+    start = png.index(b"IDAT")
+    size = int.from_bytes(png[start - 4 : start], "big")
+    content = png[start + 4 : start + 4 + size]
+    assert int.from_bytes(png[start + 4 + size :][:4], "big") == zlib.crc32(b"IDAT" + content)
+    lines = np.frombuffer(zlib.decompress(content), np.uint8).reshape(rows, -1)
+    assert not lines[:, 0].any()
+    return lines[:, 1:].reshape(rows, columns, channels)
+
+
+class TestThumbnails:
+    @given(seed=st.integers(0, 100), channels=st.sampled_from([3, 4]))
+    def test_a_png_holds_its_image(self, seed, channels):
+        rng = np.random.default_rng(seed)
+        drawn = rng.integers(0, 256, (*rng.integers(1, 9, 2), channels), np.uint8)
+        np.testing.assert_array_equal(pixels_of(png_bytes(drawn)), drawn)
+
+    def test_other_readers_read_the_png(self, rng, tmp_path):
+        plt = pytest.importorskip("matplotlib.pyplot")
+        drawn = rng.integers(0, 256, (5, 7, 4), np.uint8)
+        (tmp_path / "a.png").write_bytes(png_bytes(drawn))
+        np.testing.assert_array_equal(np.rint(255 * plt.imread(tmp_path / "a.png")), drawn)
+
+    def test_images_of_other_shapes_are_refused(self):
+        with pytest.raises(InvalidInput, match=r"image.shape = \(3, 3\)"):
+            png_bytes(np.zeros((3, 3), np.uint8))
+
+    @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+    def test_a_ball_is_a_disc_in_the_middle_at_any_scale(self, rng, scale):
+        points = rng.normal(size=(3000, 3))
+        hull = convex_hull(scale * points / np.linalg.norm(points, axis=1, keepdims=True))
+        opacity = pixels_of(thumbnail(Skin(hull.vertices, hull.faces), width=100))[..., 3] / 255
+        radius = 50 / 1.06
+        assert opacity.sum() == pytest.approx(np.pi * radius**2, rel=0.02)
+        row, column = np.average(np.indices((100, 100)), axis=(1, 2), weights=opacity)
+        assert (row, column) == pytest.approx((49.5, 49.5), abs=0.5)
+
+    def test_points_show_in_their_colors_and_many_are_thinned(self):
+        points = np.zeros((300_000, 3))
+        points[:, 0] = np.linspace(-1, 1, len(points))
+        colors = np.where(points[:, :1] < 0, RED, BLUE)
+        drawn = pixels_of(thumbnail(Dots(points, colors), view="front", width=40))
+        solid = drawn[drawn[..., 3] == 255]
+        assert {RED, BLUE} <= {tuple(c) for c in solid[:, :3].tolist()}
+
+    @pytest.mark.parametrize(
+        "parts", [(), (Dots(np.full((4, 3), np.nan)),), (Skin(np.empty((0, 3)), np.empty((0, 3))),)]
+    )
+    def test_nothing_to_show_leaves_the_text(self, parts):
+        assert html_card("a < b", *parts) == "<pre>a &lt; b</pre>"
+
+    def test_a_hull_shows_its_picture_and_what_it_says(self, rng):
+        hull = convex_hull(rng.uniform(-1, 1, (500, 3)))
+        shown = hull._repr_html_()
+        data = re.search(r"data:image/png;base64,([^\"]+)", shown)
+        assert pixels_of(base64.b64decode(data[1]))[..., 3].any()
+        assert f"volume {hull.volume:.6g} m³" in shown
+        flat = convex_hull(np.eye(3))
+        assert "<img" not in flat._repr_html_()

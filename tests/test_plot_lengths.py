@@ -1,0 +1,397 @@
+"""One law for all figures: what an axis says it counts in is what it counts in, at L = 0.3 m."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import softreach as sr
+from softreach import plot
+from softreach.arm_shape import arm_mesh, rest_configuration
+from softreach.errors import InvalidInput
+from softreach.picture.projection import project, view_axes
+from softreach.redundancy import activation_distance
+
+plt = pytest.importorskip("matplotlib.pyplot")
+
+LENGTH = 0.3
+OBLIQUE = "oblique"
+
+Shown = tuple[str, object, object]
+"""A label, the numbers drawn beside it, and what they show in powers of m."""
+Case = Callable[[SimpleNamespace], Iterator[Shown]]
+
+CASES: dict[str, Case] = {}
+MAY_NOT_KNOW: set[str] = set()
+
+
+def case(*, may_not_know: bool) -> Callable[[Case], Case]:
+    """Enter a figure; it is drawn with data that know L, and if possible with data that do not."""
+
+    def enter(function: Case) -> Case:
+        CASES[function.__name__] = function
+        MAY_NOT_KNOW.update({function.__name__} if may_not_know else ())
+        return function
+
+    return enter
+
+
+def si(label: str, numbers: object) -> np.ndarray:
+    """Numbers on an axis in powers of m, as its label says: "x / L", "V [m³]", "0.1 L", "κL"."""
+    if label == "":
+        return np.asarray(numbers, float)
+    if label in ("κL", "$u_3$L"):
+        return np.asarray(numbers, float) / LENGTH
+    if "[1/m]" in label:
+        return np.asarray(numbers, float)
+    said = re.search(r"(/ L|\[m|\d L$|\d m$)(³?)", label)
+    assert said, f"{label!r} does not say what it counts in"
+    return np.asarray(numbers, float) * (LENGTH if "L" in said[1] else 1.0) ** (3 if said[2] else 1)
+
+
+def ends(values: object) -> tuple[float, float]:
+    return float(np.nanmin(values)), float(np.nanmax(values))
+
+
+def plane(ax, points) -> Iterator[Shown]:
+    """Both axes of a panel that looks along an axis."""
+    for label, limits in ((ax.get_xlabel(), ax.get_xlim()), (ax.get_ylabel(), ax.get_ylim())):
+        if label:  # columns share the one at the left
+            name = label.split("\n")[-1]
+            yield name, limits, points[:, "xyz".index(name[0])]
+
+
+def space(ax, points, view=OBLIQUE) -> Iterator[Shown]:
+    """A box in space: its three labels, each for what the image shows."""
+    labels = [text.get_text() for text in ax.texts if text.get_text()[0] in "xyz"]
+    assert [label[0] for label in labels] == list("xyz")
+    seen = project(points, view)
+    for label in labels:
+        yield label, ax.get_xlim(), seen[:, 0]
+        yield label, ax.get_ylim(), seen[:, 1]
+
+
+def image_axes(figure) -> list:
+    return [ax for ax in figure.axes if ax.images]
+
+
+@pytest.fixture(scope="module")
+def everything(tmp_path_factory) -> SimpleNamespace:
+    """Data of arms of that length: clouds, shapes, sets, hulls, statistics, an atlas."""
+    arm = sr.designs.minimal_trunk(length=LENGTH)
+    cloud = sr.compute_cloud(arm, n=3000, seed=1)
+    space = sr.DesignSpace.grid(arm, length=[LENGTH, 2 * LENGTH], taper=np.radians([0.0, 1.0]))
+    store = tmp_path_factory.mktemp("lengths") / "atlas.zarr"
+    atlas = sr.build_atlas(space, store, n=500, metrics=("extent",))
+    return SimpleNamespace(
+        known=True,
+        length=LENGTH,
+        arm=arm,
+        cloud=cloud,
+        tips=cloud.tip.values,
+        rest=arm_mesh(rest_configuration(arm))[0],
+        distance=activation_distance(cloud, LENGTH / 10),
+        grid=sr.reachable_set(arm, accuracy=3e-2).grid,
+        hull=sr.convex_hull(cloud.tip),
+        curvature=sr.curvature_statistics(cloud),
+        atlas=atlas,
+    )
+
+
+@pytest.fixture
+def ignorant(everything) -> SimpleNamespace:
+    """The same data without the length of the arm."""
+    found = SimpleNamespace(**vars(everything))
+    found.known, found.length = False, None
+    found.cloud = everything.cloud.copy(deep=True)
+    del found.cloud.tip.attrs["length"]
+    for name in ("grid", "curvature"):
+        data = getattr(everything, name).copy()
+        data.attrs = {k: v for k, v in data.attrs.items() if k != "length"}
+        setattr(found, name, data)
+    return found
+
+
+@pytest.fixture(autouse=True)
+def few_pixels(monkeypatch):
+    monkeypatch.setattr("softreach.plot.frame.DPI", 60)
+    monkeypatch.setattr("softreach.plot.sheet.DPI", 60)
+    yield
+    plt.close("all")
+
+
+@case(may_not_know=True)
+def plot_cloud(of):
+    yield from plane(plot.plot_cloud(of.cloud, view="back"), of.tips)
+    yield from space(plot.plot_cloud(of.cloud, view=OBLIQUE), of.tips)
+    box = np.array([of.tips.min(axis=0), of.tips.max(axis=0)])
+    yield from plane(plot.plot_cloud(of.cloud, view="top", box=box), of.tips)
+
+
+@case(may_not_know=True)
+def plot_slab(of):
+    ax = plot.plot_slab(of.cloud, view="side", at=0.03, thickness=0.05)
+    yield from plane(ax, of.tips)
+    note = ax.texts[-1].get_text()
+    middle, half = re.findall(r"[\d.]+ [Lm]", note)
+    yield middle, (0, float(middle[:-2])), (0, 0.03)
+    yield half, (0, float(half[:-2])), (0, 0.025)
+
+
+@case(may_not_know=True)
+def plot_distance(of):
+    tips = of.tips[of.distance.sample]
+    yield from plane(plot.plot_distance(of.cloud, of.distance, view="left"), tips)
+
+
+@case(may_not_know=True)
+def plot_distance_histograms(of):
+    (ax,) = plot.plot_distance_histograms({"one": of.distance}).axes
+    yield "", ax.get_xlim(), of.distance
+
+
+@case(may_not_know=True)
+def plot_redundancy(of):
+    figure = plot.plot_redundancy({"one": of.cloud}, {"one": of.distance}, thickness=0.05)
+    for ax in image_axes(figure):
+        yield from plane(ax, of.tips)
+
+
+@case(may_not_know=True)
+def plot_views(of):
+    arm = of.arm if of.known else None
+    *planes, oblique = image_axes(plot.plot_views(of.cloud, arm))
+    for ax in planes:
+        yield from plane(ax, of.tips)
+    yield from space(oblique, of.tips)
+
+
+@case(may_not_know=True)
+def plot_slice(of):
+    ax = plot.plot_slice(of.grid, view="top", at=0.1)
+    half = of.grid.cell / 2
+    for label, limits in ((ax.get_xlabel(), ax.get_xlim()), (ax.get_ylabel(), ax.get_ylim())):
+        centers = of.grid[label[0]].values
+        yield label, limits, (centers[0] - half, centers[-1] + half)
+    title = ax.get_title()
+    yield title, (0, float(re.search(r"[\d.]+", title)[0])), (0, 0.1)
+
+
+@case(may_not_know=True)
+def plot_slices(of):
+    for ax in image_axes(plot.plot_slices(of.grid, at=(0.01, 0.0, 0.1))):
+        points = np.stack(np.broadcast_arrays(*np.ix_(*(ends(of.grid[a]) for a in "xyz"))), -1)
+        yield from plane(ax, points.reshape(-1, 3))
+
+
+@case(may_not_know=True)
+def plot_hull(of):
+    yield from plane(plot.plot_hull(of.hull, length=of.length), of.hull.vertices)
+    yield from space(plot.plot_hull(of.hull, length=of.length, view=OBLIQUE), of.hull.vertices)
+
+
+@case(may_not_know=True)
+def plot_volume_curve(of):
+    alphas = np.geomspace(0.03, 0.3, 5)
+    volumes = sr.volume_curve(of.cloud.tip, alphas)
+    convex = of.hull.volume
+    curves = {"one": volumes}
+    ax = plot.plot_volume_curve(curves, alphas, length=of.length, convex=convex)
+    yield ax.get_xlabel(), ends(ax.lines[0].get_xdata()), alphas
+    yield ax.get_ylabel(), ends(ax.lines[0].get_ydata()), volumes
+    yield ax.get_ylabel(), (0, ax.lines[1].get_ydata()[0]), (0, convex)
+
+
+@case(may_not_know=True)
+def plot_curvature(of):
+    for quantity in ("bending", "torsion"):
+        ax = plot.plot_curvature({"one": of.curvature}, quantity=quantity)
+        places = [float(text.get_text()) for text in ax.get_xticklabels()]
+        yield ax.get_xlabel(), places, of.curvature.Z
+        medians = of.curvature[f"{quantity}_quantile"].sel(quantile=0.5)
+        yield ax.get_ylabel(), ax.lines[-1].get_ydata(), medians
+
+
+@case(may_not_know=False)
+def plot_arm(of):
+    yield from plane(plot.plot_arm(of.arm, view="side"), of.rest)
+    yield from space(plot.plot_arm(of.arm, view=OBLIQUE), of.rest)
+
+
+@case(may_not_know=False)
+def plot_cross_section(of):
+    radius = float(of.arm.radius(0.1))
+    circle = np.outer([-1, 1], [radius] * 3)
+    yield from plane(plot.plot_cross_section(of.arm, 0.1), circle)
+    yield from plane(plot.plot_cross_section(of.arm, 0.1, half_width=1.1 * radius), circle)
+
+
+@case(may_not_know=False)
+def plot_designs(of):
+    long = sr.designs.minimal_trunk(length=2 * LENGTH)
+    panels = [plot.DesignPanel("a", of.arm), plot.DesignPanel("b", long)]
+    arm, _, section, _ = plot.plot_designs(panels).axes
+    yield from plane(arm, of.rest)
+    circle = np.outer([-1, 1], [float(of.arm.radius(0.0))] * 3)
+    yield from plane(section, circle)
+
+
+@case(may_not_know=False)
+def plot_opposite_sides(of):
+    view = (0.3, 0.2)
+    above, below = image_axes(plot.plot_opposite_sides({"one": of.cloud}, view=view))
+    yield from space(above, of.tips, view)
+    yield from space(below, of.tips, (0.3 + np.pi, 0.2))
+
+
+def sheet(of, draw) -> Iterator[Shown]:
+    """Panels and the bar of half a length in the margin."""
+    axis = plot.SheetAxis("parameter", (1.0,))
+    box = np.array([of.tips.min(axis=0), of.tips.max(axis=0)]) / LENGTH
+    figure = draw(axis, axis, box)
+    (panel,) = image_axes(figure)
+    seen = project(of.tips, OBLIQUE)
+    yield "x / L", panel.get_xlim(), seen[:, 0]
+    yield "y / L", panel.get_ylim(), seen[:, 1]
+    margin = figure.axes[-1]
+    (bar,) = margin.lines
+    assert margin.texts[0].get_text() == "$L/2$"
+    inches = np.ptp(bar.get_xdata()) / np.ptp(margin.get_xlim()) * margin.get_position().width
+    drawn = inches / panel.get_position().width * np.ptp(panel.get_xlim())
+    yield "x / L", (0, drawn), (0, LENGTH / 2)
+
+
+@case(may_not_know=False)
+def plot_cloud_sheet(of):
+    yield from sheet(
+        of,
+        lambda *axes: plot.plot_cloud_sheet(
+            lambda *_: of.cloud, *axes[:2], box_over_length=axes[2]
+        ),
+    )
+
+
+@case(may_not_know=False)
+def plot_hull_sheet(of):
+    yield from sheet(
+        of,
+        lambda *axes: plot.plot_hull_sheet(
+            lambda *_: of.hull, *axes[:2], length=LENGTH, box_over_length=axes[2]
+        ),
+    )
+
+
+@case(may_not_know=False)
+def plot_metric_map(of):
+    atlas = of.atlas
+    ax = plot.plot_metric_map(atlas, "reach_height")
+    bar = ax.figure.axes[-1]
+    # every design in its own length, of which there are two
+    yield bar.get_ylabel(), bar.get_ylim(), atlas.reach_height * LENGTH / atlas.length
+    assert ax.get_xlabel() == "length (m)"
+    yield "", ax.get_xlim(), atlas.length
+
+
+def test_every_figure_of_the_product_is_held_to_this():
+    assert set(CASES) == {name for name in plot.__all__ if name.startswith("plot_")}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_axes_count_in_what_they_say_where_data_know_the_length(name, everything):
+    check(CASES[name](everything))
+    assert not any("[m" in text for text in texts())
+
+
+@pytest.mark.parametrize("name", sorted(MAY_NOT_KNOW))
+def test_axes_count_in_meters_where_data_do_not_know_the_length(name, ignorant):
+    check(CASES[name](ignorant))
+    assert not any(re.search(r"/ L|\dL|\d L\b|κL", text) for text in texts())
+
+
+def check(shown: Iterator[Shown]) -> None:
+    count = 0
+    for label, drawn, data in shown:
+        low, high = ends(si(label, drawn))
+        first, last = ends(data)
+        slack = 2e-2 * (last - first)  # notes and ticks are rounded
+        assert low <= first + slack
+        assert last - slack <= high
+        assert last - first > 0.4 * (high - low)  # a third, L, is not between
+        count += 1
+    assert count
+
+
+def texts() -> list[str]:
+    """All that is written in all open figures."""
+    from matplotlib.text import Text
+
+    figures = map(plt.figure, plt.get_fignums())
+    return [text.get_text() for figure in figures for text in figure.findobj(Text)]
+
+
+def test_numbers_along_a_box_stand_where_they_say(everything):
+    ax = plot.plot_cloud(everything.cloud, view=OBLIQUE)
+    axis, ticks = 0, []
+    for text in ax.texts:
+        if text.get_text()[0] in "xyz":
+            values = np.array([float(t.get_text().replace("\N{MINUS SIGN}", "-")) for t in ticks])
+            places = np.array([t.xy for t in ticks])
+            step = np.diff(places, axis=0)
+            wanted = np.outer(np.diff(values), view_axes(OBLIQUE)[:2, axis])
+            np.testing.assert_allclose(step, wanted, atol=1e-9)
+            axis, ticks = axis + 1, []
+        else:
+            ticks.append(text)
+    assert axis == 3
+
+
+def test_data_in_meters_do_not_go_over_data_in_lengths(everything):
+    ax = plot.plot_cloud(everything.cloud)
+    with pytest.raises(InvalidInput, match="ax = counted in L: must be in m"):
+        plot.plot_hull(everything.hull, ax=ax)
+    plot.plot_hull(everything.hull, ax=ax, length=LENGTH)
+    assert ax.get_xlabel() == "x / L"
+
+
+def test_sheets_and_rows_take_no_mixture(everything, ignorant):
+    both = {"a": everything.cloud, "b": ignorant.cloud}
+    distances = dict.fromkeys(both, everything.distance)
+    with pytest.raises(InvalidInput, match="some with and some without"):
+        plot.plot_redundancy(both, distances)
+    with pytest.raises(InvalidInput, match="some with and some without"):
+        plot.plot_views(ignorant.cloud, everything.arm)
+    axis = plot.SheetAxis("parameter", (1.0,))
+    with pytest.raises(InvalidInput, match="unit of the sheet"):
+        plot.plot_cloud_sheet(
+            lambda *_: ignorant.cloud, axis, axis, box_over_length=[[-1, -1, -1], [1, 1, 1]]
+        )
+
+
+def test_boxes_and_points_of_another_shape_are_refused(everything):
+    with pytest.raises(InvalidInput, match="a lower and an upper corner"):
+        plot.plot_cloud(everything.cloud, box=[[0, 0, 0], [1, 1, 0]])
+    with pytest.raises(InvalidInput, match=r"a point \(x, y, z\)"):
+        plot.plot_slices(everything.grid, at=(0.0, 0.0))
+    with pytest.raises(InvalidInput, match=r"at = 1\.0: must be between"):
+        plot.plot_slice(everything.grid, at=1.0)
+
+
+def test_stations_of_two_designs_stand_at_the_same_places(everything):
+    other = sr.curvature_statistics(everything.cloud, [0.1, 0.2])
+    with pytest.raises(InvalidInput, match="stations"):
+        plot.plot_curvature({"a": everything.curvature, "b": other})
+
+
+def test_a_single_row_of_designs_is_drawn_as_cells_and_an_empty_atlas_stays_white(everything):
+    row = everything.atlas.isel(length=[0])
+    (cells,) = plot.plot_metric_map(row, "reach_height", key=False).collections
+    np.testing.assert_allclose(np.ravel(cells.get_array()), row.reach_height[0] / LENGTH)
+    nothing = everything.atlas.assign(reach_height=np.nan * everything.atlas.reach_height)
+    ax = plot.plot_metric_map(nothing, "reach_height", designs=True, key=False)
+    assert ax.collections[0].get_array().mask.all()
+    (dots,) = ax.lines
+    assert len(dots.get_xdata()) == nothing.status.size
