@@ -32,6 +32,11 @@ def single(revolution: float = 0.0, **changes: object) -> Manipulator:
     return arm_of(fiber, **changes)
 
 
+def of_length(arm: Manipulator, length: float) -> Manipulator:
+    """The arm with another length, its radius at the base as it was."""
+    return arm.replace(profile=arm.profile.replace(length=length))
+
+
 @st.composite
 def arms(draw: st.DrawFn) -> Manipulator:
     """Any arm with one to three architectures of one to three narrow bundles."""

@@ -36,7 +36,7 @@ def test_a_cloud_depends_on_its_arguments_alone(trunk, sampler, monkeypatch):
 
 
 def test_a_cloud_knows_where_it_comes_from(cloud, trunk):
-    assert sr.design_of(cloud) == trunk
+    assert sr.cloud.design_of(cloud) == trunk
     assert {k: cloud.attrs[k] for k in ("seed", "sampler", "tol")} == {
         "seed": 3,
         "sampler": "uniform",
@@ -45,7 +45,7 @@ def test_a_cloud_knows_where_it_comes_from(cloud, trunk):
     assert cloud.tip.attrs["units"] == "m"
     assert cloud.tip.attrs["length"] == trunk.length
     assert list(cloud.fiber.values) == ["left", "right", "longitudinal"]
-    again = sr.compute_cloud(sr.design_of(cloud), n=40_000, seed=cloud.attrs["seed"])
+    again = sr.compute_cloud(sr.cloud.design_of(cloud), n=40_000, seed=cloud.attrs["seed"])
     assert again.identical(cloud)
 
 

@@ -18,7 +18,7 @@ def cloud():
 @pytest.fixture(scope="module")
 def shapes(cloud):
     """The same numbers from the whole configurations."""
-    arm = sr.design_of(cloud)
+    arm = sr.cloud.design_of(cloud)
     z = np.concatenate([[0.0], distal_stations(arm)])
     return sr.configuration(arm, cloud.activation.values, z).isel(station=slice(1, None))
 
@@ -54,7 +54,7 @@ def test_every_sample_is_counted_once_inside_the_range_of_the_box(cloud):
 
 
 def test_blocks_do_not_matter(cloud):
-    arm, gamma = sr.design_of(cloud), cloud.activation.values
+    arm, gamma = sr.cloud.design_of(cloud), cloud.activation.values
     whole, cut = stream_statistics(arm, [gamma]), stream_statistics(arm, np.array_split(gamma, 7))
     assert whole.bending_count.equals(cut.bending_count)
     np.testing.assert_allclose(whole.bending_mean, cut.bending_mean, rtol=1e-12)
@@ -100,7 +100,7 @@ def test_stations_off_the_arm_are_refused(cloud, stations):
 
 def test_nothing_to_count_is_refused(cloud):
     with pytest.raises(InvalidInput, match="one sample at least"):
-        stream_statistics(sr.design_of(cloud), [])
+        stream_statistics(sr.cloud.design_of(cloud), [])
     with pytest.raises(InvalidInput, match="bins = 0"):
         curvature_statistics(cloud, bins=0)
     with pytest.raises(InvalidInput, match="quantiles"):

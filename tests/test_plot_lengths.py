@@ -97,7 +97,7 @@ def everything(tmp_path_factory) -> SimpleNamespace:
         distance=activation_distance(cloud, LENGTH / 10),
         grid=sr.reachable_set(arm, accuracy=3e-2).grid,
         hull=sr.convex_hull(cloud.tip),
-        curvature=sr.curvature_statistics(cloud),
+        curvature=sr.curvature.curvature_statistics(cloud),
         atlas=atlas,
     )
 
@@ -197,7 +197,7 @@ def plot_hull(of):
 @case(may_not_know=True)
 def plot_volume_curve(of):
     alphas = np.geomspace(0.03, 0.3, 5)
-    volumes = sr.volume_curve(of.cloud.tip, alphas)
+    volumes = sr.volume.volume_curve(of.cloud.tip, alphas)
     convex = of.hull.volume
     curves = {"one": volumes}
     ax = plot.plot_volume_curve(curves, alphas, length=of.length, convex=convex)
@@ -381,7 +381,7 @@ def test_boxes_and_points_of_another_shape_are_refused(everything):
 
 
 def test_stations_of_two_designs_stand_at_the_same_places(everything):
-    other = sr.curvature_statistics(everything.cloud, [0.1, 0.2])
+    other = sr.curvature.curvature_statistics(everything.cloud, [0.1, 0.2])
     with pytest.raises(InvalidInput, match="stations"):
         plot.plot_curvature({"a": everything.curvature, "b": other})
 

@@ -120,7 +120,7 @@ def _fill(
         first = 0
         for cube in cube_blocks(sampler, len(tip), rod.box.bundles, seed, BLOCK):
             block = slice(first, first := first + len(cube))
-            activation[block] = rod.box.from_cube(cube, out=cube)
+            rod.box.from_cube(cube, out=activation[block])
             task = rod.tip_task(activation[block], tip[block])
             yield partial(_reported, task, progress, len(cube))
 

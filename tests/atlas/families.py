@@ -34,7 +34,7 @@ def gapped_space() -> DesignSpace:
 def similar_designs(*lengths: float) -> DesignSpace:
     """Designs of one shape and different size."""
     base = sr.designs.minimal_trunk()
-    radii = np.array(lengths) * base.outer_radius
+    radii = np.array(lengths) * base.profile.outer_radius
     return DesignSpace.listed(base, length=lengths, outer_radius=radii)
 
 

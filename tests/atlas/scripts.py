@@ -13,7 +13,7 @@ SCRIPT = """
     import sys
     from pathlib import Path
     import numpy as np
-    from softreach import designs
+    from softreach import describe, designs
     from softreach.atlas import DesignSpace, build_atlas, design_task, worker_processes
 
     def build(store, n=3_000, alpha_over_length=0.3, accuracy=0.2, **options):

@@ -43,7 +43,7 @@ DEADLY = """
     right = design_task.Intermediates
 
     def deadly(arm, *rest):
-        guilty = arm.taper > 0.05 and abs(arm.revolutions[0]) < 1e-9
+        guilty = arm.profile.taper > 0.05 and abs(describe(arm).revolutions[0]) < 1e-9
         mark = Path(sys.argv[0]).with_suffix(".died")
         if guilty and (ALWAYS or not mark.exists()):
             mark.touch()

@@ -17,6 +17,7 @@ from softreach.atlas import (
 from softreach.atlas.metrics import chosen_metrics
 from softreach.errors import SoftreachWarning
 from tests.atlas.families import SMALL, similar_designs, small_space
+from tests.laws import of_length
 
 
 def test_volume_grows_with_revolution_for_every_taper(paper):
@@ -97,7 +98,7 @@ def test_the_alpha_radius_follows_each_design(tmp_path):
     space = DesignSpace.grid(sr.designs.minimal_trunk(), length=[0.5, 1.5])
     atlas = build_atlas(space, tmp_path / "a.zarr", **SMALL)
     for length in (0.5, 1.5):
-        tip = sr.compute_cloud(space.base.replace(length=length), n=2_000).tip
+        tip = sr.compute_cloud(of_length(space.base, length), n=2_000).tip
         found = atlas.volume.sel(length=length)
         np.testing.assert_allclose(found, sr.concave_hull(tip, 0.5 * length).volume, rtol=1e-12)
 

@@ -35,12 +35,13 @@ from tests.atlas.families import (
     similar_designs,
     small_space,
 )
+from tests.laws import of_length
 
 
 def test_stored_clouds_are_those_of_the_cloud_alone_to_half_a_step(paper):
     at = {"revolution": 0.0, "taper": np.radians(3)}
     stored = atlas_cloud(paper, **at)
-    alone = sr.compute_cloud(sr.design_of(stored), n=20_000, seed=1)
+    alone = sr.compute_cloud(sr.cloud.design_of(stored), n=20_000, seed=1)
     assert stored.activation.equals(alone.activation)
     assert np.abs(stored.tip.values - alone.tip.values).max() <= 0.5e-5 * (1 + 1e-9)
     assert stored.attrs == alone.attrs
@@ -50,7 +51,7 @@ def test_clouds_that_were_not_kept_are_computed_again(tmp_path):
     atlas = build_atlas(small_space(), tmp_path / "a.zarr", keep_clouds=False, **SMALL)
     assert "tip" not in atlas
     again = atlas_cloud(atlas, revolution=0.5, taper=0.0)
-    alone = sr.compute_cloud(sr.design_of(again), n=2_000)
+    alone = sr.compute_cloud(sr.cloud.design_of(again), n=2_000)
     assert again.tip.equals(alone.tip)
 
 
@@ -58,7 +59,7 @@ def test_any_reader_of_zarr_and_cf_understands_the_store(tmp_path):
     build_atlas(small_space(length=[1.0, 1.5]), tmp_path / "a.zarr", **SMALL)
     raw = xr.open_zarr(tmp_path / "a.zarr", consolidated=False, zarr_format=3, chunks=None)
     tips = raw.tip.isel(revolution=1, taper=1, length=1).T.values
-    alone = sr.compute_cloud(sr.designs.minimal_trunk(1.5).replace(length=1.5), n=2_000)
+    alone = sr.compute_cloud(of_length(sr.designs.minimal_trunk(1.5), 1.5), n=2_000)
     np.testing.assert_allclose(tips, alone.tip, atol=0.6e-5)
     assert raw.taper.attrs["units"] == "rad"
     assert raw.status.attrs["flag_meanings"].split()[1] == "done"
@@ -151,7 +152,7 @@ def test_a_part_of_an_atlas_keeps_the_numbers_of_its_designs(some):
     part = open_atlas(some).isel(outer_radius=[1])
     assert part.number.values.tolist() == [[1], [3]]
     assert atlas_status(part).messages == {3: "no luck"}
-    assert atlas_design(part, taper=np.radians(4), outer_radius=0.1).taper == np.radians(4)
+    assert atlas_design(part, taper=np.radians(4), outer_radius=0.1).profile.taper == np.radians(4)
 
 
 def test_questions_about_a_design_name_the_parameters_they_need(some):

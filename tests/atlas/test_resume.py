@@ -14,6 +14,7 @@ from softreach.atlas.store import AtlasStore
 from softreach.errors import InvalidInput, SoftreachWarning
 from tests.atlas.families import SMALL, assert_same, command, small_space
 from tests.atlas.scripts import build16, ended, run_script
+from tests.laws import of_length
 
 
 @pytest.mark.slow
@@ -75,7 +76,7 @@ def test_another_space_is_refused_with_what_differs(tmp_path):
         (DesignSpace.grid(base, revolution=[0.5, 1.0], taper=[0.0, np.radians(2)]), "revolution: "),
         (DesignSpace.grid(base, revolution=[0.5, 1.5]), "taper: .* there, none here"),
         (
-            DesignSpace.grid(base.replace(length=1.5), revolution=[0.5, 1.5]),
+            DesignSpace.grid(of_length(base, 1.5), revolution=[0.5, 1.5]),
             "length_m = 1.0 there, length_m = 1.5 here",
         ),
     ]:
@@ -107,7 +108,7 @@ def test_a_failing_design_is_recorded_and_tried_again_later(tmp_path, monkeypatc
     store = tmp_path / "a.zarr"
 
     def fails_for_taper(arm, *rest):
-        if arm.taper > 0 and abs(arm.revolutions[0]) > 1:
+        if arm.profile.taper > 0 and abs(sr.describe(arm).revolutions[0]) > 1:
             raise RuntimeError("no hull today")
         return Intermediates(arm, *rest)
 

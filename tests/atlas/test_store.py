@@ -24,6 +24,7 @@ from softreach.atlas import (
 from softreach.atlas.store import AtlasStore, Result
 from softreach.errors import InvalidInput, SoftreachError, SoftreachWarning
 from tests.atlas.families import SMALL, TINY, assert_same, command, gapped_space, small_space
+from tests.laws import of_length
 
 
 class Interrupted(Exception):
@@ -249,7 +250,7 @@ def test_a_store_says_how_long_each_design_is_and_steps_by_the_shortest(tmp_path
         atlas = build_atlas(space, tmp_path / "a.zarr", **SMALL)
     assert atlas.length.values.tolist() == [0.0, 0.8, 1.5]
     for length in (0.8, 1.5):
-        alone = sr.compute_cloud(space.base.replace(length=length), n=2_000)
+        alone = sr.compute_cloud(of_length(space.base, length), n=2_000)
         off = np.abs(atlas_cloud(atlas, length=length).tip.values - alone.tip.values).max()
         assert 0 < off <= 0.5e-5 * 0.8 * (1 + 1e-9)
 

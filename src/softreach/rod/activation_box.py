@@ -80,8 +80,14 @@ class ActivationBox:
         Returns:
             Activations, shape (n, bundles), never outside the bounds.
         """
-        scaled = np.multiply(cube, self.widths, out=out)
-        return np.minimum(np.add(self.low, scaled, out=scaled), self.high, out=scaled)
+        gamma = np.multiply(cube, self.widths, out=out)
+        gamma += self.low
+        return np.minimum(gamma, self.high, out=gamma) if self._overshoots else gamma
+
+    @cached_property
+    def _overshoots(self) -> bool:
+        """Whether rounding carries some low + width past its bound, where 1 would then lie."""
+        return bool((self.low + self.widths > self.high).any())
 
     def from_free_cube(self, cube: Array) -> Array:
         """Activations of points of the unit cube of the free bundles; the others stay held.

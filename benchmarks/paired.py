@@ -1,0 +1,284 @@
+"""The same work by two versions of softreach, in turns: are the numbers equal, and which is faster.
+
+`python -m benchmarks.paired OTHER/src [PART ...]` starts one process for this checkout and one for
+the other, lets them run each task by turns, and prints the ratio of their CPU times (the median of
+the turns, this one over the other) with the largest difference of their results. Nothing else on
+the machine can favor one of them. With `--most R` the exit code is 1 if a ratio exceeds R.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).parent.parent
+Results = dict[str, np.ndarray]
+Task = Callable[[], Results]
+
+
+def kernel_tasks() -> dict[str, Task]:
+    """Tips, Jacobians and shapes."""
+    import softreach as sr
+
+    def tips(arm: Any, n: int) -> Task:
+        gamma = _activations(arm, n)
+        return lambda: {"tips": sr.tip_positions(arm, gamma)}
+
+    minimal, redundant = sr.designs.minimal_trunk(), sr.designs.redundant_trunk()
+    few, some = _activations(minimal, 2_000), _activations(minimal, 100_000)
+    return {
+        "tips, 3 bundles": tips(minimal, 1_000_000),
+        "tips, 4 bundles": tips(redundant, 1_000_000),
+        "Jacobians": lambda: {"twists": sr.tip_jacobian(minimal, some)},
+        "tip directions": lambda: {"d3": _tip_directions(minimal, some)},
+        "shapes": lambda: {"r": sr.configuration(minimal, few).position.values},
+        "cloud": lambda: {"tip": sr.compute_cloud(minimal, 1_000_000).tip.values},
+    }
+
+
+def workspace_tasks() -> dict[str, Task]:
+    """The exact reachable set."""
+    from softreach.workspace import reachable_set
+
+    def numbers(arm: Any, accuracy: float) -> Task:
+        def task() -> Results:
+            found = reachable_set(arm, accuracy=accuracy)
+            asked = ("volume", "volume_error", "convex_volume")
+            return {name: np.array(getattr(found, name)) for name in asked}
+
+        return task
+
+    trunks = {f"{o}°, {p}°": _trunk(o, p) for o, p in ((108, 2), (75, 3), (36, 3))}
+    found = {f"reachable set, {name}": numbers(arm, 3e-3) for name, arm in trunks.items()}
+    import softreach as sr
+
+    found["reachable set, 4 bundles"] = numbers(sr.designs.redundant_trunk(), 0.02)
+    found["reachable surface"] = lambda: {
+        "vertices": reachable_set(_trunk(75, 3)).surface().vertices
+    }
+    return found
+
+
+def inverse_tasks() -> dict[str, Task]:
+    """Every branch, least change, directions, places out of reach."""
+    import softreach as sr
+
+    def solve(arm: Any, n: int, **options: Any) -> Task:
+        targets = sr.tip_positions(arm, _activations(arm, n))
+
+        def task() -> Results:
+            found = sr.solve_inverse(arm, targets, **options)
+            return {"counts": found.counts, "activations": found.activations}
+
+        return task
+
+    def away() -> Results:
+        targets = 1.3 * np.random.default_rng(3).normal(size=(100, 3))
+        return {"gap": np.array([one.gap for one in sr.solve_inverse(_trunk(108, 2), targets)])}
+
+    def track() -> Results:
+        arm = _trunk(108, 2)
+        path = sr.tip_positions(arm, np.linspace([-0.2] * 3, [-1.2, -0.6, -0.9], 30))
+        return {"activation": sr.track_path(arm, path).activation.values}
+
+    designs = ((108, 2), (75, 3), (36, 3), (0, 0))
+    found = {f"every branch, {o}°, {p}°": solve(_trunk(o, p), 20_000) for o, p in designs}
+    redundant = sr.designs.redundant_trunk()
+    return found | {
+        "least change, 4 bundles": solve(redundant, 60),
+        "direction, 3 bundles": solve(_trunk(108, 2), 60, direction=(0.0, 0.0, 1.0)),
+        "out of reach": away,
+        "path": track,
+    }
+
+
+def redundancy_tasks() -> dict[str, Task]:
+    """Questions asked of a cloud."""
+    import softreach as sr
+    from softreach.curvature import curvature_statistics
+    from softreach.dexterity import dexterity
+
+    cloud = sr.compute_cloud(sr.designs.redundant_trunk(), 200_000)
+
+    def statistics() -> Results:
+        found = curvature_statistics(cloud)
+        return {name: found[name].values for name in found if not name.endswith("_count")}
+
+    return {
+        "activation distance": lambda: {
+            "distance": sr.activation_distance(cloud, 1 / 60, 10_000).values
+        },
+        "dexterity": lambda: {"manipulability": dexterity(cloud).manipulability.values},
+        "curvature statistics": statistics,
+    }
+
+
+def atlas_tasks() -> dict[str, Task]:
+    """A small atlas with every metric."""
+    import softreach as sr
+
+    space = sr.DesignSpace.grid(
+        sr.designs.minimal_trunk(), revolution=[0.9, 1.8], taper=np.radians([0.0, 2.0]).tolist()
+    )
+    metrics = ("extent", "convex", "concave", "exact", "curvature")
+
+    def task() -> Results:
+        with tempfile.TemporaryDirectory() as folder:
+            atlas = sr.build_atlas(space, f"{folder}/a.zarr", 100_000, metrics=metrics)
+            names = ("volume", "convex_volume", "exact_volume", "unreachability", "x_min")
+            return {name: atlas[name].values for name in names}
+
+    return {"atlas, 2 x 2 of 100,000": task}
+
+
+PARTS: dict[str, Callable[[], dict[str, Task]]] = {
+    "kernels": kernel_tasks,
+    "workspace": workspace_tasks,
+    "inverse": inverse_tasks,
+    "redundancy": redundancy_tasks,
+    "atlas": atlas_tasks,
+}
+
+
+def _trunk(revolution: float, taper: float) -> Any:
+    import softreach as sr
+
+    return sr.designs.minimal_trunk(np.radians(revolution), np.radians(taper))
+
+
+def _activations(arm: Any, n: int) -> np.ndarray:
+    return np.random.default_rng(0).uniform(*arm.bounds.T, (n, arm.bundles))
+
+
+def _tip_directions(arm: Any, gamma: np.ndarray) -> np.ndarray:
+    import softreach as sr
+
+    return sr.configuration(arm, gamma, [arm.length]).directors.values[:, 0, 2]
+
+
+def serve() -> None:
+    """Run the tasks that arrive as lines; this is what the processes of both versions do."""
+    import time
+    import warnings
+
+    warnings.simplefilter("ignore")
+    tasks: dict[str, Task] = {}
+    for line in sys.stdin:
+        asked = json.loads(line)
+        if asked["part"]:
+            tasks = PARTS[asked["part"]]()
+            answer: dict[str, Any] = {"tasks": list(tasks)}
+        else:
+            wall, cpu = time.perf_counter(), time.process_time()
+            results = tasks[asked["task"]]()
+            answer = {"wall": time.perf_counter() - wall, "cpu": time.process_time() - cpu}
+            np.savez(asked["out"], **results)  # type: ignore[arg-type]
+        sys.stdout.write(json.dumps(answer) + "\n")
+        sys.stdout.flush()
+
+
+class Version:
+    """One version of softreach in a process of its own."""
+
+    def __init__(self, source: Path, out: Path) -> None:
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(source), str(ROOT)])}
+        self.out = out
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "benchmarks.paired", "--serve"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=environment,
+        )
+
+    def ask(self, **question: str) -> dict[str, Any]:
+        """The answer to a question, when it comes."""
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        whole = {"part": "", "task": "", "out": str(self.out), **question}
+        self.process.stdin.write(json.dumps(whole) + "\n")
+        self.process.stdin.flush()
+        if not (line := self.process.stdout.readline()):
+            raise SystemExit(f"the process of {self.out.stem} ended at {question}")
+        return json.loads(line)
+
+    def results(self) -> Results:
+        """What the last task found."""
+        with np.load(self.out) as stored:
+            return dict(stored)
+
+    def end(self) -> None:
+        """End the process."""
+        self.process.kill()
+
+
+def difference(ours: Results, theirs: Results) -> float:
+    """Largest difference of two results, relative to the largest number of each array."""
+    worst = 0.0
+    for name, mine in ours.items():
+        other = theirs[name]
+        if mine.shape != other.shape:
+            return float("inf")
+        scale = np.nanmax(np.abs(other), initial=0.0) or 1.0
+        apart = np.abs(mine.astype(float) - other.astype(float))
+        if (np.isnan(mine.astype(float)) != np.isnan(other.astype(float))).any():
+            return float("inf")
+        worst = max(worst, float(np.nanmax(apart, initial=0.0)) / float(scale))
+    return worst
+
+
+def compared(ours: Version, theirs: Version, part: str, turns: int) -> Iterator[tuple[Any, ...]]:
+    """Task, ratio of CPU times, CPU time of the other version [s], difference of results."""
+    names = ours.ask(part=part)["tasks"]
+    theirs.ask(part=part)
+    for name in names:
+        for version in (ours, theirs):  # compiled, loaded
+            version.ask(task=name)
+        apart = difference(ours.results(), theirs.results())
+        pairs = []
+        for turn in range(turns):
+            order = (ours, theirs) if turn % 2 else (theirs, ours)
+            took = {version: version.ask(task=name)["cpu"] for version in order}
+            pairs.append((took[ours], took[theirs]))
+        mine, other = np.array(pairs).T
+        yield name, float(np.median(mine / other)), float(np.median(other)), apart
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("source", type=Path, help="the folder src of the other checkout")
+    parser.add_argument("parts", nargs="*", default=list(PARTS), help=", ".join(PARTS))
+    parser.add_argument("--turns", type=int, default=9)
+    parser.add_argument("--most", type=float, default=float("inf"))
+    asked = parser.parse_args()
+    if not (asked.source / "softreach").is_dir():
+        parser.error(f"source = {asked.source}: must hold the package softreach")
+    worst = 0.0
+    print("| task | CPU of the other [s] | ratio of CPU times | largest relative difference |")
+    print("|---|--:|--:|--:|")
+    with tempfile.TemporaryDirectory() as folder:
+        ours = Version(ROOT / "src", Path(folder) / "ours.npz")
+        theirs = Version(asked.source.resolve(), Path(folder) / "theirs.npz")
+        try:
+            for part in asked.parts:
+                for name, ratio, cpu, apart in compared(ours, theirs, part, asked.turns):
+                    worst = max(worst, ratio)
+                    print(f"| {name} | {cpu:.3f} | {ratio:.3f} | {apart:.1e} |", flush=True)
+        finally:
+            ours.end()
+            theirs.end()
+    sys.exit(worst > asked.most)
+
+
+if __name__ == "__main__":
+    serve() if "--serve" in sys.argv else main()
