@@ -6,7 +6,7 @@ import importlib
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.io import loadmat
 
@@ -135,6 +135,7 @@ class TestCloud:
 
 
 @given(st.lists(st.text(max_size=8), max_size=6))
+@example(["a_b_2", "a b", "a_b"])
 def test_column_names_are_different_and_safe_in_every_language(names):
     columns = column_names(names)
     assert len(set(columns)) == len(names)
@@ -201,10 +202,12 @@ class TestArm:
         assert mesh.volume == pytest.approx(reference.volume, rel=1e-5)
         assert set(np.unique(plain.cell_data["part"][0])) == {0, 1, 2, 3}
 
-    def test_bundles_of_one_name_become_different_parts(self, trunk, bent, tmp_path):
-        twins = trunk.replace(fibers=tuple(f.replace(name="body") for f in trunk.fibers))
-        export_arm(twins, bent, tmp_path / "arm.glb")
-        assert len(trimesh.load(tmp_path / "arm.glb").geometry) == 4
+    def test_a_bundle_called_body_is_a_part_of_its_own(self, trunk, bent, tmp_path):
+        first, *others = trunk.actuators
+        arm = trunk.replace(actuators=(first.replace(name="body"), *others))
+        export_arm(arm, bent, tmp_path / "arm.glb")
+        names = set(trimesh.load(tmp_path / "arm.glb").geometry)
+        assert names == {"body", "body (1)", "right", "longitudinal"}
 
 
 class TestWhole:

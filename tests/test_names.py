@@ -18,6 +18,7 @@ MODULES = [
     for name in (
         "arm",
         "arm.designs",
+        "arm.parameters",
         "atlas",
         "cloud",
         "curvature",

@@ -66,7 +66,7 @@ def test_any_reader_of_zarr_and_cf_understands_the_store(tmp_path):
 
 
 def test_designs_with_more_bundles_share_the_activations_of_the_others(tmp_path):
-    space = DesignSpace.listed(sr.designs.minimal_trunk(), bundles_left=[1, 2])
+    space = DesignSpace.listed(sr.designs.minimal_trunk(), **{"left.bundles": [1, 2]})
     atlas = build_atlas(space, tmp_path / "a.zarr", **SMALL)
     few, more = atlas_cloud(atlas, design=0), atlas_cloud(atlas, design=1)
     assert (few.activation.shape[1], more.activation.shape[1]) == (3, 4)

@@ -6,23 +6,29 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.atlas import DesignSpace, parameter_units
+from softreach.arm.actuators import FiberArchitecture
+from softreach.arm.parameters import changed
+from softreach.atlas import DesignSpace
 from softreach.atlas.space_file import parse_space
 from softreach.errors import InvalidInput
 from tests.atlas.families import small_space
+
+
+def builtin(name: str) -> sr.Manipulator:
+    return getattr(sr.designs, name)()
 
 
 def test_a_grid_has_every_combination_in_c_order():
     space = small_space()
     assert (space.dims, space.shape, space.size) == (("revolution", "taper"), (2, 2), 4)
     assert space.values(1) == {"revolution": 0.5, "taper": np.radians(2.0)}
-    arm = space.design(1)
-    assert arm.taper == np.radians(2.0)
-    np.testing.assert_allclose(np.abs(arm.revolutions[:2]), 0.5)
+    assert space.design(1) == changed(sr.designs.minimal_trunk(), space.values(1))
 
 
 def test_a_list_takes_values_together():
-    space = DesignSpace.listed(sr.designs.minimal_trunk(), taper=[0.0, 0.01], offset_left=[1, 2])
+    space = DesignSpace.listed(
+        sr.designs.minimal_trunk(), taper=[0.0, 0.01], **{"left.offset": [1, 2]}
+    )
     assert (space.dims, space.size) == (("design",), 2)
     assert space.design(1).fibers[0].offset == 2
 
@@ -37,43 +43,25 @@ def test_sampled_designs_fill_each_stratum_once(method):
         assert sorted(strata) == list(range(16))
 
 
-@pytest.mark.parametrize("name", list(parameter_units(sr.designs.minimal_trunk())))
-def test_every_parameter_changes_the_design_and_its_own_value_changes_nothing(name):
-    base = sr.designs.minimal_trunk()
-    value = {"bundles": 2, "lower": -1.0, "upper": 0.5, "length": 1.1, "outer_radius": 0.07}
-    new = next((v for key, v in value.items() if name.startswith(key)), 0.3)
-    new = {"taper": 0.01}.get(name, new)
-    changed = DesignSpace.listed(base, **{name: [new]}).design(0)
-    assert changed != base
-    same = {"taper": base.taper, "poisson_ratio": 0.5, "length": 1.0, "radius_ratio": 0.75}
-    if name in same:
-        np.testing.assert_allclose(
-            sr.tip_positions(
-                DesignSpace.listed(base, **{name: [same[name]]}).design(0), [[-1] * 3]
-            ),
-            sr.tip_positions(base, [[-1] * 3]),
-            atol=1e-12,
-        )
+def test_counts_that_are_sampled_are_whole():
+    arm = sr.designs.minimal_trunk()
+    space = DesignSpace.sampled(arm, 8, **{"left.bundles": (1, 3), "left.offset": (0.0, 1.0)})
+    counts, offsets = (np.array(values) for _, values in space.parameters)
+    assert set(counts) == {1.0, 2.0, 3.0}
+    assert (offsets % 1 != 0).any()
 
 
-def test_a_valid_design_behind_an_invalid_one_is_found():
-    base = sr.designs.minimal_trunk(taper=np.radians(3))
-    space = DesignSpace.listed(base, outer_radius=[0.01], taper=[0.0])
-    assert space.design(0).outer_radius == 0.01
-
-
-def test_bounds_of_one_fiber_follow_its_bundles():
-    base = sr.designs.minimal_trunk()
-    space = DesignSpace.listed(base, bundles_left=[2], lower_left=[-1.0], upper=[0.1])
-    expected = [[-1, 0.1], [-1, 0.1], [-5 / 3, 0.1], [-5 / 3, 0.1]]
-    np.testing.assert_allclose(space.design(0).bounds, expected)
+def test_designs_that_would_be_shortened_to_nothing_are_gaps():
+    space = DesignSpace.listed(sr.designs.minimal_trunk(), lower=[-1.0, -30.0])
+    assert list(space.gaps) == [1]
+    assert "must keep ζ > 0" in space.gaps[1]
 
 
 @pytest.mark.parametrize(
     ("values", "message"),
     [
         ({}, "parameters = none"),
-        ({"tapper": [0]}, "parameter = tapper: must be one of revolution, taper"),
+        ({"tapper": [0]}, "parameter = tapper: must be one of revolution, taper.*did you mean"),
         ({"taper": []}, "taper = .*: must be one finite value"),
         ({"taper": [np.nan]}, "taper = .*: must be one finite value"),
         ({"taper": [0.01, 0.01]}, "taper = .*: must be values that differ"),
@@ -86,7 +74,7 @@ def test_faulty_spaces_are_refused_in_one_line(values, message):
 
 
 def test_a_space_survives_being_written():
-    space = small_space(offset_left=[1.0, 2.0])
+    space = small_space(**{"left.offset": [1.0, 2.0]})
     assert DesignSpace.from_dict(space.to_dict()) == space
 
 
@@ -98,10 +86,31 @@ def test_written_spaces_speak_in_degrees_and_ranges():
         taper_deg = [0, 1.5]
         outer_radius_m = 0.0625
     """
-    space = parse_space(text, lambda name: getattr(sr.designs, name)())
+    space = parse_space(text, builtin)
     assert space.shape == (4, 2, 1)
     np.testing.assert_allclose(np.degrees(space.values(3)["revolution"]), 36)
     np.testing.assert_allclose(np.degrees(space.values(3)["taper"]), 1.5)
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        "[parameters]\nleft.offset_deg = [60]\n'longitudinal 1'.bundles = 2",
+        "[parameters]\n'left.offset_deg' = [60]\n'longitudinal 1.bundles' = 2",
+        "[parameters.left]\noffset_deg = [60]\n[parameters.'longitudinal 1']\nbundles = 2",
+    ],
+)
+def test_parameters_of_one_fiber_are_written_with_its_name_and_a_dot(table):
+    space = parse_space(f"design = 'redundant_trunk'\n{table}", builtin)
+    wanted = {"left.offset": np.radians(60), "longitudinal 1.bundles": 2}
+    assert space.values(0) == pytest.approx(wanted)
+
+
+def test_the_dot_of_a_name_is_matched_exactly():
+    fibers = (FiberArchitecture(name=name, revolution=0, extent=0.1) for name in ("a.b", "a_b"))
+    base = sr.designs.minimal_trunk().replace(actuators=tuple(fibers))
+    space = parse_space("[parameters]\na.b.offset_deg = [90]", lambda _: base)
+    assert [fiber.offset for fiber in space.design(0).fibers] == pytest.approx([np.pi / 2, 0])
 
 
 @pytest.mark.parametrize(
@@ -117,16 +126,20 @@ def test_written_spaces_speak_in_degrees_and_ranges():
         ),
         ('[parameters]\ntaper_deg = "0:3"', "taper_deg = 0:3: must be numbers"),
         ('layout = "sobol"\n[parameters]\ntaper_deg = [0]', "taper = .*: must be two ends"),
+        (
+            "[parameters]\n'left.lower' = [-1]\nleft.lower = [-2]",
+            "left.lower = .*: must be given once",
+        ),
         ("lay_out = 1", "key = lay_out: must be one of design"),
         ("=", "must be valid TOML"),
     ],
 )
 def test_faulty_space_files_are_refused(text, message):
     with pytest.raises(InvalidInput, match=message):
-        parse_space(text, lambda name: getattr(sr.designs, name)())
+        parse_space(text, builtin)
 
 
 def test_sampled_spaces_can_be_written_too():
     text = 'layout = "latin"\ndesigns = 5\n[parameters]\ntaper_deg = [0, 3]'
-    space = parse_space(text, lambda name: getattr(sr.designs, name)())
+    space = parse_space(text, builtin)
     assert (space.dims, space.shape) == (("design",), (5,))

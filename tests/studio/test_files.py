@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from softreach.arm import designs
+from softreach.arm.parameters import changed, find_parameter
 from softreach.atlas import DesignSpace, build_atlas, open_atlas
-from softreach.atlas.parameter import changed
 from softreach.cloud import compute_cloud, save_cloud
-from softreach.errors import InvalidInput
+from softreach.errors import InvalidDesign, InvalidInput
 from softreach.export import export_cloud
 from softreach.plot.style import pyplot
 from softreach.studio.atlas_map import atlas_map, held_places, map_choices, metric_names
@@ -96,11 +96,14 @@ def test_a_saved_page_carries_the_map(fine):
 
 def test_a_design_file_changes_the_design_alone(trunk):
     state = StudioState(design=trunk, target=(0.0, 0.1, 0.5))
-    other = trunk.replace(taper=0.01)
+    other = changed(trunk, {"taper": 0.01})
     assert state_from("x.TOML", other.to_toml().encode(), state) == state.replace(design=other)
     assert state_from("x.json", state.to_json().encode(), StudioState(design=other)) == state
     with pytest.raises(InvalidInput, match="UTF-8"):
         state_from("x.toml", b"\xff\xfe", state)
+    tight = trunk.with_bounds((-30.0, 0.0))
+    with pytest.raises(InvalidDesign, match="x.toml: 1 problem\n.*must keep ζ > 0"):
+        state_from("x.toml", tight.to_toml().encode(), state)
 
 
 def test_a_saved_state_is_begun_with(trunk, tmp_path):
@@ -126,8 +129,9 @@ def test_an_atlas_opens_on_its_largest_design(store):
     start = start_on_store(store, SMALL)
     atlas = open_atlas(store)
     best = atlas.convex_volume.where(atlas.convex_volume == atlas.convex_volume.max(), drop=True)
-    assert start.state.design.taper == float(best.taper[0])
-    assert start.state.design.revolutions[1] == pytest.approx(float(best.revolution[0]))
+    for name in ("taper", "revolution"):
+        value = find_parameter(start.state.design, name).value(start.state.design)
+        assert value == pytest.approx(float(best[name][0]))
     assert start.atlas is not None
 
 

@@ -1,64 +1,44 @@
-"""Laws of background work."""
+"""What follows from a change of the state."""
 
 from __future__ import annotations
 
-import threading
+from hypothesis import given
 
-from softreach.studio.jobs import Latest
-
-
-def test_of_waiting_work_only_the_last_is_done():
-    done, started, go = [], threading.Event(), threading.Event()
-    latest = Latest(done.append)
-
-    def first(check):
-        started.set()
-        go.wait(10)
-        done.append("first")
-
-    latest.submit(first)
-    assert started.wait(10)
-    for name in ("second", "third", "fourth"):
-        latest.submit(lambda check, name=name: done.append(name))
-    go.set()
-    assert latest.join(10)
-    assert done == ["first", "fourth"]
+from softreach.arm.parameters import changed
+from softreach.studio.jobs import (
+    JOBS,
+    ComputeReach,
+    DrawArm,
+    DrawCloud,
+    DrawMap,
+    DrawReference,
+    DrawSurfaces,
+    SolveInverse,
+    what_follows,
+)
+from softreach.studio.state import Camera, MapView, Slice, StudioState
+from tests.studio.test_state import states
 
 
-def test_stale_work_is_dropped_between_its_stages():
-    done, coarse, go = [], threading.Event(), threading.Event()
-    latest = Latest(done.append)
-
-    def staged(check):
-        done.append("coarse")
-        coarse.set()
-        go.wait(10)
-        check()
-        done.append("fine")
-
-    latest.submit(staged)
-    assert coarse.wait(10)
-    latest.submit(lambda check: done.append("newer"))
-    go.set()
-    assert latest.join(10)
-    assert done == ["coarse", "newer"]
+@given(states())
+def test_nothing_follows_from_no_change_and_all_from_a_first_state(state):
+    assert what_follows(state, state) == frozenset()
+    assert what_follows(None, state) == frozenset(JOBS)
 
 
-def test_trouble_is_told_and_the_next_work_is_done():
-    told, done = [], []
-    latest = Latest(told.append)
-    latest.submit(lambda check: 1 / 0)
-    assert latest.join(10)
-    latest.submit(lambda check: done.append("next"))
-    assert latest.join(10)
-    assert isinstance(told[0], ZeroDivisionError)
-    assert done == ["next"]
-
-
-def test_a_closed_worker_does_nothing_more():
-    done = []
-    latest = Latest(done.append)
-    latest.close()
-    latest.submit(lambda check: done.append("late"))
-    assert latest.join(10)
-    assert done == []
+def test_each_change_makes_stale_what_depends_on_it(trunk):
+    state = StudioState(design=trunk)
+    other = changed(trunk, {"taper": 0.01})
+    changes = {
+        state.replace(activation=(-1.0, 0.0, 0.0)): {DrawArm},
+        state.showing(color="multiplicity"): {DrawCloud, DrawReference},
+        state.showing(slice=Slice(axis="x")): {DrawCloud, DrawReference, DrawSurfaces},
+        state.showing(map=MapView(metric="volume")): {DrawMap},
+        state.showing(surface=True): {DrawSurfaces},
+        state.replace(target=(0.1, 0.0, 0.8)): {SolveInverse},
+        state.replace(reference=trunk): {DrawReference},
+        state.replace(design=other): {ComputeReach, DrawArm, SolveInverse, DrawMap},
+        state.replace(camera=Camera(position=(1, 1, 1), look_at=(0, 0, 0))): set(),
+    }
+    for new, jobs in changes.items():
+        assert what_follows(state, new) == jobs

@@ -11,11 +11,11 @@ from softreach.plot.coloring import ScalarKey
 from softreach.rod.kinematics import tip_positions
 from softreach.studio.axes import axes_box
 from softreach.studio.colors import color_names, key_html, manipulability, sample_colors
-from softreach.studio.jobs import Dropped
 from softreach.studio.picking import picked_point, plane_crossing
 from softreach.studio.reach import Quality, Reach, reached, shown_samples, stages
 from softreach.studio.slicing import in_slice, sliced_faces
 from softreach.studio.state import Slice
+from softreach.studio.worker import Dropped
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
 

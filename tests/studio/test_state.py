@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from softreach.arm import designs
+from softreach.arm.actuators import FiberArchitecture
 from softreach.errors import InvalidDesign, InvalidInput
 from softreach.studio.state import (
     LEVELS,
@@ -18,10 +19,8 @@ from softreach.studio.state import (
     MapView,
     Slice,
     StudioState,
-    Work,
-    what_follows,
 )
-from tests.laws import arms
+from tests.laws import arm_of, arms
 
 numbers = st.floats(-3, 3)
 vectors = st.tuples(numbers, numbers, numbers)
@@ -62,39 +61,11 @@ def test_activations_stay_within_the_bounds_whatever_the_design(state):
     assert ((low <= gamma) & (gamma <= high)).all()
 
 
-@given(states())
-def test_nothing_follows_from_no_change_and_all_from_a_first_state(state):
-    assert what_follows(state, state) == frozenset()
-    assert what_follows(None, state) == frozenset(Work)
-
-
-def test_each_change_makes_stale_what_depends_on_it(trunk):
-    state = StudioState(design=trunk)
-    changes = {
-        state.replace(activation=(-1.0, 0.0, 0.0)): {Work.ARM},
-        state.showing(color="multiplicity"): {Work.CLOUD, Work.REFERENCE},
-        state.showing(slice=Slice(axis="x")): {Work.CLOUD, Work.REFERENCE, Work.SURFACES},
-        state.showing(map=MapView(metric="volume")): {Work.MAP},
-        state.showing(surface=True): {Work.SURFACES},
-        state.replace(target=(0.1, 0.0, 0.8)): {Work.INVERSE},
-        state.replace(reference=trunk): {Work.REFERENCE},
-        state.replace(design=trunk.replace(taper=0.01)): {
-            Work.REACH,
-            Work.ARM,
-            Work.INVERSE,
-            Work.MAP,
-        },
-        state.replace(camera=Camera(position=(1, 1, 1), look_at=(0, 0, 0))): set(),
-    }
-    for changed, works in changes.items():
-        assert what_follows(state, changed) == works
-
-
 def test_a_design_with_other_bundles_keeps_the_activations_that_it_can(trunk):
     state = StudioState(design=trunk, activation=(-1.0, -0.5, -0.2))
     more = state.replace(design=designs.redundant_trunk())
     assert more.activation == (-1.0, -0.5, -0.2, 0.0)
-    narrow = state.replace(design=trunk.replace(activation_bounds=(-0.4, -0.1)))
+    narrow = state.replace(design=trunk.with_bounds((-0.4, -0.1)))
     assert narrow.activation == (-0.4, -0.4, -0.2)
 
 
@@ -115,3 +86,24 @@ def test_other_texts_are_refused(trunk):
 def test_activations_must_be_numbers(trunk):
     with pytest.raises(InvalidInput, match="finite"):
         StudioState(design=trunk, activation=(np.nan, 0.0, 0.0))
+
+
+@pytest.fixture(scope="module")
+def squeezed(trunk):
+    """A design that its activations would shorten to nothing."""
+    fiber = FiberArchitecture(name="all", revolution=0.0, extent=6.0)
+    return arm_of(fiber, activation_bounds=(-4.0, 0.0))
+
+
+def test_a_design_that_would_be_shortened_to_nothing_is_no_state(trunk, squeezed):
+    with pytest.raises(InvalidDesign, match="must keep ζ > 0: narrow the bounds"):
+        StudioState(design=squeezed)
+    with pytest.raises(InvalidDesign, match="must keep ζ > 0"):
+        StudioState(design=trunk).replace(reference=squeezed)
+
+
+@pytest.mark.parametrize("key", ["design", "reference"])
+def test_a_saved_state_with_such_a_design_says_so(trunk, squeezed, key):
+    good = json.loads(StudioState(design=trunk).to_json())
+    with pytest.raises(InvalidDesign, match="state file: 1 problem\n.*must keep ζ > 0"):
+        StudioState.from_json(json.dumps(good | {key: squeezed.to_toml()}))

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import softreach as sr
+from softreach.arm.parameters import changed, find_parameter
+from softreach.arm.summary import describe
 from softreach.atlas import DesignSpace, build_atlas
-from softreach.atlas.parameter import changed
 from softreach.studio import Studio, StudioState
 from softreach.studio.panels.inverse import InversePanel
 from softreach.studio.source import start_on_store
@@ -36,7 +37,7 @@ def test_a_design_slider_changes_volume_and_cloud(tab):
     after = tab.session.reach
     assert after.fine
     assert after.arm == tab.session.state.design
-    assert np.degrees(after.arm.revolutions[1]) > 130
+    assert np.degrees(parameter(tab, "revolution")) > 130
     tab.page.get_by_text(f"volume {after.volume:.4f}").wait_for()
     assert after.volume != before.volume
     assert not np.allclose(after.cloud.tip, before.cloud.tip)
@@ -92,7 +93,7 @@ def test_the_tip_leaves_a_trail_of_this_design_alone(tab):
     tab.settle()
     assert tab.drawn("/trail")
     np.testing.assert_array_equal(tab.session.trail[-1], tab.session.tip)
-    tab.session.update(lambda s: s.replace(design=s.design.replace(taper=0.03)))
+    tab.session.update(lambda s: s.replace(design=changed(s.design, {"taper": 0.03})))
     tab.settle()
     assert len(tab.session.trail) <= 2  # this arm's tip was nowhere else
     tab.page.get_by_label("leave a trail").uncheck()
@@ -109,7 +110,7 @@ def test_a_reference_stays_while_the_design_changes(tab):
     tab.wait(lambda: tab.session.state.design != kept, "the design changes")
     tab.settle()
     tab.page.get_by_text(f"reference (gray): volume {known.volume:.4f}").wait_for()
-    eye = np.array(tab.session.camera_now().position)
+    eye = np.array(tab.session.eye.camera().position)
     tab.page.get_by_label("side by side").check()
     tab.wait(lambda: tab.drawn("/reference/arm"), "the reference stands beside")
     assert tab.session.reference is known
@@ -119,8 +120,14 @@ def test_a_reference_stays_while_the_design_changes(tab):
     tab.wait(lambda: not far(tab, eye), "the eye is back")
 
 
+def parameter(tab, name: str) -> float:
+    """What the design of a tab has of a parameter."""
+    design = tab.session.state.design
+    return find_parameter(design, name).value(design)
+
+
 def far(tab, eye) -> bool:
-    return np.linalg.norm(np.array(tab.session.camera_now().position) - eye) > 0.2
+    return np.linalg.norm(np.array(tab.session.eye.camera().position) - eye) > 0.2
 
 
 def test_surfaces_are_drawn_and_cut(tab):
@@ -158,10 +165,23 @@ def test_a_design_that_cannot_exist_shows_the_librarys_message(tab):
     alert = tab.page.get_by_role("alert").filter(has_text="leaves no tip")
     alert.wait_for()
     assert "must be below" in alert.inner_text()
-    assert tab.session.state.design.tip_radius > 0
+    assert describe(tab.session.state.design).tip_radius > 0
     tab.drag("taper φ [deg]", -95)
     alert.wait_for(state="hidden")
     assert tab.session.state.design != good
+
+
+def test_bounds_that_would_shorten_the_arm_to_nothing_are_refused(tab):
+    tab.open("Design")
+    tab.session.update(lambda s: s.replace(design=changed(s.design, {"extent": 2.0})))
+    tab.settle()
+    tab.drag("lowest γ", -300)
+    alert = tab.page.get_by_role("alert").filter(has_text="must keep ζ > 0")
+    alert.wait_for()
+    assert describe(tab.session.state.design).extension[0] > 0
+    tab.drag("lowest γ", 290)
+    alert.wait_for(state="hidden")
+    tab.settle()
 
 
 def test_a_saved_state_comes_back(tab, tmp_path):
@@ -198,7 +218,7 @@ def test_a_link_opens_the_state_in_another_tab(tab, studio):
     tab.wait(lambda: other.state == kept, "the state is there")
     assert other.settle(PATIENCE)
     assert other.reach.arm == kept.design
-    np.testing.assert_allclose(other.camera_now().position, kept.camera.position, atol=1e-6)
+    np.testing.assert_allclose(other.eye.camera().position, kept.camera.position, atol=1e-6)
     page.close()
     tab.wait(lambda: set(studio.sessions) == known, "the session of the closed tab ends")
 
@@ -233,7 +253,7 @@ def test_a_click_on_the_map_of_an_atlas_loads_the_design(browser, tmp_path):
         board = tab.session.board
         at = {"revolution": 0.5, "taper": 0.01}
         tab.click_at(board.place_of(**at))
-        tab.wait(lambda: tab.session.state.design.taper == 0.01, "the design is loaded")
+        tab.wait(lambda: parameter(tab, "taper") == 0.01, "the design is loaded")
         assert tab.session.state.design == changed(trunk, at)
         assert board.map.names == ("revolution", "taper")
         tab.open("Atlas")
@@ -245,7 +265,7 @@ def test_a_click_on_the_map_of_an_atlas_loads_the_design(browser, tmp_path):
         tab.settle()
         at = {"revolution": 1.5, "taper": 0.02}
         tab.click_at(board.place_of(**at))
-        tab.wait(lambda: tab.session.state.design.taper == 0.02, "the design is loaded")
+        tab.wait(lambda: parameter(tab, "taper") == 0.02, "the design is loaded")
         assert tab.session.state.design == changed(trunk, at)
         assert tab.drawn("/atlas/here")
         assert not tab.errors

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from softreach.arm.actuators import Actuator, FiberArchitecture
+from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.manipulator import Manipulator
 
-__all__ = ["minimal_trunk", "redundant_trunk", "varied"]
+__all__ = ["minimal_trunk", "redundant_trunk"]
 
 _EXTENT = math.radians(48)
 
@@ -83,31 +83,3 @@ def _trunk(
         poisson_ratio=0.5,
         actuators=fibers,
     )
-
-
-def varied(
-    arm: Manipulator, *, revolution: float | None = None, taper: float | None = None
-) -> Manipulator:
-    """A relative of a design: the same arm with another revolution or taper.
-
-    Args:
-        arm: The design; its profile is a linear taper where that is to change.
-        revolution: |Ω| of every helical architecture, each keeping its own sense [rad];
-            longitudinal ones stay longitudinal. None keeps what there is.
-        taper: φ [rad]; the revolutions stay what they are, the helical angles follow.
-    """
-    wound = tuple(_wound(one, arm, revolution) for one in arm.actuators)
-    profile = arm.profile if taper is None else arm.profile.replace(taper=taper)
-    return arm.replace(actuators=wound, profile=profile)
-
-
-def _wound(actuator: Actuator, arm: Manipulator, revolution: float | None) -> Actuator:
-    """A fiber with its revolution stated, as it is or with another size."""
-    if not isinstance(actuator, FiberArchitecture):
-        return actuator
-    turn = actuator.revolution_on(arm.profile, arm.section)
-    if turn == 0:
-        return actuator
-    if revolution is None:
-        return actuator if actuator.revolution is not None else actuator.replace(revolution=turn)
-    return actuator.replace(revolution=math.copysign(revolution, turn))

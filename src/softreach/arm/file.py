@@ -261,8 +261,10 @@ _KEYS = {
 }
 
 
-def _key(field: str) -> str:
-    return _KEYS.get(field, field)
+def _key(path: str) -> str:
+    """The key of a field, behind the name of the actuator that it belongs to, if any."""
+    owner, dot, field = path.rpartition(".")
+    return owner + dot + _KEYS.get(field, field)
 
 
 def _field(key: str) -> str:

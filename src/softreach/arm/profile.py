@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.checks import PROFILE_RANGES, plain_number, profile_faults
+from softreach.arm.variable import Variable
 from softreach.errors import InvalidDesign
 
 __all__ = ["LinearTaper", "Profile"]
@@ -22,6 +23,9 @@ Array = NDArray[np.float64]
 
 class Profile(ABC):
     """The outer radius along the arm, before activation."""
+
+    variables: ClassVar[tuple[Variable, ...]] = ()
+    """Fields that a designer varies."""
 
     length: float
     """L, from base to tip [m]."""
@@ -76,6 +80,14 @@ class LinearTaper(Profile):
     Raises:
         InvalidDesign: A field is out of its range, or the taper leaves no tip.
     """
+
+    variables: ClassVar[tuple[Variable, ...]] = (
+        Variable("taper", "φ", "taper angle", PROFILE_RANGES["taper"]),
+        Variable(
+            "outer_radius", "R2(0)", "outer radius at the base", PROFILE_RANGES["outer_radius"]
+        ),
+        Variable("length", "L", "length before activation", PROFILE_RANGES["length"]),
+    )
 
     length: float
     """L, from base to tip before activation [m]."""

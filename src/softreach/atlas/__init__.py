@@ -5,7 +5,6 @@ from softreach.atlas.build import build_atlas
 from softreach.atlas.executor import worker_processes
 from softreach.atlas.metric import Metric, MetricFailed, Need
 from softreach.atlas.metrics import METRIC_GROUPS
-from softreach.atlas.parameter import parameter_units
 from softreach.atlas.questions import AtlasStatus, atlas_cloud, atlas_design, atlas_status
 from softreach.atlas.reading import open_atlas, over_length
 from softreach.atlas.space import DesignSpace
@@ -26,6 +25,5 @@ __all__ = [
     "build_atlas",
     "open_atlas",
     "over_length",
-    "parameter_units",
     "worker_processes",
 ]

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
-from softreach.atlas.parameter import changed, parameter_units
+from softreach.arm.parameters import changed, parameters, unknown_parameter
+from softreach.arm.tables import check_extension
 from softreach.errors import InvalidDesign, InvalidInput
 
 __all__ = ["DesignSpace"]
@@ -49,7 +50,8 @@ class DesignSpace:
         Args:
             base: The design to vary.
             **values: Parameter -> values [SI units], for instance `taper=np.radians([0, 1, 2])`;
-                see `parameter_units` for the names.
+                see `arm.parameters` for the names. Those with a dot are given as
+                `**{"left.offset": [0.0, 0.5]}`.
         """
         return cls(base=base, parameters=_plain(values), layout="grid")
 
@@ -80,7 +82,8 @@ class DesignSpace:
         cube = _spread(count, len(ranges), method, seed)
         ends = np.array(list(ranges.values()), float).reshape(-1, 2)
         points = ends[:, 0] + cube * np.diff(ends, axis=1)[:, 0]
-        if whole := [k for k, name in enumerate(ranges) if name.startswith("bundles")]:
+        known = parameters(base)
+        if whole := [k for k, name in enumerate(ranges) if name in known and known[name].whole]:
             points[:, whole] = np.rint(points[:, whole])
         columns = zip(ranges, points.T.tolist(), strict=True)
         return cls(base=base, parameters=_plain(dict(columns)), layout="list")
@@ -108,8 +111,8 @@ class DesignSpace:
 
     def units(self) -> dict[str, str]:
         """Unit of each parameter."""
-        known = parameter_units(self.base)
-        return {name: known[name] for name in self.names}
+        known = parameters(self.base)
+        return {name: known[name].unit for name in self.names}
 
     def values(self, index: int) -> dict[str, float]:
         """Parameters of the design with this number, counted in C order over `shape`."""
@@ -123,9 +126,11 @@ class DesignSpace:
         """The design with this number.
 
         Raises:
-            InvalidDesign: No such arm can exist.
+            InvalidDesign: No such arm can exist, or some activation would shorten it to nothing.
         """
-        return changed(self.base, self.values(index))
+        arm = changed(self.base, self.values(index))
+        check_extension(arm)
+        return arm
 
     @property
     def gaps(self) -> Mapping[int, str]:
@@ -182,12 +187,14 @@ def _plain(values: Mapping[str, ArrayLike]) -> tuple[tuple[str, tuple[float, ...
 
 
 def _faults(space: DesignSpace) -> Iterator[InvalidInput]:
-    known = parameter_units(space.base)
+    known = parameters(space.base)
     if not space.parameters:
         yield InvalidInput("parameters", "none", f"one at least of {', '.join(known)}")
     for name, values in space.parameters:
         if name not in known:
-            yield InvalidInput("parameter", name, f"one of {', '.join(known)}")
+            yield unknown_parameter(name, known)
+        if "/" in name:
+            yield InvalidInput("parameter", name, 'a name without "/"', "rename the actuator")
         if not values or not np.isfinite(values).all():
             yield InvalidInput(name, values, "one finite value or more")
         if space.layout == "grid" and len(set(values)) < len(values):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.atlas.parameter import parameter_units
+from softreach.arm.parameters import parameters, unknown_parameter
 from softreach.atlas.space import DesignSpace
 from softreach.errors import InvalidInput
 
@@ -30,6 +30,8 @@ def parse_space(text: str, design_from: Callable[[str], Manipulator]) -> DesignS
     [parameters]
     revolution_deg = "0:108:16"  # 16 values, ends included; or a list: [0, 54, 108]
     taper_deg = "0:3:16"         # for sobol and latin the two ends: [0, 3]
+    left.offset_deg = [60, 70]   # of the fiber "left"
+    "fiber 2".extent_deg = [48]  # other names are quoted
     ```
 
     With `sobol` and `latin` the keys `designs` (their number) and `seed` apply too.
@@ -46,8 +48,22 @@ def parse_space(text: str, design_from: Callable[[str], Manipulator]) -> DesignS
     given = document.get("parameters", {})
     if not isinstance(given, dict):
         raise InvalidInput("parameters", given, "a table of parameters and their values")
-    values = dict(parse_parameter(base, key, value) for key, value in given.items())
+    values: dict[str, list[float]] = {}
+    for key, value in _flat(given):
+        name, numbers = parse_parameter(base, key, value)
+        if name in values:
+            raise InvalidInput(key, value, "given once")
+        values[name] = numbers
     return _space(base, values, document)
+
+
+def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Keys and values; TOML reads the dots of unquoted keys as tables within tables."""
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value
 
 
 def parse_parameter(base: Manipulator, key: str, value: Any) -> tuple[str, list[float]]:
@@ -58,14 +74,16 @@ def parse_parameter(base: Manipulator, key: str, value: Any) -> tuple[str, list[
     """
     keys = written_keys(base)
     if key not in keys:
-        raise InvalidInput("parameter", key, f"one of {', '.join(keys)}")
+        raise unknown_parameter(key, keys)
     numbers = _numbers(key, value)
     return keys[key], [math.radians(x) for x in numbers] if key.endswith("_deg") else numbers
 
 
 def written_keys(base: Manipulator) -> dict[str, str]:
     """Parameters as written, with the unit -> their names."""
-    return {name + _SUFFIX[unit]: name for name, unit in parameter_units(base).items()}
+    return {
+        name + _SUFFIX.get(one.unit, f"_{one.unit}"): name for name, one in parameters(base).items()
+    }
 
 
 def _document(text: str) -> dict[str, Any]:

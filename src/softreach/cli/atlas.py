@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 
 from softreach.cli.inputs import AsJson, Sampler, design_from
-from softreach.cli.output import report
+from softreach.cli.output import print_rows
 from softreach.errors import InvalidInput, MissingExtra
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def build(
     design: Annotated[str, Parameter(help="Base design for --vary.")] = "minimal_trunk",
     vary: Annotated[
         list[str] | None,
-        Parameter(help="A parameter of the grid, e.g. taper_deg=0:3:16 or bundles_left=1,2."),
+        Parameter(help="A parameter of the grid, e.g. taper_deg=0:3:16 or left.bundles=1,2."),
     ] = None,
     n: Annotated[int, Parameter(help="Samples of each design.")] = 400_000,
     seed: Annotated[int, Parameter(help="Seed of the sampler.")] = 0,
@@ -92,7 +92,7 @@ def status(store: Store, *, json: AsJson = False) -> None:
         rows["messages"] = ({str(k): text for k, text in found.messages.items()}, "")
     else:
         rows |= {f"number {k}": (text, "") for k, text in list(found.messages.items())[:10]}
-    report(f"atlas {store}", rows, json)
+    print_rows(f"atlas {store}", rows, json)
 
 
 @atlas.command
@@ -119,7 +119,7 @@ def best(
     names = [name for name in found.variables if found[name].dtype.kind in "fi"]
     columns = [_written(found[name]) for name in names]
     rows: dict[str, tuple[Any, str]] = {name: (values, unit) for name, values, unit in columns}
-    report(f"best {metric} of {store}", rows, json)
+    print_rows(f"best {metric} of {store}", rows, json)
 
 
 @atlas.command
@@ -157,10 +157,15 @@ def _space_of(path: Path | None, design: str, vary: list[str] | None) -> DesignS
             raise InvalidInput("space", path, "a file that exists")
         return parse_space(path.read_text(encoding="utf-8"), design_from)
     base = design_from(design)
-    pairs = [text.partition("=") for text in vary or ()]
     return DesignSpace.grid(
-        base, **dict(parse_parameter(base, key, values) for key, _, values in pairs)
+        base, **dict(parse_parameter(base, *_key_and_values(text)) for text in vary or ())
     )
+
+
+def _key_and_values(text: str) -> tuple[str, str]:
+    """`taper_deg=0:3:16` in two; the name of an actuator may hold another =."""
+    key, sign, values = text.rpartition("=")
+    return (key, values) if sign else (text, "")
 
 
 def _executor(

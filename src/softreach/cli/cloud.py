@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from softreach.cli.inputs import AsJson, Design, RevolutionDeg, Sampler, TaperDeg, design_from
-from softreach.cli.output import report
+from softreach.cli.output import print_rows
 
 __all__ = ["cloud"]
 
@@ -49,4 +49,4 @@ def cloud(
         "lowest tip": (float(dataset.tip[:, 2].min()) / arm.length, "L"),
         "cloud": (str(out), ""),
     }
-    report(f"cloud of {design}", rows, json)
+    print_rows(f"cloud of {design}", rows, json)

@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from softreach.cli.inputs import AsJson
-from softreach.cli.output import report
+from softreach.cli.output import print_rows
 from softreach.cli.volume import volume_rows
 
 __all__ = ["demo"]
@@ -49,4 +49,4 @@ def demo(
     rows["time in all"] = (round(perf_counter() - start, 3), "s")
     files = ("design.toml", "cloud.zarr", "cloud.ply", "hull.ply", "cloud.png")
     rows["written"] = ([str(out / name) for name in files], "")
-    report("minimal trunk, revolution 108°, taper 2°", rows, json)
+    print_rows("minimal trunk, revolution 108°, taper 2°", rows, json)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from softreach.cli.inputs import AsJson, Design, RevolutionDeg, TaperDeg, design_from
-from softreach.cli.output import report
+from softreach.cli.output import print_rows
 
 __all__ = ["design"]
 
@@ -48,7 +48,7 @@ def design(
     }
     if json:
         rows["warnings"] = (list(facts.warnings), "")
-    report(f"design {design}", rows, json)
+    print_rows(f"design {design}", rows, json)
     for warning in facts.warnings if not json else ():
         sys.stderr.write(f"warning: {warning}\n")
 

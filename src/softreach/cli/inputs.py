@@ -52,6 +52,7 @@ def design_from(
 ) -> Manipulator:
     """The design of that name or file, varied as asked."""
     from softreach.arm import designs, file
+    from softreach.arm.parameters import changed
     from softreach.arm.tables import check_extension
 
     built_in = {name: getattr(designs, name) for name in ("minimal_trunk", "redundant_trunk")}
@@ -61,14 +62,11 @@ def design_from(
         arm = _loaded(text)
     else:
         raise InvalidInput("design", text, f"a .toml file, or one of {', '.join(built_in)}")
+    angles = {"revolution": revolution_deg, "taper": taper_deg}
     try:
-        relative = designs.varied(
-            arm,
-            revolution=None if revolution_deg is None else math.radians(revolution_deg),
-            taper=None if taper_deg is None else math.radians(taper_deg),
-        )
-        check_extension(relative)
-        return relative
+        varied = changed(arm, {k: math.radians(v) for k, v in angles.items() if v is not None})
+        check_extension(varied)
+        return varied
     except InvalidDesign as error:
         raise file.in_file_terms(error, text) from None
 

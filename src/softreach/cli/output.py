@@ -7,10 +7,10 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["report"]
+__all__ = ["print_rows"]
 
 
-def report(title: str, rows: Mapping[str, tuple[Any, str]], as_json: bool) -> None:
+def print_rows(title: str, rows: Mapping[str, tuple[Any, str]], as_json: bool) -> None:
     """Print named values with their units.
 
     Args:

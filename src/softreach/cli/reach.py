@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from softreach.cli.inputs import AsJson, Design, RevolutionDeg, TaperDeg, design_from
-from softreach.cli.output import report
+from softreach.cli.output import print_rows
 
 if TYPE_CHECKING:
     from softreach.workspace import ReachableSet
@@ -37,7 +37,7 @@ def reach(
     arm = design_from(design, revolution_deg, taper_deg)
     with progress.bar("mapping the activation box", None) as shown:
         found = reachable_set(arm, accuracy=accuracy, report=shown)
-    report(f"reachable set of {design}", _rows(found), json)
+    print_rows(f"reachable set of {design}", _rows(found), json)
     if surface is not None:
         from softreach.export import export_mesh
 

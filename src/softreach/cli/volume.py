@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from softreach.cli.inputs import AsJson, Sampler, Source, cloud_of, radius_of
-from softreach.cli.output import report
+from softreach.cli.output import print_rows
 
 if TYPE_CHECKING:
     from softreach.geometry.hull import Hull
@@ -41,7 +41,7 @@ def volume(
     concave = concave_hull(
         cloud.tip, radius_of(alpha, length), bias=cloud.attrs["sampler"] == "uniform"
     )
-    report(f"volume of {source}", volume_rows(concave, convex_hull(cloud.tip), length), json)
+    print_rows(f"volume of {source}", volume_rows(concave, convex_hull(cloud.tip), length), json)
     if hull is not None:
         from softreach.export import export_mesh
 

@@ -26,12 +26,12 @@ def export_cloud(cloud: xr.Dataset, path: str | PathLike[str]) -> None:
     """Write a cloud as .ply, .csv, .parquet, .npz, .mat, .vtu or .vtk, chosen by the suffix.
 
     Tables have the columns x, y, z [m] and one activation [-] per bundle, such as ``gamma_left``;
-    NPZ and MAT hold the arrays tip, activation and fiber. Design, seed, tolerance, version and
+    NPZ and MAT hold the arrays tip, activation and bundle. Design, seed, tolerance, version and
     units go along, except in CSV, VTU and VTK, which have no place for them. PLY carries the
     picture's colors too.
 
     Args:
-        cloud: tip(sample, axis) [m] and activation(sample, fiber) [-].
+        cloud: tip(sample, axis) [m] and activation(sample, bundle) [-].
         path: The file; it is replaced only when the new one is complete.
 
     Raises:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from itertools import chain, count
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -27,7 +28,7 @@ class CloudTable(NamedTuple):
     tip: Array
     """[m], shape (sample, 3)."""
     activation: Array
-    """γ [-], shape (sample, fiber)."""
+    """γ [-], shape (sample, bundle)."""
     bundles: tuple[str, ...]
     """Names of the bundles as the cloud has them."""
     metadata: dict[str, str | int | float]
@@ -54,7 +55,7 @@ def cloud_table(cloud: xr.Dataset) -> CloudTable:
     """The arrays and the description of a cloud.
 
     Args:
-        cloud: tip(sample, axis) [m] and activation(sample, fiber) [-].
+        cloud: tip(sample, axis) [m] and activation(sample, bundle) [-].
 
     Raises:
         InvalidInput: The dataset is not a cloud.
@@ -67,26 +68,27 @@ def cloud_table(cloud: xr.Dataset) -> CloudTable:
     return CloudTable(
         tip.transpose("sample", "axis").values.astype(float, copy=False),
         activation.transpose("sample", "bundle").values.astype(float, copy=False),
-        _fiber_names(activation),
+        _bundle_names(activation),
         _metadata(cloud),
     )
 
 
-def column_names(fibers: Sequence[str]) -> list[str]:
+def column_names(bundles: Sequence[str]) -> list[str]:
     """Column names that every format and language can hold, all different.
 
     >>> column_names(["left", "fiber 1 2", "left"])
     ['gamma_left', 'gamma_fiber_1_2', 'gamma_left_2']
     """
     names: list[str] = []
-    for k, fiber in enumerate(fibers):
-        safe = re.sub(r"[^0-9A-Za-z]+", "_", fiber).strip("_") or str(k + 1)
-        name = f"gamma_{safe}"
-        names.append(name if name not in names else f"{name}_{k}")
+    for k, bundle in enumerate(bundles):
+        safe = re.sub(r"[^0-9A-Za-z]+", "_", bundle).strip("_") or str(k + 1)
+        plain = f"gamma_{safe}"
+        numbered = (f"{plain}_{number}" for number in count(k))
+        names.append(next(name for name in chain([plain], numbered) if name not in names))
     return names
 
 
-def _fiber_names(activation: xr.DataArray) -> tuple[str, ...]:
+def _bundle_names(activation: xr.DataArray) -> tuple[str, ...]:
     if "bundle" in activation.coords:
         return tuple(map(str, activation["bundle"].values))
     return tuple(str(k + 1) for k in range(activation.sizes["bundle"]))

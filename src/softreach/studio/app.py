@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 from softreach.studio.link import state_in_request
-from softreach.studio.panels.binding import told
+from softreach.studio.panels.binding import attempt
 from softreach.studio.server import LOOPBACK, asked_path, page_url, start_server, stop_server
 from softreach.studio.session import Session
 from softreach.studio.source import Start
@@ -86,7 +86,7 @@ class Studio:
         session.begin()
         if session.atlas is not None and session.board is None:
             session.say("There is no map: the atlas is no grid of two parameters or more.")
-        told(session, lambda: self._follow_link(session))
+        attempt(session, lambda: self._follow_link(session))
 
     def _follow_link(self, session: Session) -> None:
         """Bring a tab that was opened by a link into its state."""

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.errors import InvalidInput
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.parameters import find_parameter
+from softreach.errors import InvalidInput
 from softreach.plot.metric_map import metric_label, plot_metric_map
-from softreach.studio.parameter_value import parameter_value
 from softreach.studio.state import MapView
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class AtlasMap:
 
     def values_of(self, design: Manipulator) -> dict[str, float] | None:
         """The two parameters of a design, if the map goes so far."""
-        at = {name: parameter_value(design, name) for name in self.names}
+        at = {name: find_parameter(design, name).value(design) for name in self.names}
         places = (self.x, self.y)
         inside = (
             min(values) - 1e-9 <= value <= max(values) + 1e-9
@@ -98,7 +98,7 @@ def held_places(atlas: xr.Dataset, view: MapView, design: Manipulator) -> dict[s
     _, *shown = map_choices(atlas, view)
     others = [str(dim) for dim in atlas["status"].dims if dim not in shown]
     return {
-        name: int(np.abs(atlas[name].values - parameter_value(design, name)).argmin())
+        name: int(np.abs(atlas[name].values - find_parameter(design, name).value(design)).argmin())
         for name in others
     }
 

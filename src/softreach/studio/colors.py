@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.plot.coloring import BundleKey, Coloring, ScalarKey, color_samples
 from softreach.redundancy import activation_distance
-from softreach.rod.tip_map import tip_map
-from softreach.studio.jobs import kernels
 from softreach.studio.reach import Reach, shown_samples
+from softreach.studio.rod import rod_of
+from softreach.studio.worker import all_cores
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,11 +34,12 @@ _RADIUS = 1 / 60  # [L], within which D̄ compares activations
 
 def color_names(arm: Manipulator) -> dict[str, str]:
     """What points can be colored by: name -> what the menu says."""
+    box = rod_of(arm).box
     names = {"rgb": "all activations (RGB)"}
-    names |= {f"bundle {k}": f"|γ| {name}" for k, name in enumerate(arm.bundle_names)}
+    names |= {f"bundle {k}": f"|γ| {name}" for k, name in enumerate(box.names)}
     names["manipulability"] = "manipulability"
     names["activation distance"] = "activation distance D̄"
-    if np.count_nonzero(np.diff(arm.bounds, axis=1)) == 3:
+    if box.dimension == 3:
         names["multiplicity"] = "multiplicity"
     return names
 
@@ -59,7 +60,7 @@ def sample_values(reach: Reach, level: int, color: str) -> Literal["rgb"] | int 
     if color not in _VALUES or color not in color_names(reach.arm):
         return "rgb"
     cloud = reach.cloud[["tip", "activation"]].isel(sample=shown_samples(reach, level))
-    with kernels:
+    with all_cores:
         return _VALUES[color](reach, cloud)
 
 
@@ -73,8 +74,9 @@ def manipulability(arm: Manipulator, activation: Array) -> Array:
 
     J = ∂r/∂γ [L]; with fewer than three bundles √det(Jᵀ J): an area or a length.
     """
-    _, slope = tip_map(arm, 1e-5).tips_and_slopes(activation)
-    return np.prod(np.linalg.svd(slope / arm.length, compute_uv=False), axis=1)
+    rod = rod_of(arm)
+    _, slope = rod.tips_and_slopes(activation)
+    return np.prod(np.linalg.svd(slope / rod.length, compute_uv=False), axis=1)
 
 
 def key_html(key: BundleKey | ScalarKey | None) -> str:

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
 from softreach.export import export_cloud, export_mesh
 from softreach.rod.kinematics import configuration
 from softreach.studio.colors import color_label, sample_values
 from softreach.studio.reach import Reach, cloud_points, shown_samples
+from softreach.studio.rod import design_of_text
 from softreach.studio.slicing import in_slice
 from softreach.studio.state import Appearance, StudioState
 
@@ -46,7 +46,7 @@ def state_from(name: str, content: bytes, state: StudioState) -> StudioState:
     """
     if name.lower().endswith(".toml"):
         try:
-            return state.replace(design=Manipulator.from_toml(content.decode("utf-8"), name))
+            return state.replace(design=design_of_text(content.decode("utf-8"), name))
         except UnicodeDecodeError as error:
             raise InvalidInput(name, str(error), "text in UTF-8") from None
     return StudioState.from_json(content)

@@ -17,7 +17,7 @@ from softreach.studio.state import MapView
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["MapBoard"]
+__all__ = ["MapBoard", "board_of"]
 
 Array = NDArray[np.float64]
 
@@ -82,3 +82,10 @@ class MapBoard:
         at = None if self.map is None else self.map.values_of(design)
         if at is not None:
             self._scene.draw_mark("/atlas/here", self.place_of(**at))
+
+
+def board_of(scene: Scene, atlas: xr.Dataset | None) -> MapBoard | None:
+    """A board, if there is an atlas that a map can be drawn of."""
+    if atlas is None or len(atlas["status"].dims) < 2:
+        return None
+    return MapBoard(scene, atlas)

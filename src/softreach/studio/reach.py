@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud import compute_cloud, design_of
 from softreach.errors import SoftreachWarning
-from softreach.studio.jobs import StaleCheck, kernels
+from softreach.studio.rod import TOL
+from softreach.studio.worker import StaleCheck, all_cores
 from softreach.volume import concave_hull
 from softreach.workspace import ReachableSet, reachable_set
 
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
     from softreach.geometry.hull import Hull
 
-__all__ = ["Quality", "Reach", "cloud_points", "reached", "shown_samples", "stages"]
+__all__ = ["Quality", "Reach", "beside", "cloud_points", "reached", "shown_samples", "stages"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,8 +37,8 @@ class Quality:
     coarse_accuracy: float = 0.02
     """Relative error allowed in the volume."""
     fine_accuracy: float = 0.003
-    tol: float = 1e-5
-    """Largest tip error, in L: far below a pixel."""
+    tol: float = TOL
+    """Largest tip error, in L."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,7 +74,7 @@ class Reach:
     @cached_property
     def alpha_shape(self) -> Hull:
         """The α-shape of at most 2^17 points, α = 0.05 L."""
-        with kernels, warnings.catch_warnings():
+        with all_cores, warnings.catch_warnings():
             warnings.simplefilter("ignore", SoftreachWarning)  # coarse clouds are sparse
             return concave_hull(self.cloud.tip[shown_samples(self, 17)])
 
@@ -85,7 +86,7 @@ class Reach:
 
 
 def stages(arm: Manipulator, level: int, quality: Quality, check: StaleCheck) -> Iterator[Reach]:
-    """The reach of a design, coarse and then fine; waits for its turn at the kernels.
+    """The reach of a design, coarse and then fine; waits for its turn where all cores are used.
 
     Args:
         arm: The design.
@@ -97,7 +98,7 @@ def stages(arm: Manipulator, level: int, quality: Quality, check: StaleCheck) ->
     sizes = (quality.coarse_level, quality.coarse_accuracy), (fine, quality.fine_accuracy)
     for stage, (points, accuracy) in enumerate(sizes):
         check()
-        with kernels:
+        with all_cores:
             cloud = compute_cloud(
                 arm, 1 << points, 0, "sobol", tol=quality.tol, progress=lambda _: check()
             )
@@ -107,7 +108,7 @@ def stages(arm: Manipulator, level: int, quality: Quality, check: StaleCheck) ->
 
 def reached(cloud: xr.Dataset, quality: Quality) -> Reach:
     """The reach that belongs to a cloud from a file."""
-    with kernels:
+    with all_cores:
         exact = _exact(design_of(cloud), quality.fine_accuracy, quality.tol, lambda: None)
     ordered = cloud.attrs.get("sampler") in ("uniform", "sobol")
     shuffled = None if ordered else np.random.default_rng(0).permutation(cloud.sizes["sample"])
@@ -123,6 +124,11 @@ def shown_samples(reach: Reach, level: int) -> slice | NDArray[np.int64]:
 def cloud_points(reach: Reach, level: int) -> NDArray[np.float64]:
     """Tips that a picture of 2^level points shows [L], shape (n, 3)."""
     return reach.cloud.tip.values[shown_samples(reach, level)] / reach.arm.length
+
+
+def beside(reach: Reach) -> NDArray[np.float64]:
+    """How far a cloud stands beside another of about its size [L], shape (3,)."""
+    return np.array([1.3 * float(np.ptp(cloud_points(reach, 14)[:, 0])), 0.0, 0.0])
 
 
 def _exact(arm: Manipulator, accuracy: float, tol: float, check: StaleCheck) -> ReachableSet:

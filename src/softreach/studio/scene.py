@@ -16,6 +16,7 @@ from softreach.rod.kinematics import configuration
 from softreach.studio.axes import axes_box
 from softreach.studio.colors import sample_colors
 from softreach.studio.reach import Reach, cloud_points
+from softreach.studio.rod import rod_of
 from softreach.studio.slicing import in_slice, sliced_faces
 from softreach.studio.state import Appearance, Slice
 
@@ -57,7 +58,7 @@ class Scene:
 
     def draw_arm(self, arm: Manipulator, activation: Sequence[float], path: str = "/arm") -> Array:
         """The body and its fibers; returns the tip [L]. Redrawn by moving what there is."""
-        shape = configuration(arm, np.asarray(activation), _STATIONS, tol=1e-5)
+        shape = configuration(rod_of(arm), np.asarray(activation), _STATIONS)
         meshes = _arm_meshes(arm, shape)
         known, handles = self._arms.get(path, (None, []))
         if known is arm:

@@ -1,17 +1,18 @@
-"""What a tab of the studio shows, as a value, and what follows when it changes."""
+"""What a tab of the studio shows, as a value."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from enum import Enum, auto
 from typing import Any, Self
 
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
+from softreach.rod.activation_box import ActivationBox
+from softreach.studio.rod import design_of_text, rod_of
 
 __all__ = [
     "LEVELS",
@@ -20,9 +21,8 @@ __all__ = [
     "MapView",
     "Slice",
     "StudioState",
-    "Work",
+    "Vector",
     "vector",
-    "what_follows",
 ]
 
 VERSION = 1
@@ -92,7 +92,12 @@ class Camera:
 
 @dataclass(frozen=True, kw_only=True)
 class StudioState:
-    """Everything that a tab shows follows from this value."""
+    """Everything that a tab shows follows from this value.
+
+    Raises:
+        InvalidInput: Activations or appearance out of range.
+        InvalidDesign: A design that some activation within its bounds would shorten to nothing.
+    """
 
     design: Manipulator
     activation: tuple[float, ...] = ()
@@ -106,7 +111,9 @@ class StudioState:
     camera: Camera | None = None
 
     def __post_init__(self) -> None:
-        within = _within(self.design, self.activation)
+        if self.reference is not None:
+            rod_of(self.reference)
+        within = _within(rod_of(self.design).box, self.activation)
         object.__setattr__(self, "activation", within)
 
     def replace(self, **changes: Any) -> Self:
@@ -163,11 +170,11 @@ def _fields(values: dict[str, Any]) -> dict[str, Any]:
     look["slice"], look["map"] = Slice(**look["slice"]), MapView(**look["map"])
     camera, reference = values["camera"], values["reference"]
     return {
-        "design": Manipulator.from_toml(values["design"], "state file"),
+        "design": design_of_text(values["design"], "state file"),
         "activation": tuple(map(float, values["activation"])),
         "appearance": Appearance(**look),
         "target": values["target"] and vector(values["target"]),
-        "reference": reference and Manipulator.from_toml(reference, "state file"),
+        "reference": reference and design_of_text(reference, "state file"),
         "side_by_side": bool(values["side_by_side"]),
         "camera": camera and Camera(**{name: vector(v) for name, v in camera.items()}),
     }
@@ -179,62 +186,11 @@ def vector(values: Iterable[float]) -> Vector:
     return x, y, z
 
 
-def _within(arm: Manipulator, activation: Sequence[float]) -> tuple[float, ...]:
+def _within(box: ActivationBox, activation: Sequence[float]) -> tuple[float, ...]:
     """As many activations as there are bundles, each within its bounds."""
-    wanted = np.zeros(arm.bundles)
-    count = min(len(activation), arm.bundles)
+    wanted = np.zeros(box.bundles)
+    count = min(len(activation), box.bundles)
     wanted[:count] = np.asarray(activation, float)[:count]
     if not np.isfinite(wanted).all():
         raise InvalidInput("activation", tuple(activation), "finite numbers")
-    return tuple(np.clip(wanted, *arm.bounds.T).tolist())
-
-
-class Work(Enum):
-    """What has to be done again."""
-
-    REACH = auto()
-    """Cloud, volume, unreachability of the design."""
-    ARM = auto()
-    CLOUD = auto()
-    """Colors, number of points, slice."""
-    SURFACES = auto()
-    INVERSE = auto()
-    REFERENCE = auto()
-    MAP = auto()
-    """Of an atlas."""
-
-
-def what_follows(old: StudioState | None, new: StudioState) -> frozenset[Work]:
-    """What a change makes stale; everything if there was nothing before."""
-    if old is None:
-        return frozenset(Work)
-    return frozenset(work for work, value in _CAUSES.items() if value(old) != value(new))
-
-
-_CAUSES = {
-    Work.REACH: lambda s: s.design,
-    Work.ARM: lambda s: (s.design, s.activation, s.appearance.arm, s.appearance.trail),
-    Work.CLOUD: lambda s: (
-        s.appearance.level,
-        s.appearance.color,
-        s.appearance.point_size,
-        s.appearance.slice,
-        s.appearance.cloud,
-        s.appearance.axes,
-    ),
-    Work.SURFACES: lambda s: (
-        s.appearance.surface,
-        s.appearance.alpha_shape,
-        s.appearance.slice,
-    ),
-    Work.INVERSE: lambda s: (s.design, s.target, s.appearance.ghosts),
-    Work.REFERENCE: lambda s: (
-        s.reference,
-        s.side_by_side,
-        s.appearance.level,
-        s.appearance.color,
-        s.appearance.point_size,
-        s.appearance.slice,
-    ),
-    Work.MAP: lambda s: (s.design, s.appearance.map),
-}
+    return tuple(box.clip(wanted).tolist())

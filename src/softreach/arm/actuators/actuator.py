@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
+from softreach.arm.variable import Variable
 
 __all__ = ["Actuator", "Outline", "Resultants", "actuator_kinds"]
 
@@ -48,6 +49,8 @@ class Actuator(ABC):
 
     unit: ClassVar[str] = "1"
     """Unit of an activation."""
+    variables: ClassVar[tuple[Variable, ...]] = ()
+    """Fields that a designer varies, beside the bounds."""
 
     name: str
     """What summaries and pictures call it; unique within an arm."""
@@ -77,6 +80,11 @@ class Actuator(ABC):
         if self.bundles == 1:
             return (self.name,)
         return tuple(f"{self.name} {k + 1}" for k in range(self.bundles))
+
+    def value_on(self, field: str, profile: Profile, section: Section) -> float:
+        """Value of a variable when this actuator drives an arm of such profile and section."""
+        del profile, section
+        return getattr(self, field)
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed, checked like a new one."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,7 @@ from softreach.arm.actuators.ring_integrals import ring_integrals
 from softreach.arm.checks import FIBER_RANGES, fiber_faults, plain_number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
+from softreach.arm.variable import Variable
 from softreach.errors import InvalidDesign, InvalidInput
 
 __all__ = ["FiberArchitecture"]
@@ -33,6 +34,17 @@ class FiberArchitecture(Actuator):
         InvalidDesign: A field is out of its range, or both or neither of `helical_angle` and
             `revolution` are given.
     """
+
+    variables: ClassVar[tuple[Variable, ...]] = tuple(
+        Variable(field, symbol, meaning, FIBER_RANGES[field])
+        for field, symbol, meaning in (
+            ("revolution", "Ω", "revolution from base to tip"),
+            ("helical_angle", "α", "helical angle at the outer radius"),
+            ("offset", "θ0", "polar angle of the first bundle at the base"),
+            ("extent", "σ", "angular extent of a bundle"),
+            ("bundles", "n", "number of bundles"),
+        )
+    )
 
     helical_angle: float | None = None
     """α, from the axis, at the outer radius [rad]; |α| < π/2."""
@@ -84,6 +96,14 @@ class FiberArchitecture(Actuator):
     def revolution_on(self, profile: Profile, section: Section) -> float:
         """Ω = Θ(L) [rad], which the helical angle fixes."""
         return float(self._rotation(profile, section, np.asarray(profile.length)))
+
+    def value_on(self, field: str, profile: Profile, section: Section) -> float:
+        """What these fibers have of a variable; the arm decides between Ω and α."""
+        if field == "revolution" and self.revolution is None:
+            return self.revolution_on(profile, section)
+        if field == "helical_angle":
+            return self.helical_angle_on(profile, section)
+        return getattr(self, field)
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
         """N = πE R2² I0 σ/π and M = πE R2³ (I1 a sin θ, -I1 a cos θ, I3 σ/π) with a = 2 sin(σ/2)/π.

@@ -14,6 +14,7 @@ from softreach.errors import InvalidDesign
 from softreach.paper import printed
 from softreach.paper.notebook import Notebook
 from softreach.paper.settings import Settings
+from softreach.rod.tip_map import tip_map
 from softreach.workspace import reachable_set
 
 __all__ = ["misprints"]
@@ -56,9 +57,10 @@ def _rotation(arm: Manipulator, taper: float, angle: float) -> dict[str, float]:
     """How far the printed fiber rotation is from the integral, and near φ = 0 from its limit."""
     from scipy.integrate import quad
 
-    z, radius = 0.7 * arm.length, float(arm.profile.radius(0.0))
+    rod = tip_map(arm)
+    z, radius = 0.7 * rod.length, describe(arm).base_radius
     slope = np.tan(angle) * np.hypot(1, np.tan(taper))
-    integral = quad(lambda s: slope / float(arm.profile.radius(s)), 0, z)[0]
+    integral = quad(lambda s: slope / float(rod.radius(s)), 0, z)[0]
     almost = printed.rotation(radius, 1e-5, angle, z)
     found = printed.rotation(radius, taper, angle, z)
     limit = np.tan(angle) * z / radius
@@ -75,7 +77,7 @@ def _inclination(arm: Manipulator, taper: float) -> tuple[float, float]:
     """
     step = 1e-6 * arm.length
     start, end = arm.outline([0.0, step]).center[:, 1]
-    around, along = float(arm.profile.radius(0.0)) * (end - start), step / np.cos(taper)
+    around, along = describe(arm).base_radius * (end - start), step / np.cos(taper)
     return float(np.arctan2(around, along)), float(np.arctan2(along, around))
 
 

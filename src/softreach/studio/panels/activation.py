@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from softreach.arm.manipulator import Manipulator
 from softreach.studio.panels.binding import bind, bind_button
+from softreach.studio.rod import rod_of
 from softreach.studio.state import StudioState
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ class ActivationPanel:
             self._tip.content = f"tip at ({x:.6f}, {y:.6f}, {z:.6f}) L"
 
     def _build(self, session: Session) -> None:
-        arm, self._made_for = session.state.design, _slider_ends(session.state.design)
+        self._made_for = _slider_ends(session.state.design)
         for slider in self._sliders:
             slider.remove()
         with self._folder:
@@ -60,7 +61,6 @@ class ActivationPanel:
                     self._made_for, session.state.activation, strict=True
                 )
             ]
-        assert len(self._sliders) == arm.bundles
 
     def _slider(self, name: str, low: float, high: float, value: float) -> Any:
         high = max(high, low + 1e-6)  # a slider needs room; the state keeps to the bounds
@@ -76,7 +76,5 @@ class ActivationPanel:
 
 def _slider_ends(arm: Manipulator) -> list[tuple[str, float, float]]:
     """Name and bounds of every bundle."""
-    return [
-        (name, low, high)
-        for name, (low, high) in zip(arm.bundle_names, arm.bounds.tolist(), strict=True)
-    ]
+    box = rod_of(arm).box
+    return [(name, low, high) for name, (low, high) in zip(box.names, box.bounds, strict=True)]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from softreach.studio.atlas_map import map_choices, metric_names
 from softreach.studio.map_board import MapBoard
-from softreach.studio.panels.binding import bind, told
+from softreach.studio.panels.binding import attempt, bind
 from softreach.studio.state import MapView, StudioState
 
 if TYPE_CHECKING:
@@ -47,13 +47,13 @@ class AtlasPanel:
         """Bring the widgets in line with the state."""
         if session.revision != self._revision:
             self._revision = session.revision
-            told(session, lambda: self._follow(session.state.appearance.map))
+            attempt(session, lambda: self._follow(session.state.appearance.map))
 
     def click(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
         """Load the design under the cursor, and whether the map is there."""
         at = self._board.parameters_under(origin, direction)
         if at:
-            told(self._session, lambda: self._load(at))
+            attempt(self._session, lambda: self._load(at))
         return at is not None
 
     def _follow(self, view: MapView) -> None:

@@ -11,7 +11,7 @@ from softreach.studio.state import StudioState
 if TYPE_CHECKING:
     from softreach.studio.session import Session
 
-__all__ = ["bind", "bind_button"]
+__all__ = ["attempt", "bind", "bind_button"]
 
 
 def bind(widget: Any, session: Session, change: Callable[[StudioState, Any], StudioState]) -> None:
@@ -23,17 +23,19 @@ def bind(widget: Any, session: Session, change: Callable[[StudioState, Any], Stu
 
     def moved(event: Any) -> None:
         if event.client_id is not None:
-            told(session, lambda: session.update(lambda s: change(s, widget.value), by_widget=True))
+            attempt(
+                session, lambda: session.update(lambda s: change(s, widget.value), by_widget=True)
+            )
 
     widget.on_update(moved)
 
 
 def bind_button(button: Any, session: Session, action: Callable[[], object]) -> None:
     """Act whenever a person presses the button."""
-    button.on_click(lambda _: told(session, action))
+    button.on_click(lambda _: attempt(session, action))
 
 
-def told(session: Session, action: Callable[[], object]) -> None:
+def attempt(session: Session, action: Callable[[], object]) -> None:
     """Act, and show the reader what is wrong if that fails."""
     try:
         action()

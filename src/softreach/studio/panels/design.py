@@ -3,90 +3,25 @@
 from __future__ import annotations
 
 import html
-import math
 import threading
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from softreach.arm.file import in_file_terms
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.summary import describe
-from softreach.atlas.parameter import changed
+from softreach.arm.parameters import changed
 from softreach.errors import InvalidDesign
+from softreach.studio.controls import Control, controls
 from softreach.studio.panels.binding import bind, bind_button
 from softreach.studio.panels.status import reach_text
-from softreach.studio.parameter_value import fiber_keys, parameter_value
+from softreach.studio.reach import beside
+from softreach.studio.rod import rod_of
 
 if TYPE_CHECKING:
     from viser import GuiApi
 
     from softreach.studio.session import Session
 
-__all__ = ["Control", "DesignPanel", "controls"]
-
-
-class Control(NamedTuple):
-    """One slider: a parameter of `atlas.parameter` in the unit that a person reads."""
-
-    name: str
-    label: str
-    value: float
-    low: float
-    high: float
-    step: float
-    scale: float = 1.0
-    """SI per shown unit."""
-
-    @property
-    def shown(self) -> float:
-        """The value on the slider."""
-        return round(self.value / self.scale, 6)
-
-    @property
-    def limits(self) -> tuple[float, float]:
-        """Ends of the slider: wide enough for a design from a file."""
-        return min(self.low, self.shown), max(self.high, self.shown)
-
-
-def controls(arm: Manipulator) -> list[Control]:
-    """The sliders of a design."""
-    helical = [abs(turn) for turn in describe(arm).revolutions.tolist() if turn]
-    low, high = arm.bounds[0].tolist()
-    found = [
-        Control("taper", "taper φ [deg]", parameter_value(arm, "taper"), -2, 5, 0.05, _DEG),
-        Control(
-            "radius_ratio", "inner / outer radius", parameter_value(arm, "radius_ratio"), 0, 1, 0.01
-        ),
-        Control(
-            "outer_radius",
-            "outer radius / L",
-            parameter_value(arm, "outer_radius"),
-            0.02,
-            0.12,
-            5e-4,
-            arm.length,
-        ),
-        Control("extent", "extent σ [deg]", arm.fibers[0].extent, 2, 120, 1, _DEG),
-        Control("lower", "lowest γ", low, -4, 0, 0.01),
-        Control("upper", "highest γ", high, -1, 2, 0.01),
-    ]
-    if helical:
-        turn = Control("revolution", "revolution Ω [deg]", helical[0], 1, 360, 1, _DEG)
-        found.insert(0, turn)
-    return found + list(_fiber_controls(arm))
-
-
-_DEG = math.radians(1)
-
-
-def _fiber_controls(arm: Manipulator) -> Iterator[Control]:
-    for fiber, key, turn in zip(
-        arm.fibers, fiber_keys(arm), describe(arm).revolutions.tolist(), strict=True
-    ):
-        name = fiber.name or key.replace("_", " ")
-        if not turn:
-            yield Control(f"bundles_{key}", f"bundles of {name}", fiber.bundles, 1, 6, 1)
-        yield Control(f"offset_{key}", f"offset of {name} [deg]", fiber.offset, 0, 360, 1, _DEG)
+__all__ = ["DesignPanel"]
 
 
 class _Row(NamedTuple):
@@ -133,12 +68,19 @@ class DesignPanel:
 
     def _forget(self) -> None:
         if self._session.state.side_by_side and self._session.state.reference is not None:
-            self._session.step_aside(False)
+            self._step(False)
         self._session.update(lambda s: s.replace(reference=None, side_by_side=False))
 
     def _stepped(self, event: Any) -> None:
         if event.client_id is not None and self._session.state.reference is not None:
-            self._session.step_aside(self._beside.value)
+            self._step(self._beside.value)
+
+    def _step(self, back: bool) -> None:
+        """Move the eye so that two clouds side by side fit; or to where it was."""
+        session = self._session
+        if session.reach is not None:
+            shift = beside(session.reach)
+            (session.eye.step_back if back else session.eye.step_forth)(shift)
 
     def _build(self, arm: Manipulator) -> None:
         for row in self._rows:
@@ -163,12 +105,12 @@ class DesignPanel:
         with self._lock:
             assert self._base is not None
             try:
-                self._made = changed(self._base, self._values())
+                made = rod_of(changed(self._base, self._values())).arm
             except InvalidDesign as error:
                 self._complain(name, str(in_file_terms(error, "")))
                 return
+            self._made = made
             self._complain(name, "")
-            made = self._made
         self._session.update(lambda s: s.replace(design=made), by_widget=True)
 
     def _values(self) -> dict[str, float]:

@@ -17,7 +17,7 @@ from softreach.studio.files import (
 )
 from softreach.studio.link import state_link
 from softreach.studio.page import static_page
-from softreach.studio.panels.binding import bind_button, told
+from softreach.studio.panels.binding import attempt, bind_button
 
 if TYPE_CHECKING:
     from viser import GuiApi, UploadedFile
@@ -53,7 +53,7 @@ class ExportPanel:
             self._button("Save surface", self._save_surface)
             self._button("Save figure (PNG)", self._save_figure)
             self._button("Save web page (HTML)", self._save_page)
-        load.on_upload(lambda _: told(session, lambda: self._restore(load.value)))
+        load.on_upload(lambda _: attempt(session, lambda: self._restore(load.value)))
 
     def show(self, session: Session) -> None:
         """Nothing here depends on the state."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.kinematics import tip_positions
-from softreach.studio.panels.binding import bind, bind_button, told
+from softreach.studio.panels.binding import attempt, bind, bind_button
 from softreach.studio.picking import picked_point
 from softreach.studio.reach import cloud_points, shown_samples
 from softreach.studio.slicing import in_slice
@@ -65,7 +65,7 @@ class InversePanel:
         if answer is not None:
             arm = self._session.state.design
             self._target.value = answer.target / arm.length
-            self._text.content = _told(answer, arm)
+            self._text.content = _answer_text(answer, arm)
             with self._folder:
                 self._buttons = [(row, self._button(row)) for row in answer.activations]
 
@@ -81,7 +81,7 @@ class InversePanel:
         if found is None:
             return False
         activations = reach.cloud.activation.values[shown_samples(reach, look.level)]
-        told(session, lambda: session.aim(_tip(reach.arm, activations[kept[found]])))
+        attempt(session, lambda: session.aim(_tip(reach.arm, activations[kept[found]])))
         return True
 
     def _solve_typed(self) -> None:
@@ -101,7 +101,7 @@ def _tip(arm: Manipulator, activation: Any) -> Any:
     return tip_positions(arm, [activation])[0]
 
 
-def _told(answer: Solution, arm: Manipulator) -> str:
+def _answer_text(answer: Solution, arm: Manipulator) -> str:
     """What became of the target, in words."""
     place = _place(answer.target / arm.length)
     if not len(answer):

@@ -30,16 +30,16 @@ class StatusPanel:
     def show(self, session: Session) -> None:
         """Tell what is known, and whether it is about to change."""
         reach = session.reach
-        self._numbers.content = "computing ..." if reach is None else _told(session, reach)
+        self._numbers.content = "computing ..." if reach is None else _known_text(session, reach)
         self._key.content = key_html(session.key)
         self._note.content, self._note.visible = session.note, bool(session.note)
 
 
-def _told(session: Session, reach: Reach) -> str:
+def _known_text(session: Session, reach: Reach) -> str:
     stale = reach.arm != session.state.design
     hull = reach.alpha_volume if session.state.appearance.alpha_shape else None
-    told = f" · α-shape {hull:.4f} L³" if hull is not None else ""
-    return reach_text(reach) + told + (" · computing ..." if stale or not reach.fine else "")
+    hull_text = f" · α-shape {hull:.4f} L³" if hull is not None else ""
+    return reach_text(reach) + hull_text + (" · computing ..." if stale or not reach.fine else "")
 
 
 def reach_text(reach: Reach) -> str:

@@ -1,16 +1,16 @@
-"""Background work: the latest order wins, stale work is dropped, kernels take turns."""
+"""Background work: the latest order wins, stale work is dropped, heavy work takes turns."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable
 
-__all__ = ["Dropped", "Latest", "StaleCheck", "kernels"]
+__all__ = ["Dropped", "Latest", "StaleCheck", "all_cores"]
 
 StaleCheck = Callable[[], None]
 """Raises `Dropped` if what is being done is no longer wanted."""
 
-kernels = threading.Lock()
+all_cores = threading.Lock()
 """Held by whoever uses every core, so that tabs take turns and do not slow each other down."""
 
 
@@ -62,7 +62,7 @@ class Latest:
                 work(self._check)
             except Dropped:
                 continue
-            except Exception as error:  # told to the reader; a thread has nobody to raise to
+            except Exception as error:  # shown to the reader; a thread has nobody to raise to
                 if not self._closed:  # else the reader is gone
                     self._failed(error)
 

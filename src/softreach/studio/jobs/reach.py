@@ -1,0 +1,95 @@
+"""Computes what a design can reach, and draws its cloud and its surfaces."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from softreach.studio.jobs.job import Job
+from softreach.studio.reach import Reach, stages
+from softreach.studio.state import StudioState
+from softreach.studio.worker import StaleCheck
+
+if TYPE_CHECKING:
+    from softreach.studio.session import Session
+
+__all__ = ["ComputeReach", "DrawCloud", "DrawSurfaces"]
+
+
+class ComputeReach(Job):
+    """Cloud, volume and unreachability of the design, coarse and then fine."""
+
+    @staticmethod
+    def depends_on(state: StudioState) -> object:
+        """The design alone; how many points are shown, `DrawCloud` watches."""
+        return state.design
+
+    def run(self, check: StaleCheck) -> None:
+        """Compute what is not known yet, and draw each stage."""
+        session, state = self.session, self.session.state
+        if _is_complete(session.reach, state):
+            _draw_cloud(session)
+            return
+        for reach in stages(state.design, state.appearance.level, session.quality, check):
+            check()
+            session.reach = reach
+            _draw_cloud(session)
+
+
+class DrawCloud(Job):
+    """Points, their colors, and the axes around them."""
+
+    @staticmethod
+    def depends_on(state: StudioState) -> object:
+        """How points look and which of them are shown."""
+        look = state.appearance
+        return look.level, look.color, look.point_size, look.slice, look.cloud, look.axes
+
+    def run(self, check: StaleCheck) -> None:
+        """Draw what is known; ask for more where it is not enough."""
+        check()
+        if _is_complete(self.session.reach, self.session.state):
+            _draw_points(self.session)
+            self.session.show()
+        else:
+            self.session.follow(ComputeReach)
+
+
+class DrawSurfaces(Job):
+    """The exact boundary and the α-shape."""
+
+    @staticmethod
+    def depends_on(state: StudioState) -> object:
+        """Which surfaces are shown, and the slice through them."""
+        look = state.appearance
+        return look.surface, look.alpha_shape, look.slice
+
+    def run(self, check: StaleCheck) -> None:
+        """Draw them, which computes them the first time."""
+        check()
+        if self.session.reach is not None:
+            self.session.scene.draw_surfaces(self.session.reach, self.session.state.appearance)
+            self.session.show()
+
+
+def _is_complete(known: Reach | None, state: StudioState) -> bool:
+    """Whether what was computed, or read from a file, is all there is to know."""
+    if known is None or not known.fine or known.arm != state.design:
+        return False
+    enough = known.samples >= 1 << state.appearance.level
+    return enough or known.cloud.attrs.get("sampler") != "sobol"
+
+
+def _draw_cloud(session: Session) -> None:
+    _draw_points(session)
+    session.follow(DrawSurfaces)
+    session.show()
+
+
+def _draw_points(session: Session) -> None:
+    """Draw the cloud and its axes, and keep the key to its colors."""
+    reach, look = session.reach, session.state.appearance
+    if reach is None:
+        return
+    with session.drawing, session.client.atomic():
+        session.key = session.scene.draw_cloud(reach, look)
+        session.scene.draw_axes(reach, look)
