@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from softreach.arm.actuators import FiberArchitecture
-from softreach.rod.kinematics import tip_positions
-from softreach.arm.manipulator import Manipulator
+from softreach.inverse.mesh import box_mesh
 
 from softreach import designs
+from softreach.arm.actuators import FiberArchitecture
+from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidDesign
-from softreach.inverse.mesh import box_mesh
 from softreach.kernels.activation_mesh import ActivationMesh, face_planes
+from softreach.rod.kinematics import tip_positions
 from tests.kernels.maps import Quadratic, mesh_of, random_quadratic, sampled
 from tests.laws import arm_of
 
