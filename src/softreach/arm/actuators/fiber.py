@@ -91,12 +91,14 @@ class FiberArchitecture(Actuator):
         A fiber of extent σ pulls with the mean of cos and sin over it, a (section 2, a1 and b1).
         """
         ring, radius = section.rings[0], profile.radius(z) * section.rings[0].outer_ratio
-        axial, bending, torsion = ring_integrals(
+        slopes, station = np.unique(profile.slope(z), return_inverse=True)
+        integrals = ring_integrals(
             ring.radius_ratio,
-            np.arctan(profile.slope(z) * ring.outer_ratio),
+            np.arctan(slopes * ring.outer_ratio),
             self.helical_angle_on(profile, section),
             ring.material.poisson_ratio,
         )
+        axial, bending, torsion = (integral[station] for integral in integrals)
         theta = self._angles(profile, section, z)
         share, mean = self.extent / np.pi, 2.0 * np.sin(self.extent / 2.0) / np.pi
         bend = (np.pi * radius**3 * bending * mean)[:, None]
