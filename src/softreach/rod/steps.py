@@ -107,9 +107,7 @@ class StepRule:
         """As `steps_for`, for the largest error of the centerline anywhere along the arm."""
         return self._fewest(tol, self._shape_differences, _FRAME_TURN)
 
-    def _fewest(
-        self, tol: float, halving: Callable[[int], Differences], turn: float
-    ) -> int:
+    def _fewest(self, tol: float, halving: Callable[[int], Differences], turn: float) -> int:
         """The fewest steps whose differences on the pilot, and on what it leads to, are allowed."""
         allowed = tol * self.arm.length / _SAFETY
         steps, pilot = self._fewest_steps(turn), self.pilot
@@ -118,8 +116,8 @@ class StepRule:
             found = difference(pilot)
             error = float(found.max())
             if error <= allowed:
-                worse = worsened(difference, pilot, found, self.box)
-                error = float(difference(worse).max())
+                worse, found = worsened(difference, pilot, found, self.box)
+                error = float(found.max())
                 if error <= allowed:
                     return steps
                 pilot = np.concatenate([pilot, worse])

@@ -26,7 +26,7 @@ class Resultants(NamedTuple):
     """Moment M about the directors [m³], shape (station, 3, bundle)."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Outline:
     """Where bundles lie in the sections, for pictures: a sector of a ring at each station."""
 
@@ -48,9 +48,11 @@ class Actuator(ABC):
 
     unit: ClassVar[str] = "1"
     """Unit of an activation."""
+    default_name: ClassVar[str] = "actuator"
+    """What an arm calls unnamed ones, with a number."""
 
     name: str
-    """What summaries and pictures call it; unique within an arm."""
+    """What summaries and pictures call it; unique within an arm, which names those without."""
     bundles: int
     """Number of independent activations."""
 
