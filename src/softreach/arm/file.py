@@ -290,7 +290,8 @@ def _radians(text: str) -> float:
     Floating-point degrees miss one angle in ten by a unit in the last place; twenty digits do not.
     """
     digits = text.lower().partition("e")[0].lstrip("+-0.").replace(".", "")
-    if len(digits) < _LONG or not math.isfinite(float(text)):
+    short = len(digits) < _LONG and math.isfinite(float(text))
+    if short or not Decimal(text).is_finite():
         return math.radians(float(text))
     return float(Decimal(text) * _PI / 180)
 
@@ -298,11 +299,15 @@ def _radians(text: str) -> float:
 def _degrees_text(angle: float) -> str:
     """The shortest number of degrees that converts to exactly this angle."""
     degrees = Decimal(angle) * 180 / _PI
-    texts = (f"{degrees:.{digits}g}" for digits in range(1, 26))
-    text = next((text for text in texts if _radians(text) == angle), repr(math.degrees(angle)))
-    exponent = math.log10(abs(angle)) if angle else 0.0
-    plain = f"{Decimal(text):f}" if -6 < exponent < 16 else text
-    return plain if "." in plain or "e" in plain else f"{plain}.0"
+    texts = (_decimal_text(f"{degrees:.{digits}g}") for digits in range(1, 26))
+    return next((text for text in texts if _radians(text) == angle), repr(math.degrees(angle)))
+
+
+def _decimal_text(number: str) -> str:
+    """A TOML float, without an exponent unless it is far from 1."""
+    plain = -6 < Decimal(number).adjusted() < 16
+    text = f"{Decimal(number):f}" if plain else number
+    return text if "." in text or "e" in text else f"{text}.0"
 
 
 def _in_file_terms(fault: Fault, prefix: str) -> Fault:
