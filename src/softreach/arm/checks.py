@@ -1,7 +1,7 @@
 """What a design must satisfy, checked on plain values.
 
 The constructors and the file reader share these checks. Absent values are not judged, so that a
-file with one unreadable key still hears of its other faults.
+file with one unreadable key still hears of its other faults; None is a value, and rarely allowed.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ __all__ = [
     "FIBER_RANGES",
     "MATERIAL_RANGES",
     "PROFILE_RANGES",
+    "RING_RANGES",
     "bounds_faults",
     "fiber_faults",
     "name_faults",
@@ -44,7 +45,7 @@ FIBER_RANGES = {
     "bundles": Range(low=1, whole=True),
 }
 
-_RING_RANGES = {
+RING_RANGES = {
     "inner_ratio": Range(0.0, 1.0, open_high=True),
     "outer_ratio": Range(0.0, 1.0, open_low=True),
 }
@@ -53,9 +54,12 @@ _TUBE_RANGES = {
     "length": PROFILE_RANGES["length"],
     "outer_radius": PROFILE_RANGES["outer_radius"],
     "inner_radius": Range(0.0, unit="m"),
+    "inner_ratio": RING_RANGES["inner_ratio"],
     "taper": PROFILE_RANGES["taper"],
     **MATERIAL_RANGES,
 }
+
+_OPTIONAL = {"helical_angle", "revolution"}
 
 
 def profile_faults(values: Mapping[str, Any]) -> list[Fault]:
@@ -66,8 +70,8 @@ def profile_faults(values: Mapping[str, Any]) -> list[Fault]:
 
 def ring_faults(values: Mapping[str, Any]) -> list[Fault]:
     """Everything wrong with the fields of a ring."""
-    faults = range_faults(values, _RING_RANGES)
-    inner, outer = (plain_number(values[name]) for name in _RING_RANGES)
+    faults = range_faults(values, RING_RANGES)
+    inner, outer = (plain_number(values[name]) for name in RING_RANGES)
     if not faults and inner >= outer:
         faults = [Fault("inner_ratio", inner, f"must be below outer_ratio = {outer:g}")]
     return faults
@@ -94,6 +98,8 @@ def fiber_faults(values: Mapping[str, Any]) -> list[Fault]:
     faults = range_faults(values, FIBER_RANGES)
     if {"helical_angle", "revolution"} <= values.keys():
         faults += _winding_faults(values["helical_angle"], values["revolution"])
+    if not isinstance(values.get("name", ""), str):
+        faults.append(Fault("name", values["name"], "must be text"))
     if "activation_bounds" in values:
         bundles = _sound(values, faults).get("bundles")
         faults += bounds_faults(values["activation_bounds"], bundles)
@@ -102,10 +108,7 @@ def fiber_faults(values: Mapping[str, Any]) -> list[Fault]:
 
 def bounds_faults(bounds: Any, bundles: int | None) -> list[Fault]:
     """Whatever is wrong with a pair (lower, upper), or one such pair for each bundle."""
-    try:
-        pairs = np.asarray(bounds, dtype=float)
-    except (TypeError, ValueError):
-        pairs = np.empty(0)
+    pairs = _numbers(bounds)
     if pairs.shape[-1:] != (2,) or pairs.ndim > 2 or not pairs.size:
         allowed = "must be a pair (lower, upper), or one such pair for each bundle"
         return [Fault("activation_bounds", bounds, allowed)]
@@ -133,13 +136,22 @@ def plain_number(value: Any) -> Any:
 
 
 def range_faults(values: Mapping[str, Any], ranges: Mapping[str, Range]) -> list[Fault]:
-    """A fault for each value outside its range; None is skipped."""
-    faults = []
-    for name, allowed in ranges.items():
-        value = plain_number(values.get(name))
-        if value is not None and not allowed.admits(value):
-            faults.append(Fault(name, value, allowed))
-    return faults
+    """A fault for each value outside its range; absent ones are skipped."""
+    given = {name: plain_number(values[name]) for name in ranges if name in values}
+    return [
+        Fault(name, value, ranges[name])
+        for name, value in given.items()
+        if not ranges[name].admits(value) and not (value is None and name in _OPTIONAL)
+    ]
+
+
+def _numbers(values: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Numbers as an array; an empty one for texts, truth values and whatever else is none."""
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError):
+        return np.empty(0)
+    return array.astype(float) if array.dtype.kind in "iuf" else np.empty(0)
 
 
 def _sound(values: Mapping[str, Any], faults: list[Fault]) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import json
 import math
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
 from decimal import Decimal
 from typing import Any
 
@@ -100,13 +101,13 @@ def parse(text: str, source: str) -> tuple[dict[str, Any], list[Actuator]]:
 
 def _own_kind(table: dict[str, Any], path: str, source: str) -> Actuator:
     """An actuator of a kind that the reader's program defines: its fields, in SI units."""
-    fields = {key: _plain(value) for key, value in table.items()}
-    kind, known = fields.pop("kind", None), actuator_kinds()
-    if kind not in known:
+    values = {key: _plain(value) for key, value in table.items()}
+    kind, known = values.pop("kind", None), actuator_kinds()
+    if not isinstance(kind, str) or kind not in known:
         allowed = f"must be a kind of actuator that is imported: {', '.join(known)}"
         raise InvalidDesign([Fault(f"{path}.kind", kind, allowed)], source)
     try:
-        return known[kind](**fields)
+        return known[kind](**values)
     except TypeError as error:
         raise InvalidDesign([Fault(path, kind, f"has other fields: {error}")], source) from None
     except InvalidDesign as error:
@@ -166,18 +167,23 @@ def _actuator_lines(actuators: Sequence[Actuator]) -> Iterator[str]:
     """A table for each actuator: its kind and its fields, as they are in Python."""
     for actuator in actuators:
         yield from ("", "[[actuators]]", f"kind = {json.dumps(type(actuator).__name__)}")
-        for name, value in vars(actuator).items():
-            if value is not None and not name.startswith("_"):
+        for name in (field.name for field in fields(actuator)):
+            if (value := getattr(actuator, name)) is not None:
                 yield f"{name} = {_value_text(actuator, name, value)}"
 
 
 def _value_text(actuator: Actuator, name: str, value: Any) -> str:
     try:
-        return json.dumps(value, ensure_ascii=False, allow_nan=False)
+        return _toml(value)
     except (TypeError, ValueError):
         kind = type(actuator).__name__
         allowed = "must be a number, a text or a sequence of them to stand in a design file"
         raise InvalidDesign([Fault(f"{kind}.{name}", value, allowed)]) from None
+
+
+def _toml(value: Any) -> str:
+    """Text, numbers and sequences of them as JSON, which is TOML too but for one character."""
+    return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("\x7f", "\\u007f")
 
 
 def in_file_terms(error: InvalidDesign, source: str) -> InvalidDesign:
@@ -187,7 +193,7 @@ def in_file_terms(error: InvalidDesign, source: str) -> InvalidDesign:
 
 def _fiber_lines(fiber: Mapping[str, Any]) -> Iterator[str]:
     if fiber["name"]:
-        yield f"name = {json.dumps(fiber['name'], ensure_ascii=False)}"
+        yield f"name = {_toml(fiber['name'])}"
     for field in ("helical_angle", "revolution", "offset", "extent"):
         if fiber[field] is not None:
             yield f"{field}_deg = {_degrees_text(fiber[field])}"
@@ -286,7 +292,8 @@ def _radians(text: str) -> float:
     Floating-point degrees miss one angle in ten by a unit in the last place; twenty digits do not.
     """
     digits = text.lower().partition("e")[0].lstrip("+-0.").replace(".", "")
-    if len(digits) < _LONG or not math.isfinite(float(text)):
+    short = len(digits) < _LONG and math.isfinite(float(text))
+    if short or not Decimal(text).is_finite():
         return math.radians(float(text))
     return float(Decimal(text) * _PI / 180)
 
@@ -294,11 +301,15 @@ def _radians(text: str) -> float:
 def _degrees_text(angle: float) -> str:
     """The shortest number of degrees that converts to exactly this angle."""
     degrees = Decimal(angle) * 180 / _PI
-    texts = (f"{degrees:.{digits}g}" for digits in range(1, 26))
-    text = next((text for text in texts if _radians(text) == angle), repr(math.degrees(angle)))
-    exponent = math.log10(abs(angle)) if angle else 0.0
-    plain = f"{Decimal(text):f}" if -6 < exponent < 16 else text
-    return plain if "." in plain or "e" in plain else f"{plain}.0"
+    texts = (_decimal_text(f"{degrees:.{digits}g}") for digits in range(1, 26))
+    return next((text for text in texts if _radians(text) == angle), repr(math.degrees(angle)))
+
+
+def _decimal_text(number: str) -> str:
+    """A TOML float, without an exponent unless it is far from 1."""
+    plain = -6 < Decimal(number).adjusted() < 16
+    text = f"{Decimal(number):f}" if plain else number
+    return text if "." in text or "e" in text else f"{text}.0"
 
 
 def _in_file_terms(fault: Fault, prefix: str) -> Fault:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -78,10 +79,10 @@ class Manipulator:
         Raises:
             InvalidDesign: The arm cannot exist; the error names every fault.
         """
-        values = dict(locals())
-        known = all(isinstance(actuator, Actuator) for actuator in actuators)
-        bundles = sum(actuator.bundles for actuator in actuators) if known else None
-        if faults := tube_faults(values, bundles):
+        values = {name: value for name, value in locals().items() if name != "cls"}
+        faults = list(_actuator_faults(actuators))
+        bundles = None if faults else sum(actuator.bundles for actuator in actuators)
+        if faults := tube_faults(values, bundles) + faults:
             raise InvalidDesign(faults)
         ring = Ring(
             inner_ratio=inner_radius / outer_radius, material=Material(poisson_ratio=poisson_ratio)
@@ -223,7 +224,8 @@ class Manipulator:
         of_fibers = [isinstance(one, FiberArchitecture) for one in self.actuators]
         if isinstance(fiber, str) and fiber in names and of_fibers[names.index(fiber)]:
             return names.index(fiber)
-        if not isinstance(fiber, str | bool) and fiber in range(len(names)) and of_fibers[fiber]:
+        known_place = isinstance(fiber, int | np.integer) and fiber in range(len(names))
+        if known_place and not isinstance(fiber, bool) and of_fibers[fiber]:
             return int(fiber)
         known = ", ".join(
             f"{k} ({name})"
@@ -239,11 +241,14 @@ def _part_faults(arm: Manipulator) -> Iterator[Fault]:
         yield Fault("profile", arm.profile, "must be a Profile, such as LinearTaper")
     if not isinstance(arm.section, Section):
         yield Fault("section", arm.section, "must be a Section")
-    parts = arm.actuators
-    if not isinstance(parts, Sequence) or isinstance(parts, str) or not parts:
-        yield Fault("actuators", parts, "must be a sequence of one actuator or more")
+    yield from _actuator_faults(arm.actuators)
+
+
+def _actuator_faults(actuators: Any) -> Iterator[Fault]:
+    if not isinstance(actuators, Sequence) or isinstance(actuators, str) or not actuators:
+        yield Fault("actuators", actuators, "must be a sequence of one actuator or more")
         return
-    for k, part in enumerate(parts):
+    for k, part in enumerate(actuators):
         if not isinstance(part, Actuator):
             yield Fault(f"actuators[{k}]", part, "must be an actuator, such as FiberArchitecture")
 
@@ -251,17 +256,14 @@ def _part_faults(arm: Manipulator) -> Iterator[Fault]:
 def _named(actuators: Sequence[Actuator]) -> Iterator[Actuator]:
     """The actuators, those without a name called "fiber 1", "fiber 2", ... by their places."""
     taken = {actuator.name for actuator in actuators}
-    for k, actuator in enumerate(actuators):
+    for place, actuator in enumerate(actuators, start=1):
         if actuator.name:
             yield actuator
-        else:
-            number = next(n for n in range(k + 1, 2 * len(taken) + k + 2) if _fiber(n) not in taken)
-            taken.add(_fiber(number))
-            yield actuator.replace(name=_fiber(number))
-
-
-def _fiber(number: int) -> str:
-    return f"fiber {number}"
+            continue
+        names = (f"{actuator.default_name} {number}" for number in itertools.count(place))
+        name = next(name for name in names if name not in taken)
+        taken.add(name)
+        yield actuator.replace(name=name)
 
 
 def _name_faults(arm: Manipulator) -> Iterator[Fault]:

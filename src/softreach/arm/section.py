@@ -51,7 +51,10 @@ class Ring:
     """What the ring is made of."""
 
     def __post_init__(self) -> None:
-        if faults := ring_faults(vars(self)):
+        faults = ring_faults(vars(self))
+        if not isinstance(self.material, Material):
+            faults.append(Fault("material", self.material, "must be a Material"))
+        if faults:
             raise InvalidDesign(faults)
         for field in ("inner_ratio", "outer_ratio"):
             object.__setattr__(self, field, float(plain_number(getattr(self, field))))
@@ -85,9 +88,10 @@ class Section:
     """The ring of actuators; the core inside it is of the same material."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rings", tuple(self.rings))
-        if len(self.rings) != 1 or not isinstance(self.rings[0], Ring):
+        rings = tuple(self.rings) if isinstance(self.rings, tuple | list) else ()
+        if len(rings) != 1 or not isinstance(rings[0], Ring):
             raise InvalidDesign([Fault("section.rings", self.rings, "must hold one Ring")])
+        object.__setattr__(self, "rings", rings)
         if self.rings[0].outer_ratio != 1.0:
             fault = Fault("section.rings[0].outer_ratio", self.rings[0].outer_ratio, "must be 1")
             raise InvalidDesign([fault])

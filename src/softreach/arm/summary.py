@@ -102,7 +102,7 @@ def _sharp_bending(arm: Manipulator) -> Iterator[str]:
 
 
 def _large_activations(arm: Manipulator) -> Iterator[str]:
-    largest = float(np.abs(arm.bounds).max())
+    largest = max((float(np.abs(fiber.bounds).max()) for fiber in arm.fibers), default=0.0)
     if largest > 1:
         yield (
             f"activations reach |γ| = {largest:.3g}: above 1 a fiber would shorten by more than "

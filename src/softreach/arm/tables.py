@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 _STATIONS = 101
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tables:
     """The response of an arm at given stations per unit of activation of each bundle."""
 
@@ -70,17 +70,17 @@ def extension_range(arm: Manipulator) -> tuple[float, float]:
 
 
 def curvature_range(arm: Manipulator) -> tuple[Array, Array]:
-    """The largest bending √(u1² + u2²) that the activation box reaches, along the arm.
+    """The largest bending √(u1² + u2²), theory (45), that the activation box reaches.
 
-    Bending is convex in γ, so its maximum lies at a corner of the box; with many bundles the
-    corners are searched along directions instead, which is exact for the polygon they form.
+    Bending is convex in γ, so its maximum lies at a corner of the box. The corners that lead
+    farthest in each of 1,440 directions are tried; none leads farther by more than 3e-6 of it.
 
     Returns:
         Stations Z [m] and the largest bending there [1/m], each of shape (station,).
     """
     table = tables(arm, _stations(arm))
     plane = table.curvature[:, :2]
-    # The reachable (u1, u2) are a zonogon; its farthest vertex maximises some direction's support.
+    # The reachable (u1, u2) are a zonogon; its farthest vertex maximizes some direction's support.
     heading = np.linspace(0.0, 2.0 * np.pi, 1440, endpoint=False)
     along = np.einsum("hc,scb->shb", np.stack([np.cos(heading), np.sin(heading)], 1), plane)
     best = np.where(along > 0, arm.bounds[:, 1], arm.bounds[:, 0])

@@ -11,24 +11,35 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.errors import InvalidInput
 
-__all__ = ["ActivationBox"]
+__all__ = ["ActivationBox", "as_floats"]
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class ActivationBox:
-    """Bounds of activations; a bundle whose bounds are equal is held, the others are free."""
+    """Bounds of activations; a bundle whose bounds are equal is held, the others are free.
+
+    Raises:
+        InvalidInput: No pair lower <= upper of finite numbers and no name for each bundle.
+    """
 
     bounds: tuple[tuple[float, float], ...]
     """(lower, upper) for each bundle, in its own unit."""
     names: tuple[str, ...]
     """A name for each bundle."""
 
+    def __post_init__(self) -> None:
+        if not all(-np.inf < low <= high < np.inf for low, high in self.bounds):
+            raise InvalidInput("bounds", self.bounds, "pairs of finite numbers, lower <= upper")
+        if len(self.names) != len(self.bounds):
+            raise InvalidInput("names", self.names, f"{len(self.bounds)}: one for each bundle")
+
     @classmethod
     def between(cls, bounds: ArrayLike, names: Sequence[str]) -> ActivationBox:
         """The box of an array of bounds, shape (bundles, 2)."""
-        return cls(tuple((low, high) for low, high in np.asarray(bounds).tolist()), tuple(names))
+        pairs = np.asarray(bounds, float).tolist()
+        return cls(tuple((low, high) for low, high in pairs), tuple(names))
 
     @property
     def bundles(self) -> int:
@@ -127,7 +138,7 @@ class ActivationBox:
         Raises:
             InvalidInput: Another shape, or values that are not finite.
         """
-        gamma = np.ascontiguousarray(activations, dtype=float)
+        gamma = as_floats("activations", activations)
         if gamma.ndim != 2 or gamma.shape[1] != self.bundles:
             allowed = f"of shape (n, {self.bundles}), one column per bundle"
             raise InvalidInput("activations.shape", gamma.shape, allowed)
@@ -141,7 +152,7 @@ class ActivationBox:
         return np.clip(activations, self.low, self.high)
 
     def excess(self, activations: Array) -> Array:
-        """How far each bundle is outside its bounds, in widths; negative inside."""
+        """How far each bundle is outside its bounds, in `scales`; negative inside."""
         return np.maximum(self.low - activations, activations - self.high) / self.scales
 
     def margin(self, activations: Array) -> Array:
@@ -153,8 +164,20 @@ class ActivationBox:
 
     def corners(self) -> Array:
         """All corners, shape (2^bundles, bundles), the last bundle varying fastest."""
-        bits = np.indices((2,) * self.bundles).reshape(self.bundles, -1).T
-        return self.from_cube(bits.astype(float))
+        upper = np.indices((2,) * self.bundles).reshape(self.bundles, -1).T
+        return np.where(upper, self.high, self.low)
+
+
+def as_floats(name: str, values: ArrayLike) -> Array:
+    """The values as a contiguous float array.
+
+    Raises:
+        InvalidInput: They are no numbers, or rows of different lengths.
+    """
+    try:
+        return np.ascontiguousarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise InvalidInput(name, values, "an array of numbers") from None
 
 
 def _frozen(values: Array) -> Array:

@@ -99,7 +99,7 @@ class FreeRod(TipMap):
     def strains(self, activations: ArrayLike, stations: ArrayLike) -> Strains:
         """U = Uγ and ζ = 1 + z·γ at stations Z [m]."""
         gamma = self.box.check(activations)
-        local = tables(self.arm, stations)
+        local = tables(self.arm, self.check_stations(stations))
         return Strains(
             np.einsum("scb,nb->nsc", local.curvature, gamma), 1.0 + gamma @ local.extension.T
         )

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach import schema
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
+from softreach.rod.activation_box import as_floats
 from softreach.rod.tip_map import TipMap, tip_map
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ def configuration(
         InvalidInput: Activations or stations of another shape or out of range.
     """
     rod = tip_map(arm, tol)
-    gamma = rod.box.check(np.atleast_2d(np.asarray(activation, float)))
+    gamma = rod.box.check(np.atleast_2d(as_floats("activation", activation)))
     z = _even_stations(rod, stations) if np.ndim(stations) == 0 else rod.check_stations(stations)
     position, directors = rod.frames(gamma, z)
     curvature, extension = rod.strains(gamma, z)
@@ -101,7 +102,7 @@ def configuration(
 
 
 def _even_stations(rod: TipMap, stations: int | ArrayLike) -> Array:
-    count = int(np.asarray(stations))
-    if count < 2:
+    whole = isinstance(stations, int | np.integer) and not isinstance(stations, bool)
+    if not whole or stations < 2:
         raise InvalidInput("stations", stations, "2 or more, or the stations' Z in m")
-    return np.linspace(0.0, rod.length, count)
+    return np.linspace(0.0, rod.length, int(stations))

@@ -28,9 +28,10 @@ _ROUNDS = 24
 
 
 def pilot_activations(arm: Manipulator, box: ActivationBox) -> Array:
-    """Corners, points on faces and points inside; the same places of the box for all arms.
+    """Corners, points on faces and points inside the activation box.
 
     All corners where they are no more than 1,024; else as many at random, and those that bend most.
+    Only the last depend on more of an arm than its bounds.
 
     Returns:
         Activations, shape (n, bundles).
@@ -70,7 +71,7 @@ def _bending_corners(arm: Manipulator) -> Array:
 
 def worsened(
     error: Callable[[Array], Array], pilot: Array, found: Array, box: ActivationBox
-) -> Array:
+) -> tuple[Array, Array]:
     """Activations of larger error, by moving one bundle to a bound at a time, from the worst.
 
     Args:
@@ -80,7 +81,7 @@ def worsened(
         box: The bounds.
 
     Returns:
-        Where the searches ended, shape (at most 8, bundles).
+        Where the searches ended, shape (at most 8, bundles), and the errors there.
     """
     chosen = np.argsort(-found, kind="stable")[:_SEARCHED]
     gamma, worst = pilot[chosen].copy(), found[chosen].copy()
@@ -96,4 +97,4 @@ def worsened(
             break
         gamma[better] = moved[rows, best][better]
         worst[better] = errors[rows, best][better]
-    return gamma
+    return gamma, worst

@@ -20,7 +20,7 @@ from softreach.rod.pilot import pilot_activations, worsened
 __all__ = ["Nodes", "StepRule", "check_tol"]
 
 Array = NDArray[np.float64]
-Differences = Callable[[int, Array], Array]
+Differences = Callable[[Array], Array]
 
 _SAFETY = 2.0
 _SMALLEST_TOL = 1e-12
@@ -101,22 +101,23 @@ class StepRule:
             InvalidInput: `tol` below 1e-12, or not reached within 4,096 steps.
         """
         check_tol(tol)
-        return self._fewest(tol, self.pilot, self._tip_differences, _TIP_TURN)
+        return self._fewest(tol, self._tip_differences, _TIP_TURN)
 
     def steps_for_shapes(self, tol: float) -> int:
         """As `steps_for`, for the largest error of the centerline anywhere along the arm."""
-        return self._fewest(tol, self.pilot, self._shape_differences, _FRAME_TURN)
+        return self._fewest(tol, self._shape_differences, _FRAME_TURN)
 
-    def _fewest(self, tol: float, pilot: Array, differences: Differences, turn: float) -> int:
+    def _fewest(self, tol: float, halving: Callable[[int], Differences], turn: float) -> int:
         """The fewest steps whose differences on the pilot, and on what it leads to, are allowed."""
         allowed = tol * self.arm.length / _SAFETY
-        steps = self._fewest_steps(turn)
+        steps, pilot = self._fewest_steps(turn), self.pilot
         while steps <= _MOST_STEPS:
-            found = differences(steps, pilot)
+            difference = halving(steps)
+            found = difference(pilot)
             error = float(found.max())
             if error <= allowed:
-                worse = worsened(lambda gamma: differences(steps, gamma), pilot, found, self.box)  # noqa: B023
-                error = float(differences(steps, worse).max())
+                worse, found = worsened(difference, pilot, found, self.box)
+                error = float(found.max())
                 if error <= allowed:
                     return steps
                 pilot = np.concatenate([pilot, worse])
@@ -148,21 +149,31 @@ class StepRule:
         """Activations on which steps are judged, shape (n, bundles)."""
         return pilot_activations(self.arm, self.box)
 
-    def _tip_differences(self, steps: int, gamma: Array) -> Array:
-        """Distances of the tips with n and with 2n steps [m], shape (n,)."""
-        coarse, fine = np.empty((len(gamma), 3)), np.empty((len(gamma), 3))
-        rod.tips(self.packed_nodes(steps), gamma, coarse)
-        rod.tips(self.packed_nodes(2 * steps), gamma, fine)
-        return np.linalg.norm(coarse - fine, axis=1)
+    def _tip_differences(self, steps: int) -> Differences:
+        """Distances [m] between the tips with `steps` and with twice as many."""
+        coarse, fine = self.packed_nodes(steps), self.packed_nodes(2 * steps)
 
-    def _shape_differences(self, steps: int, gamma: Array) -> Array:
-        """Largest distances along the centerlines with n and with 2n steps [m], shape (n,)."""
+        def difference(gamma: Array) -> Array:
+            places = np.empty((2, len(gamma), 3))
+            rod.tips(coarse, gamma, places[0])
+            rod.tips(fine, gamma, places[1])
+            return np.linalg.norm(places[0] - places[1], axis=-1)
+
+        return difference
+
+    def _shape_differences(self, steps: int) -> Differences:
+        """Largest distances [m] along the centerlines with `steps` and with twice as many."""
+        coarse, fine = self.packed_nodes(steps), self.packed_nodes(2 * steps)
         ends = np.arange(1, steps + 1)
-        places = np.empty((2, len(gamma), steps, 3))
-        directors = np.empty((len(gamma), steps, 3, 3))
-        frames.frames(self.packed_nodes(steps), ends, gamma, places[0], directors)
-        frames.frames(self.packed_nodes(2 * steps), 2 * ends, gamma, places[1], directors)
-        return np.linalg.norm(places[0] - places[1], axis=-1).max(axis=1)
+
+        def difference(gamma: Array) -> Array:
+            places = np.empty((2, len(gamma), steps, 3))
+            directors = np.empty((len(gamma), steps, 3, 3))
+            frames.frames(coarse, ends, gamma, places[0], directors)
+            frames.frames(fine, 2 * ends, gamma, places[1], directors)
+            return np.linalg.norm(places[0] - places[1], axis=-1).max(axis=1)
+
+        return difference
 
 
 def check_tol(tol: float) -> None:

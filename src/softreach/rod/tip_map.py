@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach import parallel
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
-from softreach.rod.activation_box import ActivationBox
+from softreach.rod.activation_box import ActivationBox, as_floats
 
 __all__ = [
     "BLOCK",
@@ -174,7 +174,7 @@ class TipMap(ABC):
         Raises:
             InvalidInput: No ascending Z within [0, L].
         """
-        z = np.asarray(stations, float)
+        z = as_floats("stations", stations)
         inside = z.ndim == 1 and z.size > 0 and np.isfinite(z).all()
         if not inside or z[0] < 0 or z[-1] > self.length or (np.diff(z) < 0).any():
             raise InvalidInput("stations", stations, f"ascending Z within [0, {self.length:g}] m")

@@ -27,7 +27,7 @@ class Resultants(NamedTuple):
     """Moment M about the directors [m³], shape (station, 3, bundle)."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Outline:
     """Where bundles lie in the sections, for pictures: a sector of a ring at each station."""
 
@@ -51,9 +51,11 @@ class Actuator(ABC):
     """Unit of an activation."""
     variables: ClassVar[tuple[Variable, ...]] = ()
     """Fields that a designer varies, beside the bounds."""
+    default_name: ClassVar[str] = "actuator"
+    """What an arm calls unnamed ones, with a number."""
 
     name: str
-    """What summaries and pictures call it; unique within an arm."""
+    """What summaries and pictures call it; unique within an arm, which names those without."""
     bundles: int
     """Number of independent activations."""
 

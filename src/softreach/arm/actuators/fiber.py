@@ -45,6 +45,7 @@ class FiberArchitecture(Actuator):
             ("bundles", "n", "number of bundles"),
         )
     )
+    default_name: ClassVar[str] = "fiber"
 
     helical_angle: float | None = None
     """α, from the axis, at the outer radius [rad]; |α| < π/2."""
@@ -57,7 +58,7 @@ class FiberArchitecture(Actuator):
     bundles: int = 1
     """n, independent bundles, spaced evenly by 2π/n [-]."""
     name: str = ""
-    """What summaries and pictures call it; an arm names those that have none."""
+    """What summaries and pictures call it; an arm calls unnamed ones "fiber 1", "fiber 2", ..."""
     activation_bounds: Bounds = (-5 / 3, 0.0)
     """(lower, upper) of γ for every bundle, or one pair per bundle [-]; γ < 0 contracts."""
 
@@ -83,8 +84,7 @@ class FiberArchitecture(Actuator):
 
     def with_bounds(self, bounds: Array) -> Self:
         """A copy with other bounds [-], shape (bundles, 2)."""
-        alike = (bounds == bounds[0]).all()
-        return self.replace(activation_bounds=bounds[0] if alike else bounds)
+        return self.replace(activation_bounds=bounds)
 
     def helical_angle_on(self, profile: Profile, section: Section) -> float:
         """α at the outer radius of the ring [rad], which the revolution fixes."""
@@ -111,12 +111,14 @@ class FiberArchitecture(Actuator):
         A fiber of extent σ pulls with the mean of cos and sin over it, a (section 2, a1 and b1).
         """
         ring, radius = section.rings[0], profile.radius(z) * section.rings[0].outer_ratio
-        axial, bending, torsion = ring_integrals(
+        slopes, station = np.unique(profile.slope(z), return_inverse=True)
+        integrals = ring_integrals(
             ring.radius_ratio,
-            np.arctan(profile.slope(z) * ring.outer_ratio),
+            np.arctan(slopes * ring.outer_ratio),
             self.helical_angle_on(profile, section),
             ring.material.poisson_ratio,
         )
+        axial, bending, torsion = (integral[station] for integral in integrals)
         theta = self._angles(profile, section, z)
         share, mean = self.extent / np.pi, 2.0 * np.sin(self.extent / 2.0) / np.pi
         bend = (np.pi * radius**3 * bending * mean)[:, None]
@@ -153,14 +155,15 @@ class FiberArchitecture(Actuator):
             raise InvalidInput("count", count, "a whole number >= 1")
         if self.bundles != 1:
             hint = "its bundles are independent already"
-            raise InvalidInput(f"bundles of {self.name}", self.bundles, "1 to be split", hint)
+            raise InvalidInput(f"{self.name}.bundles", self.bundles, "1 to be split", hint)
         return tuple(self._parts(int(count), keep_extent)) if count > 1 else (self,)
 
     def _parts(self, count: int, keep_extent: bool) -> Iterator[Self]:
         extent = self.extent if keep_extent else self.extent / count
         for k in range(count):
             offset = self.offset + (k - (count - 1) / 2) * extent
-            yield self.replace(name=f"{self.name} {k + 1}", offset=offset, extent=extent)
+            name = f"{self.name} {k + 1}" if self.name else ""
+            yield self.replace(name=name, offset=offset, extent=extent)
 
     def _angles(self, profile: Profile, section: Section, z: Array) -> Array:
         """θ_j + Θ(Z) with θ_j = θ0 + 2πj/n [rad], shape (station, bundle)."""
@@ -174,5 +177,6 @@ class FiberArchitecture(Actuator):
 
 
 def _plain_bounds(bounds: ArrayLike) -> Bounds:
-    pairs = np.asarray(bounds, float).tolist()
-    return tuple(pairs) if np.ndim(pairs) == 1 else tuple(tuple(pair) for pair in pairs)
+    """One pair where all bundles share it, else one for each."""
+    pairs = [(low, high) for low, high in np.atleast_2d(np.asarray(bounds, float)).tolist()]
+    return pairs[0] if all(pair == pairs[0] for pair in pairs) else tuple(pairs)

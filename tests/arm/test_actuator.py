@@ -1,0 +1,152 @@
+"""A new kind of actuator is one object: nothing else needs to know of it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import softreach as sr
+from softreach.arm import designs
+from softreach.arm.summary import design_warnings
+from softreach.arm.tables import tables
+from tests.cable import Cable
+from tests.laws import arm_of, in_box, integrated_tip
+
+PLACE = (0.03, 0.04)
+
+
+def cylinder(*actuators, **changes):
+    return arm_of(*actuators, activation_bounds=None, **changes)
+
+
+@given(
+    place=st.tuples(st.floats(-0.06, 0.06), st.floats(-0.06, 0.06)).filter(
+        lambda p: math.hypot(*p) > 1e-3
+    ),
+    tension=st.floats(1e-5, 1e-3),
+)
+def test_a_cable_bends_a_shortened_arm_to_a_circle(place, tension):
+    """ζ = 1 - T/K0, and the curvature T |p| / K1 per activated arclength, toward the cable."""
+    arm = cylinder(Cable(place=place))
+    radius = arm.profile.outer_radius
+    zeta = 1 - tension / (math.pi * radius**2)
+    curvature = tension * math.hypot(*place) / (math.pi / 4 * radius**4)
+    angle = curvature * zeta * arm.length
+    x, y, z = sr.tip_positions(arm, [[tension]], tol=1e-12)[0]
+    assert z == pytest.approx(math.sin(angle) / curvature, abs=1e-12)
+    assert math.hypot(x, y) == pytest.approx((1 - math.cos(angle)) / curvature, abs=1e-12)
+    away = math.remainder(math.atan2(y, x) - math.atan2(place[1], place[0]), 2 * math.pi)
+    assert math.hypot(x, y) * abs(away) < 1e-12
+
+
+def test_actuators_of_different_kinds_add_up(trunk):
+    mixed = trunk.replace(actuators=(*trunk.actuators, Cable(place=PLACE)))
+    stations = np.linspace(0, 1, 5)
+    whole, fibers = tables(mixed, stations), tables(trunk, stations)
+    alone = tables(trunk.replace(actuators=(Cable(place=PLACE),)), stations)
+    np.testing.assert_array_equal(whole.extension, np.hstack([fibers.extension, alone.extension]))
+    np.testing.assert_array_equal(
+        whole.curvature, np.concatenate([fibers.curvature, alone.curvature], axis=2)
+    )
+    gamma = in_box(mixed, 3)
+    np.testing.assert_allclose(
+        sr.tip_positions(mixed, gamma, tol=1e-9),
+        [integrated_tip(mixed, one) for one in gamma],
+        atol=1e-9,
+    )
+
+
+@pytest.fixture(scope="module")
+def mixed(trunk):
+    """Two fibers and a cable of another unit and other bounds."""
+    return trunk.replace(actuators=(*trunk.actuators[:2], Cable(place=PLACE)))
+
+
+class TestEverythingElseWorks:
+    def test_it_is_named_and_bounded_like_any_other(self, mixed):
+        assert mixed.bundle_names == ("left", "right", "cable 3")
+        np.testing.assert_array_equal(mixed.bounds[2], [0.0, 1e-3])
+        other = mixed.with_bounds(((-1, 0), (-1, 0), (0, 5e-4)))
+        assert other.actuators[2].tension == (0.0, 5e-4)
+
+    def test_it_survives_a_file(self, mixed):
+        text = mixed.to_toml()
+        assert 'kind = "Cable"' in text
+        assert sr.Manipulator.from_toml(text) == mixed
+
+    def test_clouds_of_it_are_computed_saved_and_opened(self, mixed, tmp_path):
+        cloud = sr.compute_cloud(mixed, n=500)
+        sr.save_cloud(cloud, tmp_path / "cloud.zarr")
+        opened = sr.open_cloud(tmp_path / "cloud.zarr")
+        assert opened.identical(cloud)
+        assert sr.design_of(opened) == mixed
+        low, high = mixed.bounds.T
+        assert (cloud.activation >= low).all()
+        assert (cloud.activation <= high).all()
+
+    def test_its_reachable_set_holds_its_tips(self, mixed):
+        reached = sr.reachable_set(mixed, accuracy=0.02)
+        assert reached.volume > 0
+        assert (reached.distance(sr.compute_cloud(mixed, n=200).tip.values) < 1e-2).all()
+
+    def test_inverse_solutions_are_activations_of_it(self, mixed):
+        gamma = in_box(mixed, 5)
+        targets = sr.tip_positions(mixed, gamma)
+        for target, solution in zip(targets, sr.solve_inverse(mixed, targets), strict=True):
+            tips = sr.tip_positions(mixed, solution.activations)
+            assert len(tips) >= 1
+            np.testing.assert_allclose(tips, np.broadcast_to(target, tips.shape), atol=1e-5)
+
+    def test_it_is_drawn(self, mixed):
+        pytest.importorskip("matplotlib")
+        shape = sr.configuration(mixed, [-1.0, -0.5, 5e-4], stations=21)
+        axes = sr.plot.plot_arm(mixed, shape)
+        assert axes.images
+        axes.figure.clear()
+
+    def test_its_activations_are_not_taken_for_those_of_fibers(self):
+        strong = Cable(place=PLACE, tension=(0.0, 5.0))
+        assert not any("|γ|" in line for line in design_warnings(cylinder(strong)))
+
+
+class TestFiles:
+    def written(self, text):
+        head = designs.minimal_trunk().to_toml().partition("[[fibers]]")[0]
+        return head.partition("activation_bounds")[0] + text
+
+    def test_fibers_and_other_kinds_may_stand_together(self):
+        arm = sr.Manipulator.from_toml(
+            self.written(
+                "[[actuators]]\nkind = 'Cable'\nplace = [0.03, 0.0]\n"
+                "[[fibers]]\nname = 'left'\nhelical_angle_deg = 10.0\nextent_deg = 20.0\n"
+            )
+        )
+        assert arm.bundle_names == ("left", "cable 2")
+        assert arm.actuators[1] == Cable(place=(0.03, 0.0), name="cable 2")
+
+    @pytest.mark.parametrize(
+        ("table", "message"),
+        [
+            ("kind = 'Cables'", r"actuators\[0\].kind = 'Cables': must be a kind of actuator"),
+            ("kind = {a = 1}", r"actuators\[0\].kind = {'a': 1}: must be a kind of actuator"),
+            ("place = [0, 0]", r"actuators\[0\].kind: must be a kind of actuator"),
+            ("kind = 'Cable'", r"actuators\[0\] = 'Cable': has other fields: .*'place'"),
+            ("kind = 'Cable'\nplace = [0, 0]\nx = 1", r"has other fields: .*'x'"),
+            (
+                "kind = 'FiberArchitecture'\nhelical_angle = 0\nextent = 7.0",
+                r"actuators\[0\].extent = 7: must be",
+            ),
+        ],
+    )
+    def test_a_faulty_table_is_refused_with_its_place(self, table, message):
+        with pytest.raises(sr.InvalidDesign, match=message):
+            sr.Manipulator.from_toml(self.written(f"[[actuators]]\n{table}\n"))
+
+    def test_what_is_no_plain_value_is_not_written(self, trunk):
+        arm = trunk.replace(actuators=(Cable(place=(np.float32(0.03), 0.0)),))
+        with pytest.raises(sr.InvalidDesign, match=r"Cable.place = .*to stand in a design file"):
+            arm.to_toml()

@@ -1,0 +1,161 @@
+"""Arms are values: checked, frozen, replaceable, named."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+import softreach as sr
+from softreach.arm import LinearTaper, Ring, Section, designs
+from tests.laws import arm_of, arms
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            {"inner_radius": 1 / 12},
+            r"inner_radius = 0.0833333: must be below outer_radius = 0.0625 m",
+        ),
+        ({"taper": 0.07}, r"taper = 0.07: leaves no tip.*must be below 0.0624188 rad \(3.576°\)"),
+        ({"poisson_ratio": 0.6}, "poisson_ratio = 0.6: .*>= 0 and <= 0.5"),
+        ({"poisson_ratio": -0.1}, "poisson_ratio = -0.1"),
+        ({"length": 0.0}, "length = 0: .*> 0 m"),
+        ({"length": "1"}, "length = '1'"),
+        ({"length": None}, "length: must be a finite number > 0 m"),
+        ({"length": np.bool_(True)}, "length = True"),
+        ({"inner_radius": None}, "inner_radius: must be a finite number >= 0 m"),
+        ({"outer_radius": math.inf}, "outer_radius = inf"),
+        ({"taper": math.nan}, "taper = nan"),
+        ({"activation_bounds": (0.5, -0.5)}, "lower <= upper"),
+        ({"activation_bounds": (math.nan, 0)}, "finite"),
+        ({"activation_bounds": ((-1, 0),) * 2}, "one pair, or 3 pairs"),
+        ({"activation_bounds": 3}, "must be a pair"),
+        ({"activation_bounds": ("-1", "0")}, "must be a pair"),
+        ({"activation_bounds": (False, True)}, "must be a pair"),
+        ({"activation_bounds": ((-1, 0), (0,), (0, 1))}, "must be a pair"),
+        ({"actuators": ()}, r"actuators = \(\): must be a sequence of one actuator or more"),
+        ({"actuators": None}, "actuators: must be a sequence"),
+        ({"actuators": "left"}, "actuators = 'left': must be a sequence"),
+        ({"actuators": (3,)}, r"actuators\[0\] = 3: must be an actuator"),
+    ],
+)
+def test_an_impossible_arm_is_refused_with_value_and_allowed_range(trunk, change, message):
+    tube = {"length": 1.0, "outer_radius": 1 / 16, "inner_radius": 3 / 64}
+    with pytest.raises(sr.InvalidDesign, match=message):
+        sr.Manipulator.tapered(**(tube | {"actuators": trunk.actuators} | change))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"profile": 1.0}, "profile = 1: must be a Profile"),
+        ({"section": Ring(inner_ratio=0.5)}, "section = Ring.*: must be a Section"),
+        ({"actuators": ()}, "one actuator or more"),
+        ({"actuators": iter(())}, "must be a sequence"),
+    ],
+)
+def test_parts_of_another_kind_are_refused(trunk, change, message):
+    with pytest.raises(sr.InvalidDesign, match=message):
+        trunk.replace(**change)
+
+
+@pytest.mark.parametrize("bounds", [(1, 0), ((-1, 0),) * 2, None, "ab", (0, math.inf)])
+def test_other_bounds_are_checked_like_those_of_a_new_arm(trunk, bounds):
+    with pytest.raises(sr.InvalidDesign, match="activation_bounds"):
+        trunk.with_bounds(bounds)
+
+
+def test_all_faults_are_named_at_once(trunk):
+    with pytest.raises(sr.InvalidDesign) as error:
+        sr.Manipulator.tapered(
+            length=1.0,
+            outer_radius=0.1,
+            inner_radius=1.0,
+            poisson_ratio=2.0,
+            activation_bounds=(1, 0),
+            actuators=(*trunk.actuators, 3),
+        )
+    assert {fault.path for fault in error.value.faults} == {
+        "inner_radius",
+        "poisson_ratio",
+        "activation_bounds",
+        "actuators[3]",
+    }
+
+
+def test_designs_are_frozen_hashable_values(trunk):
+    assert trunk == designs.minimal_trunk()
+    assert hash(trunk) == hash(designs.minimal_trunk())
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        trunk.profile = None
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        trunk.profile.length = 2.0
+    with pytest.raises(ValueError, match="read-only"):
+        trunk.bounds[0, 0] = 1.0
+
+
+@given(arm=arms())
+def test_a_design_survives_a_pickle(arm):
+    again = pickle.loads(pickle.dumps(arm))
+    assert again == arm
+    assert hash(again) == hash(arm)
+
+
+def test_a_tapered_arm_is_its_profile_its_section_and_its_actuators(trunk):
+    arm = sr.Manipulator.tapered(
+        length=2.0, outer_radius=0.2, inner_radius=0.1, taper=0.01, actuators=[*trunk.actuators]
+    )
+    profile = LinearTaper(length=2.0, outer_radius=0.2, taper=0.01)
+    section = Section(rings=(Ring(inner_ratio=0.5),))
+    assert arm == sr.Manipulator(profile=profile, section=section, actuators=trunk.actuators)
+    assert arm.length == 2.0
+
+
+class TestBounds:
+    def test_bounds_follow_the_bundles_and_belong_to_their_actuators(self):
+        pair = sr.FiberArchitecture(helical_angle=0.0, extent=0.3, bundles=2)
+        each = ((-1.0, 0.0), (-0.5, 0.0), (-0.25, 0.25))
+        arm = arm_of(pair, pair.replace(bundles=1), activation_bounds=each)
+        np.testing.assert_array_equal(arm.bounds, each)
+        np.testing.assert_array_equal(arm.actuators[0].bounds, each[:2])
+        np.testing.assert_array_equal(arm.actuators[1].bounds, each[2:])
+
+    def test_without_bounds_of_its_own_an_arm_has_those_of_its_actuators(self):
+        fiber = sr.FiberArchitecture(helical_angle=0.0, extent=0.3, activation_bounds=(-0.3, 0.1))
+        np.testing.assert_array_equal(arm_of(fiber, activation_bounds=None).bounds, [[-0.3, 0.1]])
+
+    @given(arm=arms())
+    def test_replacing_bounds_by_themselves_changes_nothing(self, arm):
+        assert arm.with_bounds(arm.bounds) == arm
+
+    def test_one_pair_for_all_is_the_same_as_one_for_each(self, trunk):
+        assert trunk.with_bounds((-1, 0)) == trunk.with_bounds(((-1, 0),) * 3)
+
+
+class TestNames:
+    def test_whoever_has_no_name_is_called_after_its_place(self):
+        fiber = sr.FiberArchitecture(helical_angle=0.0, extent=0.1)
+        arm = arm_of(fiber, fiber.replace(name="own"), fiber)
+        assert arm.bundle_names == ("fiber 1", "own", "fiber 3")
+        assert arm.actuators[2].name == "fiber 3"
+
+    def test_a_name_that_is_taken_is_not_given_again(self):
+        fiber = sr.FiberArchitecture(helical_angle=0.0, extent=0.1)
+        names = arm_of(fiber.replace(name="fiber 2"), fiber, fiber).bundle_names
+        assert names[0] == "fiber 2"
+        assert len(set(names)) == 3
+
+    def test_two_actuators_of_one_name_are_refused(self, trunk):
+        with pytest.raises(sr.InvalidDesign, match=r"actuators\[1\].name = 'left': must differ"):
+            trunk.replace(actuators=tuple(f.replace(name="left") for f in trunk.actuators))
+
+    def test_two_bundles_of_one_name_are_refused(self):
+        fiber = sr.FiberArchitecture(helical_angle=0.0, extent=0.1)
+        with pytest.raises(sr.InvalidDesign, match="'a 1': names two bundles"):
+            arm_of(fiber.replace(name="a", bundles=2), fiber.replace(name="a 1"))

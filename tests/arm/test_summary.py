@@ -1,0 +1,82 @@
+"""What follows from a design: its numbers, and the limits that it touches."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+import softreach as sr
+from softreach.arm import designs
+from softreach.arm.summary import describe, design_warnings
+from softreach.arm.tables import extension_range, tables
+from tests.laws import arm_of, arms, single
+
+
+def test_the_helical_bundles_of_the_trunk_meet_the_longitudinal_one_at_the_tip(trunk):
+    """Section 3: at Ω = 108° the sectors touch at the distal end, and do not overlap before it."""
+    angles = np.degrees(trunk.outline([0.0, trunk.length]).center)
+    np.testing.assert_allclose(angles, [[66, 114, 270], [-42, 222, 270]], atol=1e-12)
+    assert not any("overlap" in line for line in design_warnings(trunk))
+
+
+def test_the_paper_s_taper_of_three_degrees_thins_the_tip_sixfold():
+    report = describe(designs.minimal_trunk(taper=math.radians(3)))
+    assert report.taper_ratio == pytest.approx(6.2, abs=0.02)
+    assert report.tip_radius == pytest.approx(1 / 16 - math.tan(math.radians(3)))
+
+
+def test_overlapping_sectors_are_warned_of_with_their_angle_and_place():
+    arm = designs.minimal_trunk(revolution=math.radians(150))
+    lines = [line for line in design_warnings(arm) if "left and longitudinal" in line]
+    assert len(lines) == 1
+    assert "by up to 42°" in lines[0]
+    # They touch when 66° - Ω(Z) = 318°, that is Ω(Z) = 108°, of 150° at the tip.
+    place = float(lines[0].split("Z = ")[1].split()[0])
+    turned = arm.profile.slender_coordinate(place)
+    assert turned / arm.profile.slender_length == pytest.approx(108 / 150, abs=0.01)
+
+
+def test_sectors_of_one_architecture_overlap_when_wider_than_their_spacing():
+    arm = arm_of(
+        sr.FiberArchitecture(helical_angle=0.2, extent=2.2, bundles=3), activation_bounds=(-0.1, 0)
+    )
+    assert sum("overlap" in line for line in design_warnings(arm)) == 3
+
+
+def test_bending_beyond_the_theory_and_large_activations_are_warned_of():
+    sharp = design_warnings(designs.redundant_trunk())
+    assert any("|κ| R2 = 1.05" in line for line in sharp)
+    assert any("|γ| = 1.67" in line for line in sharp)
+    assert design_warnings(single(activation_bounds=(-0.9, 0.0))) == ()
+
+
+@pytest.mark.parametrize("bounds", [(-0.8, -0.3), (-0.5, 0.2), (-0.4, -0.4)])
+def test_the_range_of_curvature_is_that_of_all_activations(trunk, bounds):
+    arm = trunk.with_bounds(bounds)
+    ticks = np.linspace(*bounds, 13)
+    gamma = np.stack(np.meshgrid(ticks, ticks, ticks), axis=-1).reshape(-1, 3)
+    u = tables(arm, np.linspace(0, 1, 11)).curvature[:, :2] @ gamma.T
+    kappa = np.linalg.norm(u, axis=1)
+    low, high = describe(arm).curvature
+    assert low <= kappa.min() + 1e-9
+    assert kappa.min() - low < 0.2
+    assert kappa.max() == pytest.approx(high, rel=1e-5)
+
+
+@given(arm=arms())
+def test_a_summary_is_that_of_the_parts(arm):
+    facts = describe(arm)
+    assert facts.base_radius == arm.profile.outer_radius
+    assert facts.tip_radius == arm.profile.radius(arm.length)
+    assert facts.radius_ratio == arm.section.rings[0].inner_ratio
+    assert facts.taper_ratio == facts.base_radius / facts.tip_radius
+    assert facts.extension == extension_range(arm)
+    assert facts.warnings == design_warnings(arm)
+
+
+def test_a_design_beyond_the_theory_has_no_summary(trunk):
+    with pytest.raises(sr.InvalidDesign, match="must keep ζ > 0"):
+        describe(trunk.with_bounds((-9.0, 0.0)))
