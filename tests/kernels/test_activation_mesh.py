@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from softreach.arm.actuators import FiberArchitecture
-from softreach.rod.kinematics import tip_positions
-from softreach.arm.manipulator import Manipulator
 
-from softreach import designs
+from softreach.arm import FiberArchitecture, Manipulator, designs
 from softreach.errors import InvalidDesign
-from softreach.inverse.mesh import box_mesh
+from softreach.inverse.cells import activation_cells
 from softreach.kernels.activation_mesh import ActivationMesh, face_planes
+from softreach.rod import tip_map
 from tests.kernels.maps import Quadratic, mesh_of, random_quadratic, sampled
 from tests.laws import arm_of
 
@@ -34,7 +32,9 @@ def random_arm(rng: np.random.Generator) -> Manipulator:
         )
         taper = rng.uniform(0, 0.8) / 16
         try:
-            return arm_of(*fibers, taper=taper, activation_bounds=(-5 / 3, 0.0))
+            arm = arm_of(*fibers, taper=taper, activation_bounds=(-5 / 3, 0.0))
+            tip_map(arm, TOL)
+            return arm
         except InvalidDesign:
             continue
 
@@ -59,10 +59,10 @@ def depth(planes: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", [(108, 2), (36, 3), (0, 0), *range(6)])
 def test_no_tip_is_farther_from_its_linear_interpolant_than_estimated(name):
-    arm, rng = any_arm(name), np.random.default_rng(0)
-    mesh = box_mesh(arm, TOL, CELLS, 0)
+    rod, rng = tip_map(any_arm(name), TOL), np.random.default_rng(0)
+    mesh = activation_cells(rod, CELLS)
     tetrahedron, v, weights, gamma = sampled(mesh, 30_000, rng)
-    tip = tip_positions(arm, gamma, TOL)
+    tip = rod.tips(gamma)
     error = np.linalg.norm(tip - np.einsum("ni,nik->nk", weights, mesh.tip[v]), axis=1)
     share = error / mesh.interpolation_error[tetrahedron // 6]
     assert share.max() <= 1.0

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softreach.inverse.tree import space_tree
+from softreach.inverse.image_tree import image_tree
 from softreach.kernels import candidates
 from softreach.kernels.candidates import MOST_STARTS, find_starts
 from tests.kernels.maps import Quadratic, mesh_of, random_fold
@@ -19,7 +19,7 @@ LOW, HIGH = np.full(3, -1.0), np.full(3, 1.0)
 def starts_of(f: Quadratic, targets: np.ndarray, cells: int, with_root: bool = True):
     """Number of the target and activation of every start."""
     mesh = mesh_of(f, cells)
-    tree = space_tree(mesh)
+    tree = image_tree(mesh)
     room = MOST_STARTS * (1 + len(targets))
     target, cell, start = np.empty(room, int), np.empty(room, int), np.empty((room, 3))
     done, found = find_starts(mesh, tree, targets, LOW, HIGH, with_root, target, cell, start)

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softreach.inverse.tree import space_tree
+from softreach.inverse.image_tree import image_tree
 from softreach.kernels.space_tree import SpaceTree, leaf_at
 from tests.kernels.maps import mesh_of, random_quadratic, sampled
 
@@ -26,7 +26,7 @@ def test_the_tetrahedron_of_every_activation_is_listed_where_its_tip_is(seed):
     rng = np.random.default_rng(seed)
     f = random_quadratic(rng, bend=0.05)
     mesh = mesh_of(f, 4)
-    tree = space_tree(mesh)
+    tree = image_tree(mesh)
     assert len(tree.child) > 100  # deep enough to mean something
     tetrahedron, _, _, gamma = sampled(mesh, 300, rng)
     for k, tip in zip(tetrahedron, f.values(gamma), strict=True):
@@ -38,7 +38,7 @@ def test_the_tetrahedron_of_every_activation_is_listed_where_its_tip_is(seed):
 def test_every_inflated_image_that_holds_a_place_is_listed_there(seed):
     rng = np.random.default_rng(seed)
     mesh = mesh_of(random_quadratic(rng, bend=0.05), 4)
-    tree = space_tree(mesh)
+    tree = image_tree(mesh)
     images = mesh.tip[np.repeat(mesh.corner, 6, axis=0)]
     error = np.repeat(mesh.interpolation_error, 6)[:, None]
     low, high = images.min(axis=1) - error, images.max(axis=1) + error
@@ -49,7 +49,7 @@ def test_every_inflated_image_that_holds_a_place_is_listed_there(seed):
 
 
 def test_outside_the_root_nothing_is_listed(rng):
-    tree = space_tree(mesh_of(random_quadratic(rng), 2))
+    tree = image_tree(mesh_of(random_quadratic(rng), 2))
     for axis in range(3):
         for side in (-1e-6, tree.size + 1e-6):
             point = tree.low + 0.5 * tree.size
