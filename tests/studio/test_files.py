@@ -102,7 +102,7 @@ def test_a_design_file_changes_the_design_alone(trunk):
     with pytest.raises(InvalidInput, match="UTF-8"):
         state_from("x.toml", b"\xff\xfe", state)
     tight = trunk.with_bounds((-30.0, 0.0))
-    with pytest.raises(InvalidDesign, match="x.toml: 1 problem\n.*must keep ζ > 0"):
+    with pytest.raises(InvalidDesign, match=r"x\.toml: 1 problem\n.*must keep ζ > 0"):
         state_from("x.toml", tight.to_toml().encode(), state)
 
 

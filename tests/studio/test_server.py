@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import socket
+from pathlib import Path
 
 import pytest
 
+import softreach.studio
 from softreach.errors import InvalidInput
 from softreach.studio.server import page_url, same_origin, start_server, stop_server
 
@@ -71,3 +74,27 @@ def test_the_address_of_the_client_build_is_a_plain_page(server):
     with socket.create_connection(("127.0.0.1", server.get_port()), timeout=10) as line:
         line.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
         assert line.recv(20).startswith(b"HTTP/1.1 200")
+
+
+def test_viser_still_has_no_public_way_to_the_sockets_of_its_pages():
+    """If this fails, see whether studio/connections.py and the upper pin of viser can go."""
+    import viser
+
+    words = re.compile("client|connect|request|header|origin|socket")
+    offered = {name for name in dir(viser.ViserServer) if not name.startswith("_")}
+    assert {name for name in offered if words.search(name)} == {
+        "disconnect_share_url",
+        "get_clients",
+        "on_client_connect",
+        "on_client_disconnect",
+        "request_share_url",
+    }
+    handle = {name for name in dir(viser.ClientHandle) if not name.startswith("_")}
+    assert not {name for name in handle if words.search(name)}
+
+
+def test_only_one_file_uses_names_that_viser_keeps_to_itself():
+    room = Path(softreach.studio.__file__).parent
+    private = re.compile(r"server\._[a-z]|_live_connections|_websock")
+    users = {p.name for p in room.rglob("*.py") if private.search(p.read_text(encoding="utf-8"))}
+    assert users == {"connections.py"}

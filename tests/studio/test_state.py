@@ -105,5 +105,5 @@ def test_a_design_that_would_be_shortened_to_nothing_is_no_state(trunk, squeezed
 @pytest.mark.parametrize("key", ["design", "reference"])
 def test_a_saved_state_with_such_a_design_says_so(trunk, squeezed, key):
     good = json.loads(StudioState(design=trunk).to_json())
-    with pytest.raises(InvalidDesign, match="state file: 1 problem\n.*must keep ζ > 0"):
+    with pytest.raises(InvalidDesign, match=r"state file: 1 problem\n.*must keep ζ > 0"):
         StudioState.from_json(json.dumps(good | {key: squeezed.to_toml()}))

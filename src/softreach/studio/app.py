@@ -7,9 +7,10 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
+from softreach.studio.connections import asked_path, close_all
 from softreach.studio.link import state_in_request
 from softreach.studio.panels.binding import attempt
-from softreach.studio.server import LOOPBACK, asked_path, page_url, start_server, stop_server
+from softreach.studio.server import LOOPBACK, page_url, start_server, stop_server
 from softreach.studio.session import Session
 from softreach.studio.source import Start
 from softreach.studio.state import Camera
@@ -62,7 +63,7 @@ class Studio:
 
     def _say_goodbye(self, patience: float = 3.0) -> None:
         """Close the tabs' connections first: viser ends its pool before it tells of the closing."""
-        self.server._websock_server.disconnect_all_clients()
+        close_all(self.server)
         deadline = time.monotonic() + patience
         while self.sessions and time.monotonic() < deadline:
             time.sleep(0.02)

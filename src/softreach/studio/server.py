@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from softreach.errors import InvalidInput, MissingExtra
+from softreach.studio.connections import refuse_unless
 
 if TYPE_CHECKING:
     from viser import ViserServer
 
-__all__ = ["LOOPBACK", "asked_path", "page_url", "same_origin", "start_server", "stop_server"]
+__all__ = ["LOOPBACK", "page_url", "same_origin", "start_server", "stop_server"]
 
 LOOPBACK = "127.0.0.1"
 _FOV = 0.6  # [rad]; viser's 75 degrees draw a ball at the rim as an egg
@@ -41,7 +42,7 @@ def start_server(host: str = LOOPBACK, port: int | None = None) -> ViserServer:
     with contextlib.redirect_stdout(io.StringIO()):  # its banner; we print our own line
         server = viser.ViserServer(host=host, port=port or 0, verbose=False, label="softreach")
     _disable_tunnel(server)
-    _refuse_foreign_pages(server, host)
+    refuse_unless(server, lambda headers: same_origin(headers, host))
     # Shadows and a mirrored room cost seconds where no graphics card helps, and say nothing.
     server.scene.configure_environment_map(None)
     server.scene.configure_default_lights(cast_shadow=False)
@@ -63,13 +64,6 @@ def page_url(server: ViserServer) -> str:
     host = server.get_host()
     shown = LOOPBACK if host in ("0.0.0.0", "::") else host
     return f"http://{f'[{shown}]' if ':' in shown else shown}:{server.get_port()}"
-
-
-def asked_path(server: ViserServer, client_id: int) -> str:
-    """The address that the socket of a page asked for, from the first slash on."""
-    live = server._websock_server._live_connections.get(client_id)
-    request = live.request if live is not None else None
-    return "/" if request is None else request.path
 
 
 def same_origin(headers: Mapping[str, str], host: str) -> bool:
@@ -103,14 +97,3 @@ def _disable_tunnel(server: ViserServer) -> None:
         return None
 
     server.request_share_url = refuse
-
-
-def _refuse_foreign_pages(server: ViserServer, host: str) -> None:
-    connections = server._websock_server  # viser has no public hook before its own hello
-
-    @connections.on_client_connect
-    async def _(client: Any) -> None:
-        live = connections._live_connections[client.client_id]
-        request = live.request
-        if request is None or not same_origin(request.headers, host):
-            await live.close(1008, "not our page")

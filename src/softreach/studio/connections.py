@@ -1,0 +1,39 @@
+"""The sockets behind the tabs: the one place that uses names which viser keeps to itself.
+
+viser offers no public way to see the request of a socket, to refuse it, or to close all of them.
+The upper pin of viser in `pyproject.toml` is there for this file; a test tells when it can go.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+
+__all__ = ["asked_path", "close_all", "refuse_unless"]
+
+
+def asked_path(server: ViserServer, client_id: int) -> str:
+    """The address that the socket of a page asked for, from the first slash on."""
+    live = server._websock_server._live_connections.get(client_id)
+    request = live.request if live is not None else None
+    return "/" if request is None else request.path
+
+
+def close_all(server: ViserServer) -> None:
+    """Close the sockets of all tabs."""
+    server._websock_server.disconnect_all_clients()
+
+
+def refuse_unless(server: ViserServer, welcome: Callable[[Any], bool]) -> None:
+    """Close every socket whose headers are not welcome before anything is sent to it."""
+    sockets = server._websock_server
+
+    @sockets.on_client_connect
+    async def _(client: Any) -> None:
+        live = sockets._live_connections[client.client_id]
+        request = live.request
+        if request is None or not welcome(request.headers):
+            await live.close(1008, "not our page")
