@@ -3,7 +3,7 @@
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.free_bundles import FreeBundles, free_bundles
 from softreach.rod.kinematics import configuration, tip_jacobian, tip_positions
-from softreach.rod.tip_map import Frames, Strains, TipMap, TipStatus, tip_map
+from softreach.rod.tip_map import Frames, Strains, TipMap, TipMotions, TipStatus, tip_map
 
 __all__ = [
     "ActivationBox",
@@ -11,6 +11,7 @@ __all__ = [
     "FreeBundles",
     "Strains",
     "TipMap",
+    "TipMotions",
     "TipStatus",
     "configuration",
     "free_bundles",
