@@ -4,7 +4,7 @@ from softreach.arm import designs
 from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, Resultants
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.profile import LinearTaper, Profile
-from softreach.arm.section import Material, Ring, Section
+from softreach.arm.section import Material, Ring, Section, Stiffness
 from softreach.arm.summary import DesignSummary, describe
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "Resultants",
     "Ring",
     "Section",
+    "Stiffness",
     "describe",
     "designs",
 ]
