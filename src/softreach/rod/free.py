@@ -34,7 +34,7 @@ class FreeRod(TipMap):
     tol: float = 1e-6
 
     def __post_init__(self) -> None:
-        check_tol(self.tol)
+        object.__setattr__(self, "tol", check_tol(self.tol))
         check_extension(self.arm)
 
     @property
