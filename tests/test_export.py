@@ -201,9 +201,10 @@ class TestArm:
         assert mesh.volume == pytest.approx(reference.volume, rel=1e-5)
         assert set(np.unique(plain.cell_data["part"][0])) == {0, 1, 2, 3}
 
-    def test_bundles_of_one_name_become_different_parts(self, trunk, bent, tmp_path):
-        twins = trunk.replace(fibers=tuple(f.replace(name="body") for f in trunk.fibers))
-        export_arm(twins, bent, tmp_path / "arm.glb")
+    def test_a_bundle_named_like_the_body_is_a_part_of_its_own(self, trunk, bent, tmp_path):
+        first, *others = trunk.actuators
+        twin = trunk.replace(actuators=(first.replace(name="body"), *others))
+        export_arm(twin, bent, tmp_path / "arm.glb")
         assert len(trimesh.load(tmp_path / "arm.glb").geometry) == 4
 
 

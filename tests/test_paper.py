@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from softreach.cross_section import section_integrals
 
+from softreach.arm.actuators.ring_integrals import ring_integrals
 from softreach.cli.app import run
 from softreach.paper import printed, reproduce, reproduce_paper
 from softreach.paper.claims import CLAIMS
@@ -186,7 +186,7 @@ tapers, angles = st.floats(0.02, 0.5), st.floats(0.05, 1.2)
 def test_printed_appendix_a_is_the_integrals_but_for_delta3(ratio, taper, angle, hand, nu):
     if abs(taper - angle) < 0.02:
         return
-    exact = section_integrals(ratio, taper, hand * angle, nu)
+    exact = ring_integrals(ratio, taper, hand * angle, nu)
     alpha = hand * angle
     assert printed.delta0(ratio, taper, alpha, nu) == pytest.approx(4 * exact.axial, rel=1e-6)
     assert printed.delta1(ratio, taper, alpha, nu) == pytest.approx(6 * exact.bending, rel=1e-6)

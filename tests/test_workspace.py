@@ -7,12 +7,13 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from softreach import designs, sampling
+from softreach import sampling
+from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud import compute_cloud
 from softreach.errors import InvalidInput, SoftreachWarning
-from softreach.rod.kinematics import tip_positions, tips_and_jacobians
+from softreach.rod import tip_map, tip_positions
 from softreach.workspace import ReachableSet, direction_spread, reachable_set
 from softreach.workspace.surface import Surface
 
@@ -69,7 +70,7 @@ def test_volume_is_the_integral_of_det_j_minus_what_is_covered_again(folded):
     arm = folded.arm
     cube = sampling.sample_cube("sobol", 1 << 16, 3, seed=1)
     gamma = arm.bounds[:, 0] + cube * np.diff(arm.bounds, axis=1)[:, 0]
-    tips, twists = tips_and_jacobians(arm, gamma)
+    tips, twists = tip_map(arm).tip_twists(gamma)
     velocity = twists[:, :3] + np.cross(twists[:, 3:], tips[:, :, None], axis=1)
     box = np.prod(np.diff(arm.bounds, axis=1))
     integral = np.abs(np.linalg.det(velocity)).mean() * box

@@ -10,12 +10,12 @@ SCRIPT = """
 import hashlib
 import numpy as np
 import softreach as sr
-from softreach.rod.kinematics import tips_and_jacobians
+from softreach.rod import tip_map
 
 arm = sr.designs.redundant_trunk()
 gamma = np.random.default_rng(0).uniform(-5 / 3, 0, (500, 4))
 shape = sr.configuration(arm, gamma[:50])
-results = (*tips_and_jacobians(arm, gamma), sr.tip_positions(arm, gamma), shape.position.values)
+results = (*tip_map(arm).tip_twists(gamma), sr.tip_positions(arm, gamma), shape.position.values)
 for values in results:
     print(hashlib.sha256(values.tobytes()).hexdigest())
 """

@@ -101,8 +101,7 @@ def configuration(
     return dataset.isel(sample=0) if np.ndim(activation) == 1 else dataset
 
 
-def _even_stations(rod: TipMap, stations: int | ArrayLike) -> Array:
-    whole = isinstance(stations, int | np.integer) and not isinstance(stations, bool)
-    if not whole or stations < 2:
+def _even_stations(rod: TipMap, stations: object) -> Array:
+    if isinstance(stations, bool) or not isinstance(stations, int | np.integer) or stations < 2:
         raise InvalidInput("stations", stations, "2 or more, or the stations' Z in m")
     return np.linspace(0.0, rod.length, int(stations))
