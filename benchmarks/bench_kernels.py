@@ -12,12 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from softreach.steps import steps_for
 
 import softreach as sr
 from benchmarks import tsit5
 from softreach import designs, parallel
 from softreach.kernels.compiler import FAST
+from softreach.rod.free import FreeRod
 
 _WIDTH = 64
 
@@ -124,7 +124,7 @@ def activations(arm, n: int):
 def twelve_bundles():
     """The minimal trunk with four narrow bundles in each architecture."""
     arm = designs.minimal_trunk()
-    return arm.replace(fibers=tuple(f.replace(bundles=4, extent=0.2) for f in arm.fibers))
+    return arm.replace(actuators=tuple(f.replace(bundles=4, extent=0.2) for f in arm.fibers))
 
 
 ARMS = {3: designs.minimal_trunk, 4: designs.redundant_trunk, 12: twelve_bundles}
@@ -150,7 +150,7 @@ def main(n: int = 2_000_000) -> None:
 
 def _tip_row(arm, n: int, tol: float, rate: float) -> None:
     gamma = activations(arm, n)
-    steps = steps_for(arm, tol)
+    steps = FreeRod(arm, tol).steps
     seconds = best_time(lambda: sr.tip_positions(arm, gamma, tol))
     speed = n * steps * flops(arm.bundles) / seconds.cpu
     print(

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from softreach import taper
-from softreach.arm.tables import actuation
+from softreach.arm import tables as arm_tables
 from softreach.kernels.compiler import kernel
 
 LANES = 64
@@ -45,12 +44,12 @@ FINAL = np.array(
 
 def tables(arm, steps: int = STEPS):
     """z and U at every stage of every step, uniform in S like ours, with dZ/dS."""
-    end = float(taper.slender_coordinate(arm.length, arm.outer_radius, arm.taper))
+    profile, end = arm.profile, arm.profile.slender_length
     s = (np.arange(steps)[:, None] + NODES) * end / steps
-    z = taper.station_of(s, arm.outer_radius, arm.taper)
-    table = actuation(arm, z.ravel())
+    z = profile.station(s)
+    table = arm_tables.tables(arm, z.ravel())
     packed = np.concatenate([table.extension[:, None], table.curvature], axis=1)
-    return packed.reshape(steps, 6, 4, -1), arm.radius(z) * end / steps
+    return packed.reshape(steps, 6, 4, -1), profile.radius(z) * end / steps
 
 
 @kernel

@@ -50,7 +50,7 @@ def test_fibers_start_where_the_design_says_and_turn_by_their_revolution(trunk):
 def test_bands_span_the_extent_about_their_fiber(trunk, bent):
     curves = fiber_curves(trunk, bent)
     for curve, band, extent in zip(
-        curves, fiber_bands(trunk, bent), trunk.bundle_extents, strict=True
+        curves, fiber_bands(trunk, bent), trunk.outline(0.0).extent, strict=True
     ):
         chord = np.linalg.norm(band[:, -1] - band[:, 0], axis=1)
         np.testing.assert_allclose(chord, 2 * bent.radius * np.sin(extent / 2), rtol=1e-9)
@@ -60,7 +60,7 @@ def test_bands_span_the_extent_about_their_fiber(trunk, bent):
 
 def test_the_body_is_closed_and_keeps_its_volume_at_rest(trunk):
     mesh = trimesh.Trimesh(*arm_mesh(rest_configuration(trunk), sides=400), process=False)
-    r, tip = trunk.outer_radius, trunk.tip_radius
+    r, tip = trunk.profile.radius([0.0, trunk.length])
     frustum = np.pi * trunk.length / 3 * (r * r + r * tip + tip * tip)
     assert mesh.is_watertight
     assert mesh.volume == pytest.approx(frustum, rel=1e-4)
@@ -71,7 +71,7 @@ def test_bands_are_closed_skins_of_their_thickness(trunk, bent):
         mesh = trimesh.Trimesh(vertices, faces, process=False)
         assert mesh.is_watertight
         section = np.radians(48) * 0.1  # of R2², about a mean radius of R2
-        squares = np.mean(trunk.radius(np.linspace(0, trunk.length, 2001)) ** 2)
+        squares = np.mean(trunk.profile.radius(np.linspace(0, trunk.length, 2001)) ** 2)
         assert mesh.volume == pytest.approx(section * squares, rel=0.01)
     for vertices, faces in band_mesh(trunk, bent):
         assert trimesh.Trimesh(vertices, faces, process=False).volume > 0

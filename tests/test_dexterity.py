@@ -54,7 +54,7 @@ def test_three_bundles_sweep_the_volume_that_manipulability_says(trunk):
 
 def test_fewer_bundles_have_an_area_or_a_length_and_no_orientation(trunk):
     for kept in (1, 2):
-        arm = trunk.replace(fibers=trunk.fibers[:kept])
+        arm = trunk.replace(actuators=trunk.fibers[:kept])
         cloud = compute_cloud(arm, n=50)
         found, slope = dexterity(cloud), differences(arm, cloud.activation.values)
         gram = slope.transpose(0, 2, 1) @ slope
@@ -129,10 +129,10 @@ def test_the_measure_asks_for_an_even_cloud_of_three_bundles_or_more(trunk):
     for sampler, n in (("boundary", 100), ("grid", 125)):
         with pytest.raises(InvalidInput, match=f"sampler = {sampler}: must be one of uniform"):
             solution_measure(compute_cloud(trunk, n=n, sampler=sampler))
-    flat = trunk.replace(fibers=trunk.fibers[:2])
+    flat = trunk.replace(actuators=trunk.fibers[:2])
     with pytest.raises(InvalidInput, match="bundles = 2: must be 3 or more"):
         solution_measure(compute_cloud(flat, n=100))
-    fixed = trunk.replace(activation_bounds=((-1, 0), (-1, 0), (-1, -1)))
+    fixed = trunk.with_bounds(((-1, 0), (-1, 0), (-1, -1)))
     with pytest.raises(InvalidInput, match="must be apart for every bundle"):
         solution_measure(compute_cloud(fixed, n=100))
     with pytest.raises(InvalidInput, match="cell = 0: must be"):

@@ -7,12 +7,14 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from softreach import designs, sampling
+from softreach import sampling
+from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
 from softreach.cloud import compute_cloud
 from softreach.errors import InvalidInput, SoftreachWarning
+from softreach.rod import tip_map, tip_positions
 from softreach.rod.kinematics import configuration, tip_positions
 from softreach.rod.tip_map import tip_map
 from softreach.workspace import ReachableSet, direction_spread, reachable_set

@@ -83,7 +83,7 @@ class TestEverythingElseWorks:
         sr.save_cloud(cloud, tmp_path / "cloud.zarr")
         opened = sr.open_cloud(tmp_path / "cloud.zarr")
         assert opened.identical(cloud)
-        assert sr.design_of(opened) == mixed
+        assert sr.cloud.design_of(opened) == mixed
         low, high = mixed.bounds.T
         assert (cloud.activation >= low).all()
         assert (cloud.activation <= high).all()

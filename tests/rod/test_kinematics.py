@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from softreach.steps import node_tables, packed_nodes, steps_for
 
 import softreach as sr
-from softreach.arm import designs
-from softreach.arm.tables import actuation
+from softreach.arm import describe, designs
+from softreach.arm.tables import tables
 from softreach.errors import InvalidInput
 from softreach.kernels import reference
+from softreach.rod.free import FreeRod
+from softreach.rod.tip_map import tip_map
 from tests.laws import arm_of, arms, in_box, integrated_tip, single
 
 
-def edges_of(arm, steps):
-    from softreach import taper
-
-    end = taper.slender_coordinate(arm.length, arm.outer_radius, arm.taper)
-    return np.linspace(0.0, float(end), steps + 1)
+def nodes_of(arm, tol):
+    """Tables at the nodes of the steps that `tol` needs."""
+    rod = FreeRod(arm, tol)
+    return rod.rule.nodes(np.linspace(0.0, arm.profile.slender_length, rod.steps + 1))
 
 
 def test_an_arm_at_rest_stands_straight(trunk):
@@ -33,7 +33,7 @@ def test_an_arm_at_rest_stands_straight(trunk):
 def test_a_longitudinal_fiber_bends_a_circular_arc():
     arm = single()
     gamma = np.array([[-0.8]])
-    table = actuation(arm, [0.0])
+    table = tables(arm, [0.0])
     stretch = 1 + table.extension[0, 0] * gamma[0, 0]
     kappa = np.linalg.norm(table.curvature[0, :, 0] * gamma[0, 0])
     angle = kappa * stretch * arm.length
@@ -49,9 +49,9 @@ def test_a_single_helical_fiber_without_taper_makes_a_circular_helix(revolution)
     arm = single(revolution)
     shape = sr.configuration(arm, [-0.9], stations=401, tol=1e-12)
     bend = np.hypot(*shape.curvature.values[:, :2].T)
-    zeta, tangent = float(shape.extension[0]), np.tan(arm.helical_angles[0])
+    zeta, tangent = float(shape.extension[0]), np.tan(describe(arm).helical_angles[0])
     # Torsion: u3 plus the turning of (u1, u2) in the cross-section, per activated arclength.
-    torsion = float(shape.curvature[0, 2]) + tangent / (zeta * arm.outer_radius)
+    torsion = float(shape.curvature[0, 2]) + tangent / (zeta * arm.profile.outer_radius)
     d = np.gradient(shape.position.values, zeta * shape.Z.values, axis=0, edge_order=2)
     for k in range(2):
         d = (
@@ -82,7 +82,7 @@ def test_exchanging_the_helical_activations_mirrors_the_tip(trunk):
 
 @given(arm=arms(), angle=st.floats(-4, 4))
 def test_rotating_all_offsets_rotates_the_cloud(arm, angle):
-    turned = arm.replace(fibers=tuple(f.replace(offset=f.offset + angle) for f in arm.fibers))
+    turned = arm.replace(actuators=tuple(f.replace(offset=f.offset + angle) for f in arm.fibers))
     gamma = in_box(arm, 20)
     x, y, z = sr.tip_positions(arm, gamma, tol=1e-9).T
     c, s = np.cos(angle), np.sin(angle)
@@ -93,8 +93,8 @@ def test_rotating_all_offsets_rotates_the_cloud(arm, angle):
 
 @given(arm=arms(), factor=st.floats(0.01, 100))
 def test_scaling_length_and_radii_scales_the_cloud(arm, factor):
-    lengths = ("length", "outer_radius", "inner_radius")
-    scaled = arm.replace(**{name: factor * getattr(arm, name) for name in lengths})
+    lengths = {name: factor * getattr(arm.profile, name) for name in ("length", "outer_radius")}
+    scaled = arm.replace(profile=arm.profile.replace(**lengths))
     gamma = in_box(arm, 20)
     tips = factor * sr.tip_positions(arm, gamma, tol=1e-9)
     np.testing.assert_allclose(
@@ -105,7 +105,7 @@ def test_scaling_length_and_radii_scales_the_cloud(arm, factor):
 @given(arm=arms())
 def test_a_rotation_by_one_sector_permutes_the_activations(arm):
     fiber = arm.fibers[0].replace(bundles=3, extent=0.4)
-    arm = arm.replace(fibers=(fiber,), activation_bounds=(-0.5, 0.0))
+    arm = arm.replace(actuators=(fiber,)).with_bounds((-0.5, 0.0))
     gamma = in_box(arm, 20)
     x, y, z = sr.tip_positions(arm, gamma, tol=1e-9).T
     c, s = np.cos(2 * np.pi / 3), np.sin(2 * np.pi / 3)
@@ -117,7 +117,7 @@ def test_a_rotation_by_one_sector_permutes_the_activations(arm):
 @given(arm=arms())
 def test_no_tip_is_farther_from_the_base_than_the_stretched_length(arm):
     gamma = in_box(arm, 50)
-    zeta = 1 + gamma @ actuation(arm, [0.0]).extension[0]
+    zeta = 1 + gamma @ tables(arm, [0.0]).extension[0]
     reach = np.linalg.norm(sr.tip_positions(arm, gamma), axis=1)
     assert (reach <= zeta * arm.length * (1 + 1e-6)).all()
 
@@ -134,54 +134,16 @@ def test_tips_equal_an_independent_integrator(arm):
 @given(arm=arms())
 def test_kernels_equal_the_reference(arm):
     gamma = in_box(arm, 5)
-    steps = steps_for(arm, 1e-9)
-    nodes = node_tables(arm, edges_of(arm, steps))
+    nodes = nodes_of(arm, 1e-9)
     expected = np.array([reference.tip(*nodes, g) for g in gamma])
     tips = sr.tip_positions(arm, gamma, tol=1e-9)
     np.testing.assert_allclose(tips, expected, atol=1e-12 * arm.length)
 
 
-@pytest.mark.parametrize("taper", [-0.05, 0.0, 0.02, 0.05])
-def test_the_error_falls_with_the_sixth_power_of_the_steps(taper):
-    arm = designs.minimal_trunk(taper=taper)
-    gamma = in_box(arm, 50)
-    from softreach.kernels import rod
-
-    def tips(steps):
-        out = np.empty((len(gamma), 3))
-        rod.tips(packed_nodes(arm, steps), gamma, out)
-        return out
-
-    exact, steps = tips(256), [16, 20, 24, 28, 32]
-    errors = [np.abs(tips(k) - exact).max() for k in steps]
-    order = -np.polyfit(np.log(steps), np.log(errors), 1)[0]
-    assert 5.7 < order < 6.6
-
-
-@pytest.mark.parametrize("tol", [1e-4, 1e-6, 1e-8])
-@pytest.mark.parametrize("taper_deg", [-3, 0, 2, 3, 3.4])
-@pytest.mark.parametrize("design", [designs.minimal_trunk, designs.redundant_trunk])
-def test_the_tolerance_is_met_over_the_whole_activation_box(design, taper_deg, tol):
-    arm = design(taper=np.radians(taper_deg))
-    corners = np.array(list(itertools.product(*arm.bounds)))
-    gamma = np.concatenate([corners, in_box(arm, 5_000)])
-    exact = sr.tip_positions(arm, gamma, tol=1e-11)
-    error = np.linalg.norm(sr.tip_positions(arm, gamma, tol=tol) - exact, axis=1)
-    assert error.max() <= tol * arm.length
-
-
-@given(arm=arms(), tol=st.sampled_from([1e-4, 1e-6, 1e-8]))
-def test_the_tolerance_is_met_for_any_design(arm, tol):
-    gamma = np.concatenate([in_box(arm, 300), arm.bounds.T])
-    exact = sr.tip_positions(arm, gamma, tol=1e-11)
-    error = np.linalg.norm(sr.tip_positions(arm, gamma, tol=tol) - exact, axis=1)
-    assert error.max() <= tol * arm.length
-
-
 @given(arm=arms())
 def test_the_jacobian_is_the_complex_step_derivative_of_the_reference(arm):
     gamma = in_box(arm, 2)
-    nodes = node_tables(arm, edges_of(arm, steps_for(arm, 1e-6)))
+    nodes = nodes_of(arm, 1e-6)
     jacobian = sr.tip_jacobian(arm, gamma)
     scale = np.array([1, 1, 1, 1 / arm.length, 1 / arm.length, 1 / arm.length])[:, None]
     for sample, bundle in itertools.product(range(2), range(arm.bundles)):
@@ -217,11 +179,13 @@ def test_tips_are_continuous_where_the_printed_closed_forms_are_singular(singula
     def tips(offset):
         angle = {"angle = 0": 0.0, "angle = taper": 0.03}.get(singular, 0.08) + offset
         taper = (0.0 if singular == "taper = 0" else 0.03) + (singular == "taper = 0") * offset
+        profile = trunk.profile.replace(taper=taper)
         fibers = tuple(
             f.replace(helical_angle=sign * angle)
             for f, sign in zip(trunk.fibers, (-1, 1, 0), strict=True)
         )
-        return sr.tip_positions(trunk.replace(fibers=fibers, taper=taper), gamma, tol=1e-11)
+        arm = trunk.replace(profile=profile, actuators=fibers)
+        return sr.tip_positions(arm, gamma, tol=1e-11)
 
     at = tips(0.0)
     for offset in (1e-4, 1e-7, 1e-10, 1e-13, 1e-300):
@@ -254,7 +218,7 @@ def test_one_activation_gives_one_shape_without_a_sample_axis(trunk):
     shape = sr.configuration(trunk, [-1, 0, -0.5], stations=11)
     assert shape.position.dims == ("station", "axis")
     assert shape.sizes["station"] == 11
-    np.testing.assert_allclose(shape.radius, trunk.radius(shape.Z))
+    np.testing.assert_allclose(shape.radius, trunk.profile.radius(shape.Z))
 
 
 @pytest.mark.parametrize(
@@ -268,7 +232,16 @@ def test_one_activation_gives_one_shape_without_a_sample_axis(trunk):
             "tol = 1e-15: must be at least",
         ),
         (lambda a: sr.tip_positions(a, np.zeros((1, 3)), tol=np.nan), "tol = nan"),
+        (lambda a: sr.tip_positions(a, np.zeros((1, 3)), tol="1e-6"), "tol = '1e-6'"),
+        (lambda a: sr.tip_positions(a, np.zeros((1, 3)), tol=True), "tol = True"),
+        (lambda a: sr.tip_positions(a, [["a", 0, 0]]), "an array of numbers"),
+        (lambda a: sr.tip_positions(a, [[0, 0, 0], [0, 0]]), "activations = .*an array of"),
+        (lambda a: sr.tip_positions("trunk", np.zeros((1, 3))), "arm = 'trunk': must be a Manip"),
+        (lambda a: sr.configuration(a, [0, 0]), r"shape = \(1, 2\).*\(n, 3\)"),
+        (lambda a: sr.configuration(a, np.zeros((1, 1, 3))), r"shape = \(1, 1, 3\)"),
         (lambda a: sr.configuration(a, [0, 0, 0], stations=1), "stations = 1: must be 2 or more"),
+        (lambda a: sr.configuration(a, [0, 0, 0], stations=2.5), "stations = 2.5: must be 2 or"),
+        (lambda a: sr.configuration(a, [0, 0, 0], stations="ab"), "stations = ab: must be 2 or"),
         (lambda a: sr.configuration(a, [0, 0, 0], stations=[0.5, 0.2]), "ascending"),
         (lambda a: sr.configuration(a, [0, 0, 0], stations=[0.5, 1.2]), r"within \[0, 1\] m"),
     ],
@@ -280,6 +253,23 @@ def test_bad_arguments_are_named_with_what_is_allowed(trunk, call, message):
 
 def test_no_activations_give_no_tips(trunk):
     assert sr.tip_positions(trunk, np.empty((0, 3))).shape == (0, 3)
+    assert sr.tip_jacobian(trunk, np.empty((0, 3))).shape == (0, 6, 3)
+    assert sr.configuration(trunk, np.empty((0, 3)), 5).sizes["sample"] == 0
+
+
+def test_an_arm_that_an_activation_would_shorten_to_nothing_has_no_tips(trunk):
+    arm = trunk.with_bounds((-9.0, 0.0))
+    for call in (sr.tip_positions, sr.tip_jacobian, sr.configuration):
+        with pytest.raises(sr.InvalidDesign, match=r"reaches extension ζ = -0.5\d+; must keep"):
+            call(arm, np.zeros((1, 3)))
+
+
+def test_a_tip_map_may_stand_for_its_arm(trunk):
+    gamma = in_box(trunk, 10)
+    rod = tip_map(trunk, 1e-9)
+    np.testing.assert_array_equal(sr.tip_positions(rod, gamma), rod.tips(gamma))
+    np.testing.assert_array_equal(sr.tip_jacobian(rod, gamma), rod.tip_twists(gamma)[1])
+    assert sr.configuration(rod, gamma, 7).identical(sr.configuration(trunk, gamma, 7, tol=1e-9))
 
 
 def test_many_bundles_are_as_good_as_few():

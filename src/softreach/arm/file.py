@@ -167,7 +167,7 @@ def _actuator_lines(actuators: Sequence[Actuator]) -> Iterator[str]:
     """A table for each actuator: its kind and its fields, as they are in Python."""
     for actuator in actuators:
         yield from ("", "[[actuators]]", f"kind = {json.dumps(type(actuator).__name__)}")
-        for name in (field.name for field in fields(actuator)):
+        for name in (field.name for field in fields(actuator)):  # pyright: ignore[reportArgumentType]
             if (value := getattr(actuator, name)) is not None:
                 yield f"{name} = {_value_text(actuator, name, value)}"
 

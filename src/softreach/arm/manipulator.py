@@ -220,18 +220,17 @@ class Manipulator:
         )
 
     def _fiber_index(self, fiber: str | int) -> int:
-        names = [actuator.name for actuator in self.actuators]
-        of_fibers = [isinstance(one, FiberArchitecture) for one in self.actuators]
-        if isinstance(fiber, str) and fiber in names and of_fibers[names.index(fiber)]:
-            return names.index(fiber)
-        known_place = isinstance(fiber, int | np.integer) and fiber in range(len(names))
-        if known_place and not isinstance(fiber, bool) and of_fibers[fiber]:
-            return int(fiber)
-        known = ", ".join(
-            f"{k} ({name})"
-            for k, (name, is_fiber) in enumerate(zip(names, of_fibers, strict=True))
-            if is_fiber
-        )
+        """Place of a fiber architecture among the actuators, from its name or its place."""
+        names = {
+            k: actuator.name
+            for k, actuator in enumerate(self.actuators)
+            if isinstance(actuator, FiberArchitecture)
+        }
+        whole = isinstance(fiber, int | np.integer) and not isinstance(fiber, bool)
+        found = [k for k, name in names.items() if (k if whole else name) == fiber]
+        if found:
+            return found[0]
+        known = ", ".join(f"{k} ({name})" for k, name in names.items())
         raise InvalidInput("fiber", repr(fiber), f"the name or index of one architecture: {known}")
 
 

@@ -45,7 +45,7 @@ class Profile(ABC):
 
     @abstractmethod
     def slender_coordinate(self, z: ArrayLike) -> Array:
-        """S(Z) = ∫ dZ / R2 from 0 to Z [-]: length counted in local radii.
+        """S(Z) = ∫ dZ / R2 from 0 to Z [-]: length counted in local radii, theory (15).
 
         In S the bending of each fiber has constant magnitude and rotates at a constant rate, so
         that uniform steps in S share the bending evenly.
@@ -60,7 +60,7 @@ class Profile(ABC):
         """∫ dZ / (R cos φ) from 0 to Z along the cone R = ratio · R2 [-].
 
         Its slope there is ratio · tan φ. Times tan α it is the rotation Θ of a fiber of constant
-        helical angle α on that cone (Appendix B).
+        helical angle α on that cone: theory (14).
         """
 
     @property
@@ -75,7 +75,7 @@ class Profile(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class LinearTaper(Profile):
-    """R2(Z) = R2(0) - Z tan φ: a cone, or a cylinder for φ = 0.
+    """R2(Z) = R2(0) - Z tan φ, theory (13): a cone, or a cylinder for φ = 0.
 
     Raises:
         InvalidDesign: A field is out of its range, or the taper leaves no tip.
@@ -116,17 +116,17 @@ class LinearTaper(Profile):
         return np.full(np.shape(z), np.tan(self.taper))
 
     def slender_coordinate(self, z: ArrayLike) -> Array:
-        """S(Z) = -log(1 - q)/tan φ [-], with q = Z tan φ / R2(0), the share of the radius lost."""
+        """S(Z) = Z/R2(0) · log(1 - q)/(-q) [-], with q = Z tan φ/R2(0): theory (15)."""
         z = np.asarray(z, float)
         return z / self.outer_radius * _relative_log(z * np.tan(self.taper) / self.outer_radius)
 
     def station(self, s: ArrayLike) -> Array:
-        """Z(S) = R2(0) (1 - exp(-S tan φ)) / tan φ [m]."""
+        """Z(S) = R2(0) S (exp(y) - 1)/y [m] with y = -S tan φ: theory (16)."""
         s = np.asarray(s, float)
         return self.outer_radius * s * _relative_expm1(-s * np.tan(self.taper))
 
     def surface_coordinate(self, z: ArrayLike, ratio: float = 1.0) -> Array:
-        """S(Z) / (ratio cos φ) with the slope ratio · tan φ of that cone [-] (Appendix B)."""
+        """S(Z) / (ratio cos φ) with the slope ratio · tan φ of that cone [-]: theory (17)."""
         cos = np.cos(np.arctan(ratio * np.tan(self.taper)))
         return self.slender_coordinate(z) / (ratio * cos)
 

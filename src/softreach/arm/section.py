@@ -101,7 +101,7 @@ class Section:
         return Section(rings=(replace(self.rings[0], inner_ratio=ratio),))
 
     def stiffness(self, radius: ArrayLike) -> Stiffness:
-        """K0 = πE R2², K1 = (π/4) E R2⁴, K3 = K1/(1+ν), all over E, at outer radii R2 [m]."""
+        """K0 = π R2², K1 = (π/4) R2⁴, K3 = K1/(1 + ν), all over E, at R2 [m]: theory (5)."""
         outer = np.asarray(radius, float)
         bending = np.pi / 4 * outer**4
         poisson = self.rings[0].material.poisson_ratio

@@ -1,6 +1,6 @@
 """From a design to the two tables that everything downstream sees: ζ = 1 + z·γ and u = Uγ.
 
-The map is linear in the activations (section 2). All physics lives in this room: a new actuator,
+The map is linear in the activations, theory (7). All physics lives in this room: a new actuator,
 profile or material changes these tables, and nothing that reads them.
 """
 
@@ -34,7 +34,7 @@ class Tables:
 
 
 def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
-    """Z = N/K0 and U = K⁻¹M of every actuator (section 2, the equations of ζ and u).
+    """Z = N/K0 and U = K⁻¹M of every actuator: theory (6), which for fibers is (8) to (10).
 
     Args:
         arm: The design.

@@ -40,7 +40,7 @@ def pack(measure, stretch, curvature):
     table[:, :, 0, :bundles] = measure[..., None] * stretch
     table[:, :, 0, -1] = measure
     table[:, :, 1:, :bundles] = curvature
-    return table.reshape(steps, NODE_ROWS, -1)
+    return table.reshape(steps, NODE_ROWS, table.shape[-1])
 
 
 @inline

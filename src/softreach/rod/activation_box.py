@@ -175,7 +175,7 @@ def as_floats(name: str, values: ArrayLike) -> Array:
         InvalidInput: They are no numbers, or rows of different lengths.
     """
     try:
-        return np.ascontiguousarray(values, dtype=float)
+        return np.asarray(values, dtype=float, order="C")
     except (TypeError, ValueError):
         raise InvalidInput(name, values, "an array of numbers") from None
 

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FreeRod(TipMap):
-    """r' = ζ d3, dᵢ' = ζ u × dᵢ with ζ = 1 + z·γ, u = Uγ (section 2), by sixth-order Magnus steps.
+    """r' = ζ d3, dᵢ' = ζ u × dᵢ with ζ = 1 + z·γ, u = Uγ: theory (18), by sixth-order Magnus steps.
 
     Raises:
         InvalidInput: `tol` out of range.
@@ -34,7 +34,7 @@ class FreeRod(TipMap):
     tol: float = 1e-6
 
     def __post_init__(self) -> None:
-        check_tol(self.tol)
+        object.__setattr__(self, "tol", check_tol(self.tol))
         check_extension(self.arm)
 
     @property
@@ -70,7 +70,7 @@ class FreeRod(TipMap):
         rod.tips(self._table, gamma, out)
 
     def fill_slopes(self, gamma: Array, tips: Array, slopes: Array) -> None:
-        """Put tips (n, 3) and ∂r/∂γ (n, 3, bundles) [m] into place."""
+        """Put tips (n, 3) and ∂r/∂γ (n, 3, bundles) [m] into place: theory (31)."""
         twists = np.empty((len(gamma), 6, self.box.bundles))
         jacobian.jacobians(self._table, gamma, tips, twists)
         position_slopes(tips, twists, slopes)
@@ -97,7 +97,7 @@ class FreeRod(TipMap):
         return found
 
     def strains(self, activations: ArrayLike, stations: ArrayLike) -> Strains:
-        """U = Uγ and ζ = 1 + z·γ at stations Z [m]."""
+        """U = Uγ and ζ = 1 + z·γ at stations Z [m]: theory (7)."""
         gamma = self.box.check(activations)
         local = tables(self.arm, self.check_stations(stations))
         return Strains(

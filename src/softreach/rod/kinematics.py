@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 def tip_positions(arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6) -> Array:
-    """Tip positions of many activations (section 2; sixth-order Magnus integration).
+    """Tip positions of many activations: theory (25), by sixth-order Magnus integration.
 
     Args:
         arm: The design, or its tip map.
@@ -46,7 +46,8 @@ def tip_positions(arm: Manipulator | TipMap, activations: ArrayLike, tol: float 
 def tip_jacobian(arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6) -> Array:
     """Spatial twist of the tip per unit of each activation: the exact derivative of the tip.
 
-    Column j is (v, ω): ω [rad] turns the tip frame, and the tip at p moves by v + ω × p [m].
+    Column j is (v, ω): ω [rad] turns the tip frame, and the tip at p moves by v + ω × p [m],
+    theory (29) and (31).
 
     Args:
         arm: The design, or its tip map.
@@ -101,8 +102,7 @@ def configuration(
     return dataset.isel(sample=0) if np.ndim(activation) == 1 else dataset
 
 
-def _even_stations(rod: TipMap, stations: int | ArrayLike) -> Array:
-    whole = isinstance(stations, int | np.integer) and not isinstance(stations, bool)
-    if not whole or stations < 2:
+def _even_stations(rod: TipMap, stations: object) -> Array:
+    if isinstance(stations, bool) or not isinstance(stations, int | np.integer) or stations < 2:
         raise InvalidInput("stations", stations, "2 or more, or the stations' Z in m")
     return np.linspace(0.0, rod.length, int(stations))

@@ -1,4 +1,7 @@
-"""How many steps a rod needs: the grid along Z and the rule that meets a tip tolerance."""
+"""How many steps a rod needs: the grid along Z and the rule that meets a tip tolerance.
+
+Steps are uniform in S, theory (15); how many is theory (27).
+"""
 
 from __future__ import annotations
 
@@ -61,8 +64,8 @@ class StepRule:
         table = tables(self.arm, z.ravel())
         return Nodes(
             width * self.arm.profile.radius(z),  # dZ = R2 dS
-            table.extension.reshape(*s.shape, -1),
-            table.curvature.reshape(*s.shape, 3, -1),
+            table.extension.reshape(*s.shape, self.arm.bundles),
+            table.curvature.reshape(*s.shape, 3, self.arm.bundles),
         )
 
     def packed_nodes(self, steps: int) -> Array:
@@ -176,11 +179,14 @@ class StepRule:
         return difference
 
 
-def check_tol(tol: float) -> None:
-    """Whether a tolerance can be met in double precision.
+def check_tol(tol: float) -> float:
+    """A tolerance that can be met in double precision.
 
     Raises:
         InvalidInput: It is below 1e-12 or not a number.
     """
-    if not (_SMALLEST_TOL <= tol < np.inf):
-        raise InvalidInput("tol", tol, f"at least {_SMALLEST_TOL:g} (in L)")
+    number = isinstance(tol, int | float | np.number) and not isinstance(tol, bool)
+    if not (number and _SMALLEST_TOL <= tol < np.inf):
+        shown = repr(tol) if isinstance(tol, str) else tol
+        raise InvalidInput("tol", shown, f"at least {_SMALLEST_TOL:g} (in L)")
+    return float(tol)

@@ -19,6 +19,7 @@ from softreach import parallel
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
 from softreach.rod.activation_box import ActivationBox, as_floats
+from softreach.rod.steps import check_tol
 
 __all__ = [
     "BLOCK",
@@ -204,7 +205,7 @@ def tip_map(arm: Manipulator | TipMap, tol: float = 1e-6) -> TipMap:
         return arm
     if not isinstance(arm, Manipulator):
         raise InvalidInput("arm", f"{arm!r:.80}", "a Manipulator or a TipMap")
-    return _of_arm(arm, float(tol))
+    return _of_arm(arm, check_tol(tol))
 
 
 @lru_cache(maxsize=64)

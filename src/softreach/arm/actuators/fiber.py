@@ -94,7 +94,7 @@ class FiberArchitecture(Actuator):
         return math.atan((self.revolution or 0.0) / float(turn))
 
     def revolution_on(self, profile: Profile, section: Section) -> float:
-        """Ω = Θ(L) [rad], which the helical angle fixes."""
+        """Ω = Θ(L) [rad], which the helical angle fixes: theory (14)."""
         return float(self._rotation(profile, section, np.asarray(profile.length)))
 
     def value_on(self, field: str, profile: Profile, section: Section) -> float:
@@ -106,10 +106,7 @@ class FiberArchitecture(Actuator):
         return getattr(self, field)
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
-        """N = πE R2² I0 σ/π and M = πE R2³ (I1 a sin θ, -I1 a cos θ, I3 σ/π) with a = 2 sin(σ/2)/π.
-
-        A fiber of extent σ pulls with the mean of cos and sin over it, a (section 2, a1 and b1).
-        """
+        """N = R2² I0 σ and M = R2³ (I1 a sin θ, -I1 a cos θ, I3 σ), a = 2 sin(σ/2): theory (4)."""
         ring, radius = section.rings[0], profile.radius(z) * section.rings[0].outer_ratio
         slopes, station = np.unique(profile.slope(z), return_inverse=True)
         integrals = ring_integrals(
@@ -166,12 +163,12 @@ class FiberArchitecture(Actuator):
             yield self.replace(name=name, offset=offset, extent=extent)
 
     def _angles(self, profile: Profile, section: Section, z: Array) -> Array:
-        """θ_j + Θ(Z) with θ_j = θ0 + 2πj/n [rad], shape (station, bundle)."""
+        """θ0 + 2πj/n + Θ(Z) [rad], shape (station, bundle): theory (11)."""
         start = self.offset + 2 * np.pi * np.arange(self.bundles) / self.bundles
         return start + np.asarray(self._rotation(profile, section, z))[:, None]
 
     def _rotation(self, profile: Profile, section: Section, z: Array) -> Array:
-        """Θ(Z) = tan α ∫ dZ/(R2 cos φ) [rad] (Appendix B)."""
+        """Θ(Z) = tan α ∫ dZ/(R2 cos φ) [rad]: theory (14)."""
         tangent = np.tan(self.helical_angle_on(profile, section))
         return profile.surface_coordinate(z, section.rings[0].outer_ratio) * tangent
 

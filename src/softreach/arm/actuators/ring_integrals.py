@@ -2,7 +2,7 @@
 
 The paper prints closed forms (Appendix A) that are singular at φ = 0, α = 0 and α = ±φ, need
 complex numbers, and hold a misprint in δ3. They are the integrals below, which have none of that:
-δ0 = 4 R2² I0, δ1 = δ2 = 6 R2³ I1, δ3 = 6 R2³ I3.
+δ0 = 4 R2² I0, δ1 = δ2 = 6 R2³ I1, δ3 = 6 R2³ I3, theory (12).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)
 
 
 class RingIntegrals(NamedTuple):
-    """Integrals over the ring x = R/R2 in [ρ, 1], one value per helical angle [-]."""
+    """Integrals over the ring x = R/R2 in [ρ, 1] [-], theory (3)."""
 
     axial: NDArray[np.float64]
     """I0 = ∫ x k dx."""
@@ -32,7 +32,7 @@ class RingIntegrals(NamedTuple):
 def ring_integrals(
     radius_ratio: ArrayLike, taper: ArrayLike, helical_angle: ArrayLike, poisson_ratio: ArrayLike
 ) -> RingIntegrals:
-    """Integrate fiber contraction over the ring (Appendix A, as integrals).
+    """Integrate fiber contraction over the ring: theory (3), with k and t of (1) and (2).
 
     Args:
         radius_ratio: ρ = R1/R2 [-]; all four arguments broadcast.

@@ -1,0 +1,331 @@
+"""The contract of every tip map: whatever rod it solves, it answers alike.
+
+A new tip map is one more maker in `MAKERS`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import pickle
+from collections.abc import Callable
+from dataclasses import FrozenInstanceError
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from softreach.arm import Manipulator, designs
+from softreach.errors import InvalidDesign, InvalidInput
+from softreach.rod.free import FreeRod
+from softreach.rod.tip_map import BLOCK, TipMap, TipStatus, tip_map
+from tests.laws import arms, in_box, integrated_tip
+
+Make = Callable[[Manipulator, float], TipMap]
+
+MAKERS: dict[str, Make] = {"free": FreeRod}
+
+pytestmark = pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS.keys())
+
+DESIGNS = {
+    "minimal": designs.minimal_trunk(),
+    "redundant": designs.redundant_trunk(),
+    "one bundle": designs.minimal_trunk().replace(actuators=designs.minimal_trunk().actuators[:1]),
+    "one held": designs.minimal_trunk().with_bounds(((-1, 0), (-0.5, -0.5), (-1, 0.3))),
+    "wide": designs.minimal_trunk(taper=-0.05),
+}
+of_designs = pytest.mark.parametrize("arm", DESIGNS.values(), ids=DESIGNS.keys())
+
+
+def activations(rod: TipMap, n: int, seed: int = 1) -> np.ndarray:
+    """All corners of the box, and random activations in it."""
+    cube = np.random.default_rng(seed).random((n, rod.box.bundles))
+    return np.concatenate([rod.box.corners(), rod.box.from_cube(cube)])
+
+
+def differences(f: Callable[[np.ndarray], np.ndarray], gamma: np.ndarray, step: float):
+    """Fourth-order central differences of f along every bundle, on a last axis."""
+    columns = []
+    for e in step * np.eye(gamma.shape[1]):
+        near, far = (f(gamma + k * e) - f(gamma - k * e) for k in (1, 2))
+        columns.append((8 * near - far) / (12 * step))
+    return np.stack(columns, axis=-1)
+
+
+@given(arm=arms())
+def test_tips_are_those_of_an_independent_integrator(make, arm):
+    rod, gamma = make(arm, 1e-9), in_box(arm, 2)
+    expected = [integrated_tip(arm, one) for one in gamma]
+    np.testing.assert_allclose(rod.tips(gamma), expected, atol=1e-9 * rod.length)
+
+
+@of_designs
+@pytest.mark.parametrize("tol", [1e-3, 1e-6, 1e-9])
+def test_the_tolerance_is_kept_over_the_box(make, arm, tol):
+    rod, exact = make(arm, tol), make(arm, 1e-11)
+    gamma = activations(rod, 2_000)
+    error = np.linalg.norm(rod.tips(gamma) - exact.tips(gamma), axis=1)
+    assert error.max() <= tol * rod.length
+
+
+@of_designs
+@pytest.mark.parametrize("tol", [1e-3, 1e-6, 1e-9])
+def test_the_tolerance_is_kept_along_the_arm(make, arm, tol):
+    rod, exact = make(arm, tol), make(arm, 1e-11)
+    gamma = activations(rod, 50)
+    stations = rod.length * np.array([0.0, 0.2, 0.21, 0.5, 0.77, 1.0])
+    apart = rod.frames(gamma, stations).position - exact.frames(gamma, stations).position
+    assert np.linalg.norm(apart, axis=-1).max() <= tol * rod.length
+
+
+@of_designs
+def test_slopes_are_the_central_differences_of_the_tips(make, arm):
+    rod = make(arm, 1e-11)
+    gamma = activations(rod, 20)
+    tips, slopes = rod.tips_and_slopes(gamma)
+    assert slopes.shape == (len(gamma), 3, rod.box.bundles)
+    np.testing.assert_allclose(tips, rod.tips(gamma), atol=1e-13 * rod.length)
+    expected = differences(rod.tips, gamma, 1e-3)
+    np.testing.assert_allclose(slopes, expected, atol=1e-8 * rod.length)
+
+
+@of_designs
+def test_twists_move_the_tip_as_slopes_do_and_turn_its_frame(make, arm):
+    rod = make(arm, 1e-11)
+    gamma = activations(rod, 20)
+    tips, twists = rod.tip_twists(gamma)
+    assert twists.shape == (len(gamma), 6, rod.box.bundles)
+    _, slopes = rod.tips_and_slopes(gamma)
+    linear, angular = twists[:, :3], twists[:, 3:]
+    moved = linear + np.cross(angular, tips[:, :, None], axis=1)
+    np.testing.assert_allclose(slopes, moved, atol=1e-12 * rod.length)
+
+    def directors(gamma):
+        return rod.frames(gamma, [rod.length]).directors[:, 0]
+
+    turned = differences(directors, gamma, 1e-3)  # (n, director, axis, bundle)
+    expected = np.cross(angular[:, None], directors(gamma)[..., None], axis=2)
+    np.testing.assert_allclose(turned, expected, atol=1e-8)
+
+
+@of_designs
+def test_frames_start_upright_end_at_the_tips_and_are_orthonormal(make, arm):
+    rod = make(arm, 1e-9)
+    gamma = activations(rod, 20)
+    stations = rod.length * np.array([0.0, 0.3, 0.3, 0.8, 1.0])
+    frames = rod.frames(gamma, stations)
+    assert frames.position.shape == (len(gamma), 5, 3)
+    assert frames.directors.shape == (len(gamma), 5, 3, 3)
+    np.testing.assert_array_equal(frames.position[:, 0], 0.0)
+    np.testing.assert_array_equal(frames.directors[:, 0], np.tile(np.eye(3), (len(gamma), 1, 1)))
+    np.testing.assert_array_equal(frames.position[:, 1], frames.position[:, 2])
+    gram = frames.directors @ np.swapaxes(frames.directors, -1, -2)
+    np.testing.assert_allclose(gram, np.broadcast_to(np.eye(3), gram.shape), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.det(frames.directors), 1.0, atol=1e-12)
+    apart = np.linalg.norm(frames.position[:, -1] - rod.tips(gamma), axis=-1)
+    assert apart.max() <= 2 * rod.tol * rod.length
+    directions = rod.tip_directions(gamma)
+    np.testing.assert_allclose(directions, frames.directors[:, -1, 2], atol=1e-8)
+
+
+@of_designs
+def test_a_frame_does_not_depend_on_the_other_stations(make, arm):
+    rod = make(arm, 1e-9)
+    gamma = activations(rod, 5)
+    many = rod.frames(gamma, np.linspace(0, rod.length, 9))
+    alone = rod.frames(gamma, [0.5 * rod.length])
+    np.testing.assert_allclose(alone.position[:, 0], many.position[:, 4], atol=2e-9 * rod.length)
+    base = rod.frames(gamma, [0.0])
+    np.testing.assert_array_equal(base.position, 0.0)
+
+
+@of_designs
+def test_strains_are_how_frames_change_along_the_arm(make, arm):
+    """ζ d3 = r', and u in the directors from dᵢ' = ζ u × dᵢ."""
+    rod = make(arm, 1e-11)
+    gamma = activations(rod, 10)
+    middle, step = rod.length * np.array([0.25, 0.6]), 1e-3 * rod.length
+    offsets = np.array([-2, -1, 0, 1, 2]) * step
+    frames = rod.frames(gamma, (middle[:, None] + offsets).ravel())
+    weights = np.array([1, -8, 0, 8, -1]) / (12 * step)
+
+    def along(values):
+        split = values.reshape(len(gamma), 2, 5, *values.shape[2:])
+        return np.einsum("k,nsk...->ns...", weights, split), split[:, :, 2]
+
+    velocity, _ = along(frames.position)
+    turning, directors = along(frames.directors)
+    curvature, extension = rod.strains(gamma, middle)
+    assert curvature.shape == (len(gamma), 2, 3)
+    assert extension.shape == (len(gamma), 2)
+    expected = extension[..., None] * directors[..., 2, :]
+    np.testing.assert_allclose(velocity, expected, atol=1e-7)
+    darboux = np.einsum("nsc,nsci->nsi", curvature, directors)
+    expected = extension[..., None, None] * np.cross(darboux[:, :, None], directors)
+    np.testing.assert_allclose(turning, expected, atol=1e-6 / rod.length)
+
+
+@of_designs
+def test_results_do_not_depend_on_threads_or_blocks(make, arm, monkeypatch):
+    rod = make(arm, 1e-6)
+    gamma = activations(rod, BLOCK + 100)
+    few = gamma[: BLOCK // 8 + 100]
+    stations = [0.5 * rod.length, rod.length]
+
+    def everything():
+        return (
+            rod.tips(gamma),
+            *rod.tips_and_slopes(few),
+            *rod.tip_twists(few),
+            *rod.frames(few[:1100], stations),
+            *rod.strains(few[:1100], stations),
+            rod.tip_directions(few[:1100]),
+        )
+
+    monkeypatch.setenv("SOFTREACH_NUM_THREADS", "1")
+    alone = everything()
+    monkeypatch.setenv("SOFTREACH_NUM_THREADS", "2")
+    for one, other in zip(alone, everything(), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@of_designs
+def test_a_sample_alone_has_the_numbers_that_it_has_among_others(make, arm):
+    rod = make(arm, 1e-6)
+    gamma = activations(rod, 300)
+    whole = rod.tips(gamma), *rod.tips_and_slopes(gamma), *rod.tip_twists(gamma)
+    for k in (0, 3, 127, len(gamma) - 1):
+        rows = slice(k, k + 1)
+        alone = (
+            rod.tips(gamma[rows]),
+            *rod.tips_and_slopes(gamma[rows]),
+            *rod.tip_twists(gamma[rows]),
+        )
+        for one, other in zip(whole, alone, strict=True):
+            np.testing.assert_array_equal(one[rows], other)
+    frames, alone = (rod.frames(rows, [rod.length]) for rows in (gamma, gamma[3:4]))
+    np.testing.assert_array_equal(frames.directors[3:4], alone.directors)
+
+
+@of_designs
+def test_the_filling_of_tips_and_slopes_is_that_of_whole_batches(make, arm):
+    rod = make(arm, 1e-6)
+    gamma = activations(rod, 10)
+    tips, slopes = rod.tips_and_slopes(gamma)
+    filled = np.full_like(tips, np.nan)
+    rod.tip_task(gamma, filled)()
+    np.testing.assert_array_equal(filled, rod.tips(gamma))
+    filled_slopes = np.full_like(slopes, np.nan)
+    rod.fill_slopes(gamma, filled, filled_slopes)
+    np.testing.assert_array_equal(filled, tips)
+    np.testing.assert_array_equal(filled_slopes, slopes)
+
+
+@of_designs
+def test_every_sample_has_a_status(make, arm):
+    rod = make(arm, 1e-6)
+    gamma = activations(rod, 10)
+    status = rod.status(gamma)
+    assert status.shape == (len(gamma),)
+    assert status.dtype == np.int8
+    assert set(status.tolist()) <= set(TipStatus)
+    lost = status == TipStatus.NO_EQUILIBRIUM
+    assert not np.isfinite(rod.tips(gamma)[lost]).any()
+    assert np.isfinite(rod.tips(gamma)[~lost]).all()
+    assert rod.supports_unstable or (status == TipStatus.STABLE).all()
+
+
+@of_designs
+def test_no_activations_give_empty_results(make, arm):
+    rod, m = make(arm, 1e-6), arm.bundles
+    none = np.empty((0, m))
+    assert rod.tips(none).shape == (0, 3)
+    assert rod.tips_and_slopes(none)[1].shape == (0, 3, m)
+    assert rod.tip_twists(none)[1].shape == (0, 6, m)
+    assert rod.tip_directions(none).shape == (0, 3)
+    assert rod.frames(none, [0.0]).position.shape == (0, 1, 3)
+    assert rod.strains(none, [0.0]).curvature.shape == (0, 1, 3)
+    assert rod.status(none).shape == (0,)
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda rod, gamma: rod.tips(gamma),
+        lambda rod, gamma: rod.tips_and_slopes(gamma),
+        lambda rod, gamma: rod.tip_twists(gamma),
+        lambda rod, gamma: rod.tip_directions(gamma),
+        lambda rod, gamma: rod.frames(gamma, [0.5]),
+        lambda rod, gamma: rod.strains(gamma, [0.5]),
+        lambda rod, gamma: rod.status(gamma),
+    ],
+    ids=["tips", "slopes", "twists", "directions", "frames", "strains", "status"],
+)
+def test_activations_are_checked_by_every_question(make, ask, trunk):
+    rod = make(trunk, 1e-6)
+    for gamma, message in (
+        (np.zeros(3), r"activations.shape = \(3,\).*\(n, 3\)"),
+        (np.zeros((2, 4)), r"activations.shape = \(2, 4\)"),
+        ([[0, np.nan, 0]], r"activations\[0\] = .*finite"),
+        ([["a", 0, 0]], "an array of numbers"),
+    ):
+        with pytest.raises(InvalidInput, match=message):
+            ask(rod, gamma)
+
+
+@pytest.mark.parametrize(
+    "stations", [[-0.1], [0.5, 0.2], [1.1], [], [[0.5]], [np.nan], 0.5, "ab", [[0.1], [0.2, 0.3]]]
+)
+def test_stations_are_checked(make, stations, trunk):
+    rod = make(trunk, 1e-6)
+    for ask in (rod.frames, rod.strains):
+        with pytest.raises(InvalidInput, match=r"stations"):
+            ask(np.zeros((1, 3)), stations)
+
+
+@pytest.mark.parametrize("tol", [0.0, 1e-13, np.nan, np.inf, "1e-6", None])
+def test_tolerances_are_checked(make, tol, trunk):
+    with pytest.raises(InvalidInput, match=r"tol = .*at least 1e-12 \(in L\)"):
+        make(trunk, tol)
+
+
+def test_an_arm_shortened_to_nothing_has_no_tip_map(make, trunk):
+    with pytest.raises(InvalidDesign, match="must keep ζ > 0"):
+        make(trunk.with_bounds((-9.0, 0.0)), 1e-6)
+
+
+@of_designs
+def test_a_tip_map_is_a_frozen_value(make, arm):
+    rod, twin = make(arm, 1e-6), make(pickle.loads(pickle.dumps(arm)), 1e-6)
+    assert rod == twin
+    assert hash(rod) == hash(twin)
+    assert rod != make(arm, 1e-7)
+    assert (rod.arm, rod.tol, rod.length) == (arm, 1e-6, arm.length)
+    with pytest.raises(FrozenInstanceError):
+        rod.tol = 1e-3
+    gamma = activations(rod, 10)
+    tips = rod.tips(gamma)  # so that whatever it keeps for the next call is there
+    again = pickle.loads(pickle.dumps(rod))
+    assert again == rod
+    assert hash(again) == hash(rod)
+    np.testing.assert_array_equal(again.tips(gamma), tips)
+
+
+@of_designs
+def test_its_box_is_that_of_the_arm(make, arm):
+    box = make(arm, 1e-6).box
+    np.testing.assert_array_equal(np.stack([box.low, box.high], axis=1), arm.bounds)
+    assert box.names == arm.bundle_names
+    assert list(itertools.compress(box.names, box.is_free)) == [box.names[j] for j in box.free]
+
+
+@given(share=st.floats(0, 1))
+def test_its_radius_is_that_of_the_arm_at_rest(make, share, trunk):
+    z = share * trunk.length
+    assert make(trunk, 1e-6).radius(z) == trunk.profile.radius(z)
+
+
+def test_a_tip_map_is_its_own(make, trunk):
+    rod = make(trunk, 1e-9)
+    assert tip_map(rod) is rod
+    assert tip_map(rod, 1e-3) is rod
