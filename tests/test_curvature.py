@@ -70,7 +70,7 @@ def test_corners_of_the_box_lie_within_the_histogram_and_nearly_fill_it():
 
 
 def test_a_single_bundle_that_cannot_move_has_one_value():
-    arm = sr.designs.minimal_trunk().replace(activation_bounds=(-0.5, -0.5))
+    arm = sr.designs.minimal_trunk().with_bounds((-0.5, -0.5))
     found = stream_statistics(arm, [np.full((10, 3), -0.5)])
     np.testing.assert_allclose(found.extension_std, 0.0, atol=1e-12)
     assert (found.extension_quantile.std("quantile") < 1e-12).all()

@@ -56,20 +56,22 @@ def test_the_result_says_what_it_is(strewn):
 def test_what_is_evaluated_does_not_change_what_comes_out(strewn):
     everywhere = activation_distance(strewn, 0.02)
     for queries in (100, np.array([5, 5, 3999, 0])):
-        some = activation_distance(strewn, 0.02, queries)
+        some = activation_distance(strewn, 0.02, queries=queries)
         np.testing.assert_array_equal(some, everywhere[some.sample.values])
 
 
 def test_a_number_of_queries_takes_one_sample_of_each_equal_part(strewn):
-    sample = activation_distance(strewn, 0.02, 50).sample.values
+    sample = activation_distance(strewn, 0.02, queries=50).sample.values
     np.testing.assert_array_equal(sample // 80, np.arange(50))
-    np.testing.assert_array_equal(activation_distance(strewn, 0.02, 50).sample, sample)
-    np.testing.assert_array_equal(activation_distance(strewn, 0.02, 4000).sample, range(4000))
+    np.testing.assert_array_equal(activation_distance(strewn, 0.02, queries=50).sample, sample)
+    np.testing.assert_array_equal(
+        activation_distance(strewn, 0.02, queries=4000).sample, range(4000)
+    )
 
 
 @pytest.mark.parametrize("queries", [0, [], np.empty(0, int)])
 def test_no_queries_give_nothing(strewn, queries):
-    assert activation_distance(strewn, 0.02, queries).sizes == {"sample": 0}
+    assert activation_distance(strewn, 0.02, queries=queries).sizes == {"sample": 0}
 
 
 @pytest.mark.parametrize(
@@ -86,7 +88,7 @@ def test_no_queries_give_nothing(strewn, queries):
 )
 def test_other_queries_are_refused(strewn, queries, said):
     with pytest.raises(InvalidInput, match=said):
-        activation_distance(strewn, 0.02, queries)
+        activation_distance(strewn, 0.02, queries=queries)
 
 
 def test_tips_that_are_not_finite_are_refused_by_their_index():
@@ -110,8 +112,8 @@ def test_minimal_and_redundant_trunk_differ_as_in_the_paper():
     found = {}
     for design in (designs.minimal_trunk, designs.redundant_trunk):
         cloud = compute_cloud(design(), n=2_000_000, tol=1e-4)
-        distance = activation_distance(cloud, 1 / 60, 10_000)
-        found[design] = redundancy_summary(distance, cloud)
+        distance = activation_distance(cloud, 1 / 60, queries=10_000)
+        found[design] = redundancy_summary(cloud, distance)
     minimal, redundant = found.values()
     assert minimal.median == pytest.approx(0.05, abs=0.01)
     assert redundant.median == pytest.approx(0.5, abs=0.05)
@@ -125,7 +127,7 @@ def test_the_summary_counts_points_and_cells():
     gamma = np.zeros((6, 3))
     gamma[0, 0] = 1.0
     cloud = made_up(tip, gamma)
-    found = redundancy_summary(activation_distance(cloud, 0.05), cloud, 0.5, cell=0.1)
+    found = redundancy_summary(cloud, activation_distance(cloud, 0.05), threshold=0.5, cell=0.1)
     assert found.evaluated == 6
     assert found.isolated == pytest.approx(1 / 6)
     assert found.redundant_points == pytest.approx(2 / 5)
@@ -138,14 +140,14 @@ def test_the_summary_counts_points_and_cells():
 
 def test_where_all_points_are_isolated_there_is_nothing_to_summarize():
     cloud = made_up(np.eye(3))
-    found = redundancy_summary(activation_distance(cloud, 0.0), cloud)
+    found = redundancy_summary(cloud, activation_distance(cloud, 0.0))
     assert found.isolated == 1.0
     assert found.measured_volume == 0.0
     assert np.isnan([found.median, found.redundant_points, found.redundant_volume]).all()
 
 
 def test_a_map_keeps_the_mean(strewn):
-    distance = activation_distance(strewn, 0.02, 1000)
+    distance = activation_distance(strewn, 0.02, queries=1000)
     grid = distance_map(strewn, distance, cell=0.03)
     weighted = (grid.activation_distance * grid.evaluated).sum() / grid.evaluated.sum()
     assert float(weighted) == pytest.approx(float(distance.mean()))
@@ -170,18 +172,18 @@ def test_distances_of_another_cloud_are_refused(strewn):
     with pytest.raises(InvalidInput, match=r"distance.sample = indices from 0 to 3999"):
         distance_map(small, distance)
     with pytest.raises(InvalidInput, match="made by activation_distance"):
-        redundancy_summary(distance.drop_vars("sample"), strewn)
+        redundancy_summary(strewn, distance.drop_vars("sample"))
 
 
 def test_density_adds_up_to_the_number_of_tips(trunk):
     cloud = compute_cloud(trunk, n=5000)
-    grid = tip_density(cloud, 0.07)
+    grid = tip_density(cloud, cell=0.07)
     assert float(grid.density.sum()) * 0.07**3 == pytest.approx(5000)
     assert grid.density.attrs["units"] == "m-3"
 
 
 def test_points_strewn_evenly_vary_by_chance_alone(strewn):
-    grid = tip_density(strewn, 0.1)
+    grid = tip_density(strewn, cell=0.1)
     assert grid.density.shape == (2, 2, 2)
     np.testing.assert_allclose(grid.density, 4000 / 0.2**3, rtol=0.2)
     assert grid.chance == pytest.approx(500**-0.5)
@@ -191,11 +193,11 @@ def test_points_strewn_evenly_vary_by_chance_alone(strewn):
 def test_a_dense_half_is_heterogeneous():
     tip = np.random.default_rng(5).random((40_000, 3)) * 0.2
     tip = tip[(tip[:, 0] < 0.1) | (np.arange(len(tip)) % 3 == 0)]
-    grid = tip_density(made_up(tip), 0.05)
+    grid = tip_density(made_up(tip), cell=0.05)
     assert grid.heterogeneity == pytest.approx(0.5, abs=0.03)  # (3 - 1) / (3 + 1)
 
 
 @pytest.mark.parametrize("cell", [0.0, -1.0, np.nan, np.inf, 1e-9])
 def test_other_cells_are_refused(strewn, cell):
     with pytest.raises(InvalidInput, match="cell = "):
-        tip_density(strewn, cell)
+        tip_density(strewn, cell=cell)

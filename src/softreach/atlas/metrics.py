@@ -87,17 +87,19 @@ def hull_metrics(arm: Manipulator, tips: Array, alpha: float, groups: tuple[str,
 
 def image_metrics(arm: Manipulator, tol: float, accuracy: float) -> Numbers:
     """Metrics of the exact reachable set; uses all threads by itself."""
-    from softreach.workspace import reachable_set
+    from softreach.workspace import ReachableSolid, reachable_set
 
     reached = reachable_set(arm, accuracy=accuracy, tol=tol)
+    solid = isinstance(reached, ReachableSolid)
+    multiplicity = reached.multiplicity if solid else {}
     return {
         "exact_volume": reached.volume,
         "exact_volume_error": reached.volume_error,
         "exact_convex_volume": reached.convex_volume,
         "exact_unreachability": reached.unreachability,
-        "multiplicity": _mean_multiplicity(reached.multiplicity),
-        "multiple_volume": _multiple_volume(reached.multiplicity),
-        "fold_volume": reached.fold_volume,
+        "multiplicity": _mean_multiplicity(multiplicity),
+        "multiple_volume": _multiple_volume(multiplicity),
+        "fold_volume": reached.fold_volume if solid else math.nan,
     }
 
 

@@ -2,11 +2,12 @@
 
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.kinematics import configuration, tip_jacobian, tip_positions
-from softreach.rod.tip_map import Frames, Strains, TipMap, TipStatus, tip_map
+from softreach.rod.tip_map import Frames, StrainRange, Strains, TipMap, TipStatus, tip_map
 
 __all__ = [
     "ActivationBox",
     "Frames",
+    "StrainRange",
     "Strains",
     "TipMap",
     "TipStatus",

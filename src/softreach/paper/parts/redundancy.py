@@ -32,7 +32,7 @@ def redundancy(settings: Settings, folder: Path, notes: Notebook) -> None:
     arms = {"minimal": designs.minimal_trunk(), "redundant": designs.redundant_trunk()}
     clouds = {name: _cloud(name, arm, settings, notes) for name, arm in arms.items()}
     distances = {
-        name: activation_distance(cloud, _RADIUS, settings.queries)
+        name: activation_distance(cloud, _RADIUS, queries=settings.queries)
         for name, cloud in clouds.items()
     }
     notes.note(
@@ -54,7 +54,7 @@ def _cloud(name: str, arm: Manipulator, settings: Settings, notes: Notebook) -> 
 
 
 def _found(cloud: xr.Dataset, distance: xr.DataArray) -> dict[str, Any]:
-    summary = redundancy_summary(distance, cloud)
+    summary = redundancy_summary(cloud, distance)
     density, measure = tip_density(cloud), solution_measure(cloud)
     filled = density["density"].where(density["density"] > 0)
     size = _inside(measure["solution_measure"].values)
