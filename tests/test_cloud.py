@@ -44,7 +44,7 @@ def test_a_cloud_knows_where_it_comes_from(cloud, trunk):
     }
     assert cloud.tip.attrs["units"] == "m"
     assert cloud.tip.attrs["length"] == trunk.length
-    assert list(cloud.fiber.values) == ["left", "right", "longitudinal"]
+    assert list(cloud.bundle.values) == ["left", "right", "longitudinal"]
     again = sr.compute_cloud(sr.design_of(cloud), n=40_000, seed=cloud.attrs["seed"])
     assert again.identical(cloud)
 
@@ -76,12 +76,12 @@ def test_an_interrupted_computation_ends(trunk):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        sr.compute_cloud(trunk, n=200_000, report=interrupted)
+        sr.compute_cloud(trunk, n=200_000, progress=interrupted)
 
 
 def test_progress_adds_up(trunk):
     done = []
-    sr.compute_cloud(trunk, n=50_001, report=done.append)
+    sr.compute_cloud(trunk, n=50_001, progress=done.append)
     assert sum(done) == 50_001
 
 
@@ -106,6 +106,6 @@ def test_a_count_that_is_no_count_is_refused(trunk, n):
 def test_any_number_of_bundles_makes_a_cloud(bundles):
     arm = designs.minimal_trunk()
     fiber = arm.fibers[0].replace(bundles=bundles)
-    cloud = sr.compute_cloud(arm.replace(fibers=(fiber,)), n=500)
+    cloud = sr.compute_cloud(arm.replace(actuators=(fiber,)), n=500)
     assert cloud.activation.shape == (500, bundles)
     assert np.isfinite(cloud.tip).all()

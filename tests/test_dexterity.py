@@ -125,6 +125,17 @@ def test_with_three_bundles_the_measure_is_the_number_of_activations(trunk):
     assert total == pytest.approx(reached.volume, rel=2e-3)
 
 
+def test_measures_of_many_clouds_scatter_by_their_standard_error(trunk):
+    clouds = [compute_cloud(trunk, n=4096, seed=seed, tol=1e-4) for seed in range(60)]
+    inner = {"x": 0.1, "y": 0.3, "z": 0.5}
+    found = [
+        solution_measure(cloud, cell=0.2).sel(inner, method="nearest").to_array()
+        for cloud in clouds
+    ]
+    values, errors = np.array(found).T
+    assert errors.mean() == pytest.approx(values.std(), rel=0.25)
+
+
 def test_the_measure_asks_for_an_even_cloud_of_three_bundles_or_more(trunk):
     for sampler, n in (("boundary", 100), ("grid", 125)):
         with pytest.raises(InvalidInput, match=f"sampler = {sampler}: must be one of uniform"):

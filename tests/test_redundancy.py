@@ -138,6 +138,34 @@ def test_the_summary_counts_points_and_cells():
     assert found.quantiles[0.95] == pytest.approx(1.0)
 
 
+def test_medians_and_shares_of_many_draws_scatter_by_their_errors(strewn):
+    rng, sample = np.random.default_rng(2), np.arange(400)
+    summaries = [
+        redundancy_summary(
+            strewn,
+            xr.DataArray(rng.exponential(size=400), {"sample": sample}, ("sample",)),
+            threshold=1.5,
+        )
+        for _ in range(300)
+    ]
+    for name in ("median", "redundant_points"):
+        scatter = np.std([getattr(one, name) for one in summaries])
+        stated = np.mean([getattr(one, f"{name}_error") for one in summaries])
+        assert stated == pytest.approx(scatter, rel=0.15)
+
+
+def test_the_summary_prints_shares_with_their_errors_and_keeps_all_in_a_dataset(strewn):
+    found = redundancy_summary(strewn, activation_distance(strewn, 0.02), threshold=0.015)
+    first, second, third = repr(found).splitlines()
+    assert first.startswith("RedundancySummary: median D̄ 0.01")
+    assert "± " in second
+    assert "4,000 points evaluated" in third
+    dataset = found.to_dataset()
+    assert float(dataset["median"]) == found.median
+    assert float(dataset.quantiles.sel(quantile=0.25)) == found.quantiles[0.25]
+    assert dataset.measured_volume.attrs["units"] == "m3"
+
+
 def test_where_all_points_are_isolated_there_is_nothing_to_summarize():
     cloud = made_up(np.eye(3))
     found = redundancy_summary(cloud, activation_distance(cloud, 0.0))
@@ -153,6 +181,15 @@ def test_a_map_keeps_the_mean(strewn):
     assert float(weighted) == pytest.approx(float(distance.mean()))
     assert int(grid.evaluated.sum()) == int(distance.count())
     np.testing.assert_array_equal(grid.activation_distance.isnull(), grid.evaluated == 0)
+
+
+def test_the_error_of_a_cell_is_the_standard_error_of_its_mean(strewn):
+    distance = activation_distance(strewn, 0.02)
+    grid = distance_map(strewn, distance, cell=0.1)
+    inside = distance.values[(strewn.tip.values < 0.1).all(axis=1)]
+    inside = inside[np.isfinite(inside)]
+    stated = float(grid.activation_distance_error.sel(x=0.05, y=0.05, z=0.05))
+    assert stated == pytest.approx(inside.std(ddof=1) / np.sqrt(len(inside)))
 
 
 def test_a_map_puts_every_value_where_its_tip_is():
@@ -180,6 +217,8 @@ def test_density_adds_up_to_the_number_of_tips(trunk):
     grid = tip_density(cloud, cell=0.07)
     assert float(grid.density.sum()) * 0.07**3 == pytest.approx(5000)
     assert grid.density.attrs["units"] == "m-3"
+    counts = grid.density * 0.07**3
+    np.testing.assert_allclose(grid.density_error * 0.07**3, np.sqrt(counts))
 
 
 def test_points_strewn_evenly_vary_by_chance_alone(strewn):

@@ -13,6 +13,7 @@ from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud import compute_cloud
 from softreach.errors import InvalidInput, SoftreachWarning
+from softreach.geometry.hull import convex_hull
 from softreach.rod.kinematics import tip_positions
 from softreach.rod.tip_map import tip_map
 from softreach.workspace import (
@@ -67,7 +68,10 @@ def test_doubled_resolutions_agree_within_the_errors(best, folded):
         fine = solid(coarse.arm, grid=2 * coarse.cells, cell=cell)
         assert abs(fine.volume - coarse.volume) < fine.volume_error + coarse.volume_error
         assert abs(several(fine) - several(coarse)) < coarse.multiplicity_error
-        assert fine.unreachability == pytest.approx(coarse.unreachability, abs=1e-3)
+        assert abs(fine.fold_volume - coarse.fold_volume) < coarse.fold_volume_error
+        assert abs(fine.convex_volume - coarse.convex_volume) < coarse.convex_volume_error
+        assert abs(fine.unreachability - coarse.unreachability) < coarse.unreachability_error
+        assert coarse.unreachability_error < 2e-3
 
 
 def test_without_taper_it_is_06325():
@@ -156,6 +160,30 @@ def test_volume_scales_with_the_cube_of_the_length(best):
     assert large.unreachability == pytest.approx(best.unreachability, rel=1e-9)
 
 
+def test_a_tip_map_is_asked_as_its_arm_is(trunk):
+    found = solid(tip_map(trunk, 1e-5), accuracy=0.1)
+    assert found.arm is trunk
+    assert found.volume == solid(trunk, accuracy=0.1, tol=1e-5).volume
+
+
+def test_a_solid_prints_its_numbers_to_their_errors_and_what_it_was_made_of(folded):
+    text = repr(folded)
+    assert text.startswith("ReachableSolid: volume 0.4767 ± 0.0002 m³")
+    assert "33.7 ± 0.1 % are out of reach" in text
+    assert "reached more than once 0.013 ± 0.001 m³" in text
+    assert "L = 1 m, 3 free bundles; activation grid of 42³ cells" in text
+
+
+def test_every_number_of_a_solid_is_in_its_dataset_with_an_error(folded):
+    found = folded.to_dataset()
+    for name in ("volume", "convex_volume", "fold_volume", "unreachability"):
+        assert float(found[name]) == getattr(folded, name)
+        assert float(found[f"{name}_error"]) == getattr(folded, f"{name}_error")
+        assert found[name].attrs["units"] == ("1" if name == "unreachability" else "m3")
+    assert float(found.multiplicity.sum()) == pytest.approx(folded.volume)
+    assert Manipulator.from_toml(found.attrs["design"]) == folded.arm
+
+
 @pytest.fixture(scope="module")
 def redundant() -> ReachableSolid:
     return solid(designs.redundant_trunk(), accuracy=1e-2)
@@ -176,7 +204,9 @@ def test_four_bundles_reach_at_least_what_three_of_them_do(redundant):
 def test_four_bundles_agree_with_a_finer_grid_within_the_error(redundant):
     fine = solid(redundant.arm, accuracy=1e-2, grid=24, cell=redundant.grid.attrs["cell"])
     assert abs(fine.volume - redundant.volume) < redundant.volume_error
+    assert abs(fine.convex_volume - redundant.convex_volume) < redundant.convex_volume_error
     assert "count" not in fine.grid
+    assert np.isnan([fine.fold_volume, fine.fold_volume_error, fine.multiplicity_error]).all()
 
 
 def test_a_cloud_of_four_bundles_lies_inside_to_one_cell(redundant):
@@ -191,10 +221,20 @@ def test_two_free_bundles_sweep_an_area(trunk):
     assert isinstance(sheet, ReachableSurface)
     assert (sheet.dimension, sheet.volume, sheet.unreachability) == (2, 0.0, 1.0)
     assert sheet.surface().area == pytest.approx(sheet.area, rel=1e-3)
+    finer = convex_hull(tip_positions(arm, fine_grid(arm, 400)))
+    assert 0 < finer.volume - sheet.convex_volume < sheet.convex_volume_error < 1e-3
+    assert repr(sheet).startswith(f"ReachableSurface: area {sheet.area:.3f}"[:-1])
+    assert float(sheet.to_dataset().area_error) == sheet.area_error < 1e-5
     gamma = np.column_stack([-np.random.default_rng(0).random((100, 2)), np.full(100, -0.5)])
     assert sheet.distance(tip_positions(arm, gamma)).max() < 1e-4
     assert not hasattr(sheet, "contains")
     assert not hasattr(sheet, "grid")
+
+
+def fine_grid(arm: Manipulator, n: int) -> np.ndarray:
+    """Activations of n^2 points of two free bundles, corners included."""
+    ticks = np.linspace(0, 1, n)
+    return tip_map(arm).box.from_free_cube(np.stack(np.meshgrid(ticks, ticks), -1).reshape(-1, 2))
 
 
 def test_one_free_bundle_draws_a_curve():
@@ -207,6 +247,7 @@ def test_one_free_bundle_draws_a_curve():
     chords = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
     assert (curve.dimension, curve.volume) == (1, 0.0)
     assert curve.curve_length == pytest.approx(chords, rel=1e-6)
+    assert repr(curve).startswith(f"ReachableCurve: length {curve.curve_length:.3f}"[:-1])
     assert curve.distance(path).max() < 1e-5
     assert not hasattr(curve, "surface")
 
@@ -216,6 +257,7 @@ def test_no_free_bundle_leaves_a_point(trunk):
     assert isinstance(point, ReachablePoint)
     assert (point.dimension, point.volume, point.convex_volume) == (0, 0.0, 0.0)
     assert np.isnan([point.unreachability, point.unreachability_error]).all()
+    assert repr(point).startswith("ReachablePoint: (")
     tip = tip_positions(trunk, np.full((1, 3), -0.5))
     assert point.distance(tip + [[0.0, 0.3, 0.4]]) == pytest.approx(0.5)
 

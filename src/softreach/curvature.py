@@ -43,7 +43,7 @@ QUANTITIES = {
 }
 """Quantity -> unit and meaning."""
 
-_AT_A_TIME = 1 << 18  # samples times stations whose strains stay in the cache
+_AT_A_TIME = 1 << 19  # samples times stations whose strains stay in the cache
 
 
 def curvature_statistics(
@@ -159,13 +159,13 @@ class _Tally:
         if not len(values):
             return
         bins = self.count.shape[1]
-        place = ((values - self.low[k]) / self.width[k]).astype(np.int64)
-        self.count[k] += np.bincount(np.clip(place, 0, bins - 1), minlength=bins)
-        low, high = self.extremes[k]
-        self.extremes[k] = min(low, values.min()), max(high, values.max())
         # About the lower end, so that a narrow range far from zero loses no digits.
         shifted = values - self.low[k]
-        self.moments[k] += shifted.sum(), (shifted * shifted).sum()
+        place = (shifted / self.width[k]).astype(np.int64)
+        self.count[k] += np.bincount(np.clip(place, 0, bins - 1, out=place), minlength=bins)
+        low, high = self.extremes[k]
+        self.extremes[k] = min(low, values.min()), max(high, values.max())
+        self.moments[k] += shifted.sum(), np.square(shifted, out=shifted).sum()
 
     @property
     def edges(self) -> Array:

@@ -7,6 +7,7 @@ import math
 __all__ = ["quantity"]
 
 _SMALLEST = 1e-3  # below it, numbers are written with a power of ten
+_FINEST = 1e-9  # of the value: what follows is rounding
 
 
 def quantity(value: float, unit: str = "", error: float = math.nan) -> str:
@@ -23,6 +24,7 @@ def quantity(value: float, unit: str = "", error: float = math.nan) -> str:
 
 
 def _with_error(value: float, error: float) -> str:
+    error = max(error, _FINEST * abs(value))
     largest = max(abs(value), error)
     power = math.floor(math.log10(largest)) if largest < _SMALLEST else 0
     scale = 10.0**power

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
@@ -110,9 +111,15 @@ def provenance(arm: Manipulator) -> dict[str, object]:
     """Attributes that say which design and version a dataset was computed from."""
     return {
         "design": arm.to_toml(),
-        "softreach_version": version("softreach"),
+        "softreach_version": _version(),
         "schema_version": SCHEMA_VERSION,
     }
+
+
+@cache
+def _version() -> str:
+    """Looking it up takes a millisecond."""
+    return version("softreach")
 
 
 def storable(dataset: xr.Dataset) -> xr.Dataset:

@@ -96,9 +96,10 @@ def unreachability(
 ) -> float:
     """The part of the convex hull that the cloud does not fill, UNR = 1 - V_conc / V_conv [-].
 
-    Both volumes come from one triangulation, and both are smaller than those of infinitely many
-    points, the first by more: `concave_hull` estimates by how much, `reachable_set` needs no points.
-    NaN for a cloud without volume, as 0/0 says nothing.
+    Both volumes come from one triangulation. Both are smaller than those of infinitely many points,
+    the first by more, so that the share is some percent too large: `concave_hull` estimates the
+    bias of the volume, and `reachable_set` needs no points. NaN for a cloud without volume, as 0/0
+    says nothing.
 
     Args:
         points: Tips [m], shape (n, 3), or ``cloud.tip``.

@@ -30,7 +30,7 @@ def test_the_coarse_cloud_is_the_beginning_of_the_fine_one(both):
     assert (coarse.fine, fine.fine) == (False, True)
     assert (coarse.samples, fine.samples) == (1 << 10, 1 << 12)
     np.testing.assert_array_equal(coarse.cloud.tip, fine.cloud.tip[: coarse.samples])
-    assert coarse.size.value == pytest.approx(fine.size.value, rel=0.02)
+    assert coarse.volume == pytest.approx(fine.volume, rel=0.02)
 
 
 def test_more_points_are_computed_when_more_are_to_be_shown(trunk):

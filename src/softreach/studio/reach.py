@@ -76,6 +76,11 @@ class Reach:
         return self.cloud.sizes["sample"]
 
     @property
+    def volume(self) -> float:
+        """Volume [L³]; 0 for all but solids."""
+        return self.exact.volume / self.arm.length**3
+
+    @property
     def size(self) -> Size:
         """Volume, area or length of what can be reached."""
         length, found = self.arm.length, self.exact

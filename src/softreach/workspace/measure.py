@@ -79,7 +79,7 @@ def multiply_covered(image: Image) -> dict[int, float]:
 
 
 def fold_volume(fine: Image, coarse: Image) -> Estimate:
-    """Volume of the places reached with both orientations [m³], and its change by the grid; m = 3."""
+    """Volume reached with both orientations [m³], and its change by half as fine a grid; m = 3."""
     value, rough = (
         float(_mean(image, lambda spans: spans.length[spans.cover > np.abs(spans.degree)].sum()))
         for image in (fine, coarse)

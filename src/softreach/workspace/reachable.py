@@ -20,6 +20,8 @@ __all__ = ["Number", "ReachableSet"]
 
 Array = NDArray[np.float64]
 
+_POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+
 
 class Number(NamedTuple):
     """One number of a reachable set, as it is stored."""
@@ -121,5 +123,6 @@ class ReachableSet(ABC):
         """How the set was computed."""
         box, rod = self.tip_map.box, self.tip_map
         free = f"{box.dimension} free bundle" + ("s" if box.dimension != 1 else "")
-        grid = f"activation grid of {self.cells}^{box.dimension} cells, " if box.dimension else ""
+        power = str(box.dimension).translate(_POWERS) if box.dimension > 1 else ""
+        grid = f"activation grid of {self.cells}{power} cells, " if box.dimension else ""
         return f"L = {rod.length:g} m, {free}; {grid}tip error up to {rod.tol:g} L"

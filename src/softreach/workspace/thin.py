@@ -192,6 +192,11 @@ def _measure(rod: TipMap) -> Estimate:
 
 
 def _convex_volume(tips: Array, cells: int, m: int) -> Estimate:
-    """Volume of the convex hull of mapped vertices [m³], and its change by half as fine a grid."""
-    fine, coarse = (convex_hull(t).volume for t in (tips, every_second(tips, cells, m)))
-    return Estimate(fine, abs(fine - coarse))
+    """Volume of the convex hull of mapped vertices [m³].
+
+    It is too small by O(1/n²): a grid with a quarter of the cells along each axis differs by 15
+    times the error. A tenth of the difference is stated.
+    """
+    quarter = every_second(every_second(tips, cells, m), cells // 2, m)
+    fine, coarse = convex_hull(tips).volume, convex_hull(quarter).volume
+    return Estimate(fine, abs(fine - coarse) / 10.0)
