@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.arm_shape import arm_mesh, band_mesh, fiber_bands, fiber_curves, rest_configuration
+from softreach.arm_shape import (
+    arm_surface,
+    bundle_bands,
+    bundle_curves,
+    bundle_surfaces,
+    rest_configuration,
+)
 from softreach.errors import InvalidInput
 
 trimesh = pytest.importorskip("trimesh")
@@ -17,6 +23,10 @@ ACTIVATION = [-1.2, -0.3, -0.8]
 @pytest.fixture(scope="module")
 def bent(trunk):
     return sr.configuration(trunk, ACTIVATION, stations=61)
+
+
+def solid(surface):
+    return trimesh.Trimesh(surface.vertices, surface.faces, process=False)
 
 
 def from_centerline(shape, points):
@@ -34,23 +44,23 @@ def test_the_arm_at_rest_is_the_configuration_without_activation(trunk):
 
 
 def test_fibers_lie_on_the_surface_in_its_cross_sections(trunk, bent):
-    local = from_centerline(bent, fiber_curves(trunk, bent))
+    local = from_centerline(bent, bundle_curves(trunk, bent))
     np.testing.assert_allclose(local[..., 2], 0, atol=1e-12)
     distance = np.linalg.norm(local, axis=-1)
     np.testing.assert_allclose(distance, np.tile(bent.radius, (3, 1)), rtol=1e-12)
 
 
 def test_fibers_start_where_the_design_says_and_turn_by_their_revolution(trunk):
-    x, y, _ = np.moveaxis(fiber_curves(trunk, rest_configuration(trunk)), -1, 0)
+    x, y, _ = np.moveaxis(bundle_curves(trunk, rest_configuration(trunk)), -1, 0)
     angles = np.unwrap(np.arctan2(y, x), axis=1)
     np.testing.assert_allclose(angles[:, 0] % (2 * np.pi), np.radians([66, 114, 270]))
     np.testing.assert_allclose(np.ptp(angles, axis=1), np.radians([108, 108, 0]), atol=1e-9)
 
 
 def test_bands_span_the_extent_about_their_fiber(trunk, bent):
-    curves = fiber_curves(trunk, bent)
+    curves = bundle_curves(trunk, bent)
     for curve, band, extent in zip(
-        curves, fiber_bands(trunk, bent), trunk.outline(0.0).extent, strict=True
+        curves, bundle_bands(trunk, bent), trunk.outline([0.0]).extent, strict=True
     ):
         chord = np.linalg.norm(band[:, -1] - band[:, 0], axis=1)
         np.testing.assert_allclose(chord, 2 * bent.radius * np.sin(extent / 2), rtol=1e-9)
@@ -59,25 +69,25 @@ def test_bands_span_the_extent_about_their_fiber(trunk, bent):
 
 
 def test_the_body_is_closed_and_keeps_its_volume_at_rest(trunk):
-    mesh = trimesh.Trimesh(*arm_mesh(rest_configuration(trunk), sides=400), process=False)
-    r, tip = trunk.profile.radius([0.0, trunk.length])
+    mesh = solid(arm_surface(rest_configuration(trunk), sides=400))
+    r, tip = trunk.profile.radius(np.array([0.0, trunk.length]))
     frustum = np.pi * trunk.length / 3 * (r * r + r * tip + tip * tip)
     assert mesh.is_watertight
     assert mesh.volume == pytest.approx(frustum, rel=1e-4)
 
 
 def test_bands_are_closed_skins_of_their_thickness(trunk, bent):
-    for vertices, faces in band_mesh(trunk, rest_configuration(trunk), thickness=0.1):
-        mesh = trimesh.Trimesh(vertices, faces, process=False)
+    for skin in bundle_surfaces(trunk, rest_configuration(trunk), thickness=0.1):
+        mesh = solid(skin)
         assert mesh.is_watertight
         section = np.radians(48) * 0.1  # of R2², about a mean radius of R2
         squares = np.mean(trunk.profile.radius(np.linspace(0, trunk.length, 2001)) ** 2)
         assert mesh.volume == pytest.approx(section * squares, rel=0.01)
-    for vertices, faces in band_mesh(trunk, bent):
-        assert trimesh.Trimesh(vertices, faces, process=False).volume > 0
+    for skin in bundle_surfaces(trunk, bent):
+        assert solid(skin).volume > 0
 
 
 def test_several_configurations_are_refused_with_the_way_to_choose(trunk):
     several = sr.configuration(trunk, [ACTIVATION, [0, 0, 0]], stations=5)
     with pytest.raises(InvalidInput, match="isel"):
-        arm_mesh(several)
+        arm_surface(several)

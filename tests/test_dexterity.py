@@ -54,7 +54,7 @@ def test_three_bundles_sweep_the_volume_that_manipulability_says(trunk):
 
 def test_fewer_bundles_have_an_area_or_a_length_and_no_orientation(trunk):
     for kept in (1, 2):
-        arm = trunk.replace(actuators=trunk.fibers[:kept])
+        arm = trunk.replace(actuators=trunk.actuators[:kept])
         cloud = compute_cloud(arm, n=50)
         found, slope = dexterity(cloud), differences(arm, cloud.activation.values)
         gram = slope.transpose(0, 2, 1) @ slope
@@ -95,7 +95,7 @@ def solution_curve(arm, target, start, step=0.04):
 def test_with_four_bundles_the_measure_is_the_length_of_the_curve_of_solutions():
     arm, step = designs.redundant_trunk(), 0.1
     cloud = compute_cloud(arm, n=1 << 19, sampler="sobol")
-    measure = solution_measure(cloud, 0.2).solution_measure
+    measure = solution_measure(cloud, cell=0.2).solution_measure
     for place in ([0.1, -0.3, 0.5], [-0.1, 0.3, 0.7]):  # cells that lie inside
         found = float(measure.sel(dict(zip("xyz", place, strict=True)), method="nearest"))
         targets = place + np.random.default_rng(0).uniform(-0.1, 0.1, (80, 3))
@@ -113,7 +113,7 @@ def test_with_four_bundles_the_measure_is_the_length_of_the_curve_of_solutions()
 
 def test_with_three_bundles_the_measure_is_the_number_of_activations(trunk):
     cloud = compute_cloud(trunk, n=1 << 17, sampler="sobol")
-    measure = solution_measure(cloud, 0.1).solution_measure
+    measure = solution_measure(cloud, cell=0.1).solution_measure
     reached = reachable_set(trunk)
     centers = np.stack(np.meshgrid(measure.x, measure.y, measure.z, indexing="ij"), -1)
     depth = reached.distance(centers.reshape(-1, 3)).reshape(measure.shape)
@@ -125,15 +125,26 @@ def test_with_three_bundles_the_measure_is_the_number_of_activations(trunk):
     assert total == pytest.approx(reached.volume, rel=2e-3)
 
 
+def test_measures_of_many_clouds_scatter_by_their_standard_error(trunk):
+    clouds = [compute_cloud(trunk, n=4096, seed=seed, tol=1e-4) for seed in range(60)]
+    inner = {"x": 0.1, "y": 0.3, "z": 0.5}
+    found = [
+        solution_measure(cloud, cell=0.2).sel(inner, method="nearest").to_array()
+        for cloud in clouds
+    ]
+    values, errors = np.array(found).T
+    assert errors.mean() == pytest.approx(values.std(), rel=0.25)
+
+
 def test_the_measure_asks_for_an_even_cloud_of_three_bundles_or_more(trunk):
     for sampler, n in (("boundary", 100), ("grid", 125)):
         with pytest.raises(InvalidInput, match=f"sampler = {sampler}: must be one of uniform"):
             solution_measure(compute_cloud(trunk, n=n, sampler=sampler))
-    flat = trunk.replace(actuators=trunk.fibers[:2])
+    flat = trunk.replace(actuators=trunk.actuators[:2])
     with pytest.raises(InvalidInput, match="bundles = 2: must be 3 or more"):
         solution_measure(compute_cloud(flat, n=100))
     fixed = trunk.with_bounds(((-1, 0), (-1, 0), (-1, -1)))
     with pytest.raises(InvalidInput, match="must be apart for every bundle"):
         solution_measure(compute_cloud(fixed, n=100))
     with pytest.raises(InvalidInput, match="cell = 0: must be"):
-        solution_measure(compute_cloud(trunk, n=100), 0)
+        solution_measure(compute_cloud(trunk, n=100), cell=0)

@@ -56,20 +56,22 @@ def test_the_result_says_what_it_is(strewn):
 def test_what_is_evaluated_does_not_change_what_comes_out(strewn):
     everywhere = activation_distance(strewn, 0.02)
     for queries in (100, np.array([5, 5, 3999, 0])):
-        some = activation_distance(strewn, 0.02, queries)
+        some = activation_distance(strewn, 0.02, queries=queries)
         np.testing.assert_array_equal(some, everywhere[some.sample.values])
 
 
 def test_a_number_of_queries_takes_one_sample_of_each_equal_part(strewn):
-    sample = activation_distance(strewn, 0.02, 50).sample.values
+    sample = activation_distance(strewn, 0.02, queries=50).sample.values
     np.testing.assert_array_equal(sample // 80, np.arange(50))
-    np.testing.assert_array_equal(activation_distance(strewn, 0.02, 50).sample, sample)
-    np.testing.assert_array_equal(activation_distance(strewn, 0.02, 4000).sample, range(4000))
+    np.testing.assert_array_equal(activation_distance(strewn, 0.02, queries=50).sample, sample)
+    np.testing.assert_array_equal(
+        activation_distance(strewn, 0.02, queries=4000).sample, range(4000)
+    )
 
 
 @pytest.mark.parametrize("queries", [0, [], np.empty(0, int)])
 def test_no_queries_give_nothing(strewn, queries):
-    assert activation_distance(strewn, 0.02, queries).sizes == {"sample": 0}
+    assert activation_distance(strewn, 0.02, queries=queries).sizes == {"sample": 0}
 
 
 @pytest.mark.parametrize(
@@ -86,7 +88,7 @@ def test_no_queries_give_nothing(strewn, queries):
 )
 def test_other_queries_are_refused(strewn, queries, said):
     with pytest.raises(InvalidInput, match=said):
-        activation_distance(strewn, 0.02, queries)
+        activation_distance(strewn, 0.02, queries=queries)
 
 
 def test_tips_that_are_not_finite_are_refused_by_their_index():
@@ -110,7 +112,7 @@ def test_minimal_and_redundant_trunk_differ_as_in_the_paper():
     found = {}
     for design in (designs.minimal_trunk, designs.redundant_trunk):
         cloud = compute_cloud(design(), n=2_000_000, tol=1e-4)
-        distance = activation_distance(cloud, 1 / 60, 10_000)
+        distance = activation_distance(cloud, 1 / 60, queries=10_000)
         found[design] = redundancy_summary(cloud, distance)
     minimal, redundant = found.values()
     assert minimal.median == pytest.approx(0.05, abs=0.01)
@@ -136,6 +138,34 @@ def test_the_summary_counts_points_and_cells():
     assert found.quantiles[0.95] == pytest.approx(1.0)
 
 
+def test_medians_and_shares_of_many_draws_scatter_by_their_errors(strewn):
+    rng, sample = np.random.default_rng(2), np.arange(400)
+    summaries = [
+        redundancy_summary(
+            strewn,
+            xr.DataArray(rng.exponential(size=400), {"sample": sample}, ("sample",)),
+            threshold=1.5,
+        )
+        for _ in range(300)
+    ]
+    for name in ("median", "redundant_points"):
+        scatter = np.std([getattr(one, name) for one in summaries])
+        stated = np.mean([getattr(one, f"{name}_error") for one in summaries])
+        assert stated == pytest.approx(scatter, rel=0.15)
+
+
+def test_the_summary_prints_shares_with_their_errors_and_keeps_all_in_a_dataset(strewn):
+    found = redundancy_summary(strewn, activation_distance(strewn, 0.02), threshold=0.015)
+    first, second, third = repr(found).splitlines()
+    assert first.startswith("RedundancySummary: median D̄ 0.01")
+    assert "± " in second
+    assert "4,000 points evaluated" in third
+    dataset = found.to_dataset()
+    assert float(dataset["median"]) == found.median
+    assert float(dataset.quantiles.sel(quantile=0.25)) == found.quantiles[0.25]
+    assert dataset.measured_volume.attrs["units"] == "m3"
+
+
 def test_where_all_points_are_isolated_there_is_nothing_to_summarize():
     cloud = made_up(np.eye(3))
     found = redundancy_summary(cloud, activation_distance(cloud, 0.0))
@@ -145,12 +175,21 @@ def test_where_all_points_are_isolated_there_is_nothing_to_summarize():
 
 
 def test_a_map_keeps_the_mean(strewn):
-    distance = activation_distance(strewn, 0.02, 1000)
+    distance = activation_distance(strewn, 0.02, queries=1000)
     grid = distance_map(strewn, distance, cell=0.03)
     weighted = (grid.activation_distance * grid.evaluated).sum() / grid.evaluated.sum()
     assert float(weighted) == pytest.approx(float(distance.mean()))
     assert int(grid.evaluated.sum()) == int(distance.count())
     np.testing.assert_array_equal(grid.activation_distance.isnull(), grid.evaluated == 0)
+
+
+def test_the_error_of_a_cell_is_the_standard_error_of_its_mean(strewn):
+    distance = activation_distance(strewn, 0.02)
+    grid = distance_map(strewn, distance, cell=0.1)
+    inside = distance.values[(strewn.tip.values < 0.1).all(axis=1)]
+    inside = inside[np.isfinite(inside)]
+    stated = float(grid.activation_distance_error.sel(x=0.05, y=0.05, z=0.05))
+    assert stated == pytest.approx(inside.std(ddof=1) / np.sqrt(len(inside)))
 
 
 def test_a_map_puts_every_value_where_its_tip_is():
@@ -175,13 +214,15 @@ def test_distances_of_another_cloud_are_refused(strewn):
 
 def test_density_adds_up_to_the_number_of_tips(trunk):
     cloud = compute_cloud(trunk, n=5000)
-    grid = tip_density(cloud, 0.07)
+    grid = tip_density(cloud, cell=0.07)
     assert float(grid.density.sum()) * 0.07**3 == pytest.approx(5000)
     assert grid.density.attrs["units"] == "m-3"
+    counts = grid.density * 0.07**3
+    np.testing.assert_allclose(grid.density_error * 0.07**3, np.sqrt(counts))
 
 
 def test_points_strewn_evenly_vary_by_chance_alone(strewn):
-    grid = tip_density(strewn, 0.1)
+    grid = tip_density(strewn, cell=0.1)
     assert grid.density.shape == (2, 2, 2)
     np.testing.assert_allclose(grid.density, 4000 / 0.2**3, rtol=0.2)
     assert grid.chance == pytest.approx(500**-0.5)
@@ -191,11 +232,11 @@ def test_points_strewn_evenly_vary_by_chance_alone(strewn):
 def test_a_dense_half_is_heterogeneous():
     tip = np.random.default_rng(5).random((40_000, 3)) * 0.2
     tip = tip[(tip[:, 0] < 0.1) | (np.arange(len(tip)) % 3 == 0)]
-    grid = tip_density(made_up(tip), 0.05)
+    grid = tip_density(made_up(tip), cell=0.05)
     assert grid.heterogeneity == pytest.approx(0.5, abs=0.03)  # (3 - 1) / (3 + 1)
 
 
 @pytest.mark.parametrize("cell", [0.0, -1.0, np.nan, np.inf, 1e-9])
 def test_other_cells_are_refused(strewn, cell):
     with pytest.raises(InvalidInput, match="cell = "):
-        tip_density(strewn, cell)
+        tip_density(strewn, cell=cell)

@@ -50,6 +50,23 @@ def test_the_hull_states_what_it_was_made_of():
     assert hull.bias is None
 
 
+def test_a_hull_prints_its_numbers_and_what_it_was_made_of():
+    hull = concave_hull(in_ball(20_000), alpha=0.3, bias=True)
+    size, origin = repr(hull).splitlines()
+    assert size.startswith(f"Hull: volume {hull.volume:.6g} m³ (without sampling bias some 4.")
+    assert "1 region, " in size
+    assert origin == "  alpha shape, alpha = 0.3 m (5.1 mean spacings), of 20,000 points"
+    assert "convex hull of 20,000 points" in repr(convex_hull(in_ball(20_000)))
+
+
+def test_a_hull_as_a_dataset_encloses_the_volume_that_it_states():
+    found = concave_hull(in_ball(20_000), alpha=0.3, bias=True).to_dataset()
+    corners = found.vertices.values[found.faces.values]
+    assert np.linalg.det(corners).sum() / 6 == pytest.approx(float(found.volume))
+    assert found.volume.attrs["units"] == "m3"
+    assert float(found.volume_corrected) > float(found.volume)
+
+
 def test_labelled_tips_have_a_default_radius_of_a_twentieth_of_the_length(tips):
     with pytest.warns(SoftreachWarning, match="mean spacings"):
         labelled, plain = concave_hull(tips), concave_hull(tips.values, alpha=0.05)
@@ -122,10 +139,11 @@ def test_flat_clouds_have_volume_zero_and_no_faces(name):
         concave_hull(FLAT[name], "critical"),
         convex_hull(FLAT[name]),
     ):
-        assert hull.volume == hull.area == hull.spacing == 0.0
+        assert hull.volume == hull.area == 0.0
+        assert hull.spacing == 0.0 if hull.n else np.isnan(hull.spacing)
         assert hull.faces.shape == hull.vertices.shape == (0, 3)
-    with pytest.raises(InvalidInput, match="a cloud of volume 0"):
-        unreachability(FLAT[name], 0.5)
+        assert f"of {hull.n:,} points" in repr(hull)
+    assert np.isnan(unreachability(FLAT[name], 0.5))
 
 
 @pytest.mark.parametrize("function", [concave_hull, unreachability, volume_curve])

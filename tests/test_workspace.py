@@ -14,32 +14,43 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
 from softreach.cloud import compute_cloud
 from softreach.errors import InvalidInput, SoftreachWarning
-from softreach.rod import tip_map, tip_positions
-from softreach.rod.kinematics import configuration, tip_positions
-from softreach.rod.tip_map import tip_map
-from softreach.workspace import ReachableSet, direction_spread, reachable_set
-from softreach.workspace.surface import Surface
+from softreach.geometry.hull import convex_hull
+from softreach.rod import configuration, tip_map, tip_positions
+from softreach.workspace import (
+    ReachableCurve,
+    ReachablePoint,
+    ReachableSolid,
+    ReachableSurface,
+    Surface,
+    direction_spread,
+    reachable_set,
+)
 from tests.laws import arm_of, single
 
 
-def trunk_at(revolution_deg: float, taper_deg: float, **changes) -> Manipulator:
-    arm = designs.minimal_trunk(np.radians(revolution_deg), np.radians(taper_deg))
-    return arm.replace(**changes)
+def trunk_at(revolution_deg: float, taper_deg: float) -> Manipulator:
+    return designs.minimal_trunk(np.radians(revolution_deg), np.radians(taper_deg))
+
+
+def solid(arm: Manipulator, **options) -> ReachableSolid:
+    found = reachable_set(arm, **options)
+    assert isinstance(found, ReachableSolid)
+    return found
 
 
 @pytest.fixture(scope="module")
-def best(trunk: Manipulator) -> ReachableSet:
+def best(trunk: Manipulator) -> ReachableSolid:
     """The paper's best design."""
-    return reachable_set(trunk)
+    return solid(trunk)
 
 
 @pytest.fixture(scope="module")
-def folded() -> ReachableSet:
+def folded() -> ReachableSolid:
     """A design whose image folds over itself."""
-    return reachable_set(trunk_at(75, 3))
+    return solid(trunk_at(75, 3))
 
 
-def several(found: ReachableSet) -> float:
+def several(found: ReachableSolid) -> float:
     """Volume reached by more than one activation."""
     return sum(volume for k, volume in found.multiplicity.items() if k > 1)
 
@@ -55,10 +66,13 @@ def test_the_best_design_reaches_0691_and_little_of_it_twice(best):
 def test_doubled_resolutions_agree_within_the_errors(best, folded):
     for coarse in (best, folded):
         cell = coarse.grid.attrs["cell"] / 2
-        fine = reachable_set(coarse.arm, grid=2 * coarse.cells, cell=cell)
+        fine = solid(coarse.arm, grid=2 * coarse.cells, cell=cell)
         assert abs(fine.volume - coarse.volume) < fine.volume_error + coarse.volume_error
         assert abs(several(fine) - several(coarse)) < coarse.multiplicity_error
-        assert fine.unreachability == pytest.approx(coarse.unreachability, abs=1e-3)
+        assert abs(fine.fold_volume - coarse.fold_volume) < coarse.fold_volume_error
+        assert abs(fine.convex_volume - coarse.convex_volume) < coarse.convex_volume_error
+        assert abs(fine.unreachability - coarse.unreachability) < coarse.unreachability_error
+        assert coarse.unreachability_error < 2e-3
 
 
 def test_without_taper_it_is_06325():
@@ -74,10 +88,9 @@ def test_volume_is_the_integral_of_det_j_minus_what_is_covered_again(folded):
     # An independent route: Sobol points instead of Gauss nodes, |det J| instead of signed.
     arm = folded.arm
     cube = sampling.sample_cube("sobol", 1 << 16, 3, seed=1)
-    gamma = arm.bounds[:, 0] + cube * np.diff(arm.bounds, axis=1)[:, 0]
-    slopes = tip_map(arm).tips_and_slopes(gamma)[1]
-    box = np.prod(np.diff(arm.bounds, axis=1))
-    integral = np.abs(np.linalg.det(slopes)).mean() * box
+    rod = tip_map(arm)
+    _, slopes = rod.tips_and_slopes(rod.box.from_cube(cube))
+    integral = np.abs(np.linalg.det(slopes)).mean() * rod.box.volume
     again = sum((k - 1) * volume for k, volume in folded.multiplicity.items())
     assert integral - again == pytest.approx(folded.volume, rel=2e-3)
 
@@ -96,14 +109,13 @@ def test_the_grid_and_single_points_agree(folded):
     axes = [grid[name].values for name in "xyz"]
     centers = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     some = np.random.default_rng(0).integers(0, len(centers), 5000)
-    assert folded.image is not None
     counted = folded.image.counts_at(centers[some])
     assert (counted == grid["count"].values.ravel()[some]).all()
     assert (folded.contains(centers[some]) == (counted > 0)).all()
 
 
 def test_the_image_of_a_part_of_the_box_lies_within(best, trunk):
-    part = reachable_set(trunk.replace(activation_bounds=((-1.2, -0.3), (-1.5, -0.2), (-1.0, 0.0))))
+    part = solid(trunk.with_bounds(((-1.2, -0.3), (-1.5, -0.2), (-1.0, 0.0))))
     assert part.volume < best.volume
     vertices = part.surface().vertices
     outside = vertices[~best.contains(vertices)]
@@ -151,9 +163,33 @@ def test_volume_scales_with_the_cube_of_the_length(best):
     assert large.unreachability == pytest.approx(best.unreachability, rel=1e-9)
 
 
+def test_a_tip_map_is_asked_as_its_arm_is(trunk):
+    found = solid(tip_map(trunk, 1e-5), accuracy=0.1)
+    assert found.arm is trunk
+    assert found.volume == solid(trunk, accuracy=0.1, tol=1e-5).volume
+
+
+def test_a_solid_prints_its_numbers_to_their_errors_and_what_it_was_made_of(folded):
+    text = repr(folded)
+    assert text.startswith("ReachableSolid: volume 0.4767 ± 0.0002 m³")
+    assert "33.7 ± 0.1 % are out of reach" in text
+    assert "reached more than once 0.013 ± 0.001 m³" in text
+    assert "L = 1 m, 3 free bundles; activation grid of 42³ cells" in text
+
+
+def test_every_number_of_a_solid_is_in_its_dataset_with_an_error(folded):
+    found = folded.to_dataset()
+    for name in ("volume", "convex_volume", "fold_volume", "unreachability"):
+        assert float(found[name]) == getattr(folded, name)
+        assert float(found[f"{name}_error"]) == getattr(folded, f"{name}_error")
+        assert found[name].attrs["units"] == ("1" if name == "unreachability" else "m3")
+    assert float(found.multiplicity.sum()) == pytest.approx(folded.volume)
+    assert Manipulator.from_toml(found.attrs["design"]) == folded.arm
+
+
 @pytest.fixture(scope="module")
-def redundant() -> ReachableSet:
-    return reachable_set(designs.redundant_trunk(), accuracy=1e-2)
+def redundant() -> ReachableSolid:
+    return solid(designs.redundant_trunk(), accuracy=1e-2)
 
 
 @pytest.mark.slow
@@ -162,7 +198,7 @@ def test_four_bundles_reach_at_least_what_three_of_them_do(redundant):
         for end in (0, 1):
             bounds = redundant.arm.bounds.copy()
             bounds[held] = bounds[held, end]
-            face = redundant.arm.replace(activation_bounds=tuple(map(tuple, bounds.tolist())))
+            face = redundant.arm.with_bounds(bounds)
             part = reachable_set(face, accuracy=1e-2)
             assert part.dimension == 3
             assert part.volume < redundant.volume + redundant.volume_error
@@ -170,9 +206,11 @@ def test_four_bundles_reach_at_least_what_three_of_them_do(redundant):
 
 
 def test_four_bundles_agree_with_a_finer_grid_within_the_error(redundant):
-    fine = reachable_set(redundant.arm, accuracy=1e-2, grid=24, cell=redundant.grid.attrs["cell"])
+    fine = solid(redundant.arm, accuracy=1e-2, grid=24, cell=redundant.grid.attrs["cell"])
     assert abs(fine.volume - redundant.volume) < redundant.volume_error
+    assert abs(fine.convex_volume - redundant.convex_volume) < redundant.convex_volume_error
     assert "count" not in fine.grid
+    assert np.isnan([fine.fold_volume, fine.fold_volume_error, fine.multiplicity_error]).all()
 
 
 @pytest.mark.slow
@@ -183,39 +221,48 @@ def test_a_cloud_of_four_bundles_lies_inside_to_one_cell(redundant):
 
 
 def test_two_free_bundles_sweep_an_area(trunk):
-    arm = trunk.replace(activation_bounds=((-1.0, 0.0), (-1.0, 0.0), (-0.5, -0.5)))
+    arm = trunk.with_bounds(((-1.0, 0.0), (-1.0, 0.0), (-0.5, -0.5)))
     sheet = reachable_set(arm)
-    assert (sheet.dimension, sheet.measure_name, sheet.volume) == (2, "area", 0.0)
-    assert sheet.surface().area == pytest.approx(sheet.measure, rel=1e-3)
+    assert isinstance(sheet, ReachableSurface)
+    assert (sheet.dimension, sheet.volume, sheet.unreachability) == (2, 0.0, 1.0)
+    assert sheet.surface().area == pytest.approx(sheet.area, rel=1e-3)
+    finer = convex_hull(tip_positions(arm, fine_grid(arm, 400)))
+    assert 0 < finer.volume - sheet.convex_volume < sheet.convex_volume_error < 1e-3
+    assert repr(sheet).startswith(f"ReachableSurface: area {sheet.area:.3f}"[:-1])
+    assert float(sheet.to_dataset().area_error) == sheet.area_error < 1e-5
     gamma = np.column_stack([-np.random.default_rng(0).random((100, 2)), np.full(100, -0.5)])
     assert sheet.distance(tip_positions(arm, gamma)).max() < 1e-4
-    with pytest.raises(InvalidInput, match="distance"):
-        sheet.contains(np.zeros((1, 3)))
-    with pytest.raises(InvalidInput, match="distance"):
-        _ = sheet.grid
+    assert not hasattr(sheet, "contains")
+    assert not hasattr(sheet, "grid")
+
+
+def fine_grid(arm: Manipulator, n: int) -> np.ndarray:
+    """Activations of n^2 points of two free bundles, corners included."""
+    ticks = np.linspace(0, 1, n)
+    return tip_map(arm).box.from_free_cube(np.stack(np.meshgrid(ticks, ticks), -1).reshape(-1, 2))
 
 
 def test_one_free_bundle_draws_a_curve():
     # A straight fiber that bends the arm: the tip's path, chord by chord.
-    arm = Manipulator(
-        length=1.0,
-        outer_radius=1 / 16,
-        inner_radius=3 / 64,
-        fibers=(FiberArchitecture(helical_angle=0.0, offset=0.0, extent=0.8),),
-    )
+    fiber = FiberArchitecture(helical_angle=0.0, offset=0.0, extent=0.8)
+    arm = arm_of(fiber, activation_bounds=(-5 / 3, 0.0))
     curve = reachable_set(arm)
+    assert isinstance(curve, ReachableCurve)
     path = tip_positions(arm, np.linspace(-5 / 3, 0, 4001)[:, None])
     chords = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
-    assert (curve.dimension, curve.measure_name) == (1, "length")
-    assert curve.measure == pytest.approx(chords, rel=1e-6)
+    assert (curve.dimension, curve.volume) == (1, 0.0)
+    assert curve.curve_length == pytest.approx(chords, rel=1e-6)
+    assert repr(curve).startswith(f"ReachableCurve: length {curve.curve_length:.3f}"[:-1])
     assert curve.distance(path).max() < 1e-5
-    with pytest.raises(InvalidInput, match="surface"):
-        curve.surface()
+    assert not hasattr(curve, "surface")
 
 
 def test_no_free_bundle_leaves_a_point(trunk):
-    point = reachable_set(trunk.replace(activation_bounds=(-0.5, -0.5)))
-    assert (point.dimension, point.measure_name, point.measure) == (0, "point", 0.0)
+    point = reachable_set(trunk.with_bounds((-0.5, -0.5)))
+    assert isinstance(point, ReachablePoint)
+    assert (point.dimension, point.volume, point.convex_volume) == (0, 0.0, 0.0)
+    assert np.isnan([point.unreachability, point.unreachability_error]).all()
+    assert repr(point).startswith("ReachablePoint: (")
     tip = tip_positions(trunk, np.full((1, 3), -0.5))
     assert point.distance(tip + [[0.0, 0.3, 0.4]]) == pytest.approx(0.5)
 
@@ -223,24 +270,24 @@ def test_no_free_bundle_leaves_a_point(trunk):
 def test_a_held_bundle_with_room_elsewhere_changes_nothing():
     whole = designs.redundant_trunk()
     bounds = ((-5 / 3, 0.0), (-5 / 3, 0.0), (-5 / 3, 0.0), (0.0, 0.0))
-    held = reachable_set(whole.replace(activation_bounds=bounds))
-    three = whole.replace(fibers=whole.fibers[:3], activation_bounds=(-5 / 3, 0.0))
+    held = reachable_set(whole.with_bounds(bounds))
+    three = whole.replace(actuators=whole.actuators[:3])
     assert held.volume == pytest.approx(reachable_set(three).volume, rel=1e-6)
 
 
 def test_progress_counts_every_vertex(trunk):
     done: list[int] = []
-    reachable_set(trunk, grid=8, accuracy=0.1, report=done.append)
+    reachable_set(trunk, grid=8, accuracy=0.1, progress=done.append)
     assert sum(done) == 9**3
 
 
-def test_a_coarse_grid_is_told_so():
+def test_a_coarse_grid_is_warned_of():
     with pytest.warns(SoftreachWarning, match="grid above 4"):
         reachable_set(designs.redundant_trunk(), grid=4)
 
 
 @pytest.mark.parametrize(
-    ("argument", "value", "told"),
+    ("argument", "value", "allowed"),
     [
         ("accuracy", 0.0, "1e-6 to"),
         ("grid", 7, "even"),
@@ -248,8 +295,8 @@ def test_a_coarse_grid_is_told_so():
         ("cell", np.nan, "at"),
     ],
 )
-def test_a_wrong_argument_is_named(trunk, argument, value, told):
-    with pytest.raises(InvalidInput, match=told) as caught:
+def test_a_wrong_argument_is_named(trunk, argument, value, allowed):
+    with pytest.raises(InvalidInput, match=allowed) as caught:
         reachable_set(trunk, **{argument: value})
     assert caught.value.name == argument
 

@@ -1,4 +1,4 @@
-"""The surface of an arm in one configuration: its body, its fibers, and how wide they are."""
+"""The surface of an arm in one configuration: its body, its bundles, and how wide they are."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.errors import InvalidInput
-from softreach.geometry.tube import ribbon_mesh, tube_mesh
+from softreach.geometry.surface import Surface
+from softreach.geometry.tube import ribbon_surface, tube_surface
 from softreach.schema import configuration_dataset
 
 if TYPE_CHECKING:
@@ -16,7 +17,13 @@ if TYPE_CHECKING:
 
     from softreach.arm.manipulator import Manipulator
 
-__all__ = ["arm_mesh", "band_mesh", "fiber_bands", "fiber_curves", "rest_configuration"]
+__all__ = [
+    "arm_surface",
+    "bundle_bands",
+    "bundle_curves",
+    "bundle_surfaces",
+    "rest_configuration",
+]
 
 Array = NDArray[np.float64]
 
@@ -44,25 +51,22 @@ def rest_configuration(arm: Manipulator, stations: int = 101) -> xr.Dataset:
     return shape.isel(sample=0)
 
 
-def arm_mesh(configuration: xr.Dataset, sides: int = 32) -> tuple[Array, NDArray[np.int64]]:
+def arm_surface(configuration: xr.Dataset, sides: int = 32) -> Surface:
     """The body of the arm as a closed tube.
 
     Args:
         configuration: One configuration: position and radius [m], directors, along `station`.
         sides: Corners of each section.
 
-    Returns:
-        Vertices [m], shape (v, 3); outward faces, shape (f, 3).
-
     Raises:
         InvalidInput: Several configurations, or fewer than three sides.
     """
     position, directors = _frame(configuration)
     radius = configuration["radius"].values
-    return tube_mesh(position, directors[:, 0], directors[:, 1], radius, sides)
+    return tube_surface(position, directors[:, 0], directors[:, 1], radius, sides)
 
 
-def fiber_curves(arm: Manipulator, configuration: xr.Dataset) -> Array:
+def bundle_curves(arm: Manipulator, configuration: xr.Dataset) -> Array:
     """The center line of every bundle on the surface: r + R2 (cos a d1 + sin a d2).
 
     Args:
@@ -80,7 +84,7 @@ def fiber_curves(arm: Manipulator, configuration: xr.Dataset) -> Array:
     ]
 
 
-def fiber_bands(
+def bundle_bands(
     arm: Manipulator, configuration: xr.Dataset, *, lift: float = 0.0, step: float = np.pi / 32
 ) -> list[Array]:
     """Strips of the surface that show the angular extent σ of every bundle.
@@ -106,9 +110,9 @@ def fiber_bands(
     return bands
 
 
-def band_mesh(
+def bundle_surfaces(
     arm: Manipulator, configuration: xr.Dataset, thickness: float = 0.04
-) -> list[tuple[Array, NDArray[np.int64]]]:
+) -> list[Surface]:
     """Every bundle as a closed skin, half sunk into the surface.
 
     Args:
@@ -116,16 +120,13 @@ def band_mesh(
         configuration: One configuration of that arm.
         thickness: Of the skin, in R2 [-].
 
-    Returns:
-        Vertices [m] and outward faces of each bundle.
-
     Raises:
         InvalidInput: Several configurations.
     """
-    inner = fiber_bands(arm, configuration, lift=-thickness / 2)
-    outer = fiber_bands(arm, configuration, lift=thickness / 2)
+    inner = bundle_bands(arm, configuration, lift=-thickness / 2)
+    outer = bundle_bands(arm, configuration, lift=thickness / 2)
     # along x across is d3 x e_θ = -e_R: the inner patch is the upper one
-    return [ribbon_mesh(high, low) for low, high in zip(inner, outer, strict=True)]
+    return [ribbon_surface(high, low) for low, high in zip(inner, outer, strict=True)]
 
 
 def _surface(configuration: xr.Dataset, angles: ArrayLike, reach: float = 1.0) -> Array:

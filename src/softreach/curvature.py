@@ -1,22 +1,24 @@
 """How much an arm bends, twists and stretches over a whole cloud, station by station (section 4).
 
-Everything is linear in the activations but the size of the bending, so the statistics are streamed:
-blocks of samples fill histograms, and no array of samples by stations ever exists.
+The statistics are streamed: blocks of samples fill histograms whose bins span what the activation
+box allows, and no array of all samples by stations ever exists.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach import parallel
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.tables import Tables, tables
-from softreach.cloud import design_of
+from softreach.cloud import tip_map_of
 from softreach.errors import InvalidInput
+from softreach.rod.tip_map import Strains, TipMap, tip_map
+from softreach.schema import provenance
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,8 +43,7 @@ QUANTITIES = {
 }
 """Quantity -> unit and meaning."""
 
-_BLOCK = 65_536  # samples at a time: their values at one station stay in the cache
-_HEADINGS = 720
+_AT_A_TIME = 1 << 19  # samples times stations whose strains stay in the cache
 
 
 def curvature_statistics(
@@ -57,10 +58,13 @@ def curvature_statistics(
     Curvatures are per unit of activated arclength, in the directors. Memory does not grow with the
     number of stations times samples.
 
+    Two things limit the numbers: quantiles are good to one bin, and all of them are those of a
+    sample, whose mean is off by about `..._std` / √n, with n in the attribute `samples`.
+
     Args:
         cloud: A cloud; its design and activations are used.
         stations: Z [m], shape (station,); None for six even stations of the distal half.
-        bins: Bins of each histogram; quantiles are good to one bin.
+        bins: Bins of each histogram.
         quantiles: Which quantiles, each in [0, 1].
 
     Returns:
@@ -71,12 +75,13 @@ def curvature_statistics(
         InvalidInput: Stations off the arm, or bins or quantiles out of range.
     """
     activation = cloud["activation"].transpose("sample", "bundle").values
-    rows = (activation[first : first + _BLOCK] for first in range(0, len(activation), _BLOCK))
-    return stream_statistics(design_of(cloud), rows, stations, bins=bins, quantiles=quantiles)
+    return stream_statistics(
+        tip_map_of(cloud), [activation], stations, bins=bins, quantiles=quantiles
+    )
 
 
 def stream_statistics(
-    arm: Manipulator,
+    arm: Manipulator | TipMap,
     activations: Iterable[Array],
     stations: ArrayLike | None = None,
     *,
@@ -86,7 +91,7 @@ def stream_statistics(
     """`curvature_statistics` of activations that arrive in blocks, inside the arm's bounds.
 
     Args:
-        arm: The design.
+        arm: The design, or its tip map.
         activations: Blocks of γ [-], shape (n, bundles) each.
         stations: As for `curvature_statistics`.
         bins: As for `curvature_statistics`.
@@ -95,69 +100,38 @@ def stream_statistics(
     Raises:
         InvalidInput: As for `curvature_statistics`; also no activations at all.
     """
-    z = _checked_stations(arm, stations)
+    rod = tip_map(arm)
+    z = _checked_stations(rod, stations)
     _check_resolution(bins, quantiles)
-    table = tables(arm, z)
-    tallies = {name: _Tally.between(*_range(arm, table, name), bins) for name in QUANTITIES}
-    for block in activations:
+    ranges = rod.strain_range(z)._asdict()
+    tallies = {name: _Tally.between(ranges[name], bins) for name in QUANTITIES}
+    for strains in _strains(rod, activations, z):
         for k in range(len(z)):
-            for name, tally in tallies.items():
-                tally.add(k, _VALUES[name](table, k, block))
+            for name, values in _at_station(strains, k).items():
+                tallies[name].add(k, values)
     if not tallies["bending"].count.any():
         raise InvalidInput("activations", "none", "one sample at least")
-    return _dataset(arm, z, tallies, quantiles)
+    return _dataset(rod, z, tallies, quantiles)
 
 
-def distal_stations(arm: Manipulator, count: int = 6) -> Array:
+def distal_stations(arm: Manipulator | TipMap, count: int = 6) -> Array:
     """Even stations from the middle of the arm to its tip, both included, Z [m] (figure 3c)."""
     return np.linspace(0.5, 1.0, count) * arm.length
 
 
-def _bending(table: Tables, k: int, gamma: Array) -> Array:
-    u1, u2 = (_response(gamma, row) for row in table.curvature[k, :2])
-    return np.hypot(u1, u2)  # theory (45)
+def _strains(rod: TipMap, activations: Iterable[Array], z: Array) -> Iterator[Strains]:
+    """Strains of a few samples after the other."""
+    strains = rod.strains_at(z)
+    for block in activations:
+        for rows in parallel.blocks(len(block), max(1, _AT_A_TIME // len(z))):
+            yield strains(block[rows])
 
 
-def _torsion(table: Tables, k: int, gamma: Array) -> Array:
-    return _response(gamma, table.curvature[k, 2])  # theory (7)
-
-
-def _extension(table: Tables, k: int, gamma: Array) -> Array:
-    return 1.0 + _response(gamma, table.extension[k])  # theory (7)
-
-
-def _response(gamma: Array, row: Array) -> Array:
-    """Σ_j row_j γ_j, in one order whatever BLAS and its threads would do."""
-    total = gamma[:, 0] * row[0]
-    for j in range(1, len(row)):
-        total += gamma[:, j] * row[j]
-    return total
-
-
-_VALUES: dict[str, Callable[[Tables, int, Array], Array]] = {
-    "bending": _bending,
-    "torsion": _torsion,
-    "extension": _extension,
-}
-
-
-def _range(arm: Manipulator, table: Tables, name: str) -> tuple[Array, Array]:
-    """What the activation box allows at each station: lower and upper end, shape (station,)."""
-    if name == "bending":
-        return np.zeros(len(table.stations)), _most_bending(arm, table)
-    row = table.curvature[:, 2] if name == "torsion" else table.extension
-    ends = row[..., None] * arm.bounds
-    offset = 1.0 if name == "extension" else 0.0
-    return offset + ends.min(-1).sum(-1), offset + ends.max(-1).sum(-1)
-
-
-def _most_bending(arm: Manipulator, table: Tables) -> Array:
-    """An upper bound of κ, at most 1e-5 too large: the support of (u1, u2) in many directions."""
-    heading = np.linspace(0.0, 2.0 * np.pi, _HEADINGS, endpoint=False)
-    toward = np.stack([np.cos(heading), np.sin(heading)], axis=1)
-    along = np.einsum("hc,scf->shf", toward, table.curvature[:, :2])
-    support = (along[..., None] * arm.bounds).max(-1).sum(-1)
-    return support.max(axis=1) / np.cos(np.pi / _HEADINGS)
+def _at_station(strains: Strains, k: int) -> dict[str, Array]:
+    """The values of each quantity at station k, shape (n,)."""
+    u1, u2, u3 = (strains.curvature[:, k, axis] for axis in range(3))
+    # theory (7), (45)
+    return {"bending": np.hypot(u1, u2), "torsion": u3, "extension": strains.extension[:, k]}
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +145,9 @@ class _Tally:
     moments: Array
 
     @classmethod
-    def between(cls, low: Array, high: Array, bins: int) -> _Tally:
+    def between(cls, ends: Array, bins: int) -> _Tally:
+        """No values yet, in bins from the lower to the upper end of each row."""
+        low, high = ends.T
         stations = len(low)
         # A quantity that cannot vary still needs bins of some width.
         width = np.maximum(high - low, 1e-12 * np.maximum(np.abs(high), 1.0)) / bins
@@ -184,13 +160,13 @@ class _Tally:
         if not len(values):
             return
         bins = self.count.shape[1]
-        place = ((values - self.low[k]) / self.width[k]).astype(np.int64)
-        self.count[k] += np.bincount(np.clip(place, 0, bins - 1), minlength=bins)
-        low, high = self.extremes[k]
-        self.extremes[k] = min(low, values.min()), max(high, values.max())
         # About the lower end, so that a narrow range far from zero loses no digits.
         shifted = values - self.low[k]
-        self.moments[k] += shifted.sum(), (shifted * shifted).sum()
+        place = (shifted / self.width[k]).astype(np.int64)
+        self.count[k] += np.bincount(np.clip(place, 0, bins - 1, out=place), minlength=bins)
+        low, high = self.extremes[k]
+        self.extremes[k] = min(low, values.min()), max(high, values.max())
+        self.moments[k] += shifted.sum(), np.square(shifted, out=shifted).sum()
 
     @property
     def edges(self) -> Array:
@@ -219,7 +195,7 @@ def _quantiles(
 
 
 def _dataset(
-    arm: Manipulator, z: Array, tallies: dict[str, _Tally], quantiles: Sequence[float]
+    rod: TipMap, z: Array, tallies: dict[str, _Tally], quantiles: Sequence[float]
 ) -> xr.Dataset:
     import xarray as xr
 
@@ -239,15 +215,17 @@ def _dataset(
         "Z": ("station", z, {"units": "m", "long_name": "station before activation"}),
         "quantile": np.asarray(quantiles, float),
     }
-    return xr.Dataset(variables, coordinates, {"design": arm.to_toml(), "length": arm.length})
+    samples = int(tallies["bending"].count[0].sum())
+    attrs = {**provenance(rod.arm), "length": rod.length, "samples": samples}
+    return xr.Dataset(variables, coordinates, attrs)
 
 
-def _checked_stations(arm: Manipulator, stations: ArrayLike | None) -> Array:
+def _checked_stations(rod: TipMap, stations: ArrayLike | None) -> Array:
     if stations is None:
-        return distal_stations(arm)
+        return distal_stations(rod)
     z = np.atleast_1d(np.asarray(stations, float))
-    if z.ndim != 1 or not z.size or not ((z >= 0) & (z <= arm.length)).all():
-        raise InvalidInput("stations", stations, f"Z within [0, {arm.length:g}] m")
+    if z.ndim != 1 or not z.size or not ((z >= 0) & (z <= rod.length)).all():
+        raise InvalidInput("stations", stations, f"Z within [0, {rod.length:g}] m")
     return z
 
 

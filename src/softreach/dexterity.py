@@ -65,22 +65,24 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
     return result
 
 
-def solution_measure(cloud: xr.Dataset, cell: float | None = None) -> xr.Dataset:
+def solution_measure(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Dataset:
     """How many activations reach each place: a number, or the size of the family of solutions.
 
     For three bundles it is the number of activations that reach a place; with four they form
     curves in the activation box, whose length this is; with five surfaces, whose area; and so on.
     No inverse problem is solved: by the coarea formula ([Federer1969], 3.2.12) the integral of that
     measure over a cell is ∫ √det(J Jᵀ) dγ over the activations that lead into it, here the mean
-    over a cloud that fills the activation box evenly. Values are means over a cell, with the
-    noise of so many samples; cells that the border of the cloud cuts count as they are.
+    over a cloud that fills the activation box evenly. Values are means over a cell; a cell that
+    the border of the reachable set cuts has a mean over its empty part too.
 
     Args:
         cloud: A cloud of three bundles or more, sampled evenly: uniform or sobol.
         cell: Edge of the cells [m]; None for L/20.
 
     Returns:
-        Dataset over the centers x, y, z [m] of cells: `solution_measure` [-], 0 where no tip is.
+        Dataset over the centers x, y, z [m] of cells: `solution_measure` [-], 0 where no tip is,
+        and `solution_measure_error`, its standard error for independent samples; those of a Sobol
+        sequence are better.
 
     Raises:
         InvalidInput: The dataset is no cloud, of fewer bundles, of one that cannot be activated, or
@@ -96,9 +98,16 @@ def solution_measure(cloud: xr.Dataset, cell: float | None = None) -> xr.Dataset
         raise InvalidInput("activation_bounds", space.bounds, "apart for every bundle")
     grid = tip_cells(cloud, cell)
     # theory (43)
-    total = box / n / grid.volume * grid.sum(dexterity(cloud)["manipulability"].values)
+    weight = dexterity(cloud)["manipulability"].values
+    total, squares = grid.sum(weight), grid.sum(weight * weight)
+    scale, scatter = box / n / grid.volume, np.sqrt((squares - total**2 / n).clip(0.0))
     name = {"units": "1", "long_name": "activations that reach a place: number, length, area, ..."}
-    return cell_dataset(grid, solution_measure=(total, name))
+    error = {"units": "1", "long_name": "standard error of solution_measure"}
+    return cell_dataset(
+        grid,
+        solution_measure=(scale * total, name),
+        solution_measure_error=(scale * scatter, error),
+    )
 
 
 def _tasks(slope: Array, measure: Array, condition: Array, sign: Signs) -> Iterator[partial[None]]:
@@ -109,7 +118,7 @@ def _tasks(slope: Array, measure: Array, condition: Array, sign: Signs) -> Itera
 def _measure(slope: Array, measure: Array, condition: Array, sign: Signs) -> None:
     sigma = np.linalg.svd(slope, compute_uv=False)
     measure[:] = sigma.prod(axis=1)  # theory (41)
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):  # no motion at all: 0/0 is NaN
         condition[:] = sigma[:, 0] / sigma[:, -1]
     if slope.shape[2] == 3:
         sign[:] = np.sign(np.linalg.det(slope))

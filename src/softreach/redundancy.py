@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.errors import InvalidInput
 from softreach.geometry.neighbors import mean_value_distance
+from softreach.quantity import quantity
 from softreach.schema import cell_dataset, check_cloud, tip_cells
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ THRESHOLD = 0.25  # between a minimal arm's D̄ of some 0.05 and a redundant one
 
 
 def activation_distance(
-    cloud: xr.Dataset, radius: float, queries: int | ArrayLike | None = None
+    cloud: xr.Dataset, radius: float, *, queries: int | ArrayLike | None = None
 ) -> xr.DataArray:
     """Mean activation-space distance of tips to their neighbors (section 5; theory (44)).
 
@@ -43,14 +44,14 @@ def activation_distance(
     result does not depend on the number of threads.
 
     Args:
-        cloud: tip(sample, axis) [m] and activation(sample, fiber) [-].
+        cloud: tip(sample, axis) [m] and activation(sample, bundle) [-].
         radius: r [m]; the paper's is L/60. 0 leaves the tips at the same place.
         queries: How many samples are evaluated, one from each of as many equal parts of the
             cloud, always the same ones; or their indices; None for all.
 
     Returns:
         D̄ [-] over `sample`, whose coordinate is the index in the cloud; the coordinate
-        `neighbors` is K.
+        `neighbors` is K. D̄ of one point scatters by about 1/√K of the spread among its neighbors.
 
     Raises:
         InvalidInput: No cloud, tips or activations that are not finite, a radius below zero, or
@@ -77,9 +78,13 @@ def activation_distance(
     )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class RedundancySummary:
-    """D̄ of a cloud in numbers; isolated points count in `isolated` alone."""
+    """D̄ of a cloud in numbers; isolated points count in `isolated` alone.
+
+    Errors are standard errors for points that are drawn independently. The shares of volume have
+    none: they depend on the size of the cells, and on how much of what is occupied is measured.
+    """
 
     evaluated: int
     """Number of points evaluated."""
@@ -87,18 +92,52 @@ class RedundancySummary:
     """Share of them without a neighbor [-]."""
     median: float
     """Median of D̄ [-]."""
+    median_error: float
+    """Half the distance of the quantiles that a median of so many points scatters between [-]."""
     quantiles: dict[float, float]
     """Quantiles of D̄ [-] by probability."""
     threshold: float
     """The D̄ [-] above which a place counts as redundant."""
     redundant_points: float
     """Share of the points whose D̄ exceeds the threshold [-]."""
+    redundant_points_error: float
+    """√(p (1 - p) / points) of that share p [-]."""
     redundant_volume: float
     """Share of the measured volume in whose cells the mean D̄ exceeds the threshold [-]."""
     measured_volume: float
     """Volume of the cells that hold an evaluated point with neighbors [m³]."""
     occupied_volume: float
     """Volume of the cells that hold a tip of the cloud [m³]."""
+
+    def to_dataset(self) -> xr.Dataset:
+        """All numbers with their units, `quantiles` over `quantile`."""
+        import xarray as xr
+
+        numbers = {name: value for name, value in vars(self).items() if name != "quantiles"}
+        units = {name: "m3" if name in _VOLUMES else "1" for name in numbers}
+        return xr.Dataset(
+            {
+                **{name: ((), value, {"units": units[name]}) for name, value in numbers.items()},
+                "quantiles": ("quantile", list(self.quantiles.values()), {"units": "1"}),
+            },
+            {"quantile": list(self.quantiles)},
+        )
+
+    def __repr__(self) -> str:
+        shares = ", ".join(f"{100 * p:g} % below {d:.3g}" for p, d in self.quantiles.items())
+        points = quantity(100 * self.redundant_points, "%", 100 * self.redundant_points_error)
+        measured = self.measured_volume / self.occupied_volume
+        return (
+            f"RedundancySummary: median D̄ {quantity(self.median, error=self.median_error)}, "
+            f"{shares}\n"
+            f"  D̄ > {self.threshold:g} for {points} of the points, "
+            f"{100 * self.redundant_volume:.3g} % of the volume\n"
+            f"  {self.evaluated:,} points evaluated, {100 * self.isolated:.3g} % isolated; "
+            f"{100 * measured:.3g} % of the volume measured"
+        )
+
+
+_VOLUMES = ("measured_volume", "occupied_volume")
 
 
 def redundancy_summary(
@@ -133,9 +172,11 @@ def redundancy_summary(
         evaluated=len(evaluated),
         isolated=_share(np.isnan(distance.values)),
         median=float(np.median(values)) if len(values) else np.nan,
+        median_error=_median_error(values),
         quantiles=dict(zip(map(float, quantiles), found.tolist(), strict=True)),
         threshold=float(threshold),
         redundant_points=_share(values > threshold),
+        redundant_points_error=_share_error(values > threshold),
         redundant_volume=_share(mean[known] > threshold),
         measured_volume=int(known.sum()) * grid.volume,
         occupied_volume=int(np.count_nonzero(grid.count())) * grid.volume,
@@ -143,7 +184,7 @@ def redundancy_summary(
 
 
 def distance_map(
-    cloud: xr.Dataset, distance: xr.DataArray, cell: float | None = None
+    cloud: xr.Dataset, distance: xr.DataArray, *, cell: float | None = None
 ) -> xr.Dataset:
     """Mean D̄ of the evaluated points in each cell of a grid.
 
@@ -154,7 +195,8 @@ def distance_map(
 
     Returns:
         Dataset over the centers x, y, z [m] of cells: `activation_distance` [-], NaN where no point
-        with neighbors was evaluated, and `evaluated`, the number of those points.
+        with neighbors was evaluated; `activation_distance_error`, the standard error of that mean,
+        NaN for fewer than two points; and `evaluated`, the number of points.
 
     Raises:
         InvalidInput: D̄ of another cloud, or cells that are not positive or too many.
@@ -163,15 +205,24 @@ def distance_map(
     count = grid.count(evaluated[np.isfinite(distance.values)])
     name = {"long_name": "mean activation-space distance D̄ in the cell", "units": "1"}
     number = {"long_name": "evaluated points with neighbors", "units": "1"}
+    error = {"long_name": "standard error of activation_distance", "units": "1"}
     mean = grid.mean(distance.values, evaluated)
-    return cell_dataset(grid, activation_distance=(mean, name), evaluated=(count, number))
+    squares = grid.mean(distance.values**2, evaluated)
+    several = np.where(count > 1, count - 1.0, np.nan)
+    scatter = np.sqrt((squares - mean**2).clip(0.0) / several)
+    return cell_dataset(
+        grid,
+        activation_distance=(mean, name),
+        activation_distance_error=(scatter, error),
+        evaluated=(count, number),
+    )
 
 
-def tip_density(cloud: xr.Dataset, cell: float | None = None) -> xr.Dataset:
+def tip_density(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Dataset:
     """Local density of tips, and how uneven it is.
 
     The attribute `coefficient_of_variation` is that of the counts in occupied cells; `chance` is
-    what it would be for points strewn evenly over them, 1 / sqrt(mean count), and `heterogeneity`
+    what it would be for points spread evenly over them, 1 / sqrt(mean count), and `heterogeneity`
     what chance leaves of it: sqrt(coefficient_of_variation² - chance²), 0 at least. Cells that the
     cloud's border cuts count as they are.
 
@@ -180,7 +231,8 @@ def tip_density(cloud: xr.Dataset, cell: float | None = None) -> xr.Dataset:
         cell: Edge of the cells [m]; None for L/20.
 
     Returns:
-        Dataset over the centers x, y, z [m] of cells: `density` [1/m³], 0 where there is no tip.
+        Dataset over the centers x, y, z [m] of cells: `density` [1/m³], 0 where there is no tip,
+        and `density_error`, its standard error for independent samples.
 
     Raises:
         InvalidInput: No cloud, or cells that are not positive or too many.
@@ -188,7 +240,12 @@ def tip_density(cloud: xr.Dataset, cell: float | None = None) -> xr.Dataset:
     grid = tip_cells(cloud, cell)
     count = grid.count()
     name = {"long_name": "tips per volume", "units": "m-3"}
-    return cell_dataset(grid, density=(count / grid.volume, name)).assign_attrs(_unevenness(count))
+    error = {"long_name": "standard error of density", "units": "m-3"}
+    return cell_dataset(
+        grid,
+        density=(count / grid.volume, name),
+        density_error=(np.sqrt(count) / grid.volume, error),
+    ).assign_attrs(_unevenness(count))
 
 
 def _unevenness(count: Index) -> dict[str, float]:
@@ -203,6 +260,20 @@ def _unevenness(count: Index) -> dict[str, float]:
 
 def _share(which: NDArray[np.bool_]) -> float:
     return float(which.mean()) if which.size else np.nan
+
+
+def _share_error(which: NDArray[np.bool_]) -> float:
+    share = _share(which)
+    return float(np.sqrt(share * (1.0 - share) / which.size)) if which.size else np.nan
+
+
+def _median_error(values: Array) -> float:
+    """Half the distance of the quantiles 1/2 ± 1/(2√n), between which a median scatters."""
+    if not len(values):
+        return np.nan
+    reach = min(0.5, 0.5 / np.sqrt(len(values)))
+    low, high = np.quantile(values, [0.5 - reach, 0.5 + reach])
+    return float(high - low) / 2.0
 
 
 def _samples(distance: xr.DataArray, cloud: xr.Dataset) -> Index:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
@@ -24,6 +25,8 @@ __all__ = [
     "check_cloud",
     "cloud_dataset",
     "configuration_dataset",
+    "provenance",
+    "storable",
     "tip_cells",
 ]
 
@@ -55,7 +58,7 @@ def cloud_dataset(
     """A reachability cloud: tips and activations with everything needed to make them again."""
     import xarray as xr
 
-    attrs = {**_provenance(arm), "seed": seed, "sampler": sampler, "tol": tol}
+    attrs = {**provenance(arm), "seed": seed, "sampler": sampler, "tol": tol}
     variables = _variables(_CLOUD, {"tip": tip, "activation": activation})
     cloud = xr.Dataset(variables, {"axis": list(AXES), "bundle": list(arm.bundle_names)}, attrs)
     cloud.tip.attrs["length"] = arm.length
@@ -76,7 +79,7 @@ def configuration_dataset(
         "component": ["u1", "u2", "u3"],
         "bundle": list(arm.bundle_names),
     }
-    return xr.Dataset(variables, coordinates, _provenance(arm))
+    return xr.Dataset(variables, coordinates, provenance(arm))
 
 
 def check_cloud(cloud: xr.Dataset) -> xr.Dataset:
@@ -104,12 +107,19 @@ def _variables(
     }
 
 
-def _provenance(arm: Manipulator) -> dict[str, object]:
+def provenance(arm: Manipulator) -> dict[str, object]:
+    """Attributes that say which design and version a dataset was computed from."""
     return {
         "design": arm.to_toml(),
-        "softreach_version": version("softreach"),
+        "softreach_version": _version(),
         "schema_version": SCHEMA_VERSION,
     }
+
+
+@cache
+def _version() -> str:
+    """Looking it up takes a millisecond."""
+    return version("softreach")
 
 
 def storable(dataset: xr.Dataset) -> xr.Dataset:

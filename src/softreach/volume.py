@@ -18,7 +18,7 @@ from softreach.geometry.hull import Hull
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["concave_hull", "convex_hull", "unreachability", "volume_curve"]
+__all__ = ["Hull", "concave_hull", "convex_hull", "unreachability", "volume_curve"]
 
 DEFAULT_RADIUS = 0.05  # of the arm's length
 SPACINGS = 3.0  # a smaller radius falls through between the points
@@ -44,7 +44,7 @@ def concave_hull(
     bias than this takes it to have.
 
     ``alpha="critical"`` is the smallest radius at which one region covers all points. Neither it
-    nor the volume there converges with N, as the loneliest point decides: compare clouds at a
+    nor the volume there converges with N, as the most isolated point decides: compare clouds at a
     fixed radius.
 
     Points in one plane, on one line or fewer than four have volume 0 and no faces.
@@ -96,7 +96,10 @@ def unreachability(
 ) -> float:
     """The part of the convex hull that the cloud does not fill, UNR = 1 - V_conc / V_conv [-].
 
-    Both volumes come from one triangulation.
+    Both volumes come from one triangulation. Both are smaller than those of infinitely many points,
+    the first by more, so that the share is some percent too large: `concave_hull` estimates the
+    bias of the volume, and `reachable_set` needs no points. NaN for a cloud without volume, as 0/0
+    says nothing.
 
     Args:
         points: Tips [m], shape (n, 3), or ``cloud.tip``.
@@ -104,7 +107,7 @@ def unreachability(
         method: Who triangulates.
 
     Raises:
-        InvalidInput: As `concave_hull`; also a cloud without volume, as 0/0 says nothing.
+        InvalidInput: As `concave_hull`.
 
     Warns:
         SoftreachWarning: The radius is below three mean spacings of the points.
@@ -113,11 +116,9 @@ def unreachability(
     radius = _radius(alpha, points)
     shape = _alpha_complex(positions, method)
     convex = float(shape.volumes.sum())
-    if convex == 0.0:
-        raise InvalidInput("points", "a cloud of volume 0", "spread in all three directions")
     hull = shape.hull(shape.critical_alpha() if radius == "critical" else float(radius))
     _warn_if_fine(hull, convex)
-    return 1.0 - hull.volume / convex  # theory (37)
+    return 1.0 - hull.volume / convex if convex > 0 else np.nan  # theory (37)
 
 
 def volume_curve(
@@ -179,7 +180,7 @@ def _alpha_complex(positions: np.ndarray, method: Method) -> AlphaComplex:
 
 
 def _warn_if_fine(hull: Hull, convex_volume: float) -> None:
-    """Say so if the radius is too small for the density of the points.
+    """Warn if the radius is too small for the density of the points.
 
     A shape that has fallen apart has hardly any volume, hence no spacing of its own to judge by:
     the convex hull bounds it from below, for clouds that fill a fifth of their hull or more.

@@ -13,7 +13,8 @@ from scipy.sparse.csgraph import connected_components
 
 from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.geometry.delaunay import delaunay
-from softreach.geometry.hull import convex_hull, enclosed_volume
+from softreach.geometry.hull import convex_hull
+from softreach.geometry.surface import enclosed_volume
 from tests.geometry.clouds import DEGENERATE, FLAT, arc_tips, random_points
 from tests.geometry.exact import rational
 

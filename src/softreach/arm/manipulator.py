@@ -219,6 +219,12 @@ class Manipulator:
             outer_ratio=np.concatenate([one.outer_ratio for one in each]),
         )
 
+    def _repr_html_(self) -> str:
+        """A small picture and the size of the arm, for notebooks."""
+        from softreach.arm.portrait import arm_card
+
+        return arm_card(self)
+
     def _fiber_index(self, fiber: str | int) -> int:
         """Place of a fiber architecture among the actuators, from its name or its place."""
         names = {

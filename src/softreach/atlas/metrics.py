@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from operator import attrgetter
 from typing import TYPE_CHECKING
@@ -110,7 +110,7 @@ _CONCAVE = (
     Metric(
         name="regions",
         unit="1",
-        meaning="parts of the alpha shape that hang together",
+        meaning="parts of the alpha shape, connected through faces",
         needs=(Need.ALPHA_COMPLEX, Need.ALPHA),
         compute=AlphaComplex.regions,
     ),
@@ -124,14 +124,27 @@ _CONCAVE = (
 )
 
 
+def _multiplicity(reached: ReachableSet) -> Mapping[int, float]:
+    """Volume by number of activations; none where there is no volume."""
+    from softreach.workspace import ReachableSolid
+
+    return reached.multiplicity if isinstance(reached, ReachableSolid) else {}
+
+
+def _fold_volume(reached: ReachableSet) -> float:
+    from softreach.workspace import ReachableSolid
+
+    return reached.fold_volume if isinstance(reached, ReachableSolid) else 0.0
+
+
 def _mean_multiplicity(reached: ReachableSet) -> float:
-    volumes = reached.multiplicity
+    volumes = _multiplicity(reached)
     whole = sum(volumes.values())
     return sum(k * volume for k, volume in volumes.items()) / whole if whole > 0 else math.nan
 
 
 def _multiple_volume(reached: ReachableSet) -> float:
-    volumes = reached.multiplicity
+    volumes = _multiplicity(reached)
     return sum(volume for k, volume in volumes.items() if k > 1) if volumes else math.nan
 
 
@@ -188,7 +201,8 @@ _EXACT = (
         unit="m3",
         meaning="volume reached with both orientations of the map",
         needs=(Need.REACHABLE_SET,),
-        compute=attrgetter("fold_volume"),
+        compute=_fold_volume,
+        nan_if=_FINITE_ONLY,
     ),
 )
 

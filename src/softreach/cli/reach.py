@@ -9,11 +9,14 @@ from cyclopts import Parameter
 
 from softreach.cli.inputs import AsJson, Design, RevolutionDeg, TaperDeg, design_from
 from softreach.cli.output import print_rows
+from softreach.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from softreach.workspace import ReachableSet
+    from softreach.workspace import ReachableSet, ReachableSolid
 
 __all__ = ["reach"]
+
+_LEFT_OUT = "left out for a design with so few free bundles"
 
 
 def reach(
@@ -32,40 +35,62 @@ def reach(
 ) -> None:
     """The exact reachable set: volume with its error, blind share, multiplicity, folds."""
     from softreach import progress
-    from softreach.workspace import reachable_set
+    from softreach.workspace import ReachableSolid, ReachableSurface, reachable_set
 
     arm = design_from(design, revolution_deg, taper_deg)
     with progress.bar("mapping the activation box", None) as shown:
-        found = reachable_set(arm, accuracy=accuracy, report=shown)
+        found = reachable_set(arm, accuracy=accuracy, progress=shown)
     print_rows(f"reachable set of {design}", _rows(found), json)
     if surface is not None:
         from softreach.export import export_mesh
 
+        if not isinstance(found, ReachableSolid | ReachableSurface):
+            raise InvalidInput("surface", surface, _LEFT_OUT)
         export_mesh(found.surface(), surface)
     if figure is not None:
+        if not isinstance(found, ReachableSolid):
+            raise InvalidInput("figure", figure, _LEFT_OUT)
         _draw(found, figure)
 
 
 def _rows(found: ReachableSet) -> dict[str, tuple[Any, str]]:
+    from softreach.workspace import ReachableCurve, ReachablePoint, ReachableSolid, ReachableSurface
+
     length = found.arm.length
-    size, unit = length**found.dimension, ("", "L", "L²", "L³")[found.dimension]
-    rows: dict[str, tuple[Any, str]] = {
-        found.measure_name: (found.measure / size, unit),
-        f"{found.measure_name} error (estimate)": (found.measure_error / size, unit),
-        "convex volume": (found.convex_volume / length**3, "L³"),
-    }
-    if found.dimension < 3:
-        return rows
-    rows["unreachability"] = (found.unreachability, "")
+    convex = {"convex volume": (found.convex_volume / length**3, "L³")}
+    match found:
+        case ReachableSolid():
+            size = _size("volume", found.volume, found.volume_error, length, 3)
+            return size | convex | _solid_rows(found)
+        case ReachableSurface():
+            return _size("area", found.area, found.area_error, length, 2) | convex
+        case ReachableCurve():
+            return _size("length", found.curve_length, found.curve_length_error, length, 1) | convex
+        case ReachablePoint():
+            places = zip("xyz", found.tip, strict=True)
+            return {axis: (float(place) / length, "L") for axis, place in places}
+    raise AssertionError(found)
+
+
+def _size(
+    name: str, value: float, error: float, length: float, dimension: int
+) -> dict[str, tuple[Any, str]]:
+    scale, unit = length**dimension, ("", "L", "L²", "L³")[dimension]
+    return {name: (value / scale, unit), f"{name} error (estimate)": (error / scale, unit)}
+
+
+def _solid_rows(found: ReachableSolid) -> dict[str, tuple[Any, str]]:
+    cube = found.arm.length**3
+    rows: dict[str, tuple[Any, str]] = {"unreachability": (found.unreachability, "")}
     for times, volume in found.multiplicity.items():
         if volume > 1e-7 * found.volume:
-            rows[f"reached by {times} activation{'s' * (times > 1)}"] = (volume / size, unit)
+            rows[f"reached by {times} activation{'s' * (times > 1)}"] = (volume / cube, "L³")
     if found.multiplicity:
-        rows["behind folds"] = (found.fold_volume / size, unit)
+        rows["behind folds"] = (found.fold_volume / cube, "L³")
     return rows
 
 
-def _draw(found: ReachableSet, path: Path) -> None:
+def _draw(found: ReachableSolid, path: Path) -> None:
     from softreach.plot import plot_slices, save_figure
 
     save_figure(plot_slices(found.grid), path)

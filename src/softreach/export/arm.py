@@ -5,7 +5,7 @@ from __future__ import annotations
 from os import PathLike
 from typing import TYPE_CHECKING
 
-from softreach.arm_shape import arm_mesh, band_mesh
+from softreach.arm_shape import arm_surface, bundle_surfaces
 from softreach.export.surface import Part, write_parts
 from softreach.palette import bundle_color
 
@@ -35,9 +35,11 @@ def export_arm(
         InvalidInput: Unknown suffix, or several configurations.
         MissingExtra: The format needs a library that is not installed.
     """
-    parts = [Part("body", *arm_mesh(configuration, sides))]
-    for index, mesh in enumerate(band_mesh(arm, configuration)):
-        parts.append(Part(_part_name(arm.bundle_names, index), *mesh, bundle_color(index)))
+    body = arm_surface(configuration, sides)
+    parts = [Part("body", body.vertices, body.faces)]
+    for index, skin in enumerate(bundle_surfaces(arm, configuration)):
+        name = _part_name(arm.bundle_names, index)
+        parts.append(Part(name, skin.vertices, skin.faces, bundle_color(index)))
     write_parts(parts, path)
 
 

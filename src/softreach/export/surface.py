@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arrays import Faces
 from softreach.errors import InvalidInput
 from softreach.export.formats import load_library, write_by_suffix
 from softreach.palette import BODY, Color
@@ -39,7 +40,7 @@ class Part(NamedTuple):
     name: str
     vertices: NDArray[np.float64]
     """[m], shape (v, 3)."""
-    faces: NDArray[np.int64]
+    faces: Faces
     """Shape (f, 3)."""
     color: Color = BODY
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from softreach import parallel
 from softreach.geometry.delaunay import Delaunay, unit_scale
-from softreach.geometry.hull import Hull, compact_surface, surface_area
+from softreach.geometry.hull import Hull
+from softreach.geometry.surface import compact_surface, surface_area
 from softreach.kernels import alpha as kernels
 
 __all__ = ["AlphaComplex"]
@@ -24,7 +25,7 @@ class AlphaComplex:
 
     The alpha shape of radius α is the union of the tetrahedra whose circumscribed sphere has a
     radius R <= α (Edelsbrunner and Mücke 1994): what is left of the convex hull after a ball of
-    that radius has scooped out everything it can reach without touching a point.
+    that radius has scooped out everything it can reach without enclosing a point.
     """
 
     triangulation: Delaunay
@@ -58,7 +59,7 @@ class AlphaComplex:
         return float(found) if np.ndim(alpha) == 0 else found
 
     def regions(self, alpha: float) -> int:
-        """Number of parts of the shape that hang together by faces."""
+        """Number of parts of the shape that are connected through faces."""
         return int(kernels.join_regions(self.triangulation.neighbors, self.radii <= alpha)[1])
 
     def critical_alpha(self) -> float:
@@ -67,7 +68,7 @@ class AlphaComplex:
         The true smallest: below the radius that covers every point no radius will do, and from
         there on the tetrahedra are added one by one. The number of regions is not monotone in the
         radius, so a bisection over it can settle on a larger one. Neither this radius nor the
-        volume there converges as a random cloud grows: its loneliest point decides.
+        volume there converges as a random cloud grows: its most isolated point decides.
         """
         mesh = self.triangulation
         if len(mesh.tetrahedra) == 0:

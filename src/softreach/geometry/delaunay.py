@@ -75,7 +75,9 @@ def finite_points(points: object) -> Points:
     wrong = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if len(wrong):
         found = f"{len(wrong)} rows with NaN or infinity, the first at index {wrong[0]}"
-        raise InvalidInput("points", found, "finite", "drop these rows or find out whence they are")
+        raise InvalidInput(
+            "points", found, "finite", "drop these rows, or find out where they come from"
+        )
     return array
 
 

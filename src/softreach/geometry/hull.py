@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softreach.arrays import Faces, Points
 from softreach.geometry.delaunay import finite_points, unit_scale
+from softreach.geometry.surface import compact_surface, enclosed_volume, surface_area
+from softreach.quantity import quantity
 
-__all__ = ["Hull", "convex_hull", "enclosed_volume", "surface_area"]
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Hull", "convex_hull"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Hull:
     """Triangles around a cloud, the volume that they enclose, and how far to trust it."""
 
@@ -27,7 +33,7 @@ class Hull:
     alpha: float
     """Radius of the alpha shape [m]; inf for the convex hull."""
     regions: int
-    """Number of parts that hang together by faces."""
+    """Number of parts that are connected through faces."""
     n: int
     """Number of points N of the cloud."""
     volume_corrected: float | None = None
@@ -39,25 +45,63 @@ class Hull:
 
     @property
     def spacing(self) -> float:
-        """Mean distance between neighboring points, (V/N)^(1/3) [m]."""
-        return float(np.cbrt(self.volume / self.n)) if self.n else 0.0
+        """Mean distance between neighboring points, (V/N)^(1/3) [m]; NaN without points."""
+        return float(np.cbrt(self.volume / self.n)) if self.n else np.nan
 
     @property
     def bias(self) -> float | None:
         """By how much the volume is estimated to be off [m³], below zero if it is too small."""
         return None if self.volume_corrected is None else self.volume - self.volume_corrected
 
-    def __repr__(self) -> str:
-        shape = "convex hull" if np.isinf(self.alpha) else f"alpha shape of {self.alpha:.4g} m"
-        size = f"volume {self.volume:.6g} m³, area {self.area:.6g} m²"
-        parts = f"{self.regions} region{'s' * (self.regions != 1)}, {len(self.faces)} faces"
-        return f"<Hull: {shape} around {self.n} points, {size}, {parts}>"
-
     def _repr_html_(self) -> str:
         """What `repr` says below a small picture, for notebooks."""
         from softreach.picture import Skin, html_card
 
         return html_card(repr(self), Skin(self.vertices, self.faces))
+
+    def to_dataset(self) -> xr.Dataset:
+        """`vertices` (vertex, axis) [m], `faces` (face, corner) and the numbers as variables."""
+        import xarray as xr
+
+        numbers = {
+            "volume": (self.volume, "m3", "volume"),
+            "area": (self.area, "m2", "area of the surface, inner walls included"),
+            "alpha": (self.alpha, "m", "radius of the alpha shape"),
+            "regions": (self.regions, "1", "parts connected through faces"),
+            "n": (self.n, "1", "points of the cloud"),
+        }
+        if self.volume_corrected is not None:
+            meaning = "volume without sampling bias (estimate)"
+            numbers["volume_corrected"] = (self.volume_corrected, "m3", meaning)
+        variables: dict[str, Any] = {
+            name: ((), value, {"units": unit, "long_name": meaning})
+            for name, (value, unit, meaning) in numbers.items()
+        }
+        variables["vertices"] = (("vertex", "axis"), self.vertices, {"units": "m"})
+        variables["faces"] = (("face", "corner"), self.faces, {"units": "1"})
+        return xr.Dataset(variables, {"axis": list("xyz")})
+
+    def __repr__(self) -> str:
+        regions = f"{self.regions:,} region" + ("s" if self.regions != 1 else "")
+        return (
+            f"Hull: volume {quantity(self.volume, 'm³')}{self._bias_text}, "
+            f"area {quantity(self.area, 'm²')}, {regions}, {len(self.faces):,} triangles\n"
+            f"  {self._shape_text} of {self.n:,} points"
+        )
+
+    @property
+    def _bias_text(self) -> str:
+        """What the sampling does to the volume, if it was asked."""
+        if self.volume_corrected is None:
+            return ""
+        return f" (without sampling bias some {self.volume_corrected:.4g} m³)"
+
+    @property
+    def _shape_text(self) -> str:
+        if np.isinf(self.alpha):
+            return "convex hull"
+        spacings = f" ({self.alpha / self.spacing:.2g} mean spacings)" if self.volume > 0 else ""
+        return f"alpha shape, alpha = {self.alpha:.4g} m{spacings},"
 
 
 def convex_hull(points: np.ndarray) -> Hull:
@@ -102,28 +146,3 @@ def _convex_surface(points: Points) -> tuple[Points, Faces]:
     faces = hull.simplices.copy()
     faces[inward] = faces[inward][:, ::-1]
     return compact_surface(points, faces)
-
-
-def compact_surface(points: Points, faces: Faces) -> tuple[Points, Faces]:
-    """The points that faces use, and the faces in their numbering."""
-    used = np.zeros(len(points), bool)
-    used[faces] = True
-    number = np.cumsum(used, dtype=np.int32) - np.int32(1)
-    return points[used], number[faces]
-
-
-def enclosed_volume(vertices: Points, faces: Faces) -> float:
-    """Volume inside an oriented closed surface [m³] by the divergence theorem."""
-    if len(faces) == 0:
-        return 0.0
-    scaled, exponent = unit_scale(vertices)
-    a, b, c = np.moveaxis((scaled - scaled.mean(axis=0))[faces], 1, 0)
-    return float(np.ldexp(np.einsum("fi,fi->", a, np.cross(b, c)) / 6.0, 3 * exponent))
-
-
-def surface_area(vertices: Points, faces: Faces) -> float:
-    """Area of a surface [m²]."""
-    scaled, exponent = unit_scale(vertices)  # squares of squares overflow early
-    a, b, c = np.moveaxis(scaled[faces], 1, 0)
-    twice = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
-    return float(np.ldexp(twice / 2.0, 2 * exponent))

@@ -1,4 +1,4 @@
-"""Closed triangle meshes along curves: tubes of varying radius, and ribbons with a thickness."""
+"""Closed surfaces along curves: tubes of varying radius, and ribbons with a thickness."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.errors import InvalidInput
+from softreach.geometry.surface import Surface
 
-__all__ = ["grid_faces", "ribbon_mesh", "tube_mesh"]
+__all__ = ["grid_faces", "ribbon_surface", "tube_surface"]
 
 Array = NDArray[np.float64]
 Faces = NDArray[np.int64]
-TriangleMesh = tuple[Array, Faces]
 
 
-def tube_mesh(
+def tube_surface(
     centerline: ArrayLike,
     normal: ArrayLike,
     binormal: ArrayLike,
     radii: ArrayLike,
     sides: int = 32,
-) -> TriangleMesh:
+) -> Surface:
     """A tube of circular sections, capped at both ends, with outward faces.
 
     Args:
@@ -32,8 +32,8 @@ def tube_mesh(
         sides: Corners of each section.
 
     Returns:
-        Vertices [m], shape (stations * sides + 2, 3), ring by ring with the centers of the two caps
-        last; faces, shape (2 * stations * sides, 3).
+        stations * sides + 2 vertices, ring by ring with the centers of the two caps last;
+        2 * stations * sides faces.
 
     Raises:
         InvalidInput: Fewer than two stations or three sides.
@@ -46,10 +46,11 @@ def tube_mesh(
     spokes += np.multiply.outer(np.sin(angles), np.asarray(binormal, float))
     reach = np.broadcast_to(np.asarray(radii, float), len(center))[:, None]
     rings = (center + reach * spokes).swapaxes(0, 1).reshape(-1, 3)
-    return np.concatenate([rings, center[[0, -1]]]), _tube_faces(len(center), sides)
+    vertices = np.concatenate([rings, center[[0, -1]]])
+    return Surface(vertices=vertices, faces=_tube_faces(len(center), sides))
 
 
-def ribbon_mesh(lower: ArrayLike, upper: ArrayLike) -> TriangleMesh:
+def ribbon_surface(lower: ArrayLike, upper: ArrayLike) -> Surface:
     """The closed skin between two surface patches: a ribbon with a thickness.
 
     Args:
@@ -57,7 +58,7 @@ def ribbon_mesh(lower: ArrayLike, upper: ArrayLike) -> TriangleMesh:
         upper: The other, same shape, on the side that (along x across) points to.
 
     Returns:
-        Vertices [m], shape (2 * stations * across, 3), `lower` first; outward faces.
+        2 * stations * across vertices, those of `lower` first; outward faces.
 
     Raises:
         InvalidInput: Patches of different shapes or fewer than two points along a side.
@@ -70,7 +71,8 @@ def ribbon_mesh(lower: ArrayLike, upper: ArrayLike) -> TriangleMesh:
     wall = np.column_stack([rim, np.roll(rim, -1)])
     quads = [_grid(index)[:, ::-1], _grid(index) + index.size]
     quads += [np.column_stack([wall, wall[:, ::-1] + index.size])]
-    return np.concatenate([low.reshape(-1, 3), high.reshape(-1, 3)]), _halves(np.concatenate(quads))
+    vertices = np.concatenate([low.reshape(-1, 3), high.reshape(-1, 3)])
+    return Surface(vertices=vertices, faces=_halves(np.concatenate(quads)))
 
 
 def grid_faces(stations: int, across: int) -> Faces:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm_shape import arm_mesh, fiber_bands, rest_configuration
+from softreach.arm_shape import arm_surface, bundle_bands, rest_configuration
 from softreach.geometry.tube import grid_faces
 from softreach.palette import BODY, bundle_color
 from softreach.picture.projection import View
@@ -83,7 +83,7 @@ def shapes_of(configuration: xr.Dataset | None) -> list[xr.Dataset]:
 
 def arm_points(arm: Manipulator, shape: xr.Dataset) -> Array:
     """Points of the surface of one configuration [L], shape (n, 3)."""
-    return arm_mesh(shape, _SIDES)[0] / arm.length
+    return arm_surface(shape, _SIDES).vertices / arm.length
 
 
 def _show(
@@ -109,11 +109,11 @@ def _draw(
     bundles: Collection[int],
     fade: float,
 ) -> None:
-    vertices, faces = arm_mesh(shape, _SIDES)
+    body = arm_surface(shape, _SIDES)
     caps = 2 * _SIDES  # the last faces; apart, so that light breaks at the rim
-    for part in (faces[:-caps], faces[-caps:]):
-        draw_mesh(buffer, vertices / arm.length, part, BODY, view, fade)
-    bands = fiber_bands(arm, shape, lift=0.008)
+    for part in (body.faces[:-caps], body.faces[-caps:]):
+        draw_mesh(buffer, body.vertices / arm.length, part, BODY, view, fade)
+    bands = bundle_bands(arm, shape, lift=0.008)
     for index in bundles:
         band = bands[index]
         skin = grid_faces(*band.shape[:2])

@@ -3,12 +3,21 @@
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.free_bundles import FreeBundles, free_bundles
 from softreach.rod.kinematics import configuration, tip_jacobian, tip_positions
-from softreach.rod.tip_map import Frames, Strains, TipMap, TipMotions, TipStatus, tip_map
+from softreach.rod.tip_map import (
+    Frames,
+    StrainRange,
+    Strains,
+    TipMap,
+    TipMotions,
+    TipStatus,
+    tip_map,
+)
 
 __all__ = [
     "ActivationBox",
     "Frames",
     "FreeBundles",
+    "StrainRange",
     "Strains",
     "TipMap",
     "TipMotions",

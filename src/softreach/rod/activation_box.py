@@ -81,6 +81,11 @@ class ActivationBox:
         """Number of free bundles."""
         return len(self.free)
 
+    @property
+    def volume(self) -> float:
+        """Product of the widths of the free bundles; 1 if none is."""
+        return float(np.prod(self.widths[self.free]))
+
     def from_cube(self, cube: Array, out: Array | None = None) -> Array:
         """Activations of points of the unit cube that has an axis for every bundle.
 

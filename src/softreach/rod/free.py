@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -13,8 +14,17 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import check_extension, tables
 from softreach.kernels import frames, jacobian, rod
 from softreach.rod.activation_box import ActivationBox
+from softreach.rod.linear_strains import linear_strains, strain_range
 from softreach.rod.steps import StepRule, check_tol
-from softreach.rod.tip_map import BLOCK, Frames, Strains, TipMap, position_slopes
+from softreach.rod.tip_map import (
+    BLOCK,
+    Frames,
+    StrainRange,
+    Strains,
+    TipMap,
+    position_slopes,
+    tip_map,
+)
 
 __all__ = ["FreeRod"]
 
@@ -45,6 +55,10 @@ class FreeRod(TipMap):
     @cached_property
     def _box(self) -> ActivationBox:
         return ActivationBox.between(self.arm.bounds, self.arm.bundle_names)
+
+    def refined(self, tol: float) -> TipMap:
+        """The map of the same arm to a smaller tolerance; itself if its own is no larger."""
+        return self if self.tol <= tol else tip_map(self.arm, tol)
 
     @cached_property
     def rule(self) -> StepRule:
@@ -96,13 +110,14 @@ class FreeRod(TipMap):
         )
         return found
 
-    def strains(self, activations: ArrayLike, stations: ArrayLike) -> Strains:
-        """U = Uγ and ζ = 1 + z·γ at stations Z [m]: theory (7)."""
-        gamma = self.box.check(activations)
-        local = tables(self.arm, self.check_stations(stations))
-        return Strains(
-            np.einsum("scb,nb->nsc", local.curvature, gamma), 1.0 + gamma @ local.extension.T
-        )
+    def strains_at(self, stations: ArrayLike) -> Callable[[ArrayLike], Strains]:
+        """u = Uγ and ζ = 1 + z·γ at stations Z [m] as a function of activations: theory (7)."""
+        table = tables(self.arm, self.check_stations(stations))
+        return lambda activations: linear_strains(table, self.box.check(activations))
+
+    def strain_range(self, stations: ArrayLike) -> StrainRange:
+        """What the strains at stations Z [m] can be within the activation box."""
+        return strain_range(tables(self.arm, stations), self.box)
 
     def radius(self, stations: ArrayLike) -> Array:
         """Outer radius R2 before activation at stations Z [m]."""

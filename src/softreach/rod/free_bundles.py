@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.tip_map import Frames, Strains, TipMap
+from softreach.rod.tip_map import Frames, StrainRange, Strains, TipMap
 
 __all__ = ["FreeBundles", "free_bundles"]
 
@@ -42,6 +43,10 @@ class FreeBundles(TipMap):
     def _box(self) -> ActivationBox:
         return self.whole.box.of_free_bundles()
 
+    def refined(self, tol: float) -> TipMap:
+        """The map of the same bundles to a smaller tolerance; itself if its own is no larger."""
+        return self if self.tol <= tol else free_bundles(self.whole.refined(tol))
+
     def fill_tips(self, gamma: Array, out: Array) -> None:
         """Put the tips [m] of checked activations into `out`, (n, 3), on the calling thread."""
         self.whole.fill_tips(self._all(gamma), out)
@@ -61,9 +66,14 @@ class FreeBundles(TipMap):
         """Centerline and directors at ascending stations Z [m]."""
         return self.whole.frames(self._all(self.box.check(activations)), stations)
 
-    def strains(self, activations: ArrayLike, stations: ArrayLike) -> Strains:
-        """Curvature and extension at stations Z [m]."""
-        return self.whole.strains(self._all(self.box.check(activations)), stations)
+    def strains_at(self, stations: ArrayLike) -> Callable[[ArrayLike], Strains]:
+        """The strains at stations Z [m] as a function of activations."""
+        strains = self.whole.strains_at(stations)
+        return lambda activations: strains(self._all(self.box.check(activations)))
+
+    def strain_range(self, stations: ArrayLike) -> StrainRange:
+        """What the strains at stations Z [m] can be within the activation box."""
+        return self.whole.strain_range(stations)
 
     def radius(self, stations: ArrayLike) -> Array:
         """Outer radius R2 before activation at stations Z [m]."""

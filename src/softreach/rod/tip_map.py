@@ -24,6 +24,7 @@ from softreach.rod.steps import check_tol
 __all__ = [
     "BLOCK",
     "Frames",
+    "StrainRange",
     "Strains",
     "TipMap",
     "TipMotions",
@@ -80,6 +81,17 @@ class TipMotions(NamedTuple):
     """ω [rad], shape (n, 3, bundles): ∂d3/∂γ = ω × d3."""
 
 
+class StrainRange(NamedTuple):
+    """Between which ends strains lie within the activation box, shape (station, 2) each."""
+
+    bending: Array
+    """√(u1² + u2²) [1/m], from 0 to an upper bound at most 1e-5 too large."""
+    torsion: Array
+    """u3 [1/m]."""
+    extension: Array
+    """ζ [-]."""
+
+
 class TipMap(ABC):
     """The map from the activations of one arm to its tip, to a tolerance; frozen.
 
@@ -106,6 +118,10 @@ class TipMap(ABC):
         """The activations within bounds."""
 
     @abstractmethod
+    def refined(self, tol: float) -> TipMap:
+        """The map of the same arm to a smaller tolerance; itself if its own is no larger."""
+
+    @abstractmethod
     def fill_tips(self, gamma: Array, out: Array) -> None:
         """Put the tips [m] of checked activations into `out`, (n, 3), on the calling thread."""
 
@@ -126,12 +142,20 @@ class TipMap(ABC):
         """Centerline and directors at ascending stations Z [m]."""
 
     @abstractmethod
-    def strains(self, activations: ArrayLike, stations: ArrayLike) -> Strains:
-        """Curvature and extension at stations Z [m]."""
+    def strains_at(self, stations: ArrayLike) -> Callable[[ArrayLike], Strains]:
+        """The strains at stations Z [m] as a function of activations, to be asked many times."""
+
+    @abstractmethod
+    def strain_range(self, stations: ArrayLike) -> StrainRange:
+        """What the strains at stations Z [m] can be within the activation box."""
 
     @abstractmethod
     def radius(self, stations: ArrayLike) -> Array:
         """Outer radius R2 before activation at stations Z [m]."""
+
+    def strains(self, activations: ArrayLike, stations: ArrayLike) -> Strains:
+        """Curvature and extension at stations Z [m]."""
+        return self.strains_at(stations)(activations)
 
     def tips(self, activations: ArrayLike) -> Array:
         """Tip positions [m], shape (n, 3)."""

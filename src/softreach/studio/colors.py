@@ -14,6 +14,7 @@ from softreach.redundancy import activation_distance
 from softreach.studio.reach import Reach, shown_samples
 from softreach.studio.rod import rod_of
 from softreach.studio.worker import all_cores
+from softreach.workspace import ReachableSolid
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -104,10 +105,9 @@ def _line(content: str) -> str:
 
 
 def _multiplicity(reach: Reach, cloud: xr.Dataset) -> Array:
-    image = reach.exact.image
-    assert image is not None  # three free bundles fill a solid
+    assert isinstance(reach.exact, ReachableSolid)  # as three free bundles make it
     # A sample is reached by its own activation at least, whatever the grid says at the rim.
-    return np.maximum(image.counts_at(cloud.tip.values), 1).astype(float)
+    return np.maximum(reach.exact.image.counts_at(cloud.tip.values), 1).astype(float)
 
 
 def _manipulability(reach: Reach, cloud: xr.Dataset) -> Array:
@@ -118,7 +118,7 @@ def _activation_distance(reach: Reach, cloud: xr.Dataset) -> Array:
     """D̄ of the samples that are shown, among all there are; NaN where isolated."""
     shown = np.arange(reach.samples)[shown_samples(reach, cloud.sizes["sample"].bit_length() - 1)]
     rows = np.sort(shown)
-    found = activation_distance(reach.cloud, _RADIUS * reach.arm.length, rows)
+    found = activation_distance(reach.cloud, _RADIUS * reach.arm.length, queries=rows)
     return found.values[np.argsort(np.argsort(shown))]
 
 

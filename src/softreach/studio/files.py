@@ -18,6 +18,7 @@ from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.rod import design_of_text
 from softreach.studio.slicing import in_slice
 from softreach.studio.state import Appearance, StudioState
+from softreach.workspace import ReachableSolid, ReachableSurface, Surface
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -96,9 +97,10 @@ def _shown(reach: Reach, look: Appearance) -> tuple[xr.Dataset, str | int | xr.D
     return cloud.isel(sample=kept), color
 
 
-def _surface(reach: Reach):
-    surface = reach.exact.surface()
-    return surface.vertices, surface.faces
+def _surface(reach: Reach) -> Surface:
+    if not isinstance(reach.exact, ReachableSolid | ReachableSurface):
+        raise InvalidInput("design", "too few free bundles", "one whose tip reaches a surface")
+    return reach.exact.surface()
 
 
 def _written(name: str, write: Callable[[Path], object]) -> bytes:

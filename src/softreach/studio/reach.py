@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +18,29 @@ from softreach.errors import SoftreachWarning
 from softreach.studio.rod import TOL
 from softreach.studio.worker import StaleCheck, all_cores
 from softreach.volume import concave_hull
-from softreach.workspace import ReachableSet, reachable_set
+from softreach.workspace import (
+    ReachableCurve,
+    ReachableSet,
+    ReachableSolid,
+    ReachableSurface,
+    reachable_set,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from softreach.geometry.hull import Hull
 
-__all__ = ["Quality", "Reach", "beside", "cloud_points", "reached", "shown_samples", "stages"]
+__all__ = [
+    "Quality",
+    "Reach",
+    "Size",
+    "beside",
+    "cloud_points",
+    "reached",
+    "shown_samples",
+    "stages",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +54,15 @@ class Quality:
     fine_accuracy: float = 0.003
     tol: float = TOL
     """Largest tip error, in L."""
+
+
+class Size(NamedTuple):
+    """How large a reachable set is, in L."""
+
+    name: str
+    value: float
+    error: float
+    unit: str
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -63,13 +87,30 @@ class Reach:
 
     @property
     def volume(self) -> float:
-        """Volume, area or length by `exact.measure_name` [L³, L², L]."""
-        return self.exact.measure / self.arm.length**self.exact.dimension
+        """Volume [L³]; 0 for all but solids."""
+        return self.exact.volume / self.arm.length**3
+
+    @property
+    def size(self) -> Size:
+        """Volume, area or length of what can be reached."""
+        length, found = self.arm.length, self.exact
+        match found:
+            case ReachableSolid():
+                return Size(
+                    "volume", found.volume / length**3, found.volume_error / length**3, "L³"
+                )
+            case ReachableSurface():
+                return Size("area", found.area / length**2, found.area_error / length**2, "L²")
+            case ReachableCurve():
+                error = found.curve_length_error / length
+                return Size("length", found.curve_length / length, error, "L")
+            case _:
+                return Size("point", 0.0, 0.0, "")
 
     @property
     def unreachability(self) -> float:
         """UNR [-]; NaN without a volume."""
-        return self.exact.unreachability if self.exact.dimension == 3 else math.nan
+        return self.exact.unreachability if isinstance(self.exact, ReachableSolid) else math.nan
 
     @cached_property
     def alpha_shape(self) -> Hull:
@@ -134,4 +175,4 @@ def beside(reach: Reach) -> NDArray[np.float64]:
 def _exact(arm: Manipulator, accuracy: float, tol: float, check: StaleCheck) -> ReachableSet:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SoftreachWarning)  # the error is shown beside the volume
-        return reachable_set(arm, accuracy=accuracy, tol=tol, report=lambda _: check())
+        return reachable_set(arm, accuracy=accuracy, tol=tol, progress=lambda _: check())

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm_shape import arm_mesh, fiber_bands
+from softreach.arm_shape import arm_surface, bundle_bands
 from softreach.geometry.tube import grid_faces
 from softreach.palette import BODY, bundle_color
 from softreach.rod.kinematics import configuration
@@ -19,6 +19,7 @@ from softreach.studio.reach import Reach, cloud_points
 from softreach.studio.rod import rod_of
 from softreach.studio.slicing import in_slice, sliced_faces
 from softreach.studio.state import Appearance, Slice
+from softreach.workspace import ReachableSolid, ReachableSurface
 
 if TYPE_CHECKING:
     from viser import SceneApi
@@ -85,7 +86,7 @@ class Scene:
     def draw_surfaces(self, reach: Reach, look: Appearance) -> None:
         """The exact boundary and the α-shape, as asked for; slow the first time."""
         self.remove("/surface", "/alpha-shape")
-        if look.surface and reach.exact.dimension >= 2:
+        if look.surface and isinstance(reach.exact, ReachableSolid | ReachableSurface):
             self._surface("/surface", reach.exact.surface(), reach, look.slice, _SURFACE)
         if look.alpha_shape and len(reach.alpha_shape.faces):
             self._surface("/alpha-shape", reach.alpha_shape, reach, look.slice, _HULL)
@@ -136,7 +137,7 @@ class Scene:
         self.remove("/reference")
         if np.any(shift):
             self._draw_beside(reach, look, shift)
-        elif reach.exact.dimension == 3:
+        elif isinstance(reach.exact, ReachableSolid):
             self._surface("/reference", reach.exact.surface(), reach, look.slice, _REFERENCE, 0.3)
         else:
             points = cloud_points(reach, min(look.level, 16))
@@ -224,9 +225,9 @@ class Scene:
 
 def _arm_meshes(arm: Manipulator, shape: Any) -> list[tuple[Array, NDArray[Any], Color]]:
     """Vertices [L], faces and color of the body and of every bundle."""
-    vertices, faces = arm_mesh(shape, _SIDES)
-    meshes = [(vertices / arm.length, faces, _rgb(BODY))]
-    for k, band in enumerate(fiber_bands(arm, shape, lift=_LIFT, step=_ACROSS)):
+    body = arm_surface(shape, _SIDES)
+    meshes = [(body.vertices / arm.length, body.faces, _rgb(BODY))]
+    for k, band in enumerate(bundle_bands(arm, shape, lift=_LIFT, step=_ACROSS)):
         skin = grid_faces(*band.shape[:2])
         meshes.append((band.reshape(-1, 3) / arm.length, skin, _rgb(bundle_color(k))))
     return meshes

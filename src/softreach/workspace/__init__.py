@@ -1,7 +1,22 @@
 """The reachable set as the image of the activation box: volume, multiplicity, folds, surface."""
 
+from softreach.geometry.surface import Surface
 from softreach.workspace.directions import direction_spread
+from softreach.workspace.image import Image, Lattice
 from softreach.workspace.reach import reachable_set
 from softreach.workspace.reachable import ReachableSet
+from softreach.workspace.solid import ReachableSolid
+from softreach.workspace.thin import ReachableCurve, ReachablePoint, ReachableSurface
 
-__all__ = ["ReachableSet", "direction_spread", "reachable_set"]
+__all__ = [
+    "Image",
+    "Lattice",
+    "ReachableCurve",
+    "ReachablePoint",
+    "ReachableSet",
+    "ReachableSolid",
+    "ReachableSurface",
+    "Surface",
+    "direction_spread",
+    "reachable_set",
+]

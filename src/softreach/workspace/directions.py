@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from softreach import parallel
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
-from softreach.rod.kinematics import configuration
+from softreach.rod.tip_map import TipMap, tip_map
 from softreach.sampling import sample_cube
+from softreach.schema import provenance
 from softreach.workspace.image import Lattice
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ _STEPS = 32  # the cone is then too wide by some percent at most
 
 
 def direction_spread(
-    arm: Manipulator,
+    arm: Manipulator | TipMap,
     *,
     n: int = 1 << 19,
     cell: float | None = None,
@@ -40,10 +41,15 @@ def direction_spread(
     each place, and what is seen is how much it varies within a cell; the fourth opens the cone. The
     axis is that of the smallest ball around the directions (Bădoiu and Clarkson, 2003).
 
+    What limits it: the cone around the samples is found to some percent, never too narrow; but few
+    samples hardly meet the extreme directions, so that a cell with less than some dozens has too
+    narrow a cone. No error is stated, as none can be had from the samples alone: compare with twice
+    as many.
+
     Volumes follow: ``spread.attrs["cell"] ** 3 * (spread.solid_angle > 0.1).sum()``.
 
     Args:
-        arm: The design.
+        arm: The design, or its tip map.
         n: Number of samples, a power of two.
         cell: Edge of a cell [m]; by default 64 samples would fall in each of the bounding box.
         seed: Seed of the sampler.
@@ -58,9 +64,10 @@ def direction_spread(
     """
     if cell is not None and not 0 < cell < np.inf:
         raise InvalidInput("cell", cell, "a length > 0 [m]")
-    tips, directions = _tips_and_directions(arm, sample_cube("sobol", n, arm.bundles, seed), tol)
+    rod = tip_map(arm, tol)
+    tips, directions = _tips_and_directions(rod, sample_cube("sobol", n, rod.box.bundles, seed))
     if cell is None:
-        cell = float(np.cbrt(np.prod(np.ptp(tips, axis=0).clip(1e-3 * arm.length)) * _PER_CELL / n))
+        cell = float(np.cbrt(np.prod(np.ptp(tips, axis=0).clip(1e-3 * rod.length)) * _PER_CELL / n))
     lattice = Lattice.around(tips, cell)
     i, j, k = np.rint(lattice.coordinates(tips)).astype(int).T
     place = (i * lattice.shape[1] + j) * lattice.shape[2] + k
@@ -69,16 +76,16 @@ def direction_spread(
     angle, samples = np.full(lattice.shape, np.nan), np.zeros(lattice.shape, np.int64)
     angle.flat[cells] = _cones(directions[order], starts)
     samples.flat[cells] = np.diff(starts, append=n)
-    return _dataset(lattice, angle, samples, arm)
+    drawn = {"n": n, "sampler": "sobol", "seed": seed, "tol": rod.tol}
+    return _dataset(lattice, angle, samples).assign_attrs({**provenance(rod.arm), **drawn})
 
 
-def _tips_and_directions(arm: Manipulator, cube: Array, tol: float) -> tuple[Array, Array]:
-    gamma = arm.bounds[:, 0] + cube * np.diff(arm.bounds, axis=1)[:, 0]
+def _tips_and_directions(rod: TipMap, cube: Array) -> tuple[Array, Array]:
+    gamma = rod.box.from_cube(cube)
     tips, directions = np.empty((2, len(gamma), 3))
     for block in parallel.blocks(len(gamma), _BLOCK):
-        end = configuration(arm, gamma[block], stations=[arm.length], tol=tol)
-        tips[block] = end["position"].values[:, 0]
-        directions[block] = end["directors"].sel(director="d3").values[:, 0]
+        position, directors = rod.frames(gamma[block], [rod.length])
+        tips[block], directions[block] = position[:, 0], directors[:, 0, 2]
     return tips, directions
 
 
@@ -102,9 +109,7 @@ def _unit(vectors: Array) -> Array:
     return vectors / np.linalg.norm(vectors, axis=1, keepdims=True).clip(1e-300)
 
 
-def _dataset(
-    lattice: Lattice, angle: Array, samples: NDArray[np.int64], arm: Manipulator
-) -> xr.Dataset:
+def _dataset(lattice: Lattice, angle: Array, samples: NDArray[np.int64]) -> xr.Dataset:
     import xarray as xr
 
     dims = ("x", "y", "z")
@@ -118,5 +123,5 @@ def _dataset(
             "samples": (dims, samples, {"units": "1", "long_name": "samples in the cell"}),
         },
         lattice.centers(),
-        {"cell": lattice.cell, "design": arm.to_toml()},
+        {"cell": lattice.cell},
     )

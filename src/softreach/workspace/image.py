@@ -176,7 +176,7 @@ def _running_sums(values: Ints, starts: NDArray[np.bool_]) -> Ints:
 
 
 def image_of(
-    points: Array, cells: tuple[int, ...], lattice: Lattice, report: Progress = silent
+    points: Array, cells: tuple[int, ...], lattice: Lattice, progress: Progress = silent
 ) -> Image:
     """The image of a grid of boxes whose vertices go to `points`.
 
@@ -184,7 +184,7 @@ def image_of(
         points: Mapped vertices [m] in the C order of the grid, shape (prod(cells + 1), 3).
         cells: Number of boxes along each of the m >= 3 axes.
         lattice: Cells to rasterize on.
-        report: Called with the number of vertices done since its last call.
+        progress: Called with the number of vertices done since its last call.
     """
     scaled = lattice.coordinates(points)
     unit = _unit(scaled, cells)
@@ -193,7 +193,7 @@ def image_of(
         lattice=lattice,
         unit=unit,
         vertices=vertices,
-        triangles=_critical_triangles(vertices, cells, report),
+        triangles=_critical_triangles(vertices, cells, progress),
     )
 
 
@@ -205,7 +205,7 @@ def _unit(scaled: Array, cells: tuple[int, ...]) -> float:
     return 2.0 ** np.floor(contour.EXACT_BITS - 1 - np.log2(longest))
 
 
-def _critical_triangles(vertices: Array, cells: tuple[int, ...], report: Progress) -> Ints:
+def _critical_triangles(vertices: Array, cells: tuple[int, ...], progress: Progress) -> Ints:
     star = contour.stars(cells)
     blocks = list(parallel.blocks(len(vertices), max(1, _ROWS // len(star.triangles))))
     parts: list[Ints] = [np.empty((0, 5), np.int64)] * len(blocks)
@@ -215,7 +215,7 @@ def _critical_triangles(vertices: Array, cells: tuple[int, ...], report: Progres
         out = np.empty(((last - first) * len(star.triangles), 5), np.int64)
         used = contour.critical_triangles(vertices, np.array(cells), first, last, star, out)
         parts[number] = out[:used].copy()
-        report(last - first)
+        progress(last - first)
 
     parallel.run(partial(task, number) for number in range(len(blocks)))
     return np.concatenate(parts)

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.geometry.hull import convex_hull
-from softreach.workspace.box import ActivationBox
+from softreach.rod.tip_map import TipMap
+from softreach.workspace.box_grid import image_measure
 from softreach.workspace.image import Image, Spans
 
 __all__ = [
@@ -18,7 +19,7 @@ __all__ = [
     "covered_volume",
     "fold_volume",
     "multiply_covered",
-    "solid",
+    "solid_volume",
 ]
 
 Array = NDArray[np.float64]
@@ -34,7 +35,7 @@ class Estimate(NamedTuple):
     error: float
 
 
-def solid(box: ActivationBox, fine: Image, coarse: Image) -> Estimate:
+def solid_volume(rod: TipMap, fine: Image, coarse: Image) -> Estimate:
     """Volume of the image of a box [m³] from grids of n and n/2 cells along each axis, m >= 3.
 
     For m = 3 with degree d(x), the sum of the orientations of the activations that reach x,
@@ -44,9 +45,9 @@ def solid(box: ActivationBox, fine: Image, coarse: Image) -> Estimate:
     the whole volume is. What is rasterized errs by O(1/n²), which both grids together remove; 0.35
     of what they remove is the error stated, beside the noise of the raster.
     """
-    if box.m > 3:
+    if rod.box.dimension > 3:
         return extrapolated(covered_volume(fine), covered_volume(coarse))
-    signed, rough = box.measure(_NODES), box.measure(2 * _NODES // 3)
+    signed, rough = image_measure(rod, _NODES), image_measure(rod, 2 * _NODES // 3)
     sense = 1 if signed >= 0 else -1
     rest = extrapolated(_correction(fine, sense), _correction(coarse, sense))
     return Estimate(abs(signed) + rest.value, abs(signed - rough) + rest.error)
@@ -77,21 +78,25 @@ def multiply_covered(image: Image) -> dict[int, float]:
     return {k: float(v) for k, v in enumerate(volumes) if k > 1 and v > 0}
 
 
-def fold_volume(image: Image) -> float:
-    """Volume of the places reached with both orientations [m³]; m = 3."""
-    return float(_mean(image, lambda spans: spans.length[spans.cover > np.abs(spans.degree)].sum()))
+def fold_volume(fine: Image, coarse: Image) -> Estimate:
+    """Volume reached with both orientations [m³], and its change by half as fine a grid; m = 3."""
+    value, rough = (
+        float(_mean(image, lambda spans: spans.length[spans.cover > np.abs(spans.degree)].sum()))
+        for image in (fine, coarse)
+    )
+    return Estimate(value, abs(value - rough))
 
 
-def convex_volume(fine: Image, coarse: Image) -> float:
+def convex_volume(fine: Image, coarse: Image) -> Estimate:
     """Volume of the convex hull of the image [m³]: its corners are corners of critical triangles.
 
     The hull of mapped vertices lies inside that of the image by O(1/n²), which is removed.
     """
-    volumes = [
-        convex_hull(_outer_vertices(image)).volume * image.lattice.cell**3
+    value, rough = (
+        Estimate(convex_hull(_outer_vertices(image)).volume * image.lattice.cell**3, 0.0)
         for image in (fine, coarse)
-    ]
-    return volumes[0] + (volumes[0] - volumes[1]) / 3.0
+    )
+    return extrapolated(value, rough)
 
 
 def _outer_vertices(image: Image) -> Array:

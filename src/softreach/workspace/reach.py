@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput, SoftreachWarning
-from softreach.geometry.hull import convex_hull
-from softreach.kernels.simplices import chains, corner_steps
+from softreach.kernels.simplices import chains
 from softreach.progress import Progress, silent
+from softreach.rod.tip_map import TipMap, tip_map
 from softreach.workspace import measure
-from softreach.workspace.box import ActivationBox
-from softreach.workspace.image import Lattice, image_of
+from softreach.workspace.box_grid import every_second, grid_tips
+from softreach.workspace.image import Image, Lattice, image_of
 from softreach.workspace.reachable import ReachableSet
-from softreach.workspace.surface import Surface
+from softreach.workspace.solid import ReachableSolid
+from softreach.workspace.thin import thin_set
 
 __all__ = ["reachable_set"]
 
@@ -24,17 +27,16 @@ Array = NDArray[np.float64]
 
 _MOST_TRIANGLES = 4e7  # triangles of the activation grid
 _MOST_CELLS = 2.0**26
-_SHEET = {0: 1, 1: 1024, 2: 128}  # grid of a curve or surface, for distances and pictures
 
 
 def reachable_set(
-    arm: Manipulator,
+    arm: Manipulator | TipMap,
     *,
     accuracy: float = 3e-3,
     cell: float | None = None,
     grid: int | None = None,
     tol: float = 1e-6,
-    report: Progress | None = None,
+    progress: Progress | None = None,
 ) -> ReachableSet:
     """Everything that the tip can reach: the image of the activation box, without a point cloud.
 
@@ -50,12 +52,17 @@ def reachable_set(
     that changes by less than ε as well. A fold thinner than a cell of the grid may be missed.
 
     Args:
-        arm: The design. Bundles with equal bounds are held there and add no dimension.
+        arm: The design, or its tip map. Bundles with equal bounds are held there and add no
+            dimension.
         accuracy: Relative error ε allowed in the volume.
         cell: Edge h of a cell [m], instead of the rule's.
         grid: Cells n along each axis of the activation box, even, instead of the rule's.
         tol: Largest tip error, in L.
-        report: Called with the number of grid vertices done since its last call.
+        progress: Called with the number of grid vertices done since its last call.
+
+    Returns:
+        `ReachableSolid`, `ReachableSurface`, `ReachableCurve` or `ReachablePoint`, for three free
+        bundles or more, two, one or none.
 
     Raises:
         InvalidInput: An argument out of range.
@@ -65,87 +72,71 @@ def reachable_set(
     """
     if not 1e-6 <= accuracy <= 0.2:
         raise InvalidInput("accuracy", accuracy, "1e-6 to 0.2")
-    box = ActivationBox(arm=arm, tol=tol)
-    if box.m < 3:
-        return _thin_set(box)
-    cells = _checked_grid(grid) if grid is not None else _grid_for(box.m, accuracy)
-    found = _solid_set(box, cells, cell, accuracy, report or silent)
-    while grid is None and not _settled(found, accuracy) and _fits(box.m, 2 * found.cells):
-        found = _solid_set(box, 2 * found.cells, cell, accuracy, report or silent)
+    rod = tip_map(arm, tol)
+    m = rod.box.dimension
+    if m < 3:
+        return thin_set(rod)
+    cells = _checked_grid(grid) if grid is not None else _grid_for(m, accuracy)
+    found = _solid(rod, cells, cell, accuracy, progress or silent)
+    while grid is None and not _settled(found, accuracy) and _fits(m, 2 * found.cells):
+        found = _solid(rod, 2 * found.cells, cell, accuracy, progress or silent)
     if found.volume_error > accuracy * found.volume:
         warnings.warn(_inaccurate(found, accuracy), SoftreachWarning, stacklevel=2)
     return found
 
 
-def _solid_set(
-    box: ActivationBox, cells: int, cell: float | None, accuracy: float, report: Progress
-) -> ReachableSet:
-    tips = box.grid_tips(cells)
+def _solid(
+    rod: TipMap, cells: int, cell: float | None, accuracy: float, progress: Progress
+) -> ReachableSolid:
+    m, tips = rod.box.dimension, grid_tips(rod, cells)
     lattice = _lattice(tips, cell, accuracy)
-    fine = image_of(tips, (cells,) * box.m, lattice, report)
-    coarse = image_of(_every_second(tips, cells, box.m), (cells // 2,) * box.m, lattice)
-    several = [measure.multiply_covered(image) if box.m == 3 else {} for image in (fine, coarse)]
-    volume, error = measure.solid(box, fine, coarse)
-    return ReachableSet(
-        arm=box.arm,
-        dimension=3,
-        measure=volume,
-        measure_error=error,
-        convex_volume=measure.convex_volume(fine, coarse),
-        multiplicity={1: volume - sum(several[0].values()), **several[0]} if box.m == 3 else {},
-        multiplicity_error=abs(sum(several[0].values()) - sum(several[1].values())),
-        fold_volume=measure.fold_volume(fine) if box.m == 3 else 0.0,
+    fine = image_of(tips, (cells,) * m, lattice, progress)
+    coarse = image_of(every_second(tips, cells, m), (cells // 2,) * m, lattice)
+    volume = measure.solid_volume(rod, fine, coarse)
+    overlaps = _overlaps(volume.value, fine, coarse) if m == 3 else _NO_OVERLAPS
+    convex = measure.convex_volume(fine, coarse)
+    return ReachableSolid(
+        tip_map=rod,
         cells=cells,
+        volume=volume.value,
+        volume_error=volume.error,
+        convex_volume=convex.value,
+        convex_volume_error=convex.error,
         image=fine,
-        sheet=None,
+        **overlaps._asdict(),
     )
 
 
-def _settled(found: ReachableSet, accuracy: float) -> bool:
+class _Overlaps(NamedTuple):
+    """How often and how three bundles reach places: fields of a `ReachableSolid`."""
+
+    multiplicity: Mapping[int, float]
+    multiplicity_error: float
+    fold_volume: float
+    fold_volume_error: float
+
+
+_NO_OVERLAPS = _Overlaps({}, np.nan, np.nan, np.nan)
+
+
+def _overlaps(volume: float, fine: Image, coarse: Image) -> _Overlaps:
+    several, rough = measure.multiply_covered(fine), measure.multiply_covered(coarse)
+    again = sum(several.values())
+    return _Overlaps(
+        {1: volume - again, **several},
+        abs(again - sum(rough.values())),
+        *measure.fold_volume(fine, coarse),
+    )
+
+
+def _settled(found: ReachableSolid, accuracy: float) -> bool:
     """Whether a finer grid would hardly change the volume or how much of it is reached twice."""
-    error = max(found.volume_error, found.multiplicity_error)
-    return error <= accuracy * found.volume
+    errors = [found.volume_error, *([found.multiplicity_error] if found.multiplicity else [])]
+    return max(errors) <= accuracy * found.volume
 
 
 def _fits(m: int, cells: int) -> bool:
     return (cells + 1) ** m * len(chains(m, 2)) <= _MOST_TRIANGLES
-
-
-def _thin_set(box: ActivationBox) -> ReachableSet:
-    """A surface, a curve or a point."""
-    cells = _SHEET[box.m]
-    tips = box.grid_tips(cells)
-    fine = box.measure(24) if box.m else 0.0
-    rough = box.measure(16) if box.m else 0.0
-    return ReachableSet(
-        arm=box.arm,
-        dimension=box.m,
-        measure=fine,
-        measure_error=abs(fine - rough),
-        convex_volume=convex_hull(tips).volume,
-        multiplicity={},
-        multiplicity_error=0.0,
-        fold_volume=0.0,
-        cells=cells,
-        image=None,
-        sheet=Surface(vertices=tips, faces=_sheet_faces(box.m, cells)),
-    )
-
-
-def _sheet_faces(m: int, cells: int) -> NDArray[np.int64]:
-    """Simplices of the grid; those of a curve repeat a corner to make three."""
-    base = np.arange(cells**m)
-    if m == 2:
-        base += base // cells  # each row of vertices has one more
-    corners = corner_steps((cells,) * m)[chains(m, m)]
-    simplices = (base[:, None, None] + corners).reshape(-1, m + 1)
-    return np.pad(simplices, ((0, 0), (0, 2 - m)), mode="edge")
-
-
-def _every_second(tips: Array, cells: int, m: int) -> Array:
-    """Tips of the grid of half as many cells."""
-    every = tips.reshape(*(cells + 1,) * m, 3)[(slice(None, None, 2),) * m]
-    return np.ascontiguousarray(every).reshape(-1, 3)
 
 
 def _grid_for(m: int, accuracy: float) -> int:
@@ -175,7 +166,7 @@ def _lattice(tips: Array, cell: float | None, accuracy: float) -> Lattice:
     return Lattice.around(tips, float(max(wanted, sides.max() / 1024.0)))
 
 
-def _inaccurate(found: ReachableSet, accuracy: float) -> str:
+def _inaccurate(found: ReachableSolid, accuracy: float) -> str:
     return (
         f"volume {found.volume:.5g} m³ may be off by {found.volume_error:.2g} m³, more than "
         f"{accuracy:g} of it; pass a grid above {found.cells} and a smaller cell"

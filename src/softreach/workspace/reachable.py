@@ -2,183 +2,127 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import TYPE_CHECKING
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import InvalidInput
-from softreach.geometry.delaunay import finite_points
-from softreach.workspace.image import Image
-from softreach.workspace.surface import (
-    Surface,
-    boundary_surface,
-    critical_surface,
-    signed_field,
-)
+from softreach.quantity import quantity
+from softreach.rod.tip_map import TipMap
+from softreach.schema import provenance
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["ReachableSet"]
+__all__ = ["Number", "ReachableSet"]
 
 Array = NDArray[np.float64]
 
-_NAMES = ("point", "length", "area", "volume")
+_POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ReachableSet:
+class Number(NamedTuple):
+    """One number of a reachable set, as it is stored."""
+
+    value: float
+    units: str
+    long_name: str
+
+
+class ReachableSet(ABC):
     """The image of the activation box under the map from activations to tips.
 
-    Three bundles or more with room between their bounds fill a solid; two sweep a surface, one a
-    curve: these have an area or a length and no volume.
+    Three bundles or more with room between their bounds fill a `ReachableSolid`; two sweep a
+    `ReachableSurface`, one draws a `ReachableCurve`, and none leaves a `ReachablePoint`.
     """
 
-    arm: Manipulator
-    dimension: int
+    dimension: ClassVar[int]
     """3 for a solid, 2 for a surface, 1 for a curve, 0 for a point."""
-    measure: float
-    """Volume [m³], area [m²] or length [m]; see `measure_name`. Places of a solid count once
-    however often they are reached, those of a surface or curve as often as they are."""
-    measure_error: float
-    """How far off `measure` may be, estimated from two resolutions, same unit."""
-    convex_volume: float
-    """Volume of the convex hull [m³]."""
-    multiplicity: Mapping[int, float]
-    """Volume of the places that exactly 1, 2, ... activations reach [m³]. Three bundles only:
-    with more, every place inside is reached by infinitely many, and this is empty."""
-    multiplicity_error: float
-    """By how much the volume reached more than once changed from half as fine a grid [m³]."""
-    fold_volume: float
-    """Volume of the places reached with both orientations of the map [m³]; they lie behind a fold.
-    Three bundles only, else 0."""
+
+    tip_map: TipMap
+    """The map whose image this is, with its arm, activation box and tolerance."""
     cells: int
     """Cells of the activation grid along each axis."""
-    image: Image | None = field(repr=False)
-    """The rasterized image of a solid; None for surfaces and curves."""
-    sheet: Surface | None = field(repr=False)
-    """The mapped grid of a surface or curve; None for solids."""
+    volume: float
+    """Volume [m³]; places count once however often they are reached. 0 for all but solids."""
+    volume_error: float
+    """How far off `volume` may be, estimated from two resolutions [m³]."""
+    convex_volume: float
+    """Volume of the convex hull [m³]."""
+    convex_volume_error: float
+    """How far off `convex_volume` may be, estimated from two grids [m³]."""
 
     @property
-    def measure_name(self) -> str:
-        """What `measure` is: "volume", "area", "length" or "point"."""
-        return _NAMES[self.dimension]
-
-    @property
-    def volume(self) -> float:
-        """Volume [m³]; 0 for surfaces and curves."""
-        return self.measure if self.dimension == 3 else 0.0
-
-    @property
-    def volume_error(self) -> float:
-        """How far off `volume` may be [m³]."""
-        return self.measure_error if self.dimension == 3 else 0.0
+    def arm(self) -> Manipulator:
+        """The design."""
+        return self.tip_map.arm
 
     @property
     def unreachability(self) -> float:
         """The part of the convex hull that is out of reach, 1 - V / V_convex [-]; NaN for 0/0."""
-        return 1.0 - self.volume / self.convex_volume if self.convex_volume > 0 else float("nan")
+        return 1.0 - self.volume / self.convex_volume if self.convex_volume > 0 else np.nan
 
-    @cached_property
-    def grid(self) -> xr.Dataset:
-        """Cells of a solid: `occupied`, and for three bundles `count` and `degree`, at centers [m].
+    @property
+    def unreachability_error(self) -> float:
+        """How far off `unreachability` may be with both volumes [-]; NaN for 0/0."""
+        if not self.convex_volume > 0:
+            return np.nan
+        share = self.volume / self.convex_volume
+        return (self.volume_error + share * self.convex_volume_error) / self.convex_volume
 
-        `count` is the number of activations that reach the center, `degree` counts those that the
-        map turns over as -1. Exact for the map that is linear on the simplices of the grid.
-
-        Raises:
-            InvalidInput: A surface or a curve.
-        """
-        import xarray as xr
-
-        image = self._solid("grid")
-        counts, degrees = image.counts
-        fields = {"occupied": counts > 0}
-        if self.multiplicity:
-            fields |= {"count": counts, "degree": degrees}
-        variables = {name: (tuple("xyz"), values) for name, values in fields.items()}
-        cell, length = image.lattice.cell, self.arm.length
-        attrs = {"cell": cell, "length": length, "design": self.arm.to_toml()}
-        return xr.Dataset(variables, image.lattice.centers(), attrs)
-
-    def surface(self) -> Surface:
-        """The boundary of a solid: closed, oriented outwards, without staircase; or the surface.
-
-        Raises:
-            InvalidInput: A curve or a point.
-            MissingExtra: scikit-image is not installed.
-        """
-        if self.dimension < 2:
-            raise InvalidInput("dimension", self.dimension, "2 or 3 for a surface")
-        return self._boundary
-
-    def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Whether points are reachable: whether a mapped simplex of the grid covers them.
-
-        Exactly so for three bundles; for more, points a small part of a cell outside may pass.
-
-        Args:
-            points: Positions [m], shape (n, 3).
-
-        Raises:
-            InvalidInput: Points of another shape or not finite; a surface or a curve, on which no
-                point lies but by chance: use `distance`.
-        """
-        from scipy.ndimage import map_coordinates
-
-        image = self._solid("contains")
-        positions = finite_points(np.asarray(points, float))
-        # More than a cell's diagonal inside there is nothing to decide. With more bundles very many
-        # triangles are critical: there the interpolated field decides wherever it says inside.
-        margin = np.sqrt(3.0) if self.multiplicity else 0.0
-        at = image.lattice.coordinates(positions)
-        found = map_coordinates(self._field, at.T, order=1, cval=np.inf) < -margin
-        found[~found] = image.counts_at(positions[~found]) > 0
-        return found
-
+    @abstractmethod
     def distance(self, points: ArrayLike) -> Array:
-        """Distance to the boundary, negative inside [m]; to a surface or curve, never negative.
-
-        Outside it is the distance to the image of the grid itself. Inside it is the distance to
-        `surface()`, in which parts and gaps thinner than a cell are lost.
+        """Distance of points to the set [m], shape (n,).
 
         Args:
             points: Positions [m], shape (n, 3).
 
         Raises:
             InvalidInput: Points of another shape or not finite.
-            MissingExtra: scikit-image is not installed.
         """
-        positions = finite_points(np.asarray(points, float))
-        if self.sheet is not None:
-            return self.sheet.distance(positions)
-        inside = self.contains(positions)
-        out = np.empty(len(positions))
-        out[inside] = -self._boundary.distance(positions[inside])
-        out[~inside] = self._critical.distance(positions[~inside])
-        return out
 
-    def _solid(self, asked: str) -> Image:
-        if self.image is None:
-            hint = f"a {self.measure_name} has no cells: use .distance(points)"
-            raise InvalidInput(f"dimension (for {asked})", self.dimension, "3", hint)
-        return self.image
+    def to_dataset(self) -> xr.Dataset:
+        """All numbers of the set with their errors and units, and where they come from."""
+        import xarray as xr
 
-    @cached_property
-    def _field(self) -> Array:
-        return signed_field(self._solid("contains"))
+        variables = {
+            name: ((), number.value, {"units": number.units, "long_name": number.long_name})
+            for name, number in self._numbers().items()
+        }
+        attrs = {**provenance(self.arm), "tol": self.tip_map.tol, "activation_grid": self.cells}
+        return xr.Dataset(variables, attrs=attrs | {"dimension": self.dimension})
 
-    @cached_property
-    def _boundary(self) -> Surface:
-        if self.sheet is not None:
-            return self.sheet
-        return boundary_surface(self._solid("surface"), self._field, self.volume)
+    def __repr__(self) -> str:
+        size, *details = self._lines()
+        return "\n  ".join([f"{type(self).__name__}: {size}", *details, self._origin()])
 
-    @cached_property
-    def _critical(self) -> Surface:
-        return critical_surface(self._solid("distance"))
+    @abstractmethod
+    def _lines(self) -> list[str]:
+        """What to print: the size first."""
+
+    @abstractmethod
+    def _numbers(self) -> dict[str, Number]:
+        """Numbers to store."""
+
+    def _convex_numbers(self) -> dict[str, Number]:
+        """The numbers about the convex hull."""
+        convex, share = "convex hull's volume", "share of the convex hull out of reach"
+        return {
+            "convex_volume": Number(self.convex_volume, "m3", convex),
+            "convex_volume_error": Number(self.convex_volume_error, "m3", f"error of the {convex}"),
+            "unreachability": Number(self.unreachability, "1", share),
+            "unreachability_error": Number(self.unreachability_error, "1", f"error of the {share}"),
+        }
+
+    def _convex_text(self) -> str:
+        return f"convex hull {quantity(self.convex_volume, 'm³', self.convex_volume_error)}"
+
+    def _origin(self) -> str:
+        """How the set was computed."""
+        box, rod = self.tip_map.box, self.tip_map
+        free = f"{box.dimension} free bundle" + ("s" if box.dimension != 1 else "")
+        power = str(box.dimension).translate(_POWERS) if box.dimension > 1 else ""
+        grid = f"activation grid of {self.cells}{power} cells, " if box.dimension else ""
+        return f"L = {rod.length:g} m, {free}; {grid}tip error up to {rod.tol:g} L"

@@ -32,7 +32,7 @@ def redundancy(settings: Settings, folder: Path, notes: Notebook) -> None:
     arms = {"minimal": designs.minimal_trunk(), "redundant": designs.redundant_trunk()}
     clouds = {name: _cloud(name, arm, settings, notes) for name, arm in arms.items()}
     distances = {
-        name: activation_distance(cloud, _RADIUS, settings.queries)
+        name: activation_distance(cloud, _RADIUS, queries=settings.queries)
         for name, cloud in clouds.items()
     }
     notes.note(

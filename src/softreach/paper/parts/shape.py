@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.designs import minimal_trunk
-from softreach.workspace import reachable_set
+from softreach.workspace import ReachableSolid, reachable_set
 
 __all__ = ["Shape", "shapes"]
 
@@ -39,6 +39,7 @@ def shapes(revolutions: Array, tapers: Array, accuracy: float) -> dict[str, list
 
 def _shape(revolution: float, taper: float, accuracy: float) -> Shape:
     reached = reachable_set(minimal_trunk(revolution, taper), accuracy=accuracy)
+    assert isinstance(reached, ReachableSolid)
     grid, length = reached.grid, reached.arm.length
     occupied, cell = grid["occupied"], (grid.attrs["cell"] / length) ** 3
     return Shape(

@@ -15,7 +15,7 @@ from softreach.paper.notebook import Notebook
 from softreach.paper.parts.sweep import swept_atlas
 from softreach.paper.settings import Settings
 from softreach.rod.kinematics import configuration
-from softreach.workspace import ReachableSet, reachable_set
+from softreach.workspace import ReachableCurve, ReachableSolid, ReachableSurface, reachable_set
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,8 +42,12 @@ def uniqueness(settings: Settings, folder: Path, notes: Notebook) -> None:
     worst = share.isel(share.argmax(...))  # pyright: ignore[reportArgumentType]
     turn, taper = float(worst["revolution"]), float(worst["taper"])
     arm = minimal_trunk(turn, taper)
-    paper = reachable_set(minimal_trunk(), accuracy=settings.accuracy)
-    pair = _clearest_pair(reachable_set(arm, accuracy=settings.accuracy))
+    paper, clearest = (
+        reachable_set(one, accuracy=settings.accuracy) for one in (minimal_trunk(), arm)
+    )
+    assert isinstance(paper, ReachableSolid)
+    assert isinstance(clearest, ReachableSolid)
+    pair = _clearest_pair(clearest)
     notes.note(
         share=share.transpose("revolution", "taper").values.tolist(),
         worst=float(worst),
@@ -57,7 +61,7 @@ def uniqueness(settings: Settings, folder: Path, notes: Notebook) -> None:
     _draw(atlas.assign({_LABEL: 100 * share.assign_attrs(units="1")}), arm, pair, notes)
 
 
-def _clearest_pair(reached: ReachableSet) -> Pair:
+def _clearest_pair(reached: ReachableSolid) -> Pair:
     """Of places in the middle of what several activations reach, where these differ most."""
     grid = reached.grid
     count = grid["count"].values
@@ -80,8 +84,10 @@ def _apart(activations: Array) -> float:
 def _fewer_fibers() -> dict[str, float]:
     """Area of what two fibers reach and length of what one does, for L = 1 m."""
     arm = minimal_trunk()
-    sets = [reachable_set(arm.replace(actuators=arm.actuators[:count])) for count in (2, 1)]
-    return {name: reached.measure for name, reached in zip(("area", "curve"), sets, strict=True)}
+    two, one = (reachable_set(arm.replace(actuators=arm.actuators[:count])) for count in (2, 1))
+    assert isinstance(two, ReachableSurface)
+    assert isinstance(one, ReachableCurve)
+    return {"area": two.area, "curve": one.curve_length}
 
 
 def _draw(atlas: xr.Dataset, arm: Manipulator, pair: Pair, notes: Notebook) -> None:

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
 __all__ = ["StatusPanel", "reach_text"]
 
-_UNITS = {"volume": "L³", "area": "L²", "length": "L", "point": ""}
-
 
 class StatusPanel:
     """Text above all tabs."""
@@ -44,9 +42,8 @@ def _known_text(session: Session, reach: Reach) -> str:
 
 def reach_text(reach: Reach) -> str:
     """The numbers of a reach in one line."""
-    name = reach.exact.measure_name
-    error = reach.exact.measure_error / reach.arm.length**reach.exact.dimension
-    parts = [f"**{name} {reach.volume:.4f} ± {error:.1g} {_UNITS[name]}**"]
+    name, value, error, unit = reach.size
+    parts = [f"**{name} {value:.4f} ± {error:.1g} {unit}**"]
     if not math.isnan(reach.unreachability):
         parts.append(f"**UNR {100 * reach.unreachability:.2f} %**")
     return " · ".join([*parts, f"{reach.samples:,} samples"])

@@ -1,71 +1,20 @@
-"""The boundary of a reachable set as triangles, and distances to it."""
+"""The boundary of a solid reachable set as triangles."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arrays import Faces, Points
 from softreach.errors import MissingExtra
-from softreach.geometry.hull import compact_surface, enclosed_volume, surface_area
-from softreach.kernels.nearest import distances_to_faces
+from softreach.geometry.surface import Surface, compact_surface
 from softreach.workspace.image import Image
 
-if TYPE_CHECKING:
-    from scipy.spatial import KDTree
-
-__all__ = ["Surface", "boundary_surface", "critical_surface", "signed_field"]
+__all__ = ["boundary_surface", "critical_surface", "signed_field"]
 
 Array = NDArray[np.float64]
 
 _BAND = 2.5  # cells from the boundary beyond which the field is constant
 _CLOSEST = 1e-3  # cells: a center on the boundary itself would make triangles without area
-_NEIGHBORS = 16  # with 4, distances to long triangles came out up to a cell too large
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Surface:
-    """Triangles; around a solid they are closed and oriented outwards."""
-
-    vertices: Points
-    """Corners [m], shape (v, 3)."""
-    faces: Faces
-    """Indices into vertices, shape (f, 3)."""
-
-    @property
-    def volume(self) -> float:
-        """Volume inside, if the surface is closed [m³]."""
-        return enclosed_volume(self.vertices, self.faces)
-
-    @property
-    def area(self) -> float:
-        """Area [m²]."""
-        return surface_area(self.vertices, self.faces)
-
-    def distance(self, points: Array) -> Array:
-        """Distance of points to the nearest triangle around their 16 nearest vertices [m], (n,)."""
-        count = min(_NEIGHBORS, len(self.vertices))
-        near = self._tree.query(points, count, workers=-1)[1].reshape(len(points), count)
-        out = np.empty(len(points))
-        distances_to_faces(points, self.vertices, self.faces, *self._incidence, near, out)
-        return out
-
-    @cached_property
-    def _tree(self) -> KDTree:
-        from scipy.spatial import KDTree
-
-        return KDTree(self.vertices)
-
-    @cached_property
-    def _incidence(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Faces around each vertex, one after the other, and where each vertex's begin."""
-        corners = self.faces.ravel()
-        ends = np.cumsum(np.bincount(corners, minlength=len(self.vertices)))
-        return np.argsort(corners, kind="stable") // 3, np.concatenate([[0], ends])
 
 
 def critical_surface(image: Image) -> Surface:

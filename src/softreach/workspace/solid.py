@@ -1,0 +1,190 @@
+"""The solid that three free bundles or more let the tip reach."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.errors import MissingExtra
+from softreach.geometry.delaunay import finite_points
+from softreach.geometry.surface import Surface
+from softreach.quantity import quantity
+from softreach.rod.tip_map import TipMap
+from softreach.schema import provenance
+from softreach.workspace.boundary import boundary_surface, critical_surface, signed_field
+from softreach.workspace.image import Image
+from softreach.workspace.reachable import Number, ReachableSet
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["ReachableSolid"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class ReachableSolid(ReachableSet):
+    """What three free bundles or more fill.
+
+    With exactly three, a place inside is reached by a number of activations, each with an
+    orientation: `multiplicity` and `fold_volume` say how much space is reached how. With more,
+    every place inside is reached by infinitely many and these numbers have no meaning.
+    """
+
+    dimension: ClassVar[int] = 3
+
+    tip_map: TipMap
+    cells: int
+    volume: float
+    volume_error: float
+    convex_volume: float
+    convex_volume_error: float
+    multiplicity: Mapping[int, float]
+    """Volume of the places that exactly 1, 2, ... activations reach [m³]; empty for more than three
+    free bundles."""
+    multiplicity_error: float
+    """By how much the volume reached more than once changed from half as fine a grid [m³]; NaN for
+    more than three free bundles."""
+    fold_volume: float
+    """Volume of the places reached with both orientations of the map [m³]; they lie behind a fold.
+    NaN for more than three free bundles."""
+    fold_volume_error: float
+    """By how much `fold_volume` changed from half as fine a grid [m³]."""
+    image: Image = field(repr=False)
+    """The mapped activation grid, rasterized."""
+
+    @cached_property
+    def grid(self) -> xr.Dataset:
+        """The cells: `occupied`, and for three free bundles `count` and `degree`, at centers [m].
+
+        `count` is the number of activations that reach the center, `degree` counts those that the
+        map turns over as -1. Exact for the map that is linear on the simplices of the grid.
+        """
+        import xarray as xr
+
+        counts, degrees = self.image.counts
+        fields = {"occupied": counts > 0}
+        if self.multiplicity:
+            fields |= {"count": counts, "degree": degrees}
+        variables = {name: (tuple("xyz"), values) for name, values in fields.items()}
+        lattice = self.image.lattice
+        attrs = {**provenance(self.arm), "cell": lattice.cell, "length": self.tip_map.length}
+        return xr.Dataset(variables, lattice.centers(), attrs)
+
+    def surface(self) -> Surface:
+        """The boundary: closed, oriented outwards, without staircase.
+
+        Raises:
+            MissingExtra: scikit-image is not installed.
+        """
+        return self._boundary
+
+    def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """Whether points are reachable: whether a mapped simplex of the grid covers them.
+
+        Exactly so for three free bundles; for more, points a small part of a cell outside may pass.
+
+        Args:
+            points: Positions [m], shape (n, 3).
+
+        Raises:
+            InvalidInput: Points of another shape or not finite.
+        """
+        from scipy.ndimage import map_coordinates
+
+        positions = finite_points(np.asarray(points, float))
+        # More than a cell's diagonal inside there is nothing to decide. With more bundles very many
+        # triangles are critical: there the interpolated field decides wherever it says inside.
+        margin = np.sqrt(3.0) if self.multiplicity else 0.0
+        at = self.image.lattice.coordinates(positions)
+        found = map_coordinates(self._field, at.T, order=1, cval=np.inf) < -margin
+        found[~found] = self.image.counts_at(positions[~found]) > 0
+        return found
+
+    def distance(self, points: ArrayLike) -> Array:
+        """Distance to the boundary [m], negative inside.
+
+        Outside it is the distance to the image of the grid itself. Inside it is the distance to
+        `surface()`, in which parts and gaps thinner than a cell are lost.
+
+        Args:
+            points: Positions [m], shape (n, 3).
+
+        Raises:
+            InvalidInput: Points of another shape or not finite.
+            MissingExtra: scikit-image is not installed.
+        """
+        positions = finite_points(np.asarray(points, float))
+        inside = self.contains(positions)
+        out = np.empty(len(positions))
+        out[inside] = -self._boundary.distance(positions[inside])
+        out[~inside] = self._critical.distance(positions[~inside])
+        return out
+
+    def _repr_html_(self) -> str:
+        """What `repr` says below a small picture, for notebooks."""
+        from softreach.picture import Dots, Skin, html_card
+
+        try:
+            return html_card(repr(self), Skin(self.surface().vertices, self.surface().faces))
+        except MissingExtra:  # cells instead of a surface
+            lattice, cells = self.image.lattice, np.argwhere(self.image.counts[0] > 0)
+            return html_card(repr(self), Dots(lattice.origin + lattice.cell * cells))
+
+    def to_dataset(self) -> xr.Dataset:
+        """All numbers with their errors and units; `multiplicity` over `activations`."""
+        import xarray as xr
+
+        found = super().to_dataset().assign_attrs(cell=self.image.lattice.cell)
+        if not self.multiplicity:
+            return found
+        name = {"units": "m3", "long_name": "volume that so many activations reach"}
+        volumes = xr.Variable("activations", list(self.multiplicity.values()), name)
+        return found.assign_coords(activations=list(self.multiplicity)).assign(multiplicity=volumes)
+
+    @cached_property
+    def _field(self) -> Array:
+        return signed_field(self.image)
+
+    @cached_property
+    def _boundary(self) -> Surface:
+        return boundary_surface(self.image, self._field, self.volume)
+
+    @cached_property
+    def _critical(self) -> Surface:
+        return critical_surface(self.image)
+
+    def _lines(self) -> list[str]:
+        share, error = 100 * self.unreachability, 100 * self.unreachability_error
+        lines = [
+            f"volume {quantity(self.volume, 'm³', self.volume_error)}",
+            f"{self._convex_text()}, of which {quantity(share, '%', error)} are out of reach",
+        ]
+        if self.multiplicity:
+            several = sum(volume for times, volume in self.multiplicity.items() if times > 1)
+            again = quantity(several, "m³", self.multiplicity_error)
+            behind = quantity(self.fold_volume, "m³", self.fold_volume_error)
+            lines.append(f"reached more than once {again}, behind folds {behind}")
+        return [*lines, f"raster of {self.image.lattice.cell:.3g} m"]
+
+    def _numbers(self) -> dict[str, Number]:
+        numbers = {
+            "volume": Number(self.volume, "m3", "volume"),
+            "volume_error": Number(self.volume_error, "m3", "error of the volume"),
+            **self._convex_numbers(),
+        }
+        if not self.multiplicity:
+            return numbers
+        fold = "volume reached with both orientations"
+        again = "error of the volume reached more than once"
+        return numbers | {
+            "multiplicity_error": Number(self.multiplicity_error, "m3", again),
+            "fold_volume": Number(self.fold_volume, "m3", fold),
+            "fold_volume_error": Number(self.fold_volume_error, "m3", f"error of the {fold}"),
+        }
