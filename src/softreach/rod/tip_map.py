@@ -105,7 +105,7 @@ class TipMap(ABC):
 
     @abstractmethod
     def strains(self, activations: ArrayLike, stations: ArrayLike) -> Strains:
-        """Curvature and extension at stations Z [m]."""
+        """Curvature and extension at ascending stations Z [m]."""
 
     @abstractmethod
     def radius(self, stations: ArrayLike) -> Array:
