@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach import parallel
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
 from softreach.errors import InvalidInput
@@ -31,6 +32,7 @@ _MOST_STEPS = 4096
 # Rotation of one step [rad] up to which the kernels' series are good to 1e-10 (tips), and to
 # rounding (frames, whose directors must stay orthonormal).
 _TIP_TURN, _FRAME_TURN = 2.0, 1.0
+_SHAPES = 512  # whole shapes held at once
 
 
 class Nodes(NamedTuple):
@@ -169,12 +171,16 @@ class StepRule:
         coarse, fine = self.packed_nodes(steps), self.packed_nodes(2 * steps)
         ends = np.arange(1, steps + 1)
 
-        def difference(gamma: Array) -> Array:
+        def of_block(gamma: Array) -> Array:
             places = np.empty((2, len(gamma), steps, 3))
             directors = np.empty((len(gamma), steps, 3, 3))
             frames.frames(coarse, ends, gamma, places[0], directors)
             frames.frames(fine, 2 * ends, gamma, places[1], directors)
             return np.linalg.norm(places[0] - places[1], axis=-1).max(axis=1)
+
+        def difference(gamma: Array) -> Array:
+            rows = parallel.blocks(len(gamma), _SHAPES)
+            return np.concatenate([of_block(gamma[block]) for block in rows])
 
         return difference
 
