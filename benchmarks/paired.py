@@ -77,7 +77,10 @@ def inverse_tasks() -> dict[str, Task]:
 
         def task() -> Results:
             found = sr.solve_inverse(arm, targets, **options)
-            return {"counts": found.counts, "activations": found.activations}
+            # Within a target their order is a matter of rounding.
+            keys = found.activations.T[::-1].round(5)
+            order = np.lexsort((*keys, np.repeat(np.arange(n), found.counts)))
+            return {"counts": found.counts, "activations": found.activations[order]}
 
         return task
 
@@ -115,7 +118,7 @@ def redundancy_tasks() -> dict[str, Task]:
 
     return {
         "activation distance": lambda: {
-            "distance": sr.activation_distance(cloud, 1 / 60, 10_000).values
+            "distance": sr.activation_distance(cloud, 1 / 60, queries=10_000).values
         },
         "dexterity": lambda: {"manipulability": dexterity(cloud).manipulability.values},
         "curvature statistics": statistics,

@@ -7,6 +7,7 @@ import inspect
 import re
 import typing
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from types import ModuleType
 
 import pytest
@@ -173,3 +174,15 @@ def test_a_name_means_one_thing_everywhere():
     for name, thing in public_objects():
         homes.setdefault(name.rpartition(".")[2], set()).add(id(thing))
     assert {name for name, things in homes.items() if len(things) > 1} == set()
+
+
+def test_every_public_name_is_in_the_reference():
+    page = Path(__file__).parent.parent / "docs" / "reference.md"
+    shown = set(re.findall(r"^::: softreach\.([\w.]+)", page.read_text("utf-8"), re.MULTILINE))
+    names = {name.rpartition(".")[2] for name in shown}
+    missing = [
+        name
+        for name, _ in public_objects()
+        if name.rpartition(".")[2] not in names and name.rpartition(".")[0] not in shown
+    ]
+    assert missing == []

@@ -11,7 +11,7 @@ import pytest
 
 import softreach as sr
 from softreach import plot
-from softreach.arm_shape import arm_mesh, rest_configuration
+from softreach.arm_shape import arm_surface, rest_configuration
 from softreach.errors import InvalidInput
 from softreach.picture.projection import project, view_axes
 from softreach.redundancy import activation_distance
@@ -93,7 +93,7 @@ def everything(tmp_path_factory) -> SimpleNamespace:
         arm=arm,
         cloud=cloud,
         tips=cloud.tip.values,
-        rest=arm_mesh(rest_configuration(arm))[0],
+        rest=arm_surface(rest_configuration(arm)).vertices,
         distance=activation_distance(cloud, LENGTH / 10),
         grid=sr.reachable_set(arm, accuracy=3e-2).grid,
         hull=sr.convex_hull(cloud.tip),

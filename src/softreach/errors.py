@@ -14,7 +14,6 @@ __all__ = [
     "Range",
     "SoftreachError",
     "SoftreachWarning",
-    "counted",
 ]
 
 
