@@ -48,7 +48,7 @@ def plot_hull(
         hull: A hull, the surface of a reachable set, or anything with vertices [m] and faces.
         ax: Axes to draw in; None for a new figure.
         view: As in `plot_cloud`.
-        length: L [m], to count coordinates in L; None counts them in meters.
+        length: L [m], by which coordinates are divided; None leaves them in meters.
         color: RGB from 0 to 1.
         box: What to show, lower and upper corner [m], shape (2, 3); None for all of it.
 

@@ -33,7 +33,7 @@ def plot_volume_curve(
         curves: Label -> volumes [m³] from `volume_curve`, shape (n,).
         alphas: Their radii [m], shape (n,).
         ax: Axes to draw in; None for a new figure.
-        length: L [m], to count radii in L and volumes in L³; None counts them in meters.
+        length: L [m], by which radii, and volumes by its cube, are divided; None leaves them in m.
         exact: Volume of the reachable set [m³], drawn as a line.
         convex: Volume of its convex hull [m³], likewise.
 
