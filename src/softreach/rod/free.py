@@ -112,7 +112,7 @@ class FreeRod(TipMap):
 
     def strains_at(self, stations: ArrayLike) -> Callable[[ArrayLike], Strains]:
         """u = Uγ and ζ = 1 + z·γ at stations Z [m] as a function of activations: theory (7)."""
-        table = tables(self.arm, self.check_stations(stations))
+        table = tables(self.arm, stations)
         return lambda activations: linear_strains(table, self.box.check(activations))
 
     def strain_range(self, stations: ArrayLike) -> StrainRange:

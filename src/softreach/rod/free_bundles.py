@@ -44,7 +44,11 @@ class FreeBundles(TipMap):
         return self.whole.box.of_free_bundles()
 
     def refined(self, tol: float) -> TipMap:
-        """The map of the same bundles to a smaller tolerance; itself if its own is no larger."""
+        """The map of the same bundles to a smaller tolerance; itself if its own is no larger.
+
+        Args:
+            tol: Largest tip error, in L.
+        """
         return self if self.tol <= tol else free_bundles(self.whole.refined(tol))
 
     def fill_tips(self, gamma: Array, out: Array) -> None:
@@ -67,7 +71,7 @@ class FreeBundles(TipMap):
         return self.whole.frames(self._all(self.box.check(activations)), stations)
 
     def strains_at(self, stations: ArrayLike) -> Callable[[ArrayLike], Strains]:
-        """The strains at stations Z [m] as a function of activations."""
+        """The strains at stations Z [m], in any order, as a function of activations."""
         strains = self.whole.strains_at(stations)
         return lambda activations: strains(self._all(self.box.check(activations)))
 

@@ -119,7 +119,11 @@ class TipMap(ABC):
 
     @abstractmethod
     def refined(self, tol: float) -> TipMap:
-        """The map of the same arm to a smaller tolerance; itself if its own is no larger."""
+        """The map of the same arm to a smaller tolerance; itself if its own is no larger.
+
+        Args:
+            tol: Largest tip error, in L.
+        """
 
     @abstractmethod
     def fill_tips(self, gamma: Array, out: Array) -> None:
@@ -143,7 +147,10 @@ class TipMap(ABC):
 
     @abstractmethod
     def strains_at(self, stations: ArrayLike) -> Callable[[ArrayLike], Strains]:
-        """The strains at stations Z [m] as a function of activations, to be asked many times."""
+        """The strains at stations Z [m], in any order, as a function of activations.
+
+        What depends on the stations alone is computed once, for many blocks of activations.
+        """
 
     @abstractmethod
     def strain_range(self, stations: ArrayLike) -> StrainRange:
@@ -154,8 +161,8 @@ class TipMap(ABC):
         """Outer radius R2 before activation at stations Z [m]."""
 
     def strains(self, activations: ArrayLike, stations: ArrayLike) -> Strains:
-        """Curvature and extension at stations Z [m]."""
-        return self.strains_at(stations)(activations)
+        """Curvature and extension at ascending stations Z [m]."""
+        return self.strains_at(self.check_stations(stations))(activations)
 
     def tips(self, activations: ArrayLike) -> Array:
         """Tip positions [m], shape (n, 3)."""

@@ -75,6 +75,12 @@ class ReachableSurface(ReachableSet):
         """Distance of points to the triangles of the mapped grid [m], never negative."""
         return self.mapped_grid.distance(finite_points(np.asarray(points, float)))
 
+    def _repr_html_(self) -> str:
+        """What `repr` says below a small picture, for notebooks."""
+        from softreach.picture import Skin, html_card
+
+        return html_card(repr(self), Skin(self.mapped_grid.vertices, self.mapped_grid.faces))
+
     def _lines(self) -> list[str]:
         return [f"area {quantity(self.area, 'm²', self.area_error)}", self._convex_text()]
 
@@ -129,6 +135,12 @@ class ReachableCurve(ReachableSet):
         """The chords as triangles that repeat a corner."""
         start = np.arange(self.cells)
         return Surface(vertices=self.path, faces=np.stack([start, start + 1, start + 1], axis=1))
+
+    def _repr_html_(self) -> str:
+        """What `repr` says below a small picture, for notebooks."""
+        from softreach.picture import Dots, html_card
+
+        return html_card(repr(self), Dots(self.path))
 
     def _lines(self) -> list[str]:
         length = quantity(self.curve_length, "m", self.curve_length_error)
