@@ -224,7 +224,7 @@ def plot_arm(of):
 
 @case(may_not_know=False)
 def plot_cross_section(of):
-    radius = float(of.arm.radius(0.1))
+    radius = float(of.arm.profile.radius(0.1))
     circle = np.outer([-1, 1], [radius] * 3)
     yield from plane(plot.plot_cross_section(of.arm, 0.1), circle)
     yield from plane(plot.plot_cross_section(of.arm, 0.1, half_width=1.1 * radius), circle)
@@ -236,7 +236,7 @@ def plot_designs(of):
     panels = [plot.DesignPanel("a", of.arm), plot.DesignPanel("b", long)]
     arm, _, section, _ = plot.plot_designs(panels).axes
     yield from plane(arm, of.rest)
-    circle = np.outer([-1, 1], [float(of.arm.radius(0.0))] * 3)
+    circle = np.outer([-1, 1], [float(of.arm.profile.radius(0.0))] * 3)
     yield from plane(section, circle)
 
 
