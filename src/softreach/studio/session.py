@@ -84,7 +84,7 @@ class Session:
         Args:
             change: From the present state to the next.
             by_widget: Whether the widgets show the change already. They are left alone then: one
-                that is being dragged would be thrown back to where it was a moment ago.
+                that is being dragged would jump back to where it was a moment ago.
 
         Raises:
             SoftreachError: The change makes no valid state; nothing happens then.
