@@ -15,7 +15,7 @@ BALL = 4.0 / 3.0 * np.pi
 
 @pytest.fixture(scope="module")
 def tips() -> xr.DataArray:
-    """A labelled cloud of an arm of one meter."""
+    """A labeled cloud of an arm of one meter."""
     return xr.DataArray(arc_tips(4000), dims=("sample", "axis"), attrs={"length": 1.0})
 
 
@@ -67,14 +67,14 @@ def test_a_hull_as_a_dataset_encloses_the_volume_that_it_states():
     assert float(found.volume_corrected) > float(found.volume)
 
 
-def test_labelled_tips_have_a_default_radius_of_a_twentieth_of_the_length(tips):
+def test_labeled_tips_have_a_default_radius_of_a_twentieth_of_the_length(tips):
     with pytest.warns(SoftreachWarning, match="mean spacings"):
-        labelled, plain = concave_hull(tips), concave_hull(tips.values, alpha=0.05)
-    assert labelled.alpha == 0.05
-    assert labelled.volume == plain.volume
+        labeled, plain = concave_hull(tips), concave_hull(tips.values, alpha=0.05)
+    assert labeled.alpha == 0.05
+    assert labeled.volume == plain.volume
 
 
-def test_labelled_tips_may_have_their_axes_in_either_order(tips):
+def test_labeled_tips_may_have_their_axes_in_either_order(tips):
     assert concave_hull(tips.T, 0.2).volume == concave_hull(tips, 0.2).volume
 
 

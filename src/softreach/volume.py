@@ -142,7 +142,7 @@ def volume_curve(
 
 
 def _positions(points: np.ndarray | xr.DataArray) -> np.ndarray:
-    """Points as an array (n, 3); a labelled one may have its axes in either order."""
+    """Points as an array (n, 3); a labeled one may have its axes in either order."""
     array = np.asarray(points)
     if getattr(points, "dims", None) == ("axis", "sample"):
         array = array.T
