@@ -104,7 +104,7 @@ def test_stations_off_the_arm_are_refused(cloud, stations):
 
 
 def test_nothing_to_count_is_refused(cloud):
-    with pytest.raises(InvalidInput, match="one sample at least"):
+    with pytest.raises(InvalidInput, match="at least one sample"):
         stream_statistics(sr.cloud.design_of(cloud), [])
     with pytest.raises(InvalidInput, match="bins = 0"):
         curvature_statistics(cloud, bins=0)

@@ -144,7 +144,7 @@ def test_the_measure_asks_for_an_even_cloud_of_three_bundles_or_more(trunk):
     with pytest.raises(InvalidInput, match="bundles = 2: must be 3 or more"):
         solution_measure(compute_cloud(flat, n=100))
     fixed = trunk.with_bounds(((-1, 0), (-1, 0), (-1, -1)))
-    with pytest.raises(InvalidInput, match="must be apart for every bundle"):
+    with pytest.raises(InvalidInput, match="must be lower < upper for every bundle"):
         solution_measure(compute_cloud(fixed, n=100))
     with pytest.raises(InvalidInput, match="cell = 0: must be"):
         solution_measure(compute_cloud(trunk, n=100), cell=0)

@@ -117,7 +117,7 @@ def test_progress_is_called_with_what_was_done_since_its_last_call(name):
     assert re.match(r"Called with", argument_texts(FUNCTIONS[name])["progress"])
 
 
-def test_python_takes_radians_and_metres_so_no_argument_names_another_unit():
+def test_python_takes_radians_and_meters_so_no_argument_names_another_unit():
     units = re.compile(r"_(deg|mm|cm|degrees)$")
     bad = {n: p for n, f in FUNCTIONS.items() for p in parameters(f) if units.search(p)}
     assert bad == {}

@@ -113,7 +113,7 @@ def reversed_rows(values):
         ("symmetric", {"asymmetry": 1e-3}, Verdict.DIFFERS),
         ("R1(0)", {"refusal": "accepted"}, Verdict.AGREES),
         ("δ3", {"delta3": 1e-9}, Verdict.AGREES),
-        ("δ3", {"delta3_mended": 0.1}, Verdict.AGREES),
+        ("δ3", {"delta3_corrected": 0.1}, Verdict.AGREES),
         ("Θ̃2", {"rotation": 0.1}, Verdict.DIFFERS),
         ("e_Θ", {"from_axis_deg": 80}, Verdict.AGREES),
         ("increases with fiber helicity", {"volume": reversed_rows}, Verdict.DIFFERS),
@@ -212,9 +212,9 @@ def test_printed_appendix_a_is_the_integrals_but_for_delta3(ratio, taper, angle,
     alpha = hand * angle
     assert printed.delta0(ratio, taper, alpha, nu) == pytest.approx(4 * exact.axial, rel=1e-6)
     assert printed.delta1(ratio, taper, alpha, nu) == pytest.approx(6 * exact.bending, rel=1e-6)
-    mended = printed.delta3(ratio, taper, alpha, mended=True)
-    assert mended == pytest.approx(6 * exact.torsion, rel=1e-6)
-    assert abs(printed.delta3(ratio, taper, alpha)) > 2 * abs(mended)
+    corrected = printed.delta3(ratio, taper, alpha, corrected=True)
+    assert corrected == pytest.approx(6 * exact.torsion, rel=1e-6)
+    assert abs(printed.delta3(ratio, taper, alpha)) > 2 * abs(corrected)
 
 
 def test_an_atlas_that_was_removed_is_asked_for_and_does_not_come_back(tmp_path):

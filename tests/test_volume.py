@@ -15,7 +15,7 @@ BALL = 4.0 / 3.0 * np.pi
 
 @pytest.fixture(scope="module")
 def tips() -> xr.DataArray:
-    """A labelled cloud of an arm of one meter."""
+    """A labeled cloud of an arm of one meter."""
     return xr.DataArray(arc_tips(4000), dims=("sample", "axis"), attrs={"length": 1.0})
 
 
@@ -53,7 +53,7 @@ def test_the_hull_states_what_it_was_made_of():
 def test_a_hull_prints_its_numbers_and_what_it_was_made_of():
     hull = concave_hull(in_ball(20_000), alpha=0.3, bias=True)
     size, origin = repr(hull).splitlines()
-    assert size.startswith(f"Hull: volume {hull.volume:.6g} m³ (without sampling bias some 4.")
+    assert size.startswith(f"Hull: volume {hull.volume:.6g} m³ (without sampling bias about 4.")
     assert "1 region, " in size
     assert origin == "  alpha shape, alpha = 0.3 m (5.1 mean spacings), of 20,000 points"
     assert "convex hull of 20,000 points" in repr(convex_hull(in_ball(20_000)))
@@ -67,14 +67,14 @@ def test_a_hull_as_a_dataset_encloses_the_volume_that_it_states():
     assert float(found.volume_corrected) > float(found.volume)
 
 
-def test_labelled_tips_have_a_default_radius_of_a_twentieth_of_the_length(tips):
+def test_labeled_tips_have_a_default_radius_of_a_twentieth_of_the_length(tips):
     with pytest.warns(SoftreachWarning, match="mean spacings"):
-        labelled, plain = concave_hull(tips), concave_hull(tips.values, alpha=0.05)
-    assert labelled.alpha == 0.05
-    assert labelled.volume == plain.volume
+        labeled, plain = concave_hull(tips), concave_hull(tips.values, alpha=0.05)
+    assert labeled.alpha == 0.05
+    assert labeled.volume == plain.volume
 
 
-def test_labelled_tips_may_have_their_axes_in_either_order(tips):
+def test_labeled_tips_may_have_their_axes_in_either_order(tips):
     assert concave_hull(tips.T, 0.2).volume == concave_hull(tips, 0.2).volume
 
 

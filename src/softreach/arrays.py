@@ -1,4 +1,4 @@
-"""Names for arrays of which the shape says what they are."""
+"""Names for arrays by what they hold."""
 
 from __future__ import annotations
 

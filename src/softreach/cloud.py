@@ -1,4 +1,4 @@
-"""Reachability clouds: sampled activations, their tips, and where both came from (section 3)."""
+"""Reachability clouds: sampled activations, their tips, and how both were made (section 3)."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def tip_map_of(cloud: xr.Dataset) -> TipMap:
     return tip_map(design_of(cloud), float(cloud.attrs["tol"]))
 
 
-_LONG = 5_000_000  # samples from which a bar is worth its lines
+_LONG = 5_000_000  # samples from which a bar is worth showing
 
 
 def _fill(
@@ -133,7 +133,7 @@ def _reported(task: Callable[[], object], progress: Progress, count: int) -> Non
 
 
 def _shown(progress: Progress | None, n: int) -> AbstractContextManager[Progress]:
-    """What the caller wants to hear, or a bar if the cloud is large enough to wait for."""
+    """The caller's callback, or a bar if the cloud is large enough to wait for."""
     if progress is None and n > _LONG:
         return bar("computing tips", n)
     return nullcontext(progress or silent)

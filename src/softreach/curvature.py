@@ -58,7 +58,7 @@ def curvature_statistics(
     Curvatures are per unit of activated arclength, in the directors. Memory does not grow with the
     number of stations times samples.
 
-    Two things limit the numbers: quantiles are good to one bin, and all of them are those of a
+    Two things limit the numbers: quantiles are accurate to one bin, and all of them are those of a
     sample, whose mean is off by about `..._std` / √n, with n in the attribute `samples`.
 
     Args:
@@ -110,7 +110,7 @@ def stream_statistics(
             for name, values in _at_station(strains, k).items():
                 tallies[name].add(k, values)
     if not tallies["bending"].count.any():
-        raise InvalidInput("activations", "none", "one sample at least")
+        raise InvalidInput("activations", "none", "at least one sample")
     return _dataset(rod, z, tallies, quantiles)
 
 
@@ -120,7 +120,7 @@ def distal_stations(arm: Manipulator | TipMap, count: int = 6) -> Array:
 
 
 def _strains(rod: TipMap, activations: Iterable[Array], z: Array) -> Iterator[Strains]:
-    """Strains of a few samples after the other."""
+    """Strains, a few samples at a time."""
     strains = rod.strains_at(z)
     for block in activations:
         for rows in parallel.blocks(len(block), max(1, _AT_A_TIME // len(z))):

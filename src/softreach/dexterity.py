@@ -95,7 +95,7 @@ def solution_measure(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Data
     if (sampler := cloud.attrs.get("sampler")) not in _EVEN:
         raise InvalidInput("sampler", sampler, f"one of {', '.join(_EVEN)}")
     if not (box := float(np.prod(space.widths))):
-        raise InvalidInput("activation_bounds", space.bounds, "apart for every bundle")
+        raise InvalidInput("activation_bounds", space.bounds, "lower < upper for every bundle")
     grid = tip_cells(cloud, cell)
     # theory (43)
     weight = dexterity(cloud)["manipulability"].values

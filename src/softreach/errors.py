@@ -109,7 +109,7 @@ class InvalidDesign(SoftreachError, ValueError):
 
 
 class MissingExtra(SoftreachError, ImportError):
-    """An optional library is needed and not installed."""
+    """An optional library is needed but not installed."""
 
     def __init__(self, library: str, extra: str) -> None:
         super().__init__(f"this needs {library}; install it with: pip install 'softreach[{extra}]'")

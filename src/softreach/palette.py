@@ -45,7 +45,7 @@ def activation_colors(activation: ArrayLike) -> NDArray[np.uint8]:
     With three bundles R, G and B are the three relative magnitudes, as in the paper.
 
     Args:
-        activation: Activations γ [-], shape (sample, fiber); NaN is black.
+        activation: Activations γ [-], shape (sample, bundle); NaN is black.
 
     Returns:
         Colors from 0 to 255, shape (sample, 3).

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 __all__ = ["Hull", "concave_hull", "convex_hull", "unreachability", "volume_curve"]
 
 DEFAULT_RADIUS = 0.05  # of the arm's length
-SPACINGS = 3.0  # a smaller radius falls through between the points
-QUARTER_SPACINGS = 2.5  # below, V(N/4) has left the law N^-1/2: see design/triangulation.md
+SPACINGS = 3.0  # a smaller ball falls through between the points
+QUARTER_SPACINGS = 2.5  # below, V(N/4) leaves the law N^-1/2: design/triangulation.md
 
 Method = Literal["auto", "numba", "qhull"]
 
@@ -97,7 +97,7 @@ def unreachability(
     """The part of the convex hull that the cloud does not fill, UNR = 1 - V_conc / V_conv [-].
 
     Both volumes come from one triangulation. Both are smaller than those of infinitely many points,
-    the first by more, so that the share is some percent too large: `concave_hull` estimates the
+    the first by more, so that the share is a few percent too large: `concave_hull` estimates the
     bias of the volume, and `reachable_set` needs no points. NaN for a cloud without volume, as 0/0
     says nothing.
 
@@ -142,7 +142,7 @@ def volume_curve(
 
 
 def _positions(points: np.ndarray | xr.DataArray) -> np.ndarray:
-    """Points as an array (n, 3); a labelled one may have its axes in either order."""
+    """Points as an array (n, 3); a labeled one may have its axes in either order."""
     array = np.asarray(points)
     if getattr(points, "dims", None) == ("axis", "sample"):
         array = array.T

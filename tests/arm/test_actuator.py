@@ -148,5 +148,5 @@ class TestFiles:
 
     def test_what_is_no_plain_value_is_not_written(self, trunk):
         arm = trunk.replace(actuators=(Cable(place=(np.float32(0.03), 0.0)),))
-        with pytest.raises(sr.InvalidDesign, match=r"Cable.place = .*to stand in a design file"):
+        with pytest.raises(sr.InvalidDesign, match=r"Cable.place = .*to fit in a design file"):
             arm.to_toml()

@@ -82,7 +82,7 @@ def test_a_design_that_kills_its_workers_is_given_up_and_the_rest_goes_on(tmp_pa
     """
     assert ended(run_script(tmp_path, deadly(body, True), str(store))) == (None, "")
     status = atlas_status(store)
-    assert (status.done, status.messages) == (15, {3: "its worker died, time after time"})
+    assert (status.done, status.messages) == (15, {3: "its worker died repeatedly"})
 
 
 @pytest.mark.slow

@@ -100,7 +100,7 @@ def test_gaps_are_told_before_anything_runs_and_stay_gaps(tmp_path):
 
 def test_a_space_of_gaps_alone_is_refused(tmp_path):
     space = DesignSpace.grid(sr.designs.minimal_trunk(), taper=[0.1, 0.2])
-    with pytest.raises(InvalidInput, match=r"valid for one at least; .*leaves no tip"):
+    with pytest.raises(InvalidInput, match=r"valid for at least one design; .*leaves no tip"):
         build_atlas(space, tmp_path / "a.zarr", **SMALL)
 
 

@@ -84,10 +84,10 @@ def test_the_solution_that_the_arm_holds_is_marked_and_the_others_are_ghosts(tab
     assert all(ghosts)
 
 
-def test_the_tip_leaves_a_trail_of_this_design_alone(tab):
+def test_the_trail_is_that_of_this_design_alone(tab):
     tab.open("Activation")
     assert not tab.drawn("/trail")
-    tab.page.get_by_label("leave a trail").check()
+    tab.page.get_by_label("show trail").check()
     tab.drag("γ right", -40)
     tab.wait(lambda: len(tab.session.trail) > 1, "the tip has moved")
     tab.settle()
@@ -96,7 +96,7 @@ def test_the_tip_leaves_a_trail_of_this_design_alone(tab):
     tab.session.update(lambda s: s.replace(design=changed(s.design, {"taper": 0.03})))
     tab.settle()
     assert len(tab.session.trail) <= 2  # this arm's tip was nowhere else
-    tab.page.get_by_label("leave a trail").uncheck()
+    tab.page.get_by_label("show trail").uncheck()
     tab.wait(lambda: not tab.drawn("/trail"), "the trail is gone")
 
 

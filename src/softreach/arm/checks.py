@@ -1,7 +1,7 @@
 """What a design must satisfy, checked on plain values.
 
-The constructors and the file reader share these checks. Absent values are not judged, so that a
-file with one unreadable key still hears of its other faults; None is a value, and rarely allowed.
+The constructors and the file reader share these checks. Absent values are not judged, so that one
+unreadable key does not hide a file's other faults; None is a value, and rarely allowed.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def ring_faults(values: Mapping[str, Any]) -> list[Fault]:
 
 
 def tube_faults(values: Mapping[str, Any], bundles: int | None = None) -> list[Fault]:
-    """Everything wrong with the flat description of a tapered tube, its fibers left out.
+    """Everything wrong with the flat description of a tapered tube, except its fibers.
 
     Args:
         values: Fields by name, SI units; absent ones are skipped.
@@ -123,7 +123,7 @@ def bounds_faults(bounds: Any, bundles: int | None) -> list[Fault]:
 
 
 def name_faults(names: list[Any], path: str) -> Iterator[Fault]:
-    """Names given twice; the empty one is none."""
+    """Names given twice; an empty name does not count."""
     for k, name in enumerate(names):
         if name and name in names[:k]:
             first = names.index(name)
@@ -146,7 +146,7 @@ def range_faults(values: Mapping[str, Any], ranges: Mapping[str, Range]) -> list
 
 
 def _numbers(values: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Numbers as an array; an empty one for texts, truth values and whatever else is none."""
+    """Numbers as an array; empty for text, booleans and anything else that is not a number."""
     try:
         array = np.asarray(values)
     except (TypeError, ValueError):
@@ -155,7 +155,7 @@ def _numbers(values: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
 
 
 def _sound(values: Mapping[str, Any], faults: list[Fault]) -> dict[str, Any]:
-    """The values that are not blamed yet."""
+    """The values without a fault so far."""
     blamed = {fault.path for fault in faults}
     return {name: plain_number(value) for name, value in values.items() if name not in blamed}
 

@@ -1,4 +1,4 @@
-"""Designs as TOML files: lengths in metres, angles in degrees, the unit in every key."""
+"""Designs as TOML files: lengths in meters, angles in degrees, the unit in every key."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class _Model(BaseModel):
 
 
 class _FiberTable(_Model):
-    """The keys of [[fibers]] and their types; ranges are the design's own business."""
+    """The keys of [[fibers]] and their types; the design itself checks ranges."""
 
     name: str = ""
     helical_angle_deg: float | None = None
@@ -100,7 +100,7 @@ def parse(text: str, source: str) -> tuple[dict[str, Any], list[Actuator]]:
 
 
 def _own_kind(table: dict[str, Any], path: str, source: str) -> Actuator:
-    """An actuator of a kind that the reader's program defines: its fields, in SI units."""
+    """An actuator of a kind defined outside softreach: its fields, in SI units."""
     values = {key: _plain(value) for key, value in table.items()}
     kind, known = values.pop("kind", None), actuator_kinds()
     if not isinstance(kind, str) or kind not in known:
@@ -177,7 +177,7 @@ def _value_text(actuator: Actuator, name: str, value: Any) -> str:
         return _toml(value)
     except (TypeError, ValueError):
         kind = type(actuator).__name__
-        allowed = "must be a number, a text or a sequence of them to stand in a design file"
+        allowed = "must be a number, text or a sequence of these to fit in a design file"
         raise InvalidDesign([Fault(f"{kind}.{name}", value, allowed)]) from None
 
 
@@ -278,7 +278,7 @@ def _field(key: str) -> str:
 
 
 def _si(key: str, value: Any) -> Any:
-    """A value in SI units; one that is no number is left as it is, for the checks to name."""
+    """A value in SI units; anything else is left as it is, for the checks to report."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return value
     if key.endswith("_deg"):

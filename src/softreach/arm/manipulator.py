@@ -31,7 +31,7 @@ class Manipulator:
     """A slender arm with actuators, clamped at Z = 0 where its tangent is +z (section 2).
 
     Values are frozen; `replace` makes a changed copy, which is checked again. What a design does is
-    not computed here: `arm.tables` and everything after it ask it.
+    computed elsewhere: by `arm.tables` and everything after it.
 
     Raises:
         InvalidDesign: The arm cannot exist; the error names every fault.
@@ -105,7 +105,8 @@ class Manipulator:
             activation_bounds: (lower, upper) for every bundle, or one such pair per bundle.
 
         Raises:
-            InvalidDesign: No pairs, too few of them, or a lower bound above the upper one.
+            InvalidDesign: Not pairs, the wrong number of them, or a lower bound above its upper
+            bound.
         """
         if faults := bounds_faults(activation_bounds, self.bundles):
             raise InvalidDesign(faults)
@@ -124,7 +125,7 @@ class Manipulator:
 
         Args:
             fiber: Name or index of the architecture.
-            count: How many shall take its place; 1 leaves the design as it is.
+            count: How many take its place; 1 leaves the design as it is.
             keep_extent: True gives each the extent σ of the original, False its share σ / count, so
                 that together they fill the sector of the original.
 
@@ -226,7 +227,7 @@ class Manipulator:
         return arm_card(self)
 
     def _fiber_index(self, fiber: str | int) -> int:
-        """Place of a fiber architecture among the actuators, from its name or its place."""
+        """Index of a fiber architecture among the actuators, from its name or index."""
         names = {
             k: actuator.name
             for k, actuator in enumerate(self.actuators)
@@ -241,7 +242,7 @@ class Manipulator:
 
 
 def _part_faults(arm: Manipulator) -> Iterator[Fault]:
-    """Parts that are something else than they must be."""
+    """Parts of the wrong type."""
     if not isinstance(arm.profile, Profile):
         yield Fault("profile", arm.profile, "must be a Profile, such as LinearTaper")
     if not isinstance(arm.section, Section):
@@ -272,7 +273,7 @@ def _named(actuators: Sequence[Actuator]) -> Iterator[Actuator]:
 
 
 def _name_faults(arm: Manipulator) -> Iterator[Fault]:
-    """Names, of actuators or of their bundles, that two share."""
+    """Names that two actuators or two bundles share."""
     yield from (faults := list(name_faults([one.name for one in arm.actuators], "actuators")))
     names = arm.bundle_names
     if not faults and len(set(names)) < len(names):

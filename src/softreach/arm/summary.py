@@ -1,4 +1,4 @@
-"""What follows from a design before any sample is drawn, and what to be warned of."""
+"""What follows from a design before any sample is drawn, and its warnings."""
 
 from __future__ import annotations
 

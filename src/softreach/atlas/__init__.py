@@ -1,4 +1,4 @@
-"""Reachability clouds of whole families of designs: built, resumed, opened, asked."""
+"""Reachability clouds of whole families of designs: build, resume, open, query."""
 
 from softreach.atlas.best import best_designs
 from softreach.atlas.build import build_atlas

@@ -33,7 +33,7 @@ def best_designs(
     Args:
         atlas: A store, or a dataset from `open_atlas`.
         metric: What to compare.
-        smallest: Whether small is good.
+        smallest: Whether smaller values are better.
         where: Metric or parameter -> (lowest, highest) allowed; None leaves an end open.
         count: How many designs at most.
 

@@ -64,9 +64,9 @@ def build_atlas(
         accuracy: Relative error asked of the exact volumes; see `reachable_set`.
         tol: Largest tip error, in L.
         keep_clouds: Whether to store the tips, 6.2 bytes each.
-        executor: None for all cores of this process, holding two clouds and one triangulation per
-            thread at most; a `concurrent.futures` executor; a function that makes one, which is
-            called again should a worker die; or a Dask client. Workers write to the store, which
+        executor: None for all cores of this process, with at most two clouds and one triangulation
+            per thread in memory; a `concurrent.futures` executor; a function that makes one, which
+            is called again if a worker dies; or a Dask client. Workers write to the store, which
             they must see at the same place, and use one thread each unless
             ``SOFTREACH_NUM_THREADS`` says otherwise.
         shard: (i, k) computes every k-th design from the i-th on, i from 0: k processes share a
@@ -80,7 +80,7 @@ def build_atlas(
     Raises:
         InvalidInput: An argument out of range, no valid design, or a store that another command
             began; the message says what differs.
-        StoreFailed: The store cannot be written, as the disk is full for instance.
+        StoreFailed: The store cannot be written, for instance because the disk is full.
 
     Warns:
         SoftreachWarning: There are gaps, failed designs, or designs whose points are too sparse for
@@ -98,11 +98,11 @@ def build_atlas(
         keep_clouds=keep_clouds,
     )
     indices = _checked_shard(shard, space.size)
-    _tell_gaps(space)
+    _warn_of_gaps(space)
     atlas = AtlasStore.begin(store, command)
     _run(atlas, indices[~np.isin(atlas.status()[indices], (DONE, GAP))], executor, progress)
     built = open_atlas(store)
-    _tell_sparse(built)
+    _warn_of_sparse(built)
     return built
 
 
@@ -115,7 +115,7 @@ def _run(
     failures: dict[int, str] = {}
     lock = Lock()
     with bar("computing designs", len(indices)) as shown, warnings.catch_warnings():
-        # The metrics hold what these say: the spacing of the points, the error of the volume.
+        # The metrics hold what these warnings say: spacing of the points, error of the volume.
         warnings.simplefilter("ignore", SoftreachWarning)
 
         def on_outcome(outcome: tuple[int, str]) -> None:
@@ -138,7 +138,7 @@ def _checked_shard(shard: tuple[int, int], size: int) -> np.ndarray:
     return np.arange(first, size, count)
 
 
-def _tell_gaps(space: DesignSpace) -> None:
+def _warn_of_gaps(space: DesignSpace) -> None:
     if space.gaps and len(space.gaps) < space.size:
         index, reason = next(iter(space.gaps.items()))
         stay = "stays a gap" if len(space.gaps) == 1 else "stay gaps"
@@ -148,8 +148,8 @@ def _tell_gaps(space: DesignSpace) -> None:
         )
 
 
-def _tell_sparse(atlas: xr.Dataset) -> None:
-    """Say where the alpha shapes have holes between points."""
+def _warn_of_sparse(atlas: xr.Dataset) -> None:
+    """Warn of designs whose alpha shapes have holes between points."""
     if "spacing" not in atlas:
         return
     radius = atlas.volume.attrs["alpha_over_length"]

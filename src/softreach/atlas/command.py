@@ -28,7 +28,7 @@ _RESERVED = frozenset(
     ("status", "message", "number", "tip", "axis", "unit_activation", "sample", "bundle", "length")
     + ("design", "metric", "metrics", "curvature", "quantity", "station", "quantile", "rank")
 )
-"""Names that are no metric's, as an atlas or a question about it uses them for something else."""
+"""Names that no metric may have, as an atlas or a question about it uses them itself."""
 _LONGEST = 1e3  # ratio of the lengths of designs whose tips share one fixed-point step
 
 
@@ -116,10 +116,11 @@ def _faults(command: Command) -> Iterator[InvalidInput]:
         yield InvalidInput("alpha_over_length", value, allowed)
     taken = _RESERVED | {*space.names}
     for name in (metric.name for metric in command.metrics if metric.name in taken):
-        yield InvalidInput("name of a metric", name, "no name that the atlas uses for something")
+        yield InvalidInput("name of a metric", name, "a name that the atlas does not use itself")
     if not space.bundles:
         why = next(iter(space.gaps.values()))
-        yield InvalidInput("space", counted(space.size, "design"), "valid for one at least", why)
+        designs = counted(space.size, "design")
+        yield InvalidInput("space", designs, "valid for at least one design", why)
     shortest, longest = space.length_range
     if command.keep_clouds and longest > _LONGEST * shortest:
         allowed = f"within a factor of {_LONGEST:g} of each other if clouds are kept"

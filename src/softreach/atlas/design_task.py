@@ -26,10 +26,10 @@ Outcome = tuple[int, str]
 
 
 def begin_design(store: AtlasStore, metrics: Sequence[Metric], index: int) -> Callable[[], Outcome]:
-    """Do the part of a design that uses every thread by itself; the rest is returned, to be called.
+    """Do the part of a design that uses all threads; return the rest as a function to call.
 
-    So that one design's tips are computed by all threads while others have their hulls taken, one
-    on each thread. A failure of the design is stored and returned, one of the store is raised.
+    All threads compute the tips of one design while the hulls of others are computed, one on each
+    thread. A failure of the design is stored and returned, one of the store is raised.
     """
     try:
         arm = store.command.design(index)
@@ -84,14 +84,14 @@ _opened: dict[tuple[str, tuple[str, int]], AtlasStore] = {}
 
 
 def run_remotely(remote: Remote, index: int) -> Outcome:
-    """Compute and store a design in a worker; called again, it does the same again."""
+    """Compute and store a design in a worker; a repeated call gives the same result."""
     remote.bound_threads()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SoftreachWarning)
         try:
             return begin_design(remote.store(), remote.metrics, index)()
         except SoftreachError as error:
-            raise StoreFailed(str(error)) from None  # survives the way back
+            raise StoreFailed(str(error)) from None  # this one can be sent back
 
 
 def _finish(

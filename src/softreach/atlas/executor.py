@@ -49,7 +49,7 @@ ExecutorLike = Executor | DaskClient | Workers | None
 
 
 def worker_processes(count: int) -> Workers:
-    """Worker processes on this machine, begun anew should one die.
+    """Worker processes on this machine, restarted if one dies.
 
     Args:
         count: Number of processes; each uses one thread.
@@ -75,18 +75,20 @@ def run_designs(
     Args:
         store: Where they go.
         indices: Which designs.
-        executor: None for the threads of this process; else who runs the designs, one a task.
+        executor: None for the threads of this process; else what runs the designs, one a task.
         on_outcome: Called with each outcome as it comes.
 
     Raises:
         InvalidInput: Not an executor, or a metric that its workers cannot get.
         StoreFailed: The store cannot be written.
-        SoftreachError: An executor that cannot be begun anew has lost a worker.
+        SoftreachError: An executor that cannot be restarted has lost a worker.
     """
     if executor is None:
         # Drawing a task computes the tips, so at most a few clouds per thread are held at once.
         metrics = store.command.metrics
-        parallel.run(_told(begin_design(store, metrics, index), on_outcome) for index in indices)
+        parallel.run(
+            _reporting(begin_design(store, metrics, index), on_outcome) for index in indices
+        )
         return
     with _Pool(executor) as pool:
         pool.check_metrics(store.command.metrics)
@@ -94,12 +96,12 @@ def run_designs(
             on_outcome(_given_up(store, index))
 
 
-def _told(task: Callable[[], Outcome], on_outcome: OnOutcome) -> Callable[[], None]:
+def _reporting(task: Callable[[], Outcome], on_outcome: OnOutcome) -> Callable[[], None]:
     return lambda: on_outcome(task())
 
 
 class _Pool:
-    """An executor that is begun anew where that is possible."""
+    """An executor that is restarted where that is possible."""
 
     def __init__(self, executor: ExecutorLike) -> None:
         self._start: Workers | None = None
@@ -143,8 +145,8 @@ class _Pool:
         """Replace a broken executor."""
         if self._start is None:
             raise SoftreachError(
-                "a worker died and broke its executor; the same command continues, and a function "
-                "that makes the executor, in its place, lets it go on by itself"
+                "a worker died and broke its executor; the same call continues, and goes on by "
+                "itself if the executor is given as a function that makes it"
             )
         self._now.shutdown(wait=False, cancel_futures=True)
         self._now = self._start()
@@ -153,11 +155,11 @@ class _Pool:
 def _run_in_pool(
     pool: _Pool, remote: Remote, waiting: deque[int], on_outcome: OnOutcome
 ) -> list[int]:
-    """Run the designs; those that kill their workers again and again are returned."""
+    """Run the designs; return those that kill their workers again and again."""
     lost: list[int] = []
     while waiting:
         suspects = _run_until_broken(pool, remote, waiting, on_outcome)
-        # One at a time, so that the guilty design is told from its neighbors.
+        # One at a time, to tell the design at fault from its neighbors.
         lost += [index for index in suspects if not _survives(pool, remote, index, on_outcome)]
     return lost
 
@@ -170,7 +172,7 @@ def _survives(pool: _Pool, remote: Remote, index: int, on_outcome: OnOutcome) ->
 def _run_until_broken(
     pool: _Pool, remote: Remote, waiting: deque[int], on_outcome: OnOutcome
 ) -> list[int]:
-    """Take designs from `waiting` until all are done, or a worker has died: who was there then."""
+    """Run designs from `waiting` until all are done or a worker dies; return those running then."""
     pending: dict[Future[Outcome], int] = {}
     suspects: list[int] = []
     broken = False
@@ -208,15 +210,13 @@ def _settle(
     remote: Remote,
     on_outcome: OnOutcome,
 ) -> list[int]:
-    """Tell what has ended; designs that ended with their worker are returned."""
+    """Report what has ended; return designs that ended with their worker."""
     ended = [(future, pending.pop(future)) for future in done]
-    return [index for future, index in ended if not _told_result(future, index, remote, on_outcome)]
+    return [index for future, index in ended if not _reported(future, index, remote, on_outcome)]
 
 
-def _told_result(
-    future: Future[Outcome], index: int, remote: Remote, on_outcome: OnOutcome
-) -> bool:
-    """Tell an outcome; False if there is none, as the worker died."""
+def _reported(future: Future[Outcome], index: int, remote: Remote, on_outcome: OnOutcome) -> bool:
+    """Report an outcome; False if there is none, as the worker died."""
     try:
         on_outcome(future.result())
     except (BrokenExecutor, CancelledError):
@@ -229,6 +229,6 @@ def _told_result(
 
 
 def _given_up(store: AtlasStore, index: int) -> Outcome:
-    message = "its worker died, time after time"
+    message = "its worker died repeatedly"
     store.write_failure(index, message)
     return index, message

@@ -73,7 +73,7 @@ def _alpha_complex(of: Intermediates) -> AlphaComplex:
 
 
 def _convex_volume(of: Intermediates) -> float:
-    """From the triangulation, if there has to be one anyway."""
+    """From the triangulation, if one is needed anyway."""
     if Need.ALPHA_COMPLEX in of.wanted:
         return float(of[Need.ALPHA_COMPLEX].volumes.sum())
     return convex_hull(of[Need.TIPS]).volume

@@ -18,7 +18,7 @@ RESOLUTION = 1e-5
 """Step of stored tips over the shortest length: no coordinate is off by more than half of it."""
 
 SEAL = "metrics"
-"""The array that is created last: where it is, all others are."""
+"""The array that is created last: if it exists, so do all others."""
 
 _MISSING = int(np.iinfo(np.int32).min)
 
@@ -87,7 +87,10 @@ def _profiles(command: Command) -> Iterator[Plan]:
     yield _shared("station", np.array(command.stations), ("station",), place)
     yield _shared("quantile", np.array(command.quantiles), ("quantile",), {"units": "1"})
     sizes = {"quantity": len(command.profiles), **command.profile_sizes}
-    attrs = {"long_name": "metrics over stations and quantiles", "metrics": _told(command.profiles)}
+    attrs = {
+        "long_name": "metrics over stations and quantiles",
+        "metrics": _meanings(command.profiles),
+    }
     yield _per_design(command, "curvature", np.float64, np.nan, sizes, attrs)
 
 
@@ -106,12 +109,12 @@ def _tips(command: Command) -> Plan:
 def _described(command: Command) -> dict[str, Any]:
     return {
         "long_name": "metrics of the designs",
-        "metrics": _told(command.numbers),
+        "metrics": _meanings(command.numbers),
         "alpha_over_length": command.alpha_over_length,
     }
 
 
-def _told(metrics: Sequence[Metric]) -> str:
+def _meanings(metrics: Sequence[Metric]) -> str:
     """What each number is, for readers without softreach."""
     return "; ".join(f"{metric.name} [{metric.unit}]: {metric.meaning}" for metric in metrics)
 

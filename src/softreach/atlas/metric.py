@@ -36,7 +36,7 @@ class Need(Enum):
 
 
 class MetricFailed(SoftreachError):
-    """A metric could not be computed, or gave what it must not."""
+    """A metric could not be computed, or gave an invalid value."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,8 +145,8 @@ def check_travels(metric: Metric, *, by_import: bool) -> None:
 
     Args:
         metric: Which one.
-        by_import: Whether that process imports what it is sent, as those of Python's pools do, and
-            so has nothing that was typed into a session.
+        by_import: Whether that process imports functions by name, as those of Python's pools do,
+            and so lacks those typed into a session.
 
     Raises:
         InvalidInput: It cannot.

@@ -1,4 +1,4 @@
-"""Questions asked of an atlas: how far it is, which design is where, and its cloud."""
+"""Questions asked of an atlas: how much is done, which design is where, and its cloud."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = ["AtlasStatus", "atlas_cloud", "atlas_design", "atlas_status"]
 
 @dataclass(frozen=True, kw_only=True)
 class AtlasStatus:
-    """How far an atlas is."""
+    """How much of an atlas is done."""
 
     designs: int
     done: int

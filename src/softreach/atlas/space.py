@@ -33,7 +33,7 @@ class DesignSpace:
     """
 
     base: Manipulator
-    """The design that all others are changes of."""
+    """The design that all others are variations of."""
     parameters: tuple[tuple[str, tuple[float, ...]], ...]
     """Name and values [SI units] of every parameter."""
     layout: Layout = "grid"
@@ -189,7 +189,7 @@ def _plain(values: Mapping[str, ArrayLike]) -> tuple[tuple[str, tuple[float, ...
 def _faults(space: DesignSpace) -> Iterator[InvalidInput]:
     known = parameters(space.base)
     if not space.parameters:
-        yield InvalidInput("parameters", "none", f"one at least of {', '.join(known)}")
+        yield InvalidInput("parameters", "none", f"at least one of {', '.join(known)}")
     for name, values in space.parameters:
         if name not in known:
             yield unknown_parameter(name, known)
@@ -201,7 +201,8 @@ def _faults(space: DesignSpace) -> Iterator[InvalidInput]:
             yield InvalidInput(name, values, "values that differ")
     if space.layout == "list" and len({len(values) for _, values in space.parameters}) > 1:
         counts = ", ".join(f"{name}: {len(values)}" for name, values in space.parameters)
-        yield InvalidInput("parameters", counts, "as many values of each in a list of designs")
+        allowed = "the same number for each parameter in a list of designs"
+        yield InvalidInput("parameters", counts, allowed)
 
 
 def _spread(count: int, dim: int, method: str, seed: int) -> np.ndarray:

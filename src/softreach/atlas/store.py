@@ -5,10 +5,10 @@ and renames it, so a killed writer leaves chunks whole or absent; a design whose
 is computed again, whatever else of it exists.
 
 A store is created in three steps, so that the tasks of a job array may all do it at once and be
-killed anywhere: its root, which holds the command, exists from one moment to the next and is never
-written again, so that everybody knows whose store it is; then come the arrays, whose bytes are the
-same whoever writes them, so that a late creator changes nothing; the last of them is the seal, and
-nobody reads a store or adds designs without it.
+killed anywhere: its root, which holds the command, appears at once and is never written again, so
+that everybody knows whose store it is; then come the arrays, whose bytes are the same whoever
+writes them, so that a late creator changes nothing; the last of them is the seal, and nobody reads
+a store or adds designs without it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from softreach.atlas.store_root import (
     absolute,
     claim,
     opened_root,
-    trouble,
+    storage_errors,
     writing,
 )
 from softreach.errors import InvalidInput
@@ -121,7 +121,7 @@ class AtlasStore:
         for plan in plans:
             _create_array(self.location, self.group, plan)
         for index, reason in self.command.space.gaps.items():
-            _tell(self.group, self.command, index, reason, GAP)
+            _write_status(self.group, self.command, index, reason, GAP)
         _create_array(self.location, self.group, seal)
 
     def status(self) -> NDArray[np.uint8]:
@@ -141,7 +141,7 @@ class AtlasStore:
         Raises:
             StoreFailed: They are not what they were when the store was created.
         """
-        with trouble(f"{self.location} cannot be read"):
+        with storage_errors(f"{self.location} cannot be read"):
             cube = np.asarray(self._array("unit_activation")[...])
         self._check_cube(cube, "the stored activations are damaged; remove it")
         return cube
@@ -175,7 +175,7 @@ class AtlasStore:
             StoreFailed: It cannot be written.
         """
         with writing(self.location):
-            _tell(self.group, self.command, index, message, status)
+            _write_status(self.group, self.command, index, message, status)
 
     def _array(self, name: str) -> Any:
         return self.group[name]
@@ -225,7 +225,7 @@ def _create_array(location: StoreLike, group: zarr.Group, plan: Plan) -> None:
         array[...] = plan.data
 
 
-def _tell(group: Any, command: Command, index: int, message: str, status: int) -> None:
+def _write_status(group: Any, command: Command, index: int, message: str, status: int) -> None:
     place = np.unravel_index(index, command.space.shape)
     group["message"][place] = np.array(message, dtype=np.dtypes.StringDType())
     group["status"][place] = status

@@ -1,4 +1,4 @@
-"""The place of a store: opened, or taken by the first who comes; its troubles in one line."""
+"""The place of a store: opened, or claimed by whoever comes first; its errors in one line."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from zarr.abc.store import Store
     from zarr.storage import StoreLike, StorePath
 
-__all__ = ["StoreFailed", "absolute", "claim", "opened_root", "trouble", "writing"]
+__all__ = ["StoreFailed", "absolute", "claim", "opened_root", "storage_errors", "writing"]
 
 
 class StoreFailed(SoftreachError):
-    """The store cannot be written to, because the disk is full for instance; it can be resumed."""
+    """The store cannot be written to, for instance because the disk is full; it can be resumed."""
 
 
 def absolute(location: StoreLike) -> StoreLike:
@@ -33,16 +33,16 @@ def absolute(location: StoreLike) -> StoreLike:
 
 
 def writing(location: StoreLike) -> AbstractContextManager[None]:
-    """Turn trouble of the disk or the network into one line that says what to do."""
-    return trouble(
+    """Turn errors of the disk or the network into one line that says what to do."""
+    return storage_errors(
         f"{location} cannot be written",
-        "; what is done is safe, and the same command continues once that is mended",
+        "; what is done is safe, and the same command continues once that is fixed",
     )
 
 
 @contextmanager
-def trouble(what: str, then: str = "") -> Iterator[None]:
-    """Raise what a store raises, whatever kind of store it is, as `StoreFailed`."""
+def storage_errors(what: str, then: str = "") -> Iterator[None]:
+    """Raise any error of any kind of store as `StoreFailed`."""
     try:
         yield
     except SoftreachError:
@@ -56,7 +56,7 @@ def opened_root(location: StoreLike, mode: Literal["r", "r+"] = "r+") -> zarr.Gr
     """The root group of a store, if there is one."""
     import zarr
 
-    with trouble(f"{location} cannot be opened"):
+    with storage_errors(f"{location} cannot be opened"):
         try:
             return zarr.open_group(location, mode=mode, zarr_format=3)
         except FileNotFoundError:
@@ -67,7 +67,7 @@ def opened_root(location: StoreLike, mode: Literal["r", "r+"] = "r+") -> zarr.Gr
 
 
 def claim(location: StoreLike, attributes: Mapping[str, Any]) -> None:
-    """Write the root of a store, whole and never again: of several who try, the first does.
+    """Write the root of a store, whole and only once: of several who try, the first succeeds.
 
     Raises:
         InvalidInput: The place holds something else.
@@ -82,10 +82,9 @@ def claim(location: StoreLike, attributes: Mapping[str, Any]) -> None:
 
 
 def _first_wins(store: Store, location: StoreLike) -> Store:
-    """The same store, to which only what is missing is written, and nothing beside strange files.
+    """The same store, to which only what is missing is written, and nothing beside other files.
 
-    Zarr's groups have no exclusive mode, its stores have: whatever is set is set only if it does
-    not exist.
+    Zarr's groups have no exclusive mode, but its stores do: a key is set only if it is missing.
     """
     from zarr.storage import WrapperStore
 
@@ -93,15 +92,15 @@ def _first_wins(store: Store, location: StoreLike) -> Store:
         async def set(self, key: str, value: Any) -> None:
             folder = key.rpartition("/")[0]
             names = [name async for name in self.list_dir(folder)]
-            # In this order: a claim by somebody else in between makes its files no strangers.
-            if any(map(_strange, names)) and not await self.exists(key):
+            # In this order: files of a claim made in between are not foreign.
+            if any(map(_is_foreign, names)) and not await self.exists(key):
                 raise InvalidInput("store", location, "a new folder, or an atlas")
             await self.set_if_not_exists(key, value)
 
     return FirstWins(store)
 
 
-def _strange(name: str) -> bool:
+def _is_foreign(name: str) -> bool:
     """Whether a file is anything but what a killed writer leaves behind."""
     return not name.endswith(".partial")
 

@@ -100,7 +100,7 @@ def best(
     store: Store,
     metric: Annotated[str, Parameter(help="What to compare, e.g. exact_volume.")],
     *,
-    smallest: Annotated[bool, Parameter(negative="", help="Small is good.")] = False,
+    smallest: Annotated[bool, Parameter(negative="", help="Prefer small values.")] = False,
     where: Annotated[
         list[str] | None,
         Parameter(help="A constraint: unreachability<=0.4 or taper_deg>=1."),
@@ -127,7 +127,7 @@ def figures(
     store: Store,
     *,
     out: Annotated[Path, Parameter(help="Folder for the figures.")] = Path("figures"),
-    panels: Annotated[int, Parameter(help="Columns and rows of the sheets at most.")] = 7,
+    panels: Annotated[int, Parameter(help="Largest number of columns and rows of a sheet.")] = 7,
 ) -> None:
     """Draw the atlas, each figure as PNG and PDF: sheets, corners, maps, curvature.
 
@@ -185,7 +185,7 @@ def _executor(
 
 
 def _over_length(text: str) -> float:
-    """0.05 from `0.05L`: what is no multiple of L could not fit designs of every length."""
+    """0.05 from `0.05L`: a length in m would not suit designs of every length."""
     try:
         radius = float(text.removesuffix("L")) if text.endswith("L") else 0.0
     except ValueError:

@@ -1,4 +1,4 @@
-"""A first run compiles kernels for a minute: it says so, and is not taken for a hang."""
+"""A first run compiles kernels for a minute, and says so that nobody takes it for a hang."""
 
 from __future__ import annotations
 

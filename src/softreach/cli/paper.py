@@ -18,7 +18,7 @@ def paper(
         bool, Parameter(negative="", help="Small clouds: coarse numbers in under a minute.")
     ] = False,
 ) -> None:
-    """Recompute the paper and write a report (HTML) beside what it says; run again to continue.
+    """Recompute the paper's figures and statements into a report; run again to continue.
 
     Example: softreach paper --out paper --quick
     """

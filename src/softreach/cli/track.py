@@ -43,7 +43,7 @@ def track(
     header = ",".join([*column_names(arm.bundle_names), "tip_error_m"])
     _write(out, [header, *(",".join(f"{x:.12g}" for x in (*g, error)) for g, error in rows)])
     followed = int((found.status == 0).sum())
-    end = found.attrs["end"] or "the path's own end"
+    end = found.attrs["end"] or "the end of the path"
     sys.stdout.write(f"{followed} of {found.sizes['point']} points followed, up to {end}: {out}\n")
 
 

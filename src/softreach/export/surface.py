@@ -66,7 +66,7 @@ def export_mesh(
         pair = (pair.vertices, pair.faces)
     vertices, faces = np.asarray(pair[0], float), np.asarray(pair[1], np.int64)
     if not len(faces):
-        raise InvalidInput("mesh.faces", "none", "one triangle at least")
+        raise InvalidInput("mesh.faces", "none", "at least one triangle")
     write_parts([Part("surface", vertices, faces)], path)
 
 

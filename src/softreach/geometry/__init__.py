@@ -1,1 +1,1 @@
-"""Points to numbers; nothing here knows a robot."""
+"""From points to numbers; nothing here is about robots."""

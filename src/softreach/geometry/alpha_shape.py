@@ -21,7 +21,7 @@ BLOCK = 200_000  # cells measured by one thread at a time
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AlphaComplex:
-    """A triangulation whose tetrahedra carry the radius from which on they belong to the shape.
+    """A triangulation with the radius from which on each tetrahedron belongs to the shape.
 
     The alpha shape of radius α is the union of the tetrahedra whose circumscribed sphere has a
     radius R <= α (Edelsbrunner and Mücke 1994): what is left of the convex hull after a ball of

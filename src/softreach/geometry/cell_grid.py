@@ -41,7 +41,7 @@ class CellGrid:
         """
         points = finite_points(points)
         if len(points) == 0:
-            raise InvalidInput("points", "none", "one at least")
+            raise InvalidInput("points", "none", "at least one")
         if not 0 < edge < np.inf:  # NaN too
             raise InvalidInput("cell", edge, "an edge > 0 [m]")
         place = np.floor(points / edge)

@@ -91,10 +91,10 @@ class Hull:
 
     @property
     def _bias_text(self) -> str:
-        """What the sampling does to the volume, if it was asked."""
+        """What the sampling does to the volume, if asked for."""
         if self.volume_corrected is None:
             return ""
-        return f" (without sampling bias some {self.volume_corrected:.4g} m³)"
+        return f" (without sampling bias about {self.volume_corrected:.4g} m³)"
 
     @property
     def _shape_text(self) -> str:

@@ -1,7 +1,7 @@
 """Alpha shapes from a Delaunay triangulation: radii, volumes, boundary, regions, critical radius.
 
 The alpha shape of radius α is the union of the cells whose circumscribed sphere has radius R <= α.
-A region is a set of such cells that hang together by faces.
+A region is a set of such cells that are connected through faces.
 
 References:
     Edelsbrunner, Mücke (1994), Three-dimensional alpha shapes, ACM Trans. Graphics 13, 43-72.

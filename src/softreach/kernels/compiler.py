@@ -34,7 +34,7 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def inline(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile a small function into its callers; a call left in a loop stops vectorisation."""
+    """Compile a small function into its callers; a call left in a loop stops vectorization."""
     return njit(forceinline=True, nogil=True, fastmath=FAST, error_model="numpy")(function)
 
 

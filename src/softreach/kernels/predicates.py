@@ -1,4 +1,4 @@
-"""On which side? The two signs that a Delaunay triangulation rests on, always right.
+"""The two signs that a Delaunay triangulation rests on, always right.
 
 Each predicate first evaluates its determinant in floating point and returns the sign where the
 rounding error cannot reach it; otherwise the determinant is expanded exactly (`expansions`).
@@ -7,7 +7,7 @@ The bounds are Shewchuk's first stage, (7 + 56ε)ε and (16 + 224ε)ε times the
 permanent replaced by a larger and cheaper product of the largest coordinate differences, so that
 most calls cost little more than the determinant.
 
-Exact while coordinates lie in [-1, 1] and are multiples of 2^-200 (`kernels.delaunay` sees to it):
+Exact while coordinates lie in [-1, 1] and are multiples of 2^-200 (`geometry.delaunay` ensures it):
 then every product of five of them is a multiple of 2^-1000, and nothing under- or overflows.
 """
 

@@ -1,4 +1,4 @@
-"""A triangulation that grows: cells, who neighbors whom, and cavities dug and filled.
+"""A triangulation that grows: its cells, their neighbors, and cavities dug and filled.
 
 A cell abcd has det[b-a, c-a, d-a] > 0; its neighbor i lies opposite vertex i. The ghost vertex
 stands for all of space beyond the convex hull, so that every face has a cell on both its sides.

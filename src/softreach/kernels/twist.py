@@ -22,7 +22,7 @@ _SINC, _COSC, _SINC3 = (
     tuple((-1) ** k / math.factorial(2 * k + shift) for k in _TERMS) for shift in (1, 2, 3)
 )
 
-# Coefficients of ad .. ad⁴ in the left-trivialised differential of exp [Selig2005]: reducing
+# Coefficients of ad .. ad⁴ in the left-trivialized differential of exp [Selig2005]: reducing
 # Σ adᵏ/(k+1)! with ad⁵ = -2θ² ad³ - θ⁴ ad leaves four functions of θ alone, theory (30), as series.
 _DEXP = (
     tuple((-1) ** k * (1 - k) / math.factorial(2 * k + 2) for k in _TERMS),

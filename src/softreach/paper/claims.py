@@ -26,7 +26,7 @@ class Claim:
     part: str
     """The part of the report that computes what it needs."""
     check: Callable[[Numbers], Finding]
-    """From the part's numbers to what came out."""
+    """From the part's numbers to a finding."""
 
 
 def _claims() -> Iterator[Claim]:

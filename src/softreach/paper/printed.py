@@ -32,14 +32,14 @@ def delta1(ratio: float, taper: float, helical_angle: float, poisson_ratio: floa
     return float(2 / (p * a * (p**2 - a**2)) * (first - p * second))
 
 
-def delta3(ratio: float, taper: float, helical_angle: float, *, mended: bool = False) -> float:
-    """δ3 of Appendix A for R2 = 1 [-], as printed, or mended: its 3 before the T's alone.
+def delta3(ratio: float, taper: float, helical_angle: float, *, corrected: bool = False) -> float:
+    """δ3 of Appendix A for R2 = 1 [-], as printed, or corrected: its 3 before the T's alone.
 
     Args:
         ratio: R1/R2 [-].
         taper: φ [rad], not 0.
         helical_angle: α [rad], neither 0 nor ±φ.
-        mended: Whether to move the 3 from before the bracket to before the arctangents.
+        corrected: Whether to move the 3 from before the bracket to before the arctangents.
     """
     p, a = np.tan(taper), np.tan(helical_angle)
     root = np.sqrt(complex(p**2 - a**2))
@@ -52,7 +52,7 @@ def delta3(ratio: float, taper: float, helical_angle: float, *, mended: bool = F
 
     arctangents = (t(-ratio) + t(ratio) - t(-1) - t(1)) * p**2
     roots = 6 * a * (s(1) - s(ratio))
-    whole = 3 * arctangents + roots if mended else 3 * (arctangents + roots)
+    whole = 3 * arctangents + roots if corrected else 3 * (arctangents + roots)
     return float((whole / (p**2 * a**2 * root)).real)
 
 

@@ -59,7 +59,7 @@ def reproduce_paper(
         OSError: The folder cannot be written to.
     """
     pyplot()
-    report_template()  # what is missing is told now, not after a quarter of an hour
+    report_template()  # what is missing is reported now, not after a quarter of an hour
     settings = QUICK if quick else FULL
     folder = Path(out) / "quick" if quick else Path(out)
     folder.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""How large the clouds are with which the paper is recomputed."""
+"""Sizes of the clouds with which the paper is recomputed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a statement of the paper fares."""
+"""Verdicts on the statements of the paper."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Numbers = Mapping[str, Any]
 
 
 class Verdict(StrEnum):
-    """How a statement fares."""
+    """Whether a statement holds."""
 
     AGREES = "agrees"
     NEARLY = "nearly"
@@ -23,13 +23,13 @@ class Verdict(StrEnum):
 
 
 class Finding(NamedTuple):
-    """What came out."""
+    """What was found."""
 
     text: str
     verdict: Verdict
 
 
 def judged(text: str, agrees: bool, nearly: bool = False) -> Finding:
-    """What came out, and whether that agrees, or nearly does."""
+    """What was found, and whether that agrees, or nearly does."""
     verdict = Verdict.AGREES if agrees else Verdict.NEARLY if nearly else Verdict.DIFFERS
     return Finding(text, verdict)

@@ -1,4 +1,4 @@
-"""Small pictures for notebooks: what a value looks like, beside what it says of itself."""
+"""Small pictures for notebooks: what a value looks like, above its text."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def html_card(text: str, *parts: Skin | Dots, view: View = "oblique") -> str:
     """HTML that shows parts above a text, for `_repr_html_`; the text alone if they are empty.
 
     Args:
-        text: What the value says of itself, such as its `repr`; not yet HTML.
+        text: Text of the value, such as its `repr`; it is escaped here.
         *parts: What to show, in common units.
         view: The direction of sight.
     """

@@ -51,7 +51,7 @@ def box_over_length(atlas: xr.Dataset) -> Array:
     low = [float(over_length(atlas, f"{axis}_min").min()) for axis in "xyz"]
     high = [float(over_length(atlas, f"{axis}_max").max()) for axis in "xyz"]
     if not np.isfinite([low, high]).all():
-        raise InvalidInput("atlas", "no design is done", "one design at least")
+        raise InvalidInput("atlas", "no design is done", "at least one design")
     return np.array([low, high])
 
 

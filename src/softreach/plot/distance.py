@@ -93,7 +93,7 @@ def plot_distance_histograms(
         MissingExtra: matplotlib is not installed.
     """
     if not distances:
-        raise InvalidInput("distances", "none", "one at least")
+        raise InvalidInput("distances", "none", "at least one")
     with figure_style():
         shape = {"figsize": (width, 0.37 * width), "layout": "constrained", "squeeze": False}
         figure, grid = pyplot().subplots(1, len(distances), sharex=True, **shape)

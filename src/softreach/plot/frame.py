@@ -105,7 +105,7 @@ def bounding_box(*points: ArrayLike) -> Array:
     """
     corners = [corner for cloud in points for corner in _corners(np.asarray(cloud, float))]
     if not corners:
-        raise InvalidInput("points", "none", "one finite point at least")
+        raise InvalidInput("points", "none", "at least one finite point")
     low, high = np.min(corners, axis=0), np.max(corners, axis=0)
     margin = _MARGIN * max((high - low).max(), 1e-9)
     return np.array([low - margin, high + margin])

@@ -72,7 +72,7 @@ def plot_slices(
         width: Of the figure [inch].
 
     Raises:
-        InvalidInput: A point that is none, or outside the grid.
+        InvalidInput: Not a point, or one outside the grid.
         MissingExtra: matplotlib is not installed.
     """
     if np.shape(at) != (3,):
@@ -93,7 +93,7 @@ def _layer(grid: xr.Dataset, axis: str, at: float) -> xr.Dataset:
 
 
 def _draw(ax: Axes, layer: xr.Dataset, view: View, unit: LengthUnit) -> int:
-    """The layer, seen from there; returns the largest number that is shown."""
+    """The layer, in that view; returns the largest number that is shown."""
     plane = plane_of(view)
     assert plane is not None  # the view is along an axis
     across, up = plane

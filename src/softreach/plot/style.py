@@ -56,7 +56,7 @@ def pyplot() -> Any:
 
 
 def figure_style(ax: Axes | None = None) -> AbstractContextManager[None]:
-    """Our defaults for a figure of our own; somebody else's axes keep theirs."""
+    """Our defaults for a new figure; the caller's axes keep their own."""
     return pyplot().rc_context(_RC) if ax is None else nullcontext()
 
 

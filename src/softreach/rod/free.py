@@ -116,7 +116,7 @@ class FreeRod(TipMap):
         return lambda activations: linear_strains(table, self.box.check(activations))
 
     def strain_range(self, stations: ArrayLike) -> StrainRange:
-        """What the strains at stations Z [m] can be within the activation box."""
+        """Ranges of the strains at stations Z [m] within the activation box."""
         return strain_range(tables(self.arm, stations), self.box)
 
     def radius(self, stations: ArrayLike) -> Array:

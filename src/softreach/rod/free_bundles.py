@@ -76,7 +76,7 @@ class FreeBundles(TipMap):
         return lambda activations: strains(self._all(self.box.check(activations)))
 
     def strain_range(self, stations: ArrayLike) -> StrainRange:
-        """What the strains at stations Z [m] can be within the activation box."""
+        """Ranges of the strains at stations Z [m] within the activation box."""
         return self.whole.strain_range(stations)
 
     def radius(self, stations: ArrayLike) -> Array:

@@ -38,7 +38,7 @@ def linear_strains(table: Tables, gamma: Array) -> Strains:
 
 
 def strain_range(table: Tables, box: ActivationBox) -> StrainRange:
-    """Between which ends the strains of all activations in a box lie."""
+    """Ranges of the strains of all activations in a box."""
     bounds = np.stack([box.low, box.high], axis=1)
     most = _most_bending(table.curvature[:, :2], bounds)
     return StrainRange(

@@ -1,7 +1,7 @@
 """Where in the activation box a rod is hardest to integrate: the corners that bend it most.
 
 The error of the steps grows with a high power of the bending, so that its largest values lie where
-many bundles bend the arm the same way: at few corners of the box, which chance does not meet.
+many bundles bend the arm the same way: at few corners of the box, which random samples miss.
 """
 
 from __future__ import annotations

@@ -40,12 +40,12 @@ BLOCK = 16_384
 
 
 class TipStatus(IntEnum):
-    """What a tip is worth."""
+    """Whether a tip can be trusted."""
 
     STABLE = 0
     """A stable equilibrium."""
     UNSTABLE = 1
-    """An equilibrium that the smallest disturbance would end."""
+    """An unstable equilibrium."""
     NO_EQUILIBRIUM = 2
     """The branch that starts at the unloaded arm ends before; the tip is NaN."""
 
@@ -82,7 +82,7 @@ class TipMotions(NamedTuple):
 
 
 class StrainRange(NamedTuple):
-    """Between which ends strains lie within the activation box, shape (station, 2) each."""
+    """Ranges of the strains within the activation box, shape (station, 2) each."""
 
     bending: Array
     """√(u1² + u2²) [1/m], from 0 to an upper bound at most 1e-5 too large."""
@@ -103,7 +103,7 @@ class TipMap(ABC):
     """Whether a tip can have another status than stable."""
 
     arm: Manipulator
-    """The design, to be stored beside results; what it is made of is nobody's business here."""
+    """The design, to be stored beside results; nothing here looks inside it."""
     tol: float
     """Largest tip error, in L."""
 
@@ -154,7 +154,7 @@ class TipMap(ABC):
 
     @abstractmethod
     def strain_range(self, stations: ArrayLike) -> StrainRange:
-        """What the strains at stations Z [m] can be within the activation box."""
+        """Ranges of the strains at stations Z [m] within the activation box."""
 
     @abstractmethod
     def radius(self, stations: ArrayLike) -> Array:
@@ -222,7 +222,7 @@ def position_slopes(tips: Array, twists: Array, slopes: Array) -> None:
 
 
 def tip_map(arm: Manipulator | TipMap, tol: float = 1e-6) -> TipMap:
-    """The tip map of an arm, remembered for the next call; a tip map is its own.
+    """The tip map of an arm, kept for the next call; a tip map is returned as it is.
 
     Args:
         arm: The design, or a tip map, whose own tolerance then counts.

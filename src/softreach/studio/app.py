@@ -58,11 +58,11 @@ class Studio:
         """Stop serving."""
         for session in list(self.sessions.values()):
             session.close()
-        self._say_goodbye()
+        self._disconnect_tabs()
         stop_server(self.server)
 
-    def _say_goodbye(self, patience: float = 3.0) -> None:
-        """Close the tabs' connections first: viser ends its pool before it tells of the closing."""
+    def _disconnect_tabs(self, patience: float = 3.0) -> None:
+        """Close the tabs' connections first: viser ends its pool before it reports the closing."""
         close_all(self.server)
         deadline = time.monotonic() + patience
         while self.sessions and time.monotonic() < deadline:

@@ -66,7 +66,7 @@ def sample_values(reach: Reach, level: int, color: str) -> Literal["rgb"] | int 
 
 
 def color_label(color: str) -> str:
-    """What stands at the key of a color; "" where the key names it itself."""
+    """Label of the key of a color; "" where the key needs none."""
     return _LABELS.get(color, "")
 
 

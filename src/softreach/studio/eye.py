@@ -18,7 +18,7 @@ _STEP_BACK = 1.4  # times the distance, for two clouds side by side
 
 
 class Eye:
-    """The camera of one tab, which its reader and the studio both move."""
+    """The camera of one tab, which the user and the studio both move."""
 
     def __init__(self, client: ClientHandle) -> None:
         """Follow the camera of a client."""

@@ -1,4 +1,4 @@
-"""The rod of a design, as the studio asks it."""
+"""The rod of a design, as the studio uses it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TOL = 1e-5
 
 
 def rod_of(arm: Manipulator) -> TipMap:
-    """The tip map of a design, remembered for the next call.
+    """The tip map of a design, kept for the next call.
 
     Raises:
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.

@@ -43,7 +43,7 @@ def start_server(host: str = LOOPBACK, port: int | None = None) -> ViserServer:
         server = viser.ViserServer(host=host, port=port or 0, verbose=False, label="softreach")
     _disable_tunnel(server)
     refuse_unless(server, lambda headers: same_origin(headers, host))
-    # Shadows and a mirrored room cost seconds where no graphics card helps, and say nothing.
+    # Shadows and a mirrored room cost seconds where no graphics card helps, and show nothing.
     server.scene.configure_environment_map(None)
     server.scene.configure_default_lights(cast_shadow=False)
     server.scene.add_light_ambient("/light", intensity=1.6)

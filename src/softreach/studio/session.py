@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 
 class Panel(Protocol):
-    """Widgets of one concept; they call `Session.update` and are told of every change."""
+    """Widgets of one concept; they call `Session.update` and are notified of every change."""
 
     def show(self, session: Session) -> None:
         """Bring the widgets in line with the session; called from any thread, one at a time."""
@@ -84,7 +84,7 @@ class Session:
         Args:
             change: From the present state to the next.
             by_widget: Whether the widgets show the change already. They are left alone then: one
-                that is being dragged would be thrown back to where it was a moment ago.
+                that is being dragged would jump back to where it was a moment ago.
 
         Raises:
             SoftreachError: The change makes no valid state; nothing happens then.
@@ -126,7 +126,7 @@ class Session:
         self.show()
 
     def show(self) -> None:
-        """Tell all panels."""
+        """Notify all panels."""
         with self._showing:
             for panel in self.panels:
                 panel.show(self)
@@ -137,7 +137,7 @@ class Session:
             self._workers[kind].submit(self._jobs[kind].run)
 
     def settle(self, timeout: float = 60.0) -> bool:
-        """Wait until all that was asked for is done, and whether it is."""
+        """Wait until all that was asked for is done; return whether it is."""
         # Work of one kind may order work of another.
         return all(worker.join(timeout) for _ in range(2) for worker in self._workers.values())
 
@@ -147,7 +147,7 @@ class Session:
             worker.close()
 
     def _failed(self, error: Exception) -> None:
-        """Trouble of a worker is shown; what is not ours is a bug and goes to the log too."""
+        """Show an error of a worker; one that is not ours is a bug and goes to the log too."""
         self.say(f"**{type(error).__name__}**: {error}")
         if not isinstance(error, SoftreachError):
             threading.excepthook(

@@ -29,7 +29,7 @@ class Latest:
         """Start with nothing to do.
 
         Args:
-            failed: Told of an exception other than `Dropped`.
+            failed: Called with an exception other than `Dropped`.
         """
         self._failed = failed
         self._waiting: Callable[[StaleCheck], None] | None = None
@@ -52,7 +52,7 @@ class Latest:
             self._closed, self._waiting = True, None
 
     def join(self, timeout: float | None = None) -> bool:
-        """Wait until there is nothing left to do, and whether that came true."""
+        """Wait until there is nothing left to do; return whether that is so."""
         with self._changed:
             return self._changed.wait_for(lambda: not self._busy, timeout)
 

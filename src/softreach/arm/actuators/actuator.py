@@ -52,7 +52,7 @@ class Actuator(ABC):
     variables: ClassVar[tuple[Variable, ...]] = ()
     """Fields that a designer varies, beside the bounds."""
     default_name: ClassVar[str] = "actuator"
-    """What an arm calls unnamed ones, with a number."""
+    """Name that an arm gives to unnamed ones, followed by a number."""
 
     name: str
     """What summaries and pictures call it; unique within an arm, which names those without."""
@@ -84,7 +84,7 @@ class Actuator(ABC):
         return tuple(f"{self.name} {k + 1}" for k in range(self.bundles))
 
     def value_on(self, field: str, profile: Profile, section: Section) -> float:
-        """Value of a variable when this actuator drives an arm of such profile and section."""
+        """Value of a variable when this actuator drives an arm with this profile and section."""
         del profile, section
         return getattr(self, field)
 

@@ -98,7 +98,7 @@ class FiberArchitecture(Actuator):
         return float(self._rotation(profile, section, np.asarray(profile.length)))
 
     def value_on(self, field: str, profile: Profile, section: Section) -> float:
-        """What these fibers have of a variable; the arm decides between Ω and α."""
+        """Value of a variable on an arm; of Ω and α, the one not given follows from the other."""
         if field == "revolution" and self.revolution is None:
             return self.revolution_on(profile, section)
         if field == "helical_angle":
@@ -143,7 +143,8 @@ class FiberArchitecture(Actuator):
                 share σ / count, so that together they fill the sector of the original.
 
         Returns:
-            The parts, named "NAME 1", "NAME 2", ...; they wind and are bounded as the original.
+            The parts, named "NAME 1", "NAME 2", ...; they have the winding and the bounds of the
+            original.
 
         Raises:
             InvalidInput: Several bundles, which are independent already, or a count below 1.

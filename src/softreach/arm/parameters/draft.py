@@ -30,7 +30,7 @@ class ActuatorDraft:
     def made(self) -> Actuator:
         """The changed actuator.
 
-        Bounds are those of each bundle as long as their number stays, else those of the first.
+        Each bundle keeps its bounds while their number stays the same; else all have the first's.
         """
         actuator = self.start
         if self.fields.get("bundles", actuator.bundles) != actuator.bundles:
@@ -47,8 +47,8 @@ class ActuatorDraft:
 class Draft:
     """An arm that is being changed.
 
-    Its parts are made, and checked, when all changes are known: a valid design may lie behind an
-    invalid one.
+    Its parts are made, and checked, when all changes are known: a change may be valid only together
+    with others.
     """
 
     def __init__(self, arm: Manipulator) -> None:
@@ -60,7 +60,7 @@ class Draft:
         self.actuators = {one.name: ActuatorDraft(one) for one in arm.actuators}
 
     def wind(self, name: str, revolution: float) -> None:
-        """Give a fiber another revolution, which its own parameters may still replace."""
+        """Give a fiber another revolution, which its own parameters may still override."""
         draft = self.actuators[name]
         draft.start = draft.start.replace(revolution=revolution)
 

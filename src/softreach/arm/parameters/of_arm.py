@@ -68,9 +68,9 @@ def find_parameter(arm: Manipulator, name: str) -> Parameter:
 
 
 def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
-    """The design with these parameters, everything else as it was.
+    """The design with these parameters, everything else unchanged.
 
-    They are applied together, as a valid design may lie behind an invalid one; an actuator's own
+    They are applied together, as one may be valid only with another; an actuator's own
     parameter wins over one of the whole arm. When the taper changes, revolutions stay and helical
     angles follow; a new outer radius keeps the ratio of the radii.
 
@@ -94,7 +94,7 @@ def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
 
 
 def unknown_parameter(name: str, known: Iterable[str]) -> InvalidInput:
-    """What to raise for a name that no parameter has, with the one that was meant perhaps."""
+    """What to raise for a name that no parameter has; it suggests the closest one."""
     names = list(known)
     close = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
     hint = f'did you mean "{close[0]}"?' if close else ""
@@ -118,7 +118,7 @@ def _of_arm(arm: Manipulator, own: list[Parameter]) -> Iterator[Parameter]:
 
 
 def _shared(field: str, parts: tuple[Parameter, ...]) -> Iterator[Parameter]:
-    """One parameter for all actuators that have such a field, if they measure it alike."""
+    """One parameter for all actuators that have such a field, if it has the same unit in all."""
     if len({part.unit for part in parts}) == 1:
         yield SharedParameter(field, parts[0].variable, parts)
 

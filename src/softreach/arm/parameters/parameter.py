@@ -26,7 +26,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Parameter(ABC):
-    """A number that a design may be varied by."""
+    """A number in which designs can differ."""
 
     name: str
     """What it is called: `taper`, or `left.offset` for the offset of the actuator "left"."""
@@ -65,7 +65,7 @@ class Parameter(ABC):
 
     @abstractmethod
     def value(self, arm: Manipulator) -> float:
-        """What an arm has [unit]; of the first actuator that has one where it is of many."""
+        """Its value on an arm [unit]; where several actuators share it, that of the first."""
 
     @abstractmethod
     def change(self, draft: Draft, value: float) -> None:
@@ -94,7 +94,7 @@ class Taper(Parameter):
         return float(getattr(arm.profile, self.variable.field))
 
     def change(self, draft: Draft, value: float) -> None:
-        """Change the profile, but not what the fibers turn."""
+        """Change the profile; the fibers keep their revolutions."""
         draft.keep_revolutions()
         draft.profile[self.variable.field] = value
 

@@ -41,9 +41,9 @@ def delta3(n: Numbers) -> Finding:
     words = (
         f"as printed it is {1 + n['delta3']:.3g} times the integral at this design's α = "
         f"{n['helical_angle_deg']:.2g}°; with the 3 before the T terms alone it equals the "
-        f"integral to {n['delta3_mended']:.0e} for every α and φ tried"
+        f"integral to {n['delta3_corrected']:.0e} for every α and φ tried"
     )
-    return _misprint(words, n["delta3"] > 1e-6 > n["delta3_mended"])
+    return _misprint(words, n["delta3"] > 1e-6 > n["delta3_corrected"])
 
 
 def angle(n: Numbers) -> Finding:

@@ -36,7 +36,7 @@ def misprints(settings: Settings, folder: Path, notes: Notebook) -> None:
         delta0=float(errors[:, 0].max()),
         delta1=float(errors[:, 1].max()),
         delta3=own[2],
-        delta3_mended=float(errors[:, 3].max()),
+        delta3_corrected=float(errors[:, 3].max()),
         **_rotation(arm, taper, angle),
         refusal=_refusal(),
         ratio=ratio,
@@ -82,19 +82,19 @@ def _inclination(arm: Manipulator, taper: float) -> tuple[float, float]:
 
 
 def _errors(ratio: float, taper: float, angle: float) -> tuple[float, ...]:
-    """How far the printed δ0, δ1 and δ3, and the mended δ3, are from the integrals [-]."""
+    """How far the printed δ0, δ1 and δ3, and the corrected δ3, are from the integrals [-]."""
     exact = ring_integrals(ratio, taper, angle, 0.5)
     pairs = (
         (printed.delta0(ratio, taper, angle, 0.5), 4 * exact.axial),
         (printed.delta1(ratio, taper, angle, 0.5), 6 * exact.bending),
         (printed.delta3(ratio, taper, angle), 6 * exact.torsion),
-        (printed.delta3(ratio, taper, angle, mended=True), 6 * exact.torsion),
+        (printed.delta3(ratio, taper, angle, corrected=True), 6 * exact.torsion),
     )
     return tuple(float(abs(found / true - 1)) for found, true in pairs)
 
 
 def _refusal() -> str:
-    """What a design with R1(0) = L/12 and R2(0) = L/16 is told."""
+    """The error that a design with R1(0) = L/12 and R2(0) = L/16 raises."""
     arm = minimal_trunk()
     try:
         Manipulator.tapered(

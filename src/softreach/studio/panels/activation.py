@@ -31,13 +31,13 @@ class ActivationPanel:
         with tab:
             self._tip = gui.add_markdown("")
             self._folder = gui.add_folder("activation γ")
-            self._trail = gui.add_checkbox("leave a trail", False)
+            self._trail = gui.add_checkbox("show trail", False)
             rest = gui.add_button("Rest")
         bind(self._trail, session, lambda s, on: s.showing(trail=on))
         bind_button(rest, session, lambda: session.update(lambda s: s.replace(activation=())))
 
     def show(self, session: Session) -> None:
-        """Move the sliders to the state, and tell the tip."""
+        """Move the sliders to the state, and show where the tip is."""
         with self._lock:
             if _slider_ends(session.state.design) != self._made_for:
                 self._build(session)

@@ -50,7 +50,7 @@ class AtlasPanel:
             attempt(session, lambda: self._follow(session.state.appearance.map))
 
     def click(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
-        """Load the design under the cursor, and whether the map is there."""
+        """Load the design under the cursor; return whether the map is there."""
         at = self._board.parameters_under(origin, direction)
         if at:
             attempt(self._session, lambda: self._load(at))

@@ -1,4 +1,4 @@
-"""Sliders for the design; what cannot exist is said beside the slider that asked for it."""
+"""Sliders for the design; what cannot exist is reported below the slider moved."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class _Row(NamedTuple):
 
 
 class DesignPanel:
-    """All sliders of a design together; a valid design may lie behind an invalid one."""
+    """All sliders of a design together; a change may be valid only together with others."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
         """Add the widgets."""
@@ -56,7 +56,7 @@ class DesignPanel:
         self._beside.on_update(self._stepped)
 
     def show(self, session: Session) -> None:
-        """Tell of the reference; build the sliders anew for a design that they did not make."""
+        """Show the reference; rebuild the sliders for a design that they did not make."""
         self._reference.content = _reference_text(session)
         with self._lock:
             if session.revision == self._revision:

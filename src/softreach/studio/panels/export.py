@@ -1,4 +1,4 @@
-"""Save what there is, and take it up again."""
+"""Save what there is, and load it again."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ class InversePanel:
                 self._buttons = [(row, self._button(row)) for row in answer.activations]
 
     def click(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
-        """Aim at the point of the cloud under the cursor, and whether there is one."""
+        """Aim at the point of the cloud under the cursor; return whether there is one."""
         session = self._session
         reach, look = session.reach, session.state.appearance
         if reach is None or not look.cloud or reach.arm != session.state.design:
@@ -102,7 +102,7 @@ def _tip(arm: Manipulator, activation: Any) -> Any:
 
 
 def _answer_text(answer: Solution, arm: Manipulator) -> str:
-    """What became of the target, in words."""
+    """Whether the target is reached, in words."""
     place = _place(answer.target / arm.length)
     if not len(answer):
         certain = "out of reach" if answer.status == 1 else "not reached, perhaps out of reach"

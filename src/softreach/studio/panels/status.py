@@ -26,7 +26,7 @@ class StatusPanel:
         self._note = gui.add_markdown("", visible=False)
 
     def show(self, session: Session) -> None:
-        """Tell what is known, and whether it is about to change."""
+        """Show what is known, and whether it is about to change."""
         reach = session.reach
         self._numbers.content = "computing ..." if reach is None else _known_text(session, reach)
         self._key.content = key_html(session.key)
