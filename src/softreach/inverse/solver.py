@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -11,7 +9,7 @@ from softreach import parallel
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.branches import every_branch
 from softreach.inverse.least_change import least_changes
-from softreach.inverse.nearest import Nearest, nearest
+from softreach.inverse.nearest import Nearest, nearest, nearest_from
 from softreach.inverse.prepared_map import PreparedMap, prepared_map
 from softreach.inverse.request import (
     Request,
@@ -118,14 +116,12 @@ def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
 
 
 def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
-    """Least changes among the activations that reach the targets that can be reached."""
-    closest = nearest(prepared, replace(request, direction=None))
-    distance = np.linalg.norm(closest.tip - request.targets, axis=1)
-    rows = np.flatnonzero(distance <= request.residual)
-    target, gamma = least_changes(prepared, request.of(rows), closest.gamma[rows])
-    roots = roots_at(prepared.rod, request.targets, rows[target], gamma)
+    """Least changes where the target is reached, nearest places where it is not."""
+    target, gamma, best = least_changes(prepared, request)
+    roots = roots_at(prepared.rod, request.targets, target, gamma)
     missing = roots.missing(len(request.targets))
-    return _solutions(prepared, request, roots, missing, closest.of(missing))
+    closest = nearest_from(prepared.rod, request.of(missing), best.gamma[missing])
+    return _solutions(prepared, request, roots, missing, closest)
 
 
 def _solutions(
