@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.kernels.spread import choose_apart
 from softreach.rod.tip_map import TipMap
 from softreach.sampling import sample_cube
 
@@ -60,11 +61,7 @@ class Landmarks:
             Number of the target and activation of each start, sorted by target.
         """
         chosen = np.zeros(candidates.shape[:2], bool)
-        chosen[:, 0] = True
-        for k in range(1, candidates.shape[1]):
-            apart = np.abs(candidates[:, :k] - candidates[:, k : k + 1]) / self.scales
-            distinct = (~chosen[:, :k] | (apart.max(axis=2) > least_distance)).all(axis=1)
-            chosen[:, k] = distinct & (chosen.sum(axis=1) < most)
+        choose_apart(candidates, self.scales, most, least_distance, chosen)
         return np.nonzero(chosen)[0], candidates[chosen]
 
 

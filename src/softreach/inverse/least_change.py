@@ -26,8 +26,9 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _CANDIDATES = 96
-_STARTS = 6
+_STARTS, _FACE_STARTS = 6, 4
 _APART = 0.15
+_PRICE_OF_CARE = 1e4
 _BLOCK = 4096  # targets at once: bounds the memory of their candidates
 
 
@@ -82,22 +83,33 @@ def _least_change(prepared: PreparedMap, request: Request, known: Array | None) 
         owner, start = np.concatenate([owner, np.arange(count)]), np.concatenate([start, known])
     gamma, residual = sequential_minima(prepared.rod, request.of(owner), start)
     best = _least(owner, gamma, residual, request)
-    gamma, residual = gamma[best], residual[best]
-    left = np.flatnonzero(residual > request.residual)
-    if not len(left):
-        return Reached(gamma, residual)
-    more = reach(prepared, request.of(left), gamma[left])
-    late = more.residual <= request.residual
-    gamma[left], residual[left] = more
-    again = left[late]
-    if len(again):
-        improved = sequential_minima(prepared.rod, request.of(again), gamma[again])
-        both = np.concatenate([gamma[again], improved[0]])
-        of = np.tile(np.arange(len(again)), 2)
-        missed = np.concatenate([residual[again], improved[1]])
-        best = _least(of, both, missed, request.of(again))
-        gamma[again], residual[again] = both[best], missed[best]
-    return Reached(gamma, residual)
+    found = Reached(gamma[best], residual[best])
+    left = np.flatnonzero(found.residual > request.residual)
+    more = reach(prepared, request.of(left), found.gamma[left])
+    found.gamma[left], found.residual[left] = more
+    # Where some search lost its target, the target lies next to a fold or a boundary.
+    lost = np.bincount(owner, residual > request.residual, count) > 0
+    return _with_care(prepared, request, found, np.flatnonzero(lost), owner, start)
+
+
+def _with_care(
+    prepared: PreparedMap, request: Request, found: Reached, rows: Index, owner: Index, start: Array
+) -> Reached:
+    """Search once more for some targets: first for them, then for less change without leaving."""
+    rod, chosen = prepared.rod, np.isin(owner, rows)
+    owner = np.concatenate([owner[chosen], rows])
+    start = np.concatenate([start[chosen], found.gamma[rows]])
+    at = descend(rod, request.targets[owner], start, request.residual)
+    hit = at.residual <= request.residual
+    gamma, residual = sequential_minima(
+        rod, request.of(owner[hit]), at.gamma[hit], price=_PRICE_OF_CARE
+    )
+    count = len(request.targets)
+    owner = np.concatenate([np.arange(count), owner[hit], owner[hit]])
+    gamma = np.concatenate([found.gamma, at.gamma[hit], gamma])
+    residual = np.concatenate([found.residual, at.residual[hit], residual])
+    best = _least(owner, gamma, residual, request)
+    return Reached(gamma[best], residual[best])
 
 
 def _least(owner: Index, gamma: Array, residual: Array, request: Request) -> Index:
@@ -110,13 +122,16 @@ def _least(owner: Index, gamma: Array, residual: Array, request: Request) -> Ind
 
 def _starts(prepared: PreparedMap, request: Request) -> tuple[Index, Array]:
     """The activation to stay near to, and landmarks near the target that change little."""
-    marks, count = prepared.landmarks, len(request.targets)
-    gamma = marks.nearest(request.targets, _CANDIDATES)
-    order = np.linalg.norm(gamma - request.near[:, None], axis=2).argsort(axis=1, kind="stable")
-    gamma = np.take_along_axis(gamma, order[:, :, None], axis=1)
-    owner, start = marks.starts(gamma, _STARTS, _APART)
-    nearby = prepared.rod.box.clip(request.near)
-    return np.concatenate([np.arange(count), owner]), np.concatenate([nearby, start])
+    owners = [np.arange(len(request.targets))]
+    starts = [prepared.rod.box.clip(request.near)]
+    for marks, most in ((prepared.landmarks, _STARTS), (prepared.face_landmarks, _FACE_STARTS)):
+        gamma = marks.nearest(request.targets, _CANDIDATES)
+        order = ((gamma - request.near[:, None]) ** 2).sum(axis=2).argsort(axis=1, kind="stable")
+        gamma = np.take_along_axis(gamma, order[:, :, None], axis=1)
+        owner, start = marks.starts(gamma, most, _APART)
+        owners.append(owner)
+        starts.append(start)
+    return np.concatenate(owners), np.concatenate(starts)
 
 
 def _turned(prepared: PreparedMap, request: Request, known: Array) -> Array:

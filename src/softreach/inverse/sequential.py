@@ -39,7 +39,9 @@ class _State(NamedTuple):
     """σ: ½σ|step|² is added to what a step minimizes, shape (n,)."""
 
 
-def sequential_minima(rod: TipMap, request: Request, start: Array) -> tuple[Array, Array]:
+def sequential_minima(
+    rod: TipMap, request: Request, start: Array, price: float = 0.0
+) -> tuple[Array, Array]:
     """Minimize ½|γ - near|² subject to tip = target and bounds, from each start.
 
     Each step minimizes ½|x - near|² + ½σ|x - γ|² where the linearized map meets the target, inside
@@ -51,6 +53,8 @@ def sequential_minima(rod: TipMap, request: Request, start: Array) -> tuple[Arra
         rod: The tip map.
         request: A target for each start, and what to stay near to.
         start: Where to begin, inside the bounds [-], shape (n, m).
+        price: Least price. A high one keeps a search near the target once it is there, as it must
+            where the target lies next to a fold or to the boundary of the reachable set.
 
     Returns:
         Activations [-], shape (n, m), and their |tip - target| [m], shape (n,).
@@ -61,7 +65,7 @@ def sequential_minima(rod: TipMap, request: Request, start: Array) -> tuple[Arra
         gamma=start.copy(),
         miss=(tip - request.targets) / length,
         slope=slope / length,
-        price=np.zeros(n),
+        price=np.full(n, price),
         proximity=np.full(n, _FIRST_PROXIMITY),
     )
     active = np.arange(n)
@@ -103,7 +107,7 @@ def _trials(
     weight = 1.0 + state.proximity[active, None]
     center = (near + state.proximity[active, None] * gamma) / weight
     wanted = np.einsum("nij,nj->ni", slope, gamma) - state.miss[active]
-    softness = _SOFTNESS * (slope**2).sum(axis=(1, 2)) + 1e-30
+    softness = _SOFTNESS * (slope**2).sum(axis=(1, 2)) / (1.0 + state.price[active]) + 1e-30
     reach = _LONGEST_STEP * box.scales
     low, high = np.maximum(box.low, gamma - reach), np.minimum(box.high, gamma + reach)
     trial, multiplier = np.empty_like(gamma), np.empty((len(active), 3))
