@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach import parallel
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.branches import every_branch
+from softreach.inverse.exclusion import gap_bounds
 from softreach.inverse.least_change import least_changes
 from softreach.inverse.nearest import Nearest, nearest, nearest_from
 from softreach.inverse.prepared_map import PreparedMap, prepared_map
@@ -141,9 +142,14 @@ def _solutions(
     hit = at_closest.residual <= request.residual
     roots = roots.joined(at_closest.where(hit))
     statuses = np.full(count, Status.REACHED, np.int8)
-    statuses[missing] = np.where(closest.converged, Status.UNREACHABLE, Status.NOT_CONVERGED)
-    # With more bundles than needed a root is there, but the least change was not found.
-    statuses[missing[hit]] = Status.NOT_CONVERGED if prepared.dimension > 3 else Status.REACHED
+    out, far = missing[~hit], at_closest.residual[~hit]
+    bounds = np.zeros(count)
+    # Where the position yields to a direction, the gap says nothing of what can be reached.
+    yielding = request.direction is not None and prepared.dimension <= 3
+    if len(out) and not yielding:
+        bounds[out] = gap_bounds(rod, prepared.coarse_cells, request.targets[out], far)
+    proved = bounds[out] > request.residual
+    statuses[out] = np.where(proved, Status.UNREACHABLE, Status.NOT_FOUND)
     gamma, gaps = np.empty((count, rod.box.bundles)), np.empty(count)
     reached, first = np.unique(roots.target, return_index=True)
     gamma[reached], gaps[reached] = roots.gamma[first], roots.residual[first]
@@ -165,4 +171,5 @@ def _solutions(
         nearest=points,
         nearest_activations=prepared.whole.box.with_held(gamma),
         gaps=gaps,
+        gap_bounds=bounds,
     )
