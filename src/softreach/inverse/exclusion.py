@@ -25,6 +25,7 @@ Index = NDArray[np.int64]
 _COARSE = 70_000  # cells that all targets share
 _ENOUGH = 0.2  # of the gap of the best place: a bound that large ends the search
 _MOST_CELLS = 20_000  # examined for one target
+_MOST_OF_THREE = 4_000  # the same with three bundles or fewer, where a proof needs far fewer
 _MOST_BUNDLES = 6  # with more, halving cells proves nothing that can be afforded
 _BLOCK = 200_000  # cells at once
 _ROUNDING = 1e-12  # of tips, in L
@@ -91,7 +92,8 @@ def _of_block(rod: TipMap, coarse: CoarseCells, targets: Array, gap: Array) -> A
     counts = np.array([len(rows) for rows in near])
     half = coarse.half
     proved = _ENOUGH * gap  # the least bound of all cells that are done
-    many = counts > (_MOST_CELLS if rod.box.dimension <= _MOST_BUNDLES else 0)
+    most = _most_cells(rod.box.dimension)
+    many = counts > most
     proved[many] = 0.0
     near = [np.empty(0, np.int64) if no else rows for no, rows in zip(many, near, strict=True)]
     counts[many] = 0
@@ -101,7 +103,7 @@ def _of_block(rod: TipMap, coarse: CoarseCells, targets: Array, gap: Array) -> A
         bound = _bounds(rod, targets[cells.owner], cells.center, half)
         spent += np.bincount(cells.owner, minlength=count)
         far = bound >= _ENOUGH * gap[cells.owner]
-        hopeless = spent + 2 * np.bincount(cells.owner[~far], minlength=count) > _MOST_CELLS
+        hopeless = spent + 2 * np.bincount(cells.owner[~far], minlength=count) > most
         done = far | hopeless[cells.owner]
         np.minimum.at(proved, cells.owner[done], np.maximum(bound[done], 0.0))
         cells = _Cells(cells.owner[~done], cells.center[~done])
@@ -109,6 +111,13 @@ def _of_block(rod: TipMap, coarse: CoarseCells, targets: Array, gap: Array) -> A
             break
         half, cells = _halved(rod, half, cells)
     return proved
+
+
+def _most_cells(bundles: int) -> int:
+    """How many cells may be examined for one target."""
+    if bundles <= 3:
+        return _MOST_OF_THREE
+    return _MOST_CELLS if bundles <= _MOST_BUNDLES else 0
 
 
 def _halved(rod: TipMap, half: Array, cells: _Cells) -> tuple[Array, _Cells]:

@@ -7,9 +7,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.branches import every_branch
+from softreach.inverse.branches import distinct, every_branch
 from softreach.inverse.exclusion import gap_bounds
 from softreach.inverse.least_change import least_changes
+from softreach.inverse.natural_newton import nearly_singular_roots
 from softreach.inverse.nearest import Nearest, nearest, nearest_from
 from softreach.inverse.prepared_map import PreparedMap, prepared_map
 from softreach.inverse.request import (
@@ -105,7 +106,18 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     """All roots, and the nearest points to the targets that have none."""
     roots = every_branch(prepared, request)
     missing = roots.missing(len(request.targets))
-    return _solutions(prepared, request, roots, missing, nearest(prepared, request.of(missing)))
+    closest = nearest(prepared, request.of(missing))
+    solutions = _solutions(prepared, request, roots, missing, closest)
+    left = np.flatnonzero(solutions.statuses == Status.NOT_FOUND)
+    if not len(left):
+        return solutions
+    late = distinct(prepared, request, nearly_singular_roots(prepared, request, left))
+    if not len(late.target):
+        return solutions
+    roots = roots.joined(late)
+    again = roots.missing(len(request.targets))
+    closest = closest.of(np.isin(missing, again))
+    return _solutions(prepared, request, roots, again, closest, solutions.gap_bounds)
 
 
 def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
@@ -126,7 +138,12 @@ def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
 
 
 def _solutions(
-    prepared: PreparedMap, request: Request, roots: Roots, missing: Index, closest: Nearest
+    prepared: PreparedMap,
+    request: Request,
+    roots: Roots,
+    missing: Index,
+    closest: Nearest,
+    proved_gaps: Array | None = None,
 ) -> Solutions:
     """Put together the roots and, for targets without one, the nearest points.
 
@@ -136,6 +153,7 @@ def _solutions(
         roots: The roots found, sorted by target.
         missing: Numbers of the targets without a root.
         closest: The nearest points to these; some may prove to be roots.
+        proved_gaps: Lower bounds of the gaps of all targets, if they are known already.
     """
     rod, count = prepared.rod, len(request.targets)
     at_closest = roots_at(rod, request.targets, missing, closest.gamma)
@@ -146,7 +164,9 @@ def _solutions(
     bounds = np.zeros(count)
     # Where the position yields to a direction, the gap says nothing of what can be reached.
     yielding = request.direction is not None and prepared.dimension <= 3
-    if len(out) and not yielding:
+    if proved_gaps is not None:
+        bounds[out] = proved_gaps[out]
+    elif len(out) and not yielding:
         bounds[out] = gap_bounds(rod, prepared.coarse_cells, request.targets[out], far)
     proved = bounds[out] > request.residual
     statuses[out] = np.where(proved, Status.UNREACHABLE, Status.NOT_FOUND)
