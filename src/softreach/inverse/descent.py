@@ -42,7 +42,7 @@ def descend(
     """Levenberg's method: each step solves min |r + J d - p|² + μ |d|² inside the bounds exactly.
 
     μ falls with the residual, which keeps convergence quadratic at regular roots and linear at
-    singular ones [YamashitaFukushima2001].
+    singular ones.
 
     Args:
         rod: The tip map.
@@ -51,7 +51,7 @@ def descend(
         residual: At which a search ends [m].
         most: Iterations.
     """
-    scales, length = rod.box.scales, rod.length
+    scales = rod.box.scales
     tip, slope = rod.tips_and_slopes(start)
     found = Descent(start.copy(), tip, slope, np.linalg.norm(tip - targets, axis=1))
     damping, floor = np.full(len(start), _FIRST_DAMPING), 1e-3 * residual

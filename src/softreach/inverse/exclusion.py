@@ -2,8 +2,8 @@
 
 On a cell of the activation box with center c and half widths h the tip lies within E(h) of its
 linearization, `TipMap.linearization_error`. The distance of a target from the linear image is
-n·(p - r(c)) - Σ hj |n·Jj| at least, for any unit vector n. Cells that this bound keeps far enough away are
-done; the others are halved. What remains when the effort is spent still bounds the distance.
+n·(p - r(c)) - Σ hj |n·Jj| at least, for any unit vector n. Cells that this bound keeps far enough
+away are done; the others are halved. What is left when the effort is spent still has a bound.
 """
 
 from __future__ import annotations
@@ -49,9 +49,7 @@ class CoarseCells:
     def near(self, target: Array, distance: float) -> Index:
         """Numbers of the cells whose tips may come so near to a target."""
         room = np.empty(len(self.center), np.int64)
-        count = near_cells(
-            self.tips, self.slopes, self.radii, self.error, target, distance, room
-        )
+        count = near_cells(self.tips, self.slopes, self.radii, self.error, target, distance, room)
         return room[:count]
 
 
@@ -76,6 +74,8 @@ def gap_bounds(rod: TipMap, coarse: CoarseCells, targets: Array, gap: Array) -> 
     Returns:
         Bounds [m], shape (t,); 0 where nothing is proved.
     """
+    if rod.box.dimension == 0:
+        return gap.copy()  # one place is reached
     bounds = np.maximum(np.linalg.norm(targets, axis=1) - rod.farthest(), 0.0)
     most = max(1, _BLOCK // _MOST_CELLS)
     for first in range(0, len(targets), most):

@@ -29,6 +29,8 @@ _CANDIDATES = 96
 _STARTS, _FACE_STARTS = 6, 4
 _APART = 0.15
 _PRICE_OF_CARE = 1e4
+_EQUAL = 1e-6  # difference of activations below which they are one
+_POLISHED, _MOST_POLISHING = 1e-9, 300
 _BLOCK = 4096  # targets at once: bounds the memory of their candidates
 
 
@@ -45,7 +47,7 @@ def least_changes(prepared: PreparedMap, request: Request) -> tuple[Index, Array
         Number of the target and activation, sorted by target, those of least change first; and the
         best place found for every target, reached or not.
     """
-    count, box = len(request.targets), prepared.rod.box
+    box = prepared.rod.box
     rng = np.random.default_rng(request.seed)
     # One set for all targets, so that a target's family does not depend on its neighbors.
     others = rng.uniform(box.low, box.high, (request.family - 1, box.bundles))
@@ -59,9 +61,20 @@ def least_changes(prepared: PreparedMap, request: Request) -> tuple[Index, Array
         one = replace(asked, near=np.tile(near, (len(reached), 1)), direction=None)
         targets.append(reached)
         found.append(_in_blocks(prepared, one, found[0]).gamma)
+        if request.direction is None:
+            _put_least_first(found[0], found[-1], asked.near)
     target = np.concatenate(targets)
     order = np.argsort(target, kind="stable")
     return target[order], np.concatenate([np.empty((0, box.bundles)), *found])[order], known
+
+
+def _put_least_first(first: Array, other: Array, near: Array) -> None:
+    """Exchange activations where the other changes less; make them one where they are equal."""
+    equal = np.abs(first - other).max(axis=1, initial=0.0) <= _EQUAL
+    other[equal] = first[equal]
+    change, others = np.linalg.norm(first - near, axis=1), np.linalg.norm(other - near, axis=1)
+    less = others < change
+    first[less], other[less] = other[less], first[less]
 
 
 def _in_blocks(prepared: PreparedMap, request: Request, known: Array | None = None) -> Reached:
@@ -89,7 +102,20 @@ def _least_change(prepared: PreparedMap, request: Request, known: Array | None) 
     found.gamma[left], found.residual[left] = more
     # Where some search lost its target, the target lies next to a fold or a boundary.
     lost = np.bincount(owner, residual > request.residual, count) > 0
-    return _with_care(prepared, request, found, np.flatnonzero(lost), owner, start)
+    found = _with_care(prepared, request, found, np.flatnonzero(lost), owner, start)
+    return _polished(prepared, request, found)
+
+
+def _polished(prepared: PreparedMap, request: Request, found: Reached) -> Reached:
+    """The best once more, until its steps are negligible; kept where that changes less."""
+    gamma, residual = sequential_minima(
+        prepared.rod, request, found.gamma, settled=_POLISHED, most=_MOST_POLISHING
+    )
+    owner = np.tile(np.arange(len(gamma)), 2)
+    gamma = np.concatenate([found.gamma, gamma])
+    residual = np.concatenate([found.residual, residual])
+    best = _least(owner, gamma, residual, request)
+    return Reached(gamma[best], residual[best])
 
 
 def _with_care(
@@ -113,7 +139,7 @@ def _with_care(
 
 
 def _least(owner: Index, gamma: Array, residual: Array, request: Request) -> Index:
-    """The row of least change among those that reach their target, else that which comes nearest."""
+    """The row of least change among those that reach their target, else the nearest one."""
     change = np.linalg.norm(gamma - request.near[owner], axis=1)
     change[residual > request.residual] = 1e100
     worst = np.where(residual > request.residual, 1e100 * (1 + residual), change)
@@ -143,8 +169,9 @@ def _turned(prepared: PreparedMap, request: Request, known: Array) -> Array:
     cost = np.where(
         residual <= request.residual, _cost(prepared.rod, request.of(owner), gamma), np.inf
     )
-    gamma, cost = np.concatenate([gamma, known]), np.concatenate(
-        [cost, _cost(prepared.rod, request, known)]
+    gamma, cost = (
+        np.concatenate([gamma, known]),
+        np.concatenate([cost, _cost(prepared.rod, request, known)]),
     )
     owner = np.concatenate([owner, np.arange(count)])
     return gamma[first_of_each(owner, cost, count)]

@@ -3,7 +3,7 @@
 Near a full circle two singular values of J vanish together. The residual then says little about the
 distance from a root: on the way it has to rise, and a search that never lets it does not arrive.
 Steps are judged by the natural test instead, |J⁻¹ F(trial)| < |J⁻¹ F(γ)|, which is invariant under
-any linear change of the residual [Deuflhard2011].
+any linear change of the residual.
 """
 
 from __future__ import annotations
@@ -86,7 +86,11 @@ def natural_newton(rod: TipMap, targets: Array, start: Array, residual: float) -
         left = np.linalg.norm(np.einsum("nij,nj->ni", inverse, away), axis=1)
         accepted = left <= (1.0 - 0.25 * factor) * size
         taken = active[accepted]
-        gamma[taken], slope[taken], miss[taken] = trial[accepted], new_slope[accepted], away[accepted]
+        gamma[taken], slope[taken], miss[taken] = (
+            trial[accepted],
+            new_slope[accepted],
+            away[accepted],
+        )
         damping[active] = np.where(accepted, np.minimum(1.0, 3.0 * factor), 0.3 * factor)
         near = np.linalg.norm(miss[active], axis=1) <= residual
         end = (size <= _CONVERGED) | (near & ~accepted) | (damping[active] < _LEAST_DAMPING)
@@ -99,4 +103,6 @@ def _inverses(matrices: Array) -> Array:
     det = np.linalg.det(matrices)
     size = np.linalg.norm(matrices, axis=(1, 2))
     flat = np.abs(det) <= 1e-30 * size**3
-    return np.linalg.inv(matrices + np.where(flat, 1e-12 * size, 0.0)[:, None, None] * np.eye(3))
+    shift = np.where(flat, 1e-12 * size, 0.0)[:, None, None] * np.eye(3)
+    inverses: Array = np.linalg.inv(matrices + shift)
+    return inverses

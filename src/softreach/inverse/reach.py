@@ -98,6 +98,6 @@ def _searched(
 
 
 def first_of_each(owner: Index, value: Array, count: int) -> Index:
-    """For each of `count` owners, each of which has some, its row of least value, shape (count,)."""
+    """The row of least value of each of `count` owners, all of whom have some, shape (count,)."""
     order = np.lexsort((value, owner))
     return order[np.searchsorted(owner[order], np.arange(count))]

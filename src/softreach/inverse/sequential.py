@@ -17,9 +17,7 @@ __all__ = ["sequential_minima"]
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_MOST_ITERATIONS = 60
 _LONGEST_STEP = 0.5  # in ranges
-_SETTLED = 1e-6  # step at which a search ends, in ranges: its change is then least to the square
 _SOFTNESS = 1e-9  # of the linearized target, in |J|²
 _FIRST_PROXIMITY, _LARGEST_PROXIMITY = 0.3, 1e7
 
@@ -40,13 +38,19 @@ class _State(NamedTuple):
 
 
 def sequential_minima(
-    rod: TipMap, request: Request, start: Array, price: float = 0.0
+    rod: TipMap,
+    request: Request,
+    start: Array,
+    *,
+    price: float = 0.0,
+    settled: float = 1e-6,
+    most: int = 60,
 ) -> tuple[Array, Array]:
     """Minimize ½|γ - near|² subject to tip = target and bounds, from each start.
 
     Each step minimizes ½|x - near|² + ½σ|x - γ|² where the linearized map meets the target, inside
-    the bounds, exactly: sequential quadratic programming [NocedalWright2006] with a multiple of the
-    identity for the Hessian. It is taken if ½|x - near|² + price·|miss| falls as it should; else σ
+    the bounds, exactly: sequential quadratic programming with a multiple of the identity for
+    the Hessian. It is taken if ½|x - near|² + price·|miss| falls as it should; else σ
     grows. Descent to the target ends the search.
 
     Args:
@@ -55,6 +59,8 @@ def sequential_minima(
         start: Where to begin, inside the bounds [-], shape (n, m).
         price: Least price. A high one keeps a search near the target once it is there, as it must
             where the target lies next to a fold or to the boundary of the reachable set.
+        settled: Step at which a search ends, in ranges.
+        most: Iterations.
 
     Returns:
         Activations [-], shape (n, m), and their |tip - target| [m], shape (n,).
@@ -69,17 +75,17 @@ def sequential_minima(
         proximity=np.full(n, _FIRST_PROXIMITY),
     )
     active = np.arange(n)
-    for _ in range(_MOST_ITERATIONS):
+    for _ in range(most):
         if not len(active):
             break
-        settled = _advance(rod, request, state, active)
-        active = active[~settled & (state.proximity[active] < _LARGEST_PROXIMITY)]
+        step = _advance(rod, request, state, active)
+        active = active[(step >= settled) & (state.proximity[active] < _LARGEST_PROXIMITY)]
     found = descend(rod, request.targets, state.gamma, request.residual, most=20)
     return found.gamma, found.residual
 
 
-def _advance(rod: TipMap, request: Request, state: _State, active: Index) -> NDArray[np.bool_]:
-    """One step of the active searches; whether each has settled."""
+def _advance(rod: TipMap, request: Request, state: _State, active: Index) -> Array:
+    """One step of the active searches; how long it would be without proximity, in ranges."""
     gamma, near, slope = state.gamma[active], request.near[active], state.slope[active]
     trial, force = _trials(rod, near, slope, state, active)
     tip, new_slope = rod.tips_and_slopes(trial)
@@ -96,7 +102,7 @@ def _advance(rod: TipMap, request: Request, state: _State, active: Index) -> NDA
     state.price[active] = price
     eased = np.where(gained >= 0.7 * predicted, 0.4 * sigma, sigma)
     state.proximity[active] = np.where(accepted, eased, 4.0 * sigma + 0.1)
-    return (np.abs(trial - gamma) / rod.box.scales).max(axis=1) * (1 + sigma) < _SETTLED
+    return (np.abs(trial - gamma) / rod.box.scales).max(axis=1) * (1 + sigma)
 
 
 def _trials(

@@ -51,7 +51,8 @@ def solve_inverse(
     Bundles with equal bounds are held there; the others are free. With three free bundles: every
     activation within the bounds, by Newton's method from every cell of the activation box whose
     image covers the target. With more: the one of least |γ - near|, and `family - 1` others on
-    request. With fewer, or out of reach: the nearest reachable point. The arm is prepared at the
+    request. With fewer, or out of reach: the nearest reachable point found, and whether a bound
+    proves the target to be out of reach. The arm is prepared at the
     first call and remembered.
 
     Args:
@@ -116,7 +117,7 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
         return solutions
     roots = roots.joined(late)
     again = roots.missing(len(request.targets))
-    closest = closest.of(np.isin(missing, again))
+    closest = closest.of(np.flatnonzero(np.isin(missing, again)))
     return _solutions(prepared, request, roots, again, closest, solutions.gap_bounds)
 
 

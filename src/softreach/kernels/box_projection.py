@@ -2,7 +2,7 @@
 
 min ½ |x - c|² + |A x - b|²/(2 s) for low <= x <= high has the dual unknown y of three numbers only,
 however many variables there are: x = clip(c - Aᵀy) with A x - b = s y. The dual function is
-concave and piecewise quadratic; Newton's method with a line search maximizes it [Mangasarian2006].
+concave and piecewise quadratic; Newton's method with a line search maximizes it.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ __all__ = ["project"]
 
 _MOST_ITERATIONS = 60
 _CONVERGED = 1e-13  # of the largest terms
+_SHORTEST = 1e-9  # part of a step below which a search ends
 
 
 @kernel
@@ -33,7 +34,6 @@ def project(center, slope, wanted, softness, low, high, out, multiplier):
         out: x, shape (n, m).
         multiplier: y, shape (n, 3).
     """
-    m = center.shape[1]
     y, error, step, trial = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     gram = np.zeros((3, 3))
     for n in range(center.shape[0]):
@@ -43,21 +43,28 @@ def project(center, slope, wanted, softness, low, high, out, multiplier):
             ascent = _newton(gram, error, step)
             if not ascent > _CONVERGED * (abs(best) + 1e-30):
                 break
-            size, better = 1.0, False
-            for _ in range(30):
-                for i in range(3):
-                    trial[i] = y[i] + size * step[i]
-                value = _value(center, slope, wanted, softness, low, high, n, trial)
-                if value >= best + 0.1 * size * ascent:
-                    better = True
-                    break
-                size *= 0.5
-            if not better:
+            ends = center, slope, wanted, softness, low, high, n, y, step, trial
+            if not _climbs(ends, best, ascent):
                 break
             y[:] = trial
             best = _dual(center, slope, wanted, softness, low, high, n, y, out, error, gram)
         for i in range(3):
             multiplier[n, i] = y[i]
+
+
+@inline
+def _climbs(ends, best, ascent):
+    """Shorten a step until the dual function grows as it should; whether it does."""
+    center, slope, wanted, softness, low, high, n, y, step, trial = ends
+    size = 1.0
+    while size > _SHORTEST:
+        for i in range(3):
+            trial[i] = y[i] + size * step[i]
+        value = _value(center, slope, wanted, softness, low, high, n, trial)
+        if value >= best + 0.1 * size * ascent:
+            return True
+        size *= 0.5
+    return False
 
 
 @inline

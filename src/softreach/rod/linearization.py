@@ -1,7 +1,7 @@
 """How far the tip map of a free rod can be from its linearization.
 
-A change d of activation changes the twist by κ = ∂(ζu)/∂γ d = ζ U d + (z·d) u, and turns a section by
-at most a = ∫ |κ|. From r = ∫ ζ d3 the second derivative along d is
+A change d of activation changes the twist by κ = ∂(ζu)/∂γ d = ζ U d + (z·d) u, and turns a section
+by at most a = ∫ |κ|. From r = ∫ ζ d3 the second derivative along d is
 
 r''[d, d] = ∫ 2 (z·d) ω × d3 + ζ ω' × d3 + ζ ω × (ω × d3),   |ω'| <= ½ a² + ∫ 2 |z·d| |U d|,
 
