@@ -1,8 +1,8 @@
 """Tips of activations inside the box, solved back: none may be missed, none changes too much.
 
-`python -m benchmarks.adversarial_inverse [n] [designs]` draws designs of three to twelve bundles and,
-for each, n tips of activations inside the box, on faces, edges and corners. It prints how many targets
-were not reached, how many activations of least change exceed the one drawn, and the time.
+`python -m benchmarks.adversarial_inverse [n] [designs]` draws designs of three to twelve bundles
+and, for each, n tips of activations inside the box, on faces, edges and corners. It prints how many
+targets were not reached, how many activations of least change exceed the one drawn, and the time.
 """
 
 from __future__ import annotations

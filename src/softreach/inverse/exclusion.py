@@ -37,9 +37,9 @@ class CoarseCells:
 
     def __init__(self, rod: TipMap) -> None:
         box, m = rod.box, rod.box.dimension
-        side = max(1, int(_COARSE ** (1 / m) + 1e-9))
-        axis = (np.arange(side) + 0.5) / side
-        cube = np.stack(np.meshgrid(*[axis] * m, indexing="ij"), -1).reshape(-1, m)
+        side = max(1, int(_COARSE ** (1 / max(m, 1)) + 1e-9))
+        places = np.indices((side,) * m).reshape(m, side**m).T
+        cube = (places + 0.5) / side
         self.center, self.half = box.from_cube(cube), 0.5 * box.widths / side
         self.tips, slopes = rod.tips_and_slopes(self.center)
         self.slopes = slopes * self.half

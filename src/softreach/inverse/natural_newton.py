@@ -104,5 +104,6 @@ def _inverses(matrices: Array) -> Array:
     size = np.linalg.norm(matrices, axis=(1, 2))
     flat = np.abs(det) <= 1e-30 * size**3
     shift = np.where(flat, 1e-12 * size, 0.0)[:, None, None] * np.eye(3)
-    inverses: Array = np.linalg.inv(matrices + shift)
+    inverses = np.empty_like(matrices)
+    inverses[:] = np.linalg.inv(matrices + shift)
     return inverses
