@@ -180,3 +180,12 @@ def test_three_bundles_that_curl_past_a_full_circle_are_solved_back():
     assert np.abs(found.activations[found.offsets[:-1]] - gamma).max() < 1e-3
     some = in_box(arm, 1000)
     assert (solve_inverse(prepared_map(arm), tip_positions(arm, some)).statuses == 0).mean() > 0.998
+
+
+def test_many_bundles_are_solved_alike_alone_and_among_others():
+    arm = six_bundles()
+    targets = tip_positions(arm, activations(arm, 40, "faces", seed=2))
+    together = solve_inverse(arm, targets)
+    for i in (0, 17, 39):
+        alone = solve_inverse(arm, targets[i : i + 1])[0]
+        assert np.array_equal(alone.activations, together[i].activations)
