@@ -132,6 +132,34 @@ REDUNDANT_HEAD = """
 |---|--:|--:|--:|--:|"""
 
 
+MANY_HEAD = """
+### Inverse: many bundles, tips of random activations and random places within 1.2 L
+
+| bundles | CPU µs/target | targets/s | reached | places out of reach | proved | CPU ms/place |
+|--:|--:|--:|--:|--:|--:|--:|"""
+
+
+def many_row(bundles: int, n: int) -> str:
+    """Least change of so many bundles, and proofs that places are out of reach."""
+    from benchmarks.adversarial_inverse import random_design
+    from softreach.inverse import Status, prepared_map, solve_inverse
+
+    solver = partial(solve_inverse, prepared_map(random_design(bundles, bundles - 3)))
+    prepared, rng = solver.args[0], np.random.default_rng(0)
+    box = prepared.rod.box
+    targets = prepared.rod.tips(rng.uniform(box.low, box.high, (n, bundles)))
+    places = rng.uniform(-1.2, 1.2, (n // 10, 3))
+    solver(places[:2])
+    found, wall, cpu = timed(lambda: solver(targets))
+    away, _, long = timed(lambda: solver(places))
+    out = away.statuses != Status.REACHED
+    return (
+        f"| {bundles} | {1e6 * cpu / n:,.0f} | {n / wall:,.0f} | "
+        f"{(found.statuses == Status.REACHED).mean():.2%} | {out.sum()} | "
+        f"{(away.statuses == Status.UNREACHABLE).sum()} | {1e3 * long / len(places):.2f} |"
+    )
+
+
 def main() -> None:
     """Print the tables."""
     n = int(sys.argv[1]) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 100_000
@@ -141,6 +169,9 @@ def main() -> None:
     print(REDUNDANT_HEAD)
     for name, options in REDUNDANT:
         print(redundant_row(name, options, min(n, 1000)), flush=True)
+    print(MANY_HEAD)
+    for bundles in (4, 5, 6, 12):
+        print(many_row(bundles, min(n, 2000)), flush=True)
 
 
 @pytest.mark.benchmark(group="inverse")

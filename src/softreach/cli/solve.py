@@ -59,6 +59,7 @@ def _as_json(solution: Solution) -> dict[str, object]:
         "nearest_m": solution.nearest.tolist(),
         "nearest_activation": solution.nearest_activation.tolist(),
         "gap_m": solution.gap,
+        "gap_bound_m": solution.gap_bound,
     }
 
 
@@ -77,7 +78,8 @@ def _lines(solution: Solution, names: tuple[str, ...]) -> list[str]:
         lines.append(f"  {shown}  ({quality})")
     if not len(solution):
         near = ", ".join(f"{x:.6g}" for x in solution.nearest)
-        lines.append(f"  nearest ({near}) m, {solution.gap:.4g} m away")
+        bound = f", proved to be at least {solution.gap_bound:.4g} m" if solution.gap_bound else ""
+        lines.append(f"  nearest ({near}) m, {solution.gap:.4g} m away{bound}")
         shown = zip(names, solution.nearest_activation, strict=True)
         lines.append("  reached by " + ", ".join(f"{name} {g:.6f}" for name, g in shown))
     return lines

@@ -32,7 +32,7 @@ from softreach.inverse.roots import Roots, no_roots, roots_at, smallest_singular
 from softreach.kernels import candidates, folds, newton
 from softreach.kernels.newton import CONVERGED, RUNNING, Search
 
-__all__ = ["every_branch"]
+__all__ = ["distinct", "every_branch"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -67,7 +67,7 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
     roots = _newton(prepared, request, _starts(prepared, request, np.arange(count)))
     # Where the quadratics say that nothing leads there, look once more without believing them.
     again = _starts(prepared, request, roots.missing(count), with_root=False)
-    roots = _distinct(prepared, request, roots.joined(_newton(prepared, request, again)))
+    roots = distinct(prepared, request, roots.joined(_newton(prepared, request, again)))
     roots = _with_partners(prepared, request, roots)
     return roots.joined(_singular_roots(prepared, request, roots.missing(count)))
 
@@ -154,7 +154,7 @@ def _with_partners(prepared: PreparedMap, request: Request, roots: Roots) -> Roo
     for _ in range(2):  # a partner may have a partner of its own where two folds meet
         fresh = _newton(prepared, request, _partner_starts(prepared, fresh))
         before = len(roots.target)
-        roots = _distinct(prepared, request, roots.joined(fresh))
+        roots = distinct(prepared, request, roots.joined(fresh))
         if len(roots.target) == before:
             break
     return roots
@@ -179,7 +179,7 @@ def _partner_starts(prepared: PreparedMap, roots: Roots) -> _Starts:
     return _Starts(roots.target[near], roots.cell[near], start[near])
 
 
-def _distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
+def distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
     """Step 7: every root once."""
     offsets = np.searchsorted(roots.target, np.arange(len(request.targets) + 1))
     smallest = smallest_singular_values(roots.slope)
@@ -196,4 +196,4 @@ def _singular_roots(prepared: PreparedMap, request: Request, rows: Index) -> Roo
     )
     gamma = local_minima(prepared.rod, by_position, starts.gamma).gamma
     roots = roots_at(prepared.rod, request.targets, starts.target, gamma)
-    return _distinct(prepared, request, roots.where(roots.residual <= request.residual))
+    return distinct(prepared, request, roots.where(roots.residual <= request.residual))

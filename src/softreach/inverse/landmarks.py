@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.kernels.spread import choose_apart
 from softreach.rod.tip_map import TipMap
 from softreach.sampling import sample_cube
 
-__all__ = ["Landmarks", "landmarks"]
+__all__ = ["Landmarks", "face_landmarks", "landmarks"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -16,6 +17,9 @@ Index = NDArray[np.int64]
 _MOST = 150_000  # landmarks on a grid of the box
 _DIMENSIONS = 6  # from which on a grid is too coarse to be worth more than a low-discrepancy set
 _SOBOL = 1 << 17
+_FACE_DIMENSION = 2  # of faces whose images bound the reachable set
+_MOST_ON_FACES = 60_000
+_SEED = 0
 _CANDIDATES = 24
 _STARTS = 3
 _APART = 0.15  # of the ranges: two starts lead to different minima
@@ -43,21 +47,21 @@ class Landmarks:
         rows = np.asarray(self.tree.query(targets, k=count)[1], np.int64)
         return self.gamma[rows.reshape(-1, count)]
 
-    def starts(self, candidates: Array) -> tuple[Index, Array]:
-        """Up to three candidates for each target that lie far from each other in the box.
+    def starts(
+        self, candidates: Array, most: int = _STARTS, least_distance: float = _APART
+    ) -> tuple[Index, Array]:
+        """A few candidates for each target that lie far from each other in the box.
 
         Args:
             candidates: Activations for each target, best first, shape (t, k, m).
+            most: How many for one target.
+            least_distance: Between any two, in ranges.
 
         Returns:
             Number of the target and activation of each start, sorted by target.
         """
         chosen = np.zeros(candidates.shape[:2], bool)
-        chosen[:, 0] = True
-        for k in range(1, candidates.shape[1]):
-            apart = np.abs(candidates[:, :k] - candidates[:, k : k + 1]) / self.scales
-            distinct = (~chosen[:, :k] | (apart.max(axis=2) > _APART)).all(axis=1)
-            chosen[:, k] = distinct & (chosen.sum(axis=1) < _STARTS)
+        choose_apart(candidates, self.scales, most, least_distance, chosen)
         return np.nonzero(chosen)[0], candidates[chosen]
 
 
@@ -70,4 +74,15 @@ def landmarks(rod: TipMap) -> Landmarks:
         gamma = box.from_cube(np.array(sample_cube("grid", int(_MOST ** (1 / m)) ** m, m)))
     else:
         gamma = box.from_cube(np.array(sample_cube("sobol", _SOBOL, m)))
+    return Landmarks(gamma, rod.tips(gamma), box.scales)
+
+
+def face_landmarks(rod: TipMap) -> Landmarks:
+    """Landmarks at corners of the box, on edges, and on faces with two free bundles."""
+    box, m = rod.box, rod.box.dimension
+    rng, count = np.random.default_rng(_SEED), _MOST_ON_FACES
+    corner = rng.integers(0, 2, (count, m)).astype(float)
+    dimension = rng.integers(0, min(m, _FACE_DIMENSION) + 1, count)
+    free = rng.random((count, m)).argsort(axis=1).argsort(axis=1) < dimension[:, None]
+    gamma = box.from_cube(np.where(free, rng.random((count, m)), corner))
     return Landmarks(gamma, rod.tips(gamma), box.scales)

@@ -1,4 +1,9 @@
-"""More bundles than the target needs: of all activations that reach it, those that change least."""
+"""More bundles than the target needs: of all activations that reach it, those that change least.
+
+Local minima of |γ - near| among the activations that reach a target are found from many starts:
+`near` itself, landmarks near the target that change little and lie apart, and whatever reached the
+target otherwise. The least of them is the answer.
+"""
 
 from __future__ import annotations
 
@@ -7,141 +12,175 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.inverse.landmarks import Landmarks
-from softreach.inverse.minimizer import minimize
-from softreach.inverse.objective import Objective
+from softreach.inverse.constrained import constrained_minima
+from softreach.inverse.descent import descend
 from softreach.inverse.prepared_map import PreparedMap
+from softreach.inverse.reach import Reached, first_of_each, reach
 from softreach.inverse.request import Request
+from softreach.inverse.sequential import sequential_minima
 from softreach.rod.tip_map import TipMap
 
-__all__ = ["constrained_minima", "least_changes"]
+__all__ = ["least_changes"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_PENALTIES = (1e4, 1e5, 1e6, 1e6, 1e6, 1e6, 1e6, 1e6)
-"""Rising; with a lower first one a small miss would buy a large change of activation."""
-_PROJECTIONS = 4
 _CANDIDATES = 96
+_STARTS, _FACE_STARTS = 6, 4
+_APART = 0.15
+_PRICE_OF_CARE = 1e4
+_EQUAL = 1e-6  # difference of activations below which they are one
+_POLISHED, _MOST_POLISHING = 1e-9, 300
+_BLOCK = 4096  # targets at once: bounds the memory of their candidates
 
 
-def least_changes(prepared: PreparedMap, request: Request, known: Array) -> tuple[Index, Array]:
+def least_changes(prepared: PreparedMap, request: Request) -> tuple[Index, Array, Reached]:
     """The activation of least change for each target, then others of the solution family.
 
     The others are those nearest to `family - 1` random activations, whatever their direction.
 
     Args:
         prepared: The tip map.
-        request: Targets that can be reached, and what is preferred.
-        known: An activation that reaches each target [-], shape (t, m).
+        request: Targets, and what is preferred.
 
     Returns:
-        Number of the target and activation, sorted by target, those of least change first.
+        Number of the target and activation, sorted by target, those of least change first; and the
+        best place found for every target, reached or not.
     """
-    count, box = len(known), prepared.rod.box
-    # One set for all targets, so that a target's family does not depend on its neighbors.
+    box = prepared.rod.box
     rng = np.random.default_rng(request.seed)
+    # One set for all targets, so that a target's family does not depend on its neighbors.
     others = rng.uniform(box.low, box.high, (request.family - 1, box.bundles))
-    asked = [request]
-    asked += [replace(request, near=np.tile(near, (count, 1)), direction=None) for near in others]
-    targets, found = [np.empty(0, np.int64)], [np.empty((0, box.bundles))]
-    for one in asked:
-        gamma, residual = _least_change(prepared, one, known)
-        reached = np.flatnonzero(residual <= request.residual)
+    known = _in_blocks(prepared, replace(request, direction=None))
+    reached = np.flatnonzero(known.residual <= request.residual)
+    asked = request.of(reached)
+    targets, found = [reached], [known.gamma[reached]]
+    if request.direction is not None:
+        found = [_turned(prepared, asked, found[0])]
+    for near in others:
+        one = replace(asked, near=np.tile(near, (len(reached), 1)), direction=None)
         targets.append(reached)
-        found.append(gamma[reached])
+        found.append(_in_blocks(prepared, one, found[0]).gamma)
+        if request.direction is None:
+            _put_least_first(found[0], found[-1], asked.near)
     target = np.concatenate(targets)
     order = np.argsort(target, kind="stable")
-    return target[order], np.concatenate(found)[order]
+    return target[order], np.concatenate([np.empty((0, box.bundles)), *found])[order], known
 
 
-def _least_change(prepared: PreparedMap, request: Request, known: Array) -> tuple[Array, Array]:
-    """The best of the constrained minima from several starts: activations and residuals [m].
+def _put_least_first(first: Array, other: Array, near: Array) -> None:
+    """Exchange activations where the other changes less; make them one where they are equal."""
+    equal = np.abs(first - other).max(axis=1, initial=0.0) <= _EQUAL
+    other[equal] = first[equal]
+    change, others = np.linalg.norm(first - near, axis=1), np.linalg.norm(other - near, axis=1)
+    less = others < change
+    first[less], other[less] = other[less], first[less]
 
-    Starts are the activation known to reach each target, and landmarks of little change.
-    """
+
+def _in_blocks(prepared: PreparedMap, request: Request, known: Array | None = None) -> Reached:
+    """`_least_change` of a few thousand targets at a time."""
+    count = len(request.targets)
+    gamma, residual = np.empty((count, prepared.rod.box.bundles)), np.empty(count)
+    for first in range(0, count, _BLOCK):
+        rows = slice(first, min(first + _BLOCK, count))
+        part = None if known is None else known[rows]
+        gamma[rows], residual[rows] = _least_change(prepared, request.of(rows), part)
+    return Reached(gamma, residual)
+
+
+def _least_change(prepared: PreparedMap, request: Request, known: Array | None) -> Reached:
+    """The least of the local minima found; where none reaches its target, the nearest place."""
+    count = len(request.targets)
+    owner, start = _starts(prepared, request)
+    if known is not None:
+        owner, start = np.concatenate([owner, np.arange(count)]), np.concatenate([start, known])
+    gamma, residual = sequential_minima(prepared.rod, request.of(owner), start)
+    best = _least(owner, gamma, residual, request)
+    found = Reached(gamma[best], residual[best])
+    left = np.flatnonzero(found.residual > request.residual)
+    more = reach(prepared, request.of(left), found.gamma[left])
+    found.gamma[left], found.residual[left] = more
+    # Where some search lost its target, the target lies next to a fold or a boundary.
+    lost = np.bincount(owner, residual > request.residual, count) > 0
+    found = _with_care(prepared, request, found, np.flatnonzero(lost), owner, start)
+    return _polished(prepared, request, found)
+
+
+def _polished(prepared: PreparedMap, request: Request, found: Reached) -> Reached:
+    """The best once more, until its steps are negligible; kept where that changes less."""
+    gamma, residual = sequential_minima(
+        prepared.rod, request, found.gamma, settled=_POLISHED, most=_MOST_POLISHING
+    )
+    owner = np.tile(np.arange(len(gamma)), 2)
+    gamma = np.concatenate([found.gamma, gamma])
+    residual = np.concatenate([found.residual, residual])
+    best = _least(owner, gamma, residual, request)
+    return Reached(gamma[best], residual[best])
+
+
+def _with_care(
+    prepared: PreparedMap, request: Request, found: Reached, rows: Index, owner: Index, start: Array
+) -> Reached:
+    """Search once more for some targets: first for them, then for less change without leaving."""
+    rod, chosen = prepared.rod, np.isin(owner, rows)
+    owner = np.concatenate([owner[chosen], rows])
+    start = np.concatenate([start[chosen], found.gamma[rows]])
+    at = descend(rod, request.targets[owner], start, request.residual)
+    hit = at.residual <= request.residual
+    gamma, residual = sequential_minima(
+        rod, request.of(owner[hit]), at.gamma[hit], price=_PRICE_OF_CARE
+    )
+    count = len(request.targets)
+    owner = np.concatenate([np.arange(count), owner[hit], owner[hit]])
+    gamma = np.concatenate([found.gamma, at.gamma[hit], gamma])
+    residual = np.concatenate([found.residual, at.residual[hit], residual])
+    best = _least(owner, gamma, residual, request)
+    return Reached(gamma[best], residual[best])
+
+
+def _least(owner: Index, gamma: Array, residual: Array, request: Request) -> Index:
+    """The row of least change among those that reach their target, else the nearest one."""
+    change = np.linalg.norm(gamma - request.near[owner], axis=1)
+    change[residual > request.residual] = 1e100
+    worst = np.where(residual > request.residual, 1e100 * (1 + residual), change)
+    return first_of_each(owner, worst, len(request.targets))
+
+
+def _starts(prepared: PreparedMap, request: Request) -> tuple[Index, Array]:
+    """The activation to stay near to, and landmarks near the target that change little."""
+    owners = [np.arange(len(request.targets))]
+    starts = [prepared.rod.box.clip(request.near)]
+    for marks, most in ((prepared.landmarks, _STARTS), (prepared.face_landmarks, _FACE_STARTS)):
+        gamma = marks.nearest(request.targets, _CANDIDATES)
+        order = ((gamma - request.near[:, None]) ** 2).sum(axis=2).argsort(axis=1, kind="stable")
+        gamma = np.take_along_axis(gamma, order[:, :, None], axis=1)
+        owner, start = marks.starts(gamma, most, _APART)
+        owners.append(owner)
+        starts.append(start)
+    return np.concatenate(owners), np.concatenate(starts)
+
+
+def _turned(prepared: PreparedMap, request: Request, known: Array) -> Array:
+    """The best compromise of change and direction that keeps the position, from several starts."""
     count = len(known)
-    target, start = _starts(prepared.landmarks, request)
-    target, start = np.concatenate([np.arange(count), target]), np.concatenate([known, start])
-    each = request.of(target)
-    gamma, residual = constrained_minima(prepared.rod, each, start)
-    cost = np.where(residual <= request.residual, _cost(prepared.rod, each, gamma), np.inf)
-    order = np.lexsort((cost, target))
-    best = order[np.searchsorted(target[order], np.arange(count))]
-    return gamma[best], residual[best]
-
-
-def _starts(landmarks: Landmarks, request: Request) -> tuple[Index, Array]:
-    """Of the landmarks near each target, those that change least and lie apart."""
-    gamma = landmarks.nearest(request.targets, _CANDIDATES)
-    order = np.linalg.norm(gamma - request.near[:, None], axis=2).argsort(axis=1)
-    return landmarks.starts(np.take_along_axis(gamma, order[:, :, None], axis=1))
+    owner, start = _starts(prepared, request)
+    owner, start = np.concatenate([np.arange(count), owner]), np.concatenate([known, start])
+    gamma, residual = constrained_minima(prepared.rod, request.of(owner), start)
+    cost = np.where(
+        residual <= request.residual, _cost(prepared.rod, request.of(owner), gamma), np.inf
+    )
+    gamma, cost = (
+        np.concatenate([gamma, known]),
+        np.concatenate([cost, _cost(prepared.rod, request, known)]),
+    )
+    owner = np.concatenate([owner, np.arange(count)])
+    return gamma[first_of_each(owner, cost, count)]
 
 
 def _cost(rod: TipMap, request: Request, gamma: Array) -> Array:
     """|γ - near|² + w² |d3 - direction|², shape (n,)."""
     cost = np.linalg.norm(gamma - request.near, axis=1) ** 2
-    if request.direction is not None:
+    if request.direction is not None and len(gamma):
         error = rod.tip_directions(gamma) - request.direction
         cost += (request.direction_weight * np.linalg.norm(error, axis=1)) ** 2
     return cost
-
-
-def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Array, Array]:
-    """Minimize ½|γ - near|² + ½ w²|d3 - direction|² subject to tip = target, from each start.
-
-    Augmented Lagrangian, theory (40) [Hestenes1969] [Powell1969], whose inner searches respect the
-    bounds, then Newton on the position alone among the activations that are not at a bound.
-
-    Args:
-        rod: The tip map.
-        request: A target for each start, and what is preferred.
-        start: Where to begin [-], shape (n, m).
-
-    Returns:
-        Activations [-], shape (n, m), and their |tip - target| [m], shape (n,).
-    """
-    gamma, multiplier = start.copy(), _multipliers(rod, request, start)
-    residual = np.full(len(start), np.inf)
-    for penalty in _PENALTIES:
-        rows = np.flatnonzero(residual > 0.1 * request.residual)
-        if not len(rows):
-            break
-        part = request.of(rows)
-        lagrangian = Objective(
-            rod=rod,
-            targets=part.targets,
-            penalty=penalty,
-            multiplier=multiplier[rows],
-            near=part.near,
-            direction=part.direction,
-            direction_weight=part.direction_weight,
-        )
-        gamma[rows] = minimize(lagrangian, gamma[rows], rod.box).gamma
-        error = (rod.tips_and_slopes(gamma[rows])[0] - part.targets) / rod.length
-        multiplier[rows] += penalty * error  # theory (40)
-        residual[rows] = np.linalg.norm(error, axis=1) * rod.length
-    return _projected(rod, request.targets, gamma)
-
-
-def _multipliers(rod: TipMap, request: Request, gamma: Array) -> Array:
-    """λ for which γ - near + Jᵀλ is least, at the start: those of a solution were it one."""
-    slopes = rod.tips_and_slopes(gamma)[1] / rod.length
-    inverse = np.linalg.pinv(slopes.transpose(0, 2, 1), rcond=1e-3)
-    return -np.einsum("nij,nj->ni", inverse, gamma - request.near)
-
-
-def _projected(rod: TipMap, targets: Array, gamma: Array) -> tuple[Array, Array]:
-    """A few least-norm Newton steps, theory (39), of the activations that are off their bounds."""
-    box = rod.box
-    best, least = gamma.copy(), np.full(len(gamma), np.inf)
-    for _ in range(_PROJECTIONS):
-        tips, slopes = rod.tips_and_slopes(gamma)
-        error = targets - tips
-        residual = np.linalg.norm(error, axis=1)
-        better = residual < least
-        best[better], least[better] = gamma[better], residual[better]
-        inside = (gamma > box.low) & (gamma < box.high)
-        inverse = np.linalg.pinv(slopes * inside[:, None], rcond=1e-9)
-        gamma = box.clip(gamma + np.einsum("nji,ni->nj", inverse, error))
-    return best, least

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from softreach.inverse.request import Request
 from softreach.inverse.roots import Roots
 from softreach.rod.tip_map import TipMap
 
-__all__ = ["Nearest", "local_minima", "nearest"]
+__all__ = ["Nearest", "local_minima", "nearest", "nearest_from"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -55,6 +56,12 @@ def nearest(prepared: PreparedMap, request: Request, known: Roots | None = None)
     best = order[np.searchsorted(target[order], np.arange(len(targets)))]
     gamma = minima.gamma[best]
     return Nearest(gamma, rod.tips(gamma), minima.converged[best])
+
+
+def nearest_from(rod: TipMap, request: Request, gamma: Array) -> Nearest:
+    """The local minimum of distance from one activation for each target."""
+    minima = local_minima(rod, replace(request, direction=None), gamma)
+    return Nearest(minima.gamma, rod.tips(minima.gamma), minima.converged)
 
 
 def local_minima(rod: TipMap, request: Request, start: Array) -> Minima:

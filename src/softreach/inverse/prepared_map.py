@@ -7,8 +7,9 @@ from functools import cached_property, lru_cache
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.cells import activation_cells
+from softreach.inverse.exclusion import CoarseCells
 from softreach.inverse.image_tree import image_tree
-from softreach.inverse.landmarks import Landmarks, landmarks
+from softreach.inverse.landmarks import Landmarks, face_landmarks, landmarks
 from softreach.kernels.activation_mesh import ActivationMesh
 from softreach.kernels.space_tree import SpaceTree
 from softreach.rod.free_bundles import free_bundles
@@ -54,6 +55,16 @@ class PreparedMap:
     def landmarks(self) -> Landmarks:
         """Where searches for a minimum begin."""
         return landmarks(self.rod)
+
+    @cached_property
+    def coarse_cells(self) -> CoarseCells:
+        """Where proofs that a target is out of reach begin."""
+        return CoarseCells(self.rod)
+
+    @cached_property
+    def face_landmarks(self) -> Landmarks:
+        """Where searches begin for places on the boundary of the reachable set."""
+        return face_landmarks(self.rod)
 
 
 def prepared_map(

@@ -28,9 +28,9 @@ class Status(IntEnum):
     REACHED = 0
     """Some activation within the bounds puts the tip there."""
     UNREACHABLE = 1
-    """None does; the nearest point that was found is given."""
-    NOT_CONVERGED = 2
-    """The search did not converge: what is given is the best found, not certain."""
+    """None does, which is proved: `gap_bound` is positive."""
+    NOT_FOUND = 2
+    """The search ended without one, and without a proof that there is none."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,11 +50,13 @@ class Solution:
     margins: Array
     """Distance to the nearest bound of a free bundle, relative to its range, shape (k,)."""
     nearest: Array
-    """The reachable point nearest to the target [m], shape (3,)."""
+    """The reachable point nearest to the target that was found [m], shape (3,)."""
     nearest_activation: Array
     """An activation that leads there [-], shape (bundles,)."""
     gap: float
     """|nearest - target| [m]."""
+    gap_bound: float
+    """A proved lower bound of the distance to the reachable set [m]; 0 if nothing is proved."""
 
     def __len__(self) -> int:
         return len(self.activations)
@@ -94,6 +96,8 @@ class Solutions(Sequence[Solution]):
     """Shape (t, bundles) [-]."""
     gaps: Array
     """Shape (t,) [m]."""
+    gap_bounds: Array
+    """Proved lower bounds of the distance to the reachable set, shape (t,) [m]."""
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
@@ -155,6 +159,7 @@ class Solutions(Sequence[Solution]):
             nearest=self.nearest[i],
             nearest_activation=self.nearest_activations[i],
             gap=float(self.gaps[i]),
+            gap_bound=float(self.gap_bounds[i]),
         )
 
     def _several(self, chosen: Index) -> Solutions:
@@ -182,6 +187,7 @@ class Solutions(Sequence[Solution]):
                 "nearest": (("target", "axis"), self.nearest, {"units": "m"}),
                 "nearest_activation": (per_target, self.nearest_activations, {"units": "1"}),
                 "gap": ("target", self.gaps, {"units": "m"}),
+                "gap_bound": ("target", self.gap_bounds, {"units": "m"}),
                 "target_of": ("solution", np.repeat(np.arange(len(self)), self.counts)),
                 "activation": (per_solution, self.activations, {"units": "1"}),
                 "residual": ("solution", self.residuals, {"units": "m"}),
@@ -193,7 +199,7 @@ class Solutions(Sequence[Solution]):
         )
 
 
-_PER_TARGET = ("targets", "statuses", "nearest", "nearest_activations", "gaps")
+_PER_TARGET = ("targets", "statuses", "nearest", "nearest_activations", "gaps", "gap_bounds")
 _PER_SOLUTION = ("activations", "residuals", "conditions", "margins")
 
 

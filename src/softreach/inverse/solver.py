@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.branches import every_branch
+from softreach.inverse.branches import distinct, every_branch
+from softreach.inverse.exclusion import gap_bounds
 from softreach.inverse.least_change import least_changes
-from softreach.inverse.nearest import Nearest, nearest
+from softreach.inverse.natural_newton import nearly_singular_roots
+from softreach.inverse.nearest import Nearest, nearest, nearest_from
 from softreach.inverse.prepared_map import PreparedMap, prepared_map
 from softreach.inverse.request import (
     Request,
@@ -51,7 +51,8 @@ def solve_inverse(
     Bundles with equal bounds are held there; the others are free. With three free bundles: every
     activation within the bounds, by Newton's method from every cell of the activation box whose
     image covers the target. With more: the one of least |γ - near|, and `family - 1` others on
-    request. With fewer, or out of reach: the nearest reachable point. The arm is prepared at the
+    request. With fewer, or out of reach: the nearest reachable point found, and whether a bound
+    proves the target to be out of reach. The arm is prepared at the
     first call and remembered.
 
     Args:
@@ -106,7 +107,18 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     """All roots, and the nearest points to the targets that have none."""
     roots = every_branch(prepared, request)
     missing = roots.missing(len(request.targets))
-    return _solutions(prepared, request, roots, missing, nearest(prepared, request.of(missing)))
+    closest = nearest(prepared, request.of(missing))
+    solutions = _solutions(prepared, request, roots, missing, closest)
+    left = np.flatnonzero(solutions.statuses == Status.NOT_FOUND)
+    if not len(left):
+        return solutions
+    late = distinct(prepared, request, nearly_singular_roots(prepared, request, left))
+    if not len(late.target):
+        return solutions
+    roots = roots.joined(late)
+    again = roots.missing(len(request.targets))
+    closest = closest.of(np.flatnonzero(np.isin(missing, again)))
+    return _solutions(prepared, request, roots, again, closest, solutions.gap_bounds)
 
 
 def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
@@ -118,18 +130,21 @@ def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
 
 
 def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
-    """Least changes among the activations that reach the targets that can be reached."""
-    closest = nearest(prepared, replace(request, direction=None))
-    distance = np.linalg.norm(closest.tip - request.targets, axis=1)
-    rows = np.flatnonzero(distance <= request.residual)
-    target, gamma = least_changes(prepared, request.of(rows), closest.gamma[rows])
-    roots = roots_at(prepared.rod, request.targets, rows[target], gamma)
+    """Least changes where the target is reached, nearest places where it is not."""
+    target, gamma, best = least_changes(prepared, request)
+    roots = roots_at(prepared.rod, request.targets, target, gamma)
     missing = roots.missing(len(request.targets))
-    return _solutions(prepared, request, roots, missing, closest.of(missing))
+    closest = nearest_from(prepared.rod, request.of(missing), best.gamma[missing])
+    return _solutions(prepared, request, roots, missing, closest)
 
 
 def _solutions(
-    prepared: PreparedMap, request: Request, roots: Roots, missing: Index, closest: Nearest
+    prepared: PreparedMap,
+    request: Request,
+    roots: Roots,
+    missing: Index,
+    closest: Nearest,
+    proved_gaps: Array | None = None,
 ) -> Solutions:
     """Put together the roots and, for targets without one, the nearest points.
 
@@ -139,15 +154,23 @@ def _solutions(
         roots: The roots found, sorted by target.
         missing: Numbers of the targets without a root.
         closest: The nearest points to these; some may prove to be roots.
+        proved_gaps: Lower bounds of the gaps of all targets, if they are known already.
     """
     rod, count = prepared.rod, len(request.targets)
     at_closest = roots_at(rod, request.targets, missing, closest.gamma)
     hit = at_closest.residual <= request.residual
     roots = roots.joined(at_closest.where(hit))
     statuses = np.full(count, Status.REACHED, np.int8)
-    statuses[missing] = np.where(closest.converged, Status.UNREACHABLE, Status.NOT_CONVERGED)
-    # With more bundles than needed a root is there, but the least change was not found.
-    statuses[missing[hit]] = Status.NOT_CONVERGED if prepared.dimension > 3 else Status.REACHED
+    out, far = missing[~hit], at_closest.residual[~hit]
+    bounds = np.zeros(count)
+    # Where the position yields to a direction, the gap says nothing of what can be reached.
+    yielding = request.direction is not None and prepared.dimension <= 3
+    if proved_gaps is not None:
+        bounds[out] = proved_gaps[out]
+    elif len(out) and not yielding:
+        bounds[out] = gap_bounds(rod, prepared.coarse_cells, request.targets[out], far)
+    proved = bounds[out] > request.residual
+    statuses[out] = np.where(proved, Status.UNREACHABLE, Status.NOT_FOUND)
     gamma, gaps = np.empty((count, rod.box.bundles)), np.empty(count)
     reached, first = np.unique(roots.target, return_index=True)
     gamma[reached], gaps[reached] = roots.gamma[first], roots.residual[first]
@@ -169,4 +192,5 @@ def _solutions(
         nearest=points,
         nearest_activations=prepared.whole.box.with_held(gamma),
         gaps=gaps,
+        gap_bounds=bounds,
     )

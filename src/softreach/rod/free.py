@@ -15,6 +15,7 @@ from softreach.arm.tables import check_extension, tables
 from softreach.kernels import frames, jacobian, rod
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.linear_strains import linear_strains, strain_range
+from softreach.rod.linearization import Linearization
 from softreach.rod.steps import StepRule, check_tol
 from softreach.rod.tip_map import (
     BLOCK,
@@ -98,6 +99,18 @@ class FreeRod(TipMap):
             for b in parallel.blocks(len(gamma), BLOCK // 8)
         )
         return tips, twists
+
+    def farthest(self) -> float:
+        """No tip is farther from the base than this [m], the length of the longest arm."""
+        return self._linearization.longest_arm
+
+    def linearization_error(self, half_widths: Array) -> float:
+        """The largest |r(γ + d) - r(γ) - r'(γ) d| [m] for |dj| <= half_widths[j] in the box."""
+        return self._linearization.error(half_widths)
+
+    @cached_property
+    def _linearization(self) -> Linearization:
+        return Linearization(self.arm, self.box)
 
     def frames(self, activations: ArrayLike, stations: ArrayLike) -> Frames:
         """Centerline and directors at ascending stations Z [m]."""

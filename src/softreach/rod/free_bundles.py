@@ -66,6 +66,16 @@ class FreeBundles(TipMap):
         tips, twists = self.whole.tip_twists(self._all(self.box.check(activations)))
         return tips, np.ascontiguousarray(twists[:, :, self.whole.box.free])
 
+    def farthest(self) -> float:
+        """No tip is farther from the base than this [m]."""
+        return self.whole.farthest()
+
+    def linearization_error(self, half_widths: Array) -> float:
+        """The largest |r(γ + d) - r(γ) - r'(γ) d| [m] for |dj| <= half_widths[j] in the box."""
+        whole = np.zeros(self.whole.box.bundles)
+        whole[self.whole.box.free] = half_widths
+        return self.whole.linearization_error(whole)
+
     def frames(self, activations: ArrayLike, stations: ArrayLike) -> Frames:
         """Centerline and directors at ascending stations Z [m]."""
         return self.whole.frames(self._all(self.box.check(activations)), stations)

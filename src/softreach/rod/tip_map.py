@@ -141,6 +141,17 @@ class TipMap(ABC):
             Tips, shape (n, 3); (v, ω) with v [m] and ω [rad], shape (n, 6, bundles).
         """
 
+    def farthest(self) -> float:
+        """No tip is farther from the base than this [m]; infinite where no bound is known."""
+        return np.inf
+
+    def linearization_error(self, half_widths: Array) -> float:
+        """The largest |r(γ + d) - r(γ) - r'(γ) d| [m] for |dj| <= half_widths[j] in the box.
+
+        Infinite where no bound is known, so that nothing is proved by it.
+        """
+        return np.inf
+
     @abstractmethod
     def frames(self, activations: ArrayLike, stations: ArrayLike) -> Frames:
         """Centerline and directors at ascending stations Z [m]."""

@@ -1,0 +1,109 @@
+"""Newton's method where ∂r/∂γ is nearly singular, for three free bundles.
+
+Near a full circle two singular values of J vanish together. The residual then says little about the
+distance from a root: on the way it has to rise, and a search that never lets it does not arrive.
+Steps are judged by the natural test instead, |J⁻¹ F(trial)| < |J⁻¹ F(γ)|, which is invariant under
+any linear change of the residual.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.inverse.descent import descend
+from softreach.inverse.prepared_map import PreparedMap
+from softreach.inverse.request import Request
+from softreach.inverse.roots import Roots, no_roots, roots_at
+from softreach.rod.tip_map import TipMap
+
+__all__ = ["natural_newton", "nearly_singular_roots"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_EFFORTS = ((500, 40, 0.1), (2000, 100, 0.08))
+"""Landmarks near the target, most starts from them, their least distance in ranges."""
+_APPROACH = 4  # iterations of descent after which a start is tried once more
+_BLOCK = 500  # targets at once
+
+_MOST_ITERATIONS = 60
+_LONGEST_STEP = 0.3  # in ranges
+_OUTSIDE = 0.05  # how far a search may leave the bounds, in ranges
+_LEAST_DAMPING = 1e-3
+_CONVERGED = 1e-9  # step, in ranges
+
+
+def nearly_singular_roots(prepared: PreparedMap, request: Request, rows: Index) -> Roots:
+    """Roots for some of the targets, those that no other search found, sorted by target."""
+    roots = no_roots(prepared.rod)
+    for neighbors, most, apart in _EFFORTS:
+        left = np.setdiff1d(rows, roots.target)
+        for first in range(0, len(left), _BLOCK):
+            part = left[first : first + _BLOCK]
+            near = prepared.landmarks.nearest(request.targets[part], neighbors)
+            owner, start = prepared.landmarks.starts(near, most, apart)
+            roots = roots.joined(_from_starts(prepared.rod, request, part[owner], start))
+    return roots
+
+
+def _from_starts(rod: TipMap, request: Request, owner: Index, start: Array) -> Roots:
+    """Roots from starts, and from where a little descent leads from them."""
+    goal, residual = request.targets[owner], request.residual
+    approached = descend(rod, goal, start, residual, most=_APPROACH).gamma
+    roots = no_roots(rod)
+    for begin in (start, approached):
+        gamma = natural_newton(rod, goal, begin, residual)
+        found = roots_at(rod, request.targets, owner, gamma)
+        roots = roots.joined(found.where(found.residual <= residual))
+    return roots
+
+
+def natural_newton(rod: TipMap, targets: Array, start: Array, residual: float) -> Array:
+    """Where each search ends, inside the bounds; whether at a root is for the caller to see.
+
+    Args:
+        rod: The tip map of three free bundles.
+        targets: One for each start [m], shape (n, 3).
+        start: Shape (n, 3).
+        residual: |tip - target| at which a search may end [m].
+    """
+    box, scales = rod.box, rod.box.scales
+    low, high = box.low - _OUTSIDE * scales, box.high + _OUTSIDE * scales
+    gamma, damping = start.copy(), np.ones(len(start))
+    tip, slope = rod.tips_and_slopes(gamma)
+    miss, active = targets - tip, np.arange(len(start))
+    for _ in range(_MOST_ITERATIONS):
+        if not len(active):
+            break
+        inverse = _inverses(slope[active] * scales)
+        step = np.einsum("nij,nj->ni", inverse, miss[active])
+        size = np.linalg.norm(step, axis=1)
+        factor = np.minimum(damping[active], _LONGEST_STEP / np.maximum(size, 1e-300))
+        trial = np.clip(gamma[active] + factor[:, None] * step * scales, low, high)
+        tip, new_slope = rod.tips_and_slopes(trial)
+        away = targets[active] - tip
+        left = np.linalg.norm(np.einsum("nij,nj->ni", inverse, away), axis=1)
+        accepted = left <= (1.0 - 0.25 * factor) * size
+        taken = active[accepted]
+        gamma[taken], slope[taken], miss[taken] = (
+            trial[accepted],
+            new_slope[accepted],
+            away[accepted],
+        )
+        damping[active] = np.where(accepted, np.minimum(1.0, 3.0 * factor), 0.3 * factor)
+        near = np.linalg.norm(miss[active], axis=1) <= residual
+        end = (size <= _CONVERGED) | (near & ~accepted) | (damping[active] < _LEAST_DAMPING)
+        active = active[~end]
+    return box.clip(gamma)
+
+
+def _inverses(matrices: Array) -> Array:
+    """Inverses of 3x3 matrices, of those that are singular next to them."""
+    det = np.linalg.det(matrices)
+    size = np.linalg.norm(matrices, axis=(1, 2))
+    flat = np.abs(det) <= 1e-30 * size**3
+    shift = np.where(flat, 1e-12 * size, 0.0)[:, None, None] * np.eye(3)
+    inverses = np.empty_like(matrices)
+    inverses[:] = np.linalg.inv(matrices + shift)
+    return inverses

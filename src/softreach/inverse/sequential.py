@@ -1,0 +1,125 @@
+"""Local minima of the change of activation among the activations that reach a target."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.inverse.descent import descend
+from softreach.inverse.request import Request
+from softreach.kernels.box_projection import project
+from softreach.rod.tip_map import TipMap
+
+__all__ = ["sequential_minima"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_LONGEST_STEP = 0.5  # in ranges
+_SOFTNESS = 1e-9  # of the linearized target, in |J|²
+_FIRST_PROXIMITY, _LARGEST_PROXIMITY = 0.3, 1e7
+
+
+class _State(NamedTuple):
+    """Every search as it stands, scaled with L."""
+
+    gamma: Array
+    """Activations [-], shape (n, m)."""
+    miss: Array
+    """(tip - target)/L, shape (n, 3)."""
+    slope: Array
+    """(∂r/∂γ)/L, shape (n, 3, m)."""
+    price: Array
+    """What a miss of L costs, beside ½|γ - near|², shape (n,)."""
+    proximity: Array
+    """σ: ½σ|step|² is added to what a step minimizes, shape (n,)."""
+
+
+def sequential_minima(
+    rod: TipMap,
+    request: Request,
+    start: Array,
+    *,
+    price: float = 0.0,
+    settled: float = 1e-6,
+    most: int = 60,
+) -> tuple[Array, Array]:
+    """Minimize ½|γ - near|² subject to tip = target and bounds, from each start.
+
+    Each step minimizes ½|x - near|² + ½σ|x - γ|² where the linearized map meets the target, inside
+    the bounds, exactly: sequential quadratic programming with a multiple of the identity for
+    the Hessian. It is taken if ½|x - near|² + price·|miss| falls as it should; else σ
+    grows. Descent to the target ends the search.
+
+    Args:
+        rod: The tip map.
+        request: A target for each start, and what to stay near to.
+        start: Where to begin, inside the bounds [-], shape (n, m).
+        price: Least price. A high one keeps a search near the target once it is there, as it must
+            where the target lies next to a fold or to the boundary of the reachable set.
+        settled: Step at which a search ends, in ranges.
+        most: Iterations.
+
+    Returns:
+        Activations [-], shape (n, m), and their |tip - target| [m], shape (n,).
+    """
+    n, length = len(start), rod.length
+    tip, slope = rod.tips_and_slopes(start)
+    state = _State(
+        gamma=start.copy(),
+        miss=(tip - request.targets) / length,
+        slope=slope / length,
+        price=np.full(n, price),
+        proximity=np.full(n, _FIRST_PROXIMITY),
+    )
+    active = np.arange(n)
+    for _ in range(most):
+        if not len(active):
+            break
+        step = _advance(rod, request, state, active)
+        active = active[(step >= settled) & (state.proximity[active] < _LARGEST_PROXIMITY)]
+    found = descend(rod, request.targets, state.gamma, request.residual, most=20)
+    return found.gamma, found.residual
+
+
+def _advance(rod: TipMap, request: Request, state: _State, active: Index) -> Array:
+    """One step of the active searches; how long it would be without proximity, in ranges."""
+    gamma, near, slope = state.gamma[active], request.near[active], state.slope[active]
+    trial, force = _trials(rod, near, slope, state, active)
+    tip, new_slope = rod.tips_and_slopes(trial)
+    miss = (tip - request.targets[active]) / rod.length
+    price = np.maximum(state.price[active], 1.5 * np.linalg.norm(force, axis=1))
+    before = _merit(gamma, near, price, state.miss[active])
+    linear_miss = state.miss[active] + np.einsum("nij,nj->ni", slope, trial - gamma)
+    predicted = before - _merit(trial, near, price, linear_miss)
+    gained = before - _merit(trial, near, price, miss)
+    accepted = gained >= 0.1 * predicted - 1e-15
+    taken, sigma = active[accepted], state.proximity[active]
+    state.gamma[taken], state.miss[taken] = trial[accepted], miss[accepted]
+    state.slope[taken] = new_slope[accepted] / rod.length
+    state.price[active] = price
+    eased = np.where(gained >= 0.7 * predicted, 0.4 * sigma, sigma)
+    state.proximity[active] = np.where(accepted, eased, 4.0 * sigma + 0.1)
+    return (np.abs(trial - gamma) / rod.box.scales).max(axis=1) * (1 + sigma)
+
+
+def _trials(
+    rod: TipMap, near: Array, slope: Array, state: _State, active: Index
+) -> tuple[Array, Array]:
+    """Ends of the steps, and the multipliers of the linearized targets."""
+    box, gamma = rod.box, state.gamma[active]
+    weight = 1.0 + state.proximity[active, None]
+    center = (near + state.proximity[active, None] * gamma) / weight
+    wanted = np.einsum("nij,nj->ni", slope, gamma) - state.miss[active]
+    softness = _SOFTNESS * (slope**2).sum(axis=(1, 2)) / (1.0 + state.price[active]) + 1e-30
+    reach = _LONGEST_STEP * box.scales
+    low, high = np.maximum(box.low, gamma - reach), np.minimum(box.high, gamma + reach)
+    trial, multiplier = np.empty_like(gamma), np.empty((len(active), 3))
+    project(center, slope, wanted, softness, low, high, trial, multiplier)
+    return trial, multiplier * weight
+
+
+def _merit(gamma: Array, near: Array, price: Array, miss: Array) -> Array:
+    return 0.5 * ((gamma - near) ** 2).sum(axis=1) + price * np.linalg.norm(miss, axis=1)

@@ -1,0 +1,191 @@
+"""Four bundles and more: what is reached is found, what is called unreachable is so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from benchmarks.adversarial_inverse import PLACES, activations, random_design
+
+from softreach.arm import designs
+from softreach.arm.actuators import FiberArchitecture
+from softreach.arm.manipulator import Manipulator
+from softreach.inverse import Solutions, Status, prepared_map, solve_inverse
+from softreach.rod import tip_map, tip_positions
+from tests.laws import in_box
+
+
+def six_bundles() -> Manipulator:
+    fibers = [
+        FiberArchitecture(
+            revolution=np.radians(turn), extent=np.radians(40), offset=np.radians(at), bundles=3
+        )
+        for turn, at in ((90, 90), (-90, 30))
+    ]
+    return Manipulator.tapered(
+        length=1.0,
+        outer_radius=0.06,
+        inner_radius=0.03,
+        taper=np.radians(1),
+        poisson_ratio=0.4,
+        actuators=tuple(fibers),
+        activation_bounds=(-1.2, 0.1),
+    )
+
+
+def changes(found: Solutions, near: np.ndarray | float = 0.0) -> np.ndarray:
+    """|γ - near| of the first activation of every target."""
+    return np.linalg.norm(found.activations[found.offsets[:-1]] - near, axis=1)
+
+
+def test_an_activation_on_a_face_that_was_missed_is_reached_with_and_without_itself_as_near():
+    arm, gamma = designs.redundant_trunk(), np.array([-0.42, 0.0, -5 / 3, 0.0])
+    target = tip_positions(arm, gamma[None])
+    for near in (None, gamma):
+        found = solve_inverse(arm, target, near=near)
+        assert found.statuses[0] == Status.REACHED
+        assert found.residuals[0] <= 1e-10
+    assert changes(found, gamma)[0] <= 1e-9
+
+
+@pytest.mark.parametrize("design", [designs.redundant_trunk, six_bundles])
+@pytest.mark.parametrize("place", PLACES)
+def test_every_tip_of_an_activation_inside_the_box_is_reached(design, place):
+    arm = design()
+    gamma = activations(arm, 400, place, seed=3)
+    found = solve_inverse(arm, tip_positions(arm, gamma))
+    assert (found.statuses == Status.REACHED).all()
+    assert found.residuals.max() <= 1e-10
+    assert (found.margins >= 0).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_every_tip_of_a_random_design_is_reached(seed):
+    arm = random_design(4 + 2 * seed, seed)
+    for place in PLACES:
+        gamma = activations(arm, 60, place)
+        found = solve_inverse(arm, tip_positions(arm, gamma))
+        assert (found.statuses == Status.REACHED).all()
+
+
+@pytest.mark.parametrize("design", [designs.redundant_trunk, six_bundles])
+def test_the_answer_is_never_farther_from_near_than_near_itself(design):
+    arm = design()
+    gamma = activations(arm, 200, "faces", seed=1)
+    found = solve_inverse(arm, tip_positions(arm, gamma), near=gamma)
+    assert (found.statuses == Status.REACHED).all()
+    assert changes(found, gamma).max() <= 1e-9
+
+
+def test_the_least_activation_is_no_larger_than_one_that_was_overlooked():
+    arm = designs.redundant_trunk()
+    gamma = np.array([[-0.6582, -0.8974, -1.036, -1.4149]])
+    found = solve_inverse(arm, tip_positions(arm, gamma))
+    assert changes(found)[0] <= np.linalg.norm(gamma) + 1e-9
+
+
+def test_the_least_activation_is_no_larger_than_those_that_were_drawn():
+    for arm in (designs.redundant_trunk(), six_bundles()):
+        gamma = in_box(arm, 300)
+        found = solve_inverse(arm, tip_positions(arm, gamma))
+        assert (changes(found) <= np.linalg.norm(gamma, axis=1) * (1 + 1e-6)).all()
+
+
+def test_the_least_change_is_stationary_among_the_activations_that_reach_the_target():
+    # γ - near = Jᵀy for the bundles between their bounds; at a bound it may only push outward.
+    arm, near = designs.redundant_trunk(), np.array([-0.8, -0.2, -1.0, -0.5])
+    found = solve_inverse(arm, tip_positions(arm, in_box(arm, 100, seed=4)), near=near)
+    gamma, slopes = found.activations, tip_map(arm).tips_and_slopes(found.activations)[1]
+    low, high = arm.bounds.T
+    checked = 0
+    for at, slope in zip(gamma, slopes, strict=True):
+        free = (at > low + 1e-9) & (at < high - 1e-9)
+        if np.linalg.matrix_rank(slope[:, free], tol=1e-3) < 3:
+            continue
+        force = np.linalg.lstsq(slope[:, free].T, (at - near)[free], rcond=None)[0]
+        gradient = at - near - slope.T @ force
+        assert np.abs(gradient[free]).max() < 1e-4
+        assert (gradient[at <= low + 1e-9] > -1e-4).all()
+        assert (gradient[at >= high - 1e-9] < 1e-4).all()
+        checked += free.sum() > 3
+    assert checked > 20
+
+
+@pytest.mark.parametrize("design", [designs.minimal_trunk, designs.redundant_trunk, six_bundles])
+def test_the_remainder_of_the_linearization_is_within_its_bound(design):
+    arm = design()
+    rod, rng = tip_map(arm), np.random.default_rng(0)
+    for cells in (1.5, 4, 30):
+        half = rod.box.widths / 2 / cells
+        center = rng.uniform(rod.box.low + half, rod.box.high - half, (4000, arm.bundles))
+        change = half * rng.choice([-1.0, 1.0], center.shape)
+        tips, slopes = rod.tips_and_slopes(center)
+        rest = rod.tips(center + change) - tips - np.einsum("nij,nj->ni", slopes, change)
+        assert np.linalg.norm(rest, axis=1).max() <= rod.linearization_error(half)
+
+
+def test_no_tip_is_farther_from_the_base_than_the_longest_arm():
+    for arm in (designs.redundant_trunk(), six_bundles()):
+        rod = tip_map(arm)
+        assert np.linalg.norm(rod.tips(rod.box.corners()), axis=1).max() <= rod.farthest()
+
+
+def test_a_gap_is_never_smaller_than_its_proved_bound():
+    from scipy.spatial import KDTree
+
+    arm = designs.redundant_trunk()
+    targets = np.random.default_rng(0).uniform(-1, 1, (120, 3))
+    found = solve_inverse(arm, targets)
+    out = found.statuses == Status.UNREACHABLE
+    assert out.sum() > 60
+    assert (found.gap_bounds[out] > 0).all()
+    assert (found.gap_bounds <= found.gaps).all()
+    cloud = KDTree(tip_positions(arm, in_box(arm, 200_000))).query(targets)[0]
+    assert (found.gap_bounds <= cloud).all()
+    assert (found.gaps[out] <= cloud[out]).all()
+    assert not found.gap_bounds[found.statuses == Status.REACHED].any()
+
+
+def test_what_is_neither_reached_nor_proved_to_be_out_of_reach_is_not_found():
+    arm = random_design(12, 0)
+    beyond, near = solve_inverse(arm, [[0.0, 0.0, 3.0], [0.0, 0.0, -0.9]])
+    assert beyond.status is Status.UNREACHABLE
+    assert 0 < beyond.gap_bound <= beyond.gap
+    assert near.status is Status.NOT_FOUND
+    assert near.gap_bound == 0.0
+    assert near.gap > 0
+
+
+def curling() -> Manipulator:
+    """Three bundles that curl the arm past a full circle."""
+    fiber = FiberArchitecture(
+        revolution=0.0, extent=np.radians(80), offset=np.radians(10), bundles=3
+    )
+    return Manipulator.tapered(
+        length=1.0,
+        outer_radius=0.05,
+        inner_radius=0.02,
+        taper=0.0,
+        poisson_ratio=0.5,
+        actuators=(fiber,),
+        activation_bounds=(-1.2, 0.6),
+    )
+
+
+@pytest.mark.slow
+def test_three_bundles_that_curl_past_a_full_circle_are_solved_back():
+    arm = curling()
+    gamma = np.array([[0.0935, -0.788, -0.5483], [-0.57375, 0.22242, -0.29914]])
+    found = solve_inverse(arm, tip_positions(arm, gamma))
+    assert (found.statuses == Status.REACHED).all()
+    assert np.abs(found.activations[found.offsets[:-1]] - gamma).max() < 1e-3
+    some = in_box(arm, 1000)
+    assert (solve_inverse(prepared_map(arm), tip_positions(arm, some)).statuses == 0).mean() > 0.998
+
+
+def test_many_bundles_are_solved_alike_alone_and_among_others():
+    arm = six_bundles()
+    targets = tip_positions(arm, activations(arm, 40, "faces", seed=2))
+    together = solve_inverse(arm, targets)
+    for i in (0, 17, 39):
+        alone = solve_inverse(arm, targets[i : i + 1])[0]
+        assert np.array_equal(alone.activations, together[i].activations)
