@@ -102,7 +102,7 @@ class InvalidDesign(SoftreachError, ValueError):
         self.faults = tuple(faults)
         lines = [str(fault) for fault in self.faults]
         if source:
-            count = f"{len(lines)} problem" + ("s" if len(lines) > 1 else "")
+            count = counted(len(lines), "problem")
             super().__init__("\n  ".join([f"{source}: {count}", *lines]))
         else:
             super().__init__("\n".join(lines))

@@ -41,7 +41,7 @@ class Profile(ABC):
 
     @abstractmethod
     def slope(self, z: ArrayLike) -> Array:
-        """Tan φ(Z) = -R2'(Z) [-]; positive where the arm narrows toward the tip."""
+        """tan φ(Z) = -R2'(Z) [-]; positive where the arm narrows toward the tip."""
 
     @abstractmethod
     def slender_coordinate(self, z: ArrayLike) -> Array:
@@ -112,7 +112,7 @@ class LinearTaper(Profile):
         return self.outer_radius - np.asarray(z, float) * np.tan(self.taper)
 
     def slope(self, z: ArrayLike) -> Array:
-        """Tan φ, the same everywhere [-]."""
+        """tan φ, the same everywhere [-]."""
         return np.full(np.shape(z), np.tan(self.taper))
 
     def slender_coordinate(self, z: ArrayLike) -> Array:

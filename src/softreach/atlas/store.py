@@ -30,7 +30,7 @@ from softreach.atlas.store_root import (
     absolute,
     claim,
     opened_root,
-    trouble,
+    store_errors,
     writing,
 )
 from softreach.errors import InvalidInput
@@ -141,7 +141,7 @@ class AtlasStore:
         Raises:
             StoreFailed: They are not what they were when the store was created.
         """
-        with trouble(f"{self.location} cannot be read"):
+        with store_errors(f"{self.location} cannot be read"):
             cube = np.asarray(self._array("unit_activation")[...])
         self._check_cube(cube, "the stored activations are damaged; remove it")
         return cube

@@ -1,4 +1,4 @@
-"""The place of a store: opened, or taken by the first who comes; its troubles in one line."""
+"""The place of a store: opened, or taken by the first who comes; its errors in one line."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from zarr.abc.store import Store
     from zarr.storage import StoreLike, StorePath
 
-__all__ = ["StoreFailed", "absolute", "claim", "opened_root", "trouble", "writing"]
+__all__ = ["StoreFailed", "absolute", "claim", "opened_root", "store_errors", "writing"]
 
 
 class StoreFailed(SoftreachError):
@@ -33,15 +33,15 @@ def absolute(location: StoreLike) -> StoreLike:
 
 
 def writing(location: StoreLike) -> AbstractContextManager[None]:
-    """Turn trouble of the disk or the network into one line that says what to do."""
-    return trouble(
+    """Turn an error of the disk or the network into one line that says what to do."""
+    return store_errors(
         f"{location} cannot be written",
         "; what is done is safe, and the same command continues once that is mended",
     )
 
 
 @contextmanager
-def trouble(what: str, then: str = "") -> Iterator[None]:
+def store_errors(what: str, then: str = "") -> Iterator[None]:
     """Raise what a store raises, whatever kind of store it is, as `StoreFailed`."""
     try:
         yield
@@ -56,7 +56,7 @@ def opened_root(location: StoreLike, mode: Literal["r", "r+"] = "r+") -> zarr.Gr
     """The root group of a store, if there is one."""
     import zarr
 
-    with trouble(f"{location} cannot be opened"):
+    with store_errors(f"{location} cannot be opened"):
         try:
             return zarr.open_group(location, mode=mode, zarr_format=3)
         except FileNotFoundError:

@@ -40,9 +40,9 @@ def frames(table, ends, gamma, position, directors):
     """Centerline and directors of n rods at stations.
 
     Args:
-        table: Packed node tables, (step, 12, fiber + 1).
+        table: Packed node tables, (step, 12, bundle + 1).
         ends: Number of steps from the base to each station, ascending, (station,).
-        gamma: Activations, (n, fiber).
+        gamma: Activations, (n, bundle).
         position: Filled with r, (n, station, 3).
         directors: Filled with d1, d2, d3 as rows, (n, station, 3, 3).
     """

@@ -68,7 +68,7 @@ def _walk_column(work, column, table, k, j):
 
 @kernel
 def jacobians(table, gamma, tips, out):
-    """Tips (n, 3) and spatial Jacobians (n, 6, fiber), linear rows first, of n activations."""
+    """Tips (n, 3) and spatial Jacobians (n, 6, bundle), linear rows first, of n activations."""
     bundles = gamma.shape[1]
     work = np.zeros(WORK)
     lanes = np.zeros((table.shape[2] - 1, LANES))

@@ -28,9 +28,9 @@ def twists(measure: Array, stretch: Array, curvature: Array, gamma: Array) -> Ar
 
     Args:
         measure: Length of the step as each node sees it [m], shape (step, node).
-        stretch: z [-], shape (step, node, fiber).
-        curvature: U [1/m], shape (step, node, 3, fiber).
-        gamma: One activation [-], shape (fiber,).
+        stretch: z [-], shape (step, node, bundle).
+        curvature: U [1/m], shape (step, node, 3, bundle).
+        gamma: One activation [-], shape (bundle,).
     """
     length = measure * (1.0 + stretch @ gamma)
     e3 = np.array([0.0, 0.0, 1.0])

@@ -26,14 +26,14 @@ _GROUP = 4  # bundles added at once
 
 
 def pack(measure, stretch, curvature):
-    """Node tables as one array (step, 12, fiber + 1): rows ℓ, u1, u2, u3 of each node.
+    """Node tables as one array (step, 12, bundle + 1): rows ℓ, u1, u2, u3 of each node.
 
     The last column is the value at rest; bundles are padded with zeros to a multiple of four.
 
     Args:
         measure: Length of the step as each node sees it [m], shape (step, 3).
-        stretch: z [-], shape (step, 3, fiber).
-        curvature: U [1/m], shape (step, 3, 3, fiber).
+        stretch: z [-], shape (step, 3, bundle).
+        curvature: U [1/m], shape (step, 3, 3, bundle).
     """
     steps, _, bundles = stretch.shape
     table = np.zeros((steps, 3, 4, -(-bundles // _GROUP) * _GROUP + 1))
@@ -106,7 +106,7 @@ def walk(work):
 
 @kernel
 def tips(table, gamma, out):
-    """Tip positions: (n, fiber) activations into (n, 3) `out`, in the units of `table`."""
+    """Tip positions: (n, bundle) activations into (n, 3) `out`, in the units of `table`."""
     work = np.zeros(WORK)
     lanes = np.zeros((table.shape[2] - 1, LANES))
     for first in range(0, gamma.shape[0], LANES):

@@ -36,7 +36,7 @@ def plot_slab(
     key: bool = True,
     box: ArrayLike | None = None,
 ) -> Axes:
-    """Draw the tips in a slab across the line of sight; which slab stands in the axes.
+    """Draw the tips in a slab across the line of sight; a note in the axes says which slab.
 
     What is not described here is as in `plot_cloud`.
 
