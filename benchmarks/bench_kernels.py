@@ -118,7 +118,7 @@ def tsit5_tips(arm, gamma):
 
 def activations(arm, n: int):
     cube = np.random.default_rng(0).random((n, arm.bundles))
-    return arm.bounds[:, 0] + cube * np.diff(arm.bounds, axis=1)[:, 0]
+    return FreeRod(arm).box.from_cube(cube)
 
 
 def twelve_bundles():

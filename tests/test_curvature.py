@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import softreach as sr
 from softreach.curvature import curvature_statistics, distal_stations, stream_statistics
@@ -110,3 +111,8 @@ def test_nothing_to_count_is_refused(cloud):
         curvature_statistics(cloud, bins=0)
     with pytest.raises(InvalidInput, match="quantiles"):
         curvature_statistics(cloud, quantiles=[1.5])
+
+
+def test_stations_may_come_in_any_order(cloud):
+    up, down = (curvature_statistics(cloud, z) for z in ([0.4, 0.9], [0.9, 0.4]))
+    xr.testing.assert_equal(up, down.isel(station=[1, 0]))

@@ -98,3 +98,10 @@ def test_what_is_no_path_is_refused(trunk, path):
 def test_two_bundles_follow_no_path_in_space(trunk):
     with pytest.raises(InvalidInput, match="bundles"):
         track_path(trunk.replace(actuators=trunk.actuators[:2]), [[0.0, 0.0, 1.0]])
+
+
+def test_a_path_says_how_it_was_made(trunk):
+    track = track_path(trunk, [[0.0, 0.0, trunk.length]], tol=1e-5, residual_over_length=1e-8)
+    assert type(trunk).from_toml(track.attrs["design"]) == trunk
+    assert (track.attrs["tol"], track.attrs["residual_over_length"]) == (1e-5, 1e-8)
+    assert track.attrs["softreach_version"]

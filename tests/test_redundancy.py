@@ -240,3 +240,10 @@ def test_a_dense_half_is_heterogeneous():
 def test_other_cells_are_refused(strewn, cell):
     with pytest.raises(InvalidInput, match="cell = "):
         tip_density(strewn, cell=cell)
+
+
+def test_answers_about_a_cloud_say_which_cloud_it_was(trunk):
+    cloud = compute_cloud(trunk, n=300, seed=4)
+    distance = activation_distance(cloud, 0.1)
+    for answer in (distance, distance_map(cloud, distance), tip_density(cloud)):
+        assert cloud.attrs.items() <= answer.attrs.items()

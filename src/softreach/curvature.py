@@ -17,6 +17,7 @@ from softreach import parallel
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud import tip_map_of
 from softreach.errors import InvalidInput
+from softreach.rod.activation_box import as_floats
 from softreach.rod.tip_map import Strains, TipMap, tip_map
 from softreach.schema import provenance
 
@@ -101,7 +102,8 @@ def stream_statistics(
         InvalidInput: As for `curvature_statistics`; also no activations at all.
     """
     rod = tip_map(arm)
-    z = _checked_stations(rod, stations)
+    asked = distal_stations(rod) if stations is None else stations
+    z = rod.check_stations(np.atleast_1d(as_floats("stations", asked)), ascending=False)
     _check_resolution(bins, quantiles)
     ranges = rod.strain_range(z)._asdict()
     tallies = {name: _Tally.between(ranges[name], bins) for name in QUANTITIES}
@@ -218,15 +220,6 @@ def _dataset(
     samples = int(tallies["bending"].count[0].sum())
     attrs = {**provenance(rod.arm), "length": rod.length, "samples": samples}
     return xr.Dataset(variables, coordinates, attrs)
-
-
-def _checked_stations(rod: TipMap, stations: ArrayLike | None) -> Array:
-    if stations is None:
-        return distal_stations(rod)
-    z = np.atleast_1d(np.asarray(stations, float))
-    if z.ndim != 1 or not z.size or not ((z >= 0) & (z <= rod.length)).all():
-        raise InvalidInput("stations", stations, f"Z within [0, {rod.length:g}] m")
-    return z
 
 
 def _check_resolution(bins: int, quantiles: Sequence[float]) -> None:

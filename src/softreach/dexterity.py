@@ -107,7 +107,7 @@ def solution_measure(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Data
         grid,
         solution_measure=(scale * total, name),
         solution_measure_error=(scale * scatter, error),
-    )
+    ).assign_attrs(cloud.attrs)
 
 
 def _tasks(slope: Array, measure: Array, condition: Array, sign: Signs) -> Iterator[partial[None]]:

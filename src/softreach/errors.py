@@ -39,7 +39,8 @@ class InvalidInput(SoftreachError, ValueError):
 
     def __init__(self, name: str, value: object, allowed: str, hint: str = "") -> None:
         self.name, self.value, self.allowed = name, value, allowed
-        message = f"{name} = {value!s}: must be {allowed}"
+        shown = " ".join(str(value).splitlines())  # an array may take several lines
+        message = f"{name} = {shown}: must be {allowed}"
         super().__init__(f"{message}; {hint}" if hint else message)
 
 
@@ -102,7 +103,7 @@ class InvalidDesign(SoftreachError, ValueError):
         self.faults = tuple(faults)
         lines = [str(fault) for fault in self.faults]
         if source:
-            count = f"{len(lines)} problem" + ("s" if len(lines) > 1 else "")
+            count = counted(len(lines), "problem")
             super().__init__("\n  ".join([f"{source}: {count}", *lines]))
         else:
             super().__init__("\n".join(lines))

@@ -14,7 +14,7 @@ from softreach.inverse.continuation import BranchEnd, BranchPoint, Continuation
 from softreach.inverse.request import checked_activations, checked_residual, checked_targets
 from softreach.rod.free_bundles import free_bundles
 from softreach.rod.tip_map import TipMap, tip_map
-from softreach.schema import AXES
+from softreach.schema import AXES, provenance
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -72,7 +72,8 @@ def track_path(
     else:
         first = _best_start(rod, tracker, points[0], residual)
     followed, end = ([], None) if first is None else _followed(tracker, first, points)
-    return _dataset(rod, points, followed, end)
+    asked = {"tol": rod.tol, "residual_over_length": residual}
+    return _dataset(rod, points, followed, end).assign_attrs(asked)
 
 
 def _best_start(
@@ -130,7 +131,7 @@ def _dataset(
         },
         {"axis": list(AXES), "bundle": list(box.names)},
         {
-            "design": rod.arm.to_toml(),
+            **provenance(rod.arm),
             "end": "" if outcome == PathStatus.FOLLOWED else outcome.name.lower(),
             "end_bundle": bundle,
             "end_bound": bound,

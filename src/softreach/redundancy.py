@@ -71,6 +71,7 @@ def activation_distance(
         ("sample",),
         name="activation_distance",
         attrs={
+            **cloud.attrs,
             "long_name": "mean activation-space distance D̄",
             "units": "1",
             "radius": float(radius),
@@ -215,7 +216,7 @@ def distance_map(
         activation_distance=(mean, name),
         activation_distance_error=(scatter, error),
         evaluated=(count, number),
-    )
+    ).assign_attrs(cloud.attrs)
 
 
 def tip_density(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Dataset:
@@ -245,7 +246,7 @@ def tip_density(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Dataset:
         grid,
         density=(count / grid.volume, name),
         density_error=(np.sqrt(count) / grid.volume, error),
-    ).assign_attrs(_unevenness(count))
+    ).assign_attrs({**cloud.attrs, **_unevenness(count)})
 
 
 def _unevenness(count: Index) -> dict[str, float]:

@@ -274,13 +274,22 @@ def test_activations_are_checked_by_every_question(make, ask, trunk):
 
 
 @pytest.mark.parametrize(
-    "stations", [[-0.1], [0.5, 0.2], [1.1], [], [[0.5]], [np.nan], 0.5, "ab", [[0.1], [0.2, 0.3]]]
+    "stations", [[-0.1], [1.1], [], [[0.5]], [np.nan], 0.5, "ab", [[0.1], [0.2, 0.3]]]
 )
 def test_stations_are_checked(make, stations, trunk):
     rod = make(trunk, 1e-6)
     for ask in (rod.frames, rod.strains):
         with pytest.raises(InvalidInput, match=r"stations"):
             ask(np.zeros((1, 3)), stations)
+
+
+def test_frames_take_stations_upwards_and_strains_in_any_order(make, trunk):
+    rod, gamma = make(trunk, 1e-6), np.array([[-0.4, -1.2, -0.3]])
+    with pytest.raises(InvalidInput, match=r"stations = .*ascending"):
+        rod.frames(gamma, [0.5, 0.2])
+    down, up = rod.strains(gamma, [0.5, 0.2]), rod.strains(gamma, [0.2, 0.5])
+    np.testing.assert_array_equal(down.curvature, up.curvature[:, ::-1])
+    np.testing.assert_array_equal(down.extension, up.extension[:, ::-1])
 
 
 @pytest.mark.parametrize("tol", [0.0, 1e-13, np.nan, np.inf, "1e-6", None])

@@ -34,7 +34,7 @@ class Tables:
 
 
 def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
-    """Z = N/K0 and U = K⁻¹M of every actuator: theory (6), which for fibers is (8) to (10).
+    """z = N/K0 and U = K⁻¹M of every actuator: theory (6), which for fibers is (8) to (10).
 
     Args:
         arm: The design.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.geometry.delaunay import delaunay
 from softreach.geometry.hull import convex_hull
 from softreach.rod.kinematics import tip_positions
+from softreach.rod.tip_map import TipMap, tip_map
 
 __all__ = ["Intermediates", "activations_of"]
 
@@ -41,6 +43,11 @@ class Intermediates(Mapping[Need, Any]):
         self.wanted = frozenset(need for metric in metrics for need in metric.needs)
         self._found: dict[Need, Any] = {}
 
+    @cached_property
+    def rod(self) -> TipMap:
+        """The tip map of the design, to the tolerance of the command."""
+        return tip_map(self.arm, self.command.tol)
+
     def __getitem__(self, need: Need) -> Any:
         if need not in self._found:
             self._found[need] = _COMPUTE[need](self)
@@ -58,14 +65,13 @@ class Intermediates(Mapping[Need, Any]):
             self._found.pop(need, None)
 
 
-def activations_of(arm: Manipulator, cube: Array) -> Array:
-    """The shared unit activations in the arm's own bounds, shape (n, bundles)."""
-    low, high = arm.bounds.T
-    return low + cube[:, : arm.bundles] * (high - low)
+def activations_of(rod: TipMap, cube: Array) -> Array:
+    """The shared unit activations in the bounds of a tip map, shape (n, bundles)."""
+    return rod.box.from_cube(cube[:, : rod.box.bundles])
 
 
 def _tips(of: Intermediates) -> Array:
-    return tip_positions(of.arm, activations_of(of.arm, of.cube), of.command.tol)
+    return tip_positions(of.rod, activations_of(of.rod, of.cube))
 
 
 def _alpha_complex(of: Intermediates) -> AlphaComplex:
@@ -82,20 +88,20 @@ def _convex_volume(of: Intermediates) -> float:
 def _reachable_set(of: Intermediates) -> Any:
     from softreach.workspace import reachable_set
 
-    return reachable_set(of.arm, accuracy=of.command.accuracy, tol=of.command.tol)
+    return reachable_set(of.rod, accuracy=of.command.accuracy)
 
 
 def _strain_statistics(of: Intermediates) -> Any:
-    arm, cube = of.arm, of.cube
-    blocks = (activations_of(arm, cube[k : k + _BLOCK]) for k in range(0, len(cube), _BLOCK))
-    stations = np.array(of.command.stations) * arm.length
-    return stream_statistics(arm, blocks, stations, quantiles=of.command.quantiles)
+    rod, cube = of.rod, of.cube
+    blocks = (activations_of(rod, cube[k : k + _BLOCK]) for k in range(0, len(cube), _BLOCK))
+    stations = np.array(of.command.stations) * rod.length
+    return stream_statistics(rod, blocks, stations, quantiles=of.command.quantiles)
 
 
 _COMPUTE: dict[Need, Callable[[Intermediates], Any]] = {
     Need.ARM: lambda of: of.arm,
     Need.LENGTH: lambda of: of.arm.length,
-    Need.ACTIVATIONS: lambda of: activations_of(of.arm, of.cube),
+    Need.ACTIVATIONS: lambda of: activations_of(of.rod, of.cube),
     Need.TIPS: _tips,
     Need.ALPHA: lambda of: of.command.alpha_over_length * of.arm.length,
     Need.ALPHA_COMPLEX: _alpha_complex,

@@ -13,7 +13,7 @@ from softreach.atlas.intermediates import activations_of
 from softreach.atlas.reading import command_of, opened_atlas
 from softreach.atlas.store import DONE, FAILED, GAP, TODO
 from softreach.errors import InvalidInput
-from softreach.rod.kinematics import tip_positions
+from softreach.rod.tip_map import tip_map
 from softreach.schema import cloud_dataset
 
 if TYPE_CHECKING:
@@ -94,11 +94,12 @@ def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
     if (status := int(row["status"])) != DONE:
         raise InvalidInput("design", at, "done", f"its status is {status}")
     arm = command.design(int(row["number"]))
-    activation = activations_of(arm, opened["unit_activation"].values)
+    rod = tip_map(arm, command.tol)
+    activation = activations_of(rod, opened["unit_activation"].values)
     if "tip" in opened:
         tip = np.ascontiguousarray(row["tip"].values.T, dtype=float)
     else:
-        tip = tip_positions(arm, activation, command.tol)
+        tip = rod.tips(activation)
     return cloud_dataset(
         arm, activation, tip, seed=command.seed, sampler=command.sampler, tol=command.tol
     )

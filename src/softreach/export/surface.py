@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,25 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arrays import Faces
 from softreach.errors import InvalidInput
 from softreach.export.formats import load_library, write_by_suffix
+from softreach.geometry.surface import SurfaceMesh
 from softreach.palette import BODY, Color
 
-__all__ = ["Part", "SurfaceMesh", "export_mesh", "write_parts"]
+__all__ = ["Part", "export_mesh", "write_parts"]
 
 _Z_UP_TO_Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
-
-
-class SurfaceMesh(Protocol):
-    """Anything with vertices and triangles: a Hull, a trimesh.Trimesh."""
-
-    @property
-    def vertices(self) -> ArrayLike:
-        """[m], shape (v, 3)."""
-        ...
-
-    @property
-    def faces(self) -> ArrayLike:
-        """Indices into the vertices, shape (f, 3)."""
-        ...
 
 
 class Part(NamedTuple):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from softreach.arrays import Faces, Points
 from softreach.geometry.delaunay import unit_scale
@@ -16,11 +16,25 @@ from softreach.kernels.nearest import distances_to_faces
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
-__all__ = ["Surface", "compact_surface", "enclosed_volume", "surface_area"]
+__all__ = ["Surface", "SurfaceMesh", "compact_surface", "enclosed_volume", "surface_area"]
 
 Array = NDArray[np.float64]
 
 _NEIGHBORS = 16  # with 4, distances to long triangles came out up to a cell too large
+
+
+class SurfaceMesh(Protocol):
+    """Anything with vertices and triangles: a `Surface`, a `Hull`, a trimesh.Trimesh."""
+
+    @property
+    def vertices(self) -> ArrayLike:
+        """Corners [m], shape (v, 3)."""
+        ...
+
+    @property
+    def faces(self) -> ArrayLike:
+        """Indices into vertices, shape (f, 3)."""
+        ...
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

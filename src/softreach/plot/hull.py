@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
+from softreach.geometry.surface import SurfaceMesh
 from softreach.palette import STEEL
 from softreach.picture.projection import View
 from softreach.picture.shading import draw_mesh
@@ -16,21 +17,7 @@ from softreach.plot.style import figure_style
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["SurfaceMesh", "plot_hull"]
-
-
-class SurfaceMesh(Protocol):
-    """Anything with vertices [m] and triangles."""
-
-    @property
-    def vertices(self) -> ArrayLike:
-        """Shape (v, 3)."""
-        ...
-
-    @property
-    def faces(self) -> ArrayLike:
-        """Shape (f, 3)."""
-        ...
+__all__ = ["plot_hull"]
 
 
 def plot_hull(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.errors import InvalidInput
+from softreach.geometry.surface import SurfaceMesh
 from softreach.palette import STEEL, activation_colors
 from softreach.picture.projection import View, project, view_axes
 from softreach.picture.shading import draw_mesh
@@ -17,7 +18,6 @@ from softreach.plot.atlas_axes import SheetAxis
 from softreach.plot.cloud import drawn_tips, point_size
 from softreach.plot.coloring import bundle_activations
 from softreach.plot.frame import view_extent
-from softreach.plot.hull import SurfaceMesh
 from softreach.plot.lengths import unit_of
 from softreach.plot.style import DPI, figure_style, pyplot
 

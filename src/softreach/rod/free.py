@@ -32,7 +32,7 @@ __all__ = ["FreeRod"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FreeRod(TipMap):
     """r' = ζ d3, dᵢ' = ζ u × dᵢ with ζ = 1 + z·γ, u = Uγ: theory (18), by sixth-order Magnus steps.
 
@@ -125,12 +125,13 @@ class FreeRod(TipMap):
 
     def strains_at(self, stations: ArrayLike) -> Callable[[ArrayLike], Strains]:
         """u = Uγ and ζ = 1 + z·γ at stations Z [m] as a function of activations: theory (7)."""
-        table = tables(self.arm, stations)
+        table = tables(self.arm, self.check_stations(stations, ascending=False))
         return lambda activations: linear_strains(table, self.box.check(activations))
 
     def strain_range(self, stations: ArrayLike) -> StrainRange:
-        """Ranges of the strains at stations Z [m] within the activation box."""
-        return strain_range(tables(self.arm, stations), self.box)
+        """What the strains at stations Z [m] can be within the activation box."""
+        z = self.check_stations(stations, ascending=False)
+        return strain_range(tables(self.arm, z), self.box)
 
     def radius(self, stations: ArrayLike) -> Array:
         """Outer radius R2 before activation at stations Z [m]."""

@@ -25,7 +25,7 @@ def free_bundles(rod: TipMap) -> TipMap:
     return FreeBundles(rod.arm, rod.tol, rod)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FreeBundles(TipMap):
     """A tip map of which some bundles are held: activations and derivatives are of the others."""
 

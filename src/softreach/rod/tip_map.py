@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import InvalidInput
+from softreach.errors import InvalidInput, counted
 from softreach.rod.activation_box import ActivationBox, as_floats
 from softreach.rod.steps import check_tol
 
@@ -211,17 +211,27 @@ class TipMap(ABC):
         """`TipStatus` of each activation, shape (n,)."""
         return np.full(len(self.box.check(activations)), TipStatus.STABLE, np.int8)
 
-    def check_stations(self, stations: ArrayLike) -> Array:
+    def check_stations(self, stations: ArrayLike, *, ascending: bool = True) -> Array:
         """The stations as a float array.
 
+        Args:
+            stations: Z [m], shape (station,).
+            ascending: Whether they must not fall.
+
         Raises:
-            InvalidInput: No ascending Z within [0, L].
+            InvalidInput: No such Z within [0, L].
         """
         z = as_floats("stations", stations)
-        inside = z.ndim == 1 and z.size > 0 and np.isfinite(z).all()
-        if not inside or z[0] < 0 or z[-1] > self.length or (np.diff(z) < 0).any():
-            raise InvalidInput("stations", stations, f"ascending Z within [0, {self.length:g}] m")
+        inside = z.ndim == 1 and z.size > 0 and ((z >= 0) & (z <= self.length)).all()
+        if not inside or (ascending and (np.diff(z) < 0).any()):
+            order = "ascending " if ascending else ""
+            raise InvalidInput("stations", stations, f"{order}Z within [0, {self.length:g}] m")
         return z
+
+    def __repr__(self) -> str:
+        bundles = counted(self.box.bundles, "bundle")
+        size = f"L = {self.length:g} m, {bundles}"
+        return f"<{type(self).__name__}: {size}, tip error up to {self.tol:g} L>"
 
 
 def position_slopes(tips: Array, twists: Array, slopes: Array) -> None:
