@@ -54,11 +54,6 @@ def test_every_sample_is_counted_once_inside_the_range_of_the_box(cloud):
         assert (found[f"{name}_count"].sum("bin") == cloud.sizes["sample"]).all()
 
 
-def test_stations_may_come_in_any_order(cloud):
-    there, back = (curvature_statistics(cloud, order) for order in ([0.2, 0.9], [0.9, 0.2]))
-    np.testing.assert_array_equal(there.bending_count[::-1], back.bending_count)
-
-
 def test_blocks_do_not_matter(cloud):
     arm, gamma = sr.cloud.design_of(cloud), cloud.activation.values
     whole, cut = stream_statistics(arm, [gamma]), stream_statistics(arm, np.array_split(gamma, 7))

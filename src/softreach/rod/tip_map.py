@@ -173,7 +173,7 @@ class TipMap(ABC):
 
     def strains(self, activations: ArrayLike, stations: ArrayLike) -> Strains:
         """Curvature and extension at ascending stations Z [m]."""
-        return self.strains_at(self.check_stations(stations))(activations)
+        return self.strains_at(stations)(activations)
 
     def tips(self, activations: ArrayLike) -> Array:
         """Tip positions [m], shape (n, 3)."""
