@@ -2,8 +2,8 @@ from . import export as export
 from . import plot as plot
 from .arm import FiberArchitecture as FiberArchitecture
 from .arm import Manipulator as Manipulator
-from .arm import designs as designs
 from .arm import describe as describe
+from .arm import designs as designs
 from .atlas import DesignSpace as DesignSpace
 from .atlas import atlas_cloud as atlas_cloud
 from .atlas import atlas_status as atlas_status
