@@ -2,7 +2,7 @@
 
 `python -m benchmarks.bench_reachable_error [designs]` prints a Markdown table. The true volume is
 that of a far finer run, plus what an independent membership finds beyond it: places within half a
-cell outside that Levenberg and Marquardt's method without bounds, in angles whose squared sines are the
+cell outside that another method, Levenberg's and Marquardt's in angles whose squared sines are the
 activations, reaches after all from many starts.
 """
 

@@ -201,8 +201,8 @@ def test_four_bundles_reach_at_least_what_three_of_them_do(redundant):
     assert redundant.multiplicity == {}
 
 
-def test_four_bundles_agree_with_a_finer_grid_within_the_error(redundant):
-    fine = solid(redundant.arm, accuracy=1e-2, grid=24, cell=redundant.grid.attrs["cell"])
+def test_four_bundles_agree_with_smaller_cells_within_the_error(redundant):
+    fine = solid(redundant.arm, accuracy=1e-2, cell=redundant.grid.attrs["cell"] / 2)
     assert abs(fine.volume - redundant.volume) < redundant.volume_error
     assert abs(fine.convex_volume - redundant.convex_volume) < redundant.convex_volume_error
     assert "count" not in fine.grid

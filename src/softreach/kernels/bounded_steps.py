@@ -18,7 +18,8 @@ __all__ = ["bounded_steps"]
 
 _ITERATIONS = 40
 _HALVINGS = 12
-_ARMIJO = 1e-4  # share of the decrease that a full step promises, asked of every step
+_STEEP = 0.5  # of the slope where a step begins: one that ends on as steep a rise is halved
+_FIRST, _RATIO = 1e-2, 0.1  # damping that Newton's method begins with, and how it falls
 _PRECISE = 1e-9  # of the residual
 
 
@@ -50,7 +51,7 @@ def bounded_steps(gamma, residual, slopes, damping, scales, low, high, trial, le
             upper[j] = max((high[j] - gamma[n, j]) / scales[j], 0.0)
         mu = damping[n] * total / 3.0 + 1e-300
         r = (residual[n, 0], residual[n, 1], residual[n, 2])
-        _least_squares(r, column, lower, upper, mu, step)
+        _least_squares(r, column, lower, upper, mu, _FIRST * total / 3.0, step)
         a, b, c = r
         for j in range(m):
             a += column[j, 0] * step[j]
@@ -62,29 +63,31 @@ def bounded_steps(gamma, residual, slopes, damping, scales, low, high, trial, le
 
 
 @inline
-def _least_squares(r, column, lower, upper, mu, step):
-    """Write the step that minimizes |r + J d|² + μ |d|² between bounds."""
-    y = r
-    value, gradient, hessian = _dual(r, y, column, lower, upper, mu, step)
+def _least_squares(r, column, lower, upper, mu, most, step):
+    """Write the step that minimizes |r + J d|² + μ |d|² between bounds, from larger μ down."""
+    y, now = r, max(mu, most)
     enough = _PRECISE * math.sqrt(dot(r, r))
-    for _ in range(_ITERATIONS):
-        if math.sqrt(dot(gradient, gradient)) <= enough:
-            break
-        direction = _solved(hessian, gradient)
-        enough_less = value - _ARMIJO * dot(direction, gradient)
-        before, t = y, 1.0
-        for _ in range(_HALVINGS):
-            y = minus(before, times(t, direction))
-            value, gradient, hessian = _dual(r, y, column, lower, upper, mu, step)
-            if value <= enough_less:
+    while True:
+        gradient, hessian = _dual(r, y, column, lower, upper, now, step)
+        for _ in range(_ITERATIONS):
+            if math.sqrt(dot(gradient, gradient)) <= enough:
                 break
-            t *= 0.5
+            direction = _solved(hessian, gradient)
+            before, fall, t = y, dot(direction, gradient), 1.0
+            for _ in range(_HALVINGS):
+                y = minus(before, times(t, direction))
+                gradient, hessian = _dual(r, y, column, lower, upper, now, step)
+                if dot(direction, gradient) >= -_STEEP * fall:
+                    break
+                t *= 0.5
+        if now <= mu:
+            break
+        now = max(mu, _RATIO * now)
 
 
 @inline
 def _dual(r, y, column, lower, upper, mu, step):
-    """The dual function at y, its gradient and Hessian; the step that belongs to y."""
-    value = 0.5 * dot(y, y) - dot(r, y)
+    """Gradient and Hessian of the dual function at y; the step that belongs to y."""
     g0, g1, g2 = y[0] - r[0], y[1] - r[1], y[2] - r[2]
     h00, h01, h02, h11, h12, h22 = 1.0, 0.0, 0.0, 1.0, 0.0, 1.0
     for j in range(column.shape[0]):
@@ -103,11 +106,10 @@ def _dual(r, y, column, lower, upper, mu, step):
             h12 += c1 * c2 / mu
             h22 += c2 * c2 / mu
         step[j] = d
-        value += pull * d - 0.5 * mu * d * d
         g0 -= c0 * d
         g1 -= c1 * d
         g2 -= c2 * d
-    return value, (g0, g1, g2), ((h00, h01, h02), (h01, h11, h12), (h02, h12, h22))
+    return (g0, g1, g2), ((h00, h01, h02), (h01, h11, h12), (h02, h12, h22))
 
 
 @inline

@@ -87,7 +87,8 @@ def line_volume(crossings: Crossings) -> LineVolume:
 
     On average over where the lattice lies the sum of lengths is the volume, so that what it errs by
     is noise. Every other line along each axis, looked at on every other center, tells how much: the
-    noise of twice the spacing, which at the spacing itself is no more than half of it.
+    noise of twice the spacing, which at the spacing itself is no more than half of it; so
+    does how far the axes are apart. Two standard deviations of both together are stated.
     """
     lattice = crossings.lattice
     axes = [runs_along(crossings, axis) for axis in range(3)]
@@ -100,7 +101,7 @@ def line_volume(crossings: Crossings) -> LineVolume:
     value = float(weights @ values)
     variances = np.mean((coarse - values[:, None]) ** 2, axis=1) / 4.0
     spread = float(weights @ (values - value) ** 2)
-    noise = 2.0 * np.sqrt(max(float(weights**2 @ variances), spread / 3.0))
+    noise = 2.0 * np.sqrt(float(weights**2 @ variances) + spread / 3.0)
     return LineVolume(value * lattice.cell**3, float(noise) * lattice.cell**3)
 
 

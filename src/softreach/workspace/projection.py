@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 _TASK = BLOCK // 16
 _MOST_STEPS = 30
-_FIRST_DAMPING, _LEAST_DAMPING, _LARGEST_DAMPING = 1e-2, 1e-6, 1e4
+_FIRST_DAMPING, _LEAST_DAMPING, _LARGEST_DAMPING = 1e-2, 1e-4, 1e4
 _BELIEVED = 0.1  # damping above which the linear map says little of what is left to gain
 _PROGRESS = 0.005  # of the tolerance or the distance: a smaller gain ends a search
 

@@ -53,7 +53,7 @@ def reachable_set(
     More free bundles: simplices would be too many, so the image is searched for in space. Centers
     of cells are reached if a search within the bounds ends on them, from tips of a cloud and from
     neighbors; where the boundary cuts the edges between reached and other centers is found to 1 %
-    of h, and lines of sight through all centers add up to the volume. h begins at √ε / 2.2 of the
+    of h, and lines of sight through all centers add up to the volume. h begins at √ε / 2.5 of the
     mean side of the bounding box, 1/16 of it at most, and shrinks until the estimated error is
     within ε. Each place that counts has an activation that reaches it; parts thinner than h, or
     that no search meets, may be missing.
