@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.progress import Progress, silent
 from softreach.rod.tip_map import TipMap
 from softreach.workspace.image import Lattice
 from softreach.workspace.projection import nearest_tips
@@ -30,8 +31,8 @@ class Flood:
     activation: a tip that comes closer starts another search.
     """
 
-    def __init__(self, rod: TipMap, lattice: Lattice) -> None:
-        self.rod, self.lattice = rod, lattice
+    def __init__(self, rod: TipMap, lattice: Lattice, progress: Progress = silent) -> None:
+        self.rod, self.lattice, self.progress = rod, lattice, progress
         size = int(np.prod(lattice.shape))
         self.gap = np.full(size, np.inf)
         """Distance from a center to the nearest tip found, in cells; 0 where reached; -1 at the
@@ -116,3 +117,4 @@ class Flood:
             closer = gap < self.gap[some]
             self.gap[some[closer]] = gap[closer]
             self.gamma[some[closer]] = found.gamma[closer]
+            self.progress(len(some))

@@ -108,9 +108,8 @@ def _smallest_cell(rod: TipMap, sides: Array, memory: float) -> float:
 def _search(
     rod: TipMap, lattice: Lattice, gamma: Array, tips: Array, progress: Progress
 ) -> Searched:
-    flood = _flooded(rod, lattice, gamma, tips)
+    flood = _flooded(Flood(rod, lattice, progress), gamma, tips)
     crossings, missed = _swept(flood)
-    progress(flood.gap.size)
     cells = ReachedCells(rod, flood.lattice, flood.reached, flood.gamma, crossings)
     if not len(crossings.edges.cell):
         convex = _convex_volume(tips, tips[::2])
@@ -125,15 +124,14 @@ def _search(
     return Searched(cells, Estimate(volume.value, error), convex)
 
 
-def _flooded(rod: TipMap, lattice: Lattice, gamma: Array, tips: Array) -> Flood:
+def _flooded(flood: Flood, gamma: Array, tips: Array) -> Flood:
     """All centers that searches find, from one cloud after the other until one finds no more."""
-    flood = Flood(rod, lattice)
     flood.add(gamma, tips)
     for number in range(1, _CLOUDS):
         while not flood.is_bounded:
             flood = _wider(flood)
         before = np.count_nonzero(flood.gap == 0.0)
-        flood.add(*_cloud(rod, number))
+        flood.add(*_cloud(flood.rod, number))
         if flood.is_bounded and np.count_nonzero(flood.gap == 0.0) == before:
             break
     return flood
@@ -149,7 +147,7 @@ def _wider(flood: Flood) -> Flood:
         lattice.cell,
         (lattice.shape[0] + 2 * room, lattice.shape[1] + 2 * room, lattice.shape[2] + 2 * room),
     )
-    wide = Flood(flood.rod, larger)
+    wide = Flood(flood.rod, larger, flood.progress)
     wide.add(flood.gamma[known], flood.centers(known))
     return wide
 
