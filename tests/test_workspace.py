@@ -168,8 +168,8 @@ def test_a_tip_map_is_asked_as_its_arm_is(trunk):
 
 def test_a_solid_prints_its_numbers_to_their_errors_and_what_it_was_made_of(folded):
     text = repr(folded)
-    assert text.startswith("ReachableSolid: volume 0.4767 ± 0.0002 m³")
-    assert "33.7 ± 0.1 % are out of reach" in text
+    assert text.startswith("ReachableSolid: volume 0.4767 ± 0.0004 m³")
+    assert "33.7 ± 0.2 % are out of reach" in text
     assert "reached more than once 0.013 ± 0.001 m³" in text
     assert "L = 1 m, 3 free bundles; activation grid of 42³ cells" in text
 
@@ -210,7 +210,7 @@ def test_four_bundles_agree_with_smaller_cells_within_the_error(redundant):
 
 
 def test_a_cloud_of_four_bundles_lies_inside_to_one_cell(redundant):
-    tips = compute_cloud(redundant.arm, n=2_000_000).tip.values
+    tips = compute_cloud(redundant.arm, n=400_000).tip.values
     outside = tips[~redundant.contains(tips)]
     assert redundant.distance(outside).max() < redundant.grid.attrs["cell"]
 
@@ -278,7 +278,7 @@ def test_progress_counts_every_vertex(trunk):
 
 def test_a_coarse_grid_is_warned_of():
     with pytest.warns(SoftreachWarning, match="grid above 4"):
-        reachable_set(designs.redundant_trunk(), grid=4)
+        reachable_set(trunk_at(75, 3), grid=4)
 
 
 @pytest.mark.parametrize(
