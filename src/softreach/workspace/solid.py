@@ -102,7 +102,7 @@ class ReachableSolid(ReachableSet):
         from scipy.ndimage import map_coordinates
 
         positions = finite_points(np.asarray(points, float))
-        # A cell's diagonal inside there is nothing to decide; one cell where each place is a search.
+        # A cell's diagonal inside nothing is to be decided; one cell where each place is a search.
         margin = np.sqrt(3.0) if isinstance(self.image, Image) else 1.0
         at = self.image.lattice.coordinates(positions)
         found = map_coordinates(self._field, at.T, order=1, cval=np.inf) < -margin
