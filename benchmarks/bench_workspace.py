@@ -7,16 +7,23 @@ work runs on a small cloud.
 from __future__ import annotations
 
 import argparse
+import math
 import time
 import warnings
 from collections.abc import Callable
+from multiprocessing import get_context
 
 import pytest
 
 import softreach as sr
+from benchmarks.memory import peak_bytes, reset_peak
 from softreach.workspace import reachable_set
 
 ALPHA = 0.03
+MANY = (
+    *(("trunk", 1e-2), ("trunk", 3e-3), ("five", 1e-2), ("five", 3e-3)),
+    *(("six", 1e-2), ("six", 3e-3), ("twelve", 5e-2), ("twelve", 1e-2)),
+)
 
 
 def cloud(arm: sr.Manipulator, n: int) -> None:
@@ -88,13 +95,63 @@ def main(n: int = 400_000, repeat: int = 5) -> None:
     for name, (wall, volume) in results.items():
         shown = f"{volume:.5f}" if volume is not None else ""
         print(f"| {name} | {shown} | {wall:.3f} | {wall / one:.1f} | 1/{whole / wall:.1f} |")
-    redundant = sr.designs.redundant_trunk()
+    print("\n| bundles | accuracy | V [L³] | wall [s] | peak memory beyond the library's [MB] |")
+    print("|--:|--:|--:|--:|--:|")
+    for name, accuracy in MANY:
+        print(many_row(name, accuracy))
+
+
+def many_row(name: str, accuracy: float) -> str:
+    """A row for one design with many bundles, in a process of its own."""
+    with get_context("spawn").Pool(1) as pool:
+        bundles, volume, error, wall, peak = pool.apply(many, (name, accuracy))
+    return (
+        f"| {bundles} | {accuracy:g} | {volume:.4f} ± {error:.4f} | {wall:.1f} | {peak / 1e6:.0f} |"
+    )
+
+
+def many(name: str, accuracy: float) -> tuple[int, float, float, float, int]:
+    """Bundles, volume and its error [m³], time [s] and memory [bytes] of one search."""
+    arm = sr.designs.redundant_trunk() if name == "trunk" else family_arm(name)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        start = time.perf_counter()
-        four = reachable_set(redundant)
+        reachable_set(arm, accuracy=0.2)  # compile or load
+        before, start = reset_peak(), time.perf_counter()
+        found = reachable_set(arm, accuracy=accuracy)
     wall = time.perf_counter() - start
-    print(f"\nRedundant trunk: {four.volume:.4f} ± {four.volume_error:.4f} L³ in {wall:.2f} s")
+    return arm.bundles, found.volume, found.volume_error, wall, peak_bytes() - before
+
+
+def family_arm(name: str) -> sr.Manipulator:
+    """Designs with five, six and twelve bundles."""
+    families, inner, poisson, high = {
+        "five": (((0, 50, 90, 3), (-90, 30, 20, 2)), 0.05, 0.5, 0.0),
+        "six": (((90, 40, 90, 3), (-90, 40, 30, 3)), 0.03, 0.4, 0.1),
+        "twelve": (
+            ((90, 25, 0, 3), (-90, 25, 20, 3), (0, 25, 40, 3), (45, 25, 60, 3)),
+            0.03,
+            0.4,
+            0.1,
+        ),
+    }[name]
+    fibers = tuple(
+        sr.FiberArchitecture(
+            revolution=math.radians(turn),
+            extent=math.radians(extent),
+            offset=math.radians(offset),
+            bundles=bundles,
+        )
+        for turn, extent, offset, bundles in families
+    )
+    return sr.Manipulator.tapered(
+        length=1.0,
+        outer_radius=0.06,
+        inner_radius=inner,
+        taper=math.radians(1),
+        poisson_ratio=poisson,
+        actuators=fibers,
+        activation_bounds=(-1.2, high),
+    )
 
 
 if __name__ == "__main__":

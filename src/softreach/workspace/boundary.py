@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from softreach.errors import MissingExtra
 from softreach.geometry.surface import Surface, compact_surface
 from softreach.workspace.image import Image
+from softreach.workspace.reached_cells import ReachedCells
 
 __all__ = ["boundary_surface", "critical_surface", "signed_field"]
 
@@ -25,7 +26,7 @@ def critical_surface(image: Image) -> Surface:
     return Surface(vertices=placed, faces=faces)
 
 
-def signed_field(image: Image) -> Array:
+def signed_field(image: Image | ReachedCells) -> Array:
     """Distance of the cell centers to the boundary in cells, negative inside, up to 2.5.
 
     Along each axis the boundary is located to rounding between two centers. A plane that cuts the
@@ -43,7 +44,7 @@ def signed_field(image: Image) -> Array:
     return np.where(image.counts[0] > 0, -distance, distance)
 
 
-def _axis_distances(image: Image, axis: int) -> Array:
+def _axis_distances(image: Image | ReachedCells, axis: int) -> Array:
     """Distance to the boundary along an axis, in cells; infinite beyond two of them."""
     distance = np.full(image.lattice.shape, np.inf)
     index, behind = image.boundary_crossings(axis)
@@ -55,7 +56,7 @@ def _axis_distances(image: Image, axis: int) -> Array:
     return distance
 
 
-def boundary_surface(image: Image, field: Array, volume: float) -> Surface:
+def boundary_surface(image: Image | ReachedCells, field: Array, volume: float) -> Surface:
     """The closed surface around a volume where the field is constant, by marching cubes.
 
     The image of a grid is a little small where it is convex: a small offset, the same everywhere,
@@ -71,7 +72,7 @@ def boundary_surface(image: Image, field: Array, volume: float) -> Surface:
     return _level_set(image, field, float(np.clip(offset, -0.5, 0.5)))
 
 
-def _level_set(image: Image, field: Array, level: float) -> Surface:
+def _level_set(image: Image | ReachedCells, field: Array, level: float) -> Surface:
     """Where the field, in cells, has a value."""
     try:
         from skimage.measure import marching_cubes

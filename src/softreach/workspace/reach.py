@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput, SoftreachWarning
-from softreach.kernels.simplices import chains
+from softreach.memory import free_memory
 from softreach.progress import Progress, silent
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.workspace import measure
 from softreach.workspace.box_grid import every_second, grid_tips
 from softreach.workspace.image import Image, Lattice, image_of
 from softreach.workspace.reachable import ReachableSet
+from softreach.workspace.redundant import searched_set, smallest_memory
 from softreach.workspace.solid import ReachableSolid
 from softreach.workspace.thin import thin_set
 
@@ -25,7 +26,7 @@ __all__ = ["reachable_set"]
 
 Array = NDArray[np.float64]
 
-_MOST_TRIANGLES = 4e7  # triangles of the activation grid
+_MOST_VERTICES = 3.3e6  # of the activation grid
 _MOST_CELLS = 2.0**26
 
 
@@ -36,29 +37,38 @@ def reachable_set(
     cell: float | None = None,
     grid: int | None = None,
     tol: float = 1e-6,
+    memory: float | None = None,
     progress: Progress | None = None,
 ) -> ReachableSet:
     """Everything that the tip can reach: the image of the activation box, without a point cloud.
 
-    The box is cut into n^m cells and these into simplices (Freudenthal), whose corners are mapped;
-    in between the map is taken as linear. For m = 3 these are tetrahedra. For m > 3 a mapped
-    simplex is the union of the tetrahedra on its corners (Carathéodory), and all three-dimensional
-    faces of the triangulation are used. The result is rasterized on cells of edge h.
+    Three free bundles: the box is cut into n³ cells and these into tetrahedra (Freudenthal), whose
+    corners are mapped; in between the map is taken as linear, and the image is rasterized on cells
+    of edge h. The resolutions follow from the accuracy ε: n = √(5/ε), even; h = √(ε/30) times the
+    cube root of the volume of the bounding box. The volume itself is then far more accurate than
+    asked. Where the map folds, what lies behind the fold is reached more than once: n is doubled
+    until the volume of that changes by less than ε as well. A fold thinner than a cell of the grid
+    may be missed.
 
-    The resolutions follow from the accuracy ε: n = √(5/ε) for m = 3 and √(2.2/ε) for m > 3, even,
-    and limited for m > 4 by the number of simplices; h = √(ε/30) times the cube root of the volume
-    of the bounding box. For m = 3 the volume itself is then far more accurate than asked. Where the
-    map folds, what lies behind the fold is reached more than once: n is doubled until the volume of
-    that changes by less than ε as well. A fold thinner than a cell of the grid may be missed.
+    More free bundles: simplices would be too many, so the image is searched for in space. Centers
+    of cells are reached if a search within the bounds ends on them, from tips of a cloud and from
+    neighbors; where the boundary cuts the edges between reached and other centers is found to 1 %
+    of h, and lines of sight through all centers add up to the volume. h begins at √ε / 2.5 of the
+    mean side of the bounding box, 1/16 of it at most, and shrinks until the estimated error is
+    within ε. Each place that counts has an activation that reaches it; parts thinner than h, or
+    that no search meets, may be missing.
 
     Args:
         arm: The design, or its tip map. Bundles with equal bounds are held there and add no
             dimension.
         accuracy: Relative error ε allowed in the volume.
         cell: Edge h of a cell [m], instead of the rule's.
-        grid: Cells n along each axis of the activation box, even, instead of the rule's.
+        grid: Cells n along each axis of the activation box, even, instead of the rule's; for three
+            free bundles.
         tol: Largest tip error, in L.
-        progress: Called with the number of grid vertices done since its last call.
+        memory: What more than three free bundles may use [bytes]; by default a quarter of what is
+            free. Cells do not become smaller than it allows.
+        progress: Called with the number of grid vertices or cells done since its last call.
 
     Returns:
         `ReachableSolid`, `ReachableSurface`, `ReachableCurve` or `ReachablePoint`, for three free
@@ -76,24 +86,62 @@ def reachable_set(
     m = rod.box.dimension
     if m < 3:
         return thin_set(rod)
-    cells = _checked_grid(grid) if grid is not None else _grid_for(m, accuracy)
-    found = _solid(rod, cells, cell, accuracy, progress or silent)
-    while grid is None and not _settled(found, accuracy) and _fits(m, 2 * found.cells):
-        found = _solid(rod, 2 * found.cells, cell, accuracy, progress or silent)
+    if m == 3:
+        found = _of_three(rod, accuracy, cell, grid, progress or silent)
+        finer = f"a grid above {found.cells} and a smaller cell"
+    else:
+        found = _of_many(rod, accuracy, cell, grid, memory, progress or silent)
+        finer = "a smaller cell" if cell is not None else "more memory"
     if found.volume_error > accuracy * found.volume:
-        warnings.warn(_inaccurate(found, accuracy), SoftreachWarning, stacklevel=2)
+        warnings.warn(_inaccurate(found, accuracy, finer), SoftreachWarning, stacklevel=2)
     return found
+
+
+def _of_three(
+    rod: TipMap, accuracy: float, cell: float | None, grid: int | None, progress: Progress
+) -> ReachableSolid:
+    cells = _checked_grid(grid) if grid is not None else _grid_for(accuracy)
+    found = _solid(rod, cells, cell, accuracy, progress)
+    while grid is None and not _settled(found, accuracy) and _fits(2 * found.cells):
+        found = _solid(rod, 2 * found.cells, cell, accuracy, progress)
+    return found
+
+
+def _of_many(
+    rod: TipMap,
+    accuracy: float,
+    cell: float | None,
+    grid: int | None,
+    memory: float | None,
+    progress: Progress,
+) -> ReachableSolid:
+    if grid is not None:
+        raise InvalidInput("grid", grid, "for three free bundles only", "pass `cell` instead")
+    memory = max(free_memory() / 4.0, smallest_memory(rod)) if memory is None else memory
+    if not smallest_memory(rod) <= memory < np.inf:
+        raise InvalidInput("memory", memory, f"at least {smallest_memory(rod):.3g} bytes")
+    found = searched_set(rod, accuracy, cell, memory, progress)
+    return ReachableSolid(
+        tip_map=rod,
+        cells=0,
+        volume=found.volume.value,
+        volume_error=found.volume.error,
+        convex_volume=found.convex_volume.value,
+        convex_volume_error=found.convex_volume.error,
+        image=found.cells,
+        **_NO_OVERLAPS._asdict(),
+    )
 
 
 def _solid(
     rod: TipMap, cells: int, cell: float | None, accuracy: float, progress: Progress
 ) -> ReachableSolid:
-    m, tips = rod.box.dimension, grid_tips(rod, cells)
+    tips = grid_tips(rod, cells)
     lattice = _lattice(tips, cell, accuracy)
-    fine = image_of(tips, (cells,) * m, lattice, progress)
-    coarse = image_of(every_second(tips, cells, m), (cells // 2,) * m, lattice)
+    fine = image_of(tips, (cells,) * 3, lattice, progress)
+    coarse = image_of(every_second(tips, cells, 3), (cells // 2,) * 3, lattice)
     volume = measure.solid_volume(rod, fine, coarse)
-    overlaps = _overlaps(volume.value, fine, coarse) if m == 3 else _NO_OVERLAPS
+    overlaps = _overlaps(volume.value, fine, coarse)
     convex = measure.convex_volume(fine, coarse)
     return ReachableSolid(
         tip_map=rod,
@@ -135,15 +183,14 @@ def _settled(found: ReachableSolid, accuracy: float) -> bool:
     return max(errors) <= accuracy * found.volume
 
 
-def _fits(m: int, cells: int) -> bool:
-    return (cells + 1) ** m * len(chains(m, 2)) <= _MOST_TRIANGLES
+def _fits(cells: int) -> bool:
+    return (cells + 1) ** 3 <= _MOST_VERTICES
 
 
-def _grid_for(m: int, accuracy: float) -> int:
+def _grid_for(accuracy: float) -> int:
     """The rule for n: even, within what memory and patience hold."""
-    wanted = np.sqrt((5.0 if m == 3 else 2.2) / accuracy)
-    most = (_MOST_TRIANGLES / len(chains(m, 2))) ** (1 / m) - 1
-    return max(2, 2 * int(np.ceil(min(wanted, most) / 2)))
+    most = np.cbrt(_MOST_VERTICES) - 1.0
+    return max(2, 2 * int(np.ceil(min(np.sqrt(5.0 / accuracy), most) / 2)))
 
 
 def _checked_grid(grid: int) -> int:
@@ -166,8 +213,8 @@ def _lattice(tips: Array, cell: float | None, accuracy: float) -> Lattice:
     return Lattice.around(tips, float(max(wanted, sides.max() / 1024.0)))
 
 
-def _inaccurate(found: ReachableSolid, accuracy: float) -> str:
+def _inaccurate(found: ReachableSolid, accuracy: float, finer: str) -> str:
     return (
         f"volume {found.volume:.5g} m³ may be off by {found.volume_error:.2g} m³, more than "
-        f"{accuracy:g} of it; pass a grid above {found.cells} and a smaller cell"
+        f"{accuracy:g} of it; pass {finer}"
     )

@@ -44,7 +44,7 @@ class ReachableSet(ABC):
     tip_map: TipMap
     """The map whose image this is, with its arm, activation box and tolerance."""
     cells: int
-    """Cells of the activation grid along each axis."""
+    """Cells of the activation grid along each axis; 0 where there is none."""
     volume: float
     """Volume [m³]; places count once however often they are reached. 0 for all but solids."""
     volume_error: float
@@ -91,7 +91,8 @@ class ReachableSet(ABC):
             name: ((), number.value, {"units": number.units, "long_name": number.long_name})
             for name, number in self._numbers().items()
         }
-        attrs = {**provenance(self.arm), "tol": self.tip_map.tol, "activation_grid": self.cells}
+        attrs = {**provenance(self.arm), "tol": self.tip_map.tol}
+        attrs |= {"activation_grid": self.cells} if self.cells else {}
         return xr.Dataset(variables, attrs=attrs | {"dimension": self.dimension})
 
     def __repr__(self) -> str:
@@ -124,5 +125,5 @@ class ReachableSet(ABC):
         box, rod = self.tip_map.box, self.tip_map
         free = f"{box.dimension} free bundle" + ("s" if box.dimension != 1 else "")
         power = str(box.dimension).translate(_POWERS) if box.dimension > 1 else ""
-        grid = f"activation grid of {self.cells}{power} cells, " if box.dimension else ""
+        grid = f"activation grid of {self.cells}{power} cells, " if self.cells else ""
         return f"L = {rod.length:g} m, {free}; {grid}tip error up to {rod.tol:g} L"

@@ -19,6 +19,7 @@ from softreach.schema import provenance
 from softreach.workspace.boundary import boundary_surface, critical_surface, signed_field
 from softreach.workspace.image import Image
 from softreach.workspace.reachable import Number, ReachableSet
+from softreach.workspace.reached_cells import ReachedCells
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,8 +57,9 @@ class ReachableSolid(ReachableSet):
     NaN for more than three free bundles."""
     fold_volume_error: float
     """By how much `fold_volume` changed from half as fine a grid [m³]."""
-    image: Image = field(repr=False)
-    """The mapped activation grid, rasterized."""
+    image: Image | ReachedCells = field(repr=False)
+    """The mapped activation grid, rasterized; for more than three free bundles what was found by
+    search."""
 
     @cached_property
     def grid(self) -> xr.Dataset:
@@ -88,7 +90,8 @@ class ReachableSolid(ReachableSet):
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Whether points are reachable: whether a mapped simplex of the grid covers them.
 
-        Exactly so for three free bundles; for more, points a small part of a cell outside may pass.
+        For more than three free bundles, whether a search within the bounds ends on them, to a
+        thousandth of a cell.
 
         Args:
             points: Positions [m], shape (n, 3).
@@ -99,9 +102,8 @@ class ReachableSolid(ReachableSet):
         from scipy.ndimage import map_coordinates
 
         positions = finite_points(np.asarray(points, float))
-        # More than a cell's diagonal inside there is nothing to decide. With more bundles very many
-        # triangles are critical: there the interpolated field decides wherever it says inside.
-        margin = np.sqrt(3.0) if self.multiplicity else 0.0
+        # A cell's diagonal inside nothing is to be decided; one cell where each place is a search.
+        margin = np.sqrt(3.0) if isinstance(self.image, Image) else 1.0
         at = self.image.lattice.coordinates(positions)
         found = map_coordinates(self._field, at.T, order=1, cval=np.inf) < -margin
         found[~found] = self.image.counts_at(positions[~found]) > 0
@@ -110,7 +112,8 @@ class ReachableSolid(ReachableSet):
     def distance(self, points: ArrayLike) -> Array:
         """Distance to the boundary [m], negative inside.
 
-        Outside it is the distance to the image of the grid itself. Inside it is the distance to
+        Outside it is the distance to the image of the grid itself, or for more than three free
+        bundles to the nearest tip that a search finds. Inside it is the distance to
         `surface()`, in which parts and gaps thinner than a cell are lost.
 
         Args:
@@ -124,7 +127,8 @@ class ReachableSolid(ReachableSet):
         inside = self.contains(positions)
         out = np.empty(len(positions))
         out[inside] = -self._boundary.distance(positions[inside])
-        out[~inside] = self._critical.distance(positions[~inside])
+        outside = self.image if isinstance(self.image, ReachedCells) else self._critical
+        out[~inside] = outside.distance(positions[~inside])
         return out
 
     def _repr_html_(self) -> str:
@@ -158,6 +162,7 @@ class ReachableSolid(ReachableSet):
 
     @cached_property
     def _critical(self) -> Surface:
+        assert isinstance(self.image, Image)
         return critical_surface(self.image)
 
     def _lines(self) -> list[str]:

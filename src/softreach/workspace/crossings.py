@@ -1,0 +1,156 @@
+"""Where the boundary cuts the edges between cell centers, by search from both sides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.rod.tip_map import TipMap
+from softreach.workspace.flood import ENOUGH, Flood
+from softreach.workspace.image import Lattice
+from softreach.workspace.projection import nearest_tips
+
+__all__ = ["Crossings", "Edges", "boundary_edges"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_PROBE = 0.01  # cells: how closely crossings are enclosed
+_ROUNDS = 24
+_STEEP = 0.02  # cosine below which the tangent plane does not tell where it is cut
+
+
+class Edges(NamedTuple):
+    """Pairs of neighboring centers of which one is reached."""
+
+    cell: Ints
+    """The center that is reached, as a flat index, shape (n,)."""
+    axis: Ints
+    """Along which axis the other lies, shape (n,)."""
+    sense: Ints
+    """On which side, 1 or -1, shape (n,)."""
+
+
+def boundary_edges(reached: NDArray[np.bool_]) -> Edges:
+    """All edges of a lattice that the boundary cuts."""
+    flat, parts = np.arange(reached.size).reshape(reached.shape), []
+    for axis in range(3):
+        before, after = np.moveaxis(reached, axis, 0)[:-1], np.moveaxis(reached, axis, 0)[1:]
+        cells = np.moveaxis(flat, axis, 0)
+        for sense, here, cell in (
+            (1, before & ~after, cells[:-1]),
+            (-1, after & ~before, cells[1:]),
+        ):
+            found = cell[here]
+            parts.append((found, np.full(len(found), axis), np.full(len(found), sense)))
+    return Edges(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+
+@dataclass
+class Crossings:
+    """How far from the reached center the boundary cuts each edge, enclosed ever closer.
+
+    Places up to `low` are reached, as `gamma` proves at `low`; none was found at `high`, where the
+    plane through the nearest tip, `beyond`, says at which place between them the boundary is cut.
+    """
+
+    rod: TipMap
+    lattice: Lattice
+    edges: Edges
+    low: Array
+    """In cells from the reached center, shape (n,)."""
+    high: Array
+    gamma: Array
+    """Activations that reach `low`, shape (n, bundles)."""
+    beyond: Array
+    """Activations whose tips are nearest to `high`, shape (n, bundles)."""
+    place: Array
+    """Where the plane through the nearest tip is cut, between `low` and `high`, shape (n,)."""
+
+    @classmethod
+    def of(cls, flood: Flood) -> Crossings:
+        """The crossings of all edges at the boundary of what was reached."""
+        edges = boundary_edges(flood.reached)
+        n = len(edges.cell)
+        outside = edges.cell + edges.sense * flood.steps[edges.axis]
+        found = cls(
+            rod=flood.rod,
+            lattice=flood.lattice,
+            edges=edges,
+            low=np.zeros(n),
+            high=np.ones(n),
+            gamma=flood.gamma[edges.cell],
+            beyond=flood.gamma[outside],
+            place=np.zeros(n),
+        )
+        found._cut(np.arange(n))
+        found.enclose(np.arange(n))
+        return found
+
+    def points(self, which: Ints, t: Array) -> Array:
+        """Places on edges, t cells from the reached center [m], shape (n, 3)."""
+        lattice, edges = self.lattice, self.edges
+        index = np.stack(np.unravel_index(edges.cell[which], lattice.shape), axis=-1).astype(float)
+        index[np.arange(len(which)), edges.axis[which]] += edges.sense[which] * t
+        return lattice.origin + lattice.cell * index
+
+    def enclose(self, which: Ints) -> None:
+        """Bring `low` and `high` together on some of the edges."""
+        guess = np.ones(len(which), bool)  # whether to trust the tangent plane
+        for _ in range(_ROUNDS):
+            wide = self.high[which] - self.low[which] > 1.5 * _PROBE
+            which, guess = which[wide], guess[wide]
+            if not len(which):
+                return
+            low, high, place = self.low[which], self.high[which], self.place[which]
+            probe = np.minimum(low + _PROBE, 0.5 * (low + high))
+            tangent = np.clip(place, low + 0.5 * _PROBE, high - 0.1 * _PROBE)
+            t = np.where(guess, np.where(place > low + 0.5 * _PROBE, tangent, probe), probe)
+            probed = t == probe
+            start = np.where(probed[:, None], self.gamma[which], self.beyond[which])
+            reached = self._try(which, t, start)
+            # A probe that is reached: the plane lied, and halving follows.
+            lied = reached & probed
+            self.place[which[lied]] = 0.5 * (self.low[which[lied]] + self.high[which[lied]])
+            guess = ~reached | lied
+
+    def _try(self, which: Ints, t: Array, start: Array) -> NDArray[np.bool_]:
+        """Search for places on edges; whether they are reached."""
+        cell = self.lattice.cell
+        found = nearest_tips(self.rod, start, self.points(which, t), ENOUGH * cell)
+        reached = found.distance <= ENOUGH * cell
+        yes, no = which[reached], which[~reached]
+        self.low[yes], self.gamma[yes] = t[reached], found.gamma[reached]
+        self.high[no], self.beyond[no] = t[~reached], found.gamma[~reached]
+        self._cut(no, found.tips[~reached])
+        return reached
+
+    def _cut(self, which: Ints, tips: Array | None = None) -> None:
+        """Where planes through the tips nearest to `high`, square to the way, cut the edges."""
+        if tips is None:
+            tips = self.rod.tips(self.beyond[which])
+        away = (self.points(which, self.high[which]) - tips) / self.lattice.cell
+        distance = np.linalg.norm(away, axis=1).clip(1e-12)
+        edges = self.edges
+        along = away[np.arange(len(which)), edges.axis[which]] * edges.sense[which] / distance
+        low, high = self.low[which], self.high[which]
+        back = np.where(along > _STEEP, distance / along.clip(_STEEP), 0.5 * (high - low))
+        self.place[which] = np.clip(high - back, low, high)
+
+    def advance(self, which: Ints, start: Array, by: float) -> Array:
+        """Search beyond crossings from other activations; by how many cells each moved outward."""
+        before = self.place[which].copy()
+        target = np.minimum(before + by, 1.0)
+        cell = self.lattice.cell
+        found = nearest_tips(self.rod, start, self.points(which, target), ENOUGH * cell)
+        reached = found.distance <= ENOUGH * cell
+        yes = which[reached]
+        self.low[yes], self.gamma[yes] = target[reached], found.gamma[reached]
+        self.high[yes] = np.maximum(self.high[yes], 1.0)
+        self.beyond[yes] = found.gamma[reached]
+        self.place[yes] = 0.5 * (self.low[yes] + 1.0)
+        self.enclose(yes)
+        return self.place[which] - before

@@ -1,0 +1,120 @@
+"""Which cell centers are within reach, each with an activation that proves it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.progress import Progress, silent
+from softreach.rod.tip_map import TipMap
+from softreach.workspace.image import Lattice
+from softreach.workspace.projection import nearest_tips
+
+__all__ = ["ENOUGH", "Flood"]
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+ENOUGH = 1e-3
+"""Distance at which a place counts as reached, in cells."""
+_CHUNK = 1 << 16  # places searched for at a time
+_CORNERS = np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+class Flood:
+    """Cell centers that are reached, grown from tips of a cloud to their neighbors.
+
+    A center is reached if a search that starts at a neighbor's activation, or at that of a tip
+    nearby, ends on it. Centers that are not have the distance to the nearest tip found, and its
+    activation: a tip that comes closer starts another search.
+    """
+
+    def __init__(self, rod: TipMap, lattice: Lattice, progress: Progress = silent) -> None:
+        self.rod, self.lattice, self.progress = rod, lattice, progress
+        size = int(np.prod(lattice.shape))
+        self.gap = np.full(size, np.inf)
+        """Distance from a center to the nearest tip found, in cells; 0 where reached; -1 at the
+        sides of the lattice, where nothing is searched."""
+        self.gamma = np.zeros((size, rod.box.bundles))
+        """Its activation, meaningless where `gap` is infinite."""
+        _, ny, nz = lattice.shape
+        sides = np.ones(lattice.shape, bool)
+        sides[1:-1, 1:-1, 1:-1] = False
+        self.gap[sides.ravel()] = -1.0
+        self.steps = np.array([ny * nz, nz, 1])
+
+    @property
+    def reached(self) -> NDArray[np.bool_]:
+        """Of the lattice's shape."""
+        return (self.gap == 0.0).reshape(self.lattice.shape)
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether all that is reached ends within the lattice."""
+        inside = self.reached[2:-2, 2:-2, 2:-2]
+        return int(np.count_nonzero(inside)) == int(np.count_nonzero(self.gap == 0.0))
+
+    def centers(self, cells: Ints) -> Array:
+        """Places [m] of cells given by flat index, shape (n, 3)."""
+        index = np.stack(np.unravel_index(cells, self.lattice.shape), axis=-1)
+        return self.lattice.origin + self.lattice.cell * index
+
+    def add(self, gamma: Array, tips: Array) -> None:
+        """Search around tips that come closer to a center than all before."""
+        cells, starts = self._improved(gamma, tips)
+        self._search(cells, starts)
+        self.grow(cells[self.gap[cells] == 0.0])
+
+    def _improved(self, gamma: Array, tips: Array) -> tuple[Ints, Array]:
+        """Centers around tips that one of them is clearly closer to than `gap`, and which."""
+        at = self.lattice.coordinates(tips)
+        within = ((at >= 0) & (at < np.array(self.lattice.shape) - 1)).all(axis=1)
+        at, gamma = at[within], gamma[within]
+        base = np.floor(at).astype(np.int64)
+        found: list[tuple[Ints, Array, Ints]] = []
+        for corner in _CORNERS:
+            cells = (base + corner) @ self.steps
+            away = np.linalg.norm(at - base - corner, axis=1)
+            near = np.flatnonzero(away < self.gap[cells] - 0.02)
+            found.append((cells[near], away[near], near))
+        cells, away, row = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        order = np.lexsort((away, cells))
+        cells, first = np.unique(cells[order], return_index=True)
+        return cells, gamma[row[order[first]]]
+
+    def grow(self, cells: Ints) -> None:
+        """Search the neighbors of reached cells from there, and theirs, until none is new."""
+        while len(cells):
+            fresh = []
+            for neighbors, sources in self._frontier(cells):
+                known = self.gap[neighbors] > 0
+                neighbors, sources = neighbors[known], sources[known]
+                self._search(neighbors, self.gamma[sources])
+                fresh.append(neighbors[self.gap[neighbors] == 0.0])
+            cells = np.unique(np.concatenate(fresh)) if fresh else cells[:0]
+
+    def _frontier(self, cells: Ints) -> Iterator[tuple[Ints, Ints]]:
+        """Neighbors of cells that are not reached, and the cell each is a neighbor of."""
+        for step in (*self.steps, *-self.steps):
+            neighbors = cells + step
+            open_ = np.flatnonzero(self.gap[neighbors] > 0)
+            for first in range(0, len(open_), _CHUNK):
+                part = open_[first : first + _CHUNK]
+                yield neighbors[part], cells[part]
+
+    def _search(self, cells: Ints, starts: Array) -> None:
+        """Search for centers, and keep what comes closer."""
+        cell = self.lattice.cell
+        for first in range(0, len(cells), _CHUNK):
+            some = cells[first : first + _CHUNK]
+            found = nearest_tips(
+                self.rod, starts[first : first + _CHUNK], self.centers(some), ENOUGH * cell
+            )
+            gap = found.distance / cell
+            gap[gap <= ENOUGH] = 0.0
+            closer = gap < self.gap[some]
+            self.gap[some[closer]] = gap[closer]
+            self.gamma[some[closer]] = found.gamma[closer]
+            self.progress(len(some))

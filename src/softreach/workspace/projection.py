@@ -1,0 +1,87 @@
+"""From targets in space to the nearest tips within reach, by descent from given activations."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach import parallel
+from softreach.kernels.bounded_steps import bounded_steps
+from softreach.rod.tip_map import BLOCK, TipMap
+
+__all__ = ["Nearest", "nearest_tips"]
+
+Array = NDArray[np.float64]
+
+_TASK = BLOCK // 16
+_MOST_STEPS = 30
+_FIRST_DAMPING, _LEAST_DAMPING, _LARGEST_DAMPING = 1e-2, 1e-4, 1e4
+_BELIEVED = 0.1  # damping above which the linear map says little of what is left to gain
+_PROGRESS = 0.005  # of the tolerance or the distance: a smaller gain ends a search
+
+
+class Nearest(NamedTuple):
+    """Where searches ended: local minima of the distance, one for each target."""
+
+    gamma: Array
+    """Activations within the bounds, shape (n, bundles)."""
+    tips: Array
+    """Their tips [m], shape (n, 3)."""
+    distance: Array
+    """From tip to target [m], shape (n,)."""
+
+
+def nearest_tips(rod: TipMap, start: Array, targets: Array, enough: float) -> Nearest:
+    """The activations whose tips come closest to targets, as far as a descent from `start` finds.
+
+    Args:
+        rod: The tip map.
+        start: Where to begin, within the bounds, shape (n, bundles).
+        targets: Places [m], shape (n, 3).
+        enough: Distance at which a target counts as reached [m].
+    """
+    gamma = np.ascontiguousarray(start)
+    found = Nearest(gamma.copy(), np.empty_like(targets), np.empty(len(targets)))
+
+    def task(block: slice) -> None:
+        parts = (found.gamma[block], found.tips[block], found.distance[block])
+        _descend(rod, targets[block], enough, Nearest(*parts))
+
+    parallel.run(partial(task, block) for block in parallel.blocks(len(targets), _TASK))
+    return found
+
+
+def _descend(rod: TipMap, targets: Array, enough: float, found: Nearest) -> None:
+    """Damped Gauss and Newton steps that stay within the bounds; on the calling thread."""
+    low, high, scales = rod.box.low.copy(), rod.box.high.copy(), rod.box.scales.copy()
+    active, damping = np.arange(len(targets)), np.full(len(targets), _FIRST_DAMPING)
+    slopes = np.empty((len(targets), 3, rod.box.bundles))
+    rod.fill_slopes(found.gamma, found.tips, slopes)
+    found.distance[:] = np.linalg.norm(found.tips - targets, axis=1)
+    for _ in range(_MOST_STEPS):
+        active = active[found.distance[active] > enough]
+        if not len(active):
+            return
+        gamma, now = found.gamma[active], found.distance[active]
+        trial, left = np.empty_like(gamma), np.empty(len(active))
+        residual = found.tips[active] - targets[active]
+        bounded_steps(
+            gamma, residual, slopes[active], damping[active], scales, low, high, trial, left
+        )
+        tips, ahead = np.empty((len(active), 3)), np.empty((len(active), 3, rod.box.bundles))
+        rod.fill_slopes(trial, tips, ahead)
+        distance = np.linalg.norm(tips - targets[active], axis=1)
+        better = distance < now
+        taken = active[better]
+        found.gamma[taken], found.tips[taken] = trial[better], tips[better]
+        found.distance[taken], slopes[taken] = distance[better], ahead[better]
+        good = now - distance > 0.25 * (now - left)
+        believed = damping[active] <= _BELIEVED
+        factor = np.where(good, 0.1, np.where(better, 1.0, 10.0))
+        damping[active] = np.maximum(damping[active] * factor, _LEAST_DAMPING)
+        # What the linear map promises bounds what is left to gain, once it is to be believed.
+        small = (now - left <= _PROGRESS * np.minimum(enough, now)) & believed
+        active = active[~small & (damping[active] < _LARGEST_DAMPING)]

@@ -1,0 +1,213 @@
+"""What four free bundles or more let the tip reach, by search instead of by simplices.
+
+The box of m activations has m! simplices to a cell of its grid, its image has one boundary. So the
+image is found in space: which centers of a lattice are reached, and where the boundary cuts the
+edges between those that are and those that are not. Each place that counts as reached has an
+activation that proves it; what searches miss is missing from the volume.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.errors import InvalidInput
+from softreach.geometry.hull import convex_hull
+from softreach.progress import Progress
+from softreach.rod.tip_map import TipMap
+from softreach.workspace.crossings import Crossings
+from softreach.workspace.flood import ENOUGH, Flood
+from softreach.workspace.image import Lattice
+from softreach.workspace.lines import line_volume
+from softreach.workspace.measure import Estimate
+from softreach.workspace.reached_cells import ReachedCells
+
+__all__ = ["Searched", "searched_set", "smallest_memory"]
+
+Array = NDArray[np.float64]
+
+_CLOUD = 1 << 16  # tips in a cloud that searches start from
+_CLOUDS = 8  # at most
+_RULE = 2.5  # cells along the mean side of the bounding box, times the root of the accuracy
+_FEWEST = 16.0
+_FINER = 1.5
+_SHIFT = (0.31, 0.17, 0.43)  # of a cell: lines on a plane of symmetry would all err alike
+_SWEEPS = 3
+_BEYOND = 0.05  # cells by which a sweep looks beyond a crossing
+_MOST_CELLS = 2.0**26
+
+
+class Searched(NamedTuple):
+    """A reachable set found by search."""
+
+    cells: ReachedCells
+    volume: Estimate
+    convex_volume: Estimate
+
+
+def searched_set(
+    rod: TipMap, accuracy: float, cell: float | None, memory: float, progress: Progress
+) -> Searched:
+    """The image of a box of four free bundles or more.
+
+    Args:
+        rod: The tip map.
+        accuracy: Relative error asked of the volume: cells become smaller until it is met, or
+            `memory` is used.
+        cell: Edge of a cell [m], instead of the rule's.
+        memory: What the search may use [bytes].
+        progress: Called with the number of centers searched since its last call.
+    """
+    gamma, tips = _cloud(rod, 0)
+    sides = np.ptp(tips, axis=0)
+    smallest = _smallest_cell(rod, sides, memory)
+    if cell is not None:
+        if not smallest <= cell < np.inf:  # NaN too
+            raise InvalidInput("cell", cell, f"at least {smallest:.3g} m for {memory:.2g} bytes")
+        return _search(rod, _lattice(tips, cell), gamma, tips, progress)
+    wanted = min(np.sqrt(accuracy) / _RULE, 1.0 / _FEWEST) * np.cbrt(np.prod(sides))
+    edge = float(max(wanted, smallest, sides.max() / 1024.0))
+    found = _search(rod, _lattice(tips, edge), gamma, tips, progress)
+    while found.volume.error > accuracy * found.volume.value and edge / _FINER >= smallest:
+        edge /= _FINER
+        found = _search(rod, _lattice(tips, edge), gamma, tips, progress)
+    return found
+
+
+def _lattice(tips: Array, cell: float) -> Lattice:
+    """A lattice around tips that shares no plane of symmetry with them."""
+    lattice = Lattice.around(tips, cell)
+    return lattice._replace(origin=lattice.origin + cell * np.array(_SHIFT))
+
+
+def smallest_memory(rod: TipMap) -> float:
+    """What a search cannot do without [bytes]."""
+    return _fixed(rod) + 2e4 * _per_cell(rod)
+
+
+def _fixed(rod: TipMap) -> float:
+    return 16.0 * 8.0 * _CLOUD * (rod.box.bundles + 3)
+
+
+def _per_cell(rod: TipMap) -> float:
+    """Bytes of a center: its gap and activation, masks, and its part of the edges."""
+    return 16.0 * rod.box.bundles + 120.0
+
+
+def _smallest_cell(rod: TipMap, sides: Array, memory: float) -> float:
+    most = min((memory - _fixed(rod)) / _per_cell(rod), _MOST_CELLS)
+    low, high = 0.0, 1.0 + float(sides.max())
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if np.prod(sides / middle + 8.0) <= most else (middle, high)
+    return high
+
+
+def _search(
+    rod: TipMap, lattice: Lattice, gamma: Array, tips: Array, progress: Progress
+) -> Searched:
+    flood = _flooded(Flood(rod, lattice, progress), gamma, tips)
+    crossings, missed = _swept(flood)
+    cells = ReachedCells(rod, flood.lattice, flood.reached, flood.gamma, crossings)
+    if not len(crossings.edges.cell):
+        convex = _convex_volume(tips, tips[::2])
+        return Searched(cells, Estimate(0.0, convex.value + convex.error), convex)
+    volume = line_volume(crossings)
+    edge = flood.lattice.cell
+    area = len(crossings.edges.cell) * edge**2 / 1.5  # a plane cuts 1.5 edges to a square of a cell
+    slack = area * (ENOUGH * edge + rod.tol * rod.length)
+    convex = _hull(crossings, tips)
+    noise = volume.noise if np.isfinite(volume.noise) else convex.value + convex.error
+    error = noise + missed + slack
+    return Searched(cells, Estimate(volume.value, error), convex)
+
+
+def _flooded(flood: Flood, gamma: Array, tips: Array) -> Flood:
+    """All centers that searches find, from one cloud after the other until one finds no more."""
+    flood.add(gamma, tips)
+    for number in range(1, _CLOUDS):
+        while not flood.is_bounded:
+            flood = _wider(flood)
+        before = np.count_nonzero(flood.gap == 0.0)
+        flood.add(*_cloud(flood.rod, number))
+        if flood.is_bounded and np.count_nonzero(flood.gap == 0.0) == before:
+            break
+    return flood
+
+
+def _wider(flood: Flood) -> Flood:
+    """The same on a lattice with room around what is reached."""
+    lattice = flood.lattice
+    known = np.flatnonzero(flood.gap == 0.0)
+    room = 4 + max(lattice.shape) // 8
+    larger = Lattice(
+        lattice.origin - room * lattice.cell,
+        lattice.cell,
+        (lattice.shape[0] + 2 * room, lattice.shape[1] + 2 * room, lattice.shape[2] + 2 * room),
+    )
+    wide = Flood(flood.rod, larger, flood.progress)
+    wide.add(flood.gamma[known], flood.centers(known))
+    return wide
+
+
+def _swept(flood: Flood) -> tuple[Crossings, float]:
+    """Crossings that no neighbor's activation leads beyond, and what may still be missed [m³]."""
+    from scipy.spatial import KDTree
+
+    crossings = Crossings.of(flood)
+    volume = flood.lattice.cell**3 / 3.0  # three axes see the volume, each by itself
+    gain = 0.0
+    for sweep in range(1, _SWEEPS + 1):
+        count = len(crossings.edges.cell)
+        if count <= sweep:
+            return crossings, 0.0
+        every = np.arange(count)
+        places = crossings.points(every, crossings.place)
+        others = np.asarray(KDTree(places).query(places, k=sweep + 1)[1])[:, sweep]
+        moved = crossings.advance(every, crossings.gamma[others], _BEYOND)
+        gain = float(moved.clip(0.0).sum()) * volume
+        beyond = np.flatnonzero(crossings.low >= 1.0)
+        if len(beyond):
+            _reach_further(flood, crossings, beyond)
+            crossings = Crossings.of(flood)
+    return crossings, gain
+
+
+def _reach_further(flood: Flood, crossings: Crossings, beyond: NDArray[np.int64]) -> None:
+    """Note that the far ends of edges are reached after all."""
+    gamma = crossings.gamma[beyond]
+    flood.add(gamma, crossings.points(beyond, crossings.low[beyond]))
+
+
+def _hull(crossings: Crossings, tips: Array) -> Estimate:
+    """Volume of the convex hull [m³] from points of the boundary, and from every fourth line."""
+    every = np.arange(len(crossings.edges.cell))
+    index = np.stack(np.unravel_index(crossings.edges.cell, crossings.lattice.shape), axis=-1)
+    index[every, crossings.edges.axis] = 0
+    even = (index % 2 == 0).all(axis=1)
+    points = crossings.points(every, crossings.place)
+    nearest = crossings.rod.tips(crossings.beyond)
+    return _convex_volume(
+        np.concatenate([points, nearest, tips]), np.concatenate([points[even], nearest[even]])
+    )
+
+
+def _convex_volume(points: Array, fewer: Array) -> Estimate:
+    """What hulls of ever more boundary points tend to, as far as two of them tell."""
+    value, rough = convex_hull(points).volume, convex_hull(fewer).volume
+    rest = max(value - rough, 0.0) / 3.0
+    return Estimate(value + 0.5 * rest, rest)
+
+
+def _cloud(rod: TipMap, seed: int) -> tuple[Array, Array]:
+    """Activations on faces of all dimensions of the box, and their tips."""
+    box, rng = rod.box, np.random.default_rng(seed)
+    m = box.dimension
+    cube = rng.random((_CLOUD, m))
+    free = np.maximum(rng.integers(0, m + 1, _CLOUD), 2)
+    bound = rng.random((_CLOUD, m)).argsort(axis=1) >= free[:, None]
+    cube[bound] = rng.integers(0, 2, int(bound.sum()))
+    gamma = np.ascontiguousarray(box.from_free_cube(cube))
+    return gamma, rod.tips(gamma)

@@ -1,0 +1,169 @@
+"""Reachable sets of four free bundles and more: volumes known otherwise, memory, refusals."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from softreach.arm import designs
+from softreach.arm.actuators import FiberArchitecture
+from softreach.arm.manipulator import Manipulator
+from softreach.errors import InvalidInput, SoftreachWarning
+from softreach.kernels.bounded_steps import bounded_steps
+from softreach.rod.tip_map import tip_map
+from softreach.workspace import ReachableSolid, reachable_set
+from softreach.workspace.redundant import smallest_memory
+
+
+def family(revolution: float, extent: float, offset: float, bundles: int) -> FiberArchitecture:
+    """Equidistant bundles, in degrees."""
+    angles = np.radians([revolution, extent, offset])
+    return FiberArchitecture(
+        revolution=angles[0], extent=angles[1], offset=angles[2], bundles=bundles
+    )
+
+
+def arm_of(
+    *fibers: FiberArchitecture, inner_radius: float, poisson_ratio: float, bounds: object
+) -> Manipulator:
+    return Manipulator.tapered(
+        length=1.0,
+        outer_radius=0.06,
+        inner_radius=inner_radius,
+        taper=math.radians(1),
+        poisson_ratio=poisson_ratio,
+        actuators=fibers,
+        activation_bounds=bounds,
+    )
+
+
+def five_bundles() -> Manipulator:
+    fibers = family(0, 50, 90, 3), family(-90, 30, 20, 2)
+    return arm_of(*fibers, inner_radius=0.05, poisson_ratio=0.5, bounds=(-1.2, 0.0))
+
+
+def six_bundles() -> Manipulator:
+    fibers = family(90, 40, 90, 3), family(-90, 40, 30, 3)
+    return arm_of(*fibers, inner_radius=0.03, poisson_ratio=0.4, bounds=(-1.2, 0.1))
+
+
+def twelve_bundles() -> Manipulator:
+    fibers = [family(turn, 25, 20 * i, 3) for i, turn in enumerate((90, -90, 0, 45))]
+    return arm_of(*fibers, inner_radius=0.03, poisson_ratio=0.4, bounds=(-1.2, 0.1))
+
+
+def solid(arm: Manipulator, **options: object) -> ReachableSolid:
+    found = reachable_set(arm, **options)  # pyright: ignore[reportArgumentType]
+    assert isinstance(found, ReachableSolid)
+    return found
+
+
+@pytest.fixture(scope="module")
+def five() -> ReachableSolid:
+    return solid(five_bundles(), accuracy=1e-2)
+
+
+def test_five_bundles_reach_what_monte_carlo_says(five):
+    # 0.44292 ± 0.0003 by sampling places and asking an inverse for each
+    assert abs(five.volume - 0.44292) < five.volume_error + 3e-4
+    assert five.volume_error < 1e-2 * five.volume
+    rough = solid(five.arm, accuracy=0.1)
+    assert abs(rough.volume - 0.44292) < rough.volume_error + 3e-4
+
+
+def test_random_places_are_inside_as_often_as_the_volume_says(five):
+    box = np.array([five.grid[axis].values[[0, -1]] for axis in "xyz"])
+    places = np.random.default_rng(0).uniform(box[:, 0], box[:, 1], (40_000, 3))
+    share = five.contains(places).mean()
+    whole = np.prod(np.diff(box))
+    deviation = whole * np.sqrt(share * (1 - share) / len(places))
+    assert abs(share * whole - five.volume) < 3 * deviation + five.volume_error
+
+
+def test_tips_of_faces_of_every_dimension_are_inside_to_a_part_of_a_cell(five):
+    rng = np.random.default_rng(1)
+    cube = rng.random((20_000, 5))
+    bound = rng.random((20_000, 5)) < 0.5
+    cube[bound] = rng.integers(0, 2, int(bound.sum()))
+    tips = five.tip_map.tips(five.tip_map.box.from_cube(cube))
+    outside = five.image.distance(tips) / five.grid.attrs["cell"]
+    assert (outside > 1e-2).mean() < 2e-3
+    assert outside.max() < 1
+
+
+@pytest.mark.parametrize(
+    ("arm", "accuracy"),
+    [
+        pytest.param(six_bundles(), 1e-2, id="six at 1 %"),
+        pytest.param(twelve_bundles(), 5e-2, id="twelve at 5 %"),
+        pytest.param(five_bundles(), 3e-3, id="five at the default", marks=pytest.mark.slow),
+    ],
+)
+def test_many_bundles_keep_the_accuracy_asked(arm, accuracy):
+    found = solid(arm, accuracy=accuracy, memory=5e8)
+    assert 0 < found.volume_error <= accuracy * found.volume
+    assert found.volume < found.convex_volume + found.convex_volume_error
+
+
+def test_more_bundles_reach_more():
+    # Of six bundles one held at 0 leaves a part of what all reach.
+    six = solid(six_bundles(), accuracy=3e-2)
+    bounds = six.arm.bounds.copy()
+    bounds[0] = 0.0
+    part = solid(six.arm.with_bounds(bounds), accuracy=3e-2)
+    assert part.tip_map.box.dimension == 5
+    assert part.volume < six.volume + six.volume_error + part.volume_error
+    reached = part.surface().vertices
+    assert six.distance(reached).max() < 0.5 * part.grid.attrs["cell"]
+
+
+def test_little_memory_means_larger_cells_a_larger_error_and_a_warning():
+    arm = designs.redundant_trunk()
+    least = smallest_memory(tip_map(arm))
+    with pytest.warns(SoftreachWarning, match="more memory"):
+        found = solid(arm, accuracy=1e-3, memory=least)
+    assert found.image.reached.size < 2.5e4
+    fine = solid(arm, accuracy=1e-2)
+    assert fine.volume_error < found.volume_error or fine.grid.attrs["cell"] < 0.05
+    assert abs(found.volume - fine.volume) < found.volume_error + fine.volume_error
+    with pytest.raises(InvalidInput, match="memory"):
+        reachable_set(arm, memory=0.9 * least)
+
+
+def test_a_grid_of_activations_is_refused_for_more_than_three_bundles():
+    with pytest.raises(InvalidInput, match="three free bundles only"):
+        reachable_set(designs.redundant_trunk(), grid=24)
+
+
+def test_bundles_that_bend_in_one_plane_fill_nothing():
+    flat = arm_of(
+        family(0, 20, 90, 2), family(0, 40, 90, 2),
+        inner_radius=0.05, poisson_ratio=0.5, bounds=(-1.0, 0.0),
+    )  # fmt: skip
+    found = solid(flat, accuracy=0.2, memory=1.3 * smallest_memory(tip_map(flat)))
+    assert found.volume <= found.volume_error < 0.02
+
+
+def test_bounded_steps_solve_linear_problems_within_bounds():
+    # Optimality of a bounded least squares problem: the gradient pushes outward at every bound.
+    rng = np.random.default_rng(0)
+    n, m = 200, 7
+    low, high = -rng.random(m), rng.random(m)
+    gamma = rng.uniform(low, high, (n, m))
+    residual, slopes = rng.normal(size=(n, 3)), rng.normal(size=(n, 3, m))
+    trial, left = np.empty((n, m)), np.empty(n)
+    damping = np.full(n, 1e-3)
+    bounded_steps(gamma, residual, slopes, damping, high - low, low, high, trial, left)
+    widths = high - low
+    step, scaled = (trial - gamma) / widths, slopes * widths
+    ahead = residual + np.einsum("nij,nj->ni", scaled, step)
+    assert np.linalg.norm(ahead, axis=1) == pytest.approx(left, abs=1e-9)
+    weight = 1e-3 * (scaled**2).sum(axis=(1, 2)) / 3
+    gradient = np.einsum("nij,ni->nj", scaled, ahead) + weight[:, None] * step
+    at_low, at_high = trial <= low + 1e-9, trial >= high - 1e-9
+    small = 1e-6
+    assert (gradient[at_low] > -small).all()
+    assert (gradient[at_high] < small).all()
+    assert (np.abs(gradient[~at_low & ~at_high]) < small).all()
