@@ -105,8 +105,7 @@ class Manipulator:
             activation_bounds: (lower, upper) for every bundle, or one such pair per bundle.
 
         Raises:
-            InvalidDesign: Not pairs, the wrong number of them, or a lower bound above its upper
-            bound.
+            InvalidDesign: Not pairs, the wrong number of them, or a lower bound above the upper one.
         """
         if faults := bounds_faults(activation_bounds, self.bundles):
             raise InvalidDesign(faults)
