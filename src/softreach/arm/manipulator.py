@@ -105,7 +105,7 @@ class Manipulator:
             activation_bounds: (lower, upper) for every bundle, or one such pair per bundle.
 
         Raises:
-            InvalidDesign: Not pairs, the wrong number of them, or a lower bound above the upper one.
+            InvalidDesign: Not pairs, the wrong number of them, or lower above upper bounds.
         """
         if faults := bounds_faults(activation_bounds, self.bundles):
             raise InvalidDesign(faults)
