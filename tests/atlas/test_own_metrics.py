@@ -148,8 +148,14 @@ def test_nan_is_an_answer_where_the_metric_says_when(tmp_path):
         ("extent", "metrics = extent: must be some of"),
         ((MEAN_HEIGHT, replace(MEAN_HEIGHT, unit="1")), "name of a metric = mean_height"),
         ((replace(MEAN_HEIGHT, name="volume"),), "name of a metric = volume: must be of one"),
-        ((replace(MEAN_HEIGHT, name="status"),), "name of a metric = status: must be no name"),
-        ((replace(MEAN_HEIGHT, name="taper"),), "name of a metric = taper: must be no name"),
+        (
+            (replace(MEAN_HEIGHT, name="status"),),
+            "name of a metric = status: must be a name that the atlas does not use",
+        ),
+        (
+            (replace(MEAN_HEIGHT, name="taper"),),
+            "name of a metric = taper: must be a name that the atlas does not use",
+        ),
     ],
 )
 def test_metrics_that_cannot_be_told_apart_are_refused(tmp_path, metrics, message):
