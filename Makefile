@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: help setup demo test browser quick fast-tests check lint types format bench atlas paper docs lock clean
+.PHONY: help setup demo test browser quick fast-rooms fast-rest check lint types format bench atlas paper docs lock clean
 
 help:
 	@echo "make demo    set up, then compute the paper's design into out/"
@@ -42,10 +42,13 @@ browser:
 
 # For every edit: types and fast tests side by side. What is not fast is marked slow.
 quick: lint
-	$(MAKE) --no-print-directory -j2 --output-sync=target types fast-tests
+	$(MAKE) --no-print-directory -j3 --output-sync=target types fast-rooms fast-rest
 
-fast-tests: setup
-	$(BIN)/python -m pytest -q -m "not slow" tests
+fast-rooms: setup
+	$(BIN)/python -m pytest -q -m "not slow" $(wildcard tests/*/)
+
+fast-rest: setup
+	$(BIN)/python -m pytest -q -m "not slow" $(wildcard tests/test_*.py)
 
 check: lint types
 	$(BIN)/python -m zensical build --strict --clean

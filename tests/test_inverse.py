@@ -40,6 +40,7 @@ def folded() -> Manipulator:
 
 
 @pytest.mark.parametrize(("revolution", "taper"), DESIGNS)
+@pytest.mark.slow
 def test_every_random_tip_is_solved_back_to_its_activation(revolution, taper):
     arm = trunk_at(revolution, taper)
     gamma = random_activations(arm, 3000)

@@ -17,6 +17,7 @@ from softreach.picture.projection import project, view_axes
 from softreach.redundancy import activation_distance
 
 plt = pytest.importorskip("matplotlib.pyplot")
+pytestmark = pytest.mark.slow
 
 LENGTH = 0.3
 OBLIQUE = "oblique"

@@ -205,6 +205,7 @@ def test_four_bundles_reach_at_least_what_three_of_them_do(redundant):
     assert redundant.multiplicity == {}
 
 
+@pytest.mark.slow
 def test_four_bundles_agree_with_smaller_cells_within_the_error(redundant):
     fine = solid(redundant.arm, accuracy=1e-2, cell=redundant.grid.attrs["cell"] / 2)
     assert abs(fine.volume - redundant.volume) < redundant.volume_error
@@ -220,6 +221,7 @@ def test_a_cloud_of_four_bundles_lies_inside_to_one_cell(redundant):
     assert redundant.distance(outside).max() < redundant.grid.attrs["cell"]
 
 
+@pytest.mark.slow
 def test_two_free_bundles_sweep_an_area(trunk):
     arm = trunk.with_bounds(((-1.0, 0.0), (-1.0, 0.0), (-0.5, -0.5)))
     sheet = reachable_set(arm)

@@ -59,6 +59,7 @@ def test_every_tip_of_an_activation_inside_the_box_is_reached(design, place):
 
 
 @pytest.mark.parametrize("seed", range(4))
+@pytest.mark.slow
 def test_every_tip_of_a_random_design_is_reached(seed):
     arm = random_design(4 + 2 * seed, seed)
     for place in PLACES:
@@ -129,6 +130,7 @@ def test_no_tip_is_farther_from_the_base_than_the_longest_arm():
         assert np.linalg.norm(rod.tips(rod.box.corners()), axis=1).max() <= rod.farthest()
 
 
+@pytest.mark.slow
 def test_a_gap_is_never_smaller_than_its_proved_bound():
     from scipy.spatial import KDTree
 

@@ -41,6 +41,7 @@ def test_the_root_of_an_affine_map_is_found_exactly(seed, with_root):
 
 @given(seed=SEEDS)
 @settings(max_examples=5)
+@pytest.mark.slow
 def test_both_roots_of_a_fold_have_a_start(seed):
     rng = np.random.default_rng(seed)
     fold = random_fold(rng)

@@ -53,6 +53,7 @@ def differences(f: Callable[[np.ndarray], np.ndarray], gamma: np.ndarray, step: 
 
 
 @given(arm=arms())
+@pytest.mark.slow
 def test_tips_are_those_of_an_independent_integrator(make, arm):
     rod, gamma = make(arm, 1e-9), in_box(arm, 2)
     expected = [integrated_tip(arm, one) for one in gamma]
