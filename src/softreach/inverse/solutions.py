@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
+from softreach.errors import counted
 from softreach.schema import AXES
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ class Solution:
         outcome = self.status.name.lower().replace("_", " ")
         if not len(self):
             return f"<Solution for ({place}) m: {outcome}, nearest point {self.gap:.3g} m away>"
-        count, worst = _counted(len(self), "activation"), self.residuals.max()
+        count, worst = counted(len(self), "activation"), self.residuals.max()
         return f"<Solution for ({place}) m: {outcome}, {count}, largest residual {worst:.1e} m>"
 
 
@@ -142,9 +143,9 @@ class Solutions(Sequence[Solution]):
             if outcomes[status]
         ]
         if len(self.residuals):
-            parts.append(_counted(len(self.residuals), "activation"))
+            parts.append(counted(len(self.residuals), "activation"))
             parts.append(f"largest residual {self.residuals.max():.1e} m")
-        targets = _counted(len(self), "target")
+        targets = counted(len(self), "target")
         return f"<Solutions for {targets}{': ' if parts else ''}{', '.join(parts)}>"
 
     def _one(self, i: int) -> Solution:
@@ -201,7 +202,3 @@ class Solutions(Sequence[Solution]):
 
 _PER_TARGET = ("targets", "statuses", "nearest", "nearest_activations", "gaps", "gap_bounds")
 _PER_SOLUTION = ("activations", "residuals", "conditions", "margins")
-
-
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

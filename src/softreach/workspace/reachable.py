@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator
+from softreach.errors import counted
 from softreach.quantity import quantity
 from softreach.rod.tip_map import TipMap
 from softreach.schema import provenance
@@ -123,7 +124,7 @@ class ReachableSet(ABC):
     def _origin(self) -> str:
         """How the set was computed."""
         box, rod = self.tip_map.box, self.tip_map
-        free = f"{box.dimension} free bundle" + ("s" if box.dimension != 1 else "")
+        free = counted(box.dimension, "free bundle")
         power = str(box.dimension).translate(_POWERS) if box.dimension > 1 else ""
         grid = f"activation grid of {self.cells}{power} cells, " if self.cells else ""
         return f"L = {rod.length:g} m, {free}; {grid}tip error up to {rod.tol:g} L"
