@@ -4,37 +4,30 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm import Actuator, Outline, Profile, Resultants, Section
+from softreach.arm.actuators.actuator import Bounds
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cable(Actuator):
-    """Pulls along the axis at a fixed place of every section; its activation is tension over E."""
+    """Pulls along the axis at a fixed place of every section; its activation is a tension [N].
 
-    unit: ClassVar[str] = "m2"
+    Where Young's modulus is left out, it is the tension over that.
+    """
+
+    unit: ClassVar[str] = "N"
     default_name: ClassVar[str] = "cable"
-    bundles: ClassVar[int] = 1
 
     place: tuple[float, float]
     """(x, y) in the sections [m]."""
-    tension: tuple[float, float] = (0.0, 1e-3)
-    """Lower and upper tension over E [m²]."""
-    name: str = ""
-
-    @property
-    def bounds(self) -> Array:
-        return np.array([self.tension])
-
-    def with_bounds(self, bounds: Array) -> Self:
-        low, high = np.asarray(bounds, float).reshape(2).tolist()
-        return self.replace(tension=(low, high))
+    activation_bounds: Bounds = (0.0, 1e-3)
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
         """N = -1 and M = -p × e3."""
@@ -45,10 +38,12 @@ class Cable(Actuator):
     def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
         """A thin sector about its place."""
         x, y = self.place
-        ratio = math.hypot(x, y) / float(profile.radius(0.0))
+        ratio = np.full((len(z), 1), math.hypot(x, y) / float(profile.radius(0.0)))
         return Outline(
             center=np.full((len(z), 1), math.atan2(y, x)),
             extent=np.array([0.1]),
-            inner_ratio=np.array([0.9 * ratio]),
-            outer_ratio=np.array([min(1.0, 1.1 * ratio)]),
+            inner_ratio=0.9 * ratio,
+            outer_ratio=np.minimum(1.0, 1.1 * ratio),
+            shape=("sector",),
+            acts=self.acts(profile, z),
         )

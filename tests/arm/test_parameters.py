@@ -179,16 +179,8 @@ class Pull(Actuator):
         Variable("area", "A", "area that the force spreads over", Range(low=0.0, unit="m2")),
     )
     name: str = "pull"
-    bundles: int = 1
     area: float = 1e-4
-    range: tuple[float, float] = (-1.0, 0.0)
-
-    @property
-    def bounds(self):
-        return np.array([self.range])
-
-    def with_bounds(self, bounds):
-        return self.replace(range=tuple(bounds[0].tolist()))
+    activation_bounds: tuple[float, float] = (-1.0, 0.0)
 
     def resultants(self, profile, section, z):
         return Resultants(np.full((len(z), 1), self.area), np.zeros((len(z), 3, 1)))
@@ -197,8 +189,10 @@ class Pull(Actuator):
         return Outline(
             center=np.zeros((len(z), 1)),
             extent=np.ones(1),
-            inner_ratio=np.zeros(1),
-            outer_ratio=np.ones(1),
+            inner_ratio=np.zeros((len(z), 1)),
+            outer_ratio=np.ones((len(z), 1)),
+            shape=("sector",),
+            acts=self.acts(profile, z),
         )
 
 
@@ -212,5 +206,5 @@ def test_another_kind_of_actuator_has_the_parameters_that_it_declares(trunk):
     }
     assert (known["pull.area"].unit, known["pull.lower"].unit) == ("m2", "N")
     made = changed(arm, {"pull.area": 2e-4, "pull.lower": -3.0, "extent": 0.5})
-    assert made.actuators[3] == Pull(area=2e-4, range=(-3.0, 0.0))
+    assert made.actuators[3] == Pull(area=2e-4, activation_bounds=(-3.0, 0.0))
     assert "lower" not in known  # newtons and strains have no common bound

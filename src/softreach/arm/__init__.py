@@ -1,25 +1,49 @@
 """An arm as a value: profile, section, actuators, and the tables that follow from them."""
 
 from softreach.arm import designs
-from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, Resultants
+from softreach.arm.actuators import (
+    Actuator,
+    Chamber,
+    FiberArchitecture,
+    ObliqueMuscle,
+    Outline,
+    RadialMuscle,
+    Resultants,
+    SectorActuator,
+    Tendon,
+)
+from softreach.arm.along import AlongArm, Pieces, Samples
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper, Profile
-from softreach.arm.section import Material, Ring, Section, Stiffness
+from softreach.arm.sampled_profiles import PiecewiseTaper, SampledTaper
+from softreach.arm.section import Layer, Ring, Section, Stiffness
 from softreach.arm.summary import DesignSummary, describe
 
 __all__ = [
     "Actuator",
+    "AlongArm",
+    "Chamber",
     "DesignSummary",
     "FiberArchitecture",
+    "Layer",
     "LinearTaper",
     "Manipulator",
     "Material",
+    "ObliqueMuscle",
     "Outline",
+    "Pieces",
+    "PiecewiseTaper",
     "Profile",
+    "RadialMuscle",
     "Resultants",
     "Ring",
+    "SampledTaper",
+    "Samples",
     "Section",
+    "SectorActuator",
     "Stiffness",
+    "Tendon",
     "describe",
     "designs",
 ]

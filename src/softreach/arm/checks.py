@@ -19,13 +19,19 @@ __all__ = [
     "MATERIAL_RANGES",
     "PROFILE_RANGES",
     "RING_RANGES",
+    "STRETCH_RANGES",
     "bounds_faults",
     "fiber_faults",
+    "material_faults",
     "name_faults",
     "plain_number",
     "profile_faults",
     "range_faults",
     "ring_faults",
+    "section_faults",
+    "series_faults",
+    "stretch_faults",
+    "text_faults",
     "tube_faults",
 ]
 
@@ -35,7 +41,11 @@ PROFILE_RANGES = {
     "taper": Range(-math.pi / 2, math.pi / 2, "rad", open_low=True, open_high=True),
 }
 
-MATERIAL_RANGES = {"poisson_ratio": Range(0.0, 0.5)}
+MATERIAL_RANGES = {
+    "young_modulus": Range(0.0, unit="Pa", open_low=True),
+    "poisson_ratio": Range(0.0, 0.5),
+    "density": Range(0.0, unit="kg/m³", open_low=True),
+}
 
 FIBER_RANGES = {
     "helical_angle": Range(-math.pi / 2, math.pi / 2, "rad", open_low=True, open_high=True),
@@ -43,6 +53,11 @@ FIBER_RANGES = {
     "offset": Range(unit="rad"),
     "extent": Range(0.0, 2 * math.pi, "rad", open_low=True),
     "bundles": Range(low=1, whole=True),
+}
+
+STRETCH_RANGES = {
+    "start_over_length": Range(0.0, 1.0, open_high=True),
+    "end_over_length": Range(0.0, 1.0, open_low=True),
 }
 
 RING_RANGES = {
@@ -56,10 +71,10 @@ _TUBE_RANGES = {
     "inner_radius": Range(0.0, unit="m"),
     "inner_ratio": RING_RANGES["inner_ratio"],
     "taper": PROFILE_RANGES["taper"],
-    **MATERIAL_RANGES,
+    "poisson_ratio": MATERIAL_RANGES["poisson_ratio"],
 }
 
-_OPTIONAL = {"helical_angle", "revolution"}
+_OPTIONAL = {"helical_angle", "revolution", "young_modulus", "density"}
 
 
 def profile_faults(values: Mapping[str, Any]) -> list[Fault]:
@@ -68,12 +83,38 @@ def profile_faults(values: Mapping[str, Any]) -> list[Fault]:
     return faults + list(_taper_faults(_sound(values, faults)))
 
 
+def material_faults(values: Mapping[str, Any]) -> list[Fault]:
+    """Everything wrong with the fields of a material."""
+    return range_faults(values, MATERIAL_RANGES) + text_faults(values)
+
+
+def text_faults(values: Mapping[str, Any]) -> list[Fault]:
+    """A name that is not text."""
+    name = values.get("name", "")
+    return [] if isinstance(name, str) else [Fault("name", name, "must be text")]
+
+
 def ring_faults(values: Mapping[str, Any]) -> list[Fault]:
     """Everything wrong with the fields of a ring."""
-    faults = range_faults(values, RING_RANGES)
+    faults = range_faults(values, RING_RANGES) + text_faults(values)
     inner, outer = (plain_number(values[name]) for name in RING_RANGES)
     if not faults and inner >= outer:
         faults = [Fault("inner_ratio", inner, f"must be below outer_ratio = {outer:g}")]
+    return faults
+
+
+def section_faults(values: Mapping[str, Any]) -> list[Fault]:
+    """Everything wrong with how rings and bore fit together."""
+    rings = values["rings"]
+    faults = range_faults(values, {"bore_ratio": RING_RANGES["inner_ratio"]})
+    faults += name_faults([ring.name for ring in rings], "rings")
+    inner, outer = min(one.inner_ratio for one in rings), [one.outer_ratio for one in rings]
+    if max(outer) != 1.0:
+        allowed = "must be 1 for the outermost ring, which reaches the surface of the arm"
+        faults.append(Fault(f"rings[{int(np.argmax(outer))}].outer_ratio", max(outer), allowed))
+    if not faults and (bore := plain_number(values["bore_ratio"])) > inner:
+        allowed = f"must be at most the smallest inner_ratio of the rings, {inner:g}"
+        faults.append(Fault("bore_ratio", bore, allowed))
     return faults
 
 
@@ -94,15 +135,129 @@ def tube_faults(values: Mapping[str, Any], bundles: int | None = None) -> list[F
 
 
 def fiber_faults(values: Mapping[str, Any]) -> list[Fault]:
-    """Everything wrong with the fields of one architecture."""
+    """Everything wrong with the fields of one architecture; absent ones are skipped."""
     faults = range_faults(values, FIBER_RANGES)
     if {"helical_angle", "revolution"} <= values.keys():
-        faults += _winding_faults(values["helical_angle"], values["revolution"])
-    if not isinstance(values.get("name", ""), str):
-        faults.append(Fault("name", values["name"], "must be text"))
+        faults += _one_winding(values["helical_angle"], values["revolution"])
+    faults += text_faults(values)
     if "activation_bounds" in values:
         bundles = _sound(values, faults).get("bundles")
         faults += bounds_faults(values["activation_bounds"], bundles)
+    return faults
+
+
+def actuator_faults(values: Mapping[str, Any]) -> list[Fault]:
+    """Everything wrong with the fields that all actuators have."""
+    faults = range_faults(values, {"bundles": FIBER_RANGES["bundles"]}) + text_faults(values)
+    bundles = _sound(values, faults).get("bundles")
+    return faults + bounds_faults(values["activation_bounds"], bundles) + stretch_faults(values)
+
+
+def sector_faults(values: Mapping[str, Any]) -> list[Fault]:
+    """Everything wrong with where the bundles of a sector lie."""
+    faults = range_faults(values, {name: FIBER_RANGES[name] for name in ("offset", "extent")})
+    return faults + which_ring_faults(values["ring"])
+
+
+def which_ring_faults(ring: Any) -> list[Fault]:
+    """What names no ring."""
+    if isinstance(ring, str) or (isinstance(ring, int) and not isinstance(ring, bool)):
+        return []
+    return [Fault("ring", ring, "must be the index or the name of a ring")]
+
+
+def angle_faults(angle: Any) -> list[Fault]:
+    """What is no helical angle, constant or along the arm."""
+    values = getattr(angle, "values", None)
+    angles = values if isinstance(values, tuple) else (angle,)
+    return [
+        fault
+        for one in angles
+        for fault in range_faults(
+            {"helical_angle": one}, {"helical_angle": FIBER_RANGES["helical_angle"]}
+        )
+    ]
+
+
+def tendon_faults(values: Mapping[str, Any]) -> list[Fault]:
+    """Everything wrong with the route of a tendon, or with tensions that push."""
+    ranges = {name: FIBER_RANGES[name] for name in ("offset", "revolution")}
+    faults = range_faults(values, ranges)
+    if values["revolution"] is None:
+        faults.append(Fault("revolution", None, FIBER_RANGES["revolution"]))
+    faults += one_length_faults(values, "distance", Range(0.0, unit="m"), sampled=True)
+    bounds = _numbers(values["activation_bounds"])
+    if bounds.size and bounds.min() < 0:
+        allowed = "must be at least 0 N: a tendon pulls and cannot push"
+        faults.append(Fault("activation_bounds", values["activation_bounds"], allowed))
+    return faults
+
+
+def chamber_faults(values: Mapping[str, Any]) -> list[Fault]:
+    """Everything wrong with where a chamber lies and how wide it is."""
+    positive = Range(0.0, open_low=True)
+    faults = range_faults(values, {"offset": FIBER_RANGES["offset"], "area_factor": positive})
+    faults += one_length_faults(values, "distance", Range(0.0, unit="m"))
+    return faults + one_length_faults(values, "radius", positive._replace(unit="m"))
+
+
+def one_length_faults(
+    values: Mapping[str, Any], field: str, allowed: Range, *, sampled: bool = False
+) -> list[Fault]:
+    """Faults of a length that is given in m, or as a ratio to R2(Z)."""
+    ratio = f"{field}_ratio"
+    given = [name for name in (field, ratio) if values[name] is not None]
+    if len(given) != 1:
+        both = tuple(values[name] for name in (field, ratio))
+        return [Fault(f"{field}, {ratio}", both, f"give exactly one of {field} and {ratio}")]
+    along = getattr(values[field], "values", None) if sampled else None
+    if isinstance(along, tuple):
+        return [fault for one in along for fault in range_faults({field: one}, {field: allowed})]
+    return range_faults(
+        {given[0]: values[given[0]]},
+        {field: allowed, ratio: allowed._replace(unit="")},
+    )
+
+
+def winding_faults(angle: Any, revolution: Any) -> list[Fault]:
+    """Everything wrong with how a fiber winds."""
+    faults = angle_faults(angle)
+    faults += range_faults({"revolution": revolution}, {"revolution": FIBER_RANGES["revolution"]})
+    return faults + _one_winding(angle, revolution)
+
+
+def series_faults(values: Mapping[str, Any], field: str, per_station: bool = True) -> list[Fault]:
+    """Everything wrong with values given along the arm.
+
+    Args:
+        values: `stations_over_length` and the values themselves.
+        field: What the values are called.
+        per_station: Whether there is one for each station; else one for each gap between them.
+    """
+    stations, along = _numbers(values["stations_over_length"]), _numbers(values[field])
+    if stations.ndim != 1 or len(stations) < 2 or not _ascends_from_0_to_1(stations):
+        allowed = "must be two or more numbers that rise from 0 (base) to 1 (tip)"
+        return [Fault("stations_over_length", values["stations_over_length"], allowed)]
+    count = len(stations) if per_station else len(stations) - 1
+    if along.shape != (count,) or not np.isfinite(along).all():
+        where = "station" if per_station else "gap between stations"
+        return [
+            Fault(field, values[field], f"must be {count} finite numbers, one for each {where}")
+        ]
+    return []
+
+
+def _ascends_from_0_to_1(stations: np.ndarray[Any, np.dtype[np.float64]]) -> bool:
+    ends = stations[0] == 0.0 and stations[-1] == 1.0
+    return bool(ends and np.isfinite(stations).all() and (np.diff(stations) > 0).all())
+
+
+def stretch_faults(values: Mapping[str, Any]) -> list[Fault]:
+    """Everything wrong with where along the arm an actuator begins and ends."""
+    faults = range_faults(values, STRETCH_RANGES)
+    start, end = (plain_number(values[name]) for name in STRETCH_RANGES)
+    if not faults and start >= end:
+        faults = [Fault("end_over_length", end, f"must be above start_over_length = {start:g}")]
     return faults
 
 
@@ -160,7 +315,7 @@ def _sound(values: Mapping[str, Any], faults: list[Fault]) -> dict[str, Any]:
     return {name: plain_number(value) for name, value in values.items() if name not in blamed}
 
 
-def _winding_faults(angle: float | None, revolution: float | None) -> list[Fault]:
+def _one_winding(angle: Any, revolution: Any) -> list[Fault]:
     if (angle is None) != (revolution is None):
         return []
     allowed = "give exactly one of helical_angle and revolution (0 for a longitudinal fiber)"

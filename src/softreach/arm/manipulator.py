@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm import file
-from softreach.arm.actuators import Actuator, FiberArchitecture, Outline
+from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
 from softreach.arm.checks import bounds_faults, name_faults, tube_faults
+from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper, Profile
-from softreach.arm.section import Material, Ring, Section
+from softreach.arm.section import Ring, Section
 from softreach.atomic import replacing
 from softreach.errors import Fault, InvalidDesign, InvalidInput
 
@@ -48,7 +49,7 @@ class Manipulator:
         if faults := list(_part_faults(self)):
             raise InvalidDesign(faults)
         object.__setattr__(self, "actuators", tuple(_named(self.actuators)))
-        if faults := list(_name_faults(self)):
+        if faults := list(_name_faults(self)) or list(_fit_faults(self)):
             raise InvalidDesign(faults)
 
     @classmethod
@@ -137,7 +138,7 @@ class Manipulator:
         """
         index = self._fiber_index(fiber)
         whole = self.actuators[index]
-        assert isinstance(whole, FiberArchitecture)
+        assert isinstance(whole, SectorActuator)
         parts = whole.split(count, keep_extent=keep_extent)
         return self.replace(
             actuators=(*self.actuators[:index], *parts, *self.actuators[index + 1 :])
@@ -154,7 +155,10 @@ class Manipulator:
         ratio = tube.pop("inner_ratio", None)
         try:
             arm = cls.tapered(**tube, actuators=actuators)
-            return arm if ratio is None else arm.replace(section=arm.section.with_inner(ratio))
+            if ratio is None:
+                return arm
+            ring = arm.section.rings[0].replace(inner_ratio=ratio)
+            return arm.replace(section=Section(rings=(ring,)))
         except InvalidDesign as error:
             raise file.in_file_terms(error, source) from None
 
@@ -203,10 +207,26 @@ class Manipulator:
 
     @cached_property
     def bounds(self) -> Array:
-        """Lower and upper activation of each bundle [-], shape (bundles, 2), read-only."""
+        """Lower and upper activation of each bundle [units], shape (bundles, 2), read-only."""
         bounds = np.concatenate([actuator.bounds for actuator in self.actuators])
         bounds.setflags(write=False)
         return bounds
+
+    @cached_property
+    def breakpoints(self) -> tuple[float, ...]:
+        """Stations inside (0, L) where profile or actuators are not smooth, ascending [m]."""
+        places = {0.0, self.length, *self.profile.breakpoints}
+        places.update(z for one in self.actuators for z in one.breakpoints(self.profile))
+        ascending = np.array(sorted(places))
+        # Two that differ by rounding alone are one.
+        apart = np.diff(ascending, prepend=-np.inf) > 1e-12 * self.length
+        inside = ascending[apart & (ascending < (1 - 1e-12) * self.length)][1:]
+        return tuple(inside.tolist())
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Unit of each activation: "1", "N" or "Pa"."""
+        return tuple(one.unit for one in self.actuators for _ in range(one.bundles))
 
     def outline(self, z: ArrayLike) -> Outline:
         """Where all bundles lie in the sections at stations Z [m], shape (station,)."""
@@ -215,8 +235,10 @@ class Manipulator:
         return Outline(
             center=np.concatenate([one.center for one in each], axis=1),
             extent=np.concatenate([one.extent for one in each]),
-            inner_ratio=np.concatenate([one.inner_ratio for one in each]),
-            outer_ratio=np.concatenate([one.outer_ratio for one in each]),
+            inner_ratio=np.concatenate([one.inner_ratio for one in each], axis=1),
+            outer_ratio=np.concatenate([one.outer_ratio for one in each], axis=1),
+            shape=tuple(shape for one in each for shape in one.shape),
+            acts=np.concatenate([one.acts for one in each], axis=1),
         )
 
     def _repr_html_(self) -> str:
@@ -226,11 +248,11 @@ class Manipulator:
         return arm_card(self)
 
     def _fiber_index(self, fiber: str | int) -> int:
-        """Index of a fiber architecture among the actuators, from its name or index."""
+        """Index of a fiber architecture or muscle among the actuators, from its name or index."""
         names = {
             k: actuator.name
             for k, actuator in enumerate(self.actuators)
-            if isinstance(actuator, FiberArchitecture)
+            if isinstance(actuator, SectorActuator)
         }
         whole = isinstance(fiber, int | np.integer) and not isinstance(fiber, bool)
         found = [k for k, name in names.items() if (k if whole else name) == fiber]
@@ -256,6 +278,18 @@ def _actuator_faults(actuators: Any) -> Iterator[Fault]:
     for k, part in enumerate(actuators):
         if not isinstance(part, Actuator):
             yield Fault(f"actuators[{k}]", part, "must be an actuator, such as FiberArchitecture")
+
+
+def _fit_faults(arm: Manipulator) -> Iterator[Fault]:
+    """What keeps actuators from driving this profile and section."""
+    for actuator in arm.actuators:
+        faults = actuator.section_faults(arm.profile, arm.section)
+        yield from (
+            fault
+            if fault.path.startswith(("rings", "core"))
+            else fault._replace(path=f"{actuator.name}.{fault.path}")
+            for fault in faults
+        )
 
 
 def _named(actuators: Sequence[Actuator]) -> Iterator[Actuator]:

@@ -16,7 +16,7 @@ from softreach.arm.checks import PROFILE_RANGES, plain_number, profile_faults
 from softreach.arm.variable import Variable
 from softreach.errors import InvalidDesign
 
-__all__ = ["LinearTaper", "Profile"]
+__all__ = ["LinearTaper", "Profile", "relative_expm1", "relative_log"]
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class Profile(ABC):
     @property
     @abstractmethod
     def breakpoints(self) -> tuple[float, ...]:
-        """Stations inside (0, L) where the slope jumps, ascending [m]."""
+        """Stations inside (0, L) where the radius is not smooth, ascending [m]."""
 
     @abstractmethod
     def radius(self, z: ArrayLike) -> Array:
@@ -118,12 +118,12 @@ class LinearTaper(Profile):
     def slender_coordinate(self, z: ArrayLike) -> Array:
         """S(Z) = Z/R2(0) · log(1 - q)/(-q) [-], with q = Z tan φ/R2(0): theory (15)."""
         z = np.asarray(z, float)
-        return z / self.outer_radius * _relative_log(z * np.tan(self.taper) / self.outer_radius)
+        return z / self.outer_radius * relative_log(z * np.tan(self.taper) / self.outer_radius)
 
     def station(self, s: ArrayLike) -> Array:
         """Z(S) = R2(0) S (exp(y) - 1)/y [m] with y = -S tan φ: theory (16)."""
         s = np.asarray(s, float)
-        return self.outer_radius * s * _relative_expm1(-s * np.tan(self.taper))
+        return self.outer_radius * s * relative_expm1(-s * np.tan(self.taper))
 
     def surface_coordinate(self, z: ArrayLike, ratio: float = 1.0) -> Array:
         """S(Z) / (ratio cos φ) with the slope ratio · tan φ of that cone [-]: theory (17)."""
@@ -131,11 +131,11 @@ class LinearTaper(Profile):
         return self.slender_coordinate(z) / (ratio * cos)
 
 
-def _relative_log(q: Array) -> Array:
+def relative_log(q: Array) -> Array:
     """log(1 - q) / (-q), which is 1 at q = 0."""
     return np.divide(np.log1p(-q), -q, out=np.ones_like(q), where=q != 0)
 
 
-def _relative_expm1(x: Array) -> Array:
+def relative_expm1(x: Array) -> Array:
     """(exp(x) - 1) / x, which is 1 at x = 0."""
     return np.divide(np.expm1(x), x, out=np.ones_like(x), where=x != 0)

@@ -1,54 +1,46 @@
-"""The cross-section: what it is made of, and how stiff that makes it."""
+"""The cross-section: a core and rings of materials, and how stiff and heavy they make it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.checks import MATERIAL_RANGES, plain_number, range_faults, ring_faults
+from softreach.arm.checks import RING_RANGES, plain_number, ring_faults, section_faults
+from softreach.arm.material import Material
+from softreach.arm.variable import Variable
 from softreach.errors import Fault, InvalidDesign
 
-__all__ = ["Material", "Ring", "Section", "Stiffness"]
+__all__ = ["Layer", "Ring", "Section", "Stiffness"]
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Material:
-    """An isotropic elastic material.
-
-    One material fills the arm, so that Young's modulus cancels and is not asked for.
-
-    Raises:
-        InvalidDesign: A field is out of its range.
-    """
-
-    poisson_ratio: float = 0.5
-    """ν, Poisson's ratio [-]."""
-
-    def __post_init__(self) -> None:
-        if faults := range_faults(vars(self), MATERIAL_RANGES):
-            raise InvalidDesign(faults)
-        object.__setattr__(self, "poisson_ratio", float(plain_number(self.poisson_ratio)))
-
-
-@dataclass(frozen=True, kw_only=True)
 class Ring:
-    """The layer between two radii that actuators live in; its radii keep their ratio to R2(Z).
+    """A layer between two radii; they keep their ratio to R2(Z).
 
     Raises:
         InvalidDesign: No ring is left between the ratios.
     """
 
+    variables: ClassVar[tuple[Variable, ...]] = (
+        Variable("inner_ratio", "R1/R2", "inner radius over R2", RING_RANGES["inner_ratio"]),
+        Variable("outer_ratio", "R/R2", "outer radius over R2", RING_RANGES["outer_ratio"]),
+    )
+
     inner_ratio: float
     """R1/R2, inner radius of the ring over the outer radius of the arm [-]."""
     outer_ratio: float = 1.0
     """Outer radius of the ring over the outer radius of the arm [-]."""
-    material: Material = Material()
+    material: Material = field(default_factory=Material)
     """What the ring is made of."""
+    name: str = ""
+    """What actuators, files and pictures call it."""
 
     def __post_init__(self) -> None:
         faults = ring_faults(vars(self))
@@ -56,53 +48,179 @@ class Ring:
             faults.append(Fault("material", self.material, "must be a Material"))
         if faults:
             raise InvalidDesign(faults)
-        for field in ("inner_ratio", "outer_ratio"):
-            object.__setattr__(self, field, float(plain_number(getattr(self, field))))
+        for ratio in RING_RANGES:
+            object.__setattr__(self, ratio, float(plain_number(getattr(self, ratio))))
+
+    def replace(self, **changes: Any) -> Self:
+        """A copy with some fields changed, checked like a new one."""
+        return replace(self, **changes)
 
     @property
     def radius_ratio(self) -> float:
         """ρ, inner over outer radius of the ring itself [-]."""
         return self.inner_ratio / self.outer_ratio
 
+    @property
+    def modulus(self) -> float:
+        """E of its material [Pa], or 1 where it cancels and was left out."""
+        return _modulus(self.material)
+
+
+class Layer(NamedTuple):
+    """One part of the section."""
+
+    inner_ratio: float
+    """Inner radius over R2 [-]."""
+    outer_ratio: float
+    """Outer radius over R2 [-]."""
+    material: Material
+    """What it is made of."""
+
 
 class Stiffness(NamedTuple):
-    """What a section resists with, over Young's modulus, one value for each station."""
+    """What a section resists with, one value for each station.
+
+    All are divided by Young's modulus where that was left out.
+    """
 
     axial: Array
-    """K0/E [m²]."""
+    """K0 [N]."""
     bending: Array
-    """K1/E = K2/E [m⁴]."""
+    """K1 = K2 [N m²]."""
     torsion: Array
-    """K3/E [m⁴]."""
+    """K3 [N m²]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Section:
-    """A core and the ring around it, of one material.
+    """A core and rings around it, in proportion to R2(Z).
+
+    Rings may overlap: each adds its whole stiffness. The core fills the arm from its bore to the
+    innermost ring.
 
     Raises:
-        InvalidDesign: Not exactly one ring, or one that does not reach the surface of the arm.
+        InvalidDesign: No ring, none that reaches the surface of the arm, two of one name, a bore
+            wider than the innermost ring, or different materials without Young's moduli.
     """
 
+    variables: ClassVar[tuple[Variable, ...]] = (
+        Variable("bore_ratio", "R0/R2", "radius of the bore over R2", RING_RANGES["inner_ratio"]),
+    )
+
     rings: tuple[Ring, ...]
-    """The ring of actuators; the core inside it is of the same material."""
+    """Layers that actuators live in, by index or name."""
+    core: Material | None = None
+    """What fills the inside; None for the material of the innermost ring."""
+    bore_ratio: float = 0.0
+    """Radius of the hole along the axis over R2 [-]; 0 for a solid core."""
 
     def __post_init__(self) -> None:
         rings = tuple(self.rings) if isinstance(self.rings, tuple | list) else ()
-        if len(rings) != 1 or not isinstance(rings[0], Ring):
-            raise InvalidDesign([Fault("section.rings", self.rings, "must hold one Ring")])
+        if not rings or not all(isinstance(ring, Ring) for ring in rings):
+            raise InvalidDesign([Fault("section.rings", self.rings, "must hold one Ring or more")])
+        if not isinstance(self.core, Material | None):
+            raise InvalidDesign([Fault("section.core", self.core, "must be a Material or None")])
         object.__setattr__(self, "rings", rings)
-        if self.rings[0].outer_ratio != 1.0:
-            fault = Fault("section.rings[0].outer_ratio", self.rings[0].outer_ratio, "must be 1")
-            raise InvalidDesign([fault])
+        if faults := section_faults(vars(self)) + list(_modulus_faults(self)):
+            raise InvalidDesign(faults)
+        object.__setattr__(self, "bore_ratio", float(plain_number(self.bore_ratio)))
 
-    def with_inner(self, ratio: float) -> Section:
-        """A copy whose ring begins at another share R1/R2 of the outer radius [-]."""
-        return Section(rings=(replace(self.rings[0], inner_ratio=ratio),))
+    def replace(self, **changes: Any) -> Self:
+        """A copy with some fields changed, checked like a new one."""
+        return replace(self, **changes)
+
+    def ring(self, which: int | str) -> Ring:
+        """A ring by its index or name.
+
+        Raises:
+            InvalidDesign: There is none.
+        """
+        names = [ring.name for ring in self.rings]
+        if isinstance(which, str) and which in names:
+            return self.rings[names.index(which)]
+        if isinstance(which, int) and -len(names) <= which < len(names):
+            return self.rings[which]
+        known = ", ".join(f"{k} ({name})" if name else str(k) for k, name in enumerate(names))
+        raise InvalidDesign([Fault("ring", which, f"must be one of the section's rings: {known}")])
+
+    @property
+    def inner_ratio(self) -> float:
+        """Where the innermost ring begins, over R2 [-]."""
+        return min(ring.inner_ratio for ring in self.rings)
+
+    @property
+    def core_material(self) -> Material:
+        """What fills the inside."""
+        if self.core is not None:
+            return self.core
+        return min(self.rings, key=lambda ring: ring.inner_ratio).material
+
+    @cached_property
+    def layers(self) -> tuple[Layer, ...]:
+        """The core, if there is room for one, and the rings."""
+        rings = [Layer(ring.inner_ratio, ring.outer_ratio, ring.material) for ring in self.rings]
+        if self.inner_ratio <= self.bore_ratio:
+            return tuple(rings)
+        return (Layer(self.bore_ratio, self.inner_ratio, self.core_material), *rings)
+
+    @property
+    def has_modulus(self) -> bool:
+        """Whether Young's modulus is known, so that forces have a unit."""
+        return all(layer.material.young_modulus is not None for layer in self.layers)
 
     def stiffness(self, radius: ArrayLike) -> Stiffness:
-        """K0 = π R2², K1 = (π/4) R2⁴, K3 = K1/(1 + ν), all over E, at R2 [m]: theory (5)."""
+        """K0 = Σ πE(R2² - R1²), K1 = Σ (π/4)E(R2⁴ - R1⁴), K3 = Σ K1/(1 + ν): theory (5).
+
+        Args:
+            radius: R2 [m].
+        """
         outer = np.asarray(radius, float)
-        bending = np.pi / 4 * outer**4
-        poisson = self.rings[0].material.poisson_ratio
-        return Stiffness(np.pi * outer**2, bending, bending / (1 + poisson))
+        area = np.pi * self._sum(_modulus, 2)
+        inertia = np.pi / 4 * self._sum(_modulus, 4)
+        polar = np.pi / 4 * self._sum(lambda one: _modulus(one) / (1 + one.poisson_ratio), 4)
+        return Stiffness(area * outer**2, inertia * outer**4, polar * outer**4)
+
+    def mass_per_length(self, radius: ArrayLike) -> Array:
+        """Σ ρ π (R2² - R1²) [kg/m] at R2 [m].
+
+        Raises:
+            InvalidDesign: A layer without a density.
+        """
+        if faults := list(_missing(self, "density", "kg/m³", "where weight counts")):
+            raise InvalidDesign(faults)
+        return np.pi * self._sum(lambda one: one.density or 0.0, 2) * np.asarray(radius, float) ** 2
+
+    def modulus_faults(self, why: str) -> list[Fault]:
+        """A fault for each material whose Young's modulus is needed and left out.
+
+        Args:
+            why: Ends the sentence "must be given in Pa ...".
+        """
+        return list(_missing(self, "young_modulus", "Pa", why))
+
+    def _sum(self, factor: Callable[[Material], float], power: int) -> float:
+        """Σ factor · (b^n - a^n) over the layers between the ratios a and b."""
+        return sum(
+            factor(layer.material) * (layer.outer_ratio**power - layer.inner_ratio**power)
+            for layer in self.layers
+        )
+
+
+def _modulus(material: Material) -> float:
+    return 1.0 if material.young_modulus is None else material.young_modulus
+
+
+def _modulus_faults(section: Section) -> Iterator[Fault]:
+    first, *others = (layer.material for layer in section.layers)
+    if not all(first.same_matter(other) for other in others):
+        yield from section.modulus_faults("where materials differ")
+
+
+def _missing(section: Section, field: str, unit: str, why: str) -> Iterator[Fault]:
+    """A fault for each material of the section that lacks a field."""
+    allowed = f"must be given in {unit} {why}"
+    if section.core is not None and getattr(section.core, field) is None:
+        yield Fault(f"core.{field}", None, allowed)
+    for k, ring in enumerate(section.rings):
+        if getattr(ring.material, field) is None:
+            yield Fault(f"rings[{k}].material.{field}", None, allowed)

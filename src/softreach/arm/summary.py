@@ -9,8 +9,16 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.actuators import FiberArchitecture, Outline
+from softreach.arm.along import AlongArm
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.tables import check_extension, curvature_range, extension_range, tables
+from softreach.arm.tables import (
+    both_sides,
+    check_extension,
+    curvature_range,
+    extension_range,
+    tables,
+)
 
 __all__ = ["DesignSummary", "describe", "design_warnings"]
 
@@ -22,7 +30,7 @@ class DesignSummary:
     """The numbers that a design implies."""
 
     helical_angles: Array
-    """α of each architecture [rad]."""
+    """α of each architecture where it begins [rad]."""
     revolutions: Array
     """Ω of each architecture [rad]."""
     base_radius: float
@@ -52,16 +60,21 @@ def describe(arm: Manipulator) -> DesignSummary:
     tip_radius = float(arm.profile.radius(arm.length))
     body = arm.profile, arm.section
     return DesignSummary(
-        helical_angles=np.array([fiber.helical_angle_on(*body) for fiber in arm.fibers]),
+        helical_angles=np.array([_angle_at_start(fiber, arm) for fiber in arm.fibers]),
         revolutions=np.array([fiber.revolution_on(*body) for fiber in arm.fibers]),
         base_radius=float(arm.profile.radius(0.0)),
         tip_radius=tip_radius,
-        radius_ratio=arm.section.rings[0].inner_ratio,
+        radius_ratio=arm.section.inner_ratio,
         taper_ratio=float(arm.profile.radius(0.0)) / tip_radius,
         extension=extension_range(arm),
         curvature=(_smallest_bending(arm) * arm.length, float(bending.max() * arm.length)),
         warnings=design_warnings(arm),
     )
+
+
+def _angle_at_start(fiber: FiberArchitecture, arm: Manipulator) -> float:
+    angle = fiber.helical_angle_on(arm.profile, arm.section)
+    return float(angle(fiber.start_over_length)) if isinstance(angle, AlongArm) else angle
 
 
 def design_warnings(arm: Manipulator) -> tuple[str, ...]:
@@ -112,8 +125,10 @@ def _large_activations(arm: Manipulator) -> Iterator[str]:
 
 def _overlaps(arm: Manipulator) -> Iterator[str]:
     """Pairs of bundles whose sectors meet between base and tip."""
+    z = both_sides(arm, arm.profile.station(np.linspace(0.0, arm.profile.slender_length, 201)))
+    outline = arm.outline(z)
     for first, second in combinations(range(arm.bundles), 2):
-        depth, place = _overlap(arm, first, second)
+        depth, place = _overlap(outline, z, first, second)
         if depth > 1e-9:
             names = f"{arm.bundle_names[first]} and {arm.bundle_names[second]}"
             yield (
@@ -122,35 +137,39 @@ def _overlaps(arm: Manipulator) -> Iterator[str]:
             )
 
 
-def _overlap(arm: Manipulator, first: int, second: int) -> tuple[float, float]:
+def _overlap(outline: Outline, z: Array, first: int, second: int) -> tuple[float, float]:
     """Largest overlap of two sectors [rad] and the first Z where they overlap [m].
 
-    Their angular distance is linear in S: no sampling is needed.
+    Between stations their angular distance is taken to be linear.
     """
-    outline = arm.outline([0.0, arm.length])
-    extent = outline.extent[[first, second]].mean()
-    start, end = outline.center[:, second] - outline.center[:, first]
-    if abs(end - start) < 1e-12:
-        apart = abs(_wrapped(start))
-        return extent - apart, 0.0
-    full = 2 * np.pi
-    turns = full * np.arange(np.floor(min(start, end) / full), max(start, end) / full + 2)
-    nearest = np.clip(turns, min(start, end), max(start, end))
-    depth = float((extent - np.abs(nearest - turns)).max())
-    return depth, _first_contact(arm, start, end, extent)
+    pair = [first, second]
+    shares = outline.acts[:, pair].all(axis=1) & (
+        outline.inner_ratio[:, pair].max(axis=1) < outline.outer_ratio[:, pair].min(axis=1)
+    )
+    if not shares.any() or {outline.shape[k] for k in pair} != {"sector"}:
+        return 0.0, 0.0
+    extent = outline.extent[pair].mean()
+    apart = outline.center[:, second] - outline.center[:, first]
+    depth = extent - np.abs(_wrapped(apart))
+    # Where the distance passes a whole turn between two stations, the overlap there is complete.
+    turns = np.round(apart / (2 * np.pi))
+    passes = (np.diff(np.sign(apart - 2 * np.pi * turns)) != 0) & (np.diff(turns) == 0)
+    deepest = np.where(np.append(passes, False), extent, depth)
+    deepest[~shares] = -np.inf
+    return float(deepest.max()), _first_contact(z, depth, shares)
 
 
-def _first_contact(arm: Manipulator, start: float, end: float, extent: float) -> float:
-    """Z at which the distance first falls to the mean extent."""
-    gap = _wrapped(start)
-    if abs(gap) <= extent:
-        return 0.0
-    toward = np.sign(end - start)
-    travel = (2 * np.pi - toward * gap) % (2 * np.pi) - extent
-    s = arm.profile.slender_length * travel / abs(end - start)
-    return float(np.clip(arm.profile.station(s), 0.0, arm.length))
+def _first_contact(z: Array, depth: Array, shares: NDArray[np.bool_]) -> float:
+    """Z at which the overlap begins [m]."""
+    here = shares & (depth > 0)
+    if not here.any():
+        return float(z[shares][0])
+    first = int(np.argmax(here))
+    if first == 0 or not shares[first - 1]:
+        return float(z[first])
+    return float(np.interp(0.0, depth[first - 1 : first + 1], z[first - 1 : first + 1]))
 
 
-def _wrapped(angle: float) -> float:
-    """The angle in [-π, π)."""
-    return float((angle + np.pi) % (2 * np.pi) - np.pi)
+def _wrapped(angle: Array) -> Array:
+    """The angles in [-π, π)."""
+    return (angle + np.pi) % (2 * np.pi) - np.pi

@@ -7,14 +7,25 @@ profile or material changes these tables, and nothing that reads them.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arm.actuators import Actuator, Resultants
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import Fault, InvalidDesign
 
-__all__ = ["Tables", "check_extension", "curvature_range", "extension_range", "tables"]
+__all__ = [
+    "Compliance",
+    "Tables",
+    "both_sides",
+    "check_extension",
+    "compliance",
+    "curvature_range",
+    "extension_range",
+    "tables",
+]
 
 Array = NDArray[np.float64]
 
@@ -41,7 +52,7 @@ def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
         stations: Z [m], shape (station,).
     """
     z = np.atleast_1d(np.asarray(stations, float))
-    loads = [actuator.resultants(arm.profile, arm.section, z) for actuator in arm.actuators]
+    loads = [_resultants(actuator, arm, z) for actuator in arm.actuators]
     stiffness = arm.section.stiffness(arm.profile.radius(z))
     resistance = np.stack([stiffness.bending, stiffness.bending, stiffness.torsion], axis=1)
     return Tables(
@@ -49,6 +60,37 @@ def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
         np.concatenate([load.force for load in loads], axis=1) / stiffness.axial[:, None],
         np.concatenate([load.moment for load in loads], axis=2) / resistance[..., None],
     )
+
+
+def _resultants(actuator: Actuator, arm: Manipulator, z: Array) -> Resultants:
+    """What an actuator puts on the sections: nothing outside the stretch on which it acts."""
+    load, acts = actuator.resultants(arm.profile, arm.section, z), actuator.acts(arm.profile, z)
+    if acts.all():
+        return load
+    return Resultants(np.where(acts, load.force, 0.0), np.where(acts[:, None], load.moment, 0.0))
+
+
+class Compliance(NamedTuple):
+    """How sections yield to loads, one value for each station."""
+
+    axial: Array
+    """1/K0 [1/N]."""
+    bending: Array
+    """1/K1 = 1/K2 [1/(N m²)]."""
+    torsion: Array
+    """1/K3 [1/(N m²)]."""
+
+
+def compliance(arm: Manipulator, stations: ArrayLike) -> Compliance:
+    """1/K0, 1/K1 and 1/K3 at stations Z [m].
+
+    Raises:
+        InvalidDesign: A material without Young's modulus.
+    """
+    if faults := arm.section.modulus_faults("where loads act"):
+        raise InvalidDesign(faults)
+    stiffness = arm.section.stiffness(arm.profile.radius(np.asarray(stations, float)))
+    return Compliance(*(1.0 / value for value in stiffness))
 
 
 def check_extension(arm: Manipulator) -> None:
@@ -88,7 +130,13 @@ def curvature_range(arm: Manipulator) -> tuple[Array, Array]:
     return table.stations, np.linalg.norm(reached, axis=-1).max(axis=1)
 
 
+def both_sides(arm: Manipulator, stations: Array) -> Array:
+    """The stations [m], and both sides of every breakpoint of the arm, ascending."""
+    if not arm.breakpoints:
+        return stations
+    breaks = np.array(arm.breakpoints)
+    return np.union1d(stations, np.append(breaks, np.nextafter(breaks, 0.0)))
+
+
 def _stations(arm: Manipulator) -> Array:
-    """Even stations, and those where the profile breaks."""
-    even = np.linspace(0.0, arm.length, _STATIONS)
-    return np.union1d(even, arm.profile.breakpoints) if arm.profile.breakpoints else even
+    return both_sides(arm, np.linspace(0.0, arm.length, _STATIONS))

@@ -66,19 +66,24 @@ class FreeRod(TipMap):
         """How the arm is cut into steps."""
         return StepRule(self.arm, self.box)
 
-    @cached_property
+    @property
     def steps(self) -> int:
-        """The number of steps that `tol` needs."""
+        """The number of steps that `tol` needs, those that end at breakpoints included."""
+        return len(self.rule.edges(self._fineness)) - 1
+
+    @cached_property
+    def _fineness(self) -> int:
+        """Uniform steps in S, of which none may be longer."""
         return self.rule.steps_for(self.tol)
 
     @cached_property
     def _shape_steps(self) -> int:
         """Steps with which `tol` holds all along the arm, and directors lose no digits."""
-        return max(self.steps, self.rule.steps_for_shapes(self.tol))
+        return max(self._fineness, self.rule.steps_for_shapes(self.tol))
 
     @cached_property
     def _table(self) -> Array:
-        return self.rule.packed_nodes(self.steps)
+        return self.rule.packed_nodes(self._fineness)
 
     def fill_tips(self, gamma: Array, out: Array) -> None:
         """Put the tips [m] of checked activations into `out`, (n, 3), on the calling thread."""
@@ -146,6 +151,6 @@ class FreeRod(TipMap):
 
     @cached_property
     def _tip_table(self) -> tuple[Array, NDArray[np.int64]]:
-        steps = max(self.steps, self.rule.fewest_for_frames)
+        steps = max(self._fineness, self.rule.fewest_for_frames)
         nodes, ends = self.rule.station_nodes(np.array([self.length]), steps)
         return rod.pack(*nodes), ends

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.tables import tables
+from softreach.arm.tables import both_sides, tables
 from softreach.rod.activation_box import ActivationBox
 
 __all__ = ["Linearization"]
@@ -34,7 +34,7 @@ class Linearization:
     def __init__(self, arm: Manipulator, box: ActivationBox) -> None:
         # Even in S, in which the response of a tapered arm is even.
         s = np.linspace(0.0, arm.profile.slender_length, _STATIONS)
-        table = tables(arm, np.union1d(arm.profile.station(s), arm.profile.breakpoints or ()))
+        table = tables(arm, both_sides(arm, arm.profile.station(s)))
         self.stations, self.curvature = table.stations, table.curvature
         self.stretch = np.abs(table.extension)
         middle, half = 0.5 * (box.low + box.high), 0.5 * box.widths

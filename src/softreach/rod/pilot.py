@@ -57,16 +57,23 @@ def _bending_corners(arm: Manipulator) -> Array:
     vertex toward a heading has every bundle at the bound that helps. Along the arm the heading
     turns as the fibers of each bundle do, or not at all.
     """
-    z = np.linspace(0.0, arm.length, _STATIONS)
+    z = _stations(arm)
     plane = tables(arm, z).curvature[:, :2]
     start = 2.0 * np.pi * np.arange(_HEADINGS) / _HEADINGS
     directions = np.unwrap(np.arctan2(plane[:, 1], plane[:, 0]), axis=0)
-    turns = np.concatenate([np.zeros((_STATIONS, 1)), directions - directions[0]], axis=1)
+    turns = np.concatenate([np.zeros((len(z), 1)), directions - directions[0]], axis=1)
     turns = np.unique(turns.round(9), axis=1)
     heading = start[:, None, None] + turns.T  # (heading, turn, station)
     along = np.einsum("htsc,scb->htsb", np.stack([np.cos(heading), np.sin(heading)], -1), plane)
     helps = np.concatenate([along.reshape(-1, arm.bundles), along.sum(2).reshape(-1, arm.bundles)])
     return np.unique((helps > 0).astype(float), axis=0)
+
+
+def _stations(arm: Manipulator) -> Array:
+    """Even ones, and one within each smooth stretch of the arm."""
+    ends = np.array([0.0, *arm.breakpoints, arm.length])
+    even = np.linspace(0.0, arm.length, _STATIONS)
+    return np.union1d(even, 0.5 * (ends[1:] + ends[:-1])) if arm.breakpoints else even
 
 
 def worsened(

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.tables import tables
+from softreach.arm.tables import both_sides, tables
 from softreach.errors import InvalidInput
 from softreach.kernels import frames, magnus, rod
 from softreach.rod.activation_box import ActivationBox
@@ -48,10 +48,36 @@ class Nodes(NamedTuple):
 
 @dataclass(frozen=True)
 class StepRule:
-    """Steps along an arm, uniform in the slender coordinate S, in which bending is even."""
+    """Steps along an arm, uniform in the slender coordinate S, in which bending is even.
+
+    Wherever the arm is not smooth, a step ends: within a step everything is, so that the order of
+    the integrator stays.
+    """
 
     arm: Manipulator
     box: ActivationBox
+
+    def edges(self, steps: int) -> Array:
+        """Step boundaries S [-] from base to tip, with no step longer than `steps` uniform ones."""
+        return self._between(self._breaks, steps)
+
+    @cached_property
+    def _breaks(self) -> Array:
+        """S at the base, at every breakpoint and at the tip."""
+        profile = self.arm.profile
+        inside = profile.slender_coordinate(np.array(self.arm.breakpoints))
+        return np.array([0.0, *inside, profile.slender_length])
+
+    def _between(self, marks: Array, steps: int) -> Array:
+        """Step boundaries that hold all marks, the first and the last of which are the ends."""
+        gaps = np.diff(marks)
+        pieces = zip(marks[:-1], gaps, self._counts(gaps, steps), strict=True)
+        edges = [start + gap * np.arange(n) / n for start, gap, n in pieces]
+        return np.concatenate([*edges, marks[-1:]])
+
+    def _counts(self, gaps: Array, steps: int) -> NDArray[np.int64]:
+        """Steps in each gap of S; a gap that only rounding makes longer takes no more for it."""
+        return np.ceil(gaps * (steps / self.arm.profile.slender_length) - 1e-9).astype(np.int64)
 
     def nodes(self, edges: ArrayLike) -> Nodes:
         """Tables at the Gauss nodes of the steps between `edges`, uniform in S within each step.
@@ -71,11 +97,20 @@ class StepRule:
         )
 
     def packed_nodes(self, steps: int) -> Array:
-        """Packed tables of `steps` uniform steps from base to tip, read-only."""
-        edges = np.linspace(0.0, self.arm.profile.slender_length, steps + 1)
+        """Packed tables of the steps from base to tip, read-only."""
+        return self._packed(self.edges(steps))
+
+    def _packed(self, edges: Array) -> Array:
         table = rod.pack(*self.nodes(edges))
         table.setflags(write=False)
         return table
+
+    def _halves(self, steps: int) -> tuple[Array, Array]:
+        """Packed tables of the steps, and of both halves of each."""
+        edges = self.edges(steps)
+        middles = 0.5 * (edges[:-1] + edges[1:])
+        halved = np.append(np.column_stack([edges[:-1], middles]).ravel(), edges[-1])
+        return self._packed(edges), self._packed(halved)
 
     def station_nodes(self, stations: Array, steps: int) -> tuple[Nodes, NDArray[np.int64]]:
         """Nodes of a grid with a step boundary at every station, and the steps up to each.
@@ -83,12 +118,10 @@ class StepRule:
         No step is longer in S than those of `steps` uniform ones, so their tolerance holds.
         """
         s = self.arm.profile.slender_coordinate(stations)
-        gaps = np.diff(s, prepend=0.0)
-        counts = np.ceil(gaps / (self.arm.profile.slender_length / steps)).astype(np.int64)
-        starts = s - gaps
-        pieces = zip(starts, gaps, counts, strict=True)
-        edges = [start + gap * np.arange(n) / n for start, gap, n in pieces if n]
-        return self.nodes(np.concatenate([*edges, s[-1:]])), np.cumsum(counts)
+        inside = self._breaks[self._breaks < s[-1]]
+        marks = np.unique(np.concatenate([inside, s]))
+        ends = np.cumsum(np.append(0, self._counts(np.diff(marks), steps)))
+        return self.nodes(self._between(marks, steps)), ends[np.searchsorted(marks, s)]
 
     def steps_for(self, tol: float) -> int:
         """The number of uniform steps in S for which no tip is off by more than `tol`.
@@ -143,7 +176,7 @@ class StepRule:
     def _largest_turn(self) -> float:
         """Largest ζ |u| R2 over the pilot samples and the arm, times S(L) [rad]."""
         profile, gamma = self.arm.profile, self.pilot
-        z = profile.station(np.linspace(0.0, profile.slender_length, 65))
+        z = both_sides(self.arm, profile.station(np.linspace(0.0, profile.slender_length, 65)))
         table = tables(self.arm, z)
         bend = np.linalg.norm(np.einsum("scb,nb->nsc", table.curvature, gamma), axis=-1)
         rate = (1.0 + gamma @ table.extension.T) * bend * profile.radius(z)
@@ -156,7 +189,7 @@ class StepRule:
 
     def _tip_differences(self, steps: int) -> Differences:
         """Distances [m] between the tips with `steps` and with twice as many."""
-        coarse, fine = self.packed_nodes(steps), self.packed_nodes(2 * steps)
+        coarse, fine = self._halves(steps)
 
         def difference(gamma: Array) -> Array:
             places = np.empty((2, len(gamma), 3))
@@ -168,7 +201,8 @@ class StepRule:
 
     def _shape_differences(self, steps: int) -> Differences:
         """Largest distances [m] along the centerlines with `steps` and with twice as many."""
-        coarse, fine = self.packed_nodes(steps), self.packed_nodes(2 * steps)
+        coarse, fine = self._halves(steps)
+        steps = len(self.edges(steps)) - 1
         ends = np.arange(1, steps + 1)
 
         def of_block(gamma: Array) -> Array:

@@ -1,6 +1,20 @@
 """What drives an arm: one file for each kind of actuator."""
 
 from softreach.arm.actuators.actuator import Actuator, Outline, Resultants
+from softreach.arm.actuators.chamber import Chamber
 from softreach.arm.actuators.fiber import FiberArchitecture
+from softreach.arm.actuators.muscle import ObliqueMuscle, RadialMuscle
+from softreach.arm.actuators.sector import SectorActuator
+from softreach.arm.actuators.tendon import Tendon
 
-__all__ = ["Actuator", "FiberArchitecture", "Outline", "Resultants"]
+__all__ = [
+    "Actuator",
+    "Chamber",
+    "FiberArchitecture",
+    "ObliqueMuscle",
+    "Outline",
+    "RadialMuscle",
+    "Resultants",
+    "SectorActuator",
+    "Tendon",
+]

@@ -91,9 +91,10 @@ class Draft:
         return arm.replace(**parts)
 
     def _section(self) -> Section:
-        (ring,) = self.arm.section.rings
+        ring, *others = self.arm.section.rings
         material = replace(ring.material, **self.material)
-        return replace(self.arm.section, rings=(replace(ring, material=material, **self.ring),))
+        changed = replace(ring, material=material, **self.ring)
+        return replace(self.arm.section, rings=(changed, *others))
 
 
 def _made(make: Callable[[], Part], prefix: str, faults: list[Fault]) -> Part | None:

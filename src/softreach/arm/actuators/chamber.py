@@ -1,0 +1,133 @@
+"""Pressure chambers: channels along the arm whose fluid pushes at their ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.actuators.actuator import STRETCH, Actuator, Outline, Resultants
+from softreach.arm.checks import FIBER_RANGES, chamber_faults
+from softreach.arm.profile import Profile
+from softreach.arm.section import Section
+from softreach.arm.variable import Variable
+from softreach.errors import Fault, Range
+
+__all__ = ["Chamber"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chamber(Actuator):
+    """A round channel parallel to the axis, or several evenly around it.
+
+    Its activation is the pressure P [Pa] above that outside. Sizes are ratios to R2(Z), or lengths
+    that stay the same along the arm. That the channel takes matter out of the section is not
+    counted: give its ring the modulus of what is left.
+
+    Raises:
+        InvalidDesign: A field is out of its range, or not exactly one of `radius` and
+            `radius_ratio`, or of `distance` and `distance_ratio`, is given.
+    """
+
+    unit: ClassVar[str] = "Pa"
+    symbol: ClassVar[str] = "P"
+    variables: ClassVar[tuple[Variable, ...]] = (
+        Variable("distance", "ρc", "distance of its center from the axis", Range(0.0, unit="m")),
+        Variable("distance_ratio", "ρc/R2", "distance from the axis over R2", Range(0.0)),
+        Variable("radius", "a", "radius of the channel", Range(0.0, unit="m", open_low=True)),
+        Variable(
+            "radius_ratio", "a/R2", "radius of the channel over R2", Range(0.0, 1.0, open_low=True)
+        ),
+        Variable(
+            "area_factor", "A/πa²", "effective over geometric area", Range(0.0, open_low=True)
+        ),
+        Variable("offset", "θ0", "polar angle of the first chamber", FIBER_RANGES["offset"]),
+        Variable("bundles", "n", "number of chambers", FIBER_RANGES["bundles"]),
+        *STRETCH,
+    )
+    default_name: ClassVar[str] = "chamber"
+    validity: ClassVar[str] = (
+        "Exact for thin-walled channels that do not widen; else calibrate `area_factor`."
+    )
+
+    distance: float | None = None
+    """ρc, of the center from the axis [m]."""
+    distance_ratio: float | None = None
+    """ρc over the outer radius R2(Z) [-]."""
+    radius: float | None = None
+    """a, radius of the channel [m]."""
+    radius_ratio: float | None = None
+    """a over the outer radius R2(Z) [-]."""
+    area_factor: float = 1.0
+    """Effective area over π a² [-], from a measurement; 1 where the channel does not widen."""
+    offset: float = 0.0
+    """θ0, polar angle of the first chamber [rad]."""
+
+    def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
+        """N = A and M = p × A e3 with the effective area A(Z) and the center p(Z)."""
+        del section
+        area = np.pi * self.area_factor * self._radius(profile, z) ** 2
+        arm = area * self._distance(profile, z)
+        angle = self.offset + self._starts()
+        along = np.zeros((len(z), self.bundles))
+        moment = [arm[:, None] * np.sin(angle), -arm[:, None] * np.cos(angle), along]
+        return Resultants(area[:, None] + along, np.stack(moment, axis=1))
+
+    def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
+        """Round lumens."""
+        del section
+        each, outer = np.ones(self.bundles), profile.radius(z)
+        distance, radius = self._distance(profile, z), self._radius(profile, z)
+        share = float(np.max(radius / np.maximum(distance, radius)))
+        return Outline(
+            center=np.broadcast_to(self.offset + self._starts(), (len(z), self.bundles)),
+            extent=2.0 * np.arcsin(share) * each,
+            inner_ratio=((distance - radius) / outer)[:, None] * each,
+            outer_ratio=((distance + radius) / outer)[:, None] * each,
+            shape=("lumen",) * self.bundles,
+            acts=self.acts(profile, z),
+        )
+
+    def section_faults(self, profile: Profile, section: Section) -> list[Fault]:
+        """Moduli that its forces need."""
+        del profile
+        return section.modulus_faults(f"for chamber {self.name!r}, whose activation is in Pa")
+
+    def replace(self, **changes: Any) -> Chamber:
+        """A copy with some fields changed; a new length takes the place of its ratio."""
+        for length, ratio in (("distance", "distance_ratio"), ("radius", "radius_ratio")):
+            if changes.get(length) is not None:
+                changes.setdefault(ratio, None)
+            if changes.get(ratio) is not None:
+                changes.setdefault(length, None)
+        return super().replace(**changes)
+
+    def value_on(self, field: str, profile: Profile, section: Section) -> Any:
+        """Value of a variable; of a length and its ratio, the one not given follows at the base."""
+        del section
+        base = np.array([0.0])
+        if field in ("distance", "distance_ratio"):
+            length = float(self._distance(profile, base)[0])
+        elif field in ("radius", "radius_ratio"):
+            length = float(self._radius(profile, base)[0])
+        else:
+            return getattr(self, field)
+        return length / float(profile.radius(0.0)) if field.endswith("_ratio") else length
+
+    def _distance(self, profile: Profile, z: Array) -> Array:
+        return _length(self.distance, self.distance_ratio, profile, z)
+
+    def _radius(self, profile: Profile, z: Array) -> Array:
+        return _length(self.radius, self.radius_ratio, profile, z)
+
+    def _faults(self) -> list[Fault]:
+        return super()._faults() + chamber_faults(vars(self))
+
+
+def _length(length: float | None, ratio: float | None, profile: Profile, z: Array) -> Array:
+    """A length that is constant, or in proportion to R2(Z) [m]."""
+    return ratio * profile.radius(z) if ratio is not None else np.full(len(z), length)

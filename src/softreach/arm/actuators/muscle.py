@@ -1,0 +1,101 @@
+"""Muscles of a muscular hydrostat, such as an elephant's trunk: oblique and radial ones.
+
+Kaczmarski, Leanza, Zhao, Kuhl, Moulton and Goriely, J. Mech. Phys. Solids (2025) 106102.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.actuators.actuator import STRETCH
+from softreach.arm.actuators.cone import cone_integrals
+from softreach.arm.actuators.ring_integrals import RingIntegrals
+from softreach.arm.actuators.sector import SectorActuator
+from softreach.arm.checks import FIBER_RANGES, angle_faults
+from softreach.arm.profile import Profile
+from softreach.arm.section import Section
+from softreach.arm.variable import Variable
+from softreach.errors import Fault
+
+__all__ = ["ObliqueMuscle", "RadialMuscle"]
+
+Array = NDArray[np.float64]
+
+_SECTOR = (
+    Variable("offset", "θ0", "polar angle of the first bundle", FIBER_RANGES["offset"]),
+    Variable("extent", "σ", "angular extent of a bundle", FIBER_RANGES["extent"]),
+    Variable("bundles", "n", "number of bundles", FIBER_RANGES["bundles"]),
+    *STRETCH,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObliqueMuscle(SectorActuator):
+    """Fibers that run at an angle across a sector which does not wind.
+
+    They leave the sector at one side while others enter at the other, so that the muscle stays in
+    its place and twists the arm: theory (4) with Θ(Z) = 0 and the α of its fibers.
+
+    Raises:
+        InvalidDesign: A field is out of its range.
+    """
+
+    variables: ClassVar[tuple[Variable, ...]] = (
+        Variable("helical_angle", "α", "angle of its fibers", FIBER_RANGES["helical_angle"]),
+        *_SECTOR,
+    )
+    default_name: ClassVar[str] = "oblique muscle"
+    validity: ClassVar[str] = (
+        "As for fibers; the ends of those fibers that leave the sector between base and tip are "
+        "taken to hang on to the matrix."
+    )
+
+    helical_angle: float
+    """α of its fibers from the axis, at the outer radius of the ring [rad]; 0 is longitudinal."""
+
+    def integrals(self, profile: Profile, section: Section, z: Array) -> RingIntegrals:
+        """I0, I1, I3 with the local taper and the angle of the fibers: theory (3)."""
+        angle = np.full(len(z), self.helical_angle)
+        return cone_integrals(section.ring(self.ring), profile.slope(z), angle)
+
+    def rotation(self, profile: Profile, section: Section, z: Array) -> Array:
+        """Zero: the sector stays in its place."""
+        del profile, section
+        return np.zeros(len(z))
+
+    def _faults(self) -> list[Fault]:
+        return super()._faults() + angle_faults(self.helical_angle)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RadialMuscle(SectorActuator):
+    """Fibers along the radius of a sector: contracting them (γ < 0) makes the arm longer.
+
+    A radial strain γ stretches an elastic section by -ν γ along the axis wherever it acts, so that
+    k = -ν in theory (3): N = -ν E σ (R2² - R1²)/2 γ, and a moment unless the sectors go all around.
+
+    Raises:
+        InvalidDesign: A field is out of its range.
+    """
+
+    variables: ClassVar[tuple[Variable, ...]] = _SECTOR
+    default_name: ClassVar[str] = "radial muscle"
+    validity: ClassVar[str] = "As for fibers; the change of radius itself is left out."
+
+    def integrals(self, profile: Profile, section: Section, z: Array) -> RingIntegrals:
+        """I0 = -ν (1 - ρ²)/2, I1 = -ν (1 - ρ³)/3, I3 = 0 [-]."""
+        del profile
+        ring = section.ring(self.ring)
+        nu, rho, each = ring.material.poisson_ratio, ring.radius_ratio, np.ones(len(z))
+        return RingIntegrals(
+            -nu * (1.0 - rho**2) / 2.0 * each, -nu * (1.0 - rho**3) / 3.0 * each, 0.0 * each
+        )
+
+    def rotation(self, profile: Profile, section: Section, z: Array) -> Array:
+        """Zero: the sector stays in its place."""
+        del profile, section
+        return np.zeros(len(z))

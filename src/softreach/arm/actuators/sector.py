@@ -1,0 +1,118 @@
+"""Bundles that fill sectors of a ring and contract it: fibers and muscles."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.actuators.actuator import Actuator, Bounds, Outline, Resultants
+from softreach.arm.actuators.ring_integrals import RingIntegrals
+from softreach.arm.checks import sector_faults
+from softreach.arm.profile import Profile
+from softreach.arm.section import Section
+from softreach.errors import Fault, InvalidDesign, InvalidInput
+
+__all__ = ["SectorActuator"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SectorActuator(Actuator):
+    """Equidistant bundles of one extent in one ring; γ < 0 contracts."""
+
+    extent: float
+    """σ, angular extent of every bundle [rad]; 0 < σ ≤ 2π."""
+    offset: float = 0.0
+    """θ0, polar angle of the center of the first bundle where it begins [rad]."""
+    ring: int | str = 0
+    """Which ring of the section it is in: index or name."""
+    activation_bounds: Bounds = (-5 / 3, 0.0)
+    """(lower, upper) of γ for every bundle, or one pair per bundle [-]; γ < 0 contracts."""
+
+    @abstractmethod
+    def integrals(self, profile: Profile, section: Section, z: Array) -> RingIntegrals:
+        """I0, I1, I3 at stations Z [m], each of shape (station,): theory (3)."""
+
+    @abstractmethod
+    def rotation(self, profile: Profile, section: Section, z: Array) -> Array:
+        """Θ(Z) [rad]: how far the sectors have turned at stations Z [m] from where they begin."""
+
+    def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
+        """N = E R2² I0 σ and M = E R2³ (I1 a sin θ, -I1 a cos θ, I3 σ), a = 2 sin(σ/2): theory (4).
+
+        R2 and E are the outer radius and Young's modulus of the ring.
+        """
+        ring = section.ring(self.ring)
+        radius, scale = profile.radius(z) * ring.outer_ratio, np.pi * ring.modulus
+        axial, bending, torsion = self.integrals(profile, section, z)
+        theta = self.angles(profile, section, z)
+        share, mean = self.extent / np.pi, 2.0 * np.sin(self.extent / 2.0) / np.pi
+        bend = (scale * radius**3 * bending * mean)[:, None]
+        twist = (scale * radius**3 * torsion * share)[:, None]
+        moment = [bend * np.sin(theta), -bend * np.cos(theta), np.broadcast_to(twist, theta.shape)]
+        force = (scale * radius**2 * axial * share)[:, None]
+        return Resultants(np.broadcast_to(force, theta.shape), np.stack(moment, axis=1))
+
+    def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
+        """The sectors of the bundles."""
+        ring, each = section.ring(self.ring), np.ones(self.bundles)
+        center = self.angles(profile, section, z)
+        return Outline(
+            center=center,
+            extent=self.extent * each,
+            inner_ratio=np.full(center.shape, ring.inner_ratio),
+            outer_ratio=np.full(center.shape, ring.outer_ratio),
+            shape=("sector",) * self.bundles,
+            acts=self.acts(profile, z),
+        )
+
+    def section_faults(self, profile: Profile, section: Section) -> list[Fault]:
+        """A ring that the section does not have."""
+        del profile
+        try:
+            section.ring(self.ring)
+        except InvalidDesign as error:
+            return list(error.faults)
+        return []
+
+    def angles(self, profile: Profile, section: Section, z: Array) -> Array:
+        """θ0 + 2πj/n + Θ(Z) [rad], shape (station, bundle): theory (11)."""
+        return self.offset + self._starts() + self.rotation(profile, section, z)[:, None]
+
+    def split(self, count: int, *, keep_extent: bool = True) -> tuple[Self, ...]:
+        """Several actuators of one bundle in place of this one, evenly about its center.
+
+        Args:
+            count: How many.
+            keep_extent: True gives each the extent σ of the original, one extent apart; False its
+                share σ / count, so that together they fill the sector of the original.
+
+        Returns:
+            The parts, named "NAME 1", "NAME 2", ...; they have the winding and the bounds of the
+            original.
+
+        Raises:
+            InvalidInput: Several bundles, which are independent already, or a count below 1.
+        """
+        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
+            raise InvalidInput("count", count, "a whole number >= 1")
+        if self.bundles != 1:
+            hint = "its bundles are independent already"
+            raise InvalidInput(f"{self.name}.bundles", self.bundles, "1 to be split", hint)
+        return tuple(self._parts(int(count), keep_extent)) if count > 1 else (self,)
+
+    def _parts(self, count: int, keep_extent: bool) -> Iterator[Self]:
+        extent = self.extent if keep_extent else self.extent / count
+        for k in range(count):
+            offset = self.offset + (k - (count - 1) / 2) * extent
+            name = f"{self.name} {k + 1}" if self.name else ""
+            yield self.replace(name=name, offset=offset, extent=extent)
+
+    def _faults(self) -> list[Fault]:
+        return super()._faults() + sector_faults(vars(self))

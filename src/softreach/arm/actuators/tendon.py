@@ -1,0 +1,157 @@
+"""Tendons: cables that pull between where they enter and where they are anchored."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.actuators.actuator import STRETCH, Actuator, Outline, Resultants
+from softreach.arm.along import AlongArm, Samples
+from softreach.arm.checks import FIBER_RANGES, tendon_faults
+from softreach.arm.profile import Profile
+from softreach.arm.section import Section
+from softreach.arm.variable import Variable
+from softreach.errors import Fault, Range
+
+__all__ = ["Tendon"]
+
+Array = NDArray[np.float64]
+
+
+class _Route(NamedTuple):
+    """Polar coordinates of the tendons and their slopes along the arm."""
+
+    distance: Array
+    """ρt(Z) [m], shape (station, 1)."""
+    distance_slope: Array
+    """ρt'(Z) [-], shape (station, 1)."""
+    angle: Array
+    """θ(Z) [rad], shape (station, bundle)."""
+    angle_slope: Array
+    """θ'(Z) [rad/m], shape (station, 1)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tendon(Actuator):
+    """A tendon without friction at p = ρt (cos θ, sin θ, 0) of every section, or several evenly.
+
+    Its activation is the tension τ [N]. Give either the distance from the axis or its ratio to
+    R2(Z); it may lie outside of the arm, where disks hold it.
+
+    Raises:
+        InvalidDesign: A field is out of its range, both or neither of `distance` and
+            `distance_ratio` are given, or a tension below zero is allowed.
+    """
+
+    unit: ClassVar[str] = "N"
+    symbol: ClassVar[str] = "τ"
+    variables: ClassVar[tuple[Variable, ...]] = (
+        Variable("distance", "ρt", "distance from the axis", Range(0.0, unit="m")),
+        Variable("distance_ratio", "ρt/R2", "distance from the axis over R2", Range(0.0)),
+        Variable("offset", "θ0", "polar angle where it begins", FIBER_RANGES["offset"]),
+        Variable("revolution", "Ω", "rotation from end to end", FIBER_RANGES["revolution"]),
+        Variable("bundles", "n", "number of tendons", FIBER_RANGES["bundles"]),
+        *STRETCH,
+    )
+    default_name: ClassVar[str] = "tendon"
+    validity: ClassVar[str] = (
+        "Exact for tendons parallel to the axis. Other tendons pull along their direction at rest, "
+        "so that the error grows with curvature times the distance from the axis."
+    )
+
+    distance: float | Samples | None = None
+    """ρt, from the axis [m]; a number, or samples along the arm."""
+    distance_ratio: float | None = None
+    """ρt over the outer radius R2(Z) [-]."""
+    offset: float = 0.0
+    """θ0, polar angle of the first tendon where it begins [rad]."""
+    revolution: float = 0.0
+    """Ω, rotation from where it begins to its anchor, even along Z [rad]."""
+    routing: Samples | None = None
+    """θ(Z) - θ0 along the arm [rad], in place of an even rotation."""
+
+    def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
+        """N = -t3 and M = -p × t with the unit tangent t = (p' + e3)/|p' + e3| at rest."""
+        del section
+        route = self._route(profile, z)
+        cos, sin = np.cos(route.angle), np.sin(route.angle)
+        around = route.distance * route.angle_slope
+        x, y = route.distance * cos, route.distance * sin
+        t1 = route.distance_slope * cos - around * sin
+        t2 = route.distance_slope * sin + around * cos
+        t3 = 1.0 / np.sqrt(1.0 + t1**2 + t2**2)
+        moment = np.stack([-y * t3, x * t3, (y * t1 - x * t2) * t3], axis=1)
+        return Resultants(-t3, moment)
+
+    def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
+        """Lines along the arm."""
+        del section
+        route = self._route(profile, z)
+        ratio = route.distance / profile.radius(z)[:, None] * np.ones(self.bundles)
+        return Outline(
+            center=route.angle,
+            extent=np.zeros(self.bundles),
+            inner_ratio=ratio,
+            outer_ratio=ratio,
+            shape=("line",) * self.bundles,
+            acts=self.acts(profile, z),
+        )
+
+    def breakpoints(self, profile: Profile) -> tuple[float, ...]:
+        """Where it begins, ends, or its route is not smooth [m]."""
+        bent = [one for one in (self.distance, self.routing) if isinstance(one, AlongArm)]
+        breaks = [profile.length * x for one in bent for x in one.breaks]
+        return (*super().breakpoints(profile), *breaks)
+
+    def section_faults(self, profile: Profile, section: Section) -> list[Fault]:
+        """Moduli that its forces need."""
+        del profile
+        return section.modulus_faults(f"for tendon {self.name!r}, whose activation is in N")
+
+    def replace(self, **changes: Any) -> Tendon:
+        """A copy with some fields changed; a new distance takes the place of a ratio."""
+        if changes.get("distance") is not None:
+            changes.setdefault("distance_ratio", None)
+        if changes.get("distance_ratio") is not None:
+            changes.setdefault("distance", None)
+        return super().replace(**changes)
+
+    def value_on(self, field: str, profile: Profile, section: Section) -> Any:
+        """Value of a variable; of distance and ratio, the one not given follows at the base."""
+        del section
+        base = float(profile.radius(0.0))
+        if field == "distance" and self.distance is None:
+            return (self.distance_ratio or 0.0) * base
+        if field == "distance_ratio" and isinstance(self.distance, int | float):
+            return self.distance / base
+        return getattr(self, field)
+
+    def _route(self, profile: Profile, z: Array) -> _Route:
+        column = z[:, None]
+        angle, turning = self._angle(profile, column)
+        return _Route(
+            *self._distance(profile, column), self.offset + self._starts() + angle, turning
+        )
+
+    def _distance(self, profile: Profile, z: Array) -> tuple[Array, Array]:
+        """ρt and its slope."""
+        if self.distance_ratio is not None:
+            return self.distance_ratio * profile.radius(z), -self.distance_ratio * profile.slope(z)
+        if isinstance(self.distance, AlongArm):
+            x = z / profile.length
+            return self.distance(x), self.distance.derivative(x) / profile.length
+        return np.full(z.shape, self.distance), np.zeros(z.shape)
+
+    def _angle(self, profile: Profile, z: Array) -> tuple[Array, Array]:
+        """θ - θ0 and its slope."""
+        x = z / profile.length
+        if self.routing is not None:
+            return self.routing(x), self.routing.derivative(x) / profile.length
+        rate = self.revolution / (self.end_over_length - self.start_over_length)
+        return rate * (x - self.start_over_length), np.full(z.shape, rate / profile.length)
+
+    def _faults(self) -> list[Fault]:
+        return super()._faults() + tendon_faults(vars(self))

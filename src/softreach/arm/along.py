@@ -1,0 +1,126 @@
+"""Quantities that change along an arm: constant in pieces, or drawn through samples.
+
+Stations count from 0 at the base to 1 at the tip, so that an arm of another length keeps its shape.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.arm.checks import series_faults
+from softreach.errors import Fault, InvalidDesign
+
+__all__ = ["AlongArm", "Pieces", "Samples", "monotone_cubic"]
+
+Array = NDArray[np.float64]
+
+_INTERPOLATIONS = ("cubic", "linear")
+
+
+@dataclass(frozen=True, kw_only=True)
+class AlongArm(ABC):
+    """A function of Z/L."""
+
+    stations_over_length: tuple[float, ...]
+    """Z/L of the samples, or of the ends of the pieces [-]: from 0 to 1, rising."""
+    values: tuple[float, ...]
+    """One for each station, or one for each piece between them."""
+
+    def __post_init__(self) -> None:
+        if faults := self._faults():
+            raise InvalidDesign(faults)
+        for field in ("stations_over_length", "values"):
+            numbers = np.asarray(getattr(self, field), float).tolist()
+            object.__setattr__(self, field, tuple(numbers))
+
+    @abstractmethod
+    def __call__(self, x: ArrayLike) -> Array:
+        """Value at x = Z/L; at the end of a piece, that of the piece which begins there."""
+
+    @abstractmethod
+    def derivative(self, x: ArrayLike) -> Array:
+        """Derivative by x = Z/L."""
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Z/L inside (0, 1) where it is not smooth."""
+        return self.stations_over_length[1:-1]
+
+    def replace(self, **changes: Any) -> Self:
+        """A copy with some fields changed, checked like a new one."""
+        return replace(self, **changes)
+
+    def _faults(self) -> list[Fault]:
+        return series_faults(vars(self), "values")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pieces(AlongArm):
+    """Constant between stations.
+
+    Raises:
+        InvalidDesign: Stations that do not rise from 0 to 1, or not one value for each piece.
+    """
+
+    def __call__(self, x: ArrayLike) -> Array:
+        """The value of the piece that holds x."""
+        piece = np.searchsorted(self.stations_over_length[1:-1], np.asarray(x, float), "right")
+        return np.asarray(self.values)[piece]
+
+    def derivative(self, x: ArrayLike) -> Array:
+        """Zero."""
+        return np.zeros(np.shape(x))
+
+    def _faults(self) -> list[Fault]:
+        return series_faults(vars(self), "values", per_station=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Samples(AlongArm):
+    """Drawn through samples: by a monotone cubic, or by straight lines.
+
+    Raises:
+        InvalidDesign: Stations that do not rise from 0 to 1, not one value for each, or another
+            kind of interpolation.
+    """
+
+    interpolation: Literal["cubic", "linear"] = "cubic"
+    """The monotone cubic (PCHIP) overshoots no sample and has a continuous slope."""
+
+    def __call__(self, x: ArrayLike) -> Array:
+        """The value between the samples."""
+        if self.interpolation == "linear":
+            return np.interp(np.asarray(x, float), self.stations_over_length, self.values)
+        return self._curve(np.asarray(x, float))
+
+    def derivative(self, x: ArrayLike) -> Array:
+        """The slope; at a sample between straight lines, that of the line which begins there."""
+        if self.interpolation == "linear":
+            slopes = np.diff(self.values) / np.diff(self.stations_over_length)
+            return slopes[np.searchsorted(self.breaks, np.asarray(x, float), "right")]
+        return self._curve.derivative()(np.asarray(x, float))
+
+    @cached_property
+    def _curve(self) -> Any:
+        return monotone_cubic(self.stations_over_length, self.values)
+
+    def _faults(self) -> list[Fault]:
+        faults = super()._faults()
+        if self.interpolation not in _INTERPOLATIONS:
+            allowed = f"must be one of {', '.join(_INTERPOLATIONS)}"
+            faults.append(Fault("interpolation", self.interpolation, allowed))
+        return faults
+
+
+def monotone_cubic(stations: Sequence[float], values: Sequence[float]) -> Any:
+    """The monotone piecewise cubic through samples (Fritsch and Carlson), as SciPy's PCHIP."""
+    from scipy.interpolate import PchipInterpolator
+
+    return PchipInterpolator(stations, values)
