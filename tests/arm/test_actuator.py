@@ -71,7 +71,7 @@ class TestEverythingElseWorks:
         assert mixed.bundle_names == ("left", "right", "cable 3")
         np.testing.assert_array_equal(mixed.bounds[2], [0.0, 1e-3])
         other = mixed.with_bounds(((-1, 0), (-1, 0), (0, 5e-4)))
-        assert other.actuators[2].tension == (0.0, 5e-4)
+        assert other.actuators[2].activation_bounds == (0.0, 5e-4)
 
     def test_it_survives_a_file(self, mixed):
         text = mixed.to_toml()
@@ -109,7 +109,7 @@ class TestEverythingElseWorks:
         axes.figure.clear()
 
     def test_its_activations_are_not_taken_for_those_of_fibers(self):
-        strong = Cable(place=PLACE, tension=(0.0, 5.0))
+        strong = Cable(place=PLACE, activation_bounds=(0.0, 5.0))
         assert not any("|γ|" in line for line in design_warnings(cylinder(strong)))
 
 

@@ -44,7 +44,9 @@ def fibers(draw: st.DrawFn) -> sr.FiberArchitecture:
     )
 
 
-cables = st.builds(Cable, name=names, place=st.tuples(numbers, numbers), tension=pairs(numbers))
+cables = st.builds(
+    Cable, name=names, place=st.tuples(numbers, numbers), activation_bounds=pairs(numbers)
+)
 
 
 @st.composite

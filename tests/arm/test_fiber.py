@@ -99,8 +99,8 @@ def test_bundle_geometry_follows_the_architecture():
     outline = arm.outline([0.0])
     np.testing.assert_allclose(outline.center[0], 0.2 + 2 * np.pi / 3 * np.arange(3))
     np.testing.assert_array_equal(outline.extent, [0.3] * 3)
-    np.testing.assert_array_equal(outline.inner_ratio, [arm.section.rings[0].inner_ratio] * 3)
-    np.testing.assert_array_equal(outline.outer_ratio, [1.0] * 3)
+    np.testing.assert_array_equal(outline.inner_ratio[0], [arm.section.rings[0].inner_ratio] * 3)
+    np.testing.assert_array_equal(outline.outer_ratio[0], [1.0] * 3)
     assert arm.bundle_names == ("ring 1", "ring 2", "ring 3")
 
 

@@ -202,8 +202,21 @@ class Section:
         """Σ factor · (b^n - a^n) over the layers between the ratios a and b."""
         return sum(
             factor(layer.material) * (layer.outer_ratio**power - layer.inner_ratio**power)
-            for layer in self.layers
+            for layer in self._merged
         )
+
+    @cached_property
+    def _merged(self) -> tuple[Layer, ...]:
+        """The layers, those of one material that touch made one, so that no digit is lost."""
+        merged: list[Layer] = []
+        for layer in sorted(self.layers, key=lambda one: one.inner_ratio):
+            last = merged[-1] if merged else None
+            touches = last is not None and last.outer_ratio == layer.inner_ratio
+            if last and touches and last.material.same_matter(layer.material):
+                merged[-1] = last._replace(outer_ratio=layer.outer_ratio)
+            else:
+                merged.append(layer)
+        return tuple(merged)
 
 
 def _modulus(material: Material) -> float:
