@@ -1,0 +1,91 @@
+"""Materials by name, each number with its source: `materials.toml`."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from types import MappingProxyType
+from typing import Any
+
+from softreach.arm.material import Material
+from softreach.errors import InvalidInput
+
+__all__ = ["MaterialRecord", "material_names", "material_record", "named_material"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MaterialRecord:
+    """A material of the library and where its numbers come from."""
+
+    material: Material
+    """The material under its name."""
+    modulus: str
+    """What the number of Young's modulus is: `Young's modulus`, `stress at 100 % strain`, ..."""
+    sources: Mapping[str, str]
+    """For every number of the material, by its field, a heading of the page of references."""
+    note: str
+    """What a designer should know about it, in a line."""
+
+
+def material_names() -> tuple[str, ...]:
+    """The names of all materials of the library, from soft to stiff."""
+    return tuple(_library())
+
+
+def material_record(name: str) -> MaterialRecord:
+    """A material of the library with the sources of its numbers.
+
+    Args:
+        name: One of `material_names()`.
+
+    Raises:
+        InvalidInput: No material has this name.
+    """
+    library = _library()
+    if name not in library:
+        raise _unknown(name, tuple(library))
+    return library[name]
+
+
+def named_material(name: str) -> Material:
+    """A material of the library.
+
+    Args:
+        name: One of `material_names()`, such as "ecoflex_00_30".
+
+    Raises:
+        InvalidInput: No material has this name.
+    """
+    return material_record(name).material
+
+
+@cache
+def _library() -> Mapping[str, MaterialRecord]:
+    text = files("softreach.arm").joinpath("materials.toml").read_text(encoding="utf-8")
+    records = [_record(name, row) for name, row in tomllib.loads(text).items()]
+    records.sort(key=lambda record: record.material.young_modulus or 0.0)
+    return MappingProxyType({record.material.name: record for record in records})
+
+
+def _record(name: str, row: Mapping[str, Any]) -> MaterialRecord:
+    material = Material(
+        young_modulus=row["young_modulus_pa"],
+        poisson_ratio=row["poisson_ratio"],
+        density=row.get("density_kg_m3"),
+        name=name,
+    )
+    sources = MappingProxyType(row["sources"])
+    return MaterialRecord(
+        material=material, modulus=row["modulus"], sources=sources, note=row["note"]
+    )
+
+
+def _unknown(name: object, names: tuple[str, ...]) -> InvalidInput:
+    spelled = str(name).strip().lower().replace(" ", "_").replace("-", "_")
+    close = difflib.get_close_matches(spelled, names, n=3, cutoff=0.5)
+    hint = f"did you mean {' or '.join(close)}?" if close else ""
+    return InvalidInput("material", name, f"one of {', '.join(names)}", hint)
