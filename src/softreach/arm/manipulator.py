@@ -228,6 +228,11 @@ class Manipulator:
         """Unit of each activation: "1", "N" or "Pa"."""
         return tuple(one.unit for one in self.actuators for _ in range(one.bundles))
 
+    @property
+    def courses(self) -> tuple[str, ...]:
+        """How what contracts runs within each bundle; see `Actuator.course`."""
+        return tuple(one.course for one in self.actuators for _ in range(one.bundles))
+
     def outline(self, z: ArrayLike) -> Outline:
         """Where all bundles lie in the sections at stations Z [m], shape (station,)."""
         stations = np.atleast_1d(np.asarray(z, float))
