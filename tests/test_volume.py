@@ -65,6 +65,7 @@ def test_a_hull_as_a_dataset_encloses_the_volume_that_it_states():
     assert np.linalg.det(corners).sum() / 6 == pytest.approx(float(found.volume))
     assert found.volume.attrs["units"] == "m3"
     assert float(found.volume_corrected) > float(found.volume)
+    assert set(found.attrs) == {"softreach_version", "schema_version"}
 
 
 def test_labeled_tips_have_a_default_radius_of_a_twentieth_of_the_length(tips):

@@ -25,8 +25,10 @@ __all__ = ["Manipulator"]
 
 Array = NDArray[np.float64]
 
+_NAMES = 6  # of bundles that `repr` lists
 
-@dataclass(frozen=True, kw_only=True)
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Manipulator:
     """A slender arm with actuators, clamped at Z = 0 where its tangent is +z (section 2).
 
@@ -201,9 +203,14 @@ class Manipulator:
         """A readable name for each bundle."""
         return tuple(name for actuator in self.actuators for name in actuator.bundle_names)
 
+    @property
+    def bundle_units(self) -> tuple[str, ...]:
+        """The unit of the activation of each bundle."""
+        return tuple(one.unit for one in self.actuators for _ in range(one.bundles))
+
     @cached_property
     def bounds(self) -> Array:
-        """Lower and upper activation of each bundle [-], shape (bundles, 2), read-only."""
+        """Lower and upper activation of each bundle [unit], shape (bundles, 2), read-only."""
         bounds = np.concatenate([actuator.bounds for actuator in self.actuators])
         bounds.setflags(write=False)
         return bounds
@@ -217,6 +224,15 @@ class Manipulator:
             extent=np.concatenate([one.extent for one in each]),
             inner_ratio=np.concatenate([one.inner_ratio for one in each]),
             outer_ratio=np.concatenate([one.outer_ratio for one in each]),
+        )
+
+    def __repr__(self) -> str:
+        base, tip = self.profile.radius([0.0, self.length])
+        names = ", ".join(self.bundle_names[:_NAMES])
+        more = f", ... ({self.bundles} in all)" if self.bundles > _NAMES else ""
+        return (
+            f"{type(self).__name__}: L = {self.length:g} m, R2 = {base:.4g} to {tip:.4g} m\n"
+            f"  bundles: {names}{more}"
         )
 
     def _repr_html_(self) -> str:

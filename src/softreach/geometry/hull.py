@@ -11,6 +11,7 @@ from softreach.arrays import Faces, Points
 from softreach.geometry.delaunay import finite_points, unit_scale
 from softreach.geometry.surface import compact_surface, enclosed_volume, surface_area
 from softreach.quantity import quantity
+from softreach.versions import versions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -79,7 +80,7 @@ class Hull:
         }
         variables["vertices"] = (("vertex", "axis"), self.vertices, {"units": "m"})
         variables["faces"] = (("face", "corner"), self.faces, {"units": "1"})
-        return xr.Dataset(variables, {"axis": list("xyz")})
+        return xr.Dataset(variables, {"axis": list("xyz")}, versions())
 
     def __repr__(self) -> str:
         regions = f"{self.regions:,} region" + ("s" if self.regions != 1 else "")
