@@ -40,8 +40,9 @@ class Hull:
     volume_corrected: float | None = None
     """2 V(N) - V(N/4) [m³], an estimate of the volume of infinitely many points.
 
-    The volume of a random cloud falls short by an amount that shrinks as N^-1/2. None if not asked
-    for, or if the quarter is too sparse for the radius.
+    The volume of a random cloud falls short by an amount that shrinks as N^-1/2. Gaps narrower than
+    twice the radius stay bridged, so that the estimate is too large for what has them. None if not
+    asked for, or if the quarter is too sparse for the radius.
     """
 
     @property
