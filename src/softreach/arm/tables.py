@@ -22,7 +22,6 @@ __all__ = [
     "both_sides",
     "check_extension",
     "compliance",
-    "curvature_range",
     "extension_range",
     "tables",
 ]
@@ -109,25 +108,6 @@ def extension_range(arm: Manipulator) -> tuple[float, float]:
     """Smallest and largest ζ anywhere in the activation box and along the arm [-]."""
     ends = tables(arm, _stations(arm)).extension[..., None] * arm.bounds
     return 1.0 + float(ends.min(-1).sum(-1).min()), 1.0 + float(ends.max(-1).sum(-1).max())
-
-
-def curvature_range(arm: Manipulator) -> tuple[Array, Array]:
-    """The largest bending √(u1² + u2²), theory (45), that the activation box reaches.
-
-    Bending is convex in γ, so its maximum lies at a corner of the box. The corners that lead
-    farthest in each of 1,440 directions are tried; none leads farther by more than 3e-6 of it.
-
-    Returns:
-        Stations Z [m] and the largest bending there [1/m], each of shape (station,).
-    """
-    table = tables(arm, _stations(arm))
-    plane = table.curvature[:, :2]
-    # The reachable (u1, u2) are a zonogon; its farthest vertex maximizes some direction's support.
-    heading = np.linspace(0.0, 2.0 * np.pi, 1440, endpoint=False)
-    along = np.einsum("hc,scb->shb", np.stack([np.cos(heading), np.sin(heading)], 1), plane)
-    best = np.where(along > 0, arm.bounds[:, 1], arm.bounds[:, 0])
-    reached = np.einsum("scb,shb->shc", plane, best)
-    return table.stations, np.linalg.norm(reached, axis=-1).max(axis=1)
 
 
 def both_sides(arm: Manipulator, stations: Array) -> Array:
