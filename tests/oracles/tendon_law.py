@@ -5,7 +5,7 @@ tendon of the bent rod has b = p' + ω × p + ζ e3 instead of p' + e3: the bend
 shortens it by κρt, the thrust by 1 - ζ, the twist turns it by ω3 ρt. For the slope β = atan(ρt θ')
 of the tendon they together turn its tangent by
 
-    δβ = sin β (κρt + (1 - ζ) - κρt K1/K3) = κρt sin β ((R/2ρt)² - ν),
+    δβ = sin β cos β (κρt + (1 - ζ) - κρt K1/K3) = κρt sin β cos β ((R/2ρt)² - ν),
 
 the last for a solid rod of the radius R, to first order. The linear law is wrong by the part
 δβ tan β of bending and extension and by δβ / tan β of twist, thus of order κρt, second order in the
