@@ -90,7 +90,8 @@ def shape_of(
             atol=1e-13,
         )
         inside, state = (z >= low) & (z <= high), walk.y[:, -1]
-        states[:, inside] = walk.sol(z[inside])
+        if inside.any():
+            states[:, inside] = walk.sol(z[inside])
     along = np.array([strains(station) for station in z])
     return Shape(states[:3].T, states[3:].T.reshape(-1, 3, 3), along[:, 3], along[:, :3])
 

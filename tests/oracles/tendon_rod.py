@@ -244,7 +244,8 @@ def _sampled(parts: Sequence[tuple[float, float, Function]], z: Array) -> Array:
     states = np.empty((18, len(z)))
     for bottom, top, solution in parts:
         inside = (z >= bottom) & (z <= top)
-        states[:, inside] = solution(z[inside])
+        if inside.any():
+            states[:, inside] = solution(z[inside])
     return states
 
 
