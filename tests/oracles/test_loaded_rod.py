@@ -53,23 +53,6 @@ def test_a_tip_moment_along_the_rod_twists_it():
     assert math.acos(found.frame[-1, 1, 1]) == pytest.approx(0.3 / 0.7, rel=1e-10)
 
 
-def test_the_bend_of_45_degrees_goes_to_its_inextensible_value():
-    """Bathe and Bolourchi (1979): R = 100, section 1 × 1, E = 1e7, ν = 0, force 600 upward.
-
-    In plane toward the center, along the tangent at the base, out of plane. Their K3 is E/12, that
-    of the polar moment.
-    """
-    bend = Rod(
-        length=100 * math.pi / 4,
-        axial=lambda z: 1e13,
-        bending=lambda z: 1e7 / 12,
-        torsion=lambda z: 1e7 / 12,
-        curvature=lambda z: (0.0, 0.01, 0.0),
-    )
-    x, y, z = equilibrium(bend, Loads(tip_force=(0, 600, 0))).tip
-    np.testing.assert_allclose([x, z, y], [15.685078, 47.151294, 53.468598], atol=1e-6)
-
-
 def test_a_following_force_is_the_dead_one_that_it_has_become():
     followed = equilibrium(
         WOUND, Loads(following_force=(0.6, -0.4, -1.0), following_moment=(0.2, 0.1, -0.3))
