@@ -2,8 +2,8 @@
 
 K.-J. Bathe and S. Bolourchi, Large displacement analysis of three-dimensional beam structures,
 International Journal for Numerical Methods in Engineering 14, 961-986 (1979): a cantilever along
-45 degrees of a circle of the radius 100, section 1 × 1, E = 1e7, ν = 0, its torsional stiffness that
-of the polar moment, and a dead force of 600 at the tip, across the plane of the circle.
+45 degrees of a circle of the radius 100, section 1 × 1, E = 1e7, ν = 0, with the torsional
+stiffness of the polar moment, and a dead force of 600 at the tip, across the circle's plane.
 """
 
 from __future__ import annotations

@@ -124,7 +124,7 @@ class Chain:
 
     def solve(self, start: Array | None = None) -> Array:
         """Coordinates of the equilibrium near a start: that of the rod's shooting if None."""
-        q = self.near(equilibrium(self.rod, self.loads, self.joints)) if start is None else start
+        q = self._shot() if start is None else start
         for _ in range(30):
             step = np.linalg.solve(self.hessian(q), -self.gradient(q))
             q = q + step
@@ -183,6 +183,9 @@ class Chain:
         w, zeta = self._parts(q)
         axes = self._frames(w[None])[0, 1:-1, :, 2]
         return np.cumsum([np.zeros(3), *(self.h * zeta[:, None] * axes)], axis=0)
+
+    def _shot(self) -> Array:
+        return self.near(equilibrium(self.rod, self.loads, self.joints, rtol=1e-7))
 
     def _coordinates(self, u: Array, zeta: Array) -> Array:
         return np.concatenate([(u * self.span[:, None]).ravel(), zeta])
