@@ -78,6 +78,9 @@ class ActuatorDraft(PartDraft):
             return None if bundles == len(start) else tuple(start[0].tolist())
         bounds = start.copy() if bundles == len(start) else start[:1].repeat(bundles, axis=0)
         for (side, bundle), value in self.bounds.items():
+            if bundle is not None and bundle >= bundles:
+                allowed = f"has no bundle, as their number becomes {bundles}"
+                raise InvalidDesign([Fault("activation_bounds", value, allowed)])
             bounds[slice(None) if bundle is None else bundle, side] = value
         return tuple((low, high) for low, high in bounds.tolist())
 

@@ -69,7 +69,7 @@ def by_ring_name(arm: Manipulator, known: dict[str, Parameter]) -> dict[str, str
     for k, ring in enumerate(arm.section.rings):
         if ring.name:
             path, named = f"rings[{k}]", f"rings[{ring.name}]"
-            own = (one.name for one in known.values() if one.owner.startswith(path))
+            own = (one.name for one in known.values() if _key(one).startswith(path))
             found |= {named + name.removeprefix(path): name for name in own}
     return {name: known_as for name, known_as in found.items() if name not in known}
 

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 from softreach.arm.actuators import Actuator
+from softreach.arm.checks import plain_number
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.parts import part_of
 from softreach.arm.variable import Variable
+from softreach.errors import Fault
 
 __all__ = [
     "BoundParameter",
@@ -111,7 +113,10 @@ class ElementParameter(Parameter):
         return float(numbers[self.place])
 
     def change(self, draft: Draft, value: float) -> None:
-        """Change that number."""
+        """Change that number, if it may have this value: whatever holds it names no places."""
+        if not self.variable.allowed.admits(plain_number(value)):
+            draft.refuse(Fault(self.name, value, self.variable.allowed))
+            return
         draft.set_element(self.name, self.key, self.series, self.place, value)
 
 

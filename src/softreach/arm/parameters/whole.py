@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from softreach.arm.actuators import Actuator
 from softreach.arm.along import AlongArm
+from softreach.arm.checks import plain_number
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.parameter import FieldParameter, Parameter
@@ -36,7 +37,7 @@ class OuterRadius(Parameter):
 
     def change(self, draft: Draft, value: float) -> None:
         """Change all radii."""
-        if not self.variable.allowed.admits(value):
+        if not self.variable.allowed.admits(plain_number(value)):
             draft.refuse(Fault(self.name, value, self.variable.allowed))
             return
         radii: tuple[float, ...] = draft.parts["profile"].start.radii
