@@ -16,6 +16,7 @@ from softreach.errors import Fault, Range
 
 __all__ = [
     "FIBER_RANGES",
+    "INSIDE_RANGE",
     "MATERIAL_RANGES",
     "PROFILE_RANGES",
     "RING_RANGES",
@@ -54,6 +55,9 @@ FIBER_RANGES = {
     "extent": Range(0.0, 2 * math.pi, "rad", open_low=True),
     "bundles": Range(low=1, high=1000, whole=True),
 }
+
+INSIDE_RANGE = Range(0.0, 1.0, open_low=True, open_high=True)
+"""Between base and tip, over the length."""
 
 STRETCH_RANGES = {
     "start_over_length": Range(0.0, 1.0, open_high=True),
