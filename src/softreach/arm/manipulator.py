@@ -231,6 +231,11 @@ class Manipulator:
         inside = ascending[apart & (ascending < (1 - 1e-12) * self.length)][1:]
         return tuple(inside.tolist())
 
+    @property
+    def courses(self) -> tuple[str, ...]:
+        """How what contracts runs within each bundle; see `Actuator.course`."""
+        return tuple(one.course for one in self.actuators for _ in range(one.bundles))
+
     def outline(self, z: ArrayLike) -> Outline:
         """Where all bundles lie in the sections at stations Z [m], shape (station,)."""
         stations = np.atleast_1d(np.asarray(z, float))
