@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.actuators import FiberArchitecture, Outline
+from softreach.arm.actuators import FiberArchitecture, Outline, SectorActuator
 from softreach.arm.along import AlongArm
 from softreach.arm.bending import largest_bending, sharpest_bending, smallest_bending
 from softreach.arm.manipulator import Manipulator
@@ -99,10 +99,15 @@ def _large_activations(arm: Manipulator) -> Iterator[str]:
 
 
 def _overlaps(arm: Manipulator) -> Iterator[str]:
-    """Pairs of bundles whose sectors meet between base and tip."""
+    """Pairs of bundles in one ring whose sectors meet between base and tip.
+
+    Different rings may overlap on purpose, each with its own stiffness: they do not share matter.
+    """
     z = both_sides(arm, arm.profile.station(np.linspace(0.0, arm.profile.slender_length, 201)))
-    outline = arm.outline(z)
+    outline, rings = arm.outline(z), _ring_of_each_bundle(arm)
     for first, second in combinations(range(arm.bundles), 2):
+        if rings[first] is None or rings[first] != rings[second]:
+            continue
         depth, place = _overlap(outline, z, first, second)
         if depth > 1e-9:
             names = f"{arm.bundle_names[first]} and {arm.bundle_names[second]}"
@@ -112,16 +117,23 @@ def _overlaps(arm: Manipulator) -> Iterator[str]:
             )
 
 
+def _ring_of_each_bundle(arm: Manipulator) -> list[int | None]:
+    """Index of the ring that a bundle fills a sector of; None for other kinds."""
+    return [
+        arm.section.ring_index(one.ring) if isinstance(one, SectorActuator) else None
+        for one in arm.actuators
+        for _ in range(one.bundles)
+    ]
+
+
 def _overlap(outline: Outline, z: Array, first: int, second: int) -> tuple[float, float]:
     """Largest overlap of two sectors [rad] and the first Z where they overlap [m].
 
     Between stations their angular distance is taken to be linear.
     """
     pair = [first, second]
-    shares = outline.acts[:, pair].all(axis=1) & (
-        outline.inner_ratio[:, pair].max(axis=1) < outline.outer_ratio[:, pair].min(axis=1)
-    )
-    if not shares.any() or {outline.shape[k] for k in pair} != {"sector"}:
+    shares = outline.acts[:, pair].all(axis=1)
+    if not shares.any():
         return 0.0, 0.0
     extent = outline.extent[pair].mean()
     apart = outline.center[:, second] - outline.center[:, first]
