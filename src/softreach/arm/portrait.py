@@ -21,10 +21,7 @@ _STATIONS, _STEP = 41, np.pi / 27
 
 def arm_card(arm: Manipulator) -> str:
     """HTML with a picture of the arm and its bundles above its numbers."""
-    names = ", ".join(arm.bundle_names)
-    base, tip = arm.profile.radius([0.0, arm.length])
-    text = f"Manipulator: L = {arm.length:g} m, R2 = {base:.4g} to {tip:.4g} m\n  bundles: {names}"
-    return html_card(text, *_skins(arm))
+    return html_card(repr(arm), *_skins(arm))
 
 
 def _skins(arm: Manipulator) -> Iterator[Skin]:

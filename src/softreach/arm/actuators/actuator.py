@@ -73,6 +73,8 @@ class Actuator(ABC):
     """What formulas call an activation."""
     variables: ClassVar[tuple[Variable, ...]] = STRETCH
     """Fields that a designer varies, beside the bounds."""
+    series: ClassVar[tuple[Variable, ...]] = ()
+    """Further fields, that only functions along the arm can be given for."""
     default_name: ClassVar[str] = "actuator"
     """Name that an arm gives to unnamed ones, followed by a number."""
     validity: ClassVar[str] = ""

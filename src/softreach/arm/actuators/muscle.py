@@ -15,7 +15,7 @@ from softreach.arm.actuators.actuator import STRETCH
 from softreach.arm.actuators.cone import cone_integrals
 from softreach.arm.actuators.ring_integrals import RingIntegrals
 from softreach.arm.actuators.sector import SectorActuator
-from softreach.arm.checks import FIBER_RANGES, angle_faults
+from softreach.arm.checks import FIBER_RANGES, constant_angle_faults
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.arm.variable import Variable
@@ -75,7 +75,7 @@ class ObliqueMuscle(SectorActuator):
         return np.zeros(len(z))
 
     def _faults(self) -> list[Fault]:
-        return super()._faults() + angle_faults(self.helical_angle)
+        return super()._faults() + constant_angle_faults(self.helical_angle)
 
 
 @dataclass(frozen=True, kw_only=True)
