@@ -21,7 +21,7 @@ __all__ = ["PlacedBundle", "draw_bundles", "lumen_style", "placed_bundles", "ten
 
 Array = NDArray[np.float64]
 
-_STROKE_ANGLE = np.radians(5)  # between fibers that do not run along the bundle
+_STROKE_ANGLE = np.radians(8)  # between fibers that do not run along the bundle
 _LIGHTNESS = (0.21, 0.72, 0.07)  # of red, green and blue
 _LEAN = np.radians(14)  # of oblique strokes from the inner to the outer radius
 _OVERLAP = 1e-6  # [rad] or [-], below which bundles only touch
