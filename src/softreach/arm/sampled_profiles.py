@@ -150,15 +150,19 @@ class SampledTaper(_GivenRadii):
 
     def radius(self, z: ArrayLike) -> Array:
         """R2(Z) [m]."""
-        return self._curve(np.asarray(z, float))
+        return self._curve(np.asarray(z, float) / self.length)
 
     def slope(self, z: ArrayLike) -> Array:
         """tan φ(Z) = -R2'(Z) [-]."""
-        return -self._curve.derivative()(np.asarray(z, float))
+        return -self._curve_slope(np.asarray(z, float) / self.length) / self.length
 
     @cached_property
     def _curve(self) -> Any:
-        return monotone_cubic(self._knots.tolist(), self.radii)
+        return monotone_cubic(self.stations_over_length, self.radii)
+
+    @cached_property
+    def _curve_slope(self) -> Any:
+        return self._curve.derivative()
 
     def surface_coordinate(self, z: ArrayLike, ratio: float = 1.0) -> Array:
         """∫ dZ/(R cos φ) [-] by Gauss quadrature in each piece: theory (14)."""

@@ -9,16 +9,11 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.actuators import FiberArchitecture, Outline
+from softreach.arm.actuators import FiberArchitecture, Outline, SectorActuator
 from softreach.arm.along import AlongArm
+from softreach.arm.bending import largest_bending, sharpest_bending, smallest_bending
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.tables import (
-    both_sides,
-    check_extension,
-    curvature_range,
-    extension_range,
-    tables,
-)
+from softreach.arm.tables import both_sides, check_extension, extension_range
 
 __all__ = ["DesignSummary", "describe", "design_warnings"]
 
@@ -56,7 +51,6 @@ def describe(arm: Manipulator) -> DesignSummary:
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
     """
     check_extension(arm)
-    _, bending = curvature_range(arm)
     tip_radius = float(arm.profile.radius(arm.length))
     body = arm.profile, arm.section
     return DesignSummary(
@@ -67,7 +61,10 @@ def describe(arm: Manipulator) -> DesignSummary:
         radius_ratio=arm.section.inner_ratio,
         taper_ratio=float(arm.profile.radius(0.0)) / tip_radius,
         extension=extension_range(arm),
-        curvature=(_smallest_bending(arm) * arm.length, float(bending.max() * arm.length)),
+        curvature=(
+            smallest_bending(arm).value * arm.length,
+            largest_bending(arm).value * arm.length,
+        ),
         warnings=design_warnings(arm),
     )
 
@@ -82,34 +79,12 @@ def design_warnings(arm: Manipulator) -> tuple[str, ...]:
     return (*_overlaps(arm), *_sharp_bending(arm), *_large_activations(arm))
 
 
-def _smallest_bending(arm: Manipulator, stations: int = 11) -> float:
-    """Least √(u1² + u2²) in the box: bounded least squares at each station [1/m]."""
-    from scipy.optimize import lsq_linear
-
-    low, high = arm.bounds.T
-    if (low <= 0).all() and (high >= 0).all():
-        return 0.0
-    free = high > low
-    table = tables(arm, np.linspace(0.0, arm.length, stations)).curvature[:, :2]
-    fixed = table[:, :, ~free] @ low[~free]
-    return min(
-        float(
-            np.linalg.norm(lsq_linear(u, -rest, (low[free], high[free])).fun)
-            if free.any()
-            else np.linalg.norm(rest)
-        )
-        for u, rest in zip(table[:, :, free], fixed, strict=True)
-    )
-
-
 def _sharp_bending(arm: Manipulator) -> Iterator[str]:
-    stations, bending = curvature_range(arm)
-    slender = bending * arm.profile.radius(stations)
-    worst = int(np.argmax(slender))
-    if slender[worst] >= 1:
-        place = f"Z = {stations[worst] / arm.length:.2f} L"
+    sharpest = sharpest_bending(arm)
+    if sharpest.value >= 1:
+        place = f"Z = {sharpest.station / arm.length:.2f} L"
         yield (
-            f"bending reaches |κ| R2 = {slender[worst]:.2f} at {place}: the inner side would fold "
+            f"bending reaches |κ| R2 = {sharpest.value:.2f} at {place}: the inner side would fold "
             "where it is 1 or more, and the theory ends there"
         )
 
@@ -124,10 +99,15 @@ def _large_activations(arm: Manipulator) -> Iterator[str]:
 
 
 def _overlaps(arm: Manipulator) -> Iterator[str]:
-    """Pairs of bundles whose sectors meet between base and tip."""
+    """Pairs of bundles in one ring whose sectors meet between base and tip.
+
+    Different rings may overlap on purpose, each with its own stiffness: they do not share matter.
+    """
     z = both_sides(arm, arm.profile.station(np.linspace(0.0, arm.profile.slender_length, 201)))
-    outline = arm.outline(z)
+    outline, rings = arm.outline(z), _ring_of_each_bundle(arm)
     for first, second in combinations(range(arm.bundles), 2):
+        if rings[first] is None or rings[first] != rings[second]:
+            continue
         depth, place = _overlap(outline, z, first, second)
         if depth > 1e-9:
             names = f"{arm.bundle_names[first]} and {arm.bundle_names[second]}"
@@ -137,16 +117,23 @@ def _overlaps(arm: Manipulator) -> Iterator[str]:
             )
 
 
+def _ring_of_each_bundle(arm: Manipulator) -> list[int | None]:
+    """Index of the ring that a bundle fills a sector of; None for other kinds."""
+    return [
+        arm.section.ring_index(one.ring) if isinstance(one, SectorActuator) else None
+        for one in arm.actuators
+        for _ in range(one.bundles)
+    ]
+
+
 def _overlap(outline: Outline, z: Array, first: int, second: int) -> tuple[float, float]:
     """Largest overlap of two sectors [rad] and the first Z where they overlap [m].
 
     Between stations their angular distance is taken to be linear.
     """
     pair = [first, second]
-    shares = outline.acts[:, pair].all(axis=1) & (
-        outline.inner_ratio[:, pair].max(axis=1) < outline.outer_ratio[:, pair].min(axis=1)
-    )
-    if not shares.any() or {outline.shape[k] for k in pair} != {"sector"}:
+    shares = outline.acts[:, pair].all(axis=1)
+    if not shares.any():
         return 0.0, 0.0
     extent = outline.extent[pair].mean()
     apart = outline.center[:, second] - outline.center[:, first]

@@ -108,6 +108,14 @@ class Actuator(ABC):
         """Where the bundles lie at stations Z [m]."""
 
     @property
+    def course(self) -> str:
+        """How what contracts runs within a bundle, for pictures.
+
+        "along" it, "right-handed" or "left-handed" across it, or "radial".
+        """
+        return "along"
+
+    @property
     def bounds(self) -> Array:
         """Lower and upper activation of each bundle [unit], shape (bundles, 2)."""
         return np.broadcast_to(np.asarray(self.activation_bounds, float), (self.bundles, 2))

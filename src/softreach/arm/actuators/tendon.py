@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
@@ -85,7 +86,7 @@ class Tendon(Actuator):
         x, y = route.distance * cos, route.distance * sin
         t1 = route.distance_slope * cos - around * sin
         t2 = route.distance_slope * sin + around * cos
-        t3 = 1.0 / np.sqrt(1.0 + t1**2 + t2**2)
+        t3 = 1.0 / np.hypot(1.0, np.hypot(t1, t2))
         moment = np.stack([-y * t3, x * t3, (y * t1 - x * t2) * t3], axis=1)
         return Resultants(-t3, moment)
 
@@ -167,4 +168,16 @@ class Tendon(Actuator):
         return rate * (x - self.start_over_length), np.full(z.shape, rate / profile.length)
 
     def _faults(self) -> list[Fault]:
-        return super()._faults() + tendon_faults(vars(self))
+        return super()._faults() + tendon_faults(vars(self)) + list(self._route_faults())
+
+    def _route_faults(self) -> Iterator[Fault]:
+        """A cable that jumps, or turns in two ways."""
+        if isinstance(self.distance, AlongArm) and not isinstance(self.distance, Samples):
+            yield Fault("distance", self.distance, "must be a number or Samples, which do not jump")
+        if self.routing is None:
+            return
+        if not isinstance(self.routing, Samples):
+            yield Fault("routing", self.routing, "must be Samples of θ(Z) - θ0, or None")
+        elif self.revolution != 0:
+            allowed = "must be left out where routing is given, which says how the tendon turns"
+            yield Fault("revolution", self.revolution, allowed)
