@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.actuators import FiberArchitecture, Outline
+from softreach.arm.actuators import Actuator, FiberArchitecture, Outline
 from softreach.arm.along import AlongArm
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.section import Stiffness
 from softreach.arm.tables import (
     both_sides,
     check_extension,
@@ -19,6 +21,8 @@ from softreach.arm.tables import (
     extension_range,
     tables,
 )
+from softreach.arm.weight import load_number, mass
+from softreach.errors import Fault
 
 __all__ = ["DesignSummary", "describe", "design_warnings"]
 
@@ -45,6 +49,22 @@ class DesignSummary:
     """Smallest and largest ζ in the activation box [-]."""
     curvature: tuple[float, float]
     """Smallest and largest bending curvature times L, in the box and along the arm [-]."""
+    bundle_extension: Array
+    """Smallest and largest ζ that each activation reaches alone [-], shape (bundle, 2)."""
+    bundle_bending: Array
+    """Smallest and largest |κ| R2 that each activation reaches alone [-], shape (bundle, 2)."""
+    stiffness: Stiffness | None
+    """K0 [N], K1 and K3 [N m²] at base and tip; None without Young's modulus."""
+    mass: float | None
+    """Mass of the arm [kg]; None without density."""
+    load_number: float | None
+    """Λ = ρ g L³/(E R2²), or w L³/(4 K1) at the base [-]; None without E or ρ."""
+    lacking: tuple[str, ...]
+    """What to give so that the numbers above are known."""
+    breakpoints: tuple[float, ...]
+    """Z inside (0, L) where profile or actuators are not smooth [m]."""
+    validity: tuple[str, ...]
+    """Where the linear law of each kind of actuator ends."""
     warnings: tuple[str, ...]
     """Limits that the design touches, each with its number."""
 
@@ -68,8 +88,60 @@ def describe(arm: Manipulator) -> DesignSummary:
         taper_ratio=float(arm.profile.radius(0.0)) / tip_radius,
         extension=extension_range(arm),
         curvature=(_smallest_bending(arm) * arm.length, float(bending.max() * arm.length)),
+        bundle_extension=_extension_of_bundles(arm),
+        bundle_bending=_bending_of_bundles(arm),
+        breakpoints=arm.breakpoints,
+        validity=tuple(dict.fromkeys(_validity(one) for one in arm.actuators if one.validity)),
         warnings=design_warnings(arm),
+        **_of_matter(arm),
     )
+
+
+def _of_matter(arm: Manipulator) -> dict[str, Any]:
+    """What follows from moduli and densities, as far as they are known."""
+    moduli, densities = arm.section.modulus_faults(""), arm.section.density_faults("")
+    ends = arm.profile.radius(np.array([0.0, arm.length]))
+    return {
+        "stiffness": None if moduli else arm.section.stiffness(ends),
+        "mass": None if densities else mass(arm),
+        "load_number": None if moduli or densities else load_number(arm),
+        "lacking": (
+            *_lacking("Young's modulus [Pa]", moduli, "the stiffnesses and the load number"),
+            *_lacking("the density [kg/m³]", densities, "the mass and the load number"),
+        ),
+    }
+
+
+def _lacking(what: str, faults: list[Fault], known: str) -> Iterator[str]:
+    """What to give, and what is known then."""
+    if faults:
+        owners = dict.fromkeys(fault.path.rpartition(".")[0] for fault in faults)
+        yield f"give {what} of {', '.join(owners)} to know {known}"
+
+
+def _validity(actuator: Actuator) -> str:
+    return f"{actuator.default_name}: {actuator.validity}"
+
+
+def _extension_of_bundles(arm: Manipulator) -> Array:
+    """Smallest and largest ζ of each activation alone, anywhere [-], shape (bundle, 2)."""
+    response = tables(arm, _stations(arm)).extension
+    ends = 1.0 + response[..., None] * arm.bounds
+    return np.stack([ends.min(axis=(0, 2)), ends.max(axis=(0, 2))], axis=-1)
+
+
+def _bending_of_bundles(arm: Manipulator) -> Array:
+    """Smallest and largest |κ| R2 of each activation alone, anywhere [-], shape (bundle, 2)."""
+    z = _stations(arm)
+    response = np.linalg.norm(tables(arm, z).curvature[:, :2], axis=1)
+    slender = response * arm.profile.radius(z)[:, None]
+    sizes = np.abs(arm.bounds)
+    smallest = np.where(np.prod(arm.bounds, axis=1) > 0, sizes.min(axis=1), 0.0)
+    return np.stack([smallest * slender.min(axis=0), sizes.max(axis=1) * slender.max(axis=0)], -1)
+
+
+def _stations(arm: Manipulator) -> Array:
+    return both_sides(arm, np.linspace(0.0, arm.length, 101))
 
 
 def _angle_at_start(fiber: FiberArchitecture, arm: Manipulator) -> float:

@@ -30,7 +30,17 @@ def print_rows(title: str, rows: Mapping[str, tuple[Any, str]], as_json: bool) -
     sys.stdout.write("\n".join([title, *lines, ""]))
 
 
-_SUFFIX = {"m": "_m", "m³": "_m3", "L³": "_L3", "L": "_L", "deg": "_deg", "%": "_percent"}
+_SUFFIX = {
+    "m": "_m",
+    "N": "_N",
+    "N m²": "_N_m2",
+    "kg": "_kg",
+    "m³": "_m3",
+    "L³": "_L3",
+    "L": "_L",
+    "deg": "_deg",
+    "%": "_percent",
+}
 
 
 def _key(name: str, unit: str) -> str:

@@ -1,4 +1,4 @@
-"""Arms of every kind that a design file can describe, for hypothesis."""
+"""Arms of every kind that a design file can describe, drawn by hypothesis."""
 
 from __future__ import annotations
 
@@ -145,9 +145,7 @@ def profiles(draw: st.DrawFn) -> Profile:
     kind = draw(st.sampled_from([LinearTaper, PiecewiseTaper, SampledTaper]))
     length = draw(sizes)
     if kind is LinearTaper:
-        return LinearTaper(
-            length=length, outer_radius=draw(sizes), taper=-draw(st.floats(0, 1.5))
-        )
+        return LinearTaper(length=length, outer_radius=draw(sizes), taper=-draw(st.floats(0, 1.5)))
     places = draw(stations())
     radii = tuple(draw(sizes) for _ in places)
     return kind(length=length, stations_over_length=places, radii=radii)
