@@ -214,6 +214,7 @@ def test_solutions_read_like_a_list_and_as_a_dataset(folded):
     assert dataset.sizes["target"] == 51
     assert dataset.activation.shape == (int(solutions.counts.sum()), 3)
     assert Manipulator.from_toml(dataset.attrs["design"]) == folded
+    assert {"softreach_version", "schema_version"} <= set(dataset.attrs)
     with pytest.raises(IndexError):
         solutions[51]
 

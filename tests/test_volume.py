@@ -42,6 +42,29 @@ def test_the_corrected_volume_is_nearer_to_the_truth():
     assert hull.bias < 0
 
 
+def bridge(gap: float, alpha: float) -> float:
+    """What the alpha shape of two unit balls adds between them: a cylinder without the two caps.
+
+    Empty spheres that touch both balls have radii up to alpha as far out as that cylinder.
+    """
+    from_middle = 1 + gap / 2
+    if from_middle >= 1 + alpha:
+        return 0.0
+    radius = np.sqrt(1 - (from_middle / (1 + alpha)) ** 2)
+    half = from_middle * alpha / (1 + alpha)
+    cap = half - gap / 2
+    return np.pi * (2 * half * radius**2 - 2 * cap**2 * (1 - cap / 3))
+
+
+@pytest.mark.parametrize(("gap", "alpha"), [(0.3, 0.3), (0.3, 0.45), (0.7, 0.3), (1.0, 0.45)])
+def test_the_corrected_volume_holds_bridges_over_gaps_narrower_than_two_radii(gap, alpha):
+    apart = np.array([2 + gap, 0.0, 0.0])
+    points = np.concatenate([in_ball(20_000, seed=1), in_ball(20_000, seed=2) + apart])
+    hull = concave_hull(points, alpha=alpha, bias=True)
+    assert hull.volume_corrected == pytest.approx(2 * BALL + bridge(gap, alpha), rel=5e-3)
+    assert (bridge(gap, alpha) > 0.03 * 2 * BALL) == (gap < 2 * alpha)
+
+
 def test_the_hull_states_what_it_was_made_of():
     hull = concave_hull(in_ball(3000), alpha=0.5)
     assert (hull.n, hull.alpha, hull.regions) == (3000, 0.5, 1)
@@ -65,6 +88,7 @@ def test_a_hull_as_a_dataset_encloses_the_volume_that_it_states():
     assert np.linalg.det(corners).sum() / 6 == pytest.approx(float(found.volume))
     assert found.volume.attrs["units"] == "m3"
     assert float(found.volume_corrected) > float(found.volume)
+    assert set(found.attrs) == {"softreach_version", "schema_version"}
 
 
 def test_labeled_tips_have_a_default_radius_of_a_twentieth_of_the_length(tips):

@@ -63,7 +63,7 @@ class Range(NamedTuple):
             return False
         above = value > self.low or (value == self.low and not self.open_low)
         below = value < self.high or (value == self.high and not self.open_high)
-        return math.isfinite(value) and above and below
+        return above and below and _is_finite(value)
 
     def in_degrees(self) -> Range:
         """The same range of an angle, for files and the command line."""
@@ -76,6 +76,14 @@ class Range(NamedTuple):
         limits = " and ".join(text for text in (low, high) if text)
         number = "a whole number" if self.whole else "a finite number"
         return f"must be {number} {limits}".rstrip() + unit
+
+
+def _is_finite(number: float) -> bool:
+    """Whether it is a finite double; whole numbers of Python may be larger than any."""
+    try:
+        return math.isfinite(number)
+    except OverflowError:
+        return False
 
 
 class Fault(NamedTuple):

@@ -14,7 +14,7 @@ from softreach.inverse.continuation import BranchEnd, BranchPoint, Continuation
 from softreach.inverse.request import checked_activations, checked_residual, checked_targets
 from softreach.rod.free_bundles import free_bundles
 from softreach.rod.tip_map import TipMap, tip_map
-from softreach.schema import AXES, provenance
+from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -106,7 +106,7 @@ def _dataset(
     """The result; `end` is None if there was nothing to begin with."""
     import xarray as xr
 
-    box, n = rod.box, len(followed)
+    box, n, units = rod.box, len(followed), activation_attributes(rod.arm)
     outcome = PathStatus.NO_START if end is None else end.status
     status = np.full(len(points), int(outcome), np.int8)
     status[:n] = PathStatus.FOLLOWED
@@ -123,13 +123,13 @@ def _dataset(
     return xr.Dataset(
         {
             "position": (("point", "axis"), points, {"units": "m"}),
-            "activation": (("point", "bundle"), activation, {"units": "1"}),
+            "activation": (("point", "bundle"), activation, units),
             "tip_error": ("point", error, {"units": "m"}),
             "status": ("point", status, {"units": "1", "meanings": _MEANINGS}),
-            "end_activation": ("bundle", end_activation, {"units": "1"}),
+            "end_activation": ("bundle", end_activation, units),
             "end_position": ("axis", end_position, {"units": "m"}),
         },
-        {"axis": list(AXES), "bundle": list(box.names)},
+        {"axis": list(AXES), **bundle_coordinates(rod.arm)},
         {
             **provenance(rod.arm),
             "end": "" if outcome == PathStatus.FOLLOWED else outcome.name.lower(),

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
-from importlib.metadata import version
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
+from softreach.versions import SCHEMA_VERSION, versions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,7 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AXES",
-    "SCHEMA_VERSION",
+    "activation_attributes",
+    "bundle_coordinates",
     "cell_dataset",
     "check_cloud",
     "cloud_dataset",
@@ -30,17 +30,16 @@ __all__ = [
     "tip_cells",
 ]
 
-SCHEMA_VERSION = 2
 AXES = ("x", "y", "z")
 
 Array = NDArray[np.float64]
 
 _CELL = 1 / 20  # of the arm's length
 
-# variable -> (dimensions, unit, meaning)
+# variable -> (dimensions, unit, meaning); that of an activation follows from the arm
 _CLOUD = {
     "tip": (("sample", "axis"), "m", "tip position"),
-    "activation": (("sample", "bundle"), "1", "activation γ of each bundle; negative contracts"),
+    "activation": (("sample", "bundle"), None, "activation of each bundle; negative γ contracts"),
 }
 _CONFIGURATION = {
     "position": (("sample", "station", "axis"), "m", "centerline r"),
@@ -48,7 +47,7 @@ _CONFIGURATION = {
     "curvature": (("sample", "station", "component"), "1/m", "Darboux vector u in the directors"),
     "extension": (("sample", "station"), "1", "axial extension ζ"),
     "radius": (("station",), "m", "outer radius R2 before activation"),
-    "activation": (("sample", "bundle"), "1", "activation γ of each bundle; negative contracts"),
+    "activation": (("sample", "bundle"), None, "activation of each bundle; negative γ contracts"),
 }
 
 
@@ -59,8 +58,8 @@ def cloud_dataset(
     import xarray as xr
 
     attrs = {**provenance(arm), "seed": seed, "sampler": sampler, "tol": tol}
-    variables = _variables(_CLOUD, {"tip": tip, "activation": activation})
-    cloud = xr.Dataset(variables, {"axis": list(AXES), "bundle": list(arm.bundle_names)}, attrs)
+    variables = _variables(_CLOUD, arm, {"tip": tip, "activation": activation})
+    cloud = xr.Dataset(variables, {"axis": list(AXES), **bundle_coordinates(arm)}, attrs)
     cloud.tip.attrs["length"] = arm.length
     return cloud
 
@@ -71,13 +70,13 @@ def configuration_dataset(
     """Shapes of an arm at stations Z, one for each row of `activation`."""
     import xarray as xr
 
-    variables = _variables(_CONFIGURATION, {**arrays, "activation": activation})
+    variables = _variables(_CONFIGURATION, arm, {**arrays, "activation": activation})
     coordinates = {
         "Z": ("station", z, {"units": "m", "long_name": "station before activation"}),
         "axis": list(AXES),
         "director": ["d1", "d2", "d3"],
         "component": ["u1", "u2", "u3"],
-        "bundle": list(arm.bundle_names),
+        **bundle_coordinates(arm),
     }
     return xr.Dataset(variables, coordinates, provenance(arm))
 
@@ -98,28 +97,38 @@ def check_cloud(cloud: xr.Dataset) -> xr.Dataset:
     return cloud
 
 
+def bundle_coordinates(arm: Manipulator) -> dict[str, Any]:
+    """Names of the bundles, and the unit of each if they differ."""
+    units = arm.bundle_units
+    each = {} if len(set(units)) == 1 else {"unit": ("bundle", list(units))}
+    return {"bundle": list(arm.bundle_names), **each}
+
+
+def activation_attributes(arm: Manipulator) -> dict[str, str]:
+    """The unit of activations if all bundles share it; else the coordinate `unit` has each."""
+    units = set(arm.bundle_units)
+    return {"units": units.pop()} if len(units) == 1 else {}
+
+
 def _variables(
-    table: Mapping[str, tuple[tuple[str, ...], str, str]], arrays: Mapping[str, Array]
+    table: Mapping[str, tuple[tuple[str, ...], str | None, str]],
+    arm: Manipulator,
+    arrays: Mapping[str, Array],
 ) -> dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]:
+    activation = activation_attributes(arm)
     return {
-        name: (dims, arrays[name], {"units": unit, "long_name": meaning})
+        name: (
+            dims,
+            arrays[name],
+            {**({"units": unit} if unit else activation), "long_name": meaning},
+        )
         for name, (dims, unit, meaning) in table.items()
     }
 
 
 def provenance(arm: Manipulator) -> dict[str, object]:
     """Attributes that say which design and version a dataset was computed from."""
-    return {
-        "design": arm.to_toml(),
-        "softreach_version": _version(),
-        "schema_version": SCHEMA_VERSION,
-    }
-
-
-@cache
-def _version() -> str:
-    """Looking it up takes a millisecond."""
-    return version("softreach")
+    return {"design": arm.to_toml(), **versions()}
 
 
 def storable(dataset: xr.Dataset) -> xr.Dataset:

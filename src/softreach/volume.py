@@ -41,7 +41,9 @@ def concave_hull(
     ``bias=True`` the shape of a quarter of the points is computed too, for a quarter of the time,
     and gives the estimate ``Hull.volume_corrected`` = 2 V(N) - V(N/4); it stays None, with a
     warning, if alpha is too small for the quarter. It is meant for random clouds: a grid has less
-    bias than this takes it to have.
+    bias than this takes it to have. It estimates the alpha shape of infinitely many points, which
+    bridges gaps and hollows narrower than 2 alpha: right for a smooth convex body, it is 3 % too
+    large for two unit balls 0.3 apart at alpha = 0.3, and 7 % at 0.45.
 
     ``alpha="critical"`` is the smallest radius at which one region covers all points. Neither it
     nor the volume there converges with N, as the most isolated point decides: compare clouds at a

@@ -13,6 +13,7 @@ import softreach as sr
 from softreach.arm import designs
 from softreach.arm.summary import design_warnings
 from softreach.arm.tables import tables
+from softreach.export import export_cloud
 from tests.cable import Cable
 from tests.laws import arm_of, in_box, integrated_tip
 
@@ -87,6 +88,36 @@ class TestEverythingElseWorks:
         low, high = mixed.bounds.T
         assert (cloud.activation >= low).all()
         assert (cloud.activation <= high).all()
+
+    def test_datasets_name_the_unit_of_each_of_its_bundles(self, mixed, tmp_path):
+        cloud = sr.compute_cloud(mixed, n=50)
+        gamma = cloud.activation.values[:3]
+        path = sr.tip_positions(mixed, gamma[:1])
+        for found in (
+            cloud,
+            sr.configuration(mixed, gamma),
+            sr.solve_inverse(mixed, path).to_dataset(),
+            sr.track_path(mixed, path, start=gamma[0]),
+        ):
+            assert dict(zip(found.bundle.values, found.unit.values, strict=True)) == {
+                "left": "1",
+                "right": "1",
+                "cable 3": "N",
+            }
+            assert "units" not in found.activation.attrs
+        parquet = pytest.importorskip("pyarrow.parquet")
+        export_cloud(cloud, tmp_path / "cloud.parquet")
+        schema = parquet.read_schema(tmp_path / "cloud.parquet")
+        assert schema.field("gamma_cable_3").metadata[b"units"] == b"N"
+        assert schema.metadata[b"activation_units"] == b"1, 1, N"
+
+    def test_datasets_of_one_unit_have_it_once(self, trunk):
+        cable = sr.compute_cloud(cylinder(Cable(place=PLACE)), n=10)
+        assert cable.activation.attrs["units"] == "N"
+        fibers = sr.compute_cloud(trunk, n=10)
+        assert fibers.activation.attrs["units"] == "1"
+        assert "unit" not in cable.coords
+        assert "unit" not in fibers.coords
 
     def test_its_reachable_set_holds_its_tips(self, mixed):
         reached = sr.reachable_set(mixed, accuracy=0.02)

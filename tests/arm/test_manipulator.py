@@ -159,3 +159,12 @@ class TestNames:
         fiber = sr.FiberArchitecture(helical_angle=0.0, extent=0.1)
         with pytest.raises(sr.InvalidDesign, match="'a 1': names two bundles"):
             arm_of(fiber.replace(name="a", bundles=2), fiber.replace(name="a 1"))
+
+
+def test_an_arm_prints_its_size_and_its_bundles(trunk):
+    assert repr(trunk) == (
+        "Manipulator: L = 1 m, R2 = 0.0625 to 0.02758 m\n  bundles: left, right, longitudinal"
+    )
+    names = repr(trunk.split("longitudinal", 40)).splitlines()[1]
+    assert names.startswith("  bundles: left, right, longitudinal 1, ")
+    assert names.endswith(", longitudinal 4, ... (42 in all)")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import itertools
 import math
 
 import numpy as np
@@ -76,3 +77,46 @@ def test_quadrature_is_converged_to_rounding(rho, alpha_deg):
 
     exact = [quad(lambda x, p=p: x**p * k(x), rho, 1, epsabs=1e-14, limit=200)[0] for p in (1, 2)]
     np.testing.assert_allclose(ring_integrals(rho, phi, alpha, nu)[:2], exact, atol=2e-13)
+
+
+def by_adaptive_quadrature(rho, phi, alpha, nu):
+    """I0, I1, I3 in v = log x, decade by decade: what is near the axis gets as many nodes."""
+    from scipy.integrate import quad
+
+    cp, ca = math.tan(phi), math.tan(alpha)
+
+    def k(x):
+        return 1 / ((1 + (cp * x) ** 2) * (1 + (ca * x) ** 2))
+
+    def t(x):
+        return ca * x / ((1 + (ca * x) ** 2) * math.sqrt(1 + (cp * x) ** 2))
+
+    ends = np.log([max(rho, 1e-17), *(10.0**e for e in range(-16, 0) if 10.0**e > rho), 1.0])
+
+    def over(f):
+        pieces = (
+            quad(lambda v: math.exp(v) * f(math.exp(v)), a, b, epsabs=0, epsrel=1e-13)[0]
+            for a, b in itertools.pairwise(ends)
+        )
+        return math.fsum(pieces)
+
+    axial = (1 + nu) * over(lambda x: x * k(x)) - nu * (1 - rho**2) / 2
+    bending = (1 + nu) * over(lambda x: x**2 * k(x)) - nu * (1 - rho**3) / 3
+    return [axial, bending, over(lambda x: x**2 * t(x))]
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.01, 0.049, 0.051, 0.5])
+@pytest.mark.parametrize("nu", [0.0, 0.5])
+@pytest.mark.parametrize("to_circumferential", [0.1, 0.05, 0.01, 1e-3, 1e-6, 1e-8])
+def test_fibers_that_nearly_wind_around_the_axis_keep_all_digits(rho, nu, to_circumferential):
+    alpha = math.pi / 2 - to_circumferential
+    for phi in (0.0, 0.5):
+        found = ring_integrals(rho, phi, alpha, nu)
+        np.testing.assert_allclose(found, by_adaptive_quadrature(rho, phi, alpha, nu), rtol=1e-12)
+
+
+def test_steep_and_shallow_fibers_in_one_array_do_not_see_each_other():
+    alpha = np.array([-1.57, 0.0, 0.4, 1.5, 1.57])
+    together = ring_integrals(0.0, 0.05, alpha, 0.5)
+    alone = [ring_integrals(0.0, 0.05, one, 0.5) for one in alpha]
+    np.testing.assert_array_equal(together, np.transpose(alone))

@@ -11,7 +11,7 @@ from hypothesis import given
 
 from softreach.arm import designs
 from softreach.arm.actuators.ring_integrals import ring_integrals
-from softreach.arm.tables import check_extension, curvature_range, extension_range, tables
+from softreach.arm.tables import check_extension, extension_range, tables
 from softreach.errors import InvalidDesign
 from tests.laws import arms, in_box, single
 
@@ -47,18 +47,14 @@ def test_the_map_is_the_papers_equations_of_extension_and_curvature(arm):
 
 
 @given(arm=arms())
-def test_ranges_hold_every_sample_and_are_reached(arm):
+def test_the_range_of_extension_holds_every_sample(arm):
     corners = np.array(list(itertools.islice(itertools.product(*arm.bounds), 1024)))
     gamma = np.concatenate([in_box(arm, 200), corners])
-    stations, bending = curvature_range(arm)
-    table = tables(arm, stations)
+    table = tables(arm, np.linspace(0.0, arm.length, 101))
     zeta = 1 + gamma @ table.extension.T
     low, high = extension_range(arm)
     assert low - 1e-12 <= zeta.min()
     assert zeta.max() <= high + 1e-12
-    kappa = np.linalg.norm(np.einsum("scb,nb->nsc", table.curvature[:, :2], gamma), axis=-1)
-    assert (kappa <= bending * (1 + 1e-5) + 1e-12).all()
-    np.testing.assert_allclose(kappa.max(axis=0), bending, rtol=1e-5, atol=1e-12)
 
 
 def test_curvature_grows_as_the_arm_thins():

@@ -5,22 +5,26 @@ from __future__ import annotations
 import importlib
 import logging
 import os
+import pickle
 import pkgutil
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import numba
 import pytest
 from numba import njit
+from numba.core import caching
 from numba.core.dispatcher import Dispatcher
 
 import softreach
 import softreach.kernels.compiler
 from softreach import kernels
 from softreach.cli.first_run import compilation_announced
-from softreach.kernels.compiler import FAST
+from softreach.kernels.compiler import FAST, kernel, strict
 
 SCRIPT = """
 import hashlib
@@ -106,3 +110,64 @@ def test_only_the_compiler_module_asks_numba_to_compile():
     asks = re.compile(r"\b(n?jit|vectorize|guvectorize|cfunc|stencil)\b")
     found = [p for p in root.rglob("*.py") if asks.search(p.read_text(encoding="utf-8"))]
     assert found == [root / "kernels" / "compiler.py"]
+
+
+def doubled(x):
+    return x + x
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch) -> Path:
+    """The folder in which Numba caches."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    return tmp_path
+
+
+def in_a_new_process(compile_with=kernel) -> Dispatcher:
+    """The function as another process finds it: not compiled yet, its cache on disk."""
+    function = compile_with(doubled)
+    assert function(2.5) == 5.0
+    return function
+
+
+def was_loaded(function: Dispatcher) -> bool:
+    return sum(function.stats.cache_hits.values()) == 1
+
+
+VERSION = pickle.dumps(numba.__version__)
+DAMAGE = {
+    "emptied": lambda whole: b"",
+    "cut short": lambda whole: whole[: len(whole) // 2],
+    "overwritten": lambda whole: b"\xff" * len(whole),
+    "of a module that has moved": lambda whole: VERSION + b"csoftreach.moved\nThing\n.",
+    "of a class that was renamed": lambda whole: VERSION + b"csoftreach.arm\nRenamed\n.",
+}
+
+
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+@pytest.mark.parametrize("damage", DAMAGE.values(), ids=DAMAGE)
+def test_a_cache_that_cannot_be_read_is_compiled_anew_and_replaced(cache, suffix, damage):
+    in_a_new_process()
+    (file,) = cache.rglob(f"*.{suffix}")
+    file.write_bytes(damage(file.read_bytes()))
+    assert not was_loaded(in_a_new_process())
+    assert was_loaded(in_a_new_process())
+
+
+@pytest.mark.parametrize("compile_with", [kernel, strict])
+def test_what_was_compiled_is_loaded_by_later_processes(cache, compile_with):
+    assert not was_loaded(in_a_new_process(compile_with))
+    assert was_loaded(in_a_new_process(compile_with))
+
+
+def test_a_cache_that_cannot_be_written_does_not_stop_the_computation(cache):
+    function = kernel(doubled)
+    shutil.rmtree(cache)
+    cache.write_text("a file where the folder was")
+    assert function(2.5) == 5.0
+
+
+def test_without_any_folder_to_cache_in_kernels_work(monkeypatch):
+    monkeypatch.setattr(caching.CacheImpl, "_locator_classes", [])
+    assert not was_loaded(in_a_new_process())
+    assert not was_loaded(in_a_new_process())

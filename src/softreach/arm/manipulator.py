@@ -25,8 +25,10 @@ __all__ = ["Manipulator"]
 
 Array = NDArray[np.float64]
 
+_NAMES = 6  # of bundles that `repr` lists
 
-@dataclass(frozen=True, kw_only=True)
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Manipulator:
     """A slender arm with actuators, clamped at Z = 0 where its tangent is +z (section 2).
 
@@ -206,9 +208,14 @@ class Manipulator:
         """A readable name for each bundle."""
         return tuple(name for actuator in self.actuators for name in actuator.bundle_names)
 
+    @property
+    def bundle_units(self) -> tuple[str, ...]:
+        """The unit of the activation of each bundle."""
+        return tuple(one.unit for one in self.actuators for _ in range(one.bundles))
+
     @cached_property
     def bounds(self) -> Array:
-        """Lower and upper activation of each bundle [units], shape (bundles, 2), read-only."""
+        """Lower and upper activation of each bundle [unit], shape (bundles, 2), read-only."""
         bounds = np.concatenate([actuator.bounds for actuator in self.actuators])
         bounds.setflags(write=False)
         return bounds
@@ -225,9 +232,9 @@ class Manipulator:
         return tuple(inside.tolist())
 
     @property
-    def units(self) -> tuple[str, ...]:
-        """Unit of each activation: "1", "N" or "Pa"."""
-        return tuple(one.unit for one in self.actuators for _ in range(one.bundles))
+    def courses(self) -> tuple[str, ...]:
+        """How what contracts runs within each bundle; see `Actuator.course`."""
+        return tuple(one.course for one in self.actuators for _ in range(one.bundles))
 
     def outline(self, z: ArrayLike) -> Outline:
         """Where all bundles lie in the sections at stations Z [m], shape (station,)."""
@@ -240,6 +247,15 @@ class Manipulator:
             outer_ratio=np.concatenate([one.outer_ratio for one in each], axis=1),
             shape=tuple(shape for one in each for shape in one.shape),
             acts=np.concatenate([one.acts for one in each], axis=1),
+        )
+
+    def __repr__(self) -> str:
+        base, tip = self.profile.radius([0.0, self.length])
+        names = ", ".join(self.bundle_names[:_NAMES])
+        more = f", ... ({self.bundles} in all)" if self.bundles > _NAMES else ""
+        return (
+            f"{type(self).__name__}: L = {self.length:g} m, R2 = {base:.4g} to {tip:.4g} m\n"
+            f"  bundles: {names}{more}"
         )
 
     def _repr_html_(self) -> str:

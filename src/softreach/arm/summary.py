@@ -10,17 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.actuators import Actuator, FiberArchitecture, Outline
+from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
 from softreach.arm.along import AlongArm
+from softreach.arm.bending import bending_at, largest_bending, sharpest_bending, smallest_bending
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.section import Stiffness
-from softreach.arm.tables import (
-    both_sides,
-    check_extension,
-    curvature_range,
-    extension_range,
-    tables,
-)
+from softreach.arm.tables import both_sides, check_extension, extension_range
 from softreach.arm.weight import load_number, mass
 from softreach.errors import Fault
 
@@ -76,7 +71,6 @@ def describe(arm: Manipulator) -> DesignSummary:
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
     """
     check_extension(arm)
-    _, bending = curvature_range(arm)
     tip_radius = float(arm.profile.radius(arm.length))
     body = arm.profile, arm.section
     return DesignSummary(
@@ -87,9 +81,12 @@ def describe(arm: Manipulator) -> DesignSummary:
         radius_ratio=arm.section.inner_ratio,
         taper_ratio=float(arm.profile.radius(0.0)) / tip_radius,
         extension=extension_range(arm),
-        curvature=(_smallest_bending(arm) * arm.length, float(bending.max() * arm.length)),
-        bundle_extension=_extension_of_bundles(arm),
-        bundle_bending=_bending_of_bundles(arm),
+        curvature=(
+            smallest_bending(arm).value * arm.length,
+            largest_bending(arm).value * arm.length,
+        ),
+        bundle_extension=np.array([extension_range(one) for one in _alone(arm)]),
+        bundle_bending=np.array([_slender_bending(one) for one in _alone(arm)]),
         breakpoints=arm.breakpoints,
         validity=tuple(dict.fromkeys(_validity(one) for one in arm.actuators if one.validity)),
         warnings=design_warnings(arm),
@@ -123,25 +120,21 @@ def _validity(actuator: Actuator) -> str:
     return f"{actuator.default_name}: {actuator.validity}"
 
 
-def _extension_of_bundles(arm: Manipulator) -> Array:
-    """Smallest and largest ζ of each activation alone, anywhere [-], shape (bundle, 2)."""
-    response = tables(arm, _stations(arm)).extension
-    ends = 1.0 + response[..., None] * arm.bounds
-    return np.stack([ends.min(axis=(0, 2)), ends.max(axis=(0, 2))], axis=-1)
+def _alone(arm: Manipulator) -> Iterator[Manipulator]:
+    """For each activation, the arm whose other activations stay zero."""
+    for bundle in range(arm.bundles):
+        bounds = np.zeros_like(arm.bounds)
+        bounds[bundle] = arm.bounds[bundle]
+        yield arm.with_bounds(bounds)
 
 
-def _bending_of_bundles(arm: Manipulator) -> Array:
-    """Smallest and largest |κ| R2 of each activation alone, anywhere [-], shape (bundle, 2)."""
-    z = _stations(arm)
-    response = np.linalg.norm(tables(arm, z).curvature[:, :2], axis=1)
-    slender = response * arm.profile.radius(z)[:, None]
-    sizes = np.abs(arm.bounds)
-    smallest = np.where(np.prod(arm.bounds, axis=1) > 0, sizes.min(axis=1), 0.0)
-    return np.stack([smallest * slender.min(axis=0), sizes.max(axis=1) * slender.max(axis=0)], -1)
-
-
-def _stations(arm: Manipulator) -> Array:
-    return both_sides(arm, np.linspace(0.0, arm.length, 101))
+def _slender_bending(arm: Manipulator) -> tuple[float, float]:
+    """Smallest and largest |κ| R2 anywhere along the arm [-]."""
+    if ((arm.bounds[:, 0] <= 0) & (arm.bounds[:, 1] >= 0)).all():
+        return 0.0, sharpest_bending(arm).value
+    z = both_sides(arm, np.linspace(0.0, arm.length, 101))
+    smallest = bending_at(arm, z)[0] * arm.profile.radius(z)
+    return float(smallest.min()), sharpest_bending(arm).value
 
 
 def _angle_at_start(fiber: FiberArchitecture, arm: Manipulator) -> float:
@@ -154,34 +147,12 @@ def design_warnings(arm: Manipulator) -> tuple[str, ...]:
     return (*_overlaps(arm), *_sharp_bending(arm), *_large_activations(arm))
 
 
-def _smallest_bending(arm: Manipulator, stations: int = 11) -> float:
-    """Least √(u1² + u2²) in the box: bounded least squares at each station [1/m]."""
-    from scipy.optimize import lsq_linear
-
-    low, high = arm.bounds.T
-    if (low <= 0).all() and (high >= 0).all():
-        return 0.0
-    free = high > low
-    table = tables(arm, np.linspace(0.0, arm.length, stations)).curvature[:, :2]
-    fixed = table[:, :, ~free] @ low[~free]
-    return min(
-        float(
-            np.linalg.norm(lsq_linear(u, -rest, (low[free], high[free])).fun)
-            if free.any()
-            else np.linalg.norm(rest)
-        )
-        for u, rest in zip(table[:, :, free], fixed, strict=True)
-    )
-
-
 def _sharp_bending(arm: Manipulator) -> Iterator[str]:
-    stations, bending = curvature_range(arm)
-    slender = bending * arm.profile.radius(stations)
-    worst = int(np.argmax(slender))
-    if slender[worst] >= 1:
-        place = f"Z = {stations[worst] / arm.length:.2f} L"
+    sharpest = sharpest_bending(arm)
+    if sharpest.value >= 1:
+        place = f"Z = {sharpest.station / arm.length:.2f} L"
         yield (
-            f"bending reaches |κ| R2 = {slender[worst]:.2f} at {place}: the inner side would fold "
+            f"bending reaches |κ| R2 = {sharpest.value:.2f} at {place}: the inner side would fold "
             "where it is 1 or more, and the theory ends there"
         )
 
@@ -196,10 +167,15 @@ def _large_activations(arm: Manipulator) -> Iterator[str]:
 
 
 def _overlaps(arm: Manipulator) -> Iterator[str]:
-    """Pairs of bundles whose sectors meet between base and tip."""
+    """Pairs of bundles in one ring whose sectors meet between base and tip.
+
+    Different rings may overlap on purpose, each with its own stiffness: they do not share matter.
+    """
     z = both_sides(arm, arm.profile.station(np.linspace(0.0, arm.profile.slender_length, 201)))
-    outline = arm.outline(z)
+    outline, rings = arm.outline(z), _ring_of_each_bundle(arm)
     for first, second in combinations(range(arm.bundles), 2):
+        if rings[first] is None or rings[first] != rings[second]:
+            continue
         depth, place = _overlap(outline, z, first, second)
         if depth > 1e-9:
             names = f"{arm.bundle_names[first]} and {arm.bundle_names[second]}"
@@ -209,16 +185,23 @@ def _overlaps(arm: Manipulator) -> Iterator[str]:
             )
 
 
+def _ring_of_each_bundle(arm: Manipulator) -> list[int | None]:
+    """Index of the ring that a bundle fills a sector of; None for other kinds."""
+    return [
+        arm.section.ring_index(one.ring) if isinstance(one, SectorActuator) else None
+        for one in arm.actuators
+        for _ in range(one.bundles)
+    ]
+
+
 def _overlap(outline: Outline, z: Array, first: int, second: int) -> tuple[float, float]:
     """Largest overlap of two sectors [rad] and the first Z where they overlap [m].
 
     Between stations their angular distance is taken to be linear.
     """
     pair = [first, second]
-    shares = outline.acts[:, pair].all(axis=1) & (
-        outline.inner_ratio[:, pair].max(axis=1) < outline.outer_ratio[:, pair].min(axis=1)
-    )
-    if not shares.any() or {outline.shape[k] for k in pair} != {"sector"}:
+    shares = outline.acts[:, pair].all(axis=1)
+    if not shares.any():
         return 0.0, 0.0
     extent = outline.extent[pair].mean()
     apart = outline.center[:, second] - outline.center[:, first]

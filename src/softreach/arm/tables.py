@@ -22,7 +22,6 @@ __all__ = [
     "both_sides",
     "check_extension",
     "compliance",
-    "curvature_range",
     "extension_range",
     "tables",
 ]
@@ -97,9 +96,16 @@ def check_extension(arm: Manipulator) -> None:
     """The theory ends where an activation would shorten the arm to nothing.
 
     Raises:
-        InvalidDesign: ζ <= 0 somewhere in the activation box and along the arm.
+        InvalidDesign: ζ <= 0 somewhere in the activation box and along the arm, or dimensions too
+            large or too small for numbers of double precision.
     """
-    smallest, _ = extension_range(arm)
+    with np.errstate(all="ignore"):
+        table = tables(arm, _stations(arm))
+    if not (np.isfinite(table.extension).all() and np.isfinite(table.curvature).all()):
+        sizes = f"L = {arm.length:.3g} m, R2(0) = {float(arm.profile.radius(0.0)):.3g} m"
+        allowed = f"overflows with {sizes}: give all lengths in m, moduli and pressures in Pa"
+        raise InvalidDesign([Fault("design", None, allowed)])
+    smallest, _ = _extension_range(arm, table)
     if smallest <= 0:
         allowed = f"reaches extension ζ = {smallest:.4g}; must keep ζ > 0: narrow the bounds"
         raise InvalidDesign([Fault("activation_bounds", arm.bounds.tolist(), allowed)])
@@ -107,27 +113,12 @@ def check_extension(arm: Manipulator) -> None:
 
 def extension_range(arm: Manipulator) -> tuple[float, float]:
     """Smallest and largest ζ anywhere in the activation box and along the arm [-]."""
-    ends = tables(arm, _stations(arm)).extension[..., None] * arm.bounds
+    return _extension_range(arm, tables(arm, _stations(arm)))
+
+
+def _extension_range(arm: Manipulator, table: Tables) -> tuple[float, float]:
+    ends = table.extension[..., None] * arm.bounds
     return 1.0 + float(ends.min(-1).sum(-1).min()), 1.0 + float(ends.max(-1).sum(-1).max())
-
-
-def curvature_range(arm: Manipulator) -> tuple[Array, Array]:
-    """The largest bending √(u1² + u2²), theory (45), that the activation box reaches.
-
-    Bending is convex in γ, so its maximum lies at a corner of the box. The corners that lead
-    farthest in each of 1,440 directions are tried; none leads farther by more than 3e-6 of it.
-
-    Returns:
-        Stations Z [m] and the largest bending there [1/m], each of shape (station,).
-    """
-    table = tables(arm, _stations(arm))
-    plane = table.curvature[:, :2]
-    # The reachable (u1, u2) are a zonogon; its farthest vertex maximizes some direction's support.
-    heading = np.linspace(0.0, 2.0 * np.pi, 1440, endpoint=False)
-    along = np.einsum("hc,scb->shb", np.stack([np.cos(heading), np.sin(heading)], 1), plane)
-    best = np.where(along > 0, arm.bounds[:, 1], arm.bounds[:, 0])
-    reached = np.einsum("scb,shb->shc", plane, best)
-    return table.stations, np.linalg.norm(reached, axis=-1).max(axis=1)
 
 
 def both_sides(arm: Manipulator, stations: Array) -> Array:

@@ -18,7 +18,9 @@ app = App(
     help="""Where a soft slender robot can go: from a design to its cloud and volumes.
 
 A DESIGN is a TOML file (lengths in m, angles in degrees) or the name of a
-built-in design: minimal_trunk, redundant_trunk. Start with
+built-in design: minimal_trunk, redundant_trunk, lce_arm, filament,
+elephant_trunk, three_tendon_robot, helical_tendon_robot, three_chamber_arm.
+Start with
 
     softreach demo --out out
 """,

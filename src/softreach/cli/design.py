@@ -106,7 +106,7 @@ def _rows_of_matter(facts: DesignSummary) -> Rows:
 
 def _bundle_rows(arm: Manipulator, facts: DesignSummary) -> Rows:
     """What each activation does alone, in words."""
-    units = ("" if unit == "1" else f" {unit}" for unit in arm.units)
+    units = ("" if unit == "1" else f" {unit}" for unit in arm.bundle_units)
     ranges = zip(arm.bounds, units, facts.bundle_extension, facts.bundle_bending, strict=True)
     return {
         f"activation {name}": (
@@ -132,7 +132,7 @@ def _rows_for_machines(arm: Manipulator, facts: DesignSummary) -> Rows:
         }
         for name, unit, bounds, extension, bending in zip(
             arm.bundle_names,
-            arm.units,
+            arm.bundle_units,
             arm.bounds,
             facts.bundle_extension,
             facts.bundle_bending,

@@ -25,7 +25,7 @@ _MAT_LIMIT = 2**31  # bytes of one variable in a version 5 file
 def export_cloud(cloud: xr.Dataset, path: str | PathLike[str]) -> None:
     """Write a cloud as .ply, .csv, .parquet, .npz, .mat, .vtu or .vtk, chosen by the suffix.
 
-    Tables have the columns x, y, z [m] and one activation [-] per bundle, such as ``gamma_left``;
+    Tables have the columns x, y, z [m] and one activation per bundle, such as ``gamma_left``;
     NPZ and MAT hold the arrays tip, activation and bundle. Design, seed, tolerance, version and
     units go along, except in CSV, VTU and VTK, which have no place for them. PLY carries the
     picture's colors too.
@@ -66,7 +66,10 @@ def _write_csv(table: CloudTable, path: Path) -> None:
 def _write_parquet(table: CloudTable, path: Path) -> None:
     pa, parquet = load_library("pyarrow"), load_library("pyarrow.parquet")
     fields = [pa.field(name, pa.float64(), metadata={"units": "m"}) for name in "xyz"]
-    fields += [pa.field(name, pa.float64(), metadata={"units": "1"}) for name in table.gammas]
+    fields += [
+        pa.field(name, pa.float64(), metadata={"units": unit})
+        for name, unit in zip(table.gammas, table.units, strict=True)
+    ]
     schema = pa.schema(fields, metadata={key: str(v) for key, v in table.metadata.items()})
     with parquet.ParquetWriter(path, schema, compression="zstd") as writer:
         for block in table.blocks():

@@ -28,9 +28,11 @@ class CloudTable(NamedTuple):
     tip: Array
     """[m], shape (sample, 3)."""
     activation: Array
-    """γ [-], shape (sample, bundle)."""
+    """γ, shape (sample, bundle)."""
     bundles: tuple[str, ...]
     """Names of the bundles as the cloud has them."""
+    units: tuple[str, ...]
+    """Unit of the activation of each bundle."""
     metadata: dict[str, str | int | float]
     """Design (TOML), seed, tolerance, versions and units."""
 
@@ -69,6 +71,7 @@ def cloud_table(cloud: xr.Dataset) -> CloudTable:
         tip.transpose("sample", "axis").values.astype(float, copy=False),
         activation.transpose("sample", "bundle").values.astype(float, copy=False),
         _bundle_names(activation),
+        _bundle_units(activation),
         _metadata(cloud),
     )
 
@@ -94,8 +97,18 @@ def _bundle_names(activation: xr.DataArray) -> tuple[str, ...]:
     return tuple(str(k + 1) for k in range(activation.sizes["bundle"]))
 
 
+def _bundle_units(activation: xr.DataArray) -> tuple[str, ...]:
+    if "unit" in activation.coords:
+        return tuple(map(str, activation["unit"].values))
+    return (activation.attrs.get("units", "1"),) * activation.sizes["bundle"]
+
+
 def _metadata(cloud: xr.Dataset) -> dict[str, str | int | float]:
-    units = {"tip_units": cloud["tip"].attrs.get("units", "m"), "activation_units": "1"}
+    each = _bundle_units(cloud["activation"])
+    units = {
+        "tip_units": cloud["tip"].attrs.get("units", "m"),
+        "activation_units": ", ".join(each if len(set(each)) > 1 else each[:1]),
+    }
     length = cloud["tip"].attrs.get("length")
     known = cloud.attrs | units | ({} if length is None else {"length_m": length})
     return {str(key): _plain(value) for key, value in known.items()}

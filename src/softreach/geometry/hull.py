@@ -11,6 +11,7 @@ from softreach.arrays import Faces, Points
 from softreach.geometry.delaunay import finite_points, unit_scale
 from softreach.geometry.surface import compact_surface, enclosed_volume, surface_area
 from softreach.quantity import quantity
+from softreach.versions import versions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,8 +40,9 @@ class Hull:
     volume_corrected: float | None = None
     """2 V(N) - V(N/4) [m³], an estimate of the volume of infinitely many points.
 
-    The volume of a random cloud falls short by an amount that shrinks as N^-1/2. None if not asked
-    for, or if the quarter is too sparse for the radius.
+    The volume of a random cloud falls short by an amount that shrinks as N^-1/2. Gaps narrower than
+    twice the radius stay bridged, so that the estimate is too large for what has them. None if not
+    asked for, or if the quarter is too sparse for the radius.
     """
 
     @property
@@ -79,7 +81,7 @@ class Hull:
         }
         variables["vertices"] = (("vertex", "axis"), self.vertices, {"units": "m"})
         variables["faces"] = (("face", "corner"), self.faces, {"units": "1"})
-        return xr.Dataset(variables, {"axis": list("xyz")})
+        return xr.Dataset(variables, {"axis": list("xyz")}, versions())
 
     def __repr__(self) -> str:
         regions = f"{self.regions:,} region" + ("s" if self.regions != 1 else "")

@@ -76,9 +76,7 @@ class _Lattice:
 
     def _compute(self, key: Index) -> None:
         place = np.stack(np.unravel_index(key, (self.side,) * 3), -1)
-        low, high = self.rod.box.low, self.rod.box.high
-        part = place / (self.side - 1)
-        gamma = low * (1 - part) + high * part
+        gamma = self.rod.box.from_cube(place / (self.side - 1))
         tip, slope = self.rod.tips_and_slopes(gamma)
         self.key = np.concatenate([self.key, key])
         self.gamma = np.concatenate([self.gamma, gamma])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import counted
-from softreach.schema import AXES
+from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -181,22 +181,23 @@ class Solutions(Sequence[Solution]):
 
         meanings = " ".join(f"{status.value}={status.name.lower()}" for status in Status)
         per_target, per_solution = ("target", "bundle"), ("solution", "bundle")
+        units = activation_attributes(self.arm)
         return xr.Dataset(
             {
                 "position": (("target", "axis"), self.targets, {"units": "m"}),
                 "status": ("target", self.statuses, {"units": "1", "meanings": meanings}),
                 "nearest": (("target", "axis"), self.nearest, {"units": "m"}),
-                "nearest_activation": (per_target, self.nearest_activations, {"units": "1"}),
+                "nearest_activation": (per_target, self.nearest_activations, units),
                 "gap": ("target", self.gaps, {"units": "m"}),
                 "gap_bound": ("target", self.gap_bounds, {"units": "m"}),
                 "target_of": ("solution", np.repeat(np.arange(len(self)), self.counts)),
-                "activation": (per_solution, self.activations, {"units": "1"}),
+                "activation": (per_solution, self.activations, units),
                 "residual": ("solution", self.residuals, {"units": "m"}),
                 "condition": ("solution", self.conditions, {"units": "1"}),
                 "margin": ("solution", self.margins, {"units": "1"}),
             },
-            {"axis": list(AXES), "bundle": list(self.arm.bundle_names)},
-            {"design": self.arm.to_toml()},
+            {"axis": list(AXES), **bundle_coordinates(self.arm)},
+            provenance(self.arm),
         )
 
 

@@ -14,6 +14,8 @@ from typing import Any
 
 from numba import njit
 from numba.core import event
+from numba.core.caching import FunctionCache
+from numba.core.dispatcher import Dispatcher
 
 __all__ = ["FAST", "inline", "kernel", "strict"]
 
@@ -30,7 +32,7 @@ check.
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a loop over samples."""
-    return njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy")(function)
+    return _cached(njit(nogil=True, fastmath=FAST, error_model="numpy")(function))
 
 
 def inline(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -50,7 +52,45 @@ def strict(function: Callable[..., Any]) -> Callable[..., Any]:
     what is compiled on behalf of a caller inherits its flags.
     """
     source = getattr(function, "py_func", function)
-    return njit(cache=True, nogil=True, fastmath=False, error_model="numpy")(source)
+    return _cached(njit(nogil=True, fastmath=False, error_model="numpy")(source))
+
+
+def _cached(function: Any) -> Any:
+    """The compiled function with a cache on disk, if there is a place for one."""
+    if isinstance(function, Dispatcher):  # not so where Numba is told not to compile
+        try:
+            function._cache = _Cache(function.py_func)  # pyright: ignore[reportAttributeAccessIssue]
+        except RuntimeError as error:  # no folder can be written
+            _LOG.info("not cached: %s", error)
+    return function
+
+
+class _Cache(FunctionCache):
+    """A cache whose faults cost a compilation, never the result.
+
+    Numba reads an index whole before it asks whether the index is fresh. One that an older version
+    of the package wrote may name classes that have moved since, and a process that is killed or
+    runs out of space may leave anything: what cannot be read is discarded.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The compiled code, or None if there is none that can be read."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception as error:  # unpickling raises whatever it likes
+            _LOG.info("cache of %r discarded: %s: %s", self, type(error).__name__, error)
+            self._attempt(self.flush)
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep the compiled code for later processes, if that can be done."""
+        self._attempt(super().save_overload, sig, data)
+
+    def _attempt(self, write: Callable[..., None], *arguments: Any) -> None:
+        try:
+            write(*arguments)
+        except Exception as error:
+            _LOG.info("%r cannot be written: %s: %s", self, type(error).__name__, error)
 
 
 class _Log(event.Listener):

@@ -14,18 +14,23 @@ from numpy.typing import ArrayLike, NDArray
 
 __all__ = ["RingIntegrals", "ring_integrals"]
 
-# Enough for machine precision while x tan(α) stays below 100 or so (|α| < 89°), any ring.
+Array = NDArray[np.float64]
+
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(48)
+
+# The integrands have poles at x = ±i/tan α. Beyond this |tan α| (86.4°) they are so near to a ring
+# that begins below this ratio that 48 nodes in x no longer reach machine precision.
+_STEEP, _FULL = 16.0, 0.05
 
 
 class RingIntegrals(NamedTuple):
     """Integrals over the ring x = R/R2 in [ρ, 1] [-], theory (3)."""
 
-    axial: NDArray[np.float64]
+    axial: Array
     """I0 = ∫ x k dx."""
-    bending: NDArray[np.float64]
+    bending: Array
     """I1 = ∫ x² k dx."""
-    torsion: NDArray[np.float64]
+    torsion: Array
     """I3 = ∫ x² t dx."""
 
 
@@ -47,12 +52,25 @@ def ring_integrals(
         np.asarray(a, float)[..., None]
         for a in np.broadcast_arrays(radius_ratio, taper, helical_angle, poisson_ratio)
     )
-    half = 0.5 * (1.0 - ratio)
-    x = ratio + half * (1.0 + _NODES)
+    x, weight = _nodes(ratio, np.abs(np.tan(alpha)))
     cone = 1.0 + (x * np.tan(phi)) ** 2
     helix = 1.0 + (x * np.tan(alpha)) ** 2
     k = (1.0 + nu) / (cone * helix) - nu
     t = x * np.tan(alpha) / (helix * np.sqrt(cone))
-    return RingIntegrals(
-        *(np.sum(half * _WEIGHTS * f, axis=-1) for f in (x * k, x**2 * k, x**2 * t))
-    )
+    return RingIntegrals(*(np.sum(weight * f, axis=-1) for f in (x * k, x**2 * k, x**2 * t)))
+
+
+def _nodes(ratio: Array, tangent: Array) -> tuple[Array, Array]:
+    """Points x of the ring and their weights, which resolve |tan α| up to 10⁹ and any ring."""
+    half = 0.5 * (1.0 - ratio)
+    x, weight = ratio + half * (1.0 + _NODES), half * _WEIGHTS
+    steep = (tangent > _STEEP) & (ratio < _FULL)
+    if not steep.any():
+        return x, weight
+    # In u with x tan α = sinh u the poles stay π/2 away, however steep the fiber.
+    slope = np.where(steep, tangent, 1.0)
+    low, high = np.arcsinh(ratio * slope), np.arcsinh(slope)
+    half = 0.5 * (high - low)
+    u = low + half * (1.0 + _NODES)
+    stretch = half * _WEIGHTS * np.cosh(u) / slope
+    return np.where(steep, np.sinh(u) / slope, x), np.where(steep, stretch, weight)
