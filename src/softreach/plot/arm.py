@@ -105,9 +105,7 @@ def _show(
     if not shapes:
         return
     buffer, within = panel.buffer(oversample=3), panel.buffer(oversample=3)
-    hidden = [
-        index for index, is_inside in enumerate(inside(arm)) if is_inside and index in bundles
-    ]
+    hidden = [index for index, is_inside in enumerate(inside(arm)) if is_inside and index in bundles]
     for shape in shapes:
         _draw_body(buffer, arm, shape, panel.view, fade)
         skins = bundle_skins(arm, shape, lift=0.008)

@@ -136,10 +136,7 @@ def _draw_strokes(ax: Axes, one: PlacedBundle, outer: float) -> None:
     angles = one.center + np.linspace(-half, half, max(3, round(2 * half / _STROKE_ANGLE)))
     ends = [
         outer * ratio * np.column_stack([np.cos(at), np.sin(at)])
-        for ratio, at in (
-            (one.inner_ratio, angles - lean / 2),
-            (one.outer_ratio, angles + lean / 2),
-        )
+        for ratio, at in ((one.inner_ratio, angles - lean / 2), (one.outer_ratio, angles + lean / 2))
     ]
     strokes = np.stack(ends, axis=1)
     ax.add_collection(LineCollection(list(strokes), colors=_STROKE, linewidths=0.7))

@@ -64,7 +64,7 @@ def _bundles(arm: Manipulator, placed: Collection[PlacedBundle]) -> Iterator[tup
             style = lumen_style(one.color) if one.shape == "lumen" else {"color": one.color}
             handle = Patch(**style)
         course = "" if one.course == "along" else f", {one.course}"
-        unit = arm.units[one.index].replace("1", "-")
+        unit = arm.bundle_units[one.index].replace("1", "-")
         name = arm.bundle_names[one.index]
         yield handle, f"{name}{course}: {symbols[one.index]} [{unit}]"
 
