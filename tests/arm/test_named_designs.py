@@ -100,9 +100,7 @@ def test_the_right_and_left_muscles_of_the_trunk_are_mirror_images():
     )
     gamma = in_box(arm, 5)
     mirrored = sr.tip_positions(arm, gamma[:, swapped], tol=1e-10) @ MIRROR
-    np.testing.assert_allclose(
-        mirrored, sr.tip_positions(arm, gamma, tol=1e-10), rtol=0, atol=1e-9
-    )
+    np.testing.assert_allclose(mirrored, sr.tip_positions(arm, gamma, tol=1e-10), rtol=0, atol=1e-9)
 
 
 def test_the_muscles_of_the_trunk_do_what_elephants_do_with_them():
@@ -171,7 +169,7 @@ def test_a_helical_tendon_bends_by_the_offset_and_the_slope_of_its_route():
 
 def test_a_chamber_bends_the_pneumatic_arm_to_a_circle_away_from_it():
     arm = designs.three_chamber_arm()
-    area, modulus = math.pi * 0.004**2, named_material("ecoflex_00_50").young_modulus
+    area, modulus = math.pi * 0.004**2, 82.7e3
     pressure = 50e3
     curvature = pressure * area * 0.0075 / (modulus * math.pi / 4 * 0.0125**4)
     angle = curvature * 0.15 * (1 + pressure * area / (modulus * math.pi * 0.0125**2))
@@ -182,4 +180,5 @@ def test_a_chamber_bends_the_pneumatic_arm_to_a_circle_away_from_it():
 def test_equal_pressures_stretch_the_pneumatic_arm():
     arm = designs.three_chamber_arm()
     stretch = 3 * 1e5 * math.pi * 0.004**2 / arm.section.stiffness(0.0125).axial
-    np.testing.assert_allclose(tip(arm, 1e5, 1e5, 1e5), [0, 0, 0.15 * (1 + stretch)], atol=1e-12)
+    stretched = 0.15 * (1 + float(stretch))
+    np.testing.assert_allclose(tip(arm, 1e5, 1e5, 1e5), [0.0, 0.0, stretched], atol=1e-12)

@@ -38,9 +38,7 @@ def gamma_path(path: str | PathLike[str]) -> Path:
     return tips.with_name(f"{tips.stem}{_ENDING}{tips.suffix}")
 
 
-def read_cloud(
-    arm: Manipulator, path: str | PathLike[str], *, tol: float = 1e-6
-) -> xr.Dataset:
+def read_cloud(arm: Manipulator, path: str | PathLike[str], *, tol: float = 1e-6) -> xr.Dataset:
     """Read a cloud of ActiveFilaments.jl, and compare its tips with those that softreach computes.
 
     Columns of NAME_gamma.csv are the sectors of the filament that `write_design` writes for the

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -118,8 +119,6 @@ def filament_from(source: str, call: Call, known: Mapping[str, Any]) -> Filament
 
 def _with_bundles(parts: Sequence[FilamentRing]) -> list[FilamentRing]:
     """Each ring with the numbers of its sectors among all."""
-    from dataclasses import replace
-
     ends = np.cumsum([len(part.bounds) for part in parts]).tolist()
     return [
         replace(part, bundles=tuple(range(end - len(part.bounds), end)))
@@ -176,9 +175,7 @@ def _angle(read: _Reader, call: Call, value: object, length: float) -> Angle:
     if not joined or [start for start, _ in ends] != joined[:-1] or length <= 0:
         raise read.fault(pieces, "ranges", "pairs (Z1, Z2) that follow one another from 0 to L")
     try:
-        return Pieces(
-            stations_over_length=tuple(end / length for end in joined), values=angles
-        )
+        return Pieces(stations_over_length=tuple(end / length for end in joined), values=angles)
     except InvalidDesign as error:
         raise read.fault(pieces, "ranges", f"from 0 to L = {length:g}, {error}") from None
 
@@ -202,9 +199,7 @@ def _core(read: _Reader, call: Call, tube: object, innermost: FilamentRing) -> t
     return _mechanics(read, inside, mechanics)
 
 
-def _activation(
-    read: _Reader, call: Call, known: Mapping[str, Any], rings: int
-) -> list[_Sectors]:
+def _activation(read: _Reader, call: Call, known: Mapping[str, Any], rings: int) -> list[_Sectors]:
     """The structure of the activation: one entry for each ring."""
     name = "ActivationPiecewiseGamma"
     lists = [value for value in known.values() if _is_activation(value, name)]
@@ -257,9 +252,7 @@ def _bounds(
     ]
 
 
-def _pairs(
-    read: _Reader, call: Call, value: object, count: int
-) -> tuple[tuple[float, float], ...]:
+def _pairs(read: _Reader, call: Call, value: object, count: int) -> tuple[tuple[float, float], ...]:
     allowed = f"a tuple (lows, highs) of {count} numbers each"
     if not isinstance(value, tuple) or len(value) != 2:
         raise read.fault(call, value, allowed)

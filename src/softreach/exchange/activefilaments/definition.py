@@ -121,4 +121,6 @@ def _the_filament(source: str, known: dict[str, Any]) -> Call:
     for value in known.values():
         if isinstance(value, Unreadable) and "AFilament" in value.names:
             raise value.error
-    raise InvalidInput(source, "no filament", "a definition with `filament = AFilament(rings; ...)`")
+    raise InvalidInput(
+        source, "no filament", "a definition with `filament = AFilament(rings; ...)`"
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,15 +39,15 @@ class FilamentRing:
     """R1 at the base [m]."""
     outer_radius: float
     """R2 at the base [m]."""
-    angle: Angle
+    angle: Angle = 0.0
     """α at the outer radius [rad]."""
-    extent: float
+    extent: float = math.pi
     """σ of every sector [rad]."""
-    offset: float
+    offset: float = 0.0
     """Polar angle of the center of the first sector [rad]."""
-    bounds: tuple[tuple[float, float], ...]
-    """(lower, upper) γ of each sector in their scale [-]."""
-    bundles: tuple[int, ...]
+    bounds: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
+    """(lower, upper) γ of each sector in their scale [-]; one that stays 0 where none is."""
+    bundles: tuple[int, ...] = ()
     """Which bundle of the arm each sector is; none for a ring without fibers."""
     scale: float = 1.0
     """Their γ over that of the arm [-]."""
@@ -202,19 +202,19 @@ def _rings(arm: Manipulator) -> Iterator[FilamentRing]:
     shared = Counter(ring for ring, _, _ in families)
     for k, ring in enumerate(section.rings):
         share = max(shared[k], 1)
-        body = {
-            "young_modulus": _modulus(ring.material) / share,
-            "poisson_ratio": ring.material.poisson_ratio,
-            "inner_radius": ring.inner_ratio * base,
-            "outer_radius": ring.outer_ratio * base,
-            "scale": float(share),
-        }
+        body = FilamentRing(
+            young_modulus=_modulus(ring.material) / share,
+            poisson_ratio=ring.material.poisson_ratio,
+            inner_radius=ring.inner_ratio * base,
+            outer_radius=ring.outer_ratio * base,
+            scale=float(share),
+            name=ring.name,
+        )
         if not shared[k]:
-            passive = {"angle": 0.0, "extent": math.pi, "offset": 0.0, "bounds": ((0.0, 0.0),)}
-            yield FilamentRing(**body, **passive, bundles=(), name=ring.name)
+            yield body
         for place, first, fiber in families:
             if place == k:
-                yield FilamentRing(**body, **_sectors(arm, fiber, first, share))
+                yield _with_sectors(body, arm, fiber, first)
 
 
 def _families(arm: Manipulator) -> Iterator[tuple[int, int, FiberArchitecture]]:
@@ -232,19 +232,20 @@ def _place(section: Section, which: int | str) -> int:
     return [ring.name for ring in section.rings].index(which)
 
 
-def _sectors(
-    arm: Manipulator, fiber: FiberArchitecture, first: int, share: int
-) -> dict[str, object]:
+def _with_sectors(
+    body: FilamentRing, arm: Manipulator, fiber: FiberArchitecture, first: int
+) -> FilamentRing:
     angle = fiber.helical_angle_on(arm.profile, arm.section)
-    pairs = (fiber.bounds * share).tolist()
-    return {
-        "angle": angle if isinstance(angle, AlongArm) else float(angle),
-        "extent": fiber.extent,
-        "offset": fiber.offset,
-        "bounds": tuple((low, high) for low, high in pairs),
-        "bundles": tuple(range(first, first + fiber.bundles)),
-        "name": fiber.name,
-    }
+    pairs = (fiber.bounds * body.scale).tolist()
+    return replace(
+        body,
+        angle=angle if isinstance(angle, Pieces) else float(angle),  # pyright: ignore[reportArgumentType]
+        extent=fiber.extent,
+        offset=fiber.offset,
+        bounds=tuple((low, high) for low, high in pairs),
+        bundles=tuple(range(first, first + fiber.bundles)),
+        name=fiber.name,
+    )
 
 
 def _modulus(material: Material) -> float:

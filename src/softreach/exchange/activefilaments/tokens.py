@@ -22,7 +22,7 @@ _PATTERN = re.compile(
     """,
     re.VERBOSE | re.DOTALL,
 )
-_OPEN, _CLOSE = "([{", ")]}"
+_PAIRS = {"(": ")", "[": "]", "{": "}"}
 _CONTINUES = {"+", "-", "*", "/", "^", "=", ","}  # a line that ends so goes on in the next
 
 
@@ -39,8 +39,10 @@ class Token(NamedTuple):
 
 
 def statements(source: str, text: str) -> Iterator[list[Token]]:
-    """The tokens of each statement: of a line, of a part of one before ";", or of several lines
-    that brackets or operators hold together.
+    """The tokens of each statement.
+
+    One is a line, the part of a line before ";", or several lines that brackets or operators hold
+    together.
 
     Args:
         source: What errors call the text.
@@ -71,11 +73,17 @@ def refused(source: str, token: Token, allowed: str, hint: str = "") -> InvalidI
 
 def _match_brackets(source: str, token: Token, brackets: list[Token]) -> None:
     """Keep the brackets that are open."""
-    if token.kind == "sign" and token.text in _OPEN:
+    if token.kind != "sign":
+        return
+    if token.text in _PAIRS:
         brackets.append(token)
-    if token.kind == "sign" and token.text in _CLOSE:
-        if not brackets or _OPEN.index(brackets.pop().text) != _CLOSE.index(token.text):
-            raise refused(source, token, "a bracket that was opened before it")
+    elif token.text in _PAIRS.values() and _PAIRS.get(_last(brackets)) != token.text:
+        raise refused(source, token, "a bracket that was opened before it")
+
+
+def _last(brackets: list[Token]) -> str:
+    """The bracket opened last, which is closed now."""
+    return brackets.pop().text if brackets else ""
 
 
 def _ends(token: Token, held: list[Token]) -> bool:
