@@ -23,6 +23,32 @@ import numpy as np
 ROOT = Path(__file__).parent.parent
 Results = dict[str, np.ndarray]
 Task = Callable[[], Results]
+REST = np.zeros((1, 3))
+
+
+def design_tasks() -> dict[str, Task]:
+    """What a design costs before its first sample."""
+    import softreach as sr
+    from softreach.arm.summary import describe
+    from softreach.arm.tables import tables
+    from softreach.rod.free import FreeRod
+
+    trunks = [_trunk(o, p) for o in (36, 75, 108) for p in (0, 2, 3)]
+    stations = np.linspace(0.0, 1.0, 101)
+
+    def described(arm: Any) -> list[float]:
+        found = describe(arm)
+        return [*found.extension, *found.curvature, *found.revolutions]
+
+    return {
+        "tables": lambda: {"U": np.array([tables(one, stations).curvature for one in trunks])},
+        "steps": lambda: {"K": np.array([FreeRod(one, 1e-6).steps for one in trunks])},
+        "first tip": lambda: {"tip": np.array([FreeRod(one, 1e-6).tips(REST) for one in trunks])},
+        "describe": lambda: {"numbers": np.array([described(one) for one in trunks])},
+        "designs": lambda: {
+            "L": np.array([sr.designs.minimal_trunk(length=k).length for k in range(1, 200)])
+        },
+    }
 
 
 def kernel_tasks() -> dict[str, Task]:
@@ -144,6 +170,7 @@ def atlas_tasks() -> dict[str, Task]:
 
 
 PARTS: dict[str, Callable[[], dict[str, Task]]] = {
+    "design": design_tasks,
     "kernels": kernel_tasks,
     "workspace": workspace_tasks,
     "inverse": inverse_tasks,

@@ -16,6 +16,9 @@ __all__ = [
     "SoftreachWarning",
 ]
 
+_LONGEST = 300
+"""Characters of a value that an error shows."""
+
 
 def counted(number: int, noun: str) -> str:
     """A number of things in words: "1 design", "2 designs"."""
@@ -60,7 +63,7 @@ class Range(NamedTuple):
             return False
         above = value > self.low or (value == self.low and not self.open_low)
         below = value < self.high or (value == self.high and not self.open_high)
-        return math.isfinite(value) and above and below
+        return above and below and _is_finite(value)
 
     def in_degrees(self) -> Range:
         """The same range of an angle, for files and the command line."""
@@ -73,6 +76,14 @@ class Range(NamedTuple):
         limits = " and ".join(text for text in (low, high) if text)
         number = "a whole number" if self.whole else "a finite number"
         return f"must be {number} {limits}".rstrip() + unit
+
+
+def _is_finite(number: float) -> bool:
+    """Whether it is a finite double; whole numbers of Python may be larger than any."""
+    try:
+        return math.isfinite(number)
+    except OverflowError:
+        return False
 
 
 class Fault(NamedTuple):
@@ -89,6 +100,8 @@ class Fault(NamedTuple):
         if self.value is None:
             return f"{self.path}: {self.allowed}"
         shown = f"{self.value:.6g}" if isinstance(self.value, float) else repr(self.value)
+        if len(shown) > _LONGEST:
+            shown = f"{shown[:_LONGEST]}..."
         return f"{self.path} = {shown}: {self.allowed}"
 
 

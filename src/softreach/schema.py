@@ -39,7 +39,7 @@ _CELL = 1 / 20  # of the arm's length
 # variable -> (dimensions, unit, meaning); that of an activation follows from the arm
 _CLOUD = {
     "tip": (("sample", "axis"), "m", "tip position"),
-    "activation": (("sample", "bundle"), None, "activation γ of each bundle; negative contracts"),
+    "activation": (("sample", "bundle"), None, "activation of each bundle; negative γ contracts"),
 }
 _CONFIGURATION = {
     "position": (("sample", "station", "axis"), "m", "centerline r"),
@@ -47,7 +47,7 @@ _CONFIGURATION = {
     "curvature": (("sample", "station", "component"), "1/m", "Darboux vector u in the directors"),
     "extension": (("sample", "station"), "1", "axial extension ζ"),
     "radius": (("station",), "m", "outer radius R2 before activation"),
-    "activation": (("sample", "bundle"), None, "activation γ of each bundle; negative contracts"),
+    "activation": (("sample", "bundle"), None, "activation of each bundle; negative γ contracts"),
 }
 
 

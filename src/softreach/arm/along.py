@@ -113,7 +113,7 @@ class Samples(AlongArm):
 
     def _faults(self) -> list[Fault]:
         faults = super()._faults()
-        if self.interpolation not in _INTERPOLATIONS:
+        if not isinstance(self.interpolation, str) or self.interpolation not in _INTERPOLATIONS:
             allowed = f"must be one of {', '.join(_INTERPOLATIONS)}"
             faults.append(Fault("interpolation", self.interpolation, allowed))
         return faults

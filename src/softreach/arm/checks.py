@@ -16,6 +16,7 @@ from softreach.errors import Fault, Range
 
 __all__ = [
     "FIBER_RANGES",
+    "INSIDE_RANGE",
     "MATERIAL_RANGES",
     "PROFILE_RANGES",
     "RING_RANGES",
@@ -52,8 +53,11 @@ FIBER_RANGES = {
     "revolution": Range(unit="rad"),
     "offset": Range(unit="rad"),
     "extent": Range(0.0, 2 * math.pi, "rad", open_low=True),
-    "bundles": Range(low=1, whole=True),
+    "bundles": Range(low=1, high=1000, whole=True),
 }
+
+INSIDE_RANGE = Range(0.0, 1.0, open_low=True, open_high=True)
+"""Between base and tip, over the length."""
 
 STRETCH_RANGES = {
     "start_over_length": Range(0.0, 1.0, open_high=True),
@@ -71,7 +75,7 @@ _TUBE_RANGES = {
     "inner_radius": Range(0.0, unit="m"),
     "inner_ratio": RING_RANGES["inner_ratio"],
     "taper": PROFILE_RANGES["taper"],
-    "poisson_ratio": MATERIAL_RANGES["poisson_ratio"],
+    **MATERIAL_RANGES,
 }
 
 _OPTIONAL = {"helical_angle", "revolution", "young_modulus", "density"}
@@ -168,15 +172,16 @@ def which_ring_faults(ring: Any) -> list[Fault]:
 
 def angle_faults(angle: Any) -> list[Fault]:
     """What is no helical angle, constant or along the arm."""
-    values = getattr(angle, "values", None)
-    angles = values if isinstance(values, tuple) else (angle,)
-    return [
-        fault
-        for one in angles
-        for fault in range_faults(
-            {"helical_angle": one}, {"helical_angle": FIBER_RANGES["helical_angle"]}
-        )
-    ]
+    along = _values_along(angle)
+    allowed = {"helical_angle": FIBER_RANGES["helical_angle"]}
+    angles = (angle,) if along is None else along
+    return [fault for one in angles for fault in range_faults({"helical_angle": one}, allowed)]
+
+
+def constant_angle_faults(angle: Any) -> list[Fault]:
+    """What is no helical angle that stays the same along the arm."""
+    allowed = FIBER_RANGES["helical_angle"]
+    return [] if allowed.admits(plain_number(angle)) else [Fault("helical_angle", angle, allowed)]
 
 
 def tendon_faults(values: Mapping[str, Any]) -> list[Fault]:
@@ -210,8 +215,8 @@ def one_length_faults(
     if len(given) != 1:
         both = tuple(values[name] for name in (field, ratio))
         return [Fault(f"{field}, {ratio}", both, f"give exactly one of {field} and {ratio}")]
-    along = getattr(values[field], "values", None) if sampled else None
-    if isinstance(along, tuple):
+    along = _values_along(values[field]) if sampled else None
+    if along is not None:
         return [fault for one in along for fault in range_faults({field: one}, {field: allowed})]
     return range_faults(
         {given[0]: values[given[0]]},
@@ -298,6 +303,12 @@ def range_faults(values: Mapping[str, Any], ranges: Mapping[str, Range]) -> list
         for name, value in given.items()
         if not ranges[name].admits(value) and not (value is None and name in _OPTIONAL)
     ]
+
+
+def _values_along(given: Any) -> tuple[float, ...] | None:
+    """The values of what changes along the arm; None for anything else."""
+    values = getattr(given, "values", None)
+    return values if isinstance(values, tuple) else None
 
 
 def _numbers(values: Any) -> np.ndarray[Any, np.dtype[np.float64]]:

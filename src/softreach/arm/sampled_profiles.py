@@ -11,7 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.along import monotone_cubic
-from softreach.arm.checks import PROFILE_RANGES, plain_number, range_faults, series_faults
+from softreach.arm.checks import (
+    INSIDE_RANGE,
+    PROFILE_RANGES,
+    plain_number,
+    range_faults,
+    series_faults,
+)
 from softreach.arm.profile import Profile, relative_expm1, relative_log
 from softreach.arm.variable import Variable
 from softreach.errors import Fault, InvalidDesign
@@ -31,6 +37,11 @@ class _GivenRadii(Profile):
 
     variables: ClassVar[tuple[Variable, ...]] = (
         Variable("length", "L", "length before activation", PROFILE_RANGES["length"]),
+    )
+
+    series: ClassVar[tuple[Variable, ...]] = (
+        Variable("stations_over_length", "Z/L", "station of a radius", INSIDE_RANGE),
+        Variable("radii", "R2", "outer radius at a station", PROFILE_RANGES["outer_radius"]),
     )
 
     length: float
@@ -139,15 +150,19 @@ class SampledTaper(_GivenRadii):
 
     def radius(self, z: ArrayLike) -> Array:
         """R2(Z) [m]."""
-        return self._curve(np.asarray(z, float))
+        return self._curve(np.asarray(z, float) / self.length)
 
     def slope(self, z: ArrayLike) -> Array:
         """tan φ(Z) = -R2'(Z) [-]."""
-        return -self._curve.derivative()(np.asarray(z, float))
+        return -self._curve_slope(np.asarray(z, float) / self.length) / self.length
 
     @cached_property
     def _curve(self) -> Any:
-        return monotone_cubic(self._knots.tolist(), self.radii)
+        return monotone_cubic(self.stations_over_length, self.radii)
+
+    @cached_property
+    def _curve_slope(self) -> Any:
+        return self._curve.derivative()
 
     def surface_coordinate(self, z: ArrayLike, ratio: float = 1.0) -> Array:
         """∫ dZ/(R cos φ) [-] by Gauss quadrature in each piece: theory (14)."""

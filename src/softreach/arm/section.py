@@ -121,7 +121,7 @@ class Section:
         if not isinstance(self.core, Material | None):
             raise InvalidDesign([Fault("section.core", self.core, "must be a Material or None")])
         object.__setattr__(self, "rings", rings)
-        if faults := section_faults(vars(self)) + list(_modulus_faults(self)):
+        if faults := section_faults(vars(self)) or list(_modulus_faults(self)):
             raise InvalidDesign(faults)
         object.__setattr__(self, "bore_ratio", float(plain_number(self.bore_ratio)))
 
@@ -135,11 +135,19 @@ class Section:
         Raises:
             InvalidDesign: There is none.
         """
+        return self.rings[self.ring_index(which)]
+
+    def ring_index(self, which: int | str) -> int:
+        """The index of a ring, from 0, by its index (from behind if negative) or name.
+
+        Raises:
+            InvalidDesign: There is none.
+        """
         names = [ring.name for ring in self.rings]
         if isinstance(which, str) and which in names:
-            return self.rings[names.index(which)]
+            return names.index(which)
         if isinstance(which, int) and -len(names) <= which < len(names):
-            return self.rings[which]
+            return which % len(names)
         known = ", ".join(f"{k} ({name})" if name else str(k) for k, name in enumerate(names))
         raise InvalidDesign([Fault("ring", which, f"must be one of the section's rings: {known}")])
 
@@ -186,7 +194,7 @@ class Section:
         Raises:
             InvalidDesign: A layer without a density.
         """
-        if faults := list(_missing(self, "density", "kg/m³", "where weight counts")):
+        if faults := self.density_faults("where weight counts"):
             raise InvalidDesign(faults)
         return np.pi * self._sum(lambda one: one.density or 0.0, 2) * np.asarray(radius, float) ** 2
 
@@ -197,6 +205,14 @@ class Section:
             why: Ends the sentence "must be given in Pa ...".
         """
         return list(_missing(self, "young_modulus", "Pa", why))
+
+    def density_faults(self, why: str) -> list[Fault]:
+        """A fault for each material whose density is needed and left out.
+
+        Args:
+            why: Ends the sentence "must be given in kg/m³ ...".
+        """
+        return list(_missing(self, "density", "kg/m³", why))
 
     def _sum(self, factor: Callable[[Material], float], power: int) -> float:
         """Σ factor · (b^n - a^n) over the layers between the ratios a and b."""

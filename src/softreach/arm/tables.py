@@ -96,9 +96,16 @@ def check_extension(arm: Manipulator) -> None:
     """The theory ends where an activation would shorten the arm to nothing.
 
     Raises:
-        InvalidDesign: ζ <= 0 somewhere in the activation box and along the arm.
+        InvalidDesign: ζ <= 0 somewhere in the activation box and along the arm, or dimensions too
+            large or too small for numbers of double precision.
     """
-    smallest, _ = extension_range(arm)
+    with np.errstate(all="ignore"):
+        table = tables(arm, _stations(arm))
+    if not (np.isfinite(table.extension).all() and np.isfinite(table.curvature).all()):
+        sizes = f"L = {arm.length:.3g} m, R2(0) = {float(arm.profile.radius(0.0)):.3g} m"
+        allowed = f"overflows with {sizes}: give all lengths in m, moduli and pressures in Pa"
+        raise InvalidDesign([Fault("design", None, allowed)])
+    smallest, _ = _extension_range(arm, table)
     if smallest <= 0:
         allowed = f"reaches extension ζ = {smallest:.4g}; must keep ζ > 0: narrow the bounds"
         raise InvalidDesign([Fault("activation_bounds", arm.bounds.tolist(), allowed)])
@@ -106,7 +113,11 @@ def check_extension(arm: Manipulator) -> None:
 
 def extension_range(arm: Manipulator) -> tuple[float, float]:
     """Smallest and largest ζ anywhere in the activation box and along the arm [-]."""
-    ends = tables(arm, _stations(arm)).extension[..., None] * arm.bounds
+    return _extension_range(arm, tables(arm, _stations(arm)))
+
+
+def _extension_range(arm: Manipulator, table: Tables) -> tuple[float, float]:
+    ends = table.extension[..., None] * arm.bounds
     return 1.0 + float(ends.min(-1).sum(-1).min()), 1.0 + float(ends.max(-1).sum(-1).max())
 
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.palette import STEEL, Color
 from softreach.picture.png import png_bytes
 from softreach.picture.projection import View, project
+from softreach.picture.see_through import seen_through
 from softreach.picture.shading import draw_mesh
 from softreach.picture.zbuffer import Extent, ZBuffer
 
@@ -31,6 +32,8 @@ class Skin(NamedTuple):
     faces: ArrayLike
     """Shape (f, 3)."""
     color: Color = STEEL
+    hidden: bool = False
+    """Whether it lies within others and shows through them."""
 
 
 class Dots(NamedTuple):
@@ -78,13 +81,22 @@ def thumbnail(*parts: Skin | Dots, view: View = "oblique", width: int = _WIDTH) 
     if extent is None:
         return None
     faces = sum(len(np.asarray(part.faces)) for part in parts if isinstance(part, Skin))
-    buffer = ZBuffer(extent, width, oversample=1 if faces > _FINE else 2, color_step=4)
+    buffer, within = (
+        ZBuffer(extent, width, oversample=1 if faces > _FINE else 2, color_step=4) for _ in range(2)
+    )
     for part, points in zip(parts, seen, strict=True):
-        if isinstance(part, Skin):
-            _draw_skin(buffer, part, view)
-        else:
+        if isinstance(part, Dots):
             _draw_dots(buffer, points, part.colors)
-    return png_bytes(buffer.rgba())
+            continue
+        for layer in (buffer, within) if part.hidden else (buffer,):
+            _draw_skin(layer, part, view)
+    return png_bytes(_image(parts, buffer, within))
+
+
+def _image(parts: tuple[Skin | Dots, ...], buffer: ZBuffer, within: ZBuffer) -> NDArray[np.uint8]:
+    if any(isinstance(part, Skin) and part.hidden for part in parts):
+        return seen_through(buffer.rgba(), within.rgba())
+    return buffer.rgba()
 
 
 def _square_around(seen: list[NDArray[np.float64]]) -> Extent | None:

@@ -21,11 +21,15 @@ def cone_integrals(ring: Ring, slope: Array, angle: Array) -> RingIntegrals:
         slope: tan φ of the arm's surface, shape (station,); that of the ring is in proportion.
         angle: α at the outer radius of the ring [rad], shape (station,).
     """
-    pairs, station = np.unique(np.stack([slope, angle], axis=1), axis=0, return_inverse=True)
-    integrals = ring_integrals(
-        ring.radius_ratio,
-        np.arctan(pairs[:, 0] * ring.outer_ratio),
-        pairs[:, 1],
-        ring.material.poisson_ratio,
-    )
-    return RingIntegrals(*(integral[station] for integral in integrals))
+    pairs = slope + 1j * angle
+    if not (len(pairs) and (pairs == pairs[0]).all()):
+        pairs, station = np.unique(pairs, return_inverse=True)
+        return RingIntegrals(*(integral[station] for integral in _integrals(ring, pairs)))
+    one = _integrals(ring, pairs[:1])
+    return RingIntegrals(*(np.broadcast_to(integral, pairs.shape) for integral in one))
+
+
+def _integrals(ring: Ring, pairs: NDArray[np.complex128]) -> RingIntegrals:
+    """The integrals for pairs of slope (real) and angle (imaginary)."""
+    slope = np.arctan(pairs.real * ring.outer_ratio)
+    return ring_integrals(ring.radius_ratio, slope, pairs.imag, ring.material.poisson_ratio)

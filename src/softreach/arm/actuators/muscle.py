@@ -15,7 +15,7 @@ from softreach.arm.actuators.actuator import STRETCH
 from softreach.arm.actuators.cone import cone_integrals
 from softreach.arm.actuators.ring_integrals import RingIntegrals
 from softreach.arm.actuators.sector import SectorActuator
-from softreach.arm.checks import FIBER_RANGES, angle_faults
+from softreach.arm.checks import FIBER_RANGES, constant_angle_faults
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.arm.variable import Variable
@@ -57,6 +57,13 @@ class ObliqueMuscle(SectorActuator):
     helical_angle: float
     """α of its fibers from the axis, at the outer radius of the ring [rad]; 0 is longitudinal."""
 
+    @property
+    def course(self) -> str:
+        """Which way its fibers cross it."""
+        if self.helical_angle == 0:
+            return "along"
+        return "right-handed" if self.helical_angle > 0 else "left-handed"
+
     def integrals(self, profile: Profile, section: Section, z: Array) -> RingIntegrals:
         """I0, I1, I3 with the local taper and the angle of the fibers: theory (3)."""
         angle = np.full(len(z), self.helical_angle)
@@ -68,7 +75,7 @@ class ObliqueMuscle(SectorActuator):
         return np.zeros(len(z))
 
     def _faults(self) -> list[Fault]:
-        return super()._faults() + angle_faults(self.helical_angle)
+        return super()._faults() + constant_angle_faults(self.helical_angle)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,6 +92,11 @@ class RadialMuscle(SectorActuator):
     variables: ClassVar[tuple[Variable, ...]] = _SECTOR
     default_name: ClassVar[str] = "radial muscle"
     validity: ClassVar[str] = "As for fibers; the change of radius itself is left out."
+
+    @property
+    def course(self) -> str:
+        """Along the radius."""
+        return "radial"
 
     def integrals(self, profile: Profile, section: Section, z: Array) -> RingIntegrals:
         """I0 = -ν (1 - ρ²)/2, I1 = -ν (1 - ρ³)/3, I3 = 0 [-]."""

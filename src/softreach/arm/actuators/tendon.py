@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
@@ -56,6 +57,9 @@ class Tendon(Actuator):
         Variable("bundles", "n", "number of tendons", FIBER_RANGES["bundles"]),
         *STRETCH,
     )
+    series: ClassVar[tuple[Variable, ...]] = (
+        Variable("routing", "θ", "angle along the arm", FIBER_RANGES["offset"]),
+    )
     default_name: ClassVar[str] = "tendon"
     validity: ClassVar[str] = (
         "Exact for tendons parallel to the axis. Other tendons pull along their direction at rest, "
@@ -82,7 +86,7 @@ class Tendon(Actuator):
         x, y = route.distance * cos, route.distance * sin
         t1 = route.distance_slope * cos - around * sin
         t2 = route.distance_slope * sin + around * cos
-        t3 = 1.0 / np.sqrt(1.0 + t1**2 + t2**2)
+        t3 = 1.0 / np.hypot(1.0, np.hypot(t1, t2))
         moment = np.stack([-y * t3, x * t3, (y * t1 - x * t2) * t3], axis=1)
         return Resultants(-t3, moment)
 
@@ -112,7 +116,12 @@ class Tendon(Actuator):
         return section.modulus_faults(f"for tendon {self.name!r}, whose activation is in N")
 
     def replace(self, **changes: Any) -> Tendon:
-        """A copy with some fields changed; a new distance takes the place of a ratio."""
+        """A copy with some fields changed.
+
+        A new distance takes the place of a ratio, and a new revolution that of a routing.
+        """
+        if changes.get("revolution") is not None:
+            changes.setdefault("routing", None)
         if changes.get("distance") is not None:
             changes.setdefault("distance_ratio", None)
         if changes.get("distance_ratio") is not None:
@@ -120,8 +129,13 @@ class Tendon(Actuator):
         return super().replace(**changes)
 
     def value_on(self, field: str, profile: Profile, section: Section) -> Any:
-        """Value of a variable; of distance and ratio, the one not given follows at the base."""
+        """Value of a variable; of distance and ratio, the one not given follows at the base.
+
+        The revolution of a routing is its rotation from where the tendon begins to its anchor.
+        """
         del section
+        if field == "revolution" and self.routing is not None:
+            return float(np.diff(self.routing([self.start_over_length, self.end_over_length]))[0])
         base = float(profile.radius(0.0))
         if field == "distance" and self.distance is None:
             return (self.distance_ratio or 0.0) * base
@@ -154,4 +168,16 @@ class Tendon(Actuator):
         return rate * (x - self.start_over_length), np.full(z.shape, rate / profile.length)
 
     def _faults(self) -> list[Fault]:
-        return super()._faults() + tendon_faults(vars(self))
+        return super()._faults() + tendon_faults(vars(self)) + list(self._route_faults())
+
+    def _route_faults(self) -> Iterator[Fault]:
+        """A cable that jumps, or turns in two ways."""
+        if isinstance(self.distance, AlongArm) and not isinstance(self.distance, Samples):
+            yield Fault("distance", self.distance, "must be a number or Samples, which do not jump")
+        if self.routing is None:
+            return
+        if not isinstance(self.routing, Samples):
+            yield Fault("routing", self.routing, "must be Samples of θ(Z) - θ0, or None")
+        elif self.revolution != 0:
+            allowed = "must be left out where routing is given, which says how the tendon turns"
+            yield Fault("revolution", self.revolution, allowed)
