@@ -45,7 +45,7 @@ def change_bounds(
     """
     # No activation within the bounds is nearer than the one nearest to `near`, wherever its tip.
     bounds = np.linalg.norm(near - rod.box.clip(near), axis=1)
-    if rod.box.dimension <= MOST_BUNDLES:
+    if rod.box.dimension <= MOST_BUNDLES and np.isfinite(rod.linearization_error(coarse.half)):
         enough = np.maximum(change - _AIM, 0.0)
 
         def prove(rows: slice) -> None:

@@ -39,12 +39,8 @@ def change_bounds(center, slope, wanted, error, low, high, enough, out):
     gram, x = np.zeros((3, 3)), np.empty_like(center)
     softness = np.empty(center.shape[0])
     for n in range(center.shape[0]):
-        square, goal, most, size = 0.0, 0.5 * enough[n] ** 2, 0.0, 0.0
-        for j in range(center.shape[1]):
-            size += (0.5 * (low[n, j] + high[n, j]) - center[n, j]) ** 2
-            for i in range(3):
-                square += slope[n, i, j] ** 2
-        softness[n] = error[n] * math.sqrt(square / max(size, 1e-30)) + 1e-30
+        goal, most = 0.5 * enough[n] ** 2, 0.0
+        softness[n] = error[n] / _usual_size(center, slope, low, high, n)
         y[:] = 0.0
         for _ in range(_MOST_ITERATIONS):
             best = dual(center, slope, wanted, softness, low, high, n, y, x, miss, gram)
@@ -52,15 +48,26 @@ def change_bounds(center, slope, wanted, error, low, high, enough, out):
             most = max(most, best + 0.5 * softness[n] * size * size - error[n] * size)
             if most >= goal or _meets(center, x, n, miss, softness, y, error, goal):
                 break
-            if size > 0.0:
-                softness[n] = error[n] / size + 1e-30
-                best = dual(center, slope, wanted, softness, low, high, n, y, x, miss, gram)
+            best += _soften(
+                softness, n, error[n] / size if size > 0.0 else softness[n], y, miss, gram
+            )
             ascent = newton(gram, miss, step)
             ends = center, slope, wanted, softness, low, high, n, y, step, trial
             if not ascent > _CONVERGED * goal or not climbs(ends, best, ascent):
                 break
             y[:] = trial
         out[n] = math.sqrt(2.0 * most)
+
+
+@inline
+def _usual_size(center, slope, low, high, n):
+    """What |y| would be if all of A had a part in the change to the middle of the box."""
+    square, change = 0.0, 0.0
+    for j in range(center.shape[1]):
+        change += (0.5 * (low[n, j] + high[n, j]) - center[n, j]) ** 2
+        for i in range(3):
+            square += slope[n, i, j] ** 2
+    return math.sqrt((change + 1e-30) / (square + 1e-30))
 
 
 @inline
@@ -72,3 +79,14 @@ def _meets(center, x, n, miss, softness, y, error, goal):
     for j in range(center.shape[1]):
         change += (x[n, j] - center[n, j]) ** 2
     return square <= error[n] ** 2 and 0.5 * change < goal
+
+
+@inline
+def _soften(softness, n, now, y, miss, gram):
+    """Change the softness with what depends on it; how much the dual function grows by that."""
+    less = softness[n] - now
+    softness[n] = now
+    for i in range(3):
+        miss[i] += less * y[i]
+        gram[i, i] -= less
+    return 0.5 * less * (y[0] * y[0] + y[1] * y[1] + y[2] * y[2])

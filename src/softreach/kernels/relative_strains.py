@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
@@ -15,7 +13,7 @@ _TOGETHER = 64  # cells, so that the loop over them is innermost and short
 
 @kernel
 def relative_strains(centers, offset, stretch, curvature, longest, bending):
-    """Write the largest relative extension and bending along the arm for each cell.
+    """Write the largest relative extension and squared bending along the arm for each cell.
 
     Args:
         centers: Activations, shape (n, m).
@@ -23,7 +21,7 @@ def relative_strains(centers, offset, stretch, curvature, longest, bending):
         stretch: Its change with each activation, shape (station, m).
         curvature: Of each activation, shape (station, 3, m).
         longest: Result, largest offset + Σ stretch γ, shape (n,).
-        bending: Result, largest |Σ curvature γ|, shape (n,).
+        bending: Result, largest |Σ curvature γ|², shape (n,).
     """
     count, bundles = centers.shape
     gamma = np.zeros((bundles, _TOGETHER))
@@ -31,8 +29,7 @@ def relative_strains(centers, offset, stretch, curvature, longest, bending):
     for first in range(0, count, _TOGETHER):
         size = min(_TOGETHER, count - first)
         for i in range(size):
-            for j in range(bundles):
-                gamma[j, i] = centers[first + i, j]
+            gamma[:, i] = centers[first + i]
             longest[first + i] = bending[first + i] = 0.0
         for s in range(len(offset)):
             extension[:] = offset[s]
@@ -41,13 +38,10 @@ def relative_strains(centers, offset, stretch, curvature, longest, bending):
             for k in range(3):
                 part[:] = 0.0
                 _add_products(curvature[s, k], gamma, part)
-                for i in range(_TOGETHER):
-                    square[i] += part[i] * part[i]
+                square += part * part
             for i in range(size):
                 longest[first + i] = max(longest[first + i], extension[i])
                 bending[first + i] = max(bending[first + i], square[i])
-        for i in range(size):
-            bending[first + i] = math.sqrt(bending[first + i])
 
 
 @inline

@@ -87,7 +87,7 @@ class Linearization:
         longest, bending = np.empty(n), np.empty(n)
         offset = (1.0 + self.stretch @ half_widths) / self.longest
         relative_strains(centers, offset, *self._relative, longest, bending)
-        bending += (self.size @ half_widths * self._bending_inverse).max()
+        bending = np.sqrt(bending) + (self.size @ half_widths * self._bending_inverse).max()
         terms = self._terms(half_widths)
         return np.asarray(terms.sum(np.minimum(longest, 1.0), np.minimum(bending, 1.0)))
 
