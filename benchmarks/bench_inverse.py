@@ -138,7 +138,7 @@ MANY_HEAD = f"""
 
 The least |γ| of the first {FEW_PROOFS} tips is proved with `prove_least=True`.
 
-| bundles | CPU µs/target | targets/s | reached | least proved | CPU ms/proof | places out of reach | \
+| bundles | CPU µs/target | targets/s | reached | least proved | CPU ms/proof | out of reach | \
 proved | CPU ms/place |
 |--:|--:|--:|--:|--:|--:|--:|--:|--:|"""
 

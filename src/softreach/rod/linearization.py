@@ -40,8 +40,12 @@ _MOST_KNOWN = 64  # proportions of half widths whose terms are kept
 class _Terms(NamedTuple):
     """What the bound is made of where extension and bending are largest: degree two in d."""
 
-    cubic: tuple[float, float, float]
-    """∫ 3/2 ζ a² with the parts ζ U d and (z·d) u of κ: both the first, one of each, the second."""
+    turned_twice: float
+    """∫ 3/2 ζ a² by the first part of κ = ζ U d + (z·d) u."""
+    turned_and_stretched: float
+    """The same by one of each."""
+    stretched_twice: float
+    """The same by the second part."""
     turned: float
     """∫ 2 |z·d| a by the first part."""
     stretched: float
@@ -51,8 +55,8 @@ class _Terms(NamedTuple):
 
     def sum(self, longest: Array | float, bending: Array | float) -> Array | float:
         """The bound where extension and bending are these parts of their largest values."""
-        both, one, other = self.cubic
-        square = both * longest**2 + one * longest * bending + other * bending**2
+        square = self.turned_twice * longest**2 + self.stretched_twice * bending**2
+        square += self.turned_and_stretched * longest * bending
         linear = self.turned * longest + self.stretched * bending + self.mixed * longest
         return 0.5 * _SAFETY * (longest * square + linear)
 
@@ -79,7 +83,8 @@ class Linearization:
 
     def error(self, half_widths: Array) -> float:
         """The largest |r(γ + d) - r(γ) - r'(γ) d| [m] for |dj| <= half_widths[j] in the box."""
-        return float(self._terms(half_widths).sum(1.0, 1.0))
+        square, terms = self._terms(half_widths)
+        return square * float(terms.sum(1.0, 1.0))
 
     def errors(self, centers: Array, half_widths: Array) -> Array:
         """The same for |dj| <= half_widths[j] around each center only, shape (n,)."""
@@ -88,8 +93,8 @@ class Linearization:
         offset = (1.0 + self.stretch @ half_widths) / self.longest
         relative_strains(centers, offset, *self._relative, longest, bending)
         bending = np.sqrt(bending) + (self.size @ half_widths * self._bending_inverse).max()
-        terms = self._terms(half_widths)
-        return np.asarray(terms.sum(np.minimum(longest, 1.0), np.minimum(bending, 1.0)))
+        square, terms = self._terms(half_widths)
+        return square * np.asarray(terms.sum(np.minimum(longest, 1.0), np.minimum(bending, 1.0)))
 
     @cached_property
     def _bending_inverse(self) -> Array:
@@ -103,34 +108,31 @@ class Linearization:
         curvature = self.curvature * self._bending_inverse[:, None, None]
         return stretch, curvature
 
-    def _terms(self, half_widths: Array) -> _Terms:
-        """The terms of the bound, computed once for half widths of one proportion."""
+    def _terms(self, half_widths: Array) -> tuple[float, _Terms]:
+        """The largest half width squared, and the terms for it at 1, known for each proportion."""
         largest = float(half_widths.max(initial=0.0))
-        if largest == 0.0:
-            return _Terms((0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
-        shape = half_widths / largest
-        if shape.tobytes() not in self._known:
-            if len(self._known) >= _MOST_KNOWN:
-                self._known.clear()
-            self._known[shape.tobytes()] = self._computed(shape)
-        cubic, *others = self._known[shape.tobytes()]
-        square = largest**2
-        both, one, other = cubic
-        return _Terms(
-            (square * both, square * one, square * other), *(square * part for part in others)
-        )
+        shape = half_widths / (largest or 1.0)
+        terms = self._known.get(shape.tobytes())
+        if terms is None:
+            terms = self._computed(shape)
+            if len(self._known) < _MOST_KNOWN:
+                self._known[shape.tobytes()] = terms
+        return largest**2, terms
 
     def _computed(self, half_widths: Array) -> _Terms:
         free, z = np.flatnonzero(half_widths > 0), self.stations
+        if not len(free):
+            return _Terms(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         stretch, turned = self.stretch @ half_widths, self._turns(half_widths, free)
         first = _integrals(self.longest * turned, z)
         second = _integrals(stretch * self.bending, z)
         weight, most = 1.5 * self.longest, turned.max(axis=0)
-        # The square of a is convex in d, so that it is largest where all |dj| are.
-        cubic = (first**2, 2.0 * first * second, second[None] ** 2)
         inner = self.longest * _integrals(2.0 * stretch * most, z)
+        # The square of a is convex in d, so that it is largest where all |dj| are.
         return _Terms(
-            cubic=tuple(float(_integrals(weight * part, z)[:, -1].max()) for part in cubic),
+            turned_twice=float(_integrals(weight * first**2, z)[:, -1].max()),
+            turned_and_stretched=float(_integrals(2.0 * weight * first * second, z)[:, -1].max()),
+            stretched_twice=float(_integrals(weight * second**2, z)[-1]),
             turned=float(_integrals(2.0 * stretch * first.max(axis=0), z)[-1]),
             stretched=float(_integrals(2.0 * stretch * second, z)[-1]),
             mixed=float(_integrals(inner, z)[-1]),
