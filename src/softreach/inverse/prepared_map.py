@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 from softreach.arm.manipulator import Manipulator
+from softreach.inverse.bisection import CoarseCells
 from softreach.inverse.cells import activation_cells
-from softreach.inverse.exclusion import CoarseCells
 from softreach.inverse.image_tree import image_tree
 from softreach.inverse.landmarks import Landmarks, face_landmarks, landmarks
 from softreach.kernels.activation_mesh import ActivationMesh

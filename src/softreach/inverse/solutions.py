@@ -58,6 +58,11 @@ class Solution:
     """|nearest - target| [m]."""
     gap_bound: float
     """A proved lower bound of the distance to the reachable set [m]; 0 if nothing is proved."""
+    change_bound: float
+    """A proved lower bound of |γ - near| of all activations that reach the target [-]; 0 if nothing
+    is proved, which it is only where `prove_least` asks for it."""
+    least_proved: bool
+    """Whether the bound is the |γ - near| of the first activation, but for 1e-6."""
 
     def __len__(self) -> int:
         return len(self.activations)
@@ -99,6 +104,10 @@ class Solutions(Sequence[Solution]):
     """Shape (t,) [m]."""
     gap_bounds: Array
     """Proved lower bounds of the distance to the reachable set, shape (t,) [m]."""
+    change_bounds: Array
+    """Proved lower bounds of |γ - near| of all activations that reach a target, shape (t,) [-]."""
+    least_proved: NDArray[np.bool_]
+    """Whether the first activation of a target is proved to change least, to 1e-6, shape (t,)."""
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
@@ -161,6 +170,8 @@ class Solutions(Sequence[Solution]):
             nearest_activation=self.nearest_activations[i],
             gap=float(self.gaps[i]),
             gap_bound=float(self.gap_bounds[i]),
+            change_bound=float(self.change_bounds[i]),
+            least_proved=bool(self.least_proved[i]),
         )
 
     def _several(self, chosen: Index) -> Solutions:
@@ -190,6 +201,8 @@ class Solutions(Sequence[Solution]):
                 "nearest_activation": (per_target, self.nearest_activations, units),
                 "gap": ("target", self.gaps, {"units": "m"}),
                 "gap_bound": ("target", self.gap_bounds, {"units": "m"}),
+                "change_bound": ("target", self.change_bounds, {"units": "1"}),
+                "least_proved": ("target", self.least_proved),
                 "target_of": ("solution", np.repeat(np.arange(len(self)), self.counts)),
                 "activation": (per_solution, self.activations, units),
                 "residual": ("solution", self.residuals, {"units": "m"}),
@@ -201,5 +214,14 @@ class Solutions(Sequence[Solution]):
         )
 
 
-_PER_TARGET = ("targets", "statuses", "nearest", "nearest_activations", "gaps", "gap_bounds")
+_PER_TARGET = (
+    "targets",
+    "statuses",
+    "nearest",
+    "nearest_activations",
+    "gaps",
+    "gap_bounds",
+    "change_bounds",
+    "least_proved",
+)
 _PER_SOLUTION = ("activations", "residuals", "conditions", "margins")
