@@ -168,11 +168,10 @@ _NO_OVERLAPS = _Overlaps({}, np.nan, np.nan, np.nan)
 
 
 def _overlaps(volume: float, fine: Image, coarse: Image) -> _Overlaps:
-    several, rough = measure.multiply_covered(fine), measure.multiply_covered(coarse)
-    again = sum(several.values())
+    several, error = measure.multiply_covered(fine, coarse)
     return _Overlaps(
-        {1: volume - again, **several},
-        abs(again - sum(rough.values())),
+        {1: volume - sum(several.values()), **several},
+        error,
         *measure.fold_volume(fine, coarse),
     )
 

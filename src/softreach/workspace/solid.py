@@ -73,7 +73,7 @@ class ReachableSolid(ReachableSet):
         counts, degrees = self.image.counts
         fields = {"occupied": counts > 0}
         if self.multiplicity:
-            fields |= {"count": counts, "degree": degrees}
+            fields |= {"count": counts.clip(0), "degree": degrees}
         variables = {name: (tuple("xyz"), values) for name, values in fields.items()}
         lattice = self.image.lattice
         attrs = {**provenance(self.arm), "cell": lattice.cell, "length": self.tip_map.length}
