@@ -104,11 +104,8 @@ def row(arm, n: int, place: str) -> str:
     own = np.linalg.norm(gamma[hit], axis=1)
     larger = int((least > own * (1 + 1e-6) + 1e-9).sum()) if arm.bundles > 3 else 0
     gap = found.gaps.max() / arm.length
-    n = len(gamma)
-    return (
-        f"| {arm.bundles} | {place} | {n} | {counts[Status.UNREACHABLE]} | {counts[Status.NOT_FOUND]} | "
-        f"{gap:.0e} | {larger} | {1e6 * cpu / n:,.0f} | {n / wall:,.0f} |"
-    )
+    n, unreachable, lost = len(gamma), counts[Status.UNREACHABLE], counts[Status.NOT_FOUND]
+    return f"| {arm.bundles} | {place} | {n} | {unreachable} | {lost} | {gap:.0e} | {larger} | {1e6 * cpu / n:,.0f} | {n / wall:,.0f} |"
 
 
 def main() -> None:

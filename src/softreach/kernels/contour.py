@@ -31,8 +31,6 @@ __all__ = ["EXACT_BITS", "Star", "critical_triangles", "stars", "stretches"]
 EXACT_BITS = 16
 """Bits of the largest difference of two vertices of a simplex: 3 · 16 + 3 of a float's 53."""
 
-_STRETCH_UNIT = 2.0**12  # of det J, whose sums are then exact in any order
-
 Ints = NDArray[np.int64]
 
 
@@ -81,10 +79,10 @@ def _inside(small: int, large: int) -> bool:
 
 @strict
 def stretches(points, cells):
-    """det J at the vertices from their neighbors, in whole numbers of some unit.
+    """Eight times det J at the vertices, per cell, from the differences of their neighbors.
 
     Args:
-        points: Mapped vertices, whole numbers, shape (n, 3), in the C order of the grid.
+        points: Mapped vertices, shape (n, 3), in the C order of the grid.
         cells: Number of cells along each axis, shape (3,).
 
     Returns:
@@ -96,7 +94,7 @@ def stretches(points, cells):
         first = slope(points, v, v // layer, cells[0], layer)
         second = slope(points, v, v % layer // rows, cells[1], rows)
         third = slope(points, v, v % rows, cells[2], 1)
-        out[v] = np.rint(dot(cross(first, second), third) / _STRETCH_UNIT)
+        out[v] = dot(cross(first, second), third)
     return out
 
 

@@ -18,6 +18,7 @@ __all__ = ["Image", "Lattice", "Spans", "image_of"]
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+_STRETCH_BITS = 50  # of the largest det J: sums of four are exact in any order
 _MARGIN = 3  # empty cells around the image
 _ROWS = 1 << 20  # triangles a task may have to judge
 _POINTS = 1 << 14
@@ -182,12 +183,17 @@ def _running_sums(values: Ints, starts: NDArray[np.bool_]) -> Ints:
 
 
 def image_of(
-    points: Array, cells: tuple[int, int, int], lattice: Lattice, progress: Progress = silent
+    points: Array,
+    stretches: Array,
+    cells: tuple[int, int, int],
+    lattice: Lattice,
+    progress: Progress = silent,
 ) -> Image:
     """The image of a grid of boxes whose vertices go to `points`.
 
     Args:
         points: Mapped vertices [m] in the C order of the grid, shape (prod(cells + 1), 3).
+        stretches: det J at the vertices up to a positive factor, shape (prod(cells + 1),).
         cells: Number of boxes along each of the three axes.
         lattice: Cells to rasterize on.
         progress: Called with the number of vertices done since its last call.
@@ -199,7 +205,7 @@ def image_of(
         lattice=lattice,
         unit=unit,
         vertices=vertices,
-        triangles=_critical_triangles(vertices, cells, progress),
+        triangles=_critical_triangles(vertices, stretches, cells, progress),
     )
 
 
@@ -211,9 +217,12 @@ def _unit(scaled: Array, cells: tuple[int, int, int]) -> float:
     return 2.0 ** np.floor(contour.EXACT_BITS - 1 - np.log2(longest))
 
 
-def _critical_triangles(vertices: Array, cells: tuple[int, int, int], progress: Progress) -> Ints:
+def _critical_triangles(
+    vertices: Array, stretches: Array, cells: tuple[int, int, int], progress: Progress
+) -> Ints:
     star, axes = contour.stars(cells), np.array(cells)
-    stretches = contour.stretches(vertices, axes)
+    largest = np.abs(stretches).max() or 1.0
+    stretches = np.rint(stretches / largest * 2.0**_STRETCH_BITS)
     blocks = list(parallel.blocks(len(vertices), max(1, _ROWS // len(star.triangles))))
     parts: list[Ints] = [np.empty((0, 5), np.int64)] * len(blocks)
 

@@ -50,8 +50,8 @@ class ReachableSolid(ReachableSet):
     """Volume of the places that exactly 1, 2, ... activations reach [m³]; empty for more than three
     free bundles."""
     multiplicity_error: float
-    """By how much the volume reached more than once changed from half as fine a grid [m³]; NaN for
-    more than three free bundles."""
+    """How far off the volume reached more than once may be, the same as for the volume itself [m³];
+    NaN for more than three free bundles."""
     fold_volume: float
     """Volume of the places reached with both orientations of the map [m³]; they lie behind a fold.
     NaN for more than three free bundles."""
