@@ -105,7 +105,10 @@ def row(arm, n: int, place: str) -> str:
     larger = int((least > own * (1 + 1e-6) + 1e-9).sum()) if arm.bundles > 3 else 0
     gap = found.gaps.max() / arm.length
     n, unreachable, lost = len(gamma), counts[Status.UNREACHABLE], counts[Status.NOT_FOUND]
-    return f"| {arm.bundles} | {place} | {n} | {unreachable} | {lost} | {gap:.0e} | {larger} | {1e6 * cpu / n:,.0f} | {n / wall:,.0f} |"
+    return (
+        f"| {arm.bundles} | {place} | {n} | {unreachable} | {lost} | {gap:.0e} | "
+        f"{larger} | {1e6 * cpu / n:,.0f} | {n / wall:,.0f} |"
+    )
 
 
 def main() -> None:
