@@ -138,9 +138,9 @@ def _solid(
 ) -> ReachableSolid:
     tips = grid_tips(rod, cells)
     lattice, stretches = _lattice(tips, cell, accuracy), grid_stretches(rod, tips, cells)
-    fine = image_of(tips, stretches, (cells,) * 3, lattice, progress)
-    fewer = (every_second(values, cells, 3) for values in (tips, stretches))
-    coarse = image_of(*fewer, (cells // 2,) * 3, lattice)
+    fine = image_of(tips, stretches, (cells, cells, cells), lattice, progress)
+    half, fewer = cells // 2, every_second(stretches, cells, 3)
+    coarse = image_of(every_second(tips, cells, 3), fewer, (half, half, half), lattice)
     volume = measure.solid_volume(rod, fine, coarse)
     overlaps = _overlaps(volume, fine, coarse)
     convex = measure.convex_volume(fine, coarse)
