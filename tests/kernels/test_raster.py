@@ -44,10 +44,10 @@ def counts(vertices: np.ndarray, cells: Cells, size: int) -> tuple[np.ndarray, .
 
 
 def tetrahedra(cells: tuple[int, ...]) -> np.ndarray:
-    """All 3-faces of the triangulation, vertex by vertex."""
-    m, steps = len(cells), corner_steps(cells)
-    places, faces = grid(cells), chains(m, 3)
-    fits = ((places[:, None] + corner_bits(m)[faces[:, -1]]) <= np.array(cells)).all(axis=2)
+    """All tetrahedra of the triangulation, vertex by vertex."""
+    steps = corner_steps(cells)
+    places, faces = grid(cells), chains(3, 3)
+    fits = ((places[:, None] + corner_bits(3)[faces[:, -1]]) <= np.array(cells)).all(axis=2)
     base, which = np.nonzero(fits)
     return base[:, None] + steps[faces[which]]
 
@@ -79,7 +79,7 @@ def _volume(a, b, c, d) -> int:
     )
 
 
-@pytest.mark.parametrize("m", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("m", [1, 2, 3])
 def test_the_simplices_of_a_cube_fill_it(m):
     corners = corner_bits(m)[kuhn_simplices(m)]
     volumes = np.abs(np.linalg.det(np.diff(corners, axis=1).astype(float)))
@@ -88,14 +88,13 @@ def test_the_simplices_of_a_cube_fill_it(m):
 
 
 def test_every_tetrahedron_is_listed_once():
-    m, cells = 3, (2, 2, 2)
+    cells = (2, 2, 2)
     faces = np.sort(tetrahedra(cells), axis=1)
     assert len(np.unique(faces, axis=0)) == len(faces)
-    # each face of each simplex of each cell is among them
+    # each simplex of each cell is among them
     base = np.flatnonzero((grid(cells) < 2).all(axis=1))
-    simplices = base[:, None, None] + corner_steps(cells)[kuhn_simplices(m)]
-    picked = [list(p) for p in itertools.combinations(range(m + 1), 4)]
-    wanted = np.sort(simplices[..., picked].reshape(-1, 4), axis=1)
+    simplices = base[:, None, None] + corner_steps(cells)[kuhn_simplices(3)]
+    wanted = np.sort(simplices.reshape(-1, 4), axis=1)
     assert {tuple(f) for f in faces} == {tuple(f) for f in wanted}
 
 
