@@ -26,7 +26,10 @@ from softreach.errors import InvalidDesign
 from tests.kinds import angles_along, profiles, stations, values_at
 
 SECTION = Section(
-    rings=(Ring(inner_ratio=0.7, name="outer"), Ring(inner_ratio=0.3, outer_ratio=0.6, name="inner"))
+    rings=(
+        Ring(inner_ratio=0.7, name="outer"),
+        Ring(inner_ratio=0.3, outer_ratio=0.6, name="inner"),
+    )
 )
 
 

@@ -78,9 +78,7 @@ def test_radii_on_a_straight_line_make_the_linear_taper(places, taper, kind):
 def test_a_trunk_on_such_radii_reaches_where_the_tapered_one_does(kind, trunk):
     places = (0.0, 0.3, 0.62, 1.0)
     radii = tuple(trunk.profile.radius(places).tolist())
-    same = trunk.replace(
-        profile=kind(length=1.0, stations_over_length=places, radii=radii)
-    )
+    same = trunk.replace(profile=kind(length=1.0, stations_over_length=places, radii=radii))
     gamma = in_box(trunk, 50)
     found, expected = (sr.tip_positions(arm, gamma, tol=1e-9) for arm in (same, trunk))
     np.testing.assert_allclose(found, expected, atol=2e-9)
@@ -127,7 +125,10 @@ def test_a_profile_is_a_value(kind):
     [
         ({"length": 0.0}, "length = 0: .*> 0 m"),
         ({"length": 10**400}, "length = 1000.*> 0 m"),
-        ({"stations_over_length": (0, 0.5, 0.5, 1)}, "must be two or more numbers that rise from 0"),
+        (
+            {"stations_over_length": (0, 0.5, 0.5, 1)},
+            "must be two or more numbers that rise from 0",
+        ),
         ({"stations_over_length": (0, 0.7, 0.4, 1)}, "rise from 0"),
         ({"stations_over_length": (0.1, 1)}, "rise from 0"),
         ({"stations_over_length": (0, 0.9)}, r"to 1 \(tip\)"),

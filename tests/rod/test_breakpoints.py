@@ -80,7 +80,9 @@ def broken():
             activation_bounds=(0, 1),
         ),
     )
-    profile = PiecewiseTaper(length=1.0, stations_over_length=(0, 0.37, 1), radii=(0.06, 0.05, 0.03))
+    profile = PiecewiseTaper(
+        length=1.0, stations_over_length=(0, 0.37, 1), radii=(0.06, 0.05, 0.03)
+    )
     return driven(Manipulator(profile=profile, section=SECTION, actuators=parts), sharpness=5.0)
 
 
@@ -223,9 +225,7 @@ def test_stations_on_and_beside_breakpoints_have_the_places_and_frames_of_the_wa
     nearest = np.abs(z[:, None] - inner).argmin(axis=1)
     close = np.abs(z - inner[nearest]) < 1e-12
     assert close.sum() == 3 * len(BREAKS) + 3
-    np.testing.assert_allclose(
-        shape.position.values[close], states[nearest[close], :3], atol=1e-10
-    )
+    np.testing.assert_allclose(shape.position.values[close], states[nearest[close], :3], atol=1e-10)
     np.testing.assert_allclose(
         shape.directors.values[close].reshape(-1, 9), states[nearest[close], 3:], atol=1e-9
     )
@@ -301,18 +301,14 @@ def test_two_segments_in_series_are_two_arms_end_to_end(cut):
     base = sr.configuration(below, gamma[:2], [below.length], tol=1e-11)
     end = sr.configuration(above, gamma[2:], [above.length], tol=1e-11)
     expected = base.position.values[0] + end.position.values[0] @ base.directors.values[0]
-    np.testing.assert_allclose(
-        sr.tip_positions(whole, [gamma], tol=1e-11)[0], expected, atol=1e-10
-    )
+    np.testing.assert_allclose(sr.tip_positions(whole, [gamma], tol=1e-11)[0], expected, atol=1e-10)
 
 
 def test_a_breakpoint_where_nothing_changes_changes_nothing(trunk):
     """A curve of radii on one straight line, cut where it is smooth."""
     places = (0.0, 0.3, 0.5, 1.0)
     radii = tuple(trunk.profile.radius(places).tolist())
-    cut = trunk.replace(
-        profile=SampledTaper(length=1.0, stations_over_length=places, radii=radii)
-    )
+    cut = trunk.replace(profile=SampledTaper(length=1.0, stations_over_length=places, radii=radii))
     gamma = in_box(trunk, 20)
     for tol in (1e-4, 1e-8):
         apart = sr.tip_positions(cut, gamma, tol=tol) - sr.tip_positions(trunk, gamma, tol=tol)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, Self, overload
 
@@ -105,7 +105,10 @@ class Solutions(Sequence[Solution]):
     gap_bounds: Array
     """Proved lower bounds of the distance to the reachable set, shape (t,) [m]."""
     change_bounds: Array
-    """Proved lower bounds of |γ - near| of all activations that reach a target, shape (t,) [-]."""
+    """Proved lower bounds of |γ - near| of all activations that reach a target, shape (t,).
+
+    In the unit of the activations; where units differ, each counts in its own range.
+    """
     least_proved: NDArray[np.bool_]
     """Whether the first activation of a target is proved to change least, to 1e-6, shape (t,)."""
 
@@ -122,6 +125,18 @@ class Solutions(Sequence[Solution]):
                 name: np.concatenate([getattr(part, name) for part in parts])
                 for name in (*_PER_TARGET, *_PER_SOLUTION)
             },
+        )
+
+    def in_units_of(self, measures: Array) -> Self:
+        """The same solutions, their activations multiplied by these; (bundles,)."""
+        if (measures == 1.0).all():
+            return self
+        alike = measures[0] if (measures == measures[0]).all() else 1.0
+        return replace(
+            self,
+            activations=self.activations * measures,
+            nearest_activations=self.nearest_activations * measures,
+            change_bounds=self.change_bounds * alike,
         )
 
     @property

@@ -64,8 +64,9 @@ def solve_inverse(
         arm: The design, its tip map, or what `prepared_map` made of it.
         targets: Tip positions to reach [m], shape (t, 3).
         residual_over_length: Largest |tip - target| of a solution, in L.
-        near: With more than three free bundles: the activation to stay near to [-], shape
-            (bundles,) or (t, bundles); by default rest.
+        near: With more than three free bundles: the activation to stay near to [unit of each],
+            shape (bundles,) or (t, bundles); by default rest. Where units differ, the change of
+            each activation counts in its own range.
         direction: Wanted tip tangents d3, shape (3,) or (t, 3), of any length. With more than
             three free bundles the freedom left by the position goes to least
             |γ - near|² + w² |d3 - direction|²; with three or fewer the position yields too:
@@ -92,11 +93,11 @@ def solve_inverse(
         raise InvalidInput("prove_least", prove_least, "False where a direction is wanted")
     prepared = prepared_map(arm, tol)
     points, box = checked_targets("targets", targets), prepared.whole.box
-    rest = np.zeros(box.bundles)
+    rest = np.zeros(box.bundles) if near is None else near
     request = Request(
         targets=points,
         residual=checked_residual(residual_over_length) * prepared.whole.length,
-        near=checked_activations("near", rest if near is None else near, box, len(points)),
+        near=checked_activations("near", rest, box, len(points)) / prepared.measures,
         direction=checked_direction(direction, len(points)),
         direction_weight=checked_number("direction_weight", direction_weight, 0.0, 1e6),
         family=checked_whole_number("family", family, 1, 10_000),
@@ -104,7 +105,8 @@ def solve_inverse(
         prove_least=bool(prove_least),
     )
     blocks = list(parallel.blocks(len(points), _BLOCK)) or [slice(0)]
-    return Solutions.joined([_solved(prepared, request.of(rows)) for rows in blocks])
+    solutions = Solutions.joined([_solved(prepared, request.of(rows)) for rows in blocks])
+    return solutions.in_units_of(prepared.measures)
 
 
 def _solved(prepared: PreparedMap, request: Request) -> Solutions:
