@@ -49,7 +49,7 @@ def test_help_of_every_command_teaches_with_an_example_that_parses(command, caps
     words = example.split()
     assert words[0] == command
     function, bound, *_ = app.parse_args(words, exit_on_error=False, print_error=False)
-    assert function.__module__ == f"softreach.cli.{command}"
+    assert function.__module__.removesuffix("_file") == f"softreach.cli.{command}"
     assert bound.arguments
 
 

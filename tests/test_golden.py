@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from softreach.arm.actuators import FiberArchitecture
+from softreach.arm import designs
 from softreach.rod.kinematics import configuration
-from tests.laws import arm_of
 
 POSITION = [0.010887432435510243, 0.010588028536001756, 0.08230390930976722]
 DIRECTORS = [
@@ -23,8 +22,6 @@ DIRECTORS = [
 
 def test_an_activated_filament_is_that_of_active_filaments_jl():
     """L = 1 m, R2 = L/16, R1 = 0.6 R2, ν = 1/2; three sectors of 30° from the x-axis on."""
-    sectors = FiberArchitecture(helical_angle=np.pi / 10, extent=np.radians(30), bundles=3)
-    filament = arm_of(sectors, inner_radius=0.6 / 16, activation_bounds=(-2.0, 0.0))
-    shape = configuration(filament, [-2.0, -1.3, 0.0], stations=[0.1], tol=1e-12)
+    shape = configuration(designs.filament(), [-2.0, -1.3, 0.0], stations=[0.1], tol=1e-12)
     np.testing.assert_allclose(shape.position[0], POSITION, rtol=0, atol=1e-12)
     np.testing.assert_allclose(shape.directors[0], DIRECTORS, rtol=0, atol=1e-12)

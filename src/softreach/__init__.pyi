@@ -4,6 +4,7 @@ from . import cloud as cloud
 from . import curvature as curvature
 from . import dexterity as dexterity
 from . import errors as errors
+from . import exchange as exchange
 from . import export as export
 from . import inverse as inverse
 from . import path as path

@@ -108,6 +108,14 @@ def test_the_values_that_an_arm_has_make_the_same_arm(arm):
     np.testing.assert_allclose(tip_positions(changed(arm, own), gamma), tips, atol=1e-9)
 
 
+@pytest.mark.parametrize("design", designs.__all__)
+def test_a_named_design_can_be_given_each_value_that_it_has(design):
+    arm = getattr(designs, design)()
+    for name, one in parameters(arm).items():
+        if not math.isnan(value := one.value(arm)):
+            assert one.value(changed(arm, {name: value})) == pytest.approx(value, rel=1e-12)
+
+
 def test_no_values_change_nothing(trunk):
     assert changed(trunk, {}) is trunk
 

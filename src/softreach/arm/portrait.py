@@ -28,7 +28,6 @@ def _skins(arm: Manipulator) -> Iterator[Skin]:
     line = Centerline.at_rest(np.linspace(0.0, arm.length, _STATIONS))
     line = line.with_stations(arm.breakpoints)
     body = body_skin(arm, line)
-    yield Skin(body.vertices, body.faces, BODY)
-    skins = bundle_skins(arm, line, lift=0.01, step=_STEP)
-    for bundle, (skin, hidden) in enumerate(zip(skins, inside(arm), strict=True)):
-        yield Skin(skin.vertices, skin.faces, bundle_color(bundle), hidden)
+    yield Skin(body.vertices, body.faces, BODY, clear=any(inside(arm)))
+    for bundle, skin in enumerate(bundle_skins(arm, line, lift=0.01, step=_STEP)):
+        yield Skin(skin.vertices, skin.faces, bundle_color(bundle))

@@ -23,7 +23,7 @@ __all__ = ["Centerline", "body_skin", "bundle_curves", "bundle_skins", "bundle_s
 
 Array = NDArray[np.float64]
 
-_LINE_OVER_LENGTH, _LINE_OVER_RADIUS = 0.0025, 0.6  # radius of a line, the smaller of both
+_LINE = 1 / 400  # radius of a line, in L: what shows in small pictures
 _LINE_SIDES, _LUMEN_SIDES = 8, 24
 _SAME = 1e-9  # of the length, or of R2
 
@@ -145,7 +145,7 @@ def bundle_curves(arm: Manipulator, line: Centerline) -> Array:
 def bundle_skins(
     arm: Manipulator, line: Centerline, *, lift: float = 0.0, step: float = np.pi / 32
 ) -> list[Surface]:
-    """Each bundle as a surface to look at: an open band, or a closed tube.
+    """Each bundle as a surface to look at: an open band, or a closed tube, with outward faces.
 
     Args:
         arm: The design; bundle j covers a_j - σ_j/2 to a_j + σ_j/2.
@@ -156,7 +156,8 @@ def bundle_skins(
 
     def sector(one: _Stretch) -> Surface:
         band = one.band(lift, step)
-        return Surface(vertices=band.reshape(-1, 3), faces=grid_faces(*band.shape[:2]))
+        # along x across is d3 x e_θ = -e_R: turned, so that faces point outwards
+        return Surface(vertices=band.reshape(-1, 3), faces=grid_faces(*band.shape[:2])[:, ::-1])
 
     return _skins(arm, line, sector)
 
@@ -194,8 +195,8 @@ def _skins(
     arm: Manipulator, line: Centerline, sector: Callable[[_Stretch], Surface]
 ) -> list[Surface]:
     middle = 0.5 * (line.z[1:] + line.z[:-1])
-    width = _LINE_OVER_LENGTH * arm.length, _LINE_OVER_RADIUS * float(arm.profile.radius(0.0))
-    make = {"sector": sector, "line": lambda one: _line_tube(one, min(width)), "lumen": _lumen}
+    width = _LINE * arm.length
+    make = {"sector": sector, "line": lambda one: _line_tube(one, width), "lumen": _lumen}
     return [
         joined([make[one.shape](one) for one in stretches])
         for stretches in _stretches(arm, line, arm.outline(middle).acts)

@@ -30,7 +30,9 @@ __all__ = [
     "radius_of",
 ]
 
-Design = Annotated[str, Parameter(help="Design file (.toml), or a built-in design such as minimal_trunk.")]
+Design = Annotated[
+    str, Parameter(help="Design file (.toml), or a built-in design such as minimal_trunk.")
+]
 Source = Annotated[str, Parameter(help="Cloud (.zarr), design file (.toml) or built-in design.")]
 RevolutionDeg = Annotated[
     float | None,

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.palette import STEEL, Color
 from softreach.picture.png import png_bytes
 from softreach.picture.projection import View, project
-from softreach.picture.see_through import seen_through
+from softreach.picture.see_through import faces_to_eye, seen_through
 from softreach.picture.shading import draw_mesh
 from softreach.picture.zbuffer import Extent, ZBuffer
 
@@ -32,8 +32,8 @@ class Skin(NamedTuple):
     faces: ArrayLike
     """Shape (f, 3)."""
     color: Color = STEEL
-    hidden: bool = False
-    """Whether it lies within others and shows through them."""
+    clear: bool = False
+    """Whether the outward sides of all that is not so show through it."""
 
 
 class Dots(NamedTuple):
@@ -81,6 +81,7 @@ def thumbnail(*parts: Skin | Dots, view: View = "oblique", width: int = _WIDTH) 
     if extent is None:
         return None
     faces = sum(len(np.asarray(part.faces)) for part in parts if isinstance(part, Skin))
+    clear = any(isinstance(part, Skin) and part.clear for part in parts)
     buffer, within = (
         ZBuffer(extent, width, oversample=1 if faces > _FINE else 2, color_step=4) for _ in range(2)
     )
@@ -88,15 +89,11 @@ def thumbnail(*parts: Skin | Dots, view: View = "oblique", width: int = _WIDTH) 
         if isinstance(part, Dots):
             _draw_dots(buffer, points, part.colors)
             continue
-        for layer in (buffer, within) if part.hidden else (buffer,):
-            _draw_skin(layer, part, view)
-    return png_bytes(_image(parts, buffer, within))
-
-
-def _image(parts: tuple[Skin | Dots, ...], buffer: ZBuffer, within: ZBuffer) -> NDArray[np.uint8]:
-    if any(isinstance(part, Skin) and part.hidden for part in parts):
-        return seen_through(buffer.rgba(), within.rgba())
-    return buffer.rgba()
+        _draw_skin(buffer, part, view)
+        if clear and not part.clear:
+            faces = faces_to_eye(part.vertices, part.faces, view)
+            _draw_skin(within, part._replace(faces=faces), view)
+    return png_bytes(seen_through(buffer.rgba(), within.rgba()) if clear else buffer.rgba())
 
 
 def _square_around(seen: list[NDArray[np.float64]]) -> Extent | None:

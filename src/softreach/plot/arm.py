@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.skin import inside
 from softreach.arm_shape import arm_surface, bundle_skins, rest_configuration
-from softreach.geometry.surface import Surface
 from softreach.palette import BODY, bundle_color
 from softreach.picture.projection import View
+from softreach.picture.see_through import faces_to_eye
 from softreach.picture.shading import draw_mesh
 from softreach.picture.zbuffer import ZBuffer
 from softreach.plot.frame import Panel
@@ -105,13 +105,18 @@ def _show(
     if not shapes:
         return
     buffer, within = panel.buffer(oversample=3), panel.buffer(oversample=3)
-    hidden = [index for index, is_inside in enumerate(inside(arm)) if is_inside and index in bundles]
+    hidden = inside(arm)
+    clear = any(hidden[index] for index in bundles)
     for shape in shapes:
         _draw_body(buffer, arm, shape, panel.view, fade)
         skins = bundle_skins(arm, shape, lift=0.008)
-        _draw_bundles(buffer, arm, skins, panel.view, bundles, fade)
-        _draw_bundles(within, arm, skins, panel.view, hidden, fade)
-    panel.show(buffer, within if hidden else None)
+        for index in bundles:
+            color, points, faces = bundle_color(index), skins[index].vertices, skins[index].faces
+            draw_mesh(buffer, points / arm.length, faces, color, panel.view, fade)
+            if clear:
+                faces = faces_to_eye(points, faces, panel.view)
+                draw_mesh(within, points / arm.length, faces, color, panel.view, fade)
+    panel.show(buffer, within if clear else None)
 
 
 def _draw_body(
@@ -121,17 +126,3 @@ def _draw_body(
     caps = 2 * _SIDES  # the last faces; apart, so that light breaks at the rim
     for part in (body.faces[:-caps], body.faces[-caps:]):
         draw_mesh(buffer, body.vertices / arm.length, part, BODY, view, fade)
-
-
-def _draw_bundles(
-    buffer: ZBuffer,
-    arm: Manipulator,
-    skins: Sequence[Surface],
-    view: View,
-    bundles: Collection[int],
-    fade: float,
-) -> None:
-    for index in bundles:
-        skin = skins[index]
-        vertices = skin.vertices / arm.length
-        draw_mesh(buffer, vertices, skin.faces, bundle_color(index), view, fade)

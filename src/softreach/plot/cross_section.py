@@ -10,7 +10,7 @@ import numpy as np
 from softreach.errors import InvalidInput
 from softreach.plot.lengths import in_lengths
 from softreach.plot.section_bundles import draw_bundles, placed_bundles
-from softreach.plot.section_key import draw_section_key, needs_section_key
+from softreach.plot.section_key import needs_section_key, section_key
 from softreach.plot.section_layers import draw_layers
 from softreach.plot.style import figure_style, small_axes
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["plot_cross_section", "section_reach"]
 
-_SIZE, _KEY_WIDTH = 2.0, 1.8  # inches
+_SIZE = 2.0  # inches
 _MARGIN = 1.08
 
 
@@ -64,7 +64,8 @@ def plot_cross_section(
     placed = placed_bundles(arm, z, range(arm.bundles) if bundles is None else bundles)
     legend = needs_section_key(arm) if legend is None else legend
     with figure_style(ax):
-        ax = small_axes(_SIZE + legend * _KEY_WIDTH, _SIZE) if ax is None else ax
+        key = section_key(arm, placed) if legend else None
+        ax = small_axes(_SIZE + (key.width if key else 0.0), _SIZE) if ax is None else ax
         draw_layers(ax, arm.section, outer)
         draw_bundles(ax, placed, outer)
         half = _MARGIN * section_reach(arm, z) if half_width is None else half_width
@@ -72,8 +73,8 @@ def plot_cross_section(
         ax.set(aspect="equal", xlim=(-half, half), ylim=(-half, half))
         ax.set(xlabel=unit.label("x"), ylabel=unit.label("y"))
         ax.locator_params(nbins=3)
-        if legend:
-            draw_section_key(ax, arm, placed)
+        if key:
+            key.draw(ax)
     return ax
 
 

@@ -70,9 +70,7 @@ def plot_designs(
             axes[0, k].set_title(panel.title)
             for ax, station in zip(axes[1:, k], stations_over_length, strict=True):
                 z, half = station * length, reach * length
-                plot_cross_section(
-                    arm, z, ax=ax, bundles=drawn, half_width=half, legend=False
-                )
+                plot_cross_section(arm, z, ax=ax, bundles=drawn, half_width=half, legend=False)
                 ax.set_title(f"Z = {station:.2g} L" if station else "Z = 0")
         for ax in np.ravel(axes[:, 1:]):
             ax.set(ylabel="", yticklabels=[])

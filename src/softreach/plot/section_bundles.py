@@ -21,7 +21,8 @@ __all__ = ["PlacedBundle", "draw_bundles", "lumen_style", "placed_bundles", "ten
 
 Array = NDArray[np.float64]
 
-_STROKE, _STROKE_ANGLE = "white", np.radians(5)  # of fibers that do not run along the bundle
+_STROKE_ANGLE = np.radians(5)  # between fibers that do not run along the bundle
+_LIGHTNESS = (0.21, 0.72, 0.07)  # of red, green and blue
 _LEAN = np.radians(14)  # of oblique strokes from the inner to the outer radius
 _OVERLAP = 1e-6  # [rad] or [-], below which bundles only touch
 
@@ -136,10 +137,18 @@ def _draw_strokes(ax: Axes, one: PlacedBundle, outer: float) -> None:
     angles = one.center + np.linspace(-half, half, max(3, round(2 * half / _STROKE_ANGLE)))
     ends = [
         outer * ratio * np.column_stack([np.cos(at), np.sin(at)])
-        for ratio, at in ((one.inner_ratio, angles - lean / 2), (one.outer_ratio, angles + lean / 2))
+        for ratio, at in (
+            (one.inner_ratio, angles - lean / 2),
+            (one.outer_ratio, angles + lean / 2),
+        )
     ]
     strokes = np.stack(ends, axis=1)
-    ax.add_collection(LineCollection(list(strokes), colors=_STROKE, linewidths=0.7))
+    ax.add_collection(LineCollection(list(strokes), colors=_contrast(one.color), linewidths=0.7))
+
+
+def _contrast(color: Color) -> str:
+    """What stands out on a color."""
+    return "white" if np.dot(color, _LIGHTNESS) < 0.55 else "0.3"
 
 
 def _draw_lumen(ax: Axes, one: PlacedBundle, outer: float) -> None:

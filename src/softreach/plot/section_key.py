@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from softreach.plot.section_bundles import PlacedBundle, lumen_style, tendon_style
 from softreach.plot.section_layers import material_style, section_materials
@@ -15,10 +15,28 @@ if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
     from softreach.arm.material import Material
 
-__all__ = ["draw_section_key", "needs_section_key"]
+__all__ = ["SectionKey", "needs_section_key", "section_key"]
 
 _MOST = 12  # entries
+_HANDLE, _LETTER = 0.5, 0.056  # inches
 _UNITS = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (0.0, "Pa"))
+
+
+class SectionKey(NamedTuple):
+    """What materials and bundles look like, and what they are called."""
+
+    handles: list[Artist]
+    labels: list[str]
+
+    @property
+    def width(self) -> float:
+        """Room that it takes on paper, about [inch]."""
+        return _HANDLE + _LETTER * max(map(len, self.labels), default=0)
+
+    def draw(self, ax: Axes) -> None:
+        """Place it to the right of the axes."""
+        place = {"loc": "center left", "bbox_to_anchor": (1.02, 0.5), "borderaxespad": 0.0}
+        ax.legend(self.handles, self.labels, frameon=False, fontsize=7, **place)
 
 
 def needs_section_key(arm: Manipulator) -> bool:
@@ -28,16 +46,13 @@ def needs_section_key(arm: Manipulator) -> bool:
     return not plain or len(section_materials(arm.section)) > 1
 
 
-def draw_section_key(ax: Axes, arm: Manipulator, placed: Collection[PlacedBundle]) -> None:
-    """Name the materials, and the bundles with their activations, to the right of the axes."""
+def section_key(arm: Manipulator, placed: Collection[PlacedBundle]) -> SectionKey:
+    """Names of the materials, and of bundles with their activations."""
     entries = [*_materials(arm), *_bundles(arm, placed)]
-    rest = len(entries) - _MOST
-    handles = [handle for handle, _ in entries[:_MOST]]
-    labels = [label for _, label in entries[:_MOST]]
-    if rest > 0:
-        labels[-1] += f" and {rest} more"
-    place = {"loc": "center left", "bbox_to_anchor": (1.02, 0.5), "borderaxespad": 0.0}
-    ax.legend(handles, labels, frameon=False, fontsize=7, **place)
+    handles, labels = [list(column) for column in zip(*entries[:_MOST], strict=True)] or [[], []]
+    if len(entries) > _MOST:
+        labels[-1] += f" and {len(entries) - _MOST} more"
+    return SectionKey(handles, labels)
 
 
 def _materials(arm: Manipulator) -> Iterator[tuple[Artist, str]]:
