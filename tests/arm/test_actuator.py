@@ -167,7 +167,8 @@ class TestFiles:
         with pytest.raises(sr.InvalidDesign, match=message):
             sr.Manipulator.from_toml(self.written(f"[[actuators]]\n{table}\n"))
 
-    def test_what_is_no_plain_value_is_not_written(self, trunk):
-        arm = trunk.replace(actuators=(Cable(place=(np.float32(0.03), 0.0)),))
+    @pytest.mark.parametrize("place", [(np.float32(0.03), 0.0), (0.03, None), {"x": 0.03}])
+    def test_what_is_no_plain_value_is_not_written(self, trunk, place):
+        arm = trunk.replace(actuators=(Cable(place=place),))
         with pytest.raises(sr.InvalidDesign, match=r"Cable.place = .*to fit in a design file"):
             arm.to_toml()

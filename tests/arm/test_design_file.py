@@ -71,6 +71,12 @@ def test_the_named_designs_are_also_files(name):
     assert sr.Manipulator.load(FILES / f"{name}.toml") == getattr(designs, name)()
 
 
+@pytest.mark.parametrize("name", designs.__all__)
+def test_a_named_design_survives_a_file(name):
+    arm = getattr(designs, name)()
+    assert sr.Manipulator.from_toml(arm.to_toml()) == arm
+
+
 def test_what_is_left_out_has_its_default():
     arm = sr.Manipulator.from_toml(BODY + FIBER)
     assert arm == sr.Manipulator(

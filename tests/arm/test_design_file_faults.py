@@ -138,6 +138,15 @@ TWO = BODY.replace("0.5 }", "0.5, material = 'a' }, { inner_ratio = 0.6 }")
     [
         (BODY + TENDON, "rings[0].material.young_modulus_pa: must be given in Pa for tendon"),
         (BODY + FIBER + TENDON + TENDON, "rings[0].material.young_modulus_pa: must be given"),
+        (
+            BODY.replace("0.5 }", "0.5, material = {} }") + TENDON,
+            "rings[0].material.young_modulus_pa: must be given in Pa",
+        ),
+        (
+            BODY.replace("0.5 }", "0.5, material = 'ecoflex_00_30' }")
+            + f"[section]\ncore = {{ poisson_ratio = 0.1 }}\n{FIBER}",
+            "section.core.young_modulus_pa: must be given in Pa where materials differ",
+        ),
         (f"{BODY}{FIBER}ring = 1", "actuators[0].ring = 1: must be one of the section's rings: 0"),
         (f"{BODY}{FIBER}ring = 'x'", "actuators[0].ring = 'x': must be one of the section's"),
         (
