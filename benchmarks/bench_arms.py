@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 import softreach as sr
 from softreach import designs
 from softreach.arm import (
+    Actuator,
     Chamber,
     FiberArchitecture,
     LinearTaper,
@@ -17,6 +20,7 @@ from softreach.arm import (
     Material,
     Pieces,
     PiecewiseTaper,
+    Profile,
     Ring,
     SampledTaper,
     Samples,
@@ -36,10 +40,10 @@ def main() -> None:
     """Print the table."""
     print("## Steps of arms with segments\n")
     print(
-        "Steps of the sixth-order rule from base to tip for a tolerance of the tip [L], and CPU time "
-        "of 1,000,000 tips\nat 1e-6. Wherever the arm is not smooth a step ends: profile, angles, "
-        "routing, ends of segments. An arm of n\nbreakpoints so takes at most n steps more than its "
-        "bending asks for.\n"
+        "Steps of the sixth-order rule from base to tip for a tolerance of the tip [L], and CPU "
+        "time of 1,000,000 tips\nat 1e-6. Wherever the arm is not smooth a step ends: profile, "
+        "angles, routing, ends of segments. An arm of n\nbreakpoints so takes at most n steps "
+        "more than its bending asks for.\n"
     )
     print("| arm | bundles | breakpoints | 1e-4 | 1e-6 | 1e-9 | 1,000,000 tips [s] |")
     print("|---|--:|--:|--:|--:|--:|--:|")
@@ -85,15 +89,14 @@ def arms() -> dict[str, Manipulator]:
     }
 
 
-def _radii(kind: type, radius: object) -> object:
+def _radii(kind: Callable[..., Profile], radius: Callable[..., Any]) -> Profile:
     places = (0.0, 0.3, 0.6, 1.0)
-    assert callable(radius)
     return kind(length=1.0, stations_over_length=places, radii=tuple(radius(places)))
 
 
-def _arm(*actuators: object) -> Manipulator:
+def _arm(*actuators: Actuator) -> Manipulator:
     profile = LinearTaper(length=1.0, outer_radius=1 / 16, taper=math.radians(1))
-    return Manipulator(profile=profile, section=SECTION, actuators=actuators)  # type: ignore[arg-type]
+    return Manipulator(profile=profile, section=SECTION, actuators=actuators)
 
 
 def _segments(count: int) -> list[FiberArchitecture]:

@@ -158,7 +158,9 @@ def _tendons(draw: st.DrawFn, common: dict) -> Tendon:
         turn = {"revolution": draw(number(-3, 3))}
     else:
         places = draw(stations())
-        turn = {"routing": Samples(stations_over_length=places, values=draw(values_at(places, -2, 2)))}
+        turn = {
+            "routing": Samples(stations_over_length=places, values=draw(values_at(places, -2, 2)))
+        }
     return Tendon(
         distance_ratio=draw(number(0.1, 1.0)), activation_bounds=(0.0, 1.0), **turn, **common
     )
@@ -170,9 +172,7 @@ def driven(arm: Manipulator, sharpness: float = 3.0) -> Manipulator:
     stretch = np.abs(table.extension).max(axis=0) / 0.3
     bend = np.linalg.norm(table.curvature, axis=1).max(axis=0) * arm.length / sharpness
     largest = 1.0 / np.maximum(np.maximum(stretch, bend), 1e-300) / arm.bundles
-    pulls = np.array(
-        [isinstance(one, Tendon) for one in arm.actuators for _ in range(one.bundles)]
-    )
+    pulls = np.array([isinstance(one, Tendon) for one in arm.actuators for _ in range(one.bundles)])
     return arm.with_bounds(np.stack([np.where(pulls, 0.0, -largest), largest], axis=1))
 
 

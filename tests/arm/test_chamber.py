@@ -77,9 +77,7 @@ def test_a_chamber_opposite_a_tendon_doubles_its_bending_and_gives_back_its_leng
     expected = [side * math.cos(0.3), side * math.sin(0.3), math.sin(angle) / curvature]
     tip = sr.tip_positions(pair, [[tension, pressure]], tol=1e-11)[0]
     np.testing.assert_allclose(tip, expected, atol=1e-11)
-    np.testing.assert_allclose(
-        tables(pair, [0.1]).extension @ [tension, pressure], 0.0, atol=1e-14
-    )
+    np.testing.assert_allclose(tables(pair, [0.1]).extension @ [tension, pressure], 0.0, atol=1e-14)
 
 
 @given(tension=st.floats(0.1, 4.0), taper=st.floats(-0.02, 0.04))

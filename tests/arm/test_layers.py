@@ -158,9 +158,7 @@ def test_a_ring_is_found_by_its_index_or_name():
 
 class TestYoungsModulus:
     def arm(self, section, actuator):
-        return Manipulator(
-            profile=LinearTaper(**SLEEVE), section=section, actuators=(actuator,)
-        )
+        return Manipulator(profile=LinearTaper(**SLEEVE), section=section, actuators=(actuator,))
 
     def test_it_may_be_left_out_while_fibers_drive_one_material(self):
         section = Section(rings=(Ring(inner_ratio=0.5), Ring(inner_ratio=0.2, outer_ratio=0.4)))
@@ -170,7 +168,9 @@ class TestYoungsModulus:
     def test_it_is_asked_for_by_name_where_materials_differ(self):
         soft = Material(poisson_ratio=0.3, name="soft")
         with pytest.raises(InvalidDesign) as caught:
-            Section(rings=(Ring(inner_ratio=0.5, material=RUBBER), Ring(inner_ratio=0.5)), core=soft)
+            Section(
+                rings=(Ring(inner_ratio=0.5, material=RUBBER), Ring(inner_ratio=0.5)), core=soft
+            )
         assert [fault.path for fault in caught.value.faults] == [
             "core.young_modulus",
             "rings[1].material.young_modulus",
@@ -196,5 +196,7 @@ class TestYoungsModulus:
 
     def test_the_density_is_asked_for_by_name_where_weight_counts(self):
         rings = (Ring(inner_ratio=0.5, material=Material(young_modulus=1e6)),)
-        with pytest.raises(InvalidDesign, match=r"rings\[0\].material.density: .*kg/m³ where weight"):
+        with pytest.raises(
+            InvalidDesign, match=r"rings\[0\].material.density: .*kg/m³ where weight"
+        ):
             Section(rings=rings).mass_per_length(0.1)

@@ -121,7 +121,9 @@ def test_an_oblique_muscle_is_a_fiber_that_does_not_wind(angle, offset, extent):
     np.testing.assert_array_equal(found.curvature[0], start.curvature[0])
     thinner = TRUNK["profile"].radius(0.0) / TRUNK["profile"].radius(0.7)
     np.testing.assert_allclose(found.extension[1], start.extension[0], rtol=1e-12)
-    np.testing.assert_allclose(found.curvature[1], thinner * start.curvature[0], rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(
+        found.curvature[1], thinner * start.curvature[0], rtol=1e-12, atol=1e-13
+    )
 
 
 def test_oblique_muscles_of_both_hands_cancel_their_twist_and_bend_together():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -36,8 +37,7 @@ def test_the_coordinates_are_the_integrals_that_define_them(profile, ratio, shar
 
     def integral(f):
         inside = [0.0, *(z for z in profile.breakpoints if z < place), place]
-        ends = zip(inside[:-1], inside[1:], strict=True)
-        return sum(quad(f, *pair, epsabs=0, epsrel=1e-12)[0] for pair in ends)
+        return sum(quad(f, *pair, epsabs=0, epsrel=1e-12)[0] for pair in pairwise(inside))
 
     def on_cone(z):
         return math.hypot(1.0, ratio * profile.slope(z)) / (ratio * profile.radius(z))
@@ -78,9 +78,7 @@ def test_radii_on_a_straight_line_make_the_linear_taper(places, taper, kind):
 def test_a_trunk_on_such_radii_reaches_where_the_tapered_one_does(kind, trunk):
     places = (0.0, 0.3, 0.62, 1.0)
     radii = tuple(trunk.profile.radius(places).tolist())
-    same = trunk.replace(
-        profile=kind(length=1.0, stations_over_length=places, radii=radii)
-    )
+    same = trunk.replace(profile=kind(length=1.0, stations_over_length=places, radii=radii))
     gamma = in_box(trunk, 50)
     found, expected = (sr.tip_positions(arm, gamma, tol=1e-9) for arm in (same, trunk))
     np.testing.assert_allclose(found, expected, atol=2e-9)
@@ -127,7 +125,10 @@ def test_a_profile_is_a_value(kind):
     [
         ({"length": 0.0}, "length = 0: .*> 0 m"),
         ({"length": 10**400}, "length = 1000.*> 0 m"),
-        ({"stations_over_length": (0, 0.5, 0.5, 1)}, "must be two or more numbers that rise from 0"),
+        (
+            {"stations_over_length": (0, 0.5, 0.5, 1)},
+            "must be two or more numbers that rise from 0",
+        ),
         ({"stations_over_length": (0, 0.7, 0.4, 1)}, "rise from 0"),
         ({"stations_over_length": (0.1, 1)}, "rise from 0"),
         ({"stations_over_length": (0, 0.9)}, r"to 1 \(tip\)"),

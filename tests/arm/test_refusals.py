@@ -1,7 +1,8 @@
-"""Whatever a part of an arm is given, it is refused by name in one line, or can be computed with."""
+"""Whatever a part of an arm is given, it is refused by name, or can be computed with."""
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -27,7 +28,7 @@ from softreach.arm import (
     Tendon,
 )
 from softreach.arm.tables import tables
-from softreach.errors import InvalidDesign
+from softreach.errors import InvalidDesign, InvalidInput
 
 RUBBER = Material(young_modulus=1e6)
 RING = Ring(inner_ratio=0.5, material=RUBBER)
@@ -105,36 +106,49 @@ def arm_with(part):
     return Manipulator(profile=profile, section=section, actuators=(actuator,))
 
 
+def made(kind, fields):
+    """The part, or the faults that keep it from being made."""
+    try:
+        return kind(**fields), ()
+    except InvalidDesign as error:
+        return None, error.faults
+
+
+def reached(part):
+    """A tip of an arm with this part, or why there is none."""
+    try:
+        arm = arm_with(part)
+        return sr.tip_positions(arm, [arm.bounds[:, 1]], tol=1e-3), ""
+    except (InvalidDesign, InvalidInput) as error:
+        return None, str(error)
+
+
 @pytest.mark.filterwarnings("ignore:overflow:RuntimeWarning")  # numbers beyond all sense
 @pytest.mark.filterwarnings("ignore:divide by zero:RuntimeWarning")
 @pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
 @pytest.mark.parametrize("kind", SOUND, ids=lambda kind: kind.__name__)
 def test_a_part_is_refused_by_the_name_of_its_field_or_can_be_computed_with(kind):
-    for field in SOUND[kind]:
-        for value in GIVEN:
-            try:
-                part = kind(**(SOUND[kind] | {field: value}))
-            except InvalidDesign as error:
-                names = JOINT.get(field, (field,))
-                assert any(name in str(error) for name in names), (field, str(error))
-                for fault in error.faults:
-                    assert len(str(fault).splitlines()) == 1
-                continue
-            hash(part)
-            assert part == part.replace()
-            try:
-                arm = arm_with(part)
-                assert np.isfinite(sr.tip_positions(arm, [arm.bounds[:, 1]], tol=1e-3)).all()
-            except sr.errors.InvalidDesign as error:
-                assert str(error)
-            except sr.errors.InvalidInput as error:
-                assert "tol" in str(error)  # it winds too fast for any number of steps
+    for field, value in itertools.product(SOUND[kind], GIVEN):
+        part, faults = made(kind, SOUND[kind] | {field: value})
+        if part is None:
+            said = "\n".join(map(str, faults))
+            assert any(name in said for name in JOINT.get(field, (field,))), said
+            assert len(said.splitlines()) == len(faults)
+            continue
+        assert part == part.replace()
+        assert hash(part) == hash(part.replace())
+        tips, complaint = reached(part)
+        assert complaint or np.isfinite(tips).all()
 
 
 def test_several_faults_are_named_at_once():
     with pytest.raises(InvalidDesign) as caught:
         Tendon(
-            distance=-1, revolution=math.nan, bundles=0, name=3, activation_bounds=(1, 0),
+            distance=-1,
+            revolution=math.nan,
+            bundles=0,
+            name=3,
+            activation_bounds=(1, 0),
             end_over_length=2,
         )
     assert {fault.path for fault in caught.value.faults} == {
@@ -172,6 +186,8 @@ def test_bounds_that_shorten_an_arm_to_nothing_are_refused_for_forces_too():
 
 def test_numbers_beyond_double_precision_are_refused_with_the_units_to_use():
     arm = arm_with(Chamber(**SOUND[Chamber] | {"area_factor": 1e308}))
-    with pytest.raises(InvalidDesign, match="design: overflows .*lengths in m, moduli and pressures"):
+    with pytest.raises(
+        InvalidDesign, match=r"design: overflows .*lengths in m, moduli and pressures"
+    ):
         sr.tip_positions(arm, [[0, 0]])
     assert np.isfinite(tables(arm_with(RING), [0.0]).curvature).all()

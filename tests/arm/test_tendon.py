@@ -192,7 +192,9 @@ def test_a_distance_and_its_ratio_to_the_radius_say_the_same_without_taper():
 def test_a_tendon_at_a_share_of_the_radius_converges_with_the_arm():
     """p' has the slope of the cone that it runs on."""
     slope = 0.8 * math.tan(TAPERED.taper)
-    table = tables(arm(Tendon(distance_ratio=0.8, activation_bounds=(0, 1)), profile=TAPERED), [0.0])
+    table = tables(
+        arm(Tendon(distance_ratio=0.8, activation_bounds=(0, 1)), profile=TAPERED), [0.0]
+    )
     assert table.extension[0, 0] == pytest.approx(-1 / math.sqrt(1 + slope**2) / K0, rel=1e-13)
 
 

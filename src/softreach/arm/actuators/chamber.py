@@ -52,8 +52,8 @@ class Chamber(Actuator):
     default_name: ClassVar[str] = "chamber"
     validity: ClassVar[str] = (
         "Exact for thin-walled channels that do not widen; else calibrate `area_factor`. Curvature "
-        "is per length after activation: an elastic rod whose stiffness is per length at rest bends "
-        "less by 1/ζ where pressure lengthens it to ζ."
+        "is per length after activation: an elastic rod whose stiffness is per length at rest "
+        "bends less by 1/ζ where pressure lengthens it to ζ."
     )
 
     distance: float | None = None
