@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -89,8 +90,7 @@ def test_fibers_turn_by_the_integral_of_their_angle_across_all_breakpoints(
     breaks = angle.breaks if isinstance(angle, AlongArm) else ()
     inside = [*profile.breakpoints, *(profile.length * x for x in breaks)]
     ends = [begin, *sorted(z for z in inside if begin < z < end), end]
-    pieces = zip(ends[:-1], ends[1:], strict=True)
-    expected = sum(quad(rate, *piece, epsabs=1e-12, epsrel=1e-12)[0] for piece in pieces)
+    expected = sum(quad(rate, *piece, epsabs=1e-12, epsrel=1e-12)[0] for piece in pairwise(ends))
     one = fiber(angle, ring, start_over_length=start)
     found = one.rotation(profile, SECTION, np.array([end]))[0]
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-10)
@@ -127,7 +127,7 @@ def test_samples_are_met_and_never_left_behind(places, data):
 def test_the_derivative_is_that_of_the_values(places, data, interpolation):
     values = data.draw(values_at(places, -2, 2))
     along = Samples(stations_over_length=places, values=values, interpolation=interpolation)
-    for low, high in zip(places[:-1], places[1:], strict=True):
+    for low, high in pairwise(places):
         x, h = low + 0.37 * (high - low), 1e-6 * (high - low)
         rate = (along(x + h) - along(x - h)) / (2 * h)
         assert along.derivative(x) == pytest.approx(rate, rel=1e-6, abs=1e-6)

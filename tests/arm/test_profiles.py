@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -36,8 +37,7 @@ def test_the_coordinates_are_the_integrals_that_define_them(profile, ratio, shar
 
     def integral(f):
         inside = [0.0, *(z for z in profile.breakpoints if z < place), place]
-        ends = zip(inside[:-1], inside[1:], strict=True)
-        return sum(quad(f, *pair, epsabs=0, epsrel=1e-12)[0] for pair in ends)
+        return sum(quad(f, *pair, epsabs=0, epsrel=1e-12)[0] for pair in pairwise(inside))
 
     def on_cone(z):
         return math.hypot(1.0, ratio * profile.slope(z)) / (ratio * profile.radius(z))

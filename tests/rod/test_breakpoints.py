@@ -15,7 +15,6 @@ import softreach as sr
 from softreach.arm import (
     Chamber,
     FiberArchitecture,
-    LinearTaper,
     Manipulator,
     Material,
     Pieces,
@@ -143,8 +142,8 @@ def test_every_breakpoint_of_profile_angles_routing_and_segments_is_known():
 def test_the_order_of_the_integrator_stays_across_breakpoints():
     arm = broken()
     rule = FreeRod(arm).rule
-    found = orders(rule, rule.edges(20), in_box(arm, 20), times=3)
-    assert (found > 5.5).all(), found
+    found = orders(rule, rule.edges(20), in_box(arm, 20), times=2)
+    np.testing.assert_allclose(found, 6.0, atol=0.3)
 
 
 def test_steps_across_breakpoints_would_lose_the_order():
@@ -165,20 +164,25 @@ def test_no_breakpoint_can_be_left_out(gone):
     fewer = np.delete(marks, gone + 1)
     for _ in range(3):
         marks, fewer = halved(marks), halved(fewer)
-    # a breakpoint that bisection happens to meet would not be missed
     exact = tips(rule, rule.edges(400), gamma)
     kept, lost = (np.abs(tips(rule, edges, gamma) - exact).max() for edges in (marks, fewer))
     assert lost > 5 * kept
 
 
-@pytest.mark.parametrize("tol", [1e-4, 1e-6, 1e-9])
-def test_the_tips_are_those_of_the_rod_equations_walked_piece_by_piece(tol):
+@pytest.fixture(scope="module")
+def walk():
+    """Where the walk is at the base, at every breakpoint, at 0.95 and at the tip."""
     arm = broken()
-    gamma = in_box(arm, 4)
-    ends = [0.0, *arm.breakpoints, arm.length]
-    expected = [walked(arm, one, ends)[-1, :3] for one in gamma]
-    error = np.linalg.norm(sr.tip_positions(arm, gamma, tol=tol) - expected, axis=1)
-    assert error.max() <= tol * arm.length
+    ends = np.array([0.0, *arm.breakpoints, 0.95, arm.length])
+    return ends, walked(arm, in_box(arm, 1)[0], ends)
+
+
+def test_the_tip_is_that_of_the_rod_equations_walked_piece_by_piece(walk):
+    arm = broken()
+    gamma, expected = in_box(arm, 1), walk[1][-1, :3]
+    for tol in (1e-4, 1e-6, 1e-9):
+        error = np.linalg.norm(sr.tip_positions(arm, gamma, tol=tol)[0] - expected)
+        assert error <= tol * arm.length
 
 
 @given(arm=any_arms(), tol=st.sampled_from([1e-4, 1e-6, 1e-8]))
@@ -204,104 +208,48 @@ def test_the_tolerance_is_met_for_arms_of_any_kind(arm, tol):
     assert error(gamma).max() <= tol
 
 
-@settings(max_examples=10)
+@settings(max_examples=8)
 @given(arm=any_arms())
 def test_the_tolerance_holds_along_arms_of_any_kind(arm):
     tol, gamma = 1e-6, in_box(arm, 20)
     z = np.union1d(np.linspace(0, arm.length, 7), arm.breakpoints)
-    coarse = sr.configuration(arm, gamma, z, tol=tol).position.values
-    fine = sr.configuration(arm, gamma, z, tol=1e-10).position.values
+    coarse, fine = (FreeRod(arm, t).frames(gamma, z).position for t in (tol, 1e-10))
     assert np.linalg.norm(coarse - fine, axis=-1).max() <= tol * arm.length
 
 
-def test_stations_on_and_beside_breakpoints_have_the_places_and_frames_of_the_walk():
-    arm = broken()
-    gamma = in_box(arm, 1)[0]
+def test_stations_on_and_beside_breakpoints_have_the_places_and_frames_of_the_walk(walk):
+    arm, (inner, states) = broken(), walk
+    gamma = in_box(arm, 1)
     beside = [z + side for z in arm.breakpoints for side in (-1e-13, 0.0, 1e-13, 1e-6)]
     z = np.array(sorted([0.0, *beside, 0.95, arm.length]))
-    shape = sr.configuration(arm, gamma, z, tol=1e-11)
-    inner = np.array([0.0, *arm.breakpoints, 0.95, arm.length])
-    states = walked(arm, gamma, inner)
+    places, directors = (found[0] for found in FreeRod(arm, 1e-11).frames(gamma, z))
     nearest = np.abs(z[:, None] - inner).argmin(axis=1)
     close = np.abs(z - inner[nearest]) < 1e-12
     assert close.sum() == 3 * len(BREAKS) + 3
-    np.testing.assert_allclose(shape.position.values[close], states[nearest[close], :3], atol=1e-10)
-    np.testing.assert_allclose(
-        shape.directors.values[close].reshape(-1, 9), states[nearest[close], 3:], atol=1e-9
-    )
+    np.testing.assert_allclose(places[close], states[nearest[close], :3], atol=1e-10)
+    turned = directors[close].reshape(-1, 9)
+    np.testing.assert_allclose(turned, states[nearest[close], 3:], atol=1e-9)
     beyond = np.abs(z - inner[nearest] - 1e-6) < 1e-9
-    zeta = shape.extension.values[beyond]
+    zeta = 1.0 + tables(arm, z[beyond]).extension @ gamma[0]
     along = 1e-6 * zeta[:, None] * states[nearest[beyond], 9:]
-    np.testing.assert_allclose(
-        shape.position.values[beyond], states[nearest[beyond], :3] + along, atol=1e-9
-    )
+    ahead = states[nearest[beyond], :3] + along
+    np.testing.assert_allclose(places[beyond], ahead, atol=1e-10)
 
 
 def test_frames_are_orthonormal_at_breakpoints():
     arm = broken()
     z = np.union1d(arm.breakpoints, np.linspace(0, 1, 11))
-    frames = sr.configuration(arm, in_box(arm, 5), z).directors.values
+    frames = FreeRod(arm, 1e-6).frames(in_box(arm, 5), z).directors
     gram = np.einsum("...ij,...kj->...ik", frames, frames)
     np.testing.assert_allclose(gram, np.broadcast_to(np.eye(3), gram.shape), atol=1e-13)
 
 
 def test_strains_at_a_breakpoint_are_those_of_the_piece_that_begins_there():
     arm = broken()
-    gamma = in_box(arm, 1)[0]
     z = np.array([np.nextafter(0.83, 0), 0.83, 0.83 + 1e-12])
-    shape = sr.configuration(arm, gamma, z)
-    ending, here, after = shape.curvature.values
+    ending, here, after = FreeRod(arm, 1e-6).strains_at(z)(in_box(arm, 1)).curvature[0]
     np.testing.assert_allclose(here, after, rtol=1e-9, atol=1e-9)
     assert np.abs(here - ending).max() > 1e-3
-
-
-@given(start=st.floats(0.0, 0.5), width=st.floats(0.2, 0.5), revolution=st.floats(-2, 2))
-def test_outside_its_stretch_a_segment_is_straight(start, width, revolution):
-    fiber = FiberArchitecture(
-        revolution=revolution,
-        extent=0.8,
-        start_over_length=start,
-        end_over_length=start + width,
-        activation_bounds=(-0.8, 0),
-    )
-    profile = LinearTaper(length=1.0, outer_radius=0.06, taper=0.01)
-    arm = Manipulator(profile=profile, section=SECTION, actuators=(fiber,))
-    end = start + width
-    z = np.array([0.0, 0.5 * start, start, end, 0.5 * (end + 1.0), 1.0])
-    shape = sr.configuration(arm, [-0.7], z, tol=1e-9)
-    frames, places = shape.directors.values, shape.position.values
-    np.testing.assert_allclose(frames[:3], np.broadcast_to(np.eye(3), (3, 3, 3)), atol=1e-13)
-    np.testing.assert_allclose(places[:3], z[:3, None] * [0, 0, 1], atol=1e-13)
-    np.testing.assert_allclose(frames[3:], np.broadcast_to(frames[3], (3, 3, 3)), atol=1e-13)
-    beyond = places[3] + (z[3:, None] - end) * frames[3, 2]
-    np.testing.assert_allclose(places[3:], beyond, atol=1e-13)
-
-
-@pytest.mark.parametrize("cut", [0.25, 0.6])
-def test_two_segments_in_series_are_two_arms_end_to_end(cut):
-    profile = LinearTaper(length=1.0, outer_radius=0.06, taper=0.02)
-    lower = FiberArchitecture(
-        name="lower", helical_angle=0.3, extent=0.8, end_over_length=cut, bundles=2
-    )
-    upper = FiberArchitecture(
-        name="upper", helical_angle=-0.5, extent=0.6, offset=1.0, start_over_length=cut
-    )
-    gamma = np.array([-0.5, -0.2, -0.6])
-    whole = Manipulator(profile=profile, section=SECTION, actuators=(lower, upper))
-    below = Manipulator(
-        profile=profile.replace(length=cut),
-        section=SECTION,
-        actuators=(lower.replace(end_over_length=1.0),),
-    )
-    above = Manipulator(
-        profile=profile.replace(length=1 - cut, outer_radius=float(profile.radius(cut))),
-        section=SECTION,
-        actuators=(upper.replace(start_over_length=0.0),),
-    )
-    base = sr.configuration(below, gamma[:2], [below.length], tol=1e-11)
-    end = sr.configuration(above, gamma[2:], [above.length], tol=1e-11)
-    expected = base.position.values[0] + end.position.values[0] @ base.directors.values[0]
-    np.testing.assert_allclose(sr.tip_positions(whole, [gamma], tol=1e-11)[0], expected, atol=1e-10)
 
 
 def test_a_breakpoint_where_nothing_changes_changes_nothing(trunk):

@@ -189,7 +189,7 @@ class Section:
         return Stiffness(area * outer**2, inertia * outer**4, polar * outer**4)
 
     def mass_per_length(self, radius: ArrayLike) -> Array:
-        """Σ ρ π (R2² - R1²) [kg/m] at R2 [m].
+        """Σ ρ π (R2² - R1²) [kg/m] at R2 [m]: theory (49).
 
         Raises:
             InvalidDesign: A layer without a density.

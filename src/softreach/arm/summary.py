@@ -200,7 +200,7 @@ def _overlap(outline: Outline, z: Array, first: int, second: int) -> tuple[float
     Between stations their angular distance is taken to be linear.
     """
     pair = [first, second]
-    shares = outline.acts[:, pair].all(axis=1)
+    shares = outline.acts[:, first] & outline.acts[:, second]
     if not shares.any():
         return 0.0, 0.0
     extent = outline.extent[pair].mean()
