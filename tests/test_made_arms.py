@@ -159,16 +159,18 @@ class TestSkins:
         assert inside(mixed_arm()) == (False, False, True, True, True, True)
         assert inside(sr.designs.redundant_trunk()) == (False,) * 4
 
-    def test_a_tendon_inside_is_seen_in_the_picture_of_the_arm(self):
+    def test_a_chamber_inside_is_seen_in_the_picture_of_the_arm(self):
         """Red shows, though the body covers it."""
+        chamber = Chamber(distance=0.01, radius=0.006, activation_bounds=(0, 1))
 
-        def redness(distance_ratio):
-            tendon = Tendon(distance_ratio=distance_ratio, activation_bounds=(0, 1))
-            pixels = plot_arm(one_ring_arm(tendon), view="side").images[0].get_array()
+        def redness(bundles):
+            ax = plot_arm(one_ring_arm(chamber), view="side", bundles=bundles)
+            pixels = ax.images[0].get_array()
             opaque = pixels[pixels[..., 3] == 255].astype(int)
             return (opaque[:, 0] - opaque[:, 1]).max()
 
-        assert redness(0.5) > 60
+        assert redness([0]) > 60
+        assert redness([]) < 20
 
     def test_tendons_outside_are_in_view(self):
         arm = MADE_ARMS["tendon"]()
@@ -228,17 +230,18 @@ class TestSection:
         assert len(plot_cross_section(arm, 0.49 * arm.length).lines) == 6
         assert len(plot_cross_section(arm, 0.51 * arm.length).lines) == 3
 
-    def test_a_sector_fills_its_own_ring(self):
+    def test_a_sector_fills_its_own_ring_and_stripes_what_it_shares(self):
         from matplotlib.patches import Wedge
 
         arm = mixed_arm()
         ax = plot_cross_section(arm, 0.15)
         outer = float(arm.profile.radius(0.15)) / arm.length
-        found = [(w.r / outer, (w.r - w.width) / outer) for w in ax.patches if isinstance(w, Wedge)]
+        wedges = [patch for patch in ax.patches if isinstance(patch, Wedge)]
+        found = [((w.r - (w.width or 0)) / outer, w.r / outer) for w in wedges]
         rings = [(0.85, 1.0), (0.85, 1.0), (0.45, 0.7), (0.6, 0.85)]
-        # the oblique muscle again, as stripes over the radial one that overlaps it
-        expected = [(high, low) for low, high in (*rings, rings[2])]
-        np.testing.assert_allclose(found, expected)
+        np.testing.assert_allclose(found, [*rings, (0.6, 0.7)])
+        # oblique from 1.95 to 3.05 rad, radial from 2.7 to 3.7 rad
+        np.testing.assert_allclose(np.radians([wedges[4].theta1, wedges[4].theta2]), [2.7, 3.05])
 
     def test_only_sectors_that_overlap_get_stripes(self):
         from matplotlib.patches import Wedge

@@ -117,8 +117,9 @@ def _arc(
     if both:
         _arrow(ax, (x[3], y[3]), (x[0], y[0]))
     middle = 0.5 * (start + end)
-    place = (radius + 0.17 * _RADIUS) * np.array([np.cos(middle), np.sin(middle)])
-    ax.text(*place, name, ha="left" if place[0] > 0 else "right", va="center")
+    away = radius + 0.17 * _RADIUS
+    right, up = away * np.cos(middle), away * np.sin(middle)
+    ax.text(right, up, name, ha="left" if right > 0 else "right", va="center")
 
 
 if __name__ == "__main__":

@@ -232,7 +232,7 @@ class Manipulator:
         return tuple(inside.tolist())
 
     @property
-    def courses(self) -> tuple[str, ...]:
+    def bundle_courses(self) -> tuple[str, ...]:
         """How what contracts runs within each bundle; see `Actuator.course`."""
         return tuple(one.course for one in self.actuators for _ in range(one.bundles))
 

@@ -1,7 +1,7 @@
 """The skins of an arm on a given centerline: its body, and what shows each bundle.
 
-Bundles that fill a sector of a ring are bands on the outside of that ring, lines are thin tubes, and
-lumens are tubes of their radius. They are cut where they begin and end to act.
+Bundles that fill a sector of a ring are bands on the outside of that ring, lines are thin tubes,
+lumens tubes of their radius. They are cut where they begin and end to act.
 """
 
 from __future__ import annotations
@@ -188,7 +188,8 @@ def inside(arm: Manipulator) -> tuple[bool, ...]:
     middle = 0.5 * (outline.inner_ratio + outline.outer_ratio)
     sector = np.array([shape == "sector" for shape in outline.shape])
     place = np.where(sector, outline.outer_ratio, middle)
-    return tuple(((place < 1.0 - _SAME) & outline.acts).any(axis=0).tolist())
+    hidden = (place < 1.0 - _SAME) & outline.acts
+    return tuple(bool(hidden[:, k].any()) for k in range(arm.bundles))
 
 
 def _skins(

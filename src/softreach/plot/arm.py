@@ -84,13 +84,13 @@ def shapes_of(configuration: xr.Dataset | None) -> list[xr.Dataset]:
 
 
 def arm_points(arm: Manipulator, shape: xr.Dataset) -> Array:
-    """Points of the surface of one configuration, and of what is outside of it [L], shape (n, 3)."""
+    """Points of one configuration [L]: its surface, and bundles outside of it; shape (n, 3)."""
     outline = arm.outline(shape["Z"].values)
-    out = ((outline.outer_ratio > _BULGE) & outline.acts).any(axis=0)
+    out = (outline.outer_ratio > _BULGE) & outline.acts
     surfaces = [arm_surface(arm, shape, _SIDES)]
     if out.any():
         skins = bundle_skins(arm, shape)
-        surfaces += [skin for skin, outside in zip(skins, out, strict=True) if outside]
+        surfaces += [skin for k, skin in enumerate(skins) if out[:, k].any()]
     return np.concatenate([surface.vertices for surface in surfaces]) / arm.length
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,15 +48,18 @@ class PlacedBundle:
         """Its color in every picture."""
         return bundle_color(self.index)
 
-    def overlaps(self, other: PlacedBundle) -> bool:
-        """Whether two sectors share a part of the section."""
-        if self.shape != "sector" or other.shape != "sector":
-            return False
-        radially = min(self.outer_ratio, other.outer_ratio) - max(
-            self.inner_ratio, other.inner_ratio
-        )
-        apart = abs((self.center - other.center + np.pi) % (2 * np.pi) - np.pi)
-        return radially > _OVERLAP and (self.extent + other.extent) / 2 - apart > _OVERLAP
+    def overlaps(self, other: PlacedBundle) -> Iterator[PlacedBundle]:
+        """The parts of this sector that another shares."""
+        inner = max(self.inner_ratio, other.inner_ratio)
+        outer = min(self.outer_ratio, other.outer_ratio)
+        apart = (other.center - self.center + np.pi) % (2 * np.pi) - np.pi
+        for turn in (apart - 2 * np.pi, apart, apart + 2 * np.pi):
+            low = max(-self.extent / 2, turn - other.extent / 2)
+            high = min(self.extent / 2, turn + other.extent / 2)
+            if outer - inner > _OVERLAP and high - low > _OVERLAP:
+                middle, extent = self.center + 0.5 * (low + high), high - low
+                ratios = {"inner_ratio": inner, "outer_ratio": outer}
+                yield replace(self, center=middle, extent=extent, **ratios)
 
 
 def placed_bundles(arm: Manipulator, z: float, bundles: Collection[int]) -> list[PlacedBundle]:
@@ -66,7 +69,7 @@ def placed_bundles(arm: Manipulator, z: float, bundles: Collection[int]) -> list
         PlacedBundle(
             index=k,
             shape=outline.shape[k],
-            course=arm.courses[k],
+            course=arm.bundle_courses[k],
             center=float(outline.center[0, k]),
             extent=float(outline.extent[k]),
             inner_ratio=float(outline.inner_ratio[0, k]),
@@ -83,8 +86,9 @@ def draw_bundles(ax: Axes, placed: Collection[PlacedBundle], outer: float) -> No
     for one in sectors:
         ax.add_patch(_sector(one, outer, color=one.color, linewidth=0))
     for k, one in enumerate(sectors):
-        if any(one.overlaps(above) for above in sectors[k + 1 :]):
-            _draw_stripes(ax, one, outer)
+        for above in sectors[k + 1 :]:
+            for part in one.overlaps(above):
+                _draw_stripes(ax, part, outer)
     for one in sectors:
         _draw_strokes(ax, one, outer)
     for one in (one for one in placed if one.shape == "lumen"):
@@ -116,9 +120,9 @@ def _sector(one: PlacedBundle, outer: float, **style: Any) -> Wedge:
     return Wedge((0, 0), radius, *ends, width=width, **style)
 
 
-def _draw_stripes(ax: Axes, one: PlacedBundle, outer: float) -> None:
-    """A sector again, over those that cover it: its outline, and stripes in its color."""
-    stripes = _sector(one, outer, facecolor="none", edgecolor=one.color, linewidth=0.8)
+def _draw_stripes(ax: Axes, part: PlacedBundle, outer: float) -> None:
+    """The part of a sector that another covers, as stripes over that."""
+    stripes = _sector(part, outer, facecolor="none", edgecolor=part.color, linewidth=0.0)
     stripes.set_hatch("//////")
     stripes.set_hatch_linewidth(1.2)
     ax.add_patch(stripes)

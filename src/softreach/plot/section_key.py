@@ -42,7 +42,7 @@ class SectionKey(NamedTuple):
 def needs_section_key(arm: Manipulator) -> bool:
     """Whether colors alone leave open what is what: several materials, or more than fibers."""
     shapes = set(arm.outline(0.0).shape)
-    plain = shapes == {"sector"} and set(arm.courses) == {"along"}
+    plain = shapes == {"sector"} and set(arm.bundle_courses) == {"along"}
     return not plain or len(section_materials(arm.section)) > 1
 
 
@@ -76,8 +76,8 @@ def _bundles(arm: Manipulator, placed: Collection[PlacedBundle]) -> Iterator[tup
         if one.shape == "line":
             handle: Artist = Line2D([], [], **tendon_style(one.color))
         else:
-            style = lumen_style(one.color) if one.shape == "lumen" else {"color": one.color}
-            handle = Patch(**style)
+            lumen = one.shape == "lumen"
+            handle = Patch(**lumen_style(one.color)) if lumen else Patch(color=one.color)
         course = "" if one.course == "along" else f", {one.course}"
         unit = arm.bundle_units[one.index].replace("1", "-")
         name = arm.bundle_names[one.index]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from softreach.palette import BODY, material_fill
 
@@ -21,7 +21,7 @@ _EDGE, _HATCH = "0.4", "0.55"
 def draw_layers(ax: Axes, section: Section, outer: float) -> None:
     """Draw what a section of outer radius `outer` is made of; what is empty is white.
 
-    In a section of one material the core is paler than the rings. Rings over others are translucent.
+    In a section of one material the core is paler than the rings; rings above others are clear.
     """
     from matplotlib.patches import Circle
 
@@ -44,7 +44,7 @@ def draw_layers(ax: Axes, section: Section, outer: float) -> None:
 
 
 def section_materials(section: Section) -> tuple[tuple[str, Material], ...]:
-    """The different materials of a section, rings first, each with the part it is first found in."""
+    """The different materials of a section, rings first, each with the part it is found in."""
     rings = [
         (one.name or ("ring" if len(section.rings) == 1 else f"ring {k + 1}"), one.material)
         for k, one in enumerate(section.rings)
@@ -57,7 +57,7 @@ def section_materials(section: Section) -> tuple[tuple[str, Material], ...]:
     return tuple(found)
 
 
-def material_style(section: Section, material: Material) -> dict[str, object]:
+def material_style(section: Section, material: Material) -> dict[str, Any]:
     """Fill and hatch of a material of the section, as properties of a patch."""
     known = [material.same_matter(other) for _, other in section_materials(section)]
     color, hatch = material_fill(known.index(True))
