@@ -9,9 +9,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from softreach.arm.actuators import FiberArchitecture
+from softreach.arm import (
+    FiberArchitecture,
+    LinearTaper,
+    Manipulator,
+    Material,
+    Pieces,
+    Ring,
+    Section,
+    designs,
+)
+from softreach.rod.free import FreeRod
 from softreach.rod.kinematics import configuration
-from tests.laws import arm_of
 
 POSITION = [0.010887432435510243, 0.010588028536001756, 0.08230390930976722]
 DIRECTORS = [
@@ -23,8 +32,30 @@ DIRECTORS = [
 
 def test_an_activated_filament_is_that_of_active_filaments_jl():
     """L = 1 m, R2 = L/16, R1 = 0.6 R2, ν = 1/2; three sectors of 30° from the x-axis on."""
-    sectors = FiberArchitecture(helical_angle=np.pi / 10, extent=np.radians(30), bundles=3)
-    filament = arm_of(sectors, inner_radius=0.6 / 16, activation_bounds=(-2.0, 0.0))
-    shape = configuration(filament, [-2.0, -1.3, 0.0], stations=[0.1], tol=1e-12)
+    shape = configuration(designs.filament(), [-2.0, -1.3, 0.0], stations=[0.1], tol=1e-12)
     np.testing.assert_allclose(shape.position[0], POSITION, rtol=0, atol=1e-12)
     np.testing.assert_allclose(shape.directors[0], DIRECTORS, rtol=0, atol=1e-12)
+
+
+def test_the_same_filament_in_layers_of_one_material_is_it_too():
+    """Its rings as ActiveFilaments.jl has them, with E = 1 MPa; the core in two parts here."""
+    rubber = Material(young_modulus=1e6, poisson_ratio=0.5)
+    rings = (
+        Ring(inner_ratio=0.2, outer_ratio=0.6, material=rubber, name="inner"),
+        Ring(inner_ratio=0.6, material=rubber, name="outer"),
+    )
+    sectors = FiberArchitecture(
+        helical_angle=Pieces(stations_over_length=(0, 0.05, 1), values=(np.pi / 10, np.pi / 10)),
+        extent=np.radians(30),
+        bundles=3,
+        ring="outer",
+        activation_bounds=(-2.0, 0.0),
+    )
+    filament = Manipulator(
+        profile=LinearTaper(length=1.0, outer_radius=1 / 16),
+        section=Section(rings=rings, core=rubber),
+        actuators=(sectors,),
+    )
+    position, directors = FreeRod(filament, 1e-12).frames([[-2.0, -1.3, 0.0]], [0.1])
+    np.testing.assert_allclose(position[0, 0], POSITION, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(directors[0, 0], DIRECTORS, rtol=0, atol=1e-12)

@@ -9,7 +9,17 @@ import pytest
 from hypothesis import given
 
 import softreach as sr
-from softreach.arm import designs
+from softreach.arm import (
+    Chamber,
+    LinearTaper,
+    Manipulator,
+    Material,
+    ObliqueMuscle,
+    Ring,
+    Section,
+    Tendon,
+    designs,
+)
 from softreach.arm.summary import describe, design_warnings
 from softreach.arm.tables import extension_range, tables
 from tests.laws import arm_of, arms, single
@@ -44,6 +54,62 @@ def test_sectors_of_one_architecture_overlap_when_wider_than_their_spacing():
         sr.FiberArchitecture(helical_angle=0.2, extent=2.2, bundles=3), activation_bounds=(-0.1, 0)
     )
     assert sum("overlap" in line for line in design_warnings(arm)) == 3
+
+
+class TestOverlaps:
+    """Within one ring and one stretch alone."""
+
+    def lines(self, section, *actuators):
+        profile = LinearTaper(length=1.0, outer_radius=0.06, taper=0.01)
+        arm = Manipulator(profile=profile, section=section, actuators=actuators)
+        return [line for line in design_warnings(arm) if "overlap" in line]
+
+    def fiber(self, offset_deg, **changes):
+        return sr.FiberArchitecture(
+            **{
+                "helical_angle": 0.0,
+                "extent": math.radians(50),
+                "offset": math.radians(offset_deg),
+                "activation_bounds": (-0.1, 0.0),
+            }
+            | changes
+        )
+
+    ONE = Section(rings=(Ring(inner_ratio=0.6, name="one"),))
+    SHARED = Section(rings=(Ring(inner_ratio=0.6, name="one"), Ring(inner_ratio=0.6, name="two")))
+
+    def test_of_one_ring_are_warned_of_whatever_it_is_called_by(self):
+        for which in (0, -1, "one"):
+            (line,) = self.lines(self.ONE, self.fiber(0), self.fiber(30, ring=which))
+            assert "by up to 20°" in line
+        assert not self.lines(self.ONE, self.fiber(0), self.fiber(51))
+
+    def test_of_rings_that_share_their_radii_on_purpose_are_not(self):
+        assert not self.lines(self.SHARED, self.fiber(0), self.fiber(30, ring="two"))
+        assert len(self.lines(self.SHARED, self.fiber(0, ring=1), self.fiber(30, ring="two"))) == 1
+
+    def test_of_equal_rings_without_names_are_not(self):
+        ring = Ring(inner_ratio=0.6)
+        section = Section(rings=(ring, ring))
+        assert not self.lines(section, self.fiber(0), self.fiber(30, ring=1))
+
+    def test_of_stretches_that_follow_each_other_are_not(self):
+        lower = self.fiber(0, end_over_length=0.4)
+        assert not self.lines(self.ONE, lower, self.fiber(30, start_over_length=0.4))
+        (line,) = self.lines(self.ONE, lower, self.fiber(30, start_over_length=0.3))
+        assert "from Z = 0.30 L" in line
+
+    def test_between_a_fiber_and_a_muscle_of_one_ring_are_warned_of(self):
+        muscle = ObliqueMuscle(helical_angle=0.5, extent=0.8, activation_bounds=(-0.1, 0.0))
+        assert len(self.lines(self.ONE, self.fiber(10), muscle)) == 1
+
+    def test_with_tendons_and_chambers_are_not(self):
+        ring = Ring(inner_ratio=0.6, material=Material(young_modulus=1e6))
+        others = (
+            Tendon(distance_ratio=0.8, activation_bounds=(0, 1)),
+            Chamber(distance_ratio=0.8, radius_ratio=0.1, activation_bounds=(0, 1)),
+        )
+        assert not self.lines(Section(rings=(ring,)), self.fiber(0), *others)
 
 
 def test_bending_beyond_the_theory_and_large_activations_are_warned_of():

@@ -8,7 +8,11 @@ import numpy as np
 import pytest
 
 import softreach as sr
+from softreach.arm.actuators import Tendon
+from softreach.arm.material import Material
 from softreach.arm.parameters import changed
+from softreach.arm.sampled_profiles import PiecewiseTaper
+from softreach.arm.section import Ring, Section
 from softreach.atlas import DesignSpace, atlas_cloud, atlas_design, best_designs, open_atlas
 from softreach.atlas.space_file import parse_space
 from softreach.atlas.store import AtlasStore
@@ -116,3 +120,27 @@ def test_one_number_is_not_varied_under_two_names():
     names = {"rings[skin].inner_ratio": [0.5], "rings[0].inner_ratio": [0.6]}
     with pytest.raises(InvalidInput, match="given once"):
         DesignSpace.grid(arm, **names)
+
+
+def tendon_arm() -> sr.Manipulator:
+    """Two materials, and two tendons that are driven together."""
+    soft, skin = (Material(young_modulus=modulus) for modulus in (1e6, 2e6))
+    rings = (
+        Ring(inner_ratio=0.4, outer_ratio=0.9, material=soft),
+        Ring(inner_ratio=0.9, material=skin, name="skin"),
+    )
+    profile = PiecewiseTaper(length=0.3, stations_over_length=(0.0, 0.5, 1.0), radii=(0.02,) * 3)
+    pull = Tendon(name="pull", distance=0.01, bundles=2, activation_bounds=(0.0, 20.0))
+    return sr.Manipulator(profile=profile, section=Section(rings=rings), actuators=(pull,))
+
+
+def test_an_arm_of_other_parts_has_an_atlas_too(tmp_path):
+    names = {"rings[skin].material.young_modulus": [1e6, 4e6], "profile.radii[1]": [0.01, 0.02]}
+    grid = DesignSpace.grid(tendon_arm(), **names)
+    atlas = sr.build_atlas(grid, tmp_path / "a.zarr", **TINY)
+    assert open_atlas(tmp_path / "a.zarr")["status"].dims == tuple(names)
+    at = {"rings[skin].material.young_modulus": 4e6, "profile.radii[1]": 0.01}
+    assert atlas_design(atlas, **at) == changed(tendon_arm(), at)
+    reach = best_designs(atlas, "reach_radius", smallest=True)
+    stiffest = (reach[name].item() for name in names)
+    assert tuple(stiffest) == (4e6, 0.02)

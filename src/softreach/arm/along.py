@@ -120,7 +120,7 @@ class Samples(AlongArm):
 
 
 def monotone_cubic(stations: Sequence[float], values: Sequence[float]) -> Any:
-    """The monotone piecewise cubic through samples (Fritsch and Carlson), as SciPy's PCHIP."""
+    """The monotone piecewise cubic through samples as SciPy's PCHIP [FritschCarlson1980]."""
     from scipy.interpolate import PchipInterpolator
 
     return PchipInterpolator(stations, values)

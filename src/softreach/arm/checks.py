@@ -191,21 +191,11 @@ def tendon_faults(values: Mapping[str, Any]) -> list[Fault]:
     if values["revolution"] is None:
         faults.append(Fault("revolution", None, FIBER_RANGES["revolution"]))
     faults += one_length_faults(values, "distance", Range(0.0, unit="m"), sampled=True)
-    if values["routing"] is not None and not _is_sampled(values["routing"]):
-        faults.append(Fault("routing", values["routing"], "must be Samples of an angle, in rad"))
-    if getattr(values["distance"], "values", None) and not _is_sampled(values["distance"]):
-        allowed = "must be a number or Samples: a tendon has no steps"
-        faults.append(Fault("distance", values["distance"], allowed))
     bounds = _numbers(values["activation_bounds"])
     if bounds.size and bounds.min() < 0:
         allowed = "must be at least 0 N: a tendon pulls and cannot push"
         faults.append(Fault("activation_bounds", values["activation_bounds"], allowed))
     return faults
-
-
-def _is_sampled(along: Any) -> bool:
-    """Whether a quantity along the arm is continuous: drawn through samples."""
-    return isinstance(getattr(along, "values", None), tuple) and hasattr(along, "interpolation")
 
 
 def chamber_faults(values: Mapping[str, Any]) -> list[Fault]:

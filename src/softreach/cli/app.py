@@ -82,10 +82,16 @@ _COMMANDS = {
         "Write a cloud or an arm for other programs.",
         "softreach export trunk.zarr trunk.parquet",
     ),
+    "import": (
+        "Read a design or a cloud of ActiveFilaments.jl.",
+        "softreach import filament.jl filament.toml",
+    ),
 }
+_KEYWORDS = {"import": "import_file"}  # commands that no Python function can be called
 for _place, (_name, (_summary, _example)) in enumerate(_COMMANDS.items()):
+    _function = _KEYWORDS.get(_name, _name)
     app.command(
-        f"softreach.cli.{_name}:{_name}",
+        f"softreach.cli.{_function}:{_function}",
         name=_name,
         help=f"{_summary}\n\nExample: {_example}",
         sort_key=_place,

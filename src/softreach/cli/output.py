@@ -39,6 +39,8 @@ _SUFFIX = {
     "%": "_percent",
     "Pa": "_pa",
     "N": "_n",
+    "N m²": "_n_m2",
+    "kg": "_kg",
     "kg/m³": "_kg_m3",
 }
 

@@ -39,7 +39,7 @@ def activation_measures(arm: Manipulator) -> Array:
 
 def measured_bundles(rod: TipMap) -> TipMap:
     """A tip map whose activations are in `activation_measures`; the map itself if those are 1."""
-    if (activation_measures(rod.arm) == 1.0).all():
+    if isinstance(rod, MeasuredBundles) or (activation_measures(rod.arm) == 1.0).all():
         return rod
     return MeasuredBundles(rod.arm, rod.tol, rod)
 
@@ -94,6 +94,10 @@ class MeasuredBundles(TipMap):
     def linearization_error(self, half_widths: Array) -> float:
         """The largest |r(γ + d) - r(γ) - r'(γ) d| [m] for |dj| <= half_widths[j] in the box."""
         return self.whole.linearization_error(half_widths * self.measures)
+
+    def linearization_errors(self, centers: Array, half_widths: Array) -> Array:
+        """The same [m] for |dj| <= half_widths[j] around each center only, shape (n,)."""
+        return self.whole.linearization_errors(centers * self.measures, half_widths * self.measures)
 
     def frames(self, activations: ArrayLike, stations: ArrayLike) -> Frames:
         """Centerline and directors at ascending stations Z [m]."""

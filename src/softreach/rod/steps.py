@@ -165,7 +165,8 @@ class StepRule:
 
     def _fewest_steps(self, turn: float) -> int:
         """Steps of which none turns by more than `turn`: |ω| = ζ |u| R2 dS at the pilot samples."""
-        return max(2, int(np.ceil(self._largest_turn / turn)))
+        steps = min(self._largest_turn / turn, 2.0 * _MOST_STEPS)  # infinite ones overflow
+        return max(2, int(np.ceil(steps)))
 
     @property
     def fewest_for_frames(self) -> int:

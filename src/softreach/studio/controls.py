@@ -83,21 +83,20 @@ def controls(arm: Manipulator) -> list[Control]:
 
 
 def _slider(one: Parameter, value: float) -> _Slider | None:
+    """Ends and label; None for what the design leaves open, or for a zero of unknown size."""
     fixed = (_OF_PART if one.owner else _OF_ARM).get(one.field)
-    if math.isnan(value) or (fixed and one.unit in ("1", "rad", "m")):
-        return None if math.isnan(value) else fixed
-    return _around(one, value)
+    outside_arm = one.field == "distance_ratio" and value > 1
+    if fixed and one.unit in ("1", "rad", "m") and not outside_arm:
+        return fixed if math.isfinite(value) else None
+    return None if value == 0 or math.isnan(value) else _around(one, value)
 
 
-def _around(one: Parameter, value: float) -> _Slider | None:
-    """From zero, or near it where it is not allowed, to twice the value; None for zero."""
-    if value == 0:
-        return None
-    owner = f" of {one.owner}" if one.owner else ""
+def _around(one: Parameter, value: float) -> _Slider:
+    """From zero, or near it where it is not allowed, to twice the value."""
+    owner = f" of {one.owner.removesuffix('.material')}" if one.owner else ""
     unit = f" [{one.unit}]" if one.unit != "1" else ""
-    nearest, farthest = (0.01 if one.field == "young_modulus" else 0.0) * value, 2 * value
-    label = f"{one.symbol}{owner}{unit}"
-    return _Slider(label, min(nearest, farthest), max(nearest, farthest), abs(value) / 100)
+    ends = (0.01 if one.field == "young_modulus" else 0.0) * value, 2 * value
+    return _Slider(f"{one.symbol}{owner}{unit}", min(ends), max(ends), abs(value) / 100)
 
 
 def _is_offered(arm: Manipulator, known: Mapping[str, Parameter], one: Parameter) -> bool:

@@ -51,7 +51,9 @@ class Chamber(Actuator):
     )
     default_name: ClassVar[str] = "chamber"
     validity: ClassVar[str] = (
-        "Exact for thin-walled channels that do not widen; else calibrate `area_factor`."
+        "Exact for thin-walled channels that do not widen; else calibrate `area_factor`. Curvature "
+        "is per length after activation: an elastic rod whose stiffness is per length at rest "
+        "bends less by 1/ζ where pressure lengthens it to ζ."
     )
 
     distance: float | None = None
@@ -68,7 +70,7 @@ class Chamber(Actuator):
     """θ0, polar angle of the first chamber [rad]."""
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
-        """N = A and M = p × A e3 with the effective area A(Z) and the center p(Z)."""
+        """N = A and M = p × A e3 with the effective area A and the center p: theory (53)."""
         del section
         area = np.pi * self.area_factor * self._radius(profile, z) ** 2
         arm = area * self._distance(profile, z)

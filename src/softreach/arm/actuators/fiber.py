@@ -105,7 +105,7 @@ class FiberArchitecture(SectorActuator):
         return cone_integrals(section.ring(self.ring), profile.slope(z), local)
 
     def rotation(self, profile: Profile, section: Section, z: Array) -> Array:
-        """Θ(Z) = ∫ tan α dZ/(R cos φ) from where it begins [rad]: theory (14)."""
+        """Θ(Z) = ∫ tan α dZ/(R cos φ) from where it begins [rad]: theory (50)."""
         angle = self.helical_angle_on(profile, section)
         start = self.start_over_length * profile.length
         return helical_rotation(profile, section.ring(self.ring).outer_ratio, angle, start, z)

@@ -83,7 +83,8 @@ class RadialMuscle(SectorActuator):
     """Fibers along the radius of a sector: contracting them (γ < 0) makes the arm longer.
 
     A radial strain γ stretches an elastic section by -ν γ along the axis wherever it acts, so that
-    k = -ν in theory (3): N = -ν E σ (R2² - R1²)/2 γ, and a moment unless the sectors go all around.
+    k = -ν in theory (3), by theory (51): N = -ν E σ (R2² - R1²)/2 γ, and a moment unless the
+    sectors go all around.
 
     Raises:
         InvalidDesign: A field is out of its range.

@@ -62,8 +62,10 @@ class Tendon(Actuator):
     )
     default_name: ClassVar[str] = "tendon"
     validity: ClassVar[str] = (
-        "Exact for tendons parallel to the axis. Other tendons pull along their direction at rest, "
-        "so that the error grows with curvature times the distance from the axis."
+        "Exact for tendons parallel to the axis; others pull along their direction at rest, with a "
+        "relative error of the order of curvature times distance from the axis. Curvature is per "
+        "length after activation: an elastic rod whose stiffness is per length at rest bends more "
+        "by 1/ζ, ζ = 1 - τ/K0."
     )
 
     distance: float | Samples | None = None
@@ -78,7 +80,7 @@ class Tendon(Actuator):
     """θ(Z) - θ0 along the arm [rad], in place of an even rotation."""
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
-        """N = -t3 and M = -p × t with the unit tangent t = (p' + e3)/|p' + e3| at rest."""
+        """N = -t3 and M = -p × t with the tangent t = (p' + e3)/|p' + e3| at rest: theory (52)."""
         del section
         route = self._route(profile, z)
         cos, sin = np.cos(route.angle), np.sin(route.angle)

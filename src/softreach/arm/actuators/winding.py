@@ -19,7 +19,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 def helical_rotation(
     profile: Profile, ratio: float, angle: float | AlongArm, start: float, z: ArrayLike
 ) -> Array:
-    """Θ(Z) = ∫ tan α(Z)/(R cos φ) dZ from `start` to Z [rad]: theory (14).
+    """Θ(Z) = ∫ tan α(Z)/(R cos φ) dZ from `start` to Z [rad]: theory (50).
 
     Args:
         profile: R2(Z).

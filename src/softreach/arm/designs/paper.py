@@ -24,9 +24,9 @@ def minimal_trunk(
 ) -> Manipulator:
     """The paper's minimal design: two helical bundles of opposite hand and a longitudinal one.
 
-    Kaczmarski, Moulton, Goriely, Kuhl, EML 71 (2024) 102207, section 2. The paper prints
-    R1(0) = L/12, which exceeds its R2(0) = L/16; 12/16 of R2(0) is our reading of that misprint, so
-    `radius_ratio` is a parameter and not the paper's value.
+    [Kaczmarski2024], section 2. The paper prints R1(0) = L/12, which exceeds its R2(0) = L/16;
+    12/16 of R2(0) is our reading of that misprint, so `radius_ratio` is a parameter and not the
+    paper's value.
 
     Args:
         revolution: Ω of the right-handed bundle; the left-handed one has -Ω [rad].
@@ -57,9 +57,9 @@ def redundant_trunk(
 ) -> Manipulator:
     """The paper's redundant design: the longitudinal bundle of `minimal_trunk` split in two.
 
-    The paper does not print where the two lie (section 5). Here they have the extent of the others
-    and centers at 246° and 294°: adjacent like the helical pair, symmetric about the plane of
-    symmetry. At Ω = 108° each then meets a helical bundle near the tip.
+    [Kaczmarski2024] does not print where the two lie (section 5). Here they have the extent of the
+    others and centers at 246° and 294°: adjacent like the helical pair, symmetric about the plane
+    of symmetry. At Ω = 108° each then meets a helical bundle near the tip.
 
     Args:
         revolution: Ω of the right-handed bundle; the left-handed one has -Ω [rad].

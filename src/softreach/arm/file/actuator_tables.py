@@ -68,7 +68,11 @@ class FiberTable(_SectorTable):
             either,
         ]
         | None
-    ) = Field(default=None, alias="helical_angle_deg")
+    ) = Field(
+        default=None,
+        alias="helical_angle_deg",
+        description="α: helical angle at the outer radius of the ring, constant or along [deg]",
+    )
     revolution: Annotated[float, Quantity.of(FiberArchitecture, "revolution")] | None = Field(
         default=None, alias="revolution_deg"
     )
@@ -103,7 +107,11 @@ class TendonTable(ActuatorTable):
             either,
         ]
         | None
-    ) = Field(default=None, alias="distance_m")
+    ) = Field(
+        default=None,
+        alias="distance_m",
+        description="ρt: distance from the axis, constant or along [m]",
+    )
     distance_ratio: Annotated[float, Quantity.of(Tendon, "distance_ratio")] | None = None
     offset: Annotated[float, Quantity.of(Tendon, "offset")] = Field(default=0.0, alias="offset_deg")
     revolution: Annotated[float, Quantity.of(Tendon, "revolution")] = Field(

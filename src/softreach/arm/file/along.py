@@ -35,7 +35,7 @@ class AlongTable(Table):
             raise refused(faults[0])
         return self
 
-    def made(self) -> AlongArm:
+    def value(self) -> AlongArm:
         """The function of Z/L."""
         if self.interpolation == "constant":
             return Pieces(stations_over_length=self._stations, values=tuple(self.values))

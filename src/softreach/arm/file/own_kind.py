@@ -65,7 +65,7 @@ def _plain(value: Any) -> Any:
     """Lists as tuples, and what is given along the arm as a function."""
     if isinstance(value, dict):
         try:
-            return AlongTable.model_validate(value).made()
+            return AlongTable.model_validate(value).value()
         except ValidationError:
             return value
     if isinstance(value, list):

@@ -145,7 +145,9 @@ class _DesignReader(TableReader):
             return None
 
         def section(table: SectionTable) -> Section | None:
-            core = table.core and self._material(table.core, "section.core")
+            core = None
+            if table.core is not None:
+                core = self._material(table.core, "section.core")
             if not made or len(made) < len(rings):
                 return None
             if not self._unknown_material:
@@ -176,7 +178,9 @@ class _DesignReader(TableReader):
             return path if path.startswith("rings") else f"section.{path}"
         name = self._material_name(owner)
         home = f"section.{owner}" if owner == "core" else owner
-        return f"materials.{key_text(name)}.{key}" if name in self._materials else f"{home}.{key}"
+        if isinstance(name, str) and name in self._materials:
+            return f"materials.{key_text(name)}.{key}"
+        return f"{home}.{key}"
 
     def _material_name(self, owner: str) -> Any:
         """What the core, or a ring such as `rings[0].material`, names as its material."""

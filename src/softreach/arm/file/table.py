@@ -35,8 +35,9 @@ class Table(BaseModel):
     def values_but(self, *without: str) -> dict[str, Any]:
         """Field -> value in SI units; tables of quantities along the arm made functions."""
         fields = (name for name in type(self).model_fields if name not in without)
-        return {name: _made(getattr(self, name)) for name in fields}
+        given = ((name, getattr(self, name)) for name in fields)
+        return {name: one.value() if isinstance(one, Table) else one for name, one in given}
 
-
-def _made(value: Any) -> Any:
-    return value.made() if isinstance(value, Table) and hasattr(value, "made") else value
+    def value(self) -> Any:
+        """What it stands for as the value of a key."""
+        return self

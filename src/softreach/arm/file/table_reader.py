@@ -111,5 +111,5 @@ def _in_keys(fault: Fault, keys: Mapping[str, str], raw: Mapping[str, Any], path
         allowed = allowed.in_degrees() if allowed.unit == "rad" else allowed
     else:
         allowed = re.sub(r"\w+", lambda word: keys.get(word[0], word[0]), allowed)
-    value = given if len(given) > 1 else given[0]
+    value = given[0] if len(given) == 1 else given
     return Fault(", ".join(f"{path}.{name}" for name in names), value, allowed)

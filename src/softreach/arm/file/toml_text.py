@@ -17,7 +17,15 @@ def value_text(value: Any) -> str:
         TypeError: Another kind of value.
         ValueError: A number that is not finite.
     """
+    if not _is_plain(value):
+        raise TypeError(f"{type(value).__name__} has no text in TOML")
     return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("\x7f", "\\u007f")
+
+
+def _is_plain(value: Any) -> bool:
+    if isinstance(value, list | tuple):
+        return all(_is_plain(item) for item in value)
+    return isinstance(value, str | int | float)
 
 
 def key_text(name: str) -> str:

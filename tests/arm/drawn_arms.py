@@ -1,4 +1,4 @@
-"""Arms of every kind that a design file can describe, for hypothesis."""
+"""Arms of every kind that a design file can describe, drawn by hypothesis."""
 
 from __future__ import annotations
 
@@ -109,13 +109,11 @@ def tendons(draw: st.DrawFn) -> Tendon:
         st.fixed_dictionaries({"distance": lengths | samples(lengths)})
         | st.fixed_dictionaries({"distance_ratio": lengths})
     )
-    return Tendon(
-        **draw(common(st.floats(0, 1e9))),
-        **place,
-        offset=draw(numbers),
-        revolution=draw(numbers),
-        routing=draw(st.none() | samples(numbers)),
+    turn = draw(
+        st.fixed_dictionaries({"revolution": numbers})
+        | st.fixed_dictionaries({"routing": samples(numbers)})
     )
+    return Tendon(**draw(common(st.floats(0, 1e9))), **place, **turn, offset=draw(numbers))
 
 
 @st.composite

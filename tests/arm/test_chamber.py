@@ -1,0 +1,166 @@
+"""Laws of pressure chambers: end forces on a lumen, and what a tendon does the same with."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import softreach as sr
+from softreach.arm import Chamber, LinearTaper, Manipulator, Material, Ring, Section, Tendon
+from softreach.arm.tables import tables
+from softreach.errors import InvalidDesign
+from tests.kinds import any_arms, layers_at
+from tests.oracles.sections import disc, pressure_load, stiffness
+
+LENGTH, RADIUS, MODULUS = 0.2, 0.015, 3e5
+K0, K1 = math.pi * MODULUS * RADIUS**2, math.pi / 4 * MODULUS * RADIUS**4
+SECTION = Section(rings=(Ring(inner_ratio=0.5, material=Material(young_modulus=MODULUS)),))
+CYLINDER = LinearTaper(length=LENGTH, outer_radius=RADIUS)
+
+
+def arm(*actuators, profile=CYLINDER):
+    return Manipulator(profile=profile, section=SECTION, actuators=actuators)
+
+
+def chamber(**fields):
+    given = {"distance": 0.008, "radius": 0.004, "activation_bounds": (-2e4, 1e5)}
+    return Chamber(**(given | fields))
+
+
+@given(body=any_arms(Chamber), share=st.floats(0.0, 0.999))
+def test_a_chamber_pushes_as_the_quadrature_of_its_pressure_says(body, share):
+    z = share * body.length
+    radius = float(body.profile.radius(z))
+    table, bundle = tables(body, [z]), 0
+    resists = np.array(stiffness(layers_at(body.section, radius))[:4])
+    for actuator in body.actuators:
+        acts = actuator.acts(body.profile, np.array([z]))[0]
+        for k in range(actuator.bundles):
+            if isinstance(actuator, Chamber):
+                angle = actuator.offset + 2 * math.pi * k / actuator.bundles
+                distance = actuator.distance_ratio * radius
+                center = (distance * math.cos(angle), distance * math.sin(angle))
+                force, moment = pressure_load(disc(center, actuator.radius_ratio * radius))
+                expected = acts[k] * actuator.area_factor * np.array([force, *moment]) / resists
+                found = [table.extension[0, bundle], *table.curvature[0, :, bundle]]
+                scale = np.abs(expected).max()
+                np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11 * scale)
+            bundle += 1
+
+
+@given(pressure=st.floats(1e3, 1e5), offset=st.floats(-4, 4))
+def test_a_chamber_lengthens_the_arm_and_bends_it_away_to_an_arc(pressure, offset):
+    area = math.pi * 0.004**2
+    zeta, curvature = 1 + pressure * area / K0, pressure * area * 0.008 / K1
+    angle = zeta * curvature * LENGTH
+    side = (1 - math.cos(angle)) / curvature
+    expected = [-side * math.cos(offset), -side * math.sin(offset), math.sin(angle) / curvature]
+    tip = sr.tip_positions(arm(chamber(offset=offset)), [[pressure]], tol=1e-11)[0]
+    np.testing.assert_allclose(tip, expected, atol=1e-11)
+
+
+@given(tension=st.floats(0.1, 4.0))
+def test_a_chamber_opposite_a_tendon_doubles_its_bending_and_gives_back_its_length(tension):
+    """P A = τ at opposite places: equal moments, opposite forces."""
+    pressure = tension / (math.pi * 0.004**2)
+    pair = arm(
+        Tendon(distance=0.008, offset=0.3, activation_bounds=(0, 5)),
+        chamber(offset=0.3 + math.pi, activation_bounds=(0, 1e5)),
+    )
+    curvature = 2 * tension * 0.008 / K1
+    angle = curvature * LENGTH
+    side = (1 - math.cos(angle)) / curvature
+    expected = [side * math.cos(0.3), side * math.sin(0.3), math.sin(angle) / curvature]
+    tip = sr.tip_positions(pair, [[tension, pressure]], tol=1e-11)[0]
+    np.testing.assert_allclose(tip, expected, atol=1e-11)
+    np.testing.assert_allclose(tables(pair, [0.1]).extension @ [tension, pressure], 0.0, atol=1e-14)
+
+
+@given(tension=st.floats(0.1, 4.0), taper=st.floats(-0.02, 0.04))
+def test_a_chamber_around_a_tendon_takes_its_tension_away(tension, taper):
+    """A cable in a tube of its own: what the fluid pushes, the cable holds."""
+    pair = arm(
+        Tendon(distance=0.006, offset=0.3, activation_bounds=(0, 5)),
+        chamber(distance=0.006, offset=0.3, activation_bounds=(0, 1e5)),
+        profile=CYLINDER.replace(taper=taper),
+    )
+    tip = sr.tip_positions(pair, [[tension, tension / (math.pi * 0.004**2)]])[0]
+    np.testing.assert_allclose(tip, [0, 0, LENGTH], atol=1e-13)
+
+
+def test_the_area_factor_scales_what_a_pressure_does():
+    one, twice = (tables(arm(chamber(area_factor=f)), [0.0]) for f in (1.0, 2.0))
+    np.testing.assert_allclose(twice.extension, 2 * one.extension, rtol=1e-15)
+    np.testing.assert_allclose(twice.curvature, 2 * one.curvature, rtol=1e-15)
+
+
+def test_three_even_chambers_of_one_pressure_only_lengthen():
+    pressure = 2e4
+    tip = sr.tip_positions(arm(chamber(bundles=3, offset=0.7)), [[pressure] * 3])[0]
+    zeta = 1 + 3 * pressure * math.pi * 0.004**2 / K0
+    np.testing.assert_allclose(tip, [0, 0, zeta * LENGTH], atol=1e-13)
+
+
+def test_sizes_that_are_ratios_shrink_with_the_arm_and_lengths_do_not():
+    tapered = CYLINDER.replace(taper=0.03)
+    z = np.array([0.0, LENGTH])
+    share = tapered.radius(LENGTH) / RADIUS
+    by_length = arm(chamber(), profile=tapered)
+    by_ratio = arm(
+        Chamber(distance_ratio=8 / 15, radius_ratio=4 / 15, activation_bounds=(0, 1)),
+        profile=tapered,
+    )
+    ends = [
+        tables(body, z).extension[:, 0] * SECTION.stiffness(tapered.radius(z)).axial
+        for body in (by_length, by_ratio)
+    ]
+    area = math.pi * 0.004**2
+    np.testing.assert_allclose(ends, [[area, area], [area, area * share**2]], rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"distance": None}, "give exactly one of distance and distance_ratio"),
+        ({"distance_ratio": 0.5}, "give exactly one of distance and distance_ratio"),
+        ({"radius": None}, "give exactly one of radius and radius_ratio"),
+        ({"radius_ratio": 0.2}, r"\(0.004, 0.2\): give exactly one of radius and radius_ratio"),
+        ({"radius": 0.0}, "radius = 0: must be a finite number > 0 m"),
+        ({"radius": True}, "radius = True"),
+        ({"radius": "4mm"}, "radius = '4mm'"),
+        ({"distance": math.nan}, "distance = nan"),
+        ({"distance": -0.1}, "distance = -0.1: must be a finite number >= 0 m"),
+        ({"area_factor": 0}, "area_factor = 0: must be a finite number > 0"),
+        ({"area_factor": None}, "area_factor: must be a finite number > 0"),
+        ({"offset": math.inf}, "offset = inf"),
+        ({"activation_bounds": None}, "activation_bounds: must be a pair"),
+        ({"activation_bounds": (True, False)}, "activation_bounds = .*must be a pair"),
+        ({"activation_bounds": (0, 10**400)}, "activation_bounds = .*must be a pair"),
+        ({"bundles": 2.5}, "bundles = 2.5: must be a whole number >= 1"),
+        ({"end_over_length": 0.0}, "end_over_length = 0: .*> 0"),
+    ],
+)
+def test_an_impossible_chamber_is_refused_in_one_line(fields, message):
+    with pytest.raises(InvalidDesign, match=message) as caught:
+        chamber(**fields)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_replacing_lengths_by_ratios_and_back():
+    by_ratio = chamber().replace(distance_ratio=0.5, radius_ratio=0.2)
+    assert (by_ratio.distance, by_ratio.radius) == (None, None)
+    assert by_ratio.replace(distance=0.008, radius=0.004) == chamber()
+    assert by_ratio.value_on("radius", CYLINDER, SECTION) == pytest.approx(0.2 * RADIUS)
+
+
+def test_its_forces_need_a_modulus():
+    section = Section(rings=(Ring(inner_ratio=0.5),))
+    with pytest.raises(
+        InvalidDesign,
+        match=r"^rings\[0\].material.young_modulus: must be given in Pa for chamber 'left'",
+    ):
+        Manipulator(profile=CYLINDER, section=section, actuators=(chamber(name="left"),))

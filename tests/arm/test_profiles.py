@@ -1,0 +1,150 @@
+"""Laws of profiles given at stations: in pieces, and as a curve through samples."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad
+
+import softreach as sr
+from softreach.arm import LinearTaper, PiecewiseTaper, SampledTaper, designs
+from softreach.errors import InvalidDesign
+from tests.kinds import profiles, stations
+from tests.laws import in_box
+
+GIVEN = (PiecewiseTaper, SampledTaper)
+
+
+@given(profile=profiles())
+def test_the_slender_coordinate_and_its_inverse_undo_each_other(profile):
+    places = [0.0, *profile.breakpoints, profile.length]
+    z = np.union1d(np.linspace(0, profile.length, 9), places)
+    s = profile.slender_coordinate(z)
+    assert (np.diff(s) > 0).all()
+    np.testing.assert_allclose(profile.station(s), z, atol=1e-12 * profile.length)
+    assert profile.slender_length == pytest.approx(s[-1], rel=1e-13)
+
+
+@given(profile=profiles(), ratio=st.floats(0.1, 1.0), share=st.floats(0.0, 1.0))
+def test_the_coordinates_are_the_integrals_that_define_them(profile, ratio, share):
+    """S = ∫ dZ / R2, and ∫ dZ / (R cos φ) on the cone R = ratio R2, across breakpoints."""
+    place = share * profile.length
+
+    def integral(f):
+        inside = [0.0, *(z for z in profile.breakpoints if z < place), place]
+        return sum(quad(f, *pair, epsabs=0, epsrel=1e-12)[0] for pair in pairwise(inside))
+
+    def on_cone(z):
+        return math.hypot(1.0, ratio * profile.slope(z)) / (ratio * profile.radius(z))
+
+    assert profile.slender_coordinate(place) == pytest.approx(
+        integral(lambda z: 1 / profile.radius(z)), rel=1e-10, abs=1e-14
+    )
+    found = profile.surface_coordinate(place, ratio)
+    assert found == pytest.approx(integral(on_cone), rel=1e-10, abs=1e-14)
+
+
+@given(profile=profiles(), share=st.floats(0.01, 0.99))
+def test_the_slope_is_what_the_radius_loses_along_z(profile, share):
+    z, step = share * profile.length, 1e-5 * profile.length
+    if any(abs(z - place) < 3 * step for place in profile.breakpoints):
+        return
+    lost = profile.radius(z - step) - profile.radius(z + step)
+    assert lost / (2 * step) == pytest.approx(
+        float(profile.slope(z)), abs=1e-5 * float(profile.radius(0.0)) / profile.length
+    )
+
+
+@given(places=stations(), taper=st.floats(-0.03, 0.05), kind=st.sampled_from(GIVEN))
+def test_radii_on_a_straight_line_make_the_linear_taper(places, taper, kind):
+    line = LinearTaper(length=1.0, outer_radius=1 / 16, taper=taper)
+    radii = tuple(line.radius(places).tolist())
+    same = kind(length=1.0, stations_over_length=places, radii=radii)
+    z = np.linspace(0, 1, 11)
+    for name in ("radius", "slope", "slender_coordinate", "surface_coordinate"):
+        np.testing.assert_allclose(
+            getattr(same, name)(z), getattr(line, name)(z), rtol=1e-11, atol=1e-13, err_msg=name
+        )
+    s = line.slender_coordinate(z)
+    np.testing.assert_allclose(same.station(s), line.station(s), atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", GIVEN)
+def test_a_trunk_on_such_radii_reaches_where_the_tapered_one_does(kind, trunk):
+    places = (0.0, 0.3, 0.62, 1.0)
+    radii = tuple(trunk.profile.radius(places).tolist())
+    same = trunk.replace(profile=kind(length=1.0, stations_over_length=places, radii=radii))
+    gamma = in_box(trunk, 50)
+    found, expected = (sr.tip_positions(arm, gamma, tol=1e-9) for arm in (same, trunk))
+    np.testing.assert_allclose(found, expected, atol=2e-9)
+
+
+@given(
+    length=st.floats(0.1, 5.0),
+    places=stations(),
+    radii=st.lists(st.floats(0.01, 0.2), min_size=5, max_size=5),
+)
+def test_a_curve_through_samples_is_no_wider_and_no_thinner_than_they_are(length, places, radii):
+    radii = tuple(radii[: len(places)])
+    profile = SampledTaper(length=length, stations_over_length=places, radii=radii)
+    np.testing.assert_allclose(profile.radius(length * np.array(places)), radii, rtol=1e-13)
+    between = profile.radius(np.linspace(0, length, 201))
+    assert min(radii) * (1 - 1e-12) <= between.min()
+    assert between.max() <= max(radii) * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("kind", GIVEN)
+def test_breakpoints_are_the_stations_between_base_and_tip(kind):
+    profile = kind(length=2.0, stations_over_length=(0, 0.25, 1), radii=(0.1, 0.08, 0.05))
+    assert profile.breakpoints == (0.5,)
+    assert designs.minimal_trunk().profile.breakpoints == ()
+
+
+def test_at_a_breakpoint_the_slope_is_that_of_the_piece_that_begins_there():
+    profile = PiecewiseTaper(length=1.0, stations_over_length=(0, 0.5, 1), radii=(0.1, 0.1, 0.05))
+    np.testing.assert_allclose(profile.slope([0.5, np.nextafter(0.5, 0), 1.0]), [0.1, 0.0, 0.1])
+
+
+@pytest.mark.parametrize("kind", GIVEN)
+def test_a_profile_is_a_value(kind):
+    fields = {"stations_over_length": [0, np.float32(0.5), 1], "radii": np.array([0.1, 0.08, 0.05])}
+    profile = kind(length=np.int64(1), **fields)
+    assert profile == profile.replace() == kind(length=1.0, **fields)
+    assert hash(profile) == hash(profile.replace(length=1))
+    assert profile.replace(length=2.0).breakpoints == (1.0,)
+
+
+@pytest.mark.parametrize("kind", GIVEN)
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"length": 0.0}, "length = 0: .*> 0 m"),
+        ({"length": 10**400}, "length = 1000.*> 0 m"),
+        (
+            {"stations_over_length": (0, 0.5, 0.5, 1)},
+            "must be two or more numbers that rise from 0",
+        ),
+        ({"stations_over_length": (0, 0.7, 0.4, 1)}, "rise from 0"),
+        ({"stations_over_length": (0.1, 1)}, "rise from 0"),
+        ({"stations_over_length": (0, 0.9)}, r"to 1 \(tip\)"),
+        ({"stations_over_length": (0, math.nan, 1)}, "rise from 0"),
+        ({"stations_over_length": (False, True)}, "rise from 0"),
+        ({"stations_over_length": "01"}, "rise from 0"),
+        ({"stations_over_length": None}, "stations_over_length: must be two or more"),
+        ({"radii": (0.1, 0.1)}, r"radii = .*must be 3 finite numbers, one for each station"),
+        ({"radii": (0.1, math.inf, 0.1)}, "3 finite numbers"),
+        ({"radii": (0.1, "0.1", 0.1)}, "3 finite numbers"),
+        ({"radii": (0.1, 0.0, 0.1)}, r"radii = \(0.1, 0.0, 0.1\): must be positive, in m"),
+        ({"radii": (0.1, -0.1, 0.1)}, "must be positive"),
+        ({"radii": None}, "radii: must be 3 finite numbers"),
+    ],
+)
+def test_an_impossible_profile_is_refused(kind, change, message):
+    fields = {"length": 1.0, "stations_over_length": (0, 0.5, 1), "radii": (0.1, 0.08, 0.05)}
+    with pytest.raises(InvalidDesign, match=message):
+        kind(**(fields | change))

@@ -1,0 +1,287 @@
+"""Laws of tendons: closed forms where they are parallel, the follower load where they are not."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import softreach as sr
+from softreach.arm import (
+    LinearTaper,
+    Manipulator,
+    Material,
+    Pieces,
+    Ring,
+    SampledTaper,
+    Samples,
+    Section,
+    Tendon,
+)
+from softreach.arm.tables import tables
+from softreach.errors import InvalidDesign
+from tests.oracles import tendon_rod
+from tests.oracles.tendon_law import linear_shape
+from tests.oracles.tendon_rod import follower_shape
+
+LENGTH, RADIUS, MODULUS, NU = 0.3, 0.01, 1e6, 0.4
+K0, K1 = math.pi * MODULUS * RADIUS**2, math.pi / 4 * MODULUS * RADIUS**4
+SECTION = Section(
+    rings=(
+        Ring(inner_ratio=0.5, material=Material(young_modulus=MODULUS, poisson_ratio=NU), name="r"),
+    )
+)
+STRAIGHT = LinearTaper(length=LENGTH, outer_radius=RADIUS)
+TAPERED = LinearTaper(length=LENGTH, outer_radius=RADIUS, taper=0.015)
+
+
+def arm(*tendons, profile=STRAIGHT):
+    return Manipulator(profile=profile, section=SECTION, actuators=tendons)
+
+
+def tendon(**fields):
+    return Tendon(**({"distance": 0.008, "activation_bounds": (0, 30)} | fields))
+
+
+def arc(zeta, curvature, heading, length=LENGTH):
+    """Tip of an arc whose curvature is per length after activation."""
+    angle = zeta * curvature * length
+    side = (1 - math.cos(angle)) / curvature
+    return [side * math.cos(heading), side * math.sin(heading), math.sin(angle) / curvature]
+
+
+def rod(profile):
+    """The arm as the oracle knows it."""
+    resists = [lambda z, k=k: SECTION.stiffness(profile.radius(z))[k] for k in range(3)]
+    return tendon_rod.Rod(
+        length=profile.length, axial=resists[0], bending=resists[1], torsion=resists[2]
+    )
+
+
+def cable(one, profile, tension):
+    """A tendon as the oracle knows it: polar coordinates of its path, put down by hand."""
+    anchor = one.end_over_length * profile.length
+
+    def radius(z):
+        if one.distance_ratio is not None:
+            return one.distance_ratio * profile.radius(z)
+        if isinstance(one.distance, Samples):
+            return one.distance(np.asarray(z) / profile.length)
+        return one.distance + 0 * z
+
+    def angle(z):
+        if one.routing is not None:
+            return one.offset + one.routing(np.asarray(z) / profile.length)
+        return one.offset + one.revolution * z / anchor
+
+    return tendon_rod.Tendon(radius=radius, angle=angle, tension=tension, anchor=anchor)
+
+
+@given(tension=st.floats(0.1, 30), offset=st.floats(-4, 4), distance=st.floats(0.001, 0.012))
+def test_a_parallel_tendon_bends_to_an_arc_and_shortens_by_its_tension_over_k0(
+    tension, offset, distance
+):
+    """ζ = 1 - τ/K0, curvature τ ρt/K1 per activated arclength, toward the tendon."""
+    zeta, curvature = 1 - tension / K0, tension * distance / K1
+    one = arm(tendon(distance=distance, offset=offset))
+    tip = sr.tip_positions(one, [[tension]], tol=1e-11)[0]
+    np.testing.assert_allclose(tip, arc(zeta, curvature, offset), atol=1e-11)
+
+
+def test_three_even_tendons_of_one_tension_only_shorten():
+    tip = sr.tip_positions(arm(tendon(bundles=3, offset=0.4)), [[9.0] * 3])[0]
+    np.testing.assert_allclose(tip, [0, 0, LENGTH * (1 - 27 / K0)], atol=1e-12)
+
+
+@pytest.mark.parametrize("end", [0.35, 0.8])
+def test_beyond_its_anchor_a_tendon_leaves_the_arm_straight(end):
+    one = arm(tendon(offset=0.3, revolution=2.0, end_over_length=end))
+    anchor = end * LENGTH
+    z = np.linspace(anchor, LENGTH, 5)
+    shape = sr.configuration(one, [10.0], stations=z)
+    frames, places = shape.directors.values, shape.position.values
+    np.testing.assert_allclose(frames, np.broadcast_to(frames[0], frames.shape), atol=1e-13)
+    straight = places[0] + (z - anchor)[:, None] * frames[0, 2]
+    np.testing.assert_allclose(places, straight, atol=1e-13)
+    assert np.linalg.norm(places[0, :2]) > 1e-3
+
+
+@settings(max_examples=12)
+@given(
+    tension=st.floats(0.1, 3),
+    revolution=st.floats(-4, 4),
+    profile=st.sampled_from([STRAIGHT, TAPERED]),
+    end=st.sampled_from([1.0, 0.6]),
+    where=st.sampled_from(
+        [
+            {"distance": 0.008},
+            {"distance_ratio": 0.8},
+            {"distance": Samples(stations_over_length=(0, 1), values=(0.009, 0.004))},
+        ]
+    ),
+)
+def test_the_tip_is_that_of_the_linear_law_written_down_a_second_time(
+    tension, revolution, profile, end, where
+):
+    """N = -τ t3 and M = -p × τ t with the tangent at rest, walked by SciPy."""
+    one = Tendon(
+        offset=0.4, revolution=revolution, end_over_length=end, activation_bounds=(0, 30), **where
+    )
+    expected = linear_shape(rod(profile), [cable(one, profile, tension)], [profile.length])
+    found = sr.tip_positions(arm(one, profile=profile), [[tension]], tol=1e-10)[0]
+    np.testing.assert_allclose(found, expected.place[0], atol=2e-10)
+
+
+@pytest.mark.parametrize("tension", [0.3, 3.0])
+@pytest.mark.parametrize("end", [1.0, 0.6])
+def test_a_parallel_tendon_is_exact_where_curvature_is_per_length_after_activation(tension, end):
+    one = tendon(offset=0.4, end_over_length=end)
+    pulled = [cable(one, TAPERED, tension)]
+    exact = follower_shape(rod(TAPERED), pulled, [0.0, LENGTH], law="activated")
+    found = sr.tip_positions(arm(one, profile=TAPERED), [[tension]], tol=1e-10)[0]
+    np.testing.assert_allclose(found, exact.place[-1], atol=1e-9)
+
+
+def test_an_elastic_rod_of_energy_per_length_at_rest_bends_more_by_one_over_the_extension():
+    """What the law takes u = M/K per activated arclength costs: ζ = 1 - κρt (R/2ρt)²."""
+    tension, distance = 6.0, 0.008
+    one = tendon(distance=distance)
+    rest = follower_shape(rod(STRAIGHT), [cable(one, STRAIGHT, tension)], [LENGTH])
+    directors = sr.configuration(arm(one), [tension], [LENGTH]).directors.values
+    bends = [math.acos(frame[2, 2]) for frame in (directors[0], rest.frame[0])]
+    zeta, kappa = 1 - tension / K0, tension * distance / K1
+    assert bends[0] / bends[1] == pytest.approx(zeta, rel=1e-9)
+    assert zeta == pytest.approx(1 - kappa * distance * (RADIUS / (2 * distance)) ** 2, rel=1e-12)
+
+
+@pytest.mark.parametrize("revolution", [1.0, 2 * math.pi])
+def test_helical_tendons_miss_the_follower_load_by_less_than_their_bending(revolution):
+    """Second order in the tension: relative to what the tip moves, of order κρt."""
+    one, misses = tendon(revolution=revolution), []
+    for tension in (0.02, 0.04, 0.08):
+        pulled = [cable(one, STRAIGHT, tension)]
+        exact = follower_shape(rod(STRAIGHT), pulled, [LENGTH], law="activated")
+        found = sr.tip_positions(arm(one), [[tension]], tol=1e-10)[0]
+        moved = np.linalg.norm(exact.place[0] - [0, 0, LENGTH])
+        bend = tension * 0.008 / K1 * 0.008  # κρt
+        misses.append(np.linalg.norm(found - exact.place[0]) / moved)
+        assert misses[-1] < bend
+    np.testing.assert_allclose(np.array(misses[1:]) / misses[:-1], 2.0, rtol=0.05)
+
+
+def test_a_routing_of_even_rotation_is_a_revolution():
+    even = Samples(stations_over_length=(0, 0.4, 1), values=(0, 0.8, 2.0))
+    for interpolation in ("cubic", "linear"):
+        one = tendon(routing=even.replace(interpolation=interpolation), offset=0.3)
+        other = tendon(revolution=2.0, offset=0.3)
+        z = np.linspace(0, LENGTH, 7)
+        found, expected = (tables(arm(each), z).curvature for each in (one, other))
+        np.testing.assert_allclose(found, expected, rtol=1e-11, atol=1e-12)
+
+
+def test_a_distance_and_its_ratio_to_the_radius_say_the_same_without_taper():
+    z = np.linspace(0, LENGTH, 3)
+    by_ratio = tables(arm(Tendon(distance_ratio=0.8, activation_bounds=(0, 1))), z)
+    by_length = tables(arm(tendon(distance=0.8 * RADIUS)), z)
+    np.testing.assert_allclose(by_ratio.curvature, by_length.curvature, rtol=1e-14)
+
+
+def test_a_tendon_at_a_share_of_the_radius_converges_with_the_arm():
+    """p' has the slope of the cone that it runs on."""
+    slope = 0.8 * math.tan(TAPERED.taper)
+    table = tables(
+        arm(Tendon(distance_ratio=0.8, activation_bounds=(0, 1)), profile=TAPERED), [0.0]
+    )
+    assert table.extension[0, 0] == pytest.approx(-1 / math.sqrt(1 + slope**2) / K0, rel=1e-13)
+
+
+def test_two_tendons_in_series_bend_as_two_arms_end_to_end():
+    """Segments: the first up to 0.4 L, the second from there on."""
+    cut, tensions = 0.4, [8.0, 5.0]
+    lower = tendon(name="lower", offset=0.5, end_over_length=cut)
+    upper = tendon(name="upper", offset=2.0, revolution=1.5, start_over_length=cut)
+    whole = sr.tip_positions(arm(lower, upper, profile=TAPERED), [tensions], tol=1e-11)[0]
+    middle = float(TAPERED.radius(cut * LENGTH))
+    parts = [
+        (lower.replace(end_over_length=1.0), TAPERED.replace(length=cut * LENGTH)),
+        (
+            upper.replace(start_over_length=0.0),
+            TAPERED.replace(length=(1 - cut) * LENGTH, outer_radius=middle),
+        ),
+    ]
+    base, end = (
+        sr.configuration(arm(one, profile=profile), [tension], [profile.length], tol=1e-11)
+        for (one, profile), tension in zip(parts, tensions, strict=True)
+    )
+    expected = base.position.values[0] + end.position.values[0] @ base.directors.values[0]
+    np.testing.assert_allclose(whole, expected, atol=1e-11)
+
+
+def test_tendons_break_the_arm_where_they_start_end_and_turn():
+    bent = Samples(stations_over_length=(0, 0.3, 1), values=(0, 1, 0), interpolation="linear")
+    one = tendon(routing=bent, start_over_length=0.1, end_over_length=0.75)
+    profile = SampledTaper(length=1.0, stations_over_length=(0, 0.5, 1), radii=(0.1, 0.1, 0.1))
+    np.testing.assert_allclose(arm(one, profile=profile).breakpoints, [0.1, 0.3, 0.5, 0.75])
+
+
+def test_a_tendon_is_measured_in_newtons():
+    one = arm(tendon(name="left"))
+    assert one.bundle_units == ("N",)
+    assert sr.compute_cloud(one, n=8).activation.attrs["units"] == "N"
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"distance": None}, "give exactly one of distance and distance_ratio"),
+        ({"distance_ratio": 0.5}, r"\(0.008, 0.5\): give exactly one of distance and distance_r"),
+        ({"distance": -0.1}, "distance = -0.1: must be a finite number >= 0 m"),
+        ({"distance": math.nan}, "distance = nan"),
+        ({"distance": True}, "distance = True"),
+        ({"distance": "1cm"}, "distance = '1cm'"),
+        ({"distance": 10**400}, "distance = 1000"),
+        (
+            {"distance": Samples(stations_over_length=(0, 1), values=(0.1, -0.1))},
+            "distance = -0.1: must be a finite number >= 0 m",
+        ),
+        (
+            {"distance": Pieces(stations_over_length=(0, 1), values=(0.1,))},
+            r"distance = Pieces\(.*must be a number or Samples, which do not jump",
+        ),
+        ({"routing": 0.3}, r"routing = 0.3: must be Samples of θ\(Z\) - θ0, or None"),
+        (
+            {"routing": Pieces(stations_over_length=(0, 1), values=(0.1,))},
+            r"routing = Pieces\(.*must be Samples",
+        ),
+        (
+            {"routing": Samples(stations_over_length=(0, 1), values=(0, 1)), "revolution": 1.0},
+            "revolution = 1: must be left out where routing is given",
+        ),
+        ({"revolution": None}, "revolution: must be a finite number rad"),
+        ({"revolution": math.inf}, "revolution = inf"),
+        ({"offset": None}, "offset: must be a finite number rad"),
+        ({"activation_bounds": (-1, 5)}, "must be at least 0 N: a tendon pulls and cannot push"),
+        ({"activation_bounds": ((0, 5), (0, 6))}, "must be one pair, or 1 pairs"),
+        ({"activation_bounds": (5, 1)}, "must have lower <= upper"),
+        ({"activation_bounds": (0, math.inf)}, "must hold finite numbers"),
+        ({"activation_bounds": None}, "activation_bounds: must be a pair"),
+        ({"bundles": 0}, "bundles = 0: must be a whole number >= 1"),
+        ({"bundles": True}, "bundles = True"),
+        ({"start_over_length": 1.0}, "start_over_length = 1: .*< 1"),
+    ],
+)
+def test_an_impossible_tendon_is_refused_in_one_line(fields, message):
+    with pytest.raises(InvalidDesign, match=message) as caught:
+        tendon(**fields)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_replacing_a_distance_by_a_ratio_and_back():
+    by_ratio = tendon().replace(distance_ratio=0.7)
+    assert (by_ratio.distance, by_ratio.distance_ratio) == (None, 0.7)
+    assert by_ratio.replace(distance=0.008) == tendon()
+    assert by_ratio.value_on("distance", STRAIGHT, SECTION) == pytest.approx(0.7 * RADIUS)
+    assert tendon().value_on("distance_ratio", STRAIGHT, SECTION) == pytest.approx(0.8)
