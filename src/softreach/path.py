@@ -13,7 +13,7 @@ from softreach.inverse import PathStatus, solve_inverse
 from softreach.inverse.continuation import BranchEnd, BranchPoint, Continuation
 from softreach.inverse.request import checked_activations, checked_residual, checked_targets
 from softreach.rod.free_bundles import free_bundles
-from softreach.rod.measured_bundles import activation_measures, measured_bundles
+from softreach.rod.measured_bundles import bundle_measures, measured_bundles
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 
@@ -68,7 +68,8 @@ def track_path(
     residual = checked_residual(residual_over_length)
     tracker = Continuation(free_bundles(rod), residual * rod.length)
     if start is not None:
-        gamma = checked_activations("start", start, rod.box, 1)[0] / activation_measures(rod.arm)
+        gamma = checked_activations("start", start, rod.box, 1)[0]
+        gamma = gamma / bundle_measures(rod)[rod.box.free]
         first = tracker.corrected_start(tracker.box.clip(gamma), points[0])
     else:
         first = _best_start(rod, tracker, points[0], residual)
@@ -84,7 +85,7 @@ def _best_start(
     solution = solve_inverse(rod, target[None], residual_over_length=residual)[0]
     if not len(solution):
         return None
-    best = solution.activations[solution.conditions.argmin()] / activation_measures(rod.arm)
+    best = solution.activations[solution.conditions.argmin()] / bundle_measures(rod)
     return tracker.at(best[rod.box.free])
 
 
@@ -112,7 +113,7 @@ def _dataset(
     outcome = PathStatus.NO_START if end is None else end.status
     status = np.full(len(points), int(outcome), np.int8)
     status[:n] = PathStatus.FOLLOWED
-    activation, measures = np.full((len(points), box.bundles), np.nan), activation_measures(rod.arm)
+    activation, measures = np.full((len(points), box.bundles), np.nan), bundle_measures(rod)
     error = np.full(len(points), np.nan)
     end_activation, end_position = np.full(box.bundles, np.nan), np.full(3, np.nan)
     bundle = bound = ""

@@ -16,7 +16,7 @@ from softreach.inverse.landmarks import Landmarks, face_landmarks, landmarks
 from softreach.kernels.activation_mesh import ActivationMesh
 from softreach.kernels.space_tree import SpaceTree
 from softreach.rod.free_bundles import free_bundles
-from softreach.rod.measured_bundles import activation_measures, measured_bundles
+from softreach.rod.measured_bundles import bundle_measures, measured_bundles
 from softreach.rod.tip_map import TipMap, tip_map
 
 __all__ = ["PreparedMap", "prepared_map"]
@@ -43,7 +43,7 @@ class PreparedMap:
     @cached_property
     def measures(self) -> Array:
         """What one unit of each activation is in its own unit, shape (bundles,)."""
-        return activation_measures(self.whole.arm)
+        return bundle_measures(self.whole)
 
     @cached_property
     def rod(self) -> TipMap:

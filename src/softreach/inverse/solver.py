@@ -97,7 +97,7 @@ def solve_inverse(
     request = Request(
         targets=points,
         residual=checked_residual(residual_over_length) * prepared.whole.length,
-        near=checked_activations("near", rest, box, len(points)) / prepared.measures,
+        near=checked_activations("near", rest, box, len(points)) / prepared.measures[box.free],
         direction=checked_direction(direction, len(points)),
         direction_weight=checked_number("direction_weight", direction_weight, 0.0, 1e6),
         family=checked_whole_number("family", family, 1, 10_000),

@@ -17,7 +17,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.tip_map import Frames, StrainRange, Strains, TipMap
 
-__all__ = ["MeasuredBundles", "activation_measures", "measured_bundles"]
+__all__ = ["MeasuredBundles", "activation_measures", "bundle_measures", "measured_bundles"]
 
 Array = NDArray[np.float64]
 
@@ -37,9 +37,15 @@ def activation_measures(arm: Manipulator) -> Array:
     return np.where(ranges > 0, ranges, np.maximum(np.abs(arm.bounds[:, 1]), 1.0))
 
 
+def bundle_measures(rod: TipMap) -> Array:
+    """`activation_measures` of those bundles of an arm that a tip map has, shape (bundles,)."""
+    names = rod.arm.bundle_names
+    return activation_measures(rod.arm)[[names.index(name) for name in rod.box.names]]
+
+
 def measured_bundles(rod: TipMap) -> TipMap:
     """A tip map whose activations are in `activation_measures`; the map itself if those are 1."""
-    if isinstance(rod, MeasuredBundles) or (activation_measures(rod.arm) == 1.0).all():
+    if isinstance(rod, MeasuredBundles) or (bundle_measures(rod) == 1.0).all():
         return rod
     return MeasuredBundles(rod.arm, rod.tol, rod)
 
@@ -56,7 +62,7 @@ class MeasuredBundles(TipMap):
     @cached_property
     def measures(self) -> Array:
         """What one unit of each activation is, shape (bundles,)."""
-        return activation_measures(self.arm)
+        return bundle_measures(self.whole)
 
     @property
     def box(self) -> ActivationBox:
