@@ -8,8 +8,8 @@ import pytest
 import softreach as sr
 from softreach.arm_shape import (
     arm_surface,
-    bundle_bands,
     bundle_curves,
+    bundle_skins,
     bundle_surfaces,
     rest_configuration,
 )
@@ -59,9 +59,10 @@ def test_fibers_start_where_the_design_says_and_turn_by_their_revolution(trunk):
 
 def test_bands_span_the_extent_about_their_fiber(trunk, bent):
     curves = bundle_curves(trunk, bent)
-    for curve, band, extent in zip(
-        curves, bundle_bands(trunk, bent), trunk.outline([0.0]).extent, strict=True
+    for curve, skin, extent in zip(
+        curves, bundle_skins(trunk, bent), trunk.outline([0.0]).extent, strict=True
     ):
+        band = skin.vertices.reshape(len(curve), -1, 3)
         chord = np.linalg.norm(band[:, -1] - band[:, 0], axis=1)
         np.testing.assert_allclose(chord, 2 * bent.radius * np.sin(extent / 2), rtol=1e-9)
         to_edges = np.linalg.norm(band[:, [0, -1]] - curve[:, None], axis=2)
@@ -69,7 +70,7 @@ def test_bands_span_the_extent_about_their_fiber(trunk, bent):
 
 
 def test_the_body_is_closed_and_keeps_its_volume_at_rest(trunk):
-    mesh = solid(arm_surface(rest_configuration(trunk), sides=400))
+    mesh = solid(arm_surface(trunk, rest_configuration(trunk), sides=400))
     r, tip = trunk.profile.radius(np.array([0.0, trunk.length]))
     frustum = np.pi * trunk.length / 3 * (r * r + r * tip + tip * tip)
     assert mesh.is_watertight
@@ -90,4 +91,4 @@ def test_bands_are_closed_skins_of_their_thickness(trunk, bent):
 def test_several_configurations_are_refused_with_the_way_to_choose(trunk):
     several = sr.configuration(trunk, [ACTIVATION, [0, 0, 0]], stations=5)
     with pytest.raises(InvalidInput, match="isel"):
-        arm_surface(several)
+        arm_surface(trunk, several)

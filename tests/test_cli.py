@@ -49,7 +49,7 @@ def test_help_of_every_command_teaches_with_an_example_that_parses(command, caps
     words = example.split()
     assert words[0] == command
     function, bound, *_ = app.parse_args(words, exit_on_error=False, print_error=False)
-    assert function.__module__ == f"softreach.cli.{command}"
+    assert function.__module__.removesuffix("_file") == f"softreach.cli.{command}"
     assert bound.arguments
 
 
@@ -110,6 +110,38 @@ class TestDesign:
         streams = capsys.readouterr()
         assert "-108, 108, 0 deg" in streams.out
         assert streams.err.startswith("warning: activations reach |γ| = 1.67")
+
+    def test_stiffness_weight_and_ranges_are_those_of_the_library(self, folder, capsys):
+        rubber = sr.Material(young_modulus=1e5, density=1000.0)
+        trunk = sr.designs.minimal_trunk()
+        ring = trunk.section.rings[0].replace(material=rubber)
+        arm = trunk.replace(section=trunk.section.replace(rings=(ring,)))
+        arm.save("rubber.toml")
+        facts, known = printed_json(capsys, "design", "rubber.toml"), describe(arm)
+        assert facts["K1_at_base_and_tip_n_m2"] == known.stiffness.bending.tolist()
+        assert facts["mass_kg"] == known.mass
+        assert facts["load_number"] == known.load_number
+        assert facts["lacking"] == []
+        assert [one["name"] for one in facts["activations"]] == list(arm.bundle_names)
+        ranges = [one["bending_times_R2"] for one in facts["activations"]]
+        assert ranges == known.bundle_bending.tolist()
+
+    def test_what_is_not_known_is_left_out_and_asked_for(self, capsys):
+        assert run(["design", "minimal_trunk"]) == 0
+        text = capsys.readouterr().out
+        assert "mass  " not in text
+        assert "give the density [kg/m³] of rings[0].material to know the mass" in text
+
+    def test_where_linear_laws_end_is_said_on_demand(self, capsys):
+        assert run(["design", "minimal_trunk"]) == 0
+        assert "Exact to first order" not in capsys.readouterr().out
+        assert run(["design", "minimal_trunk", "--verbose"]) == 0
+        assert "fiber: Exact to first order" in capsys.readouterr().out
+
+    def test_the_schema_is_printed_for_editors(self, capsys):
+        from softreach.arm.file.json_schema import json_schema
+
+        assert printed_json(capsys, "design", "--schema") == json_schema()
 
     def test_a_saved_design_is_the_varied_one(self, folder, capsys):
         assert run(["design", "redundant_trunk", "--revolution-deg", "60", "--save", "a.toml"]) == 0
@@ -244,9 +276,12 @@ helical_angle_deg = 0.0
     ("arguments", "message"),
     [
         (["desgin"], 'Did you mean "design"'),
-        (["design"], "requires an argument"),
+        (["design"], "must be a design file or a built-in design, or use --schema"),
         (["design", "nowhere.toml"], "nowhere.toml: must be a file that exists"),
-        (["design", "elephant"], "elephant: must be a .toml file, or one of minimal_trunk"),
+        (
+            ["design", "elephant"],
+            "elephant: must be a .toml file, or one of elephant_trunk, filament",
+        ),
         (["design", "minimal_trunk", "--tapr-deg", "3"], "Did you mean --taper-deg"),
         (["design", "minimal_trunk", "--taper-deg", "steep"], '"steep" into float'),
         (["cloud", "minimal_trunk", "--n", "many"], '"many" into int'),

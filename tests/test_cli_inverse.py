@@ -36,6 +36,19 @@ def test_targets_come_from_a_file_with_or_without_a_header(tmp_path, target, cap
         assert found[1]["gap_m"] > 1
 
 
+def test_a_proof_of_the_least_activation_is_asked_for(capsys):
+    arm = sr.designs.redundant_trunk()
+    place = sr.tip_positions(arm, [[-0.5, -0.2, -0.8, -0.4]])[0]
+    text = ",".join(f"{x:.17g}" for x in place)
+    assert run(["solve", "redundant_trunk", f"--target={text}", "--prove-least", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)[0]
+    assert found["least_proved"]
+    least = np.linalg.norm(found["activations"][0])
+    assert least - 1e-6 <= found["change_bound"] <= least
+    assert run(["solve", "redundant_trunk", f"--target={text}", "--prove-least"]) == 0
+    assert "proved to be the least" in capsys.readouterr().out
+
+
 def test_a_path_is_tracked_into_a_file(tmp_path, trunk, capsys):
     gamma = np.linspace([-0.9, -0.3, -0.6], [-0.5, -0.8, -0.7], 5)
     points = sr.tip_positions(trunk, gamma)

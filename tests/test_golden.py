@@ -17,10 +17,10 @@ from softreach.arm import (
     Pieces,
     Ring,
     Section,
+    designs,
 )
 from softreach.rod.free import FreeRod
 from softreach.rod.kinematics import configuration
-from tests.laws import arm_of
 
 POSITION = [0.010887432435510243, 0.010588028536001756, 0.08230390930976722]
 DIRECTORS = [
@@ -32,9 +32,7 @@ DIRECTORS = [
 
 def test_an_activated_filament_is_that_of_active_filaments_jl():
     """L = 1 m, R2 = L/16, R1 = 0.6 R2, ν = 1/2; three sectors of 30° from the x-axis on."""
-    sectors = FiberArchitecture(helical_angle=np.pi / 10, extent=np.radians(30), bundles=3)
-    filament = arm_of(sectors, inner_radius=0.6 / 16, activation_bounds=(-2.0, 0.0))
-    shape = configuration(filament, [-2.0, -1.3, 0.0], stations=[0.1], tol=1e-12)
+    shape = configuration(designs.filament(), [-2.0, -1.3, 0.0], stations=[0.1], tol=1e-12)
     np.testing.assert_allclose(shape.position[0], POSITION, rtol=0, atol=1e-12)
     np.testing.assert_allclose(shape.directors[0], DIRECTORS, rtol=0, atol=1e-12)
 

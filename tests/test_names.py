@@ -25,6 +25,7 @@ MODULES = [
         "curvature",
         "dexterity",
         "errors",
+        "exchange.activefilaments",
         "export",
         "inverse",
         "path",

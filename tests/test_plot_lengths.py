@@ -94,7 +94,7 @@ def everything(tmp_path_factory) -> SimpleNamespace:
         arm=arm,
         cloud=cloud,
         tips=cloud.tip.values,
-        rest=arm_surface(rest_configuration(arm)).vertices,
+        rest=arm_surface(arm, rest_configuration(arm)).vertices,
         distance=activation_distance(cloud, LENGTH / 10),
         grid=sr.reachable_set(arm, accuracy=3e-2).grid,
         hull=sr.convex_hull(cloud.tip),

@@ -11,7 +11,8 @@ from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput, SoftreachWarning
-from softreach.kernels.bounded_steps import bounded_steps
+from softreach.rod.activation_box import ActivationBox
+from softreach.rod.damped_step import damped_steps
 from softreach.rod.tip_map import tip_map
 from softreach.workspace import ReachableSolid, reachable_set
 from softreach.workspace.redundant import smallest_memory
@@ -149,21 +150,20 @@ def test_bundles_that_bend_in_one_plane_fill_nothing():
     assert found.volume <= found.volume_error < 0.02
 
 
-def test_bounded_steps_solve_linear_problems_within_bounds():
+def test_damped_steps_solve_linear_problems_within_bounds():
     # Optimality of a bounded least squares problem: the gradient pushes outward at every bound.
     rng = np.random.default_rng(0)
     n, m = 200, 7
     low, high = -rng.random(m), rng.random(m)
     gamma = rng.uniform(low, high, (n, m))
     residual, slopes = rng.normal(size=(n, 3)), rng.normal(size=(n, 3, m))
-    trial, left = np.empty((n, m)), np.empty(n)
-    damping = np.full(n, 1e-3)
-    bounded_steps(gamma, residual, slopes, damping, high - low, low, high, trial, left)
     widths = high - low
+    weight = 1e-3 * ((slopes * widths) ** 2).sum(axis=(1, 2)) / 3
+    box = ActivationBox.between(np.stack([low, high], axis=1), [f"{j}" for j in range(m)])
+    trial, left = damped_steps(box, gamma, residual, slopes, weight)
     step, scaled = (trial - gamma) / widths, slopes * widths
     ahead = residual + np.einsum("nij,nj->ni", scaled, step)
     assert np.linalg.norm(ahead, axis=1) == pytest.approx(left, abs=1e-9)
-    weight = 1e-3 * (scaled**2).sum(axis=(1, 2)) / 3
     gradient = np.einsum("nij,ni->nj", scaled, ahead) + weight[:, None] * step
     at_low, at_high = trial <= low + 1e-9, trial >= high - 1e-9
     small = 1e-6

@@ -4,6 +4,7 @@ from . import cloud as cloud
 from . import curvature as curvature
 from . import dexterity as dexterity
 from . import errors as errors
+from . import exchange as exchange
 from . import export as export
 from . import inverse as inverse
 from . import path as path
@@ -12,12 +13,14 @@ from . import redundancy as redundancy
 from . import rod as rod
 from . import volume as volume
 from . import workspace as workspace
+from .arm import Chamber as Chamber
 from .arm import FiberArchitecture as FiberArchitecture
 from .arm import LinearTaper as LinearTaper
 from .arm import Manipulator as Manipulator
 from .arm import Material as Material
 from .arm import Ring as Ring
 from .arm import Section as Section
+from .arm import Tendon as Tendon
 from .arm import describe as describe
 from .arm import designs as designs
 from .atlas import DesignSpace as DesignSpace

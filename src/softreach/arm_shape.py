@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from softreach.arm import skin
+from softreach.arm.skin import Centerline
 from softreach.errors import InvalidInput
 from softreach.geometry.surface import Surface
-from softreach.geometry.tube import ribbon_surface, tube_surface
 from softreach.schema import configuration_dataset
 
 if TYPE_CHECKING:
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "arm_surface",
-    "bundle_bands",
     "bundle_curves",
+    "bundle_skins",
     "bundle_surfaces",
     "rest_configuration",
 ]
@@ -51,26 +52,26 @@ def rest_configuration(arm: Manipulator, stations: int = 101) -> xr.Dataset:
     return shape.isel(sample=0)
 
 
-def arm_surface(configuration: xr.Dataset, sides: int = 32) -> Surface:
+def arm_surface(arm: Manipulator, configuration: xr.Dataset, sides: int = 32) -> Surface:
     """The body of the arm as a closed tube.
 
     Args:
-        configuration: One configuration: position and radius [m], directors, along `station`.
+        arm: The design; where its radius is not smooth, the tube has a section.
+        configuration: One configuration of that arm.
         sides: Corners of each section.
 
     Raises:
         InvalidInput: Several configurations, or fewer than three sides.
     """
-    position, directors = _frame(configuration)
-    radius = configuration["radius"].values
-    return tube_surface(position, directors[:, 0], directors[:, 1], radius, sides)
+    return skin.body_skin(arm, _drawn_line(arm, configuration), sides)
 
 
 def bundle_curves(arm: Manipulator, configuration: xr.Dataset) -> Array:
-    """The center line of every bundle on the surface: r + R2 (cos a d1 + sin a d2).
+    """The middle of every bundle, also where it does not act: r + R (cos a d1 + sin a d2).
 
     Args:
-        arm: The design; a = arm.outline(Z).center.
+        arm: The design; a = arm.outline(Z).center. R is the distance of lines and lumens from the
+            axis, and the outer radius of the ring that a sector is in.
         configuration: One configuration of that arm.
 
     Returns:
@@ -79,70 +80,57 @@ def bundle_curves(arm: Manipulator, configuration: xr.Dataset) -> Array:
     Raises:
         InvalidInput: Several configurations.
     """
-    return _surface(configuration, arm.outline(configuration["Z"].values).center[..., None])[
-        :, :, 0
-    ]
+    return skin.bundle_curves(arm, _line(configuration))
 
 
-def bundle_bands(
+def bundle_skins(
     arm: Manipulator, configuration: xr.Dataset, *, lift: float = 0.0, step: float = np.pi / 32
-) -> list[Array]:
-    """Strips of the surface that show the angular extent σ of every bundle.
+) -> list[Surface]:
+    """What shows every bundle, where it acts: a band, a thin tube for a line, a tube for a lumen.
 
     Args:
-        arm: The design; bundle j covers a_j - σ_j/2 to a_j + σ_j/2.
+        arm: The design; band j covers a_j - σ_j/2 to a_j + σ_j/2 on the outside of its ring.
         configuration: One configuration of that arm.
-        lift: How far above the surface, in R2 [-].
-        step: Largest angle between neighboring points across the strip [rad].
+        lift: How far bands are above their ring, in R2 [-].
+        step: Largest angle between neighboring points across a band [rad].
 
     Returns:
-        One array of points [m] per bundle, shape (stations, across, 3).
+        One surface for each bundle; bands are open, and the points of each are (stations, across).
 
     Raises:
         InvalidInput: Several configurations.
     """
-    outline = arm.outline(configuration["Z"].values)
-    bands = []
-    for center, extent in zip(outline.center.T, outline.extent, strict=True):
-        across = 2 + int(extent / step)
-        angles = center[:, None] + np.linspace(-extent / 2, extent / 2, across)
-        bands.append(_surface(configuration, angles[:, None], 1 + lift)[0])
-    return bands
+    return skin.bundle_skins(arm, _drawn_line(arm, configuration), lift=lift, step=step)
 
 
 def bundle_surfaces(
     arm: Manipulator, configuration: xr.Dataset, thickness: float = 0.04
 ) -> list[Surface]:
-    """Every bundle as a closed skin, half sunk into the surface.
+    """Every bundle as a closed surface; bands are half sunk into the outside of their ring.
 
     Args:
         arm: The design.
         configuration: One configuration of that arm.
-        thickness: Of the skin, in R2 [-].
+        thickness: Of bands, in R2 [-].
 
     Raises:
         InvalidInput: Several configurations.
     """
-    inner = bundle_bands(arm, configuration, lift=-thickness / 2)
-    outer = bundle_bands(arm, configuration, lift=thickness / 2)
-    # along x across is d3 x e_θ = -e_R: the inner patch is the upper one
-    return [ribbon_surface(high, low) for low, high in zip(inner, outer, strict=True)]
+    return skin.bundle_solids(arm, _drawn_line(arm, configuration), thickness=thickness)
 
 
-def _surface(configuration: xr.Dataset, angles: ArrayLike, reach: float = 1.0) -> Array:
-    """Angles (stations, bundle, across) -> points (bundle, stations, across, 3)."""
-    position, directors = _frame(configuration)
-    angles = np.asarray(angles, float)
-    arm = reach * configuration["radius"].values[:, None, None, None]
-    d1, d2 = directors[:, None, None, 0], directors[:, None, None, 1]
-    spokes = np.cos(angles)[..., None] * d1 + np.sin(angles)[..., None] * d2
-    return (position[:, None, None] + arm * spokes).swapaxes(0, 1)
+def _drawn_line(arm: Manipulator, configuration: xr.Dataset) -> Centerline:
+    """With stations where the radius has kinks and where bundles begin and end."""
+    return _line(configuration).with_stations(arm.breakpoints)
 
 
-def _frame(configuration: xr.Dataset) -> tuple[Array, Array]:
+def _line(configuration: xr.Dataset) -> Centerline:
     if "sample" in configuration.dims:
         count = configuration.sizes["sample"]
         hint = "choose one with configuration.isel(sample=0)"
         raise InvalidInput("configuration.sizes['sample']", count, "absent: one shape", hint)
-    position = configuration["position"].transpose("station", "axis").values
-    return position, configuration["directors"].transpose("station", "director", "axis").values
+    return Centerline(
+        z=configuration["Z"].values,
+        position=configuration["position"].transpose("station", "axis").values,
+        directors=configuration["directors"].transpose("station", "director", "axis").values,
+    )

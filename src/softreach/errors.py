@@ -16,6 +16,9 @@ __all__ = [
     "SoftreachWarning",
 ]
 
+_LONGEST = 300
+"""Characters of a value that an error shows."""
+
 
 def counted(number: int, noun: str) -> str:
     """A number of things in words: "1 design", "2 designs"."""
@@ -97,6 +100,8 @@ class Fault(NamedTuple):
         if self.value is None:
             return f"{self.path}: {self.allowed}"
         shown = f"{self.value:.6g}" if isinstance(self.value, float) else repr(self.value)
+        if len(shown) > _LONGEST:
+            shown = f"{shown[:_LONGEST]}..."
         return f"{self.path} = {shown}: {self.allowed}"
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["BODY", "STEEL", "Color", "activation_colors", "bundle_color"]
+__all__ = ["BODY", "STEEL", "Color", "activation_colors", "bundle_color", "material_fill"]
 
 Color = tuple[float, float, float]
 
@@ -32,6 +32,22 @@ _LIGHTS = np.array(
     [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [1, 0, 1], [0, 1, 1], [1, 0.5, 0], [1, 1, 1]],
     float,
 )
+
+
+# Pale, so that bundles stand out; the first is the body. Hatches tell them apart without color.
+_MATERIALS: tuple[tuple[Color, str], ...] = (
+    (BODY, ""),
+    ((0.76, 0.84, 0.92), "////"),
+    ((0.96, 0.91, 0.76), "...."),
+    ((0.78, 0.88, 0.80), "\\\\\\\\"),
+    ((0.90, 0.80, 0.86), "xxxx"),
+    ((0.70, 0.70, 0.72), "++++"),
+)
+
+
+def material_fill(index: int) -> tuple[Color, str]:
+    """Color and hatch of a material in sections; they repeat after six."""
+    return _MATERIALS[index % len(_MATERIALS)]
 
 
 def bundle_color(index: int) -> Color:

@@ -13,6 +13,7 @@ from softreach.inverse import PathStatus, solve_inverse
 from softreach.inverse.continuation import BranchEnd, BranchPoint, Continuation
 from softreach.inverse.request import checked_activations, checked_residual, checked_targets
 from softreach.rod.free_bundles import free_bundles
+from softreach.rod.measured_bundles import activation_measures, measured_bundles
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 
@@ -59,7 +60,7 @@ def track_path(
         InvalidInput: Arguments of another shape or not finite, or fewer than three free bundles.
     """
     points = checked_targets("path", path)
-    rod = tip_map(arm, tol)
+    rod = measured_bundles(tip_map(arm, tol))
     if rod.box.dimension < 3:
         raise InvalidInput("free bundles", rod.box.dimension, "3 or more to follow a path in space")
     if not len(points):
@@ -67,7 +68,7 @@ def track_path(
     residual = checked_residual(residual_over_length)
     tracker = Continuation(free_bundles(rod), residual * rod.length)
     if start is not None:
-        gamma = checked_activations("start", start, rod.box, 1)[0]
+        gamma = checked_activations("start", start, rod.box, 1)[0] / activation_measures(rod.arm)
         first = tracker.corrected_start(tracker.box.clip(gamma), points[0])
     else:
         first = _best_start(rod, tracker, points[0], residual)
@@ -83,7 +84,8 @@ def _best_start(
     solution = solve_inverse(rod, target[None], residual_over_length=residual)[0]
     if not len(solution):
         return None
-    return tracker.at(solution.activations[solution.conditions.argmin()][rod.box.free])
+    best = solution.activations[solution.conditions.argmin()] / activation_measures(rod.arm)
+    return tracker.at(best[rod.box.free])
 
 
 def _followed(
@@ -110,7 +112,7 @@ def _dataset(
     outcome = PathStatus.NO_START if end is None else end.status
     status = np.full(len(points), int(outcome), np.int8)
     status[:n] = PathStatus.FOLLOWED
-    activation = np.full((len(points), box.bundles), np.nan)
+    activation, measures = np.full((len(points), box.bundles), np.nan), activation_measures(rod.arm)
     error = np.full(len(points), np.nan)
     end_activation, end_position = np.full(box.bundles, np.nan), np.full(3, np.nan)
     bundle = bound = ""
@@ -123,10 +125,10 @@ def _dataset(
     return xr.Dataset(
         {
             "position": (("point", "axis"), points, {"units": "m"}),
-            "activation": (("point", "bundle"), activation, units),
+            "activation": (("point", "bundle"), activation * measures, units),
             "tip_error": ("point", error, {"units": "m"}),
             "status": ("point", status, {"units": "1", "meanings": _MEANINGS}),
-            "end_activation": ("bundle", end_activation, units),
+            "end_activation": ("bundle", end_activation * measures, units),
             "end_position": ("axis", end_position, {"units": "m"}),
         },
         {"axis": list(AXES), **bundle_coordinates(rod.arm)},

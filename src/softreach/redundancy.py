@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
 from softreach.geometry.neighbors import mean_value_distance
 from softreach.quantity import quantity
+from softreach.rod.measured_bundles import activation_measures
 from softreach.schema import cell_dataset, check_cloud, tip_cells
 
 if TYPE_CHECKING:
@@ -38,7 +40,8 @@ def activation_distance(
 
     D̄(p_i, r) = Σ_j ‖Γ_j - Γ_i‖₂ / K over the K *other* points j with |p_j - p_i| <= r. Point i
     itself is not counted; another point at the same place is. Where K = 0 the point is isolated
-    and D̄ is NaN. Neighbors always come from the full cloud, whatever is evaluated.
+    and D̄ is NaN. Neighbors always come from the full cloud, whatever is evaluated. Where bundles
+    have different units, the activation of each counts in its own range.
 
     Memory is a sorted copy of the cloud and a few blocks, however many neighbors there are; the
     result does not depend on the number of threads.
@@ -50,7 +53,7 @@ def activation_distance(
             cloud, always the same ones; or their indices; None for all.
 
     Returns:
-        D̄ [-] over `sample`, whose coordinate is the index in the cloud; the coordinate
+        D̄ [unit of the activations] over `sample`, whose coordinate is the index in the cloud;
         `neighbors` is K. D̄ of one point scatters by about 1/√K of the spread among its neighbors.
 
     Raises:
@@ -62,6 +65,8 @@ def activation_distance(
     check_cloud(cloud)
     chosen = _chosen(queries, cloud.sizes["sample"])
     tip, activation = cloud["tip"].values, cloud["activation"].values
+    if "unit" in cloud.coords:
+        activation = activation / activation_measures(Manipulator.from_toml(cloud.attrs["design"]))
     mean, others = mean_value_distance(tip, activation, radius, chosen)
     sample = np.arange(cloud.sizes["sample"]) if chosen is None else chosen
     counted = {"long_name": "other tips within the radius", "units": "1"}
@@ -73,7 +78,7 @@ def activation_distance(
         attrs={
             **cloud.attrs,
             "long_name": "mean activation-space distance D̄",
-            "units": "1",
+            "units": cloud["activation"].attrs.get("units", "1"),
             "radius": float(radius),
         },
     )

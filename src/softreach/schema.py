@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 __all__ = [
     "AXES",
     "activation_attributes",
+    "activation_symbols",
+    "activation_units",
     "bundle_coordinates",
     "cell_dataset",
     "check_cloud",
@@ -39,7 +41,7 @@ _CELL = 1 / 20  # of the arm's length
 # variable -> (dimensions, unit, meaning); that of an activation follows from the arm
 _CLOUD = {
     "tip": (("sample", "axis"), "m", "tip position"),
-    "activation": (("sample", "bundle"), None, "activation γ of each bundle; negative contracts"),
+    "activation": (("sample", "bundle"), None, "activation of each bundle; negative γ contracts"),
 }
 _CONFIGURATION = {
     "position": (("sample", "station", "axis"), "m", "centerline r"),
@@ -47,7 +49,7 @@ _CONFIGURATION = {
     "curvature": (("sample", "station", "component"), "1/m", "Darboux vector u in the directors"),
     "extension": (("sample", "station"), "1", "axial extension ζ"),
     "radius": (("station",), "m", "outer radius R2 before activation"),
-    "activation": (("sample", "bundle"), None, "activation γ of each bundle; negative contracts"),
+    "activation": (("sample", "bundle"), None, "activation of each bundle; negative γ contracts"),
 }
 
 
@@ -102,6 +104,22 @@ def bundle_coordinates(arm: Manipulator) -> dict[str, Any]:
     units = arm.bundle_units
     each = {} if len(set(units)) == 1 else {"unit": ("bundle", list(units))}
     return {"bundle": list(arm.bundle_names), **each}
+
+
+_SYMBOLS = {"1": "γ", "N": "τ", "Pa": "P"}
+
+
+def activation_symbols(units: Iterable[str]) -> tuple[str, ...]:
+    """What formulas call activations of these units: γ, the tension τ, the pressure P."""
+    return tuple(_SYMBOLS.get(unit, "a") for unit in units)
+
+
+def activation_units(activation: xr.DataArray) -> tuple[str, ...]:
+    """The unit of each bundle of a cloud."""
+    count = activation.sizes[next(dim for dim in activation.dims if dim != "sample")]
+    if "unit" in activation.coords:
+        return tuple(str(unit) for unit in activation["unit"].values)
+    return (str(activation.attrs.get("units", "1")),) * count
 
 
 def activation_attributes(arm: Manipulator) -> dict[str, str]:

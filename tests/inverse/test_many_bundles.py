@@ -9,7 +9,7 @@ from benchmarks.adversarial_inverse import PLACES, activations, random_design
 from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse import Solutions, Status, prepared_map, solve_inverse
+from softreach.inverse import Solutions, Status, solve_inverse
 from softreach.rod import tip_map, tip_positions
 from tests.laws import in_box
 
@@ -181,7 +181,22 @@ def test_three_bundles_that_curl_past_a_full_circle_are_solved_back():
     assert (found.statuses == Status.REACHED).all()
     assert np.abs(found.activations[found.offsets[:-1]] - gamma).max() < 1e-3
     some = in_box(arm, 1000)
-    assert (solve_inverse(prepared_map(arm), tip_positions(arm, some)).statuses == 0).mean() > 0.998
+    assert (solve_inverse(arm, tip_positions(arm, some)).statuses == Status.REACHED).all()
+
+
+def test_where_the_arm_closes_to_a_circle_roots_lie_in_a_curved_valley_and_are_found():
+    arm = curling()
+    gamma = np.array(
+        [
+            [0.24244592838306245, -0.324646775265757, -0.532496151226835],
+            [-0.498381226396028, 0.2545431313765669, -0.07414647790786222],
+            [0.042045327546517575, 0.5702426072756839, 0.5255977928794151],
+            [0.4230666950698063, -1.1074347983651538, 0.07292151290002868],
+        ]
+    )
+    found = solve_inverse(arm, tip_positions(arm, gamma))
+    assert (found.statuses == Status.REACHED).all()
+    assert found.conditions.min() > 1e6
 
 
 def test_many_bundles_are_solved_alike_alone_and_among_others():

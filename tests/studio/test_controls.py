@@ -21,15 +21,16 @@ def test_every_slider_starts_within_its_ends_at_the_value_of_the_design(arm):
         assert control.shown * control.scale == pytest.approx(value, abs=1e-6 * control.scale)
 
 
-@pytest.mark.parametrize("arm", [designs.minimal_trunk(), designs.redundant_trunk()])
-def test_a_moved_slider_shows_its_own_value_in_the_new_design(arm):
+@pytest.mark.parametrize("design", designs.__all__)
+def test_a_moved_slider_shows_its_own_value_in_the_new_design(design):
+    arm = getattr(designs, design)()
     for control in controls(arm):
-        to = (control.shown + control.limits[0]) / 2 if control.name != "taper" else 1.0
+        to = 0.95 * control.shown + 0.05 * control.limits[0]
         to = 2 if control.name.endswith(".bundles") else to
         made = changed(arm, {control.name: to * control.scale})
         again = next((c for c in controls(made) if c.name == control.name), None)
         assert again is not None
-        assert again.shown == pytest.approx(to)
+        assert again.shown == pytest.approx(to, abs=1e-6)
 
 
 def test_sliders_of_fibers_bear_their_names_whatever_these_are():
@@ -46,3 +47,16 @@ def test_what_does_not_turn_has_no_revolution_to_change(trunk):
     assert "revolution" in [control.name for control in controls(trunk)]
     straight = trunk.replace(actuators=trunk.actuators[2:])
     assert "revolution" not in [control.name for control in controls(straight)]
+
+
+def test_forces_and_moduli_have_sliders_of_their_size():
+    found = {control.name: control for control in controls(designs.three_tendon_robot())}
+    modulus = found["rings[0].material.young_modulus"]
+    assert modulus.low > 0
+    assert modulus.limits[1] == 2 * modulus.shown
+    assert "[Pa]" in modulus.label
+    assert "[N]" in next(one.label for name, one in found.items() if name.endswith("upper"))
+
+
+def test_what_a_design_leaves_open_has_no_slider(trunk):
+    assert not [control for control in controls(trunk) if "modulus" in control.name]

@@ -191,7 +191,7 @@ def test_a_saved_state_comes_back(tab, tmp_path):
     file = tab.save("Save state", tmp_path)
     assert json.loads(file.read_text())["softreach_studio"] == 1
     design = tab.save("Save design (TOML)", tmp_path)
-    assert tomllib.loads(design.read_text())["length_m"] == 1.0
+    assert tomllib.loads(design.read_text())["profile"]["length_m"] == 1.0
     tab.session.update(
         lambda s: StudioState(design=sr.designs.minimal_trunk(1.0)).showing(level=14)
     )

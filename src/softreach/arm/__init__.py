@@ -12,9 +12,11 @@ from softreach.arm.actuators import (
     SectorActuator,
     Tendon,
 )
+from softreach.arm.actuators.ring_integrals import RingIntegrals
 from softreach.arm.along import AlongArm, Pieces, Samples
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import Material
+from softreach.arm.materials import material_names, named_material
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.sampled_profiles import PiecewiseTaper, SampledTaper
 from softreach.arm.section import Layer, Ring, Section, Stiffness
@@ -38,6 +40,7 @@ __all__ = [
     "RadialMuscle",
     "Resultants",
     "Ring",
+    "RingIntegrals",
     "SampledTaper",
     "Samples",
     "Section",
@@ -46,4 +49,6 @@ __all__ = [
     "Tendon",
     "describe",
     "designs",
+    "material_names",
+    "named_material",
 ]

@@ -16,6 +16,7 @@ from softreach.errors import Fault, Range
 
 __all__ = [
     "FIBER_RANGES",
+    "INSIDE_RANGE",
     "MATERIAL_RANGES",
     "PROFILE_RANGES",
     "RING_RANGES",
@@ -52,8 +53,11 @@ FIBER_RANGES = {
     "revolution": Range(unit="rad"),
     "offset": Range(unit="rad"),
     "extent": Range(0.0, 2 * math.pi, "rad", open_low=True),
-    "bundles": Range(low=1, whole=True),
+    "bundles": Range(low=1, high=1000, whole=True),
 }
+
+INSIDE_RANGE = Range(0.0, 1.0, open_low=True, open_high=True)
+"""Between base and tip, over the length."""
 
 STRETCH_RANGES = {
     "start_over_length": Range(0.0, 1.0, open_high=True),
@@ -71,7 +75,7 @@ _TUBE_RANGES = {
     "inner_radius": Range(0.0, unit="m"),
     "inner_ratio": RING_RANGES["inner_ratio"],
     "taper": PROFILE_RANGES["taper"],
-    "poisson_ratio": MATERIAL_RANGES["poisson_ratio"],
+    **MATERIAL_RANGES,
 }
 
 _OPTIONAL = {"helical_angle", "revolution", "young_modulus", "density"}

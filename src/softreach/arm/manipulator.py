@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike, fspath
-from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
@@ -63,6 +62,8 @@ class Manipulator:
         inner_radius: float,
         taper: float = 0.0,
         poisson_ratio: float = 0.5,
+        young_modulus: float | None = None,
+        density: float | None = None,
         actuators: Sequence[Actuator],
         activation_bounds: ArrayLike | None = None,
     ) -> Self:
@@ -75,6 +76,9 @@ class Manipulator:
                 all along.
             taper: φ, taper angle [rad].
             poisson_ratio: ν [-].
+            young_modulus: E [Pa]; None where it cancels: nothing weighs and only fibers or muscles
+                act.
+            density: ρ [kg/m³]; None where nothing weighs.
             actuators: What drives the arm.
             activation_bounds: (lower, upper) of γ for every bundle, or one pair per bundle [-];
                 None for their own.
@@ -87,9 +91,10 @@ class Manipulator:
         bundles = None if faults else sum(actuator.bundles for actuator in actuators)
         if faults := tube_faults(values, bundles) + faults:
             raise InvalidDesign(faults)
-        ring = Ring(
-            inner_ratio=inner_radius / outer_radius, material=Material(poisson_ratio=poisson_ratio)
+        material = Material(
+            young_modulus=young_modulus, poisson_ratio=poisson_ratio, density=density
         )
+        ring = Ring(inner_ratio=inner_radius / outer_radius, material=material)
         arm = cls(
             profile=LinearTaper(length=length, outer_radius=outer_radius, taper=taper),
             section=Section(rings=(ring,)),
@@ -153,14 +158,10 @@ class Manipulator:
         Raises:
             InvalidDesign: The text's faults, all of them, in the file's own names and units.
         """
-        tube, actuators = file.parse(text, source)
-        ratio = tube.pop("inner_ratio", None)
+        parts = file.parse(text, source)
         try:
-            arm = cls.tapered(**tube, actuators=actuators)
-            if ratio is None:
-                return arm
-            ring = arm.section.rings[0].replace(inner_ratio=ratio)
-            return arm.replace(section=Section(rings=(ring,)))
+            arm = cls(profile=parts.profile, section=parts.section, actuators=parts.actuators)
+            return arm if parts.bounds is None else arm.with_bounds(parts.bounds)
         except InvalidDesign as error:
             raise file.in_file_terms(error, source) from None
 
@@ -168,7 +169,7 @@ class Manipulator:
         """The design as the text of a file, from which `from_toml` makes an equal one.
 
         Raises:
-            InvalidDesign: A profile or an actuator that design files have no table for.
+            InvalidDesign: A profile or an actuator of one's own that no table can describe.
         """
         return file.render(self.profile, self.section, self.actuators)
 
@@ -180,7 +181,7 @@ class Manipulator:
             InvalidDesign: The file's faults, all of them, in the file's own names and units.
             OSError: The file cannot be read.
         """
-        return cls.from_toml(Path(path).read_text(encoding="utf-8"), source=fspath(path))
+        return cls.from_toml(file.text_of(path), source=fspath(path))
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write a design file; an older one is replaced whole."""
@@ -229,6 +230,11 @@ class Manipulator:
         apart = np.diff(ascending, prepend=-np.inf) > 1e-12 * self.length
         inside = ascending[apart & (ascending < (1 - 1e-12) * self.length)][1:]
         return tuple(inside.tolist())
+
+    @property
+    def bundle_courses(self) -> tuple[str, ...]:
+        """How what contracts runs within each bundle; see `Actuator.course`."""
+        return tuple(one.course for one in self.actuators for _ in range(one.bundles))
 
     def outline(self, z: ArrayLike) -> Outline:
         """Where all bundles lie in the sections at stations Z [m], shape (station,)."""

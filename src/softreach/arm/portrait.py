@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softreach.geometry.tube import grid_faces, tube_surface
+from softreach.arm.skin import Centerline, body_skin, bundle_skins, inside
 from softreach.palette import BODY, bundle_color
 from softreach.picture import Skin, html_card
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["arm_card"]
 
-_STATIONS, _ACROSS = 41, 9
+_STATIONS, _STEP = 41, np.pi / 27
 
 
 def arm_card(arm: Manipulator) -> str:
@@ -25,19 +25,9 @@ def arm_card(arm: Manipulator) -> str:
 
 
 def _skins(arm: Manipulator) -> Iterator[Skin]:
-    z = np.linspace(0.0, arm.length, _STATIONS)
-    radius, outline = arm.profile.radius(z), arm.outline(z)
-    along = np.column_stack([0 * z, 0 * z, z])
-    d1, d2 = (np.tile(axis, (_STATIONS, 1)) for axis in np.eye(3)[:2])
-    body = tube_surface(along, d1, d2, radius)
-    yield Skin(body.vertices, body.faces, BODY)
-    for bundle, extent in enumerate(outline.extent):
-        angle = outline.center[:, bundle, None] + np.linspace(-0.5, 0.5, _ACROSS) * extent
-        reach = 1.01 * radius[:, None]
-        band = [
-            reach * np.cos(angle),
-            reach * np.sin(angle),
-            np.broadcast_to(z[:, None], angle.shape),
-        ]
-        points = np.stack(band, axis=-1).reshape(-1, 3)
-        yield Skin(points, grid_faces(_STATIONS, _ACROSS), bundle_color(bundle))
+    line = Centerline.at_rest(np.linspace(0.0, arm.length, _STATIONS))
+    line = line.with_stations(arm.breakpoints)
+    body = body_skin(arm, line)
+    yield Skin(body.vertices, body.faces, BODY, clear=any(inside(arm)))
+    for bundle, skin in enumerate(bundle_skins(arm, line, lift=0.01, step=_STEP)):
+        yield Skin(skin.vertices, skin.faces, bundle_color(bundle))

@@ -26,6 +26,8 @@ class Profile(ABC):
 
     variables: ClassVar[tuple[Variable, ...]] = ()
     """Fields that a designer varies."""
+    series: ClassVar[tuple[Variable, ...]] = ()
+    """Fields that hold several numbers, each of which a designer varies."""
 
     length: float
     """L, from base to tip [m]."""

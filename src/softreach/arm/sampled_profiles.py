@@ -11,7 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.along import monotone_cubic
-from softreach.arm.checks import PROFILE_RANGES, plain_number, range_faults, series_faults
+from softreach.arm.checks import (
+    INSIDE_RANGE,
+    PROFILE_RANGES,
+    plain_number,
+    range_faults,
+    series_faults,
+)
 from softreach.arm.profile import Profile, relative_expm1, relative_log
 from softreach.arm.variable import Variable
 from softreach.errors import Fault, InvalidDesign
@@ -31,6 +37,11 @@ class _GivenRadii(Profile):
 
     variables: ClassVar[tuple[Variable, ...]] = (
         Variable("length", "L", "length before activation", PROFILE_RANGES["length"]),
+    )
+
+    series: ClassVar[tuple[Variable, ...]] = (
+        Variable("stations_over_length", "Z/L", "station of a radius", INSIDE_RANGE),
+        Variable("radii", "R2", "outer radius at a station", PROFILE_RANGES["outer_radius"]),
     )
 
     length: float

@@ -194,7 +194,7 @@ class Section:
         Raises:
             InvalidDesign: A layer without a density.
         """
-        if faults := list(_missing(self, "density", "kg/m³", "where weight counts")):
+        if faults := self.density_faults("where weight counts"):
             raise InvalidDesign(faults)
         return np.pi * self._sum(lambda one: one.density or 0.0, 2) * np.asarray(radius, float) ** 2
 
@@ -205,6 +205,14 @@ class Section:
             why: Ends the sentence "must be given in Pa ...".
         """
         return list(_missing(self, "young_modulus", "Pa", why))
+
+    def density_faults(self, why: str) -> list[Fault]:
+        """A fault for each material whose density is needed and left out.
+
+        Args:
+            why: Ends the sentence "must be given in kg/m³ ...".
+        """
+        return list(_missing(self, "density", "kg/m³", why))
 
     def _sum(self, factor: Callable[[Material], float], power: int) -> float:
         """Σ factor · (b^n - a^n) over the layers between the ratios a and b."""

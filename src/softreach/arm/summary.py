@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.actuators import FiberArchitecture, Outline, SectorActuator
+from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
 from softreach.arm.along import AlongArm
-from softreach.arm.bending import largest_bending, sharpest_bending, smallest_bending
+from softreach.arm.bending import bending_at, largest_bending, sharpest_bending, smallest_bending
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.section import Stiffness
 from softreach.arm.tables import both_sides, check_extension, extension_range
+from softreach.arm.weight import load_number, mass
+from softreach.errors import Fault
 
 __all__ = ["DesignSummary", "describe", "design_warnings"]
 
@@ -40,6 +44,22 @@ class DesignSummary:
     """Smallest and largest ζ in the activation box [-]."""
     curvature: tuple[float, float]
     """Smallest and largest bending curvature times L, in the box and along the arm [-]."""
+    bundle_extension: Array
+    """Smallest and largest ζ that each activation reaches alone [-], shape (bundle, 2)."""
+    bundle_bending: Array
+    """Smallest and largest |κ| R2 that each activation reaches alone [-], shape (bundle, 2)."""
+    stiffness: Stiffness | None
+    """K0 [N], K1 and K3 [N m²] at base and tip; None without Young's modulus."""
+    mass: float | None
+    """Mass of the arm [kg]; None without density."""
+    load_number: float | None
+    """Λ = ρ g L³/(E R2²), or w L³/(4 K1) at the base [-]; None without E or ρ."""
+    lacking: tuple[str, ...]
+    """What to give so that the numbers above are known."""
+    breakpoints: tuple[float, ...]
+    """Z inside (0, L) where profile or actuators are not smooth [m]."""
+    validity: tuple[str, ...]
+    """Where the linear law of each kind of actuator ends."""
     warnings: tuple[str, ...]
     """Limits that the design touches, each with its number."""
 
@@ -65,8 +85,56 @@ def describe(arm: Manipulator) -> DesignSummary:
             smallest_bending(arm).value * arm.length,
             largest_bending(arm).value * arm.length,
         ),
+        bundle_extension=np.array([extension_range(one) for one in _alone(arm)]),
+        bundle_bending=np.array([_slender_bending(one) for one in _alone(arm)]),
+        breakpoints=arm.breakpoints,
+        validity=tuple(dict.fromkeys(_validity(one) for one in arm.actuators if one.validity)),
         warnings=design_warnings(arm),
+        **_of_matter(arm),
     )
+
+
+def _of_matter(arm: Manipulator) -> dict[str, Any]:
+    """What follows from moduli and densities, as far as they are known."""
+    moduli, densities = arm.section.modulus_faults(""), arm.section.density_faults("")
+    ends = arm.profile.radius(np.array([0.0, arm.length]))
+    return {
+        "stiffness": None if moduli else arm.section.stiffness(ends),
+        "mass": None if densities else mass(arm),
+        "load_number": None if moduli or densities else load_number(arm),
+        "lacking": (
+            *_lacking("Young's modulus [Pa]", moduli, "the stiffnesses and the load number"),
+            *_lacking("the density [kg/m³]", densities, "the mass and the load number"),
+        ),
+    }
+
+
+def _lacking(what: str, faults: list[Fault], known: str) -> Iterator[str]:
+    """What to give, and what is known then."""
+    if faults:
+        owners = dict.fromkeys(fault.path.rpartition(".")[0] for fault in faults)
+        yield f"give {what} of {', '.join(owners)} to know {known}"
+
+
+def _validity(actuator: Actuator) -> str:
+    return f"{actuator.default_name}: {actuator.validity}"
+
+
+def _alone(arm: Manipulator) -> Iterator[Manipulator]:
+    """For each activation, the arm whose other activations stay zero."""
+    for bundle in range(arm.bundles):
+        bounds = np.zeros_like(arm.bounds)
+        bounds[bundle] = arm.bounds[bundle]
+        yield arm.with_bounds(bounds)
+
+
+def _slender_bending(arm: Manipulator) -> tuple[float, float]:
+    """Smallest and largest |κ| R2 anywhere along the arm [-]."""
+    if ((arm.bounds[:, 0] <= 0) & (arm.bounds[:, 1] >= 0)).all():
+        return 0.0, sharpest_bending(arm).value
+    z = both_sides(arm, np.linspace(0.0, arm.length, 101))
+    smallest = bending_at(arm, z)[0] * arm.profile.radius(z)
+    return float(smallest.min()), sharpest_bending(arm).value
 
 
 def _angle_at_start(fiber: FiberArchitecture, arm: Manipulator) -> float:

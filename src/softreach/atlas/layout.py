@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from softreach.arm.parameters import Parameter
 from softreach.atlas.command import Command
 from softreach.atlas.metric import Metric
 from softreach.schema import AXES
@@ -76,9 +77,20 @@ _STATUS = {
 
 def _parameters(command: Command) -> Iterator[Plan]:
     space = command.space
+    varied = space.varied()
     for name, values in space.parameters:
         dims = (name,) if space.layout == "grid" else ("design",)
-        yield _shared(name, np.array(values), dims, {"units": space.units()[name]})
+        yield _shared(name, np.array(values), dims, _parameter_attrs(varied[name]))
+
+
+def _parameter_attrs(parameter: Parameter) -> dict[str, Any]:
+    """Unit and meaning, and the symbol and the part that figures show."""
+    return {
+        "units": parameter.unit,
+        "long_name": parameter.meaning,
+        "symbol": parameter.symbol,
+        "part": parameter.owner,
+    }
 
 
 def _profiles(command: Command) -> Iterator[Plan]:

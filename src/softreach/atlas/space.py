@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import changed, parameters, unknown_parameter
+from softreach.arm.parameters import Parameter, changed, find_parameter, find_parameters, parameters
 from softreach.arm.tables import check_extension
 from softreach.errors import InvalidDesign, InvalidInput
 
@@ -50,8 +50,8 @@ class DesignSpace:
         Args:
             base: The design to vary.
             **values: Parameter -> values [SI units], for instance `taper=np.radians([0, 1, 2])`;
-                see `arm.parameters` for the names. Those with a dot are given as
-                `**{"left.offset": [0.0, 0.5]}`.
+                see `arm.parameters` for the names. Those with a dot or a bracket are given as
+                `**{"rings[0].material.young_modulus": [1e5, 2e5]}`.
         """
         return cls(base=base, parameters=_plain(values), layout="grid")
 
@@ -82,8 +82,7 @@ class DesignSpace:
         cube = _spread(count, len(ranges), method, seed)
         ends = np.array(list(ranges.values()), float).reshape(-1, 2)
         points = ends[:, 0] + cube * np.diff(ends, axis=1)[:, 0]
-        known = parameters(base)
-        if whole := [k for k, name in enumerate(ranges) if name in known and known[name].whole]:
+        if whole := [k for k, name in enumerate(ranges) if find_parameter(base, name).whole]:
             points[:, whole] = np.rint(points[:, whole])
         columns = zip(ranges, points.T.tolist(), strict=True)
         return cls(base=base, parameters=_plain(dict(columns)), layout="list")
@@ -111,8 +110,11 @@ class DesignSpace:
 
     def units(self) -> dict[str, str]:
         """Unit of each parameter."""
-        known = parameters(self.base)
-        return {name: known[name].unit for name in self.names}
+        return {name: one.unit for name, one in self.varied().items()}
+
+    def varied(self) -> dict[str, Parameter]:
+        """What varies, by name."""
+        return find_parameters(self.base, self.names)
 
     def values(self, index: int) -> dict[str, float]:
         """Parameters of the design with this number, counted in C order over `shape`."""
@@ -187,12 +189,12 @@ def _plain(values: Mapping[str, ArrayLike]) -> tuple[tuple[str, tuple[float, ...
 
 
 def _faults(space: DesignSpace) -> Iterator[InvalidInput]:
-    known = parameters(space.base)
     if not space.parameters:
-        yield InvalidInput("parameters", "none", f"at least one of {', '.join(known)}")
+        known = (name for name, one in parameters(space.base).items() if not one.owner)
+        allowed = f"at least one of {', '.join(known)}, or of a part, such as left.offset"
+        yield InvalidInput("parameters", "none", allowed)
+    find_parameters(space.base, space.names)
     for name, values in space.parameters:
-        if name not in known:
-            yield unknown_parameter(name, known)
         if "/" in name:
             yield InvalidInput("parameter", name, 'a name without "/"', "rename the actuator")
         if not values or not np.isfinite(values).all():

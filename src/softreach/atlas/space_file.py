@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -10,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import parameters, unknown_parameter
+from softreach.arm.parameters.unknown import unknown_parameter
+from softreach.arm.parameters.written import from_written, written_parameters
 from softreach.atlas.space import DesignSpace
 from softreach.errors import InvalidInput
 
-__all__ = ["parse_parameter", "parse_space", "written_keys"]
+__all__ = ["parse_parameter", "parse_space"]
 
-_SUFFIX = {"rad": "_deg", "m": "_m", "1": ""}
 _KEYS = ("design", "layout", "designs", "seed", "parameters")
 _LAYOUTS = ("grid", "list", "sobol", "latin")
 
@@ -32,6 +31,7 @@ def parse_space(text: str, design_from: Callable[[str], Manipulator]) -> DesignS
     taper_deg = "0:3:16"         # for sobol and latin the two ends: [0, 3]
     left.offset_deg = [60, 70]   # of the fiber "left"
     "fiber 2".extent_deg = [48]  # other names are quoted
+    "rings[0].material.young_modulus_pa" = [1e5, 1e6]
     ```
 
     With `sobol` and `latin` the keys `designs` (their number) and `seed` apply too.
@@ -72,18 +72,11 @@ def parse_parameter(base: Manipulator, key: str, value: Any) -> tuple[str, list[
     Raises:
         InvalidInput: An unknown key, or values that are no numbers.
     """
-    keys = written_keys(base)
-    if key not in keys:
-        raise unknown_parameter(key, keys)
-    numbers = _numbers(key, value)
-    return keys[key], [math.radians(x) for x in numbers] if key.endswith("_deg") else numbers
-
-
-def written_keys(base: Manipulator) -> dict[str, str]:
-    """Parameters as written, with the unit -> their names."""
-    return {
-        name + _SUFFIX.get(one.unit, f"_{one.unit}"): name for name, one in parameters(base).items()
-    }
+    known = written_parameters(base)
+    if key not in known:
+        raise unknown_parameter(key, known)
+    numbers, one = _numbers(key, value), known[key]
+    return one.name, [from_written(x, one.unit) for x in numbers]
 
 
 def _document(text: str) -> dict[str, Any]:

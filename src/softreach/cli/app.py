@@ -18,7 +18,9 @@ app = App(
     help="""Where a soft slender robot can go: from a design to its cloud and volumes.
 
 A DESIGN is a TOML file (lengths in m, angles in degrees) or the name of a
-built-in design: minimal_trunk, redundant_trunk. Start with
+built-in design: minimal_trunk, redundant_trunk, lce_arm, filament,
+elephant_trunk, three_tendon_robot, helical_tendon_robot, three_chamber_arm.
+Start with
 
     softreach demo --out out
 """,
@@ -80,10 +82,16 @@ _COMMANDS = {
         "Write a cloud or an arm for other programs.",
         "softreach export trunk.zarr trunk.parquet",
     ),
+    "import": (
+        "Read a design or a cloud of ActiveFilaments.jl.",
+        "softreach import filament.jl filament.toml",
+    ),
 }
+_KEYWORDS = {"import": "import_file"}  # commands that no Python function can be called
 for _place, (_name, (_summary, _example)) in enumerate(_COMMANDS.items()):
+    _function = _KEYWORDS.get(_name, _name)
     app.command(
-        f"softreach.cli.{_name}:{_name}",
+        f"softreach.cli.{_function}:{_function}",
         name=_name,
         help=f"{_summary}\n\nExample: {_example}",
         sort_key=_place,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -33,7 +34,10 @@ def build(
     design: Annotated[str, Parameter(help="Base design for --vary.")] = "minimal_trunk",
     vary: Annotated[
         list[str] | None,
-        Parameter(help="A parameter of the grid, e.g. taper_deg=0:3:16 or left.bundles=1,2."),
+        Parameter(
+            help="A parameter of the grid: taper_deg=0:3:16, left.bundles=1,2, or "
+            "rings[0].material.young_modulus_pa=1e5,1e6."
+        ),
     ] = None,
     n: Annotated[int, Parameter(help="Samples of each design.")] = 400_000,
     seed: Annotated[int, Parameter(help="Seed of the sampler.")] = 0,
@@ -112,10 +116,12 @@ def best(
 
     Example: softreach atlas best atlas.zarr exact_volume --where "taper_deg<=1" --count 3
     """
-    from softreach.atlas import best_designs
+    from softreach.atlas import best_designs, open_atlas
 
-    limits = dict(_constraint(text) for text in where or ())
-    found = best_designs(store, metric, smallest=smallest, where=limits, count=count)
+    opened = open_atlas(store)
+    written = _written_coordinates(opened)
+    limits = dict(_constraint(text, written) for text in where or ())
+    found = best_designs(opened, metric, smallest=smallest, where=limits, count=count)
     names = [name for name in found.variables if found[name].dtype.kind in "fi"]
     columns = [_written(found[name]) for name in names]
     rows: dict[str, tuple[Any, str]] = {name: (values, unit) for name, values, unit in columns}
@@ -202,8 +208,22 @@ def _shard(text: str) -> tuple[int, int]:
     return int(first), int(count)
 
 
-def _constraint(text: str) -> tuple[str, tuple[float | None, float | None]]:
-    """`taper_deg<=1` -> taper between anything and 1 degree."""
+def _written_coordinates(atlas: xr.Dataset) -> dict[str, xr.DataArray]:
+    """The parameters of an atlas by their names with units."""
+    from softreach.arm.parameters.written import written_name
+
+    return {
+        written_name(str(name), values.attrs.get("units", "1")): values
+        for name, values in atlas.coords.items()
+    }
+
+
+def _constraint(
+    text: str, written: Mapping[str, xr.DataArray]
+) -> tuple[str, tuple[float | None, float | None]]:
+    """`taper_deg<=1` -> taper between anything and 1 degree, in radians."""
+    from softreach.arm.parameters.written import from_written
+
     for sign in ("<=", ">=", "<", ">"):
         name, found, number = text.partition(sign)
         if found:
@@ -213,8 +233,9 @@ def _constraint(text: str) -> tuple[str, tuple[float | None, float | None]]:
     except ValueError:
         raise InvalidInput("where", text, "a name, <= or >=, and a number") from None
     name = name.strip()
-    if name.endswith("_deg"):
-        name, value = name.removesuffix("_deg"), math.radians(value)
+    if name in written:
+        name, unit = str(written[name].name), str(written[name].attrs.get("units", "1"))
+        value = from_written(value, unit)
     return name, (None, value) if "<" in sign else (value, None)
 
 

@@ -8,8 +8,14 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from softreach.cli.inputs import Activation, Source, activation_of, design_from
+from softreach.errors import InvalidInput
 
 __all__ = ["export"]
+
+Format = Annotated[
+    str | None,
+    Parameter(help="activefilaments: NAME.csv and NAME_gamma.csv as ActiveFilaments.jl has them."),
+]
 
 
 def export(
@@ -17,25 +23,58 @@ def export(
     out: Annotated[Path, Parameter(help="Target; its suffix chooses the format.")],
     *,
     activation: Activation = None,
+    format: Format = None,
 ) -> None:
     """Write a cloud (.ply .csv .parquet .npz .mat .vtu .vtk), or a design's arm as a surface mesh.
 
-    A design is written as the deformed arm with its fibers (.ply .stl .obj .glb .vtu .vtk).
+    A design is written as the deformed arm with its fibers (.ply .stl .obj .glb .vtu .vtk), or as
+    the source of a filament of ActiveFilaments.jl (.jl).
 
     Examples: softreach export trunk.zarr trunk.parquet;
-    softreach export minimal_trunk arm.glb --activation=-1,0,-0.5
+    softreach export minimal_trunk arm.glb --activation=-1,0,-0.5;
+    softreach export trunk.zarr trunk.csv --format activefilaments
     """
     import sys
 
-    from softreach import export as files
-
+    if format not in (None, "activefilaments"):
+        raise InvalidInput("format", format, "activefilaments, or left out")
     if source.rstrip("/").endswith(".zarr"):
-        from softreach.cloud import open_cloud
-
-        files.export_cloud(open_cloud(source), out)
+        written = _cloud(source, out, format)
     else:
-        from softreach.rod.kinematics import configuration
+        written = _design(source, out, activation, format)
+    sys.stdout.writelines(f"{path}\n" for path in written)
 
-        arm = design_from(source)
-        files.export_arm(arm, configuration(arm, activation_of(activation, arm)), out)
-    sys.stdout.write(f"{out}\n")
+
+def _cloud(source: str, out: Path, format: str | None) -> list[Path]:
+    from softreach.cloud import open_cloud
+
+    cloud = open_cloud(source)
+    if format is None:
+        from softreach.export import export_cloud
+
+        export_cloud(cloud, out)
+        return [out]
+    from softreach.exchange import activefilaments
+
+    if out.suffix != ".csv":
+        raise InvalidInput(
+            "out", out, "a file name ending in .csv for clouds of ActiveFilaments.jl"
+        )
+    activefilaments.write_cloud(cloud, out)
+    return [out, activefilaments.gamma_path(out)]
+
+
+def _design(source: str, out: Path, activation: str | None, format: str | None) -> list[Path]:
+    arm = design_from(source)
+    if out.suffix == ".jl":
+        from softreach.exchange.activefilaments import write_design
+
+        write_design(arm, out)
+        return [out]
+    if format is not None:
+        raise InvalidInput("out", out, "a file name ending in .jl for a filament's definition")
+    from softreach.export import export_arm
+    from softreach.rod.kinematics import configuration
+
+    export_arm(arm, configuration(arm, activation_of(activation, arm)), out)
+    return [out]

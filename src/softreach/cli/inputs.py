@@ -30,7 +30,9 @@ __all__ = [
     "radius_of",
 ]
 
-Design = Annotated[str, Parameter(help="Design file (.toml), or minimal_trunk or redundant_trunk.")]
+Design = Annotated[
+    str, Parameter(help="Design file (.toml), or a built-in design such as minimal_trunk.")
+]
 Source = Annotated[str, Parameter(help="Cloud (.zarr), design file (.toml) or built-in design.")]
 RevolutionDeg = Annotated[
     float | None,
@@ -55,7 +57,7 @@ def design_from(
     from softreach.arm.parameters import changed
     from softreach.arm.tables import check_extension
 
-    built_in = {name: getattr(designs, name) for name in ("minimal_trunk", "redundant_trunk")}
+    built_in = {name: getattr(designs, name) for name in designs.__all__}
     if text in built_in:
         arm = built_in[text]()
     elif text.endswith(".toml") or Path(text).is_file():

@@ -30,12 +30,26 @@ def print_rows(title: str, rows: Mapping[str, tuple[Any, str]], as_json: bool) -
     sys.stdout.write("\n".join([title, *lines, ""]))
 
 
-_SUFFIX = {"m": "_m", "m³": "_m3", "L³": "_L3", "L": "_L", "deg": "_deg", "%": "_percent"}
+_SUFFIX = {
+    "m": "_m",
+    "m³": "_m3",
+    "L³": "_L3",
+    "L": "_L",
+    "deg": "_deg",
+    "%": "_percent",
+    "Pa": "_pa",
+    "N": "_n",
+    "N m²": "_n_m2",
+    "kg": "_kg",
+    "kg/m³": "_kg_m3",
+}
 
 
 def _key(name: str, unit: str) -> str:
+    from softreach.arm.parameters.written import with_suffix
+
     plain = name.replace(" ", "_").replace("/", "_per_").replace("(", "").replace(")", "")
-    return plain + _SUFFIX.get(unit, "")
+    return with_suffix(plain, _SUFFIX.get(unit, ""))
 
 
 def _shown(value: Any) -> str:

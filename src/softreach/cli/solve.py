@@ -28,6 +28,13 @@ def solve(
     family: Annotated[
         int, Parameter(help="With more than three free bundles: solutions for each target.")
     ] = 1,
+    prove_least: Annotated[
+        bool,
+        Parameter(
+            negative="",
+            help="With more than three free bundles: say whether least activation is proved.",
+        ),
+    ] = False,
     revolution_deg: RevolutionDeg = None,
     taper_deg: TaperDeg = None,
     json: AsJson = False,
@@ -39,7 +46,7 @@ def solve(
         raise InvalidInput("target", target, "given, or --targets, and not both")
     arm = design_from(design, revolution_deg, taper_deg)
     points = points_of(target, targets)
-    solutions = solve_inverse(arm, points, family=family)
+    solutions = solve_inverse(arm, points, family=family, prove_least=prove_least)
     if json:
         json_format.dump([_as_json(solution) for solution in solutions], sys.stdout)
         sys.stdout.write("\n")
@@ -60,6 +67,8 @@ def _as_json(solution: Solution) -> dict[str, object]:
         "nearest_activation": solution.nearest_activation.tolist(),
         "gap_m": solution.gap,
         "gap_bound_m": solution.gap_bound,
+        "change_bound": solution.change_bound,
+        "least_proved": solution.least_proved,
     }
 
 
@@ -76,6 +85,10 @@ def _lines(solution: Solution, names: tuple[str, ...]) -> list[str]:
         shown = ", ".join(f"{name} {g:.6f}" for name, g in zip(names, gamma, strict=True))
         quality = f"residual {residual:.1e} m, condition {condition:.3g}, margin {margin:.3g}"
         lines.append(f"  {shown}  ({quality})")
+    if solution.least_proved:
+        lines.append("  proved to be the least")
+    elif solution.change_bound:
+        lines.append(f"  no activation of |γ| below {solution.change_bound:.6g} reaches it")
     if not len(solution):
         near = ", ".join(f"{x:.6g}" for x in solution.nearest)
         bound = f", proved to be at least {solution.gap_bound:.4g} m" if solution.gap_bound else ""

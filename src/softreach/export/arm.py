@@ -5,6 +5,7 @@ from __future__ import annotations
 from os import PathLike
 from typing import TYPE_CHECKING
 
+from softreach.arm.skin import inside
 from softreach.arm_shape import arm_surface, bundle_surfaces
 from softreach.export.surface import Part, write_parts
 from softreach.palette import bundle_color
@@ -16,14 +17,18 @@ if TYPE_CHECKING:
 
 __all__ = ["export_arm"]
 
+_CLEAR = 0.45  # opacity of a body that has something inside
+
 
 def export_arm(
     arm: Manipulator, configuration: xr.Dataset, path: str | PathLike[str], *, sides: int = 64
 ) -> None:
     """Write a deformed arm as .ply, .stl, .obj, .glb, .vtu or .vtk, chosen by the suffix.
 
-    The body is a closed tube; each bundle is a closed skin as wide as its extent, half sunk into
-    the body's surface. Parts are called ``body`` and by the names of the bundles.
+    The body is a closed tube, translucent in .glb and .ply where something lies inside. A bundle
+    that fills a sector is a closed skin as wide as its extent, half sunk into the outside of its
+    ring; a tendon is a thin tube, a chamber a tube of its radius. Parts are called ``body`` and by
+    the names of the bundles.
 
     Args:
         arm: The design.
@@ -35,8 +40,9 @@ def export_arm(
         InvalidInput: Unknown suffix, or several configurations.
         MissingExtra: The format needs a library that is not installed.
     """
-    body = arm_surface(configuration, sides)
-    parts = [Part("body", body.vertices, body.faces)]
+    body = arm_surface(arm, configuration, sides)
+    opacity = _CLEAR if any(inside(arm)) else 1.0
+    parts = [Part("body", body.vertices, body.faces, opacity=opacity)]
     for index, skin in enumerate(bundle_surfaces(arm, configuration)):
         name = _part_name(arm.bundle_names, index)
         parts.append(Part(name, skin.vertices, skin.faces, bundle_color(index)))

@@ -30,6 +30,7 @@ class Part(NamedTuple):
     faces: Faces
     """Shape (f, 3)."""
     color: Color = BODY
+    opacity: float = 1.0
 
 
 def export_mesh(
@@ -110,7 +111,7 @@ def _write_vtk(parts: Sequence[Part], path: Path) -> None:
 
 def _colored(part: Part) -> Any:
     trimesh = load_library("trimesh")
-    rgba = np.append(np.rint(255 * np.array(part.color)), 255).astype(np.uint8)
+    rgba = np.rint(255 * np.array([*part.color, part.opacity])).astype(np.uint8)
     colors = np.tile(rgba, (len(part.vertices), 1))
     return trimesh.Trimesh(
         part.vertices,
@@ -126,7 +127,8 @@ def _shiny(part: Part) -> Any:
     visual = load_library("trimesh.visual")
     material = visual.material.PBRMaterial(
         name=part.name,
-        baseColorFactor=[*part.color, 1.0],
+        baseColorFactor=[*part.color, part.opacity],
+        alphaMode="BLEND" if part.opacity < 1 else None,
         metallicFactor=0.0,
         roughnessFactor=0.6,
         doubleSided=True,

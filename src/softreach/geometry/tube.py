@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.errors import InvalidInput
 from softreach.geometry.surface import Surface
 
-__all__ = ["grid_faces", "ribbon_surface", "tube_surface"]
+__all__ = ["grid_faces", "joined", "ribbon_surface", "tube_surface"]
 
 Array = NDArray[np.float64]
 Faces = NDArray[np.int64]
@@ -82,6 +84,18 @@ def grid_faces(stations: int, across: int) -> Faces:
         Faces, shape (2 * (stations - 1) * (across - 1), 3).
     """
     return _halves(_grid(np.arange(stations * across).reshape(stations, across)))
+
+
+def joined(parts: Sequence[Surface]) -> Surface:
+    """Several surfaces as one; none is a surface without vertices."""
+    if len(parts) == 1:
+        return parts[0]
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
+    return Surface(
+        vertices=np.concatenate([np.empty((0, 3)), *(part.vertices for part in parts)]),
+        faces=np.concatenate([np.empty((0, 3), np.int64), *faces]),
+    )
 
 
 def _check_curve(points: ArrayLike) -> Array:

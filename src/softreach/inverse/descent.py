@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.kernels.box_projection import project
+from softreach.rod.damped_step import damped_steps
 from softreach.rod.tip_map import TipMap
 
 __all__ = ["Descent", "descend"]
@@ -61,7 +61,7 @@ def descend(
         if not len(active):
             break
         goal, gamma = targets[active], found.gamma[active]
-        trial = _step(rod, found.of(active), goal, damping[active])
+        trial = _trials(rod, found.of(active), goal, damping[active])
         tip, slope = rod.tips_and_slopes(trial)
         miss = np.linalg.norm(tip - goal, axis=1)
         better = miss < found.residual[active]
@@ -81,14 +81,7 @@ def descend(
     return found
 
 
-def _step(rod: TipMap, at: Descent, targets: Array, damping: Array) -> Array:
-    """The end of each step, never outside the bounds."""
-    box, length = rod.box, rod.length
-    slope = at.slope * (box.scales / length)
-    miss = (targets - at.tip) / length
-    n, m = at.gamma.shape
-    softness = damping * at.residual / length
-    step, multiplier = np.empty((n, m)), np.empty((n, 3))
-    low, high = (box.low - at.gamma) / box.scales, (box.high - at.gamma) / box.scales
-    project(np.zeros((n, m)), slope, miss, softness, low, high, step, multiplier)
-    return box.clip(at.gamma + step * box.scales)
+def _trials(rod: TipMap, at: Descent, targets: Array, damping: Array) -> Array:
+    """The end of each step."""
+    miss, softness = (at.tip - targets) / rod.length, damping * at.residual / rod.length
+    return damped_steps(rod.box, at.gamma, miss, at.slope / rod.length, softness)[0]

@@ -17,7 +17,7 @@ from softreach.inverse.descent import descend
 from softreach.inverse.prepared_map import PreparedMap
 from softreach.inverse.reach import Reached, first_of_each, reach
 from softreach.inverse.request import Request
-from softreach.inverse.sequential import sequential_minima
+from softreach.inverse.sequential import sequential_minima, survey
 from softreach.rod.tip_map import TipMap
 
 __all__ = ["least_changes"]
@@ -25,9 +25,11 @@ __all__ = ["least_changes"]
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_CANDIDATES = 96
-_STARTS, _FACE_STARTS = 6, 4
+_CANDIDATES = 300
+_STARTS, _FACE_STARTS = 14, 10
 _APART = 0.15
+_SURVEY = 5  # steps after which searches are compared
+_SURVIVORS, _MERGED = 6, 0.05  # searches of a target that go on, and how far they are apart
 _PRICE_OF_CARE = 1e4
 _EQUAL = 1e-6  # difference of activations below which they are one
 _POLISHED, _MOST_POLISHING = 1e-9, 300
@@ -91,7 +93,7 @@ def _in_blocks(prepared: PreparedMap, request: Request, known: Array | None = No
 def _least_change(prepared: PreparedMap, request: Request, known: Array | None) -> Reached:
     """The least of the local minima found; where none reaches its target, the nearest place."""
     count = len(request.targets)
-    owner, start = _starts(prepared, request)
+    owner, start = _promising(prepared, request, *_starts(prepared, request))
     if known is not None:
         owner, start = np.concatenate([owner, np.arange(count)]), np.concatenate([start, known])
     gamma, residual = sequential_minima(prepared.rod, request.of(owner), start)
@@ -158,6 +160,20 @@ def _starts(prepared: PreparedMap, request: Request) -> tuple[Index, Array]:
         owners.append(owner)
         starts.append(start)
     return np.concatenate(owners), np.concatenate(starts)
+
+
+def _promising(
+    prepared: PreparedMap, request: Request, owner: Index, start: Array
+) -> tuple[Index, Array]:
+    """Where the best searches of each target are after a few steps, those that are apart."""
+    gamma, merit = survey(prepared.rod, request.of(owner), start, _SURVEY)
+    order = np.lexsort((merit, owner))
+    counts = np.bincount(owner, minlength=len(request.targets))
+    first = np.cumsum(counts) - counts
+    # A row for every target, filled up with its best, which is chosen once.
+    places = first[:, None] + np.arange(counts.max(initial=0))
+    places = np.where(places < (first + counts)[:, None], places, first[:, None])
+    return prepared.landmarks.starts(gamma[order[places]], _SURVIVORS, _MERGED)
 
 
 def _turned(prepared: PreparedMap, request: Request, known: Array) -> Array:

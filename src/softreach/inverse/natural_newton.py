@@ -4,14 +4,19 @@ Near a full circle two singular values of J vanish together. The residual then s
 distance from a root: on the way it has to rise, and a search that never lets it does not arrive.
 Steps are judged by the natural test instead, |J⁻¹ F(trial)| < |J⁻¹ F(γ)|, which is invariant under
 any linear change of the residual.
+
+The roots lie in a curved valley: along one direction the tip moves millions of times as far as
+along the others, and a straight step leaves the valley's floor. So each step ends with a few of
+Newton's method along that direction alone.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.inverse.descent import descend
 from softreach.inverse.prepared_map import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.roots import Roots, no_roots, roots_at
@@ -22,9 +27,8 @@ __all__ = ["natural_newton", "nearly_singular_roots"]
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_EFFORTS = ((500, 40, 0.1), (2000, 100, 0.08))
+_EFFORTS = ((500, 20, 0.1), (2000, 100, 0.08))
 """Landmarks near the target, most starts from them, their least distance in ranges."""
-_APPROACH = 4  # iterations of descent after which a start is tried once more
 _BLOCK = 500  # targets at once
 
 _MOST_ITERATIONS = 60
@@ -32,6 +36,7 @@ _LONGEST_STEP = 0.3  # in ranges
 _OUTSIDE = 0.05  # how far a search may leave the bounds, in ranges
 _LEAST_DAMPING = 1e-3
 _CONVERGED = 1e-9  # step, in ranges
+_FIRST_RETURNS, _RETURNS = 4, 2  # steps down to the floor of the valley
 
 
 def nearly_singular_roots(prepared: PreparedMap, request: Request, rows: Index) -> Roots:
@@ -48,15 +53,10 @@ def nearly_singular_roots(prepared: PreparedMap, request: Request, rows: Index) 
 
 
 def _from_starts(rod: TipMap, request: Request, owner: Index, start: Array) -> Roots:
-    """Roots from starts, and from where a little descent leads from them."""
-    goal, residual = request.targets[owner], request.residual
-    approached = descend(rod, goal, start, residual, most=_APPROACH).gamma
-    roots = no_roots(rod)
-    for begin in (start, approached):
-        gamma = natural_newton(rod, goal, begin, residual)
-        found = roots_at(rod, request.targets, owner, gamma)
-        roots = roots.joined(found.where(found.residual <= residual))
-    return roots
+    """Roots from starts."""
+    gamma = natural_newton(rod, request.targets[owner], start, request.residual)
+    found = roots_at(rod, request.targets, owner, gamma)
+    return found.where(found.residual <= request.residual)
 
 
 def natural_newton(rod: TipMap, targets: Array, start: Array, residual: float) -> Array:
@@ -70,9 +70,9 @@ def natural_newton(rod: TipMap, targets: Array, start: Array, residual: float) -
     """
     box, scales = rod.box, rod.box.scales
     low, high = box.low - _OUTSIDE * scales, box.high + _OUTSIDE * scales
-    gamma, damping = start.copy(), np.ones(len(start))
-    tip, slope = rod.tips_and_slopes(gamma)
-    miss, active = targets - tip, np.arange(len(start))
+    valley = _Valley(rod, low, high)
+    gamma, miss, slope = valley.floor(targets, start, _FIRST_RETURNS)
+    damping, active = np.ones(len(start)), np.arange(len(start))
     for _ in range(_MOST_ITERATIONS):
         if not len(active):
             break
@@ -81,8 +81,7 @@ def natural_newton(rod: TipMap, targets: Array, start: Array, residual: float) -
         size = np.linalg.norm(step, axis=1)
         factor = np.minimum(damping[active], _LONGEST_STEP / np.maximum(size, 1e-300))
         trial = np.clip(gamma[active] + factor[:, None] * step * scales, low, high)
-        tip, new_slope = rod.tips_and_slopes(trial)
-        away = targets[active] - tip
+        trial, away, new_slope = valley.floor(targets[active], trial, _RETURNS)
         left = np.linalg.norm(np.einsum("nij,nj->ni", inverse, away), axis=1)
         accepted = left <= (1.0 - 0.25 * factor) * size
         taken = active[accepted]
@@ -96,6 +95,25 @@ def natural_newton(rod: TipMap, targets: Array, start: Array, residual: float) -
         end = (size <= _CONVERGED) | (near & ~accepted) | (damping[active] < _LEAST_DAMPING)
         active = active[~end]
     return box.clip(gamma)
+
+
+class _Valley(NamedTuple):
+    """Where the tip has the right place along the direction in which it moves most."""
+
+    rod: TipMap
+    low: Array
+    high: Array
+
+    def floor(self, targets: Array, gamma: Array, steps: int) -> tuple[Array, Array, Array]:
+        """Activations after some steps along that direction, target - tip and ∂r/∂γ [m] there."""
+        scales = self.rod.box.scales
+        tip, slope = self.rod.tips_and_slopes(gamma)
+        for _ in range(steps):
+            left, sizes, right = np.linalg.svd(slope * scales)
+            step = np.einsum("ni,ni->n", left[:, :, 0], targets - tip) / sizes[:, 0]
+            gamma = np.clip(gamma + scales * step[:, None] * right[:, 0], self.low, self.high)
+            tip, slope = self.rod.tips_and_slopes(gamma)
+        return gamma, targets - tip, slope
 
 
 def _inverses(matrices: Array) -> Array:

@@ -5,31 +5,45 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
+import numpy as np
+from numpy.typing import NDArray
+
 from softreach.arm.manipulator import Manipulator
+from softreach.inverse.bisection import CoarseCells
 from softreach.inverse.cells import activation_cells
-from softreach.inverse.exclusion import CoarseCells
 from softreach.inverse.image_tree import image_tree
 from softreach.inverse.landmarks import Landmarks, face_landmarks, landmarks
 from softreach.kernels.activation_mesh import ActivationMesh
 from softreach.kernels.space_tree import SpaceTree
 from softreach.rod.free_bundles import free_bundles
+from softreach.rod.measured_bundles import activation_measures, measured_bundles
 from softreach.rod.tip_map import TipMap, tip_map
 
 __all__ = ["PreparedMap", "prepared_map"]
+
+Array = NDArray[np.float64]
 
 _CELLS = 32
 
 
 @dataclass(frozen=True)
 class PreparedMap:
-    """A tip map with cells, tree and landmarks, each computed when first needed."""
+    """A tip map with cells, tree and landmarks, each computed when first needed.
+
+    Changes of activation are compared throughout, so that it counts them in their measures.
+    """
 
     whole: TipMap
-    """The tip map of all bundles."""
+    """The tip map of all bundles, whose activations are in `measures`."""
     cells: int = _CELLS
     """With three free bundles: cells along each axis of the activation box."""
     depth: int = 0
     """How often a cell may be halved where det ∂r/∂γ changes sign or is uneven."""
+
+    @cached_property
+    def measures(self) -> Array:
+        """What one unit of each activation is in its own unit, shape (bundles,)."""
+        return activation_measures(self.whole.arm)
 
     @cached_property
     def rod(self) -> TipMap:
@@ -84,7 +98,7 @@ def prepared_map(
     """
     if isinstance(arm, PreparedMap):
         return arm
-    return _of_map(tip_map(arm, tol), cells, depth)
+    return _of_map(measured_bundles(tip_map(arm, tol)), cells, depth)
 
 
 @lru_cache(maxsize=4)

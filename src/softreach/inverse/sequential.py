@@ -12,7 +12,7 @@ from softreach.inverse.request import Request
 from softreach.kernels.box_projection import project
 from softreach.rod.tip_map import TipMap
 
-__all__ = ["sequential_minima"]
+__all__ = ["sequential_minima", "survey"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -65,6 +65,26 @@ def sequential_minima(
     Returns:
         Activations [-], shape (n, m), and their |tip - target| [m], shape (n,).
     """
+    state = _searched(rod, request, start, price, settled, most)
+    found = descend(rod, request.targets, state.gamma, request.residual, most=20)
+    return found.gamma, found.residual
+
+
+def survey(rod: TipMap, request: Request, start: Array, most: int) -> tuple[Array, Array]:
+    """Where searches as those of `sequential_minima` are after a few steps, and what they promise.
+
+    Returns:
+        Activations [-], shape (n, m), and what each search minimizes, ½|γ - near|² and the price of
+        the miss, shape (n,).
+    """
+    state = _searched(rod, request, start, 0.0, 1e-6, most)
+    return state.gamma, _merit(state.gamma, request.near, state.price, state.miss)
+
+
+def _searched(
+    rod: TipMap, request: Request, start: Array, price: float, settled: float, most: int
+) -> _State:
+    """The searches after so many steps, or fewer where they settled."""
     n, length = len(start), rod.length
     tip, slope = rod.tips_and_slopes(start)
     state = _State(
@@ -80,8 +100,7 @@ def sequential_minima(
             break
         step = _advance(rod, request, state, active)
         active = active[(step >= settled) & (state.proximity[active] < _LARGEST_PROXIMITY)]
-    found = descend(rod, request.targets, state.gamma, request.residual, most=20)
-    return found.gamma, found.residual
+    return state
 
 
 def _advance(rod: TipMap, request: Request, state: _State, active: Index) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, Self, overload
 
@@ -58,6 +58,11 @@ class Solution:
     """|nearest - target| [m]."""
     gap_bound: float
     """A proved lower bound of the distance to the reachable set [m]; 0 if nothing is proved."""
+    change_bound: float
+    """A proved lower bound of |γ - near| of all activations that reach the target [-]; 0 if nothing
+    is proved, which it is only where `prove_least` asks for it."""
+    least_proved: bool
+    """Whether the bound is the |γ - near| of the first activation, but for 1e-6."""
 
     def __len__(self) -> int:
         return len(self.activations)
@@ -99,6 +104,13 @@ class Solutions(Sequence[Solution]):
     """Shape (t,) [m]."""
     gap_bounds: Array
     """Proved lower bounds of the distance to the reachable set, shape (t,) [m]."""
+    change_bounds: Array
+    """Proved lower bounds of |γ - near| of all activations that reach a target, shape (t,).
+
+    In the unit of the activations; where units differ, each counts in its own range.
+    """
+    least_proved: NDArray[np.bool_]
+    """Whether the first activation of a target is proved to change least, to 1e-6, shape (t,)."""
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
@@ -113,6 +125,18 @@ class Solutions(Sequence[Solution]):
                 name: np.concatenate([getattr(part, name) for part in parts])
                 for name in (*_PER_TARGET, *_PER_SOLUTION)
             },
+        )
+
+    def in_units_of(self, measures: Array) -> Self:
+        """The same solutions, their activations multiplied by these; (bundles,)."""
+        if (measures == 1.0).all():
+            return self
+        alike = measures[0] if (measures == measures[0]).all() else 1.0
+        return replace(
+            self,
+            activations=self.activations * measures,
+            nearest_activations=self.nearest_activations * measures,
+            change_bounds=self.change_bounds * alike,
         )
 
     @property
@@ -161,6 +185,8 @@ class Solutions(Sequence[Solution]):
             nearest_activation=self.nearest_activations[i],
             gap=float(self.gaps[i]),
             gap_bound=float(self.gap_bounds[i]),
+            change_bound=float(self.change_bounds[i]),
+            least_proved=bool(self.least_proved[i]),
         )
 
     def _several(self, chosen: Index) -> Solutions:
@@ -190,6 +216,8 @@ class Solutions(Sequence[Solution]):
                 "nearest_activation": (per_target, self.nearest_activations, units),
                 "gap": ("target", self.gaps, {"units": "m"}),
                 "gap_bound": ("target", self.gap_bounds, {"units": "m"}),
+                "change_bound": ("target", self.change_bounds, {"units": "1"}),
+                "least_proved": ("target", self.least_proved),
                 "target_of": ("solution", np.repeat(np.arange(len(self)), self.counts)),
                 "activation": (per_solution, self.activations, units),
                 "residual": ("solution", self.residuals, {"units": "m"}),
@@ -201,5 +229,14 @@ class Solutions(Sequence[Solution]):
         )
 
 
-_PER_TARGET = ("targets", "statuses", "nearest", "nearest_activations", "gaps", "gap_bounds")
+_PER_TARGET = (
+    "targets",
+    "statuses",
+    "nearest",
+    "nearest_activations",
+    "gaps",
+    "gap_bounds",
+    "change_bounds",
+    "least_proved",
+)
 _PER_SOLUTION = ("activations", "residuals", "conditions", "margins")

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
 from softreach.arm.manipulator import Manipulator
+from softreach.errors import InvalidInput
 from softreach.inverse.branches import distinct, every_branch
 from softreach.inverse.exclusion import gap_bounds
+from softreach.inverse.least_bound import SLACK, change_bounds
 from softreach.inverse.least_change import least_changes
 from softreach.inverse.natural_newton import nearly_singular_roots
 from softreach.inverse.nearest import Nearest, nearest, nearest_from
@@ -43,6 +47,7 @@ def solve_inverse(
     direction: ArrayLike | None = None,
     direction_weight: float = 0.1,
     family: int = 1,
+    prove_least: bool = False,
     seed: int = 0,
     tol: float = 1e-6,
 ) -> Solutions:
@@ -59,8 +64,9 @@ def solve_inverse(
         arm: The design, its tip map, or what `prepared_map` made of it.
         targets: Tip positions to reach [m], shape (t, 3).
         residual_over_length: Largest |tip - target| of a solution, in L.
-        near: With more than three free bundles: the activation to stay near to [-], shape
-            (bundles,) or (t, bundles); by default rest.
+        near: With more than three free bundles: the activation to stay near to [unit of each],
+            shape (bundles,) or (t, bundles); by default rest. Where units differ, the change of
+            each activation counts in its own range.
         direction: Wanted tip tangents d3, shape (3,) or (t, 3), of any length. With more than
             three free bundles the freedom left by the position goes to least
             |γ - near|² + w² |d3 - direction|²; with three or fewer the position yields too:
@@ -68,6 +74,10 @@ def solve_inverse(
         direction_weight: w [-].
         family: With more than three free bundles: how many activations to give for each target,
             the others being those nearest to random activations.
+        prove_least: With more than three free bundles: bound |γ - near| from below, over all
+            activations that reach a target, and say whether the one found is the least. Takes
+            some ten milliseconds for a target with four, up to half a second with five or six,
+            where it may not succeed; with more nothing is proved.
         seed: Seed of these.
         tol: Largest error of the tips themselves, in L; residuals refer to `tip_positions` with
             this tolerance. A tip map keeps its own.
@@ -76,22 +86,27 @@ def solve_inverse(
         One `Solution` for each target; failures are its status, never an exception.
 
     Raises:
-        InvalidInput: Arguments of another shape, not finite, or out of range.
+        InvalidInput: Arguments of another shape, not finite, or out of range; a proof where a
+            direction is traded against the change.
     """
+    if prove_least and direction is not None:
+        raise InvalidInput("prove_least", prove_least, "False where a direction is wanted")
     prepared = prepared_map(arm, tol)
     points, box = checked_targets("targets", targets), prepared.whole.box
-    rest = np.zeros(box.bundles)
+    rest = np.zeros(box.bundles) if near is None else near
     request = Request(
         targets=points,
         residual=checked_residual(residual_over_length) * prepared.whole.length,
-        near=checked_activations("near", rest if near is None else near, box, len(points)),
+        near=checked_activations("near", rest, box, len(points)) / prepared.measures,
         direction=checked_direction(direction, len(points)),
         direction_weight=checked_number("direction_weight", direction_weight, 0.0, 1e6),
         family=checked_whole_number("family", family, 1, 10_000),
         seed=checked_whole_number("seed", seed, 0, 2**63),
+        prove_least=bool(prove_least),
     )
     blocks = list(parallel.blocks(len(points), _BLOCK)) or [slice(0)]
-    return Solutions.joined([_solved(prepared, request.of(rows)) for rows in blocks])
+    solutions = Solutions.joined([_solved(prepared, request.of(rows)) for rows in blocks])
+    return solutions.in_units_of(prepared.measures)
 
 
 def _solved(prepared: PreparedMap, request: Request) -> Solutions:
@@ -135,7 +150,20 @@ def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
     roots = roots_at(prepared.rod, request.targets, target, gamma)
     missing = roots.missing(len(request.targets))
     closest = nearest_from(prepared.rod, request.of(missing), best.gamma[missing])
-    return _solutions(prepared, request, roots, missing, closest)
+    solutions = _solutions(prepared, request, roots, missing, closest)
+    return _with_proofs(prepared, request, solutions) if request.prove_least else solutions
+
+
+def _with_proofs(prepared: PreparedMap, request: Request, solutions: Solutions) -> Solutions:
+    """The solutions, with bounds of the change where targets are reached."""
+    reached = np.flatnonzero(solutions.statuses == Status.REACHED)
+    first = solutions.activations[solutions.offsets[reached]][:, prepared.whole.box.free]
+    asked = request.of(reached)
+    change = np.linalg.norm(first - asked.near, axis=1)
+    found = change_bounds(prepared.rod, prepared.coarse_cells, asked.targets, asked.near, change)
+    bounds, proved = np.zeros(len(request.targets)), np.zeros(len(request.targets), bool)
+    bounds[reached], proved[reached] = found, found >= change - SLACK
+    return replace(solutions, change_bounds=bounds, least_proved=proved)
 
 
 def _solutions(
@@ -193,4 +221,6 @@ def _solutions(
         nearest_activations=prepared.whole.box.with_held(gamma),
         gaps=gaps,
         gap_bounds=bounds,
+        change_bounds=np.zeros(count),
+        least_proved=np.zeros(count, bool),
     )

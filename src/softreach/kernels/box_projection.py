@@ -13,7 +13,7 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 
-__all__ = ["project"]
+__all__ = ["climbs", "dual", "newton", "project"]
 
 _MOST_ITERATIONS = 60
 _CONVERGED = 1e-13  # of the largest terms
@@ -38,22 +38,22 @@ def project(center, slope, wanted, softness, low, high, out, multiplier):
     gram = np.zeros((3, 3))
     for n in range(center.shape[0]):
         y[:] = 0.0
-        best = _dual(center, slope, wanted, softness, low, high, n, y, out, error, gram)
+        best = dual(center, slope, wanted, softness, low, high, n, y, out, error, gram)
         for _ in range(_MOST_ITERATIONS):
-            ascent = _newton(gram, error, step)
+            ascent = newton(gram, error, step)
             if not ascent > _CONVERGED * (abs(best) + 1e-30):
                 break
             ends = center, slope, wanted, softness, low, high, n, y, step, trial
-            if not _climbs(ends, best, ascent):
+            if not climbs(ends, best, ascent):
                 break
             y[:] = trial
-            best = _dual(center, slope, wanted, softness, low, high, n, y, out, error, gram)
+            best = dual(center, slope, wanted, softness, low, high, n, y, out, error, gram)
         for i in range(3):
             multiplier[n, i] = y[i]
 
 
 @inline
-def _climbs(ends, best, ascent):
+def climbs(ends, best, ascent):
     """Shorten a step until the dual function grows as it should; whether it does."""
     center, slope, wanted, softness, low, high, n, y, step, trial = ends
     size = 1.0
@@ -88,7 +88,7 @@ def _value(center, slope, wanted, softness, low, high, n, y):
 
 
 @inline
-def _dual(center, slope, wanted, softness, low, high, n, y, out, error, gram):
+def dual(center, slope, wanted, softness, low, high, n, y, out, error, gram):
     """The dual function with its gradient, minus its Hessian, and x."""
     value = 0.0
     for i in range(3):
@@ -117,7 +117,7 @@ def _dual(center, slope, wanted, softness, low, high, n, y, out, error, gram):
 
 
 @inline
-def _newton(gram, error, step):
+def newton(gram, error, step):
     """Solve for the step by Cholesky; return its slope of ascent."""
     l00 = math.sqrt(gram[0, 0])
     l10, l20 = gram[1, 0] / l00, gram[2, 0] / l00

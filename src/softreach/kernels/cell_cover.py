@@ -11,14 +11,14 @@ __all__ = ["near_cells"]
 
 
 @kernel
-def near_cells(tips, slopes, radii, error, target, distance, out):
+def near_cells(tips, slopes, radii, errors, target, distance, out):
     """Write the numbers of the cells that may come within `distance` of a target into `out`.
 
     Args:
         tips: At the centers, shape (n, 3).
         slopes: Jacobians times half widths, shape (n, 3, m).
         radii: Sums of the lengths of their columns, shape (n,).
-        error: How far a tip may lie from its linearization.
+        errors: How far a tip may lie from its linearization, shape (n,).
         target: Shape (3,).
         distance: Cells farther than this are left out.
         out: Room for all, shape (n,).
@@ -31,7 +31,7 @@ def near_cells(tips, slopes, radii, error, target, distance, out):
     for c in range(tips.shape[0]):
         away = minus(p, row(tips, c))
         apart = math.sqrt(dot(away, away))
-        room = apart - error - distance
+        room = apart - errors[c] - distance
         if room > radii[c]:
             continue
         n = times(1.0 / max(apart, 1e-300), away)

@@ -6,6 +6,11 @@ behind it the tetrahedra on its far side minus those on its near side: nothing w
 straight through. What remains are the images of the box's own boundary and the folds, one dimension
 lower than the box, and only that is rasterized.
 
+Next to a fold the map is nearly flat and the linear images of its tetrahedra zigzag: they lie upon
+each other up to a hundred times where the map itself reaches a place twice. So a tetrahedron whose
+image is turned over where det J > 0, or is not where det J < 0, counts as -1: the layers of a
+zigzag cancel, and what is counted is how often each side of the fold covers a place.
+
 Vertices are whole numbers, stored as floats, small enough for every determinant to be exact: mapped
 tetrahedra share their faces to the last bit, and flat ones cover nothing.
 """
@@ -19,9 +24,9 @@ from numpy.typing import NDArray
 
 from softreach.kernels.compiler import strict
 from softreach.kernels.simplices import chains, corner_bits, corner_steps
-from softreach.kernels.strict_vector import cross, difference, dot
+from softreach.kernels.strict_vector import cross, difference, dot, minus, times
 
-__all__ = ["EXACT_BITS", "Star", "critical_triangles", "stars"]
+__all__ = ["EXACT_BITS", "Star", "critical_triangles", "stars", "stretches"]
 
 EXACT_BITS = 16
 """Bits of the largest difference of two vertices of a simplex: 3 · 16 + 3 of a float's 53."""
@@ -36,16 +41,15 @@ class Star(NamedTuple):
     """Axes along which it needs room above (bits), steps to its 2nd and 3rd vertex; (t, 3)."""
     apexes: Ints
     """For each tetrahedron on it: axes along which it needs room above and below (bits), step to
-    its fourth vertex, orientation in the box (0 if m > 3); (k, 4)."""
+    its fourth vertex, orientation in the box; (k, 4)."""
     ranges: Ints
     """The apexes of triangle i are those from ranges[i] to ranges[i + 1]; (t + 1,)."""
 
 
-def stars(cells: tuple[int, ...]) -> Star:
-    """Triangles of the Freudenthal triangulation of a grid of boxes, in 3 or more dimensions."""
-    m, steps = len(cells), corner_steps(cells)
-    faces = chains(m, 2)
-    around = [_apexes(m, steps, chain) for chain in faces]
+def stars(cells: tuple[int, int, int]) -> Star:
+    """Triangles of the Freudenthal triangulation of a grid of boxes."""
+    steps, faces = corner_steps(cells), chains(3, 2)
+    around = [_apexes(steps, chain) for chain in faces]
     return Star(
         np.column_stack([faces[:, 2], steps[faces[:, 1]], steps[faces[:, 2]]]),
         np.array([apex for group in around for apex in group], np.int64),
@@ -53,14 +57,12 @@ def stars(cells: tuple[int, ...]) -> Star:
     )
 
 
-def _apexes(m: int, steps: Ints, chain: Ints) -> list[tuple[int, int, int, int]]:
+def _apexes(steps: Ints, chain: Ints) -> list[tuple[int, int, int, int]]:
     """Every way to make the chain of a triangle longer by one, at its lower end too."""
-    first, last, corners = int(chain[1]), int(chain[2]), range(1, 1 << m)
-    bits = corner_bits(m)
+    first, last, corners = int(chain[1]), int(chain[2]), range(1, 8)
+    bits = corner_bits(3)
 
     def turn(arrow: Ints) -> int:
-        if m > 3:
-            return 0
         return round(np.linalg.det(np.array([bits[first], bits[last], arrow])))
 
     between = [c for c in corners if _inside(c, first) or (_inside(first, c) and _inside(c, last))]
@@ -76,17 +78,54 @@ def _inside(small: int, large: int) -> bool:
 
 
 @strict
-def critical_triangles(points, cells, first, last, star, out):
+def stretches(points, cells):
+    """Eight times det J at the vertices, per cell, from the differences of their neighbors.
+
+    Args:
+        points: Mapped vertices, shape (n, 3), in the C order of the grid.
+        cells: Number of cells along each axis, shape (3,).
+
+    Returns:
+        Shape (n,).
+    """
+    rows, layer = cells[2] + 1, (cells[1] + 1) * (cells[2] + 1)
+    out = np.empty(len(points))
+    for v in range(len(points)):
+        first = slope(points, v, v // layer, cells[0], layer)
+        second = slope(points, v, v % layer // rows, cells[1], rows)
+        third = slope(points, v, v % rows, cells[2], 1)
+        out[v] = dot(cross(first, second), third)
+    return out
+
+
+@strict
+def slope(points, v, at, cells, step):
+    """Twice the derivative along an axis, at its vertex number `at`."""
+    if 0 < at < cells:
+        return difference(points, v + step, v - step)
+    inward, sign = (step, 1.0) if at == 0 else (-step, -1.0)
+    near = difference(points, v + inward, v)
+    if cells == 1:
+        return times(2.0 * sign, near)
+    far = difference(points, v + 2 * inward, v)
+    return minus(times(4.0 * sign, near), times(sign, far))
+
+
+@strict
+def critical_triangles(points, stretches, cells, first, last, star, out):
     """Triangles with least vertex in first..last around which the mapped tetrahedra do not balance.
 
     Args:
         points: Mapped vertices, whole numbers, shape (n, 3), in the C order of the grid.
-        cells: Number of cells along each axis, shape (m,).
+        stretches: det J at the vertices in whole numbers, whose sum says which orientation a
+            tetrahedron should have, shape (n,).
+        cells: Number of cells along each axis, shape (3,).
         first: First vertex of this task.
         last: One past its last.
         star: What `stars` says of one vertex.
         out: Result, one row a triangle: its three vertices; tetrahedra on the side of its normal
-            (b - a) × (c - a) minus those on the other; the same weighted with orientation (m = 3).
+            (b - a) × (c - a) minus those on the other, each 1 if oriented as it should be, else
+            -1; the same with 1 if it keeps the orientation, else -1.
 
     Returns:
         Number of rows written.
@@ -100,14 +139,16 @@ def critical_triangles(points, cells, first, last, star, out):
                 continue
             b, c = v + triangles[t, 1], v + triangles[t, 2]
             normal = cross(difference(points, b, v), difference(points, c, v))
+            stretch = stretches[v] + stretches[b] + stretches[c]
             balance, turns = 0, 0
             for k in range(ranges[t], ranges[t + 1]):
                 if apexes[k, 0] & ~above or apexes[k, 1] & ~below:
                     continue
-                height = dot(normal, difference(points, v + apexes[k, 2], v))
-                side = (height > 0) - (height < 0)
-                balance += side
-                turns += apexes[k, 3] * side * side
+                apex = v + apexes[k, 2]
+                # side times orientation, which is side · turn
+                turn = apexes[k, 3] * (dot(normal, difference(points, apex, v)) != 0)
+                balance += turn if stretch + stretches[apex] > 0 else -turn
+                turns += turn
             if balance != 0 or turns != 0:
                 out[count, 0], out[count, 1], out[count, 2] = v, b, c
                 out[count, 3], out[count, 4] = balance, turns
@@ -119,7 +160,7 @@ def critical_triangles(points, cells, first, last, star, out):
 def room(cells, v):
     """Axes (as bits) along which vertex v has a cell above it, and one below it."""
     above, below = 0, 0
-    for j in range(len(cells) - 1, -1, -1):
+    for j in (2, 1, 0):
         at = v % (cells[j] + 1)
         v //= cells[j] + 1
         above |= (at < cells[j]) << j

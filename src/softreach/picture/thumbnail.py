@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.palette import STEEL, Color
 from softreach.picture.png import png_bytes
 from softreach.picture.projection import View, project
+from softreach.picture.see_through import faces_to_eye, seen_through
 from softreach.picture.shading import draw_mesh
 from softreach.picture.zbuffer import Extent, ZBuffer
 
@@ -31,6 +32,8 @@ class Skin(NamedTuple):
     faces: ArrayLike
     """Shape (f, 3)."""
     color: Color = STEEL
+    clear: bool = False
+    """Whether the outward sides of all that is not so show through it."""
 
 
 class Dots(NamedTuple):
@@ -78,13 +81,19 @@ def thumbnail(*parts: Skin | Dots, view: View = "oblique", width: int = _WIDTH) 
     if extent is None:
         return None
     faces = sum(len(np.asarray(part.faces)) for part in parts if isinstance(part, Skin))
-    buffer = ZBuffer(extent, width, oversample=1 if faces > _FINE else 2, color_step=4)
+    clear = any(isinstance(part, Skin) and part.clear for part in parts)
+    buffer, within = (
+        ZBuffer(extent, width, oversample=1 if faces > _FINE else 2, color_step=4) for _ in range(2)
+    )
     for part, points in zip(parts, seen, strict=True):
-        if isinstance(part, Skin):
-            _draw_skin(buffer, part, view)
-        else:
+        if isinstance(part, Dots):
             _draw_dots(buffer, points, part.colors)
-    return png_bytes(buffer.rgba())
+            continue
+        _draw_skin(buffer, part, view)
+        if clear and not part.clear:
+            faces = faces_to_eye(part.vertices, part.faces, view)
+            _draw_skin(within, part._replace(faces=faces), view)
+    return png_bytes(seen_through(buffer.rgba(), within.rgba()) if clear else buffer.rgba())
 
 
 def _square_around(seen: list[NDArray[np.float64]]) -> Extent | None:

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm_shape import arm_surface, bundle_bands, rest_configuration
-from softreach.geometry.tube import grid_faces
+from softreach.arm.skin import inside
+from softreach.arm_shape import arm_surface, bundle_skins, rest_configuration
 from softreach.palette import BODY, bundle_color
 from softreach.picture.projection import View
+from softreach.picture.see_through import faces_to_eye
 from softreach.picture.shading import draw_mesh
 from softreach.picture.zbuffer import ZBuffer
 from softreach.plot.frame import Panel
@@ -29,6 +30,7 @@ __all__ = ["arm_points", "plot_arm", "shapes_of"]
 Array = NDArray[np.float64]
 
 _SIDES = 96
+_BULGE = 1.01  # of R2, beyond which a bundle makes the picture wider
 _FADE = 0.62  # how far the colors of the arm at rest go toward white
 
 
@@ -82,8 +84,14 @@ def shapes_of(configuration: xr.Dataset | None) -> list[xr.Dataset]:
 
 
 def arm_points(arm: Manipulator, shape: xr.Dataset) -> Array:
-    """Points of the surface of one configuration [L], shape (n, 3)."""
-    return arm_surface(shape, _SIDES).vertices / arm.length
+    """Points of one configuration [L]: its surface, and bundles outside of it; shape (n, 3)."""
+    outline = arm.outline(shape["Z"].values)
+    out = (outline.outer_ratio > _BULGE) & outline.acts
+    surfaces = [arm_surface(arm, shape, _SIDES)]
+    if out.any():
+        skins = bundle_skins(arm, shape)
+        surfaces += [skin for k, skin in enumerate(skins) if out[:, k].any()]
+    return np.concatenate([surface.vertices for surface in surfaces]) / arm.length
 
 
 def _show(
@@ -94,27 +102,27 @@ def _show(
     fade: float = 0.0,
 ) -> None:
     """One image of all shapes, over what the axes hold."""
-    if shapes:
-        buffer = panel.buffer(oversample=3)
-        for shape in shapes:
-            _draw(buffer, arm, shape, panel.view, bundles, fade)
-        panel.show(buffer)
+    if not shapes:
+        return
+    buffer, within = panel.buffer(oversample=3), panel.buffer(oversample=3)
+    hidden = inside(arm)
+    clear = any(hidden[index] for index in bundles)
+    for shape in shapes:
+        _draw_body(buffer, arm, shape, panel.view, fade)
+        skins = bundle_skins(arm, shape, lift=0.008)
+        for index in bundles:
+            color, points, faces = bundle_color(index), skins[index].vertices, skins[index].faces
+            draw_mesh(buffer, points / arm.length, faces, color, panel.view, fade)
+            if clear:
+                faces = faces_to_eye(points, faces, panel.view)
+                draw_mesh(within, points / arm.length, faces, color, panel.view, fade)
+    panel.show(buffer, within if clear else None)
 
 
-def _draw(
-    buffer: ZBuffer,
-    arm: Manipulator,
-    shape: xr.Dataset,
-    view: View,
-    bundles: Collection[int],
-    fade: float,
+def _draw_body(
+    buffer: ZBuffer, arm: Manipulator, shape: xr.Dataset, view: View, fade: float
 ) -> None:
-    body = arm_surface(shape, _SIDES)
+    body = arm_surface(arm, shape, _SIDES)
     caps = 2 * _SIDES  # the last faces; apart, so that light breaks at the rim
     for part in (body.faces[:-caps], body.faces[-caps:]):
         draw_mesh(buffer, body.vertices / arm.length, part, BODY, view, fade)
-    bands = bundle_bands(arm, shape, lift=0.008)
-    for index in bundles:
-        band = bands[index]
-        skin = grid_faces(*band.shape[:2])
-        draw_mesh(buffer, band.reshape(-1, 3) / arm.length, skin, bundle_color(index), view, fade)

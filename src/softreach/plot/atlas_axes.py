@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -17,7 +18,8 @@ __all__ = ["SheetAxis", "box_over_length", "plain", "sheet_axes"]
 
 Array = NDArray[np.float64]
 
-_SYMBOLS = {"revolution": "Ω", "taper": "φ", "poisson_ratio": "ν", "radius_ratio": "$R_1/R_2$"}
+_UNITS = {"rad": "°", "1": ""}
+_INDEXED = re.compile(r"(?<![a-z])([ERZaρθ])([0-9tc])")
 
 
 class SheetAxis(NamedTuple):
@@ -56,13 +58,25 @@ def box_over_length(atlas: xr.Dataset) -> Array:
 
 
 def _axis(values: xr.DataArray) -> SheetAxis:
-    angle = values.attrs.get("units") == "rad"
-    unit = (
-        "°" if angle else {"1": ""}.get(values.attrs.get("units", "1"), values.attrs.get("units"))
-    )
-    shown = np.degrees(values.values) if angle else values.values
-    name = _SYMBOLS.get(str(values.name), plain(str(values.name)))
+    given = values.attrs.get("units", "1")
+    unit = _UNITS.get(given, given)
+    shown = np.degrees(values.values) if given == "rad" else values.values
+    name = _name(values)
     return SheetAxis(f"{name} ({unit})" if unit else name, tuple(np.round(shown, 9).tolist()))
+
+
+def _name(values: xr.DataArray) -> str:
+    """The symbol of a parameter and the part that it belongs to."""
+    if "symbol" not in values.attrs:
+        return plain(str(values.name))
+    symbol = _in_math(values.attrs["symbol"])
+    return f"{symbol} of {plain(part)}" if (part := values.attrs.get("part")) else symbol
+
+
+def _in_math(symbol: str) -> str:
+    """R1/R2 with its indices set low."""
+    text = _INDEXED.sub(r"\1_\2", symbol)
+    return symbol if text == symbol else f"${text}$"
 
 
 def plain(name: str) -> str:

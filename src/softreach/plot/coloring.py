@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.errors import InvalidInput
 from softreach.palette import activation_colors
+from softreach.schema import activation_symbols, activation_units
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,6 +30,8 @@ __all__ = [
     "draw_key",
 ]
 
+Array = NDArray[np.float64]
+
 COLORMAP = "viridis"
 _MISSING = 204  # light gray
 _LINE = 44  # characters above axes of a column's width
@@ -38,6 +42,14 @@ class BundleKey(NamedTuple):
 
     names: tuple[str, ...]
     colors: NDArray[np.uint8]
+    symbols: tuple[str, ...]
+    """What formulas call the activation of each: γ, τ or P."""
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """What each color stands for."""
+        pairs = zip(self.symbols, self.names, strict=True)
+        return tuple(f"|{symbol}| {name}" for symbol, name in pairs)
 
 
 class ScalarKey(NamedTuple):
@@ -60,23 +72,34 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike = "rgb") -> Co
 
     Args:
         cloud: activation(sample, bundle) [-].
-        color: "rgb" for |γ| / max |γ| of all bundles; the name or index of one bundle; one number
-            per sample, whose attributes `long_name` and `units` go to the key if it is a DataArray;
-            or RGB from 0 to 1 per sample.
+        color: "rgb" for |γ| / max |γ| of all bundles, of each where their units differ; the name or
+            index of one bundle; one number per sample, whose attributes `long_name` and `units` go
+            to the key if it is a DataArray; or RGB from 0 to 1 per sample.
 
     Raises:
         InvalidInput: No such bundle, or an array of another length.
     """
     activation = bundle_activations(cloud)
-    names = bundle_names(cloud)
+    names, units = bundle_names(cloud), activation_units(activation)
+    symbols = activation_symbols(units)
     if isinstance(color, str) and color == "rgb":
         lights = activation_colors(np.eye(len(names)))
-        return Coloring(activation_colors(activation.values), BundleKey(names, lights))
+        key = BundleKey(names, lights, symbols)
+        return Coloring(activation_colors(_comparable(activation.values, units)), key)
     if isinstance(color, str | int | np.integer):
         bundle = _bundle(names, color)
         magnitude = np.abs(activation.values[:, bundle])
-        return _scalar(magnitude, f"|γ| {names[bundle]}", 0.0)
+        unit = "" if units[bundle] == "1" else f" [{units[bundle]}]"
+        return _scalar(magnitude, f"|{symbols[bundle]}| {names[bundle]}{unit}", 0.0)
     return _given(color, len(activation))
+
+
+def _comparable(activation: Array, units: Sequence[str]) -> Array:
+    """Activations as they are; where units differ, each over its largest magnitude."""
+    if len(set(units)) == 1:
+        return activation
+    largest = np.nanmax(np.abs(activation), axis=0, initial=0.0)
+    return activation / np.where(largest > 0, largest, 1.0)
 
 
 def bundle_activations(cloud: xr.Dataset) -> xr.DataArray:
@@ -181,5 +204,5 @@ def color_map(key: ScalarKey) -> Any:
 def _patches(key: BundleKey) -> list[Any]:
     from matplotlib.patches import Patch
 
-    named = zip(key.names, key.colors / 255, strict=True)
-    return [Patch(facecolor=tuple(rgb), label=f"|γ| {name}") for name, rgb in named]
+    named = zip(key.labels, key.colors / 255, strict=True)
+    return [Patch(facecolor=tuple(rgb), label=label) for label, rgb in named]

@@ -1,4 +1,4 @@
-"""The picture of a cross-section: its ring, and the sector that each bundle fills."""
+"""The picture of a cross-section: its layers, and the place of each bundle in it."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softreach.errors import InvalidInput
-from softreach.palette import BODY, bundle_color
 from softreach.plot.lengths import in_lengths
+from softreach.plot.section_bundles import draw_bundles, placed_bundles
+from softreach.plot.section_key import needs_section_key, section_key
+from softreach.plot.section_layers import draw_layers
 from softreach.plot.style import figure_style, small_axes
 
 if TYPE_CHECKING:
@@ -17,7 +19,10 @@ if TYPE_CHECKING:
 
     from softreach.arm.manipulator import Manipulator
 
-__all__ = ["plot_cross_section"]
+__all__ = ["plot_cross_section", "section_reach"]
+
+_SIZE = 2.0  # inches
+_MARGIN = 1.08
 
 
 def plot_cross_section(
@@ -27,8 +32,13 @@ def plot_cross_section(
     ax: Axes | None = None,
     bundles: Collection[int] | None = None,
     half_width: float | None = None,
+    legend: bool | None = None,
 ) -> Axes:
-    """Draw where the bundles lie in the cross-section at Z, seen from the tip (figure 1c).
+    """Draw the cross-section at Z, seen from the tip (figure 1c): layers, and the bundles that act.
+
+    Fibers and muscles fill a sector of their ring; strokes show radial and oblique ones. Where
+    sectors overlap, the lower shows in stripes. Tendons are dots, dotted circles the disks that
+    hold those outside of the arm; chambers are round. What does not act at Z is left out.
 
     Args:
         arm: The design, at rest.
@@ -37,6 +47,8 @@ def plot_cross_section(
         bundles: Which to draw, by index; None for all.
         half_width: Of what is shown [m], to draw several sections at one scale; None for this
             section.
+        legend: Whether to name materials and bundles beside it; None where there are several
+            materials, or bundles other than fibers.
 
     Returns:
         The axes, in L.
@@ -48,34 +60,26 @@ def plot_cross_section(
     if not 0 <= z <= arm.length:
         raise InvalidInput("z", z, f"within [0, {arm.length:g}] m")
     unit = in_lengths(arm.length)
-    outer, outline = float(unit.of(arm.profile.radius(z))), arm.outline(z)
+    outer = float(unit.of(arm.profile.radius(z)))
+    placed = placed_bundles(arm, z, range(arm.bundles) if bundles is None else bundles)
+    legend = needs_section_key(arm) if legend is None else legend
     with figure_style(ax):
-        ax = small_axes(2.0, 2.0) if ax is None else ax
-        _draw_ring(ax, outer, float(outline.inner_ratio.min()))
-        angles, extents = np.degrees(outline.center[0]), np.degrees(outline.extent)
-        for k in range(arm.bundles) if bundles is None else bundles:
-            _draw_sector(ax, outer, float(outline.inner_ratio[k]), angles[k], extents[k], k)
-        half = 1.08 * outer if half_width is None else float(unit.of(half_width))
+        key = section_key(arm, placed) if legend else None
+        ax = small_axes(_SIZE + (key.width if key else 0.0), _SIZE) if ax is None else ax
+        draw_layers(ax, arm.section, outer)
+        draw_bundles(ax, placed, outer)
+        half = _MARGIN * section_reach(arm, z) if half_width is None else half_width
+        half = float(unit.of(half))
         ax.set(aspect="equal", xlim=(-half, half), ylim=(-half, half))
         ax.set(xlabel=unit.label("x"), ylabel=unit.label("y"))
         ax.locator_params(nbins=3)
+        if key:
+            key.draw(ax)
     return ax
 
 
-def _draw_ring(ax: Axes, outer: float, ratio: float) -> None:
-    from matplotlib.patches import Annulus, Circle
-
-    ax.add_patch(Circle((0, 0), outer, facecolor="0.97", edgecolor="0.4", linewidth=0.6))
-    ring = {"facecolor": BODY, "edgecolor": "0.4", "linewidth": 0.4}
-    ax.add_patch(Annulus((0, 0), outer, outer * (1 - ratio), **ring))
-
-
-def _draw_sector(
-    ax: Axes, outer: float, ratio: float, angle: float, extent: float, bundle: int
-) -> None:
-    """A bundle from angle - extent/2 to angle + extent/2 [degrees]."""
-    from matplotlib.patches import Wedge
-
-    ends = angle - extent / 2, angle + extent / 2
-    width = outer * (1 - ratio)
-    ax.add_patch(Wedge((0, 0), outer, *ends, width=width, color=bundle_color(bundle), linewidth=0))
+def section_reach(arm: Manipulator, z: float) -> float:
+    """Distance from the axis of the surface at Z, or of what lies farther outside [m]."""
+    outline = arm.outline(z)
+    widest = np.max(outline.outer_ratio[outline.acts], initial=1.0)
+    return float(arm.profile.radius(z)) * float(widest)

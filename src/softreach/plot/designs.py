@@ -10,7 +10,7 @@ import numpy as np
 from softreach.arm_shape import rest_configuration
 from softreach.picture.projection import View
 from softreach.plot.arm import arm_points, plot_arm
-from softreach.plot.cross_section import plot_cross_section
+from softreach.plot.cross_section import plot_cross_section, section_reach
 from softreach.plot.frame import bounding_box
 from softreach.plot.style import figure_style, pyplot
 
@@ -51,7 +51,7 @@ def plot_designs(
     """
     box = bounding_box(*(arm_points(p.arm, rest_configuration(p.arm)) for p in panels))
     reach = 1.08 * max(
-        float(p.arm.profile.radius(s * p.arm.length)) / p.arm.length
+        section_reach(p.arm, s * p.arm.length) / p.arm.length
         for p in panels
         for s in (*stations_over_length, 0.0)
     )
@@ -70,7 +70,7 @@ def plot_designs(
             axes[0, k].set_title(panel.title)
             for ax, station in zip(axes[1:, k], stations_over_length, strict=True):
                 z, half = station * length, reach * length
-                plot_cross_section(arm, z, ax=ax, bundles=drawn, half_width=half)
+                plot_cross_section(arm, z, ax=ax, bundles=drawn, half_width=half, legend=False)
                 ax.set_title(f"Z = {station:.2g} L" if station else "Z = 0")
         for ax in np.ravel(axes[:, 1:]):
             ax.set(ylabel="", yticklabels=[])

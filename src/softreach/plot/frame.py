@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.errors import InvalidInput
 from softreach.picture.projection import View, is_mirrored, plane_of, project
+from softreach.picture.see_through import seen_through
 from softreach.picture.zbuffer import Extent, ZBuffer
 from softreach.plot.lengths import LengthUnit
 from softreach.plot.space_box import draw_box
@@ -72,8 +73,12 @@ class Panel:
         """An empty image of the panel; see `ZBuffer`."""
         return ZBuffer(self.extent, self._columns(), oversample, color_step)
 
-    def show(self, buffer: ZBuffer) -> None:
+    def show(self, buffer: ZBuffer, within: ZBuffer | None = None) -> None:
         """Place the finished image in the axes and label them; what is there stays in view.
+
+        Args:
+            buffer: The image.
+            within: What shows through it; None for nothing.
 
         Raises:
             InvalidInput: What is there is counted in another unit.
@@ -83,8 +88,9 @@ class Panel:
         mirror = -1 if is_mirrored(self.view) else 1
         left, right, bottom, top = buffer.extent
         extent, order = (mirror * left, mirror * right, bottom, top), 2 + len(ax.images) / 100
+        pixels = buffer.rgba() if within is None else seen_through(buffer.rgba(), within.rgba())
         # "none": vector files get the pixels as they are
-        image = ax.imshow(buffer.rgba(), extent=extent, interpolation="none", zorder=order)
+        image = ax.imshow(pixels, extent=extent, interpolation="none", zorder=order)
         image.set_label(_UNIT_MARK + self.unit.symbol)
         _widen(ax, extent, first, mirror)
         if plane:

@@ -113,6 +113,10 @@ class FreeRod(TipMap):
         """The largest |r(γ + d) - r(γ) - r'(γ) d| [m] for |dj| <= half_widths[j] in the box."""
         return self._linearization.error(half_widths)
 
+    def linearization_errors(self, centers: Array, half_widths: Array) -> Array:
+        """The same [m] for |dj| <= half_widths[j] around each center only, shape (n,)."""
+        return self._linearization.errors(centers, half_widths)
+
     @cached_property
     def _linearization(self) -> Linearization:
         return Linearization(self.arm, self.box)

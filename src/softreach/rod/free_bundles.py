@@ -72,9 +72,16 @@ class FreeBundles(TipMap):
 
     def linearization_error(self, half_widths: Array) -> float:
         """The largest |r(γ + d) - r(γ) - r'(γ) d| [m] for |dj| <= half_widths[j] in the box."""
+        return self.whole.linearization_error(self._widths_of_all(half_widths))
+
+    def linearization_errors(self, centers: Array, half_widths: Array) -> Array:
+        """The same [m] for |dj| <= half_widths[j] around each center only, shape (n,)."""
+        return self.whole.linearization_errors(self._all(centers), self._widths_of_all(half_widths))
+
+    def _widths_of_all(self, half_widths: Array) -> Array:
         whole = np.zeros(self.whole.box.bundles)
         whole[self.whole.box.free] = half_widths
-        return self.whole.linearization_error(whole)
+        return whole
 
     def frames(self, activations: ArrayLike, stations: ArrayLike) -> Frames:
         """Centerline and directors at ascending stations Z [m]."""

@@ -6,17 +6,25 @@ by at most a = ∫ |κ|. From r = ∫ ζ d3 the second derivative along d is
 r''[d, d] = ∫ 2 (z·d) ω × d3 + ζ ω' × d3 + ζ ω × (ω × d3),   |ω'| <= ½ a² + ∫ 2 |z·d| |U d|,
 
 so that |r''[d, d]| <= ∫ 2 |z·d| a + ζ (3/2 a² + ∫ 2 |z·d| |U d|) with ζ and u at their largest in
-the activation box. Here ω' is the change of ω = ∫ R κ, whose part ∫ ω × ω' is at most ½ a². The
-remainder of the linearization is at most half of that.
+the activation box, or in the cell of it where γ + d lies. Here ω' is the change of ω = ∫ R κ, whose
+part ∫ ω × ω' is at most ½ a². The remainder of the linearization is at most half of that.
+
+In a cell ζ and |u| are parts of what they are at most in the box, at every station no more than the
+largest part anywhere along the arm. All integrals are then those of the box times powers of the two
+largest parts, and are computed once.
 """
 
 from __future__ import annotations
+
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import both_sides, tables
+from softreach.kernels.relative_strains import relative_strains
 from softreach.rod.activation_box import ActivationBox
 
 __all__ = ["Linearization"]
@@ -26,6 +34,31 @@ Array = NDArray[np.float64]
 _STATIONS = 201
 _SAFETY = 1.02  # for quadrature, and for the steps of the map as it is computed
 _MOST_SIGNS = 8  # bundles up to which all signs of d are tried
+_MOST_KNOWN = 64  # proportions of half widths whose terms are kept
+
+
+class _Terms(NamedTuple):
+    """What the bound is made of where extension and bending are largest: degree two in d."""
+
+    turned_twice: float
+    """∫ 3/2 ζ a² by the first part of κ = ζ U d + (z·d) u."""
+    turned_and_stretched: float
+    """The same by one of each."""
+    stretched_twice: float
+    """The same by the second part."""
+    turned: float
+    """∫ 2 |z·d| a by the first part."""
+    stretched: float
+    """∫ 2 |z·d| a by the second part."""
+    mixed: float
+    """∫ ζ ∫ 2 |z·d| |U d|."""
+
+    def sum(self, longest: Array | float, bending: Array | float) -> Array | float:
+        """The bound where extension and bending are these parts of their largest values."""
+        square = self.turned_twice * longest**2 + self.stretched_twice * bending**2
+        square += self.turned_and_stretched * longest * bending
+        linear = self.turned * longest + self.stretched * bending + self.mixed * longest
+        return 0.5 * _SAFETY * (longest * square + linear)
 
 
 class Linearization:
@@ -36,11 +69,12 @@ class Linearization:
         s = np.linspace(0.0, arm.profile.slender_length, _STATIONS)
         table = tables(arm, both_sides(arm, arm.profile.station(s)))
         self.stations, self.curvature = table.stations, table.curvature
-        self.stretch = np.abs(table.extension)
+        self.extension, self.stretch = table.extension, np.abs(table.extension)
         middle, half = 0.5 * (box.low + box.high), 0.5 * box.widths
         self.longest = 1.0 + table.extension @ middle + self.stretch @ half
-        size = np.linalg.norm(self.curvature, axis=1)
-        self.bending = np.linalg.norm(self.curvature @ middle, axis=1) + size @ half
+        self.size = np.linalg.norm(self.curvature, axis=1)
+        self.bending = np.linalg.norm(self.curvature @ middle, axis=1) + self.size @ half
+        self._known: dict[bytes, _Terms] = {}
 
     @property
     def longest_arm(self) -> float:
@@ -49,18 +83,60 @@ class Linearization:
 
     def error(self, half_widths: Array) -> float:
         """The largest |r(γ + d) - r(γ) - r'(γ) d| [m] for |dj| <= half_widths[j] in the box."""
-        free = np.flatnonzero(half_widths > 0)
+        square, terms = self._terms(half_widths)
+        return square * float(terms.sum(1.0, 1.0))
+
+    def errors(self, centers: Array, half_widths: Array) -> Array:
+        """The same for |dj| <= half_widths[j] around each center only, shape (n,)."""
+        n = len(centers)
+        longest, bending = np.empty(n), np.empty(n)
+        offset = (1.0 + self.stretch @ half_widths) / self.longest
+        relative_strains(centers, offset, *self._relative, longest, bending)
+        bending = np.sqrt(bending) + (self.size @ half_widths * self._bending_inverse).max()
+        square, terms = self._terms(half_widths)
+        return square * np.asarray(terms.sum(np.minimum(longest, 1.0), np.minimum(bending, 1.0)))
+
+    @cached_property
+    def _bending_inverse(self) -> Array:
+        """1/bending at every station [m], 0 where nothing bends."""
+        return np.divide(1.0, self.bending, where=self.bending > 0, out=0 * self.bending)
+
+    @cached_property
+    def _relative(self) -> tuple[Array, Array]:
+        """Extension and curvature of each bundle as parts of the largest ones."""
+        stretch = self.extension / self.longest[:, None]
+        curvature = self.curvature * self._bending_inverse[:, None, None]
+        return stretch, curvature
+
+    def _terms(self, half_widths: Array) -> tuple[float, _Terms]:
+        """The largest half width squared, and the terms for it at 1, known for each proportion."""
+        largest = float(half_widths.max(initial=0.0))
+        shape = half_widths / (largest or 1.0)
+        terms = self._known.get(shape.tobytes())
+        if terms is None:
+            terms = self._computed(shape)
+            if len(self._known) < _MOST_KNOWN:
+                self._known[shape.tobytes()] = terms
+        return largest**2, terms
+
+    def _computed(self, half_widths: Array) -> _Terms:
+        free, z = np.flatnonzero(half_widths > 0), self.stations
         if not len(free):
-            return 0.0
-        stretch = self.stretch @ half_widths
-        turned = self._turns(half_widths, free)
-        turn = _integrals(self.longest * turned + stretch * self.bending, self.stations)
+            return _Terms(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        stretch, turned = self.stretch @ half_widths, self._turns(half_widths, free)
+        first = _integrals(self.longest * turned, z)
+        second = _integrals(stretch * self.bending, z)
+        weight, most = 1.5 * self.longest, turned.max(axis=0)
+        inner = self.longest * _integrals(2.0 * stretch * most, z)
         # The square of a is convex in d, so that it is largest where all |dj| are.
-        square = _integrals(1.5 * self.longest * turn**2, self.stations)[:, -1].max()
-        most = turned.max(axis=0)
-        inner = 2.0 * stretch * turn.max(axis=0)
-        inner += self.longest * _integrals(2.0 * stretch * most, self.stations)
-        return 0.5 * _SAFETY * float(square + _integrals(inner, self.stations)[-1])
+        return _Terms(
+            turned_twice=float(_integrals(weight * first**2, z)[:, -1].max()),
+            turned_and_stretched=float(_integrals(2.0 * weight * first * second, z)[:, -1].max()),
+            stretched_twice=float(_integrals(weight * second**2, z)[-1]),
+            turned=float(_integrals(2.0 * stretch * first.max(axis=0), z)[-1]),
+            stretched=float(_integrals(2.0 * stretch * second, z)[-1]),
+            mixed=float(_integrals(inner, z)[-1]),
+        )
 
     def _turns(self, half_widths: Array, free: NDArray[np.intp]) -> Array:
         """|U d| at every station for every d that counts, shape (d, station)."""

@@ -152,6 +152,15 @@ class TipMap(ABC):
         """
         return np.inf
 
+    def linearization_errors(self, centers: Array, half_widths: Array) -> Array:
+        """The same [m] for |dj| <= half_widths[j] around each center only, shape (n,).
+
+        Args:
+            centers: Activations of which no d leads out of the box, shape (n, bundles).
+            half_widths: Shape (bundles,).
+        """
+        return np.full(len(centers), self.linearization_error(half_widths))
+
     @abstractmethod
     def frames(self, activations: ArrayLike, stations: ArrayLike) -> Frames:
         """Centerline and directors at ascending stations Z [m]."""

@@ -109,6 +109,7 @@ def _furnish(session: Session, url: str) -> None:
     from softreach.studio.panels.design import DesignPanel
     from softreach.studio.panels.export import ExportPanel
     from softreach.studio.panels.inverse import InversePanel
+    from softreach.studio.panels.parts import PartsPanel
     from softreach.studio.panels.status import StatusPanel
     from softreach.studio.panels.view import ViewPanel
 
@@ -117,6 +118,7 @@ def _furnish(session: Session, url: str) -> None:
     tabs = gui.add_tab_group()
     kinds = {
         "Design": DesignPanel,
+        "Parts": PartsPanel,
         "Activation": ActivationPanel,
         "Inverse": InversePanel,
         "View": ViewPanel,

@@ -141,7 +141,8 @@ def _shown(atlas: xr.Dataset, name: str) -> NDArray[np.float64]:
 
 
 def _label(atlas: xr.Dataset, name: str) -> str:
-    unit = {"rad": "deg", "1": ""}.get(atlas[name].attrs.get("units", ""), "m")
+    given = atlas[name].attrs.get("units", "1")
+    unit = {"rad": "deg", "1": ""}.get(given, given)
     return f"{name.replace('_', ' ')} [{unit}]" if unit else name.replace("_", " ")
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.plot.coloring import BundleKey, Coloring, ScalarKey, color_samples
 from softreach.redundancy import activation_distance
+from softreach.schema import activation_symbols
 from softreach.studio.reach import Reach, shown_samples
 from softreach.studio.rod import rod_of
 from softreach.studio.worker import all_cores
@@ -37,7 +38,8 @@ def color_names(arm: Manipulator) -> dict[str, str]:
     """What points can be colored by: name -> what the menu says."""
     box = rod_of(arm).box
     names = {"rgb": "all activations (RGB)"}
-    names |= {f"bundle {k}": f"|γ| {name}" for k, name in enumerate(box.names)}
+    labels = zip(activation_symbols(arm.bundle_units), box.names, strict=True)
+    names |= {f"bundle {k}": f"|{symbol}| {name}" for k, (symbol, name) in enumerate(labels)}
     names["manipulability"] = "manipulability"
     names["activation distance"] = "activation distance D̄"
     if box.dimension == 3:
@@ -83,8 +85,8 @@ def manipulability(arm: Manipulator, activation: Array) -> Array:
 def key_html(key: BundleKey | ScalarKey | None) -> str:
     """The colors explained, as HTML without anything from elsewhere."""
     if isinstance(key, BundleKey):
-        named = zip(key.names, key.colors.tolist(), strict=True)
-        parts = (f"{_swatch(rgb)} |γ| {html.escape(name)}" for name, rgb in named)
+        named = zip(key.labels, key.colors.tolist(), strict=True)
+        parts = (f"{_swatch(rgb)} {html.escape(label)}" for label, rgb in named)
         return _line(" &ensp; ".join(parts))
     if key is None:
         return ""

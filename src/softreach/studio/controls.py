@@ -56,27 +56,56 @@ _OF_ARM = {
     "lower": _Slider("lowest γ", -4, 0, 0.01),
     "upper": _Slider("highest γ", -1, 2, 0.01),
 }
-_OF_ACTUATOR = {
+_OF_PART = {
     "bundles": _Slider("bundles of {owner}", 1, 6, 1),
     "offset": _Slider("offset of {owner} [deg]", 0, 360, 1),
+    "distance_ratio": _Slider("distance of {owner} / outer radius", 0, 1, 0.01),
+    "radius_ratio": _Slider("radius of {owner} / outer radius", 0.01, 0.5, 0.005),
 }
+_AROUND_VALUE = ("lower", "upper", "young_modulus")
+"""Fields of any magnitude: their sliders end at multiples of what the design has."""
 
 
 def controls(arm: Manipulator) -> list[Control]:
-    """The sliders of a design, those of the whole arm first."""
+    """The sliders of a design, those of the whole arm first.
+
+    What the design leaves open, such as a modulus that cancels, has none.
+    """
     known = parameters(arm)
-    owners = dict.fromkeys(one.owner for one in known.values())
-    return [
-        _control(arm, known[name], slider)
-        for owner in owners
-        for field, slider in (_OF_ACTUATOR if owner else _OF_ARM).items()
-        if (name := f"{owner}.{field}" if owner else field) in known
-        and _is_offered(arm, known, known[name])
-    ]
+    found: list[Control] = []
+    for owner in dict.fromkeys(one.owner for one in known.values()):
+        for field in dict.fromkeys((*(_OF_PART if owner else _OF_ARM), *_AROUND_VALUE)):
+            one = known.get(f"{owner}.{field}" if owner else field)
+            if one is not None and _is_offered(arm, known, one):
+                slider = _slider(one, one.value(arm))
+                found += [_control(arm, one, slider)] if slider else []
+    return found
+
+
+def _slider(one: Parameter, value: float) -> _Slider | None:
+    """Ends and label; None for what the design leaves open, or for a zero of unknown size."""
+    fixed = (_OF_PART if one.owner else _OF_ARM).get(one.field)
+    outside_arm = one.field == "distance_ratio" and value > 1
+    if fixed and one.unit in ("1", "rad", "m") and not outside_arm:
+        return fixed if math.isfinite(value) else None
+    return None if value == 0 or math.isnan(value) else _around(one, value)
+
+
+def _around(one: Parameter, value: float) -> _Slider:
+    """From zero, or near it where it is not allowed, to twice the value."""
+    owner = f" of {one.owner.removesuffix('.material')}" if one.owner else ""
+    unit = f" [{one.unit}]" if one.unit != "1" else ""
+    ends = (0.01 if one.field == "young_modulus" else 0.0) * value, 2 * value
+    return _Slider(f"{one.symbol}{owner}{unit}", min(ends), max(ends), abs(value) / 100)
 
 
 def _is_offered(arm: Manipulator, known: Mapping[str, Parameter], one: Parameter) -> bool:
-    """Only what is helical has a revolution to change; only what is not, its number of bundles."""
+    """Whether it changes this arm, and no other slider does the same.
+
+    Only what is helical has a revolution to change; only what is not, its number of bundles.
+    """
+    if one.owner and one.field in ("lower", "upper"):
+        return one.field not in known
     if one.field == "revolution":
         return one.value(arm) != 0
     turn = known.get(f"{one.owner}.revolution")

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm_shape import arm_surface, bundle_bands
-from softreach.geometry.tube import grid_faces
+from softreach.arm.skin import inside
+from softreach.arm_shape import arm_surface, bundle_skins
 from softreach.palette import BODY, bundle_color
 from softreach.rod.kinematics import configuration
 from softreach.studio.axes import axes_box
@@ -33,6 +33,7 @@ Color = tuple[int, int, int]
 
 _STATIONS, _SIDES, _ACROSS = 51, 24, np.pi / 12
 _LIFT = 0.02  # of the fibers above the body, in R2
+_CLEAR = 0.45  # opacity of a body that has something inside
 _GHOST, _REFERENCE, _SURFACE, _HULL = 0.35, (150, 150, 158), (90, 140, 200), (220, 150, 60)
 _MARK: Color = (220, 30, 120)
 
@@ -68,11 +69,13 @@ class Scene:
         else:
             self.remove(path)
             ghost = path.startswith("/ghosts")
+            body = _CLEAR if any(inside(arm)) else None
+            opacity = [_GHOST] * len(meshes) if ghost else [body] + [None] * arm.bundles
             self._arms[path] = (
                 arm,
                 [
-                    self._mesh(f"{path}/{k}", *mesh, opacity=_GHOST if ghost else None)
-                    for k, mesh in enumerate(meshes)
+                    self._mesh(f"{path}/{k}", *mesh, opacity=how)
+                    for k, (mesh, how) in enumerate(zip(meshes, opacity, strict=True))
                 ],
             )
         return shape["position"].values[-1] / arm.length
@@ -225,11 +228,10 @@ class Scene:
 
 def _arm_meshes(arm: Manipulator, shape: Any) -> list[tuple[Array, NDArray[Any], Color]]:
     """Vertices [L], faces and color of the body and of every bundle."""
-    body = arm_surface(shape, _SIDES)
+    body = arm_surface(arm, shape, _SIDES)
     meshes = [(body.vertices / arm.length, body.faces, _rgb(BODY))]
-    for k, band in enumerate(bundle_bands(arm, shape, lift=_LIFT, step=_ACROSS)):
-        skin = grid_faces(*band.shape[:2])
-        meshes.append((band.reshape(-1, 3) / arm.length, skin, _rgb(bundle_color(k))))
+    for k, skin in enumerate(bundle_skins(arm, shape, lift=_LIFT, step=_ACROSS)):
+        meshes.append((skin.vertices / arm.length, skin.faces, _rgb(bundle_color(k))))
     return meshes
 
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.kernels.contour import stretches
 from softreach.rod.tip_map import TipMap
 
-__all__ = ["every_second", "grid_tips", "image_measure"]
+__all__ = ["every_second", "grid_stretches", "grid_tips", "image_measure"]
 
 Array = NDArray[np.float64]
 
 _TOL = 1e-9  # far fewer evaluations than on the grids: their steps may be short
+_DIFFERENCES = 200.0  # over n², more than differences on n cells err by, of the largest det J
 
 
 def grid_tips(rod: TipMap, cells: int) -> Array:
@@ -24,10 +26,27 @@ def grid_tips(rod: TipMap, cells: int) -> Array:
     return rod.tips(rod.box.from_free_cube(_product(ticks)))
 
 
-def every_second(tips: Array, cells: int, m: int) -> Array:
-    """Tips of the grid of half as many cells."""
-    every = tips.reshape(*(cells + 1,) * m, 3)[(slice(None, None, 2),) * m]
-    return np.ascontiguousarray(every).reshape(-1, 3)
+def grid_stretches(rod: TipMap, tips: Array, cells: int) -> Array:
+    """det J of three free bundles at the vertices of a grid, up to a positive factor.
+
+    From differences of the tips, and where these might have the wrong sign by J itself.
+
+    Returns:
+        Shape ((cells + 1)³,).
+    """
+    found = stretches(tips, np.array([cells] * 3))
+    found *= cells**3 / (8.0 * rod.box.volume)
+    small = np.flatnonzero(np.abs(found) <= _DIFFERENCES / cells**2 * np.abs(found).max())
+    places = np.stack(np.unravel_index(small, (cells + 1,) * 3), axis=1) / cells
+    found[small] = _stretch(rod, rod.box.from_free_cube(places))
+    return found
+
+
+def every_second(values: Array, cells: int, m: int) -> Array:
+    """Values at the vertices of the grid of half as many cells."""
+    fields = values.shape[1:]
+    every = values.reshape(*(cells + 1,) * m, *fields)[(slice(None, None, 2),) * m]
+    return np.ascontiguousarray(every).reshape(-1, *fields)
 
 
 def image_measure(rod: TipMap, nodes: int) -> float:

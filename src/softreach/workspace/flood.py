@@ -80,9 +80,13 @@ class Flood:
             near = np.flatnonzero(away < self.gap[cells] - 0.02)
             found.append((cells[near], away[near], near))
         cells, away, row = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        order = np.lexsort((away, cells))
-        cells, first = np.unique(cells[order], return_index=True)
-        return cells, gamma[row[order[first]]]
+        closest = np.full(len(self.gap), np.inf)
+        np.minimum.at(closest, cells, away)
+        best = np.flatnonzero(away == closest[cells])[::-1]  # the first of equals is written last
+        owner = np.full(len(self.gap), -1)
+        owner[cells[best]] = row[best]
+        cells = np.flatnonzero(owner >= 0)
+        return cells, gamma[owner[cells]]
 
     def grow(self, cells: Ints) -> None:
         """Search the neighbors of reached cells from there, and theirs, until none is new."""

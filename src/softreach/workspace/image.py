@@ -18,6 +18,7 @@ __all__ = ["Image", "Lattice", "Spans", "image_of"]
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+_STRETCH_BITS = 50  # of the largest det J: sums of four are exact in any order
 _MARGIN = 3  # empty cells around the image
 _ROWS = 1 << 20  # triangles a task may have to judge
 _POINTS = 1 << 14
@@ -63,14 +64,14 @@ class Spans(NamedTuple):
     length: Array
     """How long it is, in cells; 0 after the last crossing of a line."""
     cover: Ints
-    """Number of simplices (m = 3) or tetrahedra (m > 3) that cover it."""
+    """Number of activations that reach it."""
     degree: Ints
-    """Those that kept their orientation minus those that were turned over (m = 3)."""
+    """Those of which the map keeps the orientation minus those that it turns over."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Image:
-    """The image of a triangulated box under the map that is linear on its simplices, m >= 3."""
+    """The image of a triangulated box under the map that is linear on its tetrahedra."""
 
     lattice: Lattice
     unit: float
@@ -91,20 +92,26 @@ class Image:
         column, height = crossing.column[order], crossing.height[order]
         same = np.diff(column, append=-1) == 0
         length = np.where(same, np.diff(height, append=0.0), 0.0)
-        # Crossings at one height come in any order: between them sums may fall below zero.
+        # Crossings at one height come in any order, folds are rough: sums may fall below zero.
         cover = np.maximum(np.cumsum(crossing.cover[order]), 0)
         return Spans(column, height, length, cover, np.cumsum(crossing.degree[order]))
 
     @cached_property
     def counts(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Cover counts and degrees at the cell centers, exactly; both of the lattice's shape."""
+        """Cover counts and degrees at the cell centers, exactly; both of the lattice's shape.
+
+        Counts may be below zero where a fold is rough.
+        """
         shape = self.lattice.shape
         counts, degrees = np.zeros((2, shape[0] * shape[1], shape[2]), np.int32)
         raster.add_counts(self._crossings(2), counts, degrees)
         return counts.reshape(shape), degrees.reshape(shape)
 
     def counts_at(self, points: Array) -> NDArray[np.int64]:
-        """Cover counts at any points [m], exactly but for rounding to units, shape (n,)."""
+        """Cover counts at any points [m], exactly but for rounding to units, shape (n,).
+
+        As `counts`, but nowhere below zero.
+        """
         where = np.rint(self.lattice.coordinates(points) * self.unit)
         out = np.empty(len(where), np.int64)
         shape = self.lattice.shape[:2]
@@ -116,7 +123,7 @@ class Image:
             )
             for block in parallel.blocks(len(where), _POINTS)
         )
-        return out
+        return np.maximum(out, 0)
 
     @cached_property
     def _bins(self) -> tuple[Ints, Ints]:
@@ -176,13 +183,18 @@ def _running_sums(values: Ints, starts: NDArray[np.bool_]) -> Ints:
 
 
 def image_of(
-    points: Array, cells: tuple[int, ...], lattice: Lattice, progress: Progress = silent
+    points: Array,
+    stretches: Array,
+    cells: tuple[int, int, int],
+    lattice: Lattice,
+    progress: Progress = silent,
 ) -> Image:
     """The image of a grid of boxes whose vertices go to `points`.
 
     Args:
         points: Mapped vertices [m] in the C order of the grid, shape (prod(cells + 1), 3).
-        cells: Number of boxes along each of the m >= 3 axes.
+        stretches: det J at the vertices up to a positive factor, shape (prod(cells + 1),).
+        cells: Number of boxes along each of the three axes.
         lattice: Cells to rasterize on.
         progress: Called with the number of vertices done since its last call.
     """
@@ -193,27 +205,31 @@ def image_of(
         lattice=lattice,
         unit=unit,
         vertices=vertices,
-        triangles=_critical_triangles(vertices, cells, progress),
+        triangles=_critical_triangles(vertices, stretches, cells, progress),
     )
 
 
-def _unit(scaled: Array, cells: tuple[int, ...]) -> float:
+def _unit(scaled: Array, cells: tuple[int, int, int]) -> float:
     """The largest power of two for which the kernels' determinants are exact."""
     grid = scaled.reshape(*(n + 1 for n in cells), 3)
-    steps = [np.abs(np.diff(grid, axis=j)).max() for j in range(len(cells))]
+    steps = [np.abs(np.diff(grid, axis=j)).max() for j in range(3)]
     longest = max(float(np.sum(steps)), 1.0)  # rounding adds at most 1 unit, hence the -1 below
     return 2.0 ** np.floor(contour.EXACT_BITS - 1 - np.log2(longest))
 
 
-def _critical_triangles(vertices: Array, cells: tuple[int, ...], progress: Progress) -> Ints:
-    star = contour.stars(cells)
+def _critical_triangles(
+    vertices: Array, stretches: Array, cells: tuple[int, int, int], progress: Progress
+) -> Ints:
+    star, axes = contour.stars(cells), np.array(cells)
+    largest = np.abs(stretches).max() or 1.0
+    stretches = np.rint(stretches / largest * 2.0**_STRETCH_BITS)
     blocks = list(parallel.blocks(len(vertices), max(1, _ROWS // len(star.triangles))))
     parts: list[Ints] = [np.empty((0, 5), np.int64)] * len(blocks)
 
     def task(number: int) -> None:
         first, last = blocks[number].start, blocks[number].stop
         out = np.empty(((last - first) * len(star.triangles), 5), np.int64)
-        used = contour.critical_triangles(vertices, np.array(cells), first, last, star, out)
+        used = contour.critical_triangles(vertices, stretches, axes, first, last, star, out)
         parts[number] = out[:used].copy()
         progress(last - first)
 

@@ -58,14 +58,36 @@ def extrapolated(fine: Estimate, coarse: Estimate) -> Estimate:
     return Estimate(fine.value + removed, _LEFT * abs(removed) + fine.error)
 
 
-def multiply_covered(image: Image) -> dict[int, float]:
-    """Volume of the places that a given number of activations, 2 or more, reach [m³]; m = 3."""
-    volumes = _mean(image, lambda spans: np.bincount(spans.cover, spans.length))
-    return {k: float(v) for k, v in enumerate(volumes) if k > 1 and v > 0}
+def multiply_covered(fine: Image, coarse: Image) -> tuple[dict[int, float], float]:
+    """Volume of the places that a given number of activations, 2 or more, reach [m³].
+
+    A number whose volume is below the error, or changes by more than itself on half as fine a
+    grid, is not a finding but the roughness of a fold: such places count with the next smaller.
+
+    Returns:
+        The volumes, and by how much their sum changes on half as fine a grid.
+    """
+    volumes, rough = _by_cover(fine), _by_cover(coarse)
+    size = max(len(volumes), len(rough), 3)
+    volumes, rough = (np.pad(v, (0, size - len(v)))[2:] for v in (volumes, rough))
+    error = float(abs(volumes.sum() - rough.sum()))
+    sure = np.maximum(np.abs(volumes - rough), error) < volumes
+    sure[0] = True
+    found, unsure = {}, 0.0
+    for number in range(size - 1, 1, -1):
+        unsure += float(volumes[number - 2])
+        if sure[number - 2] and unsure > 0.0:
+            found[number], unsure = unsure, 0.0
+    return dict(sorted(found.items())), error
+
+
+def _by_cover(image: Image) -> Array:
+    """Volume that 0, 1, 2, ... activations reach, between the first and last crossings [m³]."""
+    return _mean(image, lambda spans: np.bincount(spans.cover, spans.length))
 
 
 def fold_volume(fine: Image, coarse: Image) -> Estimate:
-    """Volume reached with both orientations [m³], and its change by half as fine a grid; m = 3."""
+    """Volume reached with both orientations [m³], and its change by half as fine a grid."""
     value, rough = (
         float(_mean(image, lambda spans: spans.length[spans.cover > np.abs(spans.degree)].sum()))
         for image in (fine, coarse)

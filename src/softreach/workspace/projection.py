@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach import parallel
-from softreach.kernels.bounded_steps import bounded_steps
+from softreach.rod.damped_step import damped_steps
 from softreach.rod.tip_map import BLOCK, TipMap
 
 __all__ = ["Nearest", "nearest_tips"]
@@ -56,7 +56,6 @@ def nearest_tips(rod: TipMap, start: Array, targets: Array, enough: float) -> Ne
 
 def _descend(rod: TipMap, targets: Array, enough: float, found: Nearest) -> None:
     """Damped Gauss and Newton steps that stay within the bounds; on the calling thread."""
-    low, high, scales = rod.box.low.copy(), rod.box.high.copy(), rod.box.scales.copy()
     active, damping = np.arange(len(targets)), np.full(len(targets), _FIRST_DAMPING)
     slopes = np.empty((len(targets), 3, rod.box.bundles))
     rod.fill_slopes(found.gamma, found.tips, slopes)
@@ -66,11 +65,10 @@ def _descend(rod: TipMap, targets: Array, enough: float, found: Nearest) -> None
         if not len(active):
             return
         gamma, now = found.gamma[active], found.distance[active]
-        trial, left = np.empty_like(gamma), np.empty(len(active))
-        residual = found.tips[active] - targets[active]
-        bounded_steps(
-            gamma, residual, slopes[active], damping[active], scales, low, high, trial, left
-        )
+        miss, slope = found.tips[active] - targets[active], slopes[active]
+        square = ((slope * rod.box.scales) ** 2).sum(axis=(1, 2)) / 3.0
+        softness = damping[active] * square + 1e-300
+        trial, left = damped_steps(rod.box, gamma, miss, slope, softness)
         tips, ahead = np.empty((len(active), 3)), np.empty((len(active), 3, rod.box.bundles))
         rod.fill_slopes(trial, tips, ahead)
         distance = np.linalg.norm(tips - targets[active], axis=1)

@@ -15,7 +15,7 @@ from softreach.memory import free_memory
 from softreach.progress import Progress, silent
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.workspace import measure
-from softreach.workspace.box_grid import every_second, grid_tips
+from softreach.workspace.box_grid import every_second, grid_stretches, grid_tips
 from softreach.workspace.image import Image, Lattice, image_of
 from softreach.workspace.reachable import ReachableSet
 from softreach.workspace.redundant import searched_set, smallest_memory
@@ -137,17 +137,18 @@ def _solid(
     rod: TipMap, cells: int, cell: float | None, accuracy: float, progress: Progress
 ) -> ReachableSolid:
     tips = grid_tips(rod, cells)
-    lattice = _lattice(tips, cell, accuracy)
-    fine = image_of(tips, (cells,) * 3, lattice, progress)
-    coarse = image_of(every_second(tips, cells, 3), (cells // 2,) * 3, lattice)
+    lattice, stretches = _lattice(tips, cell, accuracy), grid_stretches(rod, tips, cells)
+    fine = image_of(tips, stretches, (cells, cells, cells), lattice, progress)
+    half, fewer = cells // 2, every_second(stretches, cells, 3)
+    coarse = image_of(every_second(tips, cells, 3), fewer, (half, half, half), lattice)
     volume = measure.solid_volume(rod, fine, coarse)
-    overlaps = _overlaps(volume.value, fine, coarse)
+    overlaps = _overlaps(volume, fine, coarse)
     convex = measure.convex_volume(fine, coarse)
     return ReachableSolid(
         tip_map=rod,
         cells=cells,
         volume=volume.value,
-        volume_error=volume.error,
+        volume_error=overlaps.multiplicity_error,
         convex_volume=convex.value,
         convex_volume_error=convex.error,
         image=fine,
@@ -167,20 +168,19 @@ class _Overlaps(NamedTuple):
 _NO_OVERLAPS = _Overlaps({}, np.nan, np.nan, np.nan)
 
 
-def _overlaps(volume: float, fine: Image, coarse: Image) -> _Overlaps:
-    several, rough = measure.multiply_covered(fine), measure.multiply_covered(coarse)
-    again = sum(several.values())
+def _overlaps(volume: measure.Estimate, fine: Image, coarse: Image) -> _Overlaps:
+    """What is reached how often; a fold out of place errs by as much here as in the volume."""
+    several, change = measure.multiply_covered(fine, coarse)
     return _Overlaps(
-        {1: volume - again, **several},
-        abs(again - sum(rough.values())),
+        {1: volume.value - sum(several.values()), **several},
+        volume.error + change,
         *measure.fold_volume(fine, coarse),
     )
 
 
 def _settled(found: ReachableSolid, accuracy: float) -> bool:
     """Whether a finer grid would hardly change the volume or how much of it is reached twice."""
-    errors = [found.volume_error, *([found.multiplicity_error] if found.multiplicity else [])]
-    return max(errors) <= accuracy * found.volume
+    return found.volume_error <= accuracy * found.volume
 
 
 def _fits(cells: int) -> bool:

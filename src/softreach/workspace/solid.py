@@ -50,8 +50,8 @@ class ReachableSolid(ReachableSet):
     """Volume of the places that exactly 1, 2, ... activations reach [m³]; empty for more than three
     free bundles."""
     multiplicity_error: float
-    """By how much the volume reached more than once changed from half as fine a grid [m³]; NaN for
-    more than three free bundles."""
+    """How far off the volume reached more than once may be, the same as for the volume itself [m³];
+    NaN for more than three free bundles."""
     fold_volume: float
     """Volume of the places reached with both orientations of the map [m³]; they lie behind a fold.
     NaN for more than three free bundles."""
@@ -73,7 +73,7 @@ class ReachableSolid(ReachableSet):
         counts, degrees = self.image.counts
         fields = {"occupied": counts > 0}
         if self.multiplicity:
-            fields |= {"count": counts, "degree": degrees}
+            fields |= {"count": counts.clip(0), "degree": degrees}
         variables = {name: (tuple("xyz"), values) for name, values in fields.items()}
         lattice = self.image.lattice
         attrs = {**provenance(self.arm), "cell": lattice.cell, "length": self.tip_map.length}

@@ -73,6 +73,8 @@ class Actuator(ABC):
     """What formulas call an activation."""
     variables: ClassVar[tuple[Variable, ...]] = STRETCH
     """Fields that a designer varies, beside the bounds."""
+    series: ClassVar[tuple[Variable, ...]] = ()
+    """Further fields, that only functions along the arm can be given for."""
     default_name: ClassVar[str] = "actuator"
     """Name that an arm gives to unnamed ones, followed by a number."""
     validity: ClassVar[str] = ""
@@ -104,6 +106,14 @@ class Actuator(ABC):
     @abstractmethod
     def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
         """Where the bundles lie at stations Z [m]."""
+
+    @property
+    def course(self) -> str:
+        """How what contracts runs within a bundle, for pictures.
+
+        "along" it, "right-handed" or "left-handed" across it, or "radial".
+        """
+        return "along"
 
     @property
     def bounds(self) -> Array:

@@ -57,6 +57,13 @@ class ObliqueMuscle(SectorActuator):
     helical_angle: float
     """α of its fibers from the axis, at the outer radius of the ring [rad]; 0 is longitudinal."""
 
+    @property
+    def course(self) -> str:
+        """Which way its fibers cross it."""
+        if self.helical_angle == 0:
+            return "along"
+        return "right-handed" if self.helical_angle > 0 else "left-handed"
+
     def integrals(self, profile: Profile, section: Section, z: Array) -> RingIntegrals:
         """I0, I1, I3 with the local taper and the angle of the fibers: theory (3)."""
         angle = np.full(len(z), self.helical_angle)
@@ -86,6 +93,11 @@ class RadialMuscle(SectorActuator):
     variables: ClassVar[tuple[Variable, ...]] = _SECTOR
     default_name: ClassVar[str] = "radial muscle"
     validity: ClassVar[str] = "As for fibers; the change of radius itself is left out."
+
+    @property
+    def course(self) -> str:
+        """Along the radius."""
+        return "radial"
 
     def integrals(self, profile: Profile, section: Section, z: Array) -> RingIntegrals:
         """I0 = -ν (1 - ρ²)/2, I1 = -ν (1 - ρ³)/3, I3 = 0 [-]."""

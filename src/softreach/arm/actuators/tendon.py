@@ -57,6 +57,9 @@ class Tendon(Actuator):
         Variable("bundles", "n", "number of tendons", FIBER_RANGES["bundles"]),
         *STRETCH,
     )
+    series: ClassVar[tuple[Variable, ...]] = (
+        Variable("routing", "θ", "angle along the arm", FIBER_RANGES["offset"]),
+    )
     default_name: ClassVar[str] = "tendon"
     validity: ClassVar[str] = (
         "Exact for tendons parallel to the axis; others pull along their direction at rest, with a "
@@ -115,7 +118,12 @@ class Tendon(Actuator):
         return section.modulus_faults(f"for tendon {self.name!r}, whose activation is in N")
 
     def replace(self, **changes: Any) -> Tendon:
-        """A copy with some fields changed; a new distance takes the place of a ratio."""
+        """A copy with some fields changed.
+
+        A new distance takes the place of a ratio, and a new revolution that of a routing.
+        """
+        if changes.get("revolution") is not None:
+            changes.setdefault("routing", None)
         if changes.get("distance") is not None:
             changes.setdefault("distance_ratio", None)
         if changes.get("distance_ratio") is not None:
@@ -123,8 +131,13 @@ class Tendon(Actuator):
         return super().replace(**changes)
 
     def value_on(self, field: str, profile: Profile, section: Section) -> Any:
-        """Value of a variable; of distance and ratio, the one not given follows at the base."""
+        """Value of a variable; of distance and ratio, the one not given follows at the base.
+
+        The revolution of a routing is its rotation from where the tendon begins to its anchor.
+        """
         del section
+        if field == "revolution" and self.routing is not None:
+            return float(np.diff(self.routing([self.start_over_length, self.end_over_length]))[0])
         base = float(profile.radius(0.0))
         if field == "distance" and self.distance is None:
             return (self.distance_ratio or 0.0) * base

@@ -1,11 +1,17 @@
 """Design parameters: the numbers of an arm that a sweep, a slider or an optimizer varies.
 
-Parameters of the whole arm have plain names: `taper`, `length`, `revolution`. An actuator's own
-begin with its name: `left.offset`. What stands after the last dot is the field; names of actuators
-are unique and fields hold no dot, so no two parameters of an arm share a name.
+Each is called by its path. Those of the whole arm have plain names: `taper`, `length`,
+`revolution`. Those of a part begin with the part: `profile.radii[1]`, `rings[0].inner_ratio`,
+`rings[0].material.young_modulus`, `core.density`, and an actuator's own with its name:
+`left.offset`, `left.helical_angle.values[2]`, `left.lower[1]`. Counting starts at 0; a ring that
+has a name may be called by it: `rings[skin].inner_ratio`.
+
+Files and the command line write the same names with the unit, which stands before the place in a
+series, and angles in degrees: `taper_deg`, `left.helical_angle.values_deg[2]`.
 """
 
-from softreach.arm.parameters.of_arm import changed, find_parameter, parameters, unknown_parameter
+from softreach.arm.parameters.changes import changed, find_parameter, find_parameters
+from softreach.arm.parameters.of_arm import parameters
 from softreach.arm.parameters.parameter import Parameter
 
-__all__ = ["Parameter", "changed", "find_parameter", "parameters", "unknown_parameter"]
+__all__ = ["Parameter", "changed", "find_parameter", "find_parameters", "parameters"]

@@ -1,132 +1,152 @@
-"""All parameters of an arm by name, and the arm that has other values."""
+"""All parameters of an arm by name."""
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
+from typing import Any
 
 from softreach.arm.actuators import Actuator
-from softreach.arm.checks import FIBER_RANGES, MATERIAL_RANGES
+from softreach.arm.checks import FIBER_RANGES, MATERIAL_RANGES, PROFILE_RANGES, RING_RANGES
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.parameter import (
-    ActuatorParameter,
     BoundParameter,
+    ElementParameter,
+    FieldParameter,
     Parameter,
-    ProfileParameter,
-    RadiusRatio,
-    Revolution,
-    RingMaterialParameter,
     SharedParameter,
-    Taper,
 )
+from softreach.arm.parameters.parts import parts, prefix_of, series_of
+from softreach.arm.parameters.whole import OuterRadius, Revolution, Taper
 from softreach.arm.variable import Variable
 from softreach.errors import InvalidInput, Range
 
-__all__ = ["changed", "find_parameter", "parameters", "unknown_parameter"]
+__all__ = ["by_ring_name", "parameters"]
 
-_RATIO = Variable(
-    "radius_ratio",
-    "R1/R2",
-    "inner over outer radius",
-    Range(0.0, 1.0, open_high=True),
+_RADIUS = Variable(
+    "outer_radius", "R2(0)", "outer radius at the base", PROFILE_RANGES["outer_radius"]
 )
+_RATIO = Variable("radius_ratio", "R1/R2", "inner over outer radius", RING_RANGES["inner_ratio"])
 _POISSON = Variable("poisson_ratio", "ν", "Poisson's ratio", MATERIAL_RANGES["poisson_ratio"])
 _REVOLUTION = Variable(
     "revolution",
     "Ω",
-    "revolution of all helical fibers, each in its own sense",
+    "revolution of all that is helical, each in its own sense",
     FIBER_RANGES["revolution"],
 )
 _BOUNDS = {
-    "lower": "lowest activation",
-    "upper": "highest activation",
+    "lower": ("min", "lowest activation"),
+    "upper": ("max", "highest activation"),
 }
 
 
 def parameters(arm: Manipulator) -> dict[str, Parameter]:
     """Every parameter of an arm by its name.
 
-    Those of the whole arm come first. `revolution` turns all helical fibers, each in its own sense;
-    `extent`, `lower` and `upper` (the bounds of activations) belong to all actuators that have
-    them. One actuator's own parameters begin with its name and a dot: `left.offset`.
-    """
-    own = [one for actuator in arm.actuators for one in _of_actuator(actuator)]
-    return {one.name: one for one in (*_of_arm(arm, own), *own)}
-
-
-def find_parameter(arm: Manipulator, name: str) -> Parameter:
-    """The parameter of this name.
+    Those of the whole arm come first: fields of profile and section, `revolution` (of all that is
+    helical, each in its own sense), `radius_ratio` where all rings begin at one, `poisson_ratio` of
+    all materials; `extent`, `lower` and `upper` (the bounds of activations) of all actuators that
+    have them. Then come those of single parts, by their path: `profile.radii[1]`,
+    `rings[0].inner_ratio`, `rings[0].material.young_modulus`, `core.density`, and of actuators by
+    their name: `left.offset`, `left.helical_angle.values[2]`, `left.lower[1]`.
 
     Raises:
-        InvalidInput: The arm has no such parameter.
+        InvalidInput: Actuators are named so that two parameters would share a name.
     """
-    known = parameters(arm)
-    if name not in known:
-        raise unknown_parameter(name, known)
-    return known[name]
+    own = [one for key, part in parts(arm).items() for one in _of_part(key, part)]
+    plain = [one for one in own if not one.owner]
+    every = [*_of_arm(arm, plain, own), *(one for one in own if one.owner)]
+    found = {one.name: one for one in every}
+    if len(found) < len(every):
+        names = [one.name for one in every]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InvalidInput("parameter", twice, "a name for one of them", "rename the actuator")
+    return found
 
 
-def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
-    """The design with these parameters, everything else unchanged.
-
-    They are applied together, as one may be valid only with another; an actuator's own
-    parameter wins over one of the whole arm. When the taper changes, revolutions stay and helical
-    angles follow; a new outer radius keeps the ratio of the radii.
-
-    Args:
-        arm: The design to start from.
-        values: Name of a parameter -> value in its unit.
-
-    Raises:
-        InvalidInput: An unknown parameter.
-        InvalidDesign: No such arm can exist; the error names every fault.
-    """
-    known = parameters(arm)
-    for name in values:
-        if name not in known:
-            raise unknown_parameter(name, known)
-    draft = Draft(arm)
-    for name, parameter in known.items():
-        if name in values:
-            parameter.change(draft, values[name])
-    return draft.made() if values else arm
+def by_ring_name(arm: Manipulator, known: dict[str, Parameter]) -> dict[str, str]:
+    """Further names of parameters, `rings[skin].inner_ratio` for `rings[0].inner_ratio`."""
+    found: dict[str, str] = {}
+    for k, ring in enumerate(arm.section.rings):
+        if ring.name:
+            path, named = f"rings[{k}]", f"rings[{ring.name}]"
+            own = (one.name for one in known.values() if _key(one).startswith(path))
+            found |= {named + name.removeprefix(path): name for name in own}
+    return {name: known_as for name, known_as in found.items() if name not in known}
 
 
-def unknown_parameter(name: str, known: Iterable[str]) -> InvalidInput:
-    """What to raise for a name that no parameter has; it suggests the closest one."""
-    names = list(known)
-    close = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-    hint = f'did you mean "{close[0]}"?' if close else ""
-    allowed = f"one of {', '.join(name for name in names if '.' not in name)}"
-    if own := [name for name in names if "." in name]:
-        allowed += f", or of one actuator, such as {own[0]}"
-    return InvalidInput("parameter", name, allowed, hint)
-
-
-def _of_arm(arm: Manipulator, own: list[Parameter]) -> Iterator[Parameter]:
-    of_profile = {variable.field: variable for variable in arm.profile.variables}
+def _of_arm(arm: Manipulator, plain: list[Parameter], own: list[Parameter]) -> Iterator[Parameter]:
     if any(one.field == "revolution" for one in own):
-        yield Revolution("revolution", _REVOLUTION)
-    if "taper" in of_profile:
-        yield Taper("taper", of_profile.pop("taper"))
-    yield RadiusRatio("radius_ratio", _RATIO)
-    yield from (ProfileParameter(field, variable) for field, variable in of_profile.items())
-    yield RingMaterialParameter("poisson_ratio", _POISSON)
-    for field in ("extent", "lower", "upper"):
-        yield from _shared(field, tuple(one for one in own if one.field == field))
+        yield Revolution(name="revolution", variable=_REVOLUTION)
+    of_whole = {one.name: one for one in plain}
+    if (taper := of_whole.pop("taper", None)) is not None:
+        assert isinstance(taper, FieldParameter)
+        yield Taper(name="taper", variable=taper.variable, key=taper.key)
+    begins = [one for one in own if _is_of_ring(one) and one.field == "inner_ratio"]
+    if len({one.value(arm) for one in begins}) == 1:
+        yield SharedParameter(name="radius_ratio", variable=_RATIO, parts=tuple(begins))
+    if "outer_radius" not in of_whole and hasattr(arm.profile, "radii"):
+        yield OuterRadius(name="outer_radius", variable=_RADIUS)
+    yield from of_whole.values()
+    of_materials = tuple(
+        one for one in own if _is_of_material(one) and one.field == "poisson_ratio"
+    )
+    yield SharedParameter(name="poisson_ratio", variable=_POISSON, parts=of_materials)
+    of_actuators = [one for one in own if _key(one).startswith("actuators[")]
+    for field in ("extent", *_BOUNDS):
+        yield from _shared(field, tuple(one for one in of_actuators if one.field == field))
 
 
-def _shared(field: str, parts: tuple[Parameter, ...]) -> Iterator[Parameter]:
+def _shared(field: str, of: tuple[Parameter, ...]) -> Iterator[Parameter]:
     """One parameter for all actuators that have such a field, if it has the same unit in all."""
-    if len({part.unit for part in parts}) == 1:
-        yield SharedParameter(field, parts[0].variable, parts)
+    if len({one.unit for one in of}) == 1:
+        yield SharedParameter(name=field, variable=of[0].variable, parts=of)
 
 
-def _of_actuator(actuator: Actuator) -> Iterator[Parameter]:
-    for variable in actuator.variables:
-        yield ActuatorParameter(f"{actuator.name}.{variable.field}", variable)
+def _key(one: Parameter) -> str:
+    return getattr(one, "key", "")
+
+
+def _is_of_ring(one: Parameter) -> bool:
+    return _key(one).startswith("rings[")
+
+
+def _is_of_material(one: Parameter) -> bool:
+    return _key(one) == "core" or (_is_of_ring(one) and _key(one).endswith(".material"))
+
+
+def _of_part(key: str, part: Any) -> Iterator[Parameter]:
+    """Its variables, its series, and the bounds of an actuator."""
+    series = list(series_of(part))
+    tuples = {one.path for one in series}
+    for variable in part.variables:
+        if variable.field not in tuples:
+            yield FieldParameter(**_called(key, variable.field), variable=variable, key=key)
+    for path, variable, places in series:
+        for k in places:
+            element = variable._replace(
+                field=f"{path}[{k}]",
+                symbol=f"{variable.symbol}[{k}]",
+                meaning=f"{variable.meaning}, number {k}",
+            )
+            named = _called(key, element.field, path)
+            yield ElementParameter(**named, variable=element, key=key, series=path, place=k)
+    if isinstance(part, Actuator):
+        yield from _bounds(key, part)
+
+
+def _called(key: str, field: str, path: str = "") -> dict[str, str]:
+    """Name and owner of a parameter."""
+    prefix = prefix_of(key, path)
+    return {"name": prefix + field, "owner": prefix.removesuffix(".")}
+
+
+def _bounds(key: str, actuator: Actuator) -> Iterator[Parameter]:
     unit = "" if actuator.unit == "1" else actuator.unit
-    for side, (field, meaning) in enumerate(_BOUNDS.items()):
-        variable = Variable(field, "γ", meaning, Range(unit=unit))
-        yield BoundParameter(f"{actuator.name}.{field}", variable, side)
+    bundles = (None, *range(actuator.bundles)) if actuator.bundles > 1 else (None,)
+    for side, (field, (end, meaning)) in enumerate(_BOUNDS.items()):
+        for bundle in bundles:
+            whose = "" if bundle is None else f"[{bundle}]"
+            symbol = f"{end} {actuator.symbol}{whose}"
+            variable = Variable(field, symbol, meaning, Range(unit=unit))
+            named = _called(key, field + whose)
+            yield BoundParameter(**named, variable=variable, key=key, side=side, bundle=bundle)

@@ -2,40 +2,43 @@
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
-from softreach.arm.actuators import Actuator, FiberArchitecture
+import numpy as np
+
+from softreach.arm.actuators import Actuator
+from softreach.arm.checks import plain_number
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters.draft import Draft
+from softreach.arm.parameters.parts import part_of
 from softreach.arm.variable import Variable
+from softreach.errors import Fault
 
 __all__ = [
-    "ActuatorParameter",
     "BoundParameter",
+    "ElementParameter",
+    "FieldParameter",
     "Parameter",
-    "ProfileParameter",
-    "RadiusRatio",
-    "Revolution",
-    "RingMaterialParameter",
     "SharedParameter",
-    "Taper",
 ]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Parameter(ABC):
     """A number in which designs can differ."""
 
     name: str
-    """What it is called: `taper`, or `left.offset` for the offset of the actuator "left"."""
+    """What it is called: `taper`, `left.offset`, or `rings[0].material.young_modulus`."""
+    owner: str = ""
+    """The part that it belongs to, such as `left` or `rings[0].material`; "" for the whole arm."""
     variable: Variable
     """The field behind it."""
 
     @property
     def unit(self) -> str:
-        """Unit of its values: "m", "rad", or "1"."""
+        """Unit of its values: "m", "rad", "Pa", "kg/m³", "N", or "1"."""
         return self.variable.allowed.unit or "1"
 
     @property
@@ -54,144 +57,106 @@ class Parameter(ABC):
         return self.variable.allowed.whole
 
     @property
-    def owner(self) -> str:
-        """Name of the actuator that it belongs to; "" for one of the whole arm."""
-        return self.name.rpartition(".")[0]
-
-    @property
     def field(self) -> str:
         """The name without its owner."""
-        return self.name.rpartition(".")[2]
+        return self.name.removeprefix(f"{self.owner}.") if self.owner else self.name
 
     @abstractmethod
     def value(self, arm: Manipulator) -> float:
-        """Its value on an arm [unit]; where several actuators share it, that of the first."""
+        """Its value on an arm [unit]; where several parts share it, that of the first.
+
+        NaN where the arm does not give it as one number: a modulus that is left out, or an angle
+        that changes along the arm. It can be set all the same.
+        """
 
     @abstractmethod
     def change(self, draft: Draft, value: float) -> None:
         """Note the change to this value [unit]."""
 
 
-@dataclass(frozen=True)
-class ProfileParameter(Parameter):
-    """A field of the profile."""
+@dataclass(frozen=True, kw_only=True)
+class FieldParameter(Parameter):
+    """A field of one part."""
+
+    key: str
+    """Of the part."""
 
     def value(self, arm: Manipulator) -> float:
-        """What the profile has."""
-        return float(getattr(arm.profile, self.variable.field))
+        """What the part has on this arm."""
+        part, name = part_of(arm, self.key), self.variable.field
+        if isinstance(part, Actuator):
+            return _number(part.value_on(name, arm.profile, arm.section))
+        return _number(getattr(part, name))
 
     def change(self, draft: Draft, value: float) -> None:
-        """Change the profile."""
-        draft.profile[self.variable.field] = value
+        """Change the part."""
+        counted = self.whole and float(value).is_integer()
+        draft.set_field(self.name, self.key, self.variable.field, int(value) if counted else value)
 
 
-@dataclass(frozen=True)
-class Taper(Parameter):
-    """The taper angle: when it changes, revolutions stay and helical angles follow."""
+@dataclass(frozen=True, kw_only=True)
+class ElementParameter(Parameter):
+    """One number of a series: a radius of a profile, or a value along the arm."""
+
+    key: str
+    """Of the part."""
+    series: str
+    """Path of the series in the part: `radii`, or `helical_angle.values`."""
+    place: int
+    """Which number, from 0."""
 
     def value(self, arm: Manipulator) -> float:
-        """φ [rad]."""
-        return float(getattr(arm.profile, self.variable.field))
+        """What the series has there."""
+        numbers = part_of(arm, self.key)
+        for field in self.series.split("."):
+            numbers = getattr(numbers, field)
+        return float(numbers[self.place])
 
     def change(self, draft: Draft, value: float) -> None:
-        """Change the profile; the fibers keep their revolutions."""
-        draft.keep_revolutions()
-        draft.profile[self.variable.field] = value
+        """Change that number, if it may have this value: whatever holds it names no places."""
+        if not self.variable.allowed.admits(plain_number(value)):
+            draft.refuse(Fault(self.name, value, self.variable.allowed))
+            return
+        draft.set_element(self.name, self.key, self.series, self.place, value)
 
 
-@dataclass(frozen=True)
-class RadiusRatio(Parameter):
-    """Where the ring begins."""
-
-    def value(self, arm: Manipulator) -> float:
-        """R1/R2 [-]."""
-        return arm.section.rings[0].inner_ratio
-
-    def change(self, draft: Draft, value: float) -> None:
-        """Change the ring."""
-        draft.ring["inner_ratio"] = value
-
-
-@dataclass(frozen=True)
-class RingMaterialParameter(Parameter):
-    """A field of the ring's material."""
-
-    def value(self, arm: Manipulator) -> float:
-        """What the material has."""
-        return float(getattr(arm.section.rings[0].material, self.variable.field))
-
-    def change(self, draft: Draft, value: float) -> None:
-        """Change the material."""
-        draft.material[self.variable.field] = value
-
-
-@dataclass(frozen=True)
-class Revolution(Parameter):
-    """The revolution of all helical fibers; each keeps its sense, longitudinal ones stay so."""
-
-    def value(self, arm: Manipulator) -> float:
-        """|Ω| of the first helical fiber [rad]; 0 without one."""
-        return next((abs(turn) for turn in _revolutions(arm).values() if turn), 0.0)
-
-    def change(self, draft: Draft, value: float) -> None:
-        """Wind the fibers."""
-        for name, turn in _revolutions(draft.arm).items():
-            if turn:
-                draft.wind(name, math.copysign(value, turn))
-
-
-@dataclass(frozen=True)
-class ActuatorParameter(Parameter):
-    """A field of one actuator."""
-
-    def value(self, arm: Manipulator) -> float:
-        """What the actuator has on this arm."""
-        actuator = _actuator(arm, self.owner)
-        return float(actuator.value_on(self.variable.field, arm.profile, arm.section))
-
-    def change(self, draft: Draft, value: float) -> None:
-        """Change the actuator."""
-        count = int(value) if self.whole and value == int(value) else value
-        draft.actuators[self.owner].fields[self.variable.field] = count
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class BoundParameter(Parameter):
     """The lower or the upper bound of one actuator's activations."""
 
+    key: str
+    """Of the actuator."""
     side: int
     """0 for lower, 1 for upper."""
+    bundle: int | None = None
+    """Which bundle, from 0; None for all."""
 
     def value(self, arm: Manipulator) -> float:
-        """The bound of its first bundle."""
-        return float(_actuator(arm, self.owner).bounds[0, self.side])
+        """The bound of the bundle; of all of them, that of the first."""
+        return float(part_of(arm, self.key).bounds[self.bundle or 0, self.side])
 
     def change(self, draft: Draft, value: float) -> None:
-        """Change the bound of all its bundles."""
-        draft.actuators[self.owner].bounds[self.side] = value
+        """Change the bound."""
+        draft.set_bound(self.name, self.key, self.side, self.bundle, value)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SharedParameter(Parameter):
-    """The same field of several actuators at once."""
+    """The same field of several parts at once."""
 
     parts: tuple[Parameter, ...]
 
     def value(self, arm: Manipulator) -> float:
-        """What the first of them has."""
+        """That of the first."""
         return self.parts[0].value(arm)
 
     def change(self, draft: Draft, value: float) -> None:
-        """Change them all."""
+        """Change all of them, under the name that they share."""
         for part in self.parts:
-            part.change(draft, value)
+            replace(part, name=self.name).change(draft, value)
 
 
-def _actuator(arm: Manipulator, name: str) -> Actuator:
-    return next(one for one in arm.actuators if one.name == name)
-
-
-def _revolutions(arm: Manipulator) -> dict[str, float]:
-    """Ω of every fiber architecture [rad], by its name."""
-    fibers = [one for one in arm.actuators if isinstance(one, FiberArchitecture)]
-    return {fiber.name: fiber.revolution_on(arm.profile, arm.section) for fiber in fibers}
+def _number(value: Any) -> float:
+    """The value, or NaN where it is left out or no number."""
+    plain = isinstance(value, int | float | np.number)
+    return float(value) if plain else float("nan")

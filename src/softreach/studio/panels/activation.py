@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from typing import TYPE_CHECKING, Any
 
 from softreach.arm.manipulator import Manipulator
+from softreach.schema import activation_symbols
 from softreach.studio.panels.binding import bind, bind_button
 from softreach.studio.rod import rod_of
 from softreach.studio.state import StudioState
@@ -30,7 +32,7 @@ class ActivationPanel:
         self._revision = -1
         with tab:
             self._tip = gui.add_markdown("")
-            self._folder = gui.add_folder("activation γ")
+            self._folder = gui.add_folder("activation")
             self._trail = gui.add_checkbox("show trail", False)
             rest = gui.add_button("Rest")
         bind(self._trail, session, lambda s, on: s.showing(trail=on))
@@ -64,7 +66,7 @@ class ActivationPanel:
 
     def _slider(self, name: str, low: float, high: float, value: float) -> Any:
         high = max(high, low + 1e-6)  # a slider needs room; the state keeps to the bounds
-        slider = self._gui.add_slider(f"γ {name}", low, high, 1e-3, value)
+        slider = self._gui.add_slider(name, low, high, _step(high - low), value)
         bind(slider, self._session, self._wanted)
         return slider
 
@@ -74,7 +76,15 @@ class ActivationPanel:
         return state.replace(activation=tuple(float(slider.value) for slider in self._sliders))
 
 
+def _step(width: float) -> float:
+    """A round step, a thousandth of usual ranges."""
+    return min(1e-3, width) if width < 10 else 10.0 ** (math.floor(math.log10(width)) - 3)
+
+
 def _slider_ends(arm: Manipulator) -> list[tuple[str, float, float]]:
-    """Name and bounds of every bundle."""
-    box = rod_of(arm).box
-    return [(name, low, high) for name, (low, high) in zip(box.names, box.bounds, strict=True)]
+    """Label and bounds of every bundle."""
+    symbols = activation_symbols(arm.bundle_units)
+    units = (f" [{unit}]" if unit != "1" else "" for unit in arm.bundle_units)
+    labels = zip(symbols, arm.bundle_names, units, strict=True)
+    bounds = rod_of(arm).box.bounds
+    return [("{} {}{}".format(*label), *ends) for label, ends in zip(labels, bounds, strict=True)]

@@ -90,7 +90,7 @@ class InversePanel:
 
     def _button(self, activation: Any) -> Any:
         wanted = tuple(activation.tolist())
-        button = self._gui.add_button("γ = " + ", ".join(f"{value:.3f}" for value in wanted))
+        button = self._gui.add_button(", ".join(f"{value:.4g}" for value in wanted))
         take = lambda: self._session.update(lambda s: s.replace(activation=wanted))  # noqa: E731
         bind_button(button, self._session, take)
         return button
@@ -112,7 +112,7 @@ def _answer_text(answer: Solution, arm: Manipulator) -> str:
     names = ", ".join(arm.bundle_names)
     return (
         f"{count} {place} to {answer.residuals.max() / arm.length:.1e} L. "
-        f"Press one (γ of {names}) to move the arm there; green is where it is."
+        f"Press one ({names}) to move the arm there; green is where it is."
     )
 
 

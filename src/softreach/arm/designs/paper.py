@@ -1,4 +1,4 @@
-"""Named designs, each with its source."""
+"""The designs of the paper."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import math
 
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.material import Material
+from softreach.arm.section import Section
 
 __all__ = ["minimal_trunk", "redundant_trunk"]
 
@@ -18,18 +20,21 @@ def minimal_trunk(
     *,
     length: float = 1.0,
     radius_ratio: float = 0.75,
+    material: Material | None = None,
 ) -> Manipulator:
     """The paper's minimal design: two helical bundles of opposite hand and a longitudinal one.
 
-    Kaczmarski, Moulton, Goriely, Kuhl, EML 71 (2024) 102207, section 2. The paper prints
-    R1(0) = L/12, which exceeds its R2(0) = L/16; 12/16 of R2(0) is our reading of that misprint, so
-    `radius_ratio` is a parameter and not the paper's value.
+    [Kaczmarski2024], section 2. The paper prints R1(0) = L/12, which exceeds its R2(0) = L/16;
+    12/16 of R2(0) is our reading of that misprint, so `radius_ratio` is a parameter and not the
+    paper's value.
 
     Args:
         revolution: Ω of the right-handed bundle; the left-handed one has -Ω [rad].
         taper: φ [rad].
         length: L [m].
         radius_ratio: R1/R2 [-].
+        material: What all of the arm is made of; None for an incompressible one whose Young's
+            modulus cancels.
     """
     helices = (
         FiberArchitecture(
@@ -39,7 +44,7 @@ def minimal_trunk(
             name="right", revolution=revolution, offset=math.radians(114), extent=_EXTENT
         ),
     )
-    return _trunk((*helices, _longitudinal(270)), taper, length, radius_ratio)
+    return _trunk((*helices, _longitudinal(270)), taper, length, radius_ratio, material)
 
 
 def redundant_trunk(
@@ -48,20 +53,25 @@ def redundant_trunk(
     *,
     length: float = 1.0,
     radius_ratio: float = 0.75,
+    material: Material | None = None,
 ) -> Manipulator:
     """The paper's redundant design: the longitudinal bundle of `minimal_trunk` split in two.
 
-    The paper does not print where the two lie (section 5). Here they have the extent of the others
-    and centers at 246° and 294°: adjacent like the helical pair, symmetric about the plane of
-    symmetry. At Ω = 108° each then meets a helical bundle near the tip.
+    [Kaczmarski2024] does not print where the two lie (section 5). Here they have the extent of the
+    others and centers at 246° and 294°: adjacent like the helical pair, symmetric about the plane
+    of symmetry. At Ω = 108° each then meets a helical bundle near the tip.
 
     Args:
         revolution: Ω of the right-handed bundle; the left-handed one has -Ω [rad].
         taper: φ [rad].
         length: L [m].
         radius_ratio: R1/R2 [-].
+        material: What all of the arm is made of; None for an incompressible one whose Young's
+            modulus cancels.
     """
-    arm = minimal_trunk(revolution, taper, length=length, radius_ratio=radius_ratio)
+    arm = minimal_trunk(
+        revolution, taper, length=length, radius_ratio=radius_ratio, material=material
+    )
     pair = (_longitudinal(246, "longitudinal 1"), _longitudinal(294, "longitudinal 2"))
     return arm.replace(actuators=(*arm.actuators[:2], *pair))
 
@@ -72,10 +82,14 @@ def _longitudinal(offset_deg: float, name: str = "longitudinal") -> FiberArchite
 
 
 def _trunk(
-    fibers: tuple[FiberArchitecture, ...], taper: float, length: float, radius_ratio: float
+    fibers: tuple[FiberArchitecture, ...],
+    taper: float,
+    length: float,
+    radius_ratio: float,
+    material: Material | None,
 ) -> Manipulator:
     radius = length / 16
-    return Manipulator.tapered(
+    arm = Manipulator.tapered(
         length=length,
         outer_radius=radius,
         inner_radius=radius_ratio * radius,
@@ -83,3 +97,7 @@ def _trunk(
         poisson_ratio=0.5,
         actuators=fibers,
     )
+    if material is None:
+        return arm
+    (ring,) = arm.section.rings
+    return arm.replace(section=Section(rings=(ring.replace(material=material),)))

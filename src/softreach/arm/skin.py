@@ -1,0 +1,257 @@
+"""The skins of an arm on a given centerline: its body, and what shows each bundle.
+
+Bundles that fill a sector of a ring are bands on the outside of that ring, lines are thin tubes,
+lumens tubes of their radius. They are cut where they begin and end to act.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.geometry.surface import Surface
+from softreach.geometry.tube import grid_faces, joined, ribbon_surface, tube_surface
+
+if TYPE_CHECKING:
+    from softreach.arm.manipulator import Manipulator
+
+__all__ = ["Centerline", "body_skin", "bundle_curves", "bundle_skins", "bundle_solids", "inside"]
+
+Array = NDArray[np.float64]
+
+_LINE = 1 / 400  # radius of a line, in L: what shows in small pictures
+_LINE_SIDES, _LUMEN_SIDES = 8, 24
+_SAME = 1e-9  # of the length, or of R2
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Centerline:
+    """Where the sections of an arm are in one configuration."""
+
+    z: Array
+    """Stations before activation [m], ascending, shape (station,)."""
+    position: Array
+    """Their centers [m], shape (station, 3)."""
+    directors: Array
+    """d1, d2, d3 of each, shape (station, 3, 3)."""
+
+    @classmethod
+    def at_rest(cls, z: Array) -> Self:
+        """Straight along z, directors along x, y, z."""
+        directors = np.tile(np.eye(3), (len(z), 1, 1))
+        return cls(z=z, position=np.column_stack([0 * z, 0 * z, z]), directors=directors)
+
+    def with_stations(self, more: ArrayLike) -> Self:
+        """The same line with more stations; those that it has, or that lie beyond it, are left."""
+        candidates, ends = np.asarray(more, float), self.z[[0, -1]]
+        apart = np.abs(candidates[:, None] - self.z).min(axis=1, initial=np.inf)
+        within = (candidates > ends[0]) & (candidates < ends[1])
+        new = candidates[within & (apart > _SAME * np.ptp(ends))]
+        if not len(new):
+            return self
+        place = np.searchsorted(self.z, new)
+        position, directors = self._between(place, new)
+        return type(self)(
+            z=np.insert(self.z, place, new),
+            position=np.insert(self.position, place, position, axis=0),
+            directors=np.insert(self.directors, place, directors, axis=0),
+        )
+
+    def _between(self, place: NDArray[np.intp], z: Array) -> tuple[Array, Array]:
+        """Centers by the cubic with the tangents of its ends, directors turned evenly."""
+        low, high = place - 1, place
+        s = ((z - self.z[low]) / (self.z[high] - self.z[low]))[:, None]
+        p, t = self.position, self.directors[:, 2]
+        chord = np.linalg.norm(p[high] - p[low], axis=1, keepdims=True)
+        middle = (1 - s) ** 2 * (1 + 2 * s) * p[low] + s**2 * (3 - 2 * s) * p[high]
+        middle += s * (1 - s) * chord * ((1 - s) * t[low] - s * t[high])
+        d1, d2 = ((1 - s) * self.directors[low, k] + s * self.directors[high, k] for k in (0, 1))
+        d1 = _unit(d1)
+        d2 = _unit(_across(d2, d1))
+        return middle, np.stack([d1, d2, np.cross(d1, d2)], axis=1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Stretch:
+    """Where one bundle acts without a gap: stations along the first axis."""
+
+    shape: str
+    extent: float
+    position: Array
+    """Centers of the sections [m], shape (station, 3)."""
+    directors: Array
+    center: Array
+    """Polar angle of the middle of the bundle [rad], shape (station,)."""
+    inner_ratio: Array
+    """Inner radius of the bundle over R2 [-], shape (station,)."""
+    outer_ratio: Array
+    """Outer radius of the bundle over R2 [-], shape (station,)."""
+    arm_radius: Array
+    """R2 [m], shape (station,)."""
+
+    @property
+    def middle(self) -> Array:
+        """Half between inner and outer radius [m], shape (station,)."""
+        return 0.5 * (self.inner_ratio + self.outer_ratio) * self.arm_radius
+
+    def points(self, angles: Array, radius: Array) -> Array:
+        """At polar angles (station, across) and radii (station,), shape (station, across, 3)."""
+        d1, d2 = self.directors[:, None, 0], self.directors[:, None, 1]
+        spokes = np.cos(angles)[..., None] * d1 + np.sin(angles)[..., None] * d2
+        return self.position[:, None] + radius[:, None, None] * spokes
+
+    def curve(self) -> Array:
+        """Its middle, for a sector on the outside of the ring, shape (station, 3)."""
+        sector = self.shape == "sector"
+        radius = self.outer_ratio * self.arm_radius if sector else self.middle
+        return self.points(self.center[:, None], radius)[:, 0]
+
+    def band(self, lift: float, step: float) -> Array:
+        """Points over the outer radius, `lift` R2 above it, shape (station, across, 3)."""
+        across = 2 + int(self.extent / step)
+        angles = self.center[:, None] + np.linspace(-self.extent / 2, self.extent / 2, across)
+        return self.points(angles, (self.outer_ratio + lift) * self.arm_radius)
+
+
+def body_skin(arm: Manipulator, line: Centerline, sides: int = 32) -> Surface:
+    """The body of the arm as a closed tube.
+
+    Args:
+        arm: The design.
+        line: Where its sections are.
+        sides: Corners of each section.
+
+    Raises:
+        InvalidInput: Fewer than two stations or three sides.
+    """
+    d1, d2 = line.directors[:, 0], line.directors[:, 1]
+    return tube_surface(line.position, d1, d2, arm.profile.radius(line.z), sides)
+
+
+def bundle_curves(arm: Manipulator, line: Centerline) -> Array:
+    """The middle of every bundle at all stations [m], shape (bundle, station, 3).
+
+    For a sector it is on the outside of its ring.
+    """
+    every = np.ones((len(line.z) - 1, arm.bundles), bool)
+    stretches = [next(parts) for parts in _stretches(arm, line, every)]
+    return np.stack([one.curve() for one in stretches])
+
+
+def bundle_skins(
+    arm: Manipulator, line: Centerline, *, lift: float = 0.0, step: float = np.pi / 32
+) -> list[Surface]:
+    """Each bundle as a surface to look at: an open band, or a closed tube, with outward faces.
+
+    Args:
+        arm: The design; bundle j covers a_j - σ_j/2 to a_j + σ_j/2.
+        line: Where its sections are; give it `arm.breakpoints`, so that bundles end there.
+        lift: How far bands are above their ring, in R2 [-].
+        step: Largest angle between neighboring points across a band [rad].
+    """
+
+    def sector(one: _Stretch) -> Surface:
+        band = one.band(lift, step)
+        # along x across is d3 x e_θ = -e_R: turned, so that faces point outwards
+        return Surface(vertices=band.reshape(-1, 3), faces=grid_faces(*band.shape[:2])[:, ::-1])
+
+    return _skins(arm, line, sector)
+
+
+def bundle_solids(
+    arm: Manipulator, line: Centerline, *, thickness: float, step: float = np.pi / 32
+) -> list[Surface]:
+    """Each bundle as closed surfaces: bands become skins, half sunk into the outside of their ring.
+
+    Args:
+        arm: The design.
+        line: Where its sections are; give it `arm.breakpoints`, so that bundles end there.
+        thickness: Of the skins, in R2 [-].
+        step: Largest angle between neighboring points across a band [rad].
+    """
+
+    def sector(one: _Stretch) -> Surface:
+        # along x across is d3 x e_θ = -e_R: the inner patch is the upper one
+        return ribbon_surface(one.band(thickness / 2, step), one.band(-thickness / 2, step))
+
+    return _skins(arm, line, sector)
+
+
+def inside(arm: Manipulator) -> tuple[bool, ...]:
+    """For each bundle, whether the body of the arm hides some of it."""
+    z = np.union1d(np.linspace(0.0, arm.length, 101), arm.breakpoints)
+    outline = arm.outline(z)
+    middle = 0.5 * (outline.inner_ratio + outline.outer_ratio)
+    sector = np.array([shape == "sector" for shape in outline.shape])
+    place = np.where(sector, outline.outer_ratio, middle)
+    hidden = (place < 1.0 - _SAME) & outline.acts
+    return tuple(bool(hidden[:, k].any()) for k in range(arm.bundles))
+
+
+def _skins(
+    arm: Manipulator, line: Centerline, sector: Callable[[_Stretch], Surface]
+) -> list[Surface]:
+    middle = 0.5 * (line.z[1:] + line.z[:-1])
+    width = _LINE * arm.length
+    make = {"sector": sector, "line": lambda one: _line_tube(one, width), "lumen": _lumen}
+    return [
+        joined([make[one.shape](one) for one in stretches])
+        for stretches in _stretches(arm, line, arm.outline(middle).acts)
+    ]
+
+
+def _stretches(
+    arm: Manipulator, line: Centerline, acts: NDArray[np.bool_]
+) -> Iterator[Iterator[_Stretch]]:
+    """The stretches of each bundle; `acts` tells of each piece between stations."""
+    outline, radius = arm.outline(line.z), arm.profile.radius(line.z)
+
+    def of(k: int) -> Iterator[_Stretch]:
+        for part in _runs(acts[:, k]):
+            yield _Stretch(
+                shape=outline.shape[k],
+                extent=float(outline.extent[k]),
+                position=line.position[part],
+                directors=line.directors[part],
+                center=outline.center[part, k],
+                inner_ratio=outline.inner_ratio[part, k],
+                outer_ratio=outline.outer_ratio[part, k],
+                arm_radius=radius[part],
+            )
+
+    yield from (of(k) for k in range(arm.bundles))
+
+
+def _runs(acts: NDArray[np.bool_]) -> list[slice]:
+    """Stations from the start to the end of each run of pieces that act."""
+    change = np.diff(np.concatenate([[0], acts.astype(np.int8), [0]]))
+    pairs = zip(np.flatnonzero(change > 0), np.flatnonzero(change < 0), strict=True)
+    return [slice(int(start), int(end) + 1) for start, end in pairs]
+
+
+def _line_tube(one: _Stretch, radius: float) -> Surface:
+    """A thin tube, round across its own direction."""
+    curve = one.curve()
+    along = _unit(np.gradient(curve, axis=0))
+    spoke = one.points(one.center[:, None], np.ones(len(curve)))[:, 0] - one.position
+    normal = _unit(_across(spoke, along))
+    return tube_surface(curve, normal, np.cross(along, normal), radius, _LINE_SIDES)
+
+
+def _lumen(one: _Stretch) -> Surface:
+    """A tube, round in the sections."""
+    radius = 0.5 * (one.outer_ratio - one.inner_ratio) * one.arm_radius
+    return tube_surface(one.curve(), one.directors[:, 0], one.directors[:, 1], radius, _LUMEN_SIDES)
+
+
+def _across(vector: Array, along: Array) -> Array:
+    """What is left of vectors without their part along unit vectors."""
+    return vector - np.sum(vector * along, axis=1, keepdims=True) * along
+
+
+def _unit(vector: Array) -> Array:
+    return vector / np.linalg.norm(vector, axis=1, keepdims=True)

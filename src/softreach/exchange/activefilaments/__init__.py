@@ -1,0 +1,20 @@
+"""ActiveFilaments.jl: definitions of filaments as Julia source, and its clouds as headerless CSV.
+
+[ActiveFilamentsJl] is the program of the theory's authors. Definitions are read as numbers and
+constructors and never run.
+"""
+
+from __future__ import annotations
+
+from softreach.exchange.activefilaments.cloud import gamma_path, read_cloud, write_cloud
+from softreach.exchange.activefilaments.definition import read_design
+from softreach.exchange.activefilaments.script import design_script, write_design
+
+__all__ = [
+    "design_script",
+    "gamma_path",
+    "read_cloud",
+    "read_design",
+    "write_cloud",
+    "write_design",
+]

@@ -1,0 +1,159 @@
+"""Clouds of ActiveFilaments.jl: NAME.csv and NAME_gamma.csv, without headers, a row a sample."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from os import PathLike, fspath
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach import schema
+from softreach.arm.manipulator import Manipulator
+from softreach.atomic import replacing
+from softreach.cloud import design_of
+from softreach.errors import InvalidInput, SoftreachWarning, counted
+from softreach.exchange.activefilaments.filament import Filament, filament_of
+from softreach.memory import free_memory
+from softreach.rod.kinematics import tip_positions
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["gamma_path", "read_cloud", "write_cloud"]
+
+Array = NDArray[np.float64]
+
+_SAME = 1e-5  # of L; their fixed 100 steps of order five err by less
+_BLOCK = 1 << 16
+_ENDING = "_gamma"
+
+
+def gamma_path(path: str | PathLike[str]) -> Path:
+    """NAME_gamma.csv beside NAME.csv."""
+    tips = Path(path)
+    return tips.with_name(f"{tips.stem}{_ENDING}{tips.suffix}")
+
+
+def read_cloud(arm: Manipulator, path: str | PathLike[str], *, tol: float = 1e-6) -> xr.Dataset:
+    """Read a cloud of ActiveFilaments.jl, and compare its tips with those that softreach computes.
+
+    Columns of NAME_gamma.csv are the sectors of the filament that `write_design` writes for the
+    arm: ring by ring, in a ring sector by sector. Where several families of fibers share a ring,
+    its activations are those of the arm times their number.
+
+    Args:
+        arm: The design that the cloud was computed for.
+        path: NAME.csv, with tips [m]; NAME_gamma.csv lies beside it.
+        tol: Largest tip error of the tips that the file's are compared with, in L.
+
+    Returns:
+        A cloud as of `compute_cloud`, with the tips of the file; its attributes hold
+        `largest_tip_difference` [m].
+
+    Raises:
+        InvalidInput: A file that is no table of finite numbers or has other columns or rows than
+            the design and the other file, or a design that ActiveFilaments.jl cannot have.
+
+    Warns:
+        SoftreachWarning: Tips differ by more than 1e-5 L, or activations leave the bounds.
+    """
+    filament = filament_of(arm)
+    activations = gamma_path(path)
+    tip = _table(Path(path), 3, "x, y, z")
+    sectors = ", ".join(ring.name or "no fibers" for ring in filament.rings)
+    columns = _table(activations, filament.columns, f"the sectors of {sectors}")
+    if len(tip) != len(columns):
+        rows = counted(len(columns), "row")
+        raise InvalidInput(fspath(activations), rows, f"{len(tip)}, as {fspath(path)} has")
+    activation = filament.from_columns(columns)
+    difference = float(np.linalg.norm(tip - tip_positions(arm, activation, tol), axis=1).max())
+    _warn(arm, activation, difference)
+    cloud = schema.cloud_dataset(
+        arm, activation, tip, seed=0, sampler="ActiveFilaments.jl", tol=tol
+    )
+    del cloud.attrs["seed"]
+    cloud.attrs["largest_tip_difference"] = difference
+    return cloud
+
+
+def write_cloud(cloud: xr.Dataset, path: str | PathLike[str]) -> None:
+    """Write tips to NAME.csv and activations to NAME_gamma.csv, as ActiveFilaments.jl does.
+
+    Args:
+        cloud: tip(sample, axis) [m] and activation(sample, bundle) [-].
+        path: NAME.csv; each file is replaced only when the new one is complete.
+
+    Raises:
+        InvalidInput: No cloud, or one of an arm that ActiveFilaments.jl cannot have.
+    """
+    filament = filament_of(design_of(schema.check_cloud(cloud)))
+    _write(gamma_path(path), cloud["activation"].values, filament)
+    _write(Path(path), cloud["tip"].values)
+
+
+def _write(path: Path, values: Array, filament: Filament | None = None) -> None:
+    """Rows of the shortest numbers that read back to the same ones."""
+    with replacing(path) as partial, partial.open("w", encoding="ascii", newline="\n") as file:
+        for first in range(0, len(values), _BLOCK):
+            block = values[first : first + _BLOCK]
+            rows = block if filament is None else filament.to_columns(block)
+            file.writelines(",".join(map(repr, row)) + "\n" for row in rows.tolist())
+
+
+def _warn(arm: Manipulator, activation: Array, difference: float) -> None:
+    low, high = arm.bounds.T
+    if (activation < low).any() or (activation > high).any():
+        text = "activations leave the bounds of the design: widen them before asking for its set"
+        warnings.warn(text, SoftreachWarning, stacklevel=3)
+    if difference > _SAME * arm.length:
+        warnings.warn(
+            f"tips differ by up to {difference / arm.length:.2g} L from those of this design: "
+            "compare its numbers, and the order and scale of its sectors, with the filament",
+            SoftreachWarning,
+            stacklevel=3,
+        )
+
+
+def _table(path: Path, columns: int, meaning: str) -> Array:
+    """A table of numbers without a header, shape (row, columns)."""
+    name = fspath(path)
+    _check_file(path)
+    try:
+        # NumPy would unpack or fetch what it is given by name.
+        with warnings.catch_warnings(), path.open(encoding="utf-8") as file:
+            warnings.simplefilter("ignore", UserWarning)  # of an empty file, which is refused below
+            table = np.loadtxt(file, delimiter=",", comments=None, ndmin=2)
+    except (ValueError, OverflowError, MemoryError) as error:
+        raise InvalidInput(name, _reason(error), "rows of comma-separated numbers") from None
+    if not table.size:
+        raise InvalidInput(name, "no rows", "rows of comma-separated numbers")
+    if table.shape[1] != columns:
+        found = counted(table.shape[1], "column")
+        raise InvalidInput(name, found, f"{columns}: {meaning}")
+    if not (good := np.isfinite(table).all(axis=1)).all():
+        row = int(np.argmin(good)) + 1
+        raise InvalidInput(f"{name}, row {row}", table[row - 1].tolist(), "finite numbers")
+    return table
+
+
+def _check_file(path: Path) -> None:
+    """Refuse what is no file, or one that cannot fit into memory."""
+    if not path.is_file():
+        raise InvalidInput("file", fspath(path), "a file that exists")
+    size, room = os.stat(path).st_size, free_memory() / 2
+    if size > room:
+        allowed = f"at most {room / 1e9:.1f} GB, half of the free memory"
+        raise InvalidInput(fspath(path), f"{size / 1e9:.1f} GB", allowed)
+
+
+def _reason(error: Exception) -> Any:
+    """What is wrong with a table, in a few printable words."""
+    if isinstance(error, UnicodeDecodeError):
+        return "no text"
+    text = str(error).partition(";")[0] or type(error).__name__
+    shown = "".join(one if one.isprintable() else "?" for one in text)
+    return shown if len(shown) < 120 else f"{shown[:60]} ... {shown[-40:]}"

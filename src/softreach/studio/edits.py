@@ -1,0 +1,231 @@
+"""Changes of what an arm consists of: actuators and rings added, removed, renamed, remade."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Mapping
+
+import numpy as np
+
+from softreach.arm.actuators import (
+    Actuator,
+    Chamber,
+    FiberArchitecture,
+    ObliqueMuscle,
+    RadialMuscle,
+    SectorActuator,
+    Tendon,
+)
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.materials import named_material
+from softreach.arm.section import Ring
+from softreach.errors import InvalidInput
+
+__all__ = [
+    "ACTUATOR_KINDS",
+    "ring_label",
+    "with_actuator",
+    "with_actuator_name",
+    "with_core",
+    "with_ring",
+    "with_ring_material",
+    "with_ring_name",
+    "without_actuator",
+    "without_ring",
+]
+
+_EXTENT = np.radians(40)
+_TURN = 2.0  # bending of a new actuator at its bound, over the whole arm [rad]
+
+
+def with_actuator(arm: Manipulator, kind: str) -> Manipulator:
+    """The arm with one more actuator of a kind, where there is most room, of a new name.
+
+    Args:
+        arm: The design.
+        kind: One of `ACTUATOR_KINDS`.
+
+    Raises:
+        InvalidDesign: A tendon or a chamber in an arm without Young's modulus.
+    """
+    name = _new_name(kind, [one.name for one in arm.actuators])
+    made = ACTUATOR_KINDS[kind](arm, name, _widest_gap(arm))
+    return arm.replace(actuators=(*arm.actuators, made))
+
+
+def without_actuator(arm: Manipulator, name: str) -> Manipulator:
+    """The arm without one of its actuators.
+
+    Raises:
+        InvalidInput: It is the last one.
+    """
+    left = tuple(one for one in arm.actuators if one.name != name)
+    if not left:
+        raise InvalidInput("actuators", name, "more than one to remove one of them")
+    return arm.replace(actuators=left)
+
+
+def with_actuator_name(arm: Manipulator, old: str, new: str) -> Manipulator:
+    """The arm with one of its actuators renamed.
+
+    Raises:
+        InvalidDesign: Another one has this name.
+    """
+    return arm.replace(
+        actuators=tuple(one.replace(name=new) if one.name == old else one for one in arm.actuators)
+    )
+
+
+def with_ring(arm: Manipulator) -> Manipulator:
+    """The arm with one more ring, of the same material, inside the innermost or in its inner half.
+
+    Rings that an actuator names by index keep their place: the new one comes last.
+    """
+    section = arm.section
+    first = min(section.rings, key=lambda ring: ring.inner_ratio)
+    room = section.inner_ratio - section.bore_ratio
+    low, high = (section.inner_ratio - 0.5 * room, section.inner_ratio)
+    if room <= 0:
+        low, high = first.inner_ratio, 0.5 * (first.inner_ratio + first.outer_ratio)
+    name = _new_name("ring", [ring.name for ring in section.rings])
+    ring = Ring(inner_ratio=low, outer_ratio=high, material=section.core_material, name=name)
+    return arm.replace(section=section.replace(rings=(*section.rings, ring)))
+
+
+def without_ring(arm: Manipulator, index: int) -> Manipulator:
+    """The arm without one of its rings; actuators in the others stay in theirs.
+
+    Raises:
+        InvalidInput: It is the last one, or actuators are in it.
+        InvalidDesign: The others do not reach the surface of the arm.
+    """
+    rings, gone = arm.section.rings, arm.section.rings[index]
+    if len(rings) == 1:
+        raise InvalidInput("rings", ring_label(arm, index), "more than one to remove one of them")
+    inside = [one.name for one in _in_rings(arm) if arm.section.ring(one.ring) is gone]
+    if inside:
+        hint = f"move or remove {', '.join(inside)} first"
+        raise InvalidInput("rings", ring_label(arm, index), "without actuators to be removed", hint)
+    kept = tuple(ring for k, ring in enumerate(rings) if k != index)
+    section = arm.section.replace(rings=kept)
+    return arm.replace(
+        section=section, actuators=tuple(_shifted(one, arm, kept) for one in arm.actuators)
+    )
+
+
+def with_ring_name(arm: Manipulator, index: int, name: str) -> Manipulator:
+    """The arm with one of its rings renamed; actuators stay in it.
+
+    Raises:
+        InvalidDesign: Another ring has this name.
+    """
+    rings = _with(arm, index, lambda ring: ring.replace(name=name))
+    old = arm.section.rings[index].name
+    moved = tuple(
+        one.replace(ring=index) if isinstance(one, SectorActuator) and one.ring == old else one
+        for one in arm.actuators
+    )
+    return arm.replace(section=arm.section.replace(rings=rings), actuators=moved)
+
+
+def with_ring_material(arm: Manipulator, index: int, material: str) -> Manipulator:
+    """The arm with one of its rings made of a named material.
+
+    Raises:
+        InvalidDesign: Different materials, of which one has no Young's modulus.
+    """
+    made = named_material(material)
+    rings = _with(arm, index, lambda ring: ring.replace(material=made))
+    return arm.replace(section=arm.section.replace(rings=rings))
+
+
+def with_core(arm: Manipulator, material: str) -> Manipulator:
+    """The arm with a core of a named material; "" for that of the innermost ring."""
+    made = named_material(material) if material else None
+    return arm.replace(section=arm.section.replace(core=made))
+
+
+def ring_label(arm: Manipulator, index: int) -> str:
+    """What a ring is called: its index, and its name if it has one."""
+    name = arm.section.rings[index].name
+    return f"ring {index} ({name})" if name else f"ring {index}"
+
+
+def _fiber(arm: Manipulator, name: str, offset: float) -> Actuator:
+    del arm
+    return FiberArchitecture(name=name, helical_angle=0.0, offset=offset, extent=_EXTENT)
+
+
+def _oblique_muscle(arm: Manipulator, name: str, offset: float) -> Actuator:
+    del arm
+    return ObliqueMuscle(name=name, helical_angle=np.radians(30), offset=offset, extent=_EXTENT)
+
+
+def _radial_muscle(arm: Manipulator, name: str, offset: float) -> Actuator:
+    del arm, offset
+    return RadialMuscle(name=name, extent=2 * np.pi, activation_bounds=(-1.0, 0.0))
+
+
+def _tendon(arm: Manipulator, name: str, offset: float) -> Actuator:
+    most = _rounded(_moment(arm) / (0.8 * float(arm.profile.radius(0.0))))
+    return Tendon(name=name, distance_ratio=0.8, offset=offset, activation_bounds=(0.0, most))
+
+
+def _chamber(arm: Manipulator, name: str, offset: float) -> Actuator:
+    radius = float(arm.profile.radius(0.0))
+    most = _rounded(_moment(arm) / (0.5 * radius * np.pi * (0.25 * radius) ** 2))
+    bounds = (0.0, most)
+    return Chamber(
+        name=name, distance_ratio=0.5, radius_ratio=0.25, offset=offset, activation_bounds=bounds
+    )
+
+
+ACTUATOR_KINDS: Mapping[str, Callable[[Manipulator, str, float], Actuator]] = {
+    "fiber": _fiber,
+    "oblique muscle": _oblique_muscle,
+    "radial muscle": _radial_muscle,
+    "tendon": _tendon,
+    "chamber": _chamber,
+}
+
+
+def _moment(arm: Manipulator) -> float:
+    """The moment that bends the base as if the whole arm were to turn by `_TURN` [N m]."""
+    stiffness = float(arm.section.stiffness(arm.profile.radius(0.0)).bending)
+    return _TURN * stiffness / arm.length
+
+
+def _rounded(value: float) -> float:
+    """Two digits, as a person would write it."""
+    return float(f"{value:.2g}")
+
+
+def _widest_gap(arm: Manipulator) -> float:
+    """Polar angle in the middle of the widest gap between bundles at the base [rad]."""
+    angles = np.sort(np.mod(arm.outline([0.0]).center[0], 2 * np.pi))
+    gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
+    widest = int(np.argmax(gaps))
+    return float(np.mod(angles[widest] + gaps[widest] / 2, 2 * np.pi))
+
+
+def _new_name(kind: str, taken: Iterable[str]) -> str:
+    known = set(taken)
+    names = (f"{kind} {number}" for number in itertools.count(1))
+    return next(name for name in names if name not in known)
+
+
+def _in_rings(arm: Manipulator) -> list[SectorActuator]:
+    return [one for one in arm.actuators if isinstance(one, SectorActuator)]
+
+
+def _shifted(actuator: Actuator, arm: Manipulator, kept: tuple[Ring, ...]) -> Actuator:
+    """The actuator in the same ring, whose index may be another now."""
+    if not isinstance(actuator, SectorActuator) or isinstance(actuator.ring, str):
+        return actuator
+    home = arm.section.ring(actuator.ring)
+    return actuator.replace(ring=next(k for k, ring in enumerate(kept) if ring is home))
+
+
+def _with(arm: Manipulator, index: int, change: Callable[[Ring], Ring]) -> tuple[Ring, ...]:
+    rings = arm.section.rings
+    return tuple(change(ring) if k == index else ring for k, ring in enumerate(rings))

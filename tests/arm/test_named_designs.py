@@ -1,0 +1,184 @@
+"""Named designs: each is what its source says, and holds to a law of its own."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+import pytest
+
+import softreach as sr
+from softreach.arm import designs
+from softreach.arm.bending import sharpest_bending
+from softreach.arm.materials import named_material
+from tests.laws import in_box
+
+NAMES = designs.__all__
+MIRROR = np.diag([-1.0, 1.0, 1.0])
+
+
+def named(name: str) -> sr.Manipulator:
+    return getattr(designs, name)()
+
+
+def tip(arm: sr.Manipulator, *activation: float) -> np.ndarray:
+    return sr.tip_positions(arm, [activation], tol=1e-12)[0]
+
+
+def about_z(angle: float) -> np.ndarray:
+    cos, sin = math.cos(angle), math.sin(angle)
+    return np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_activation_shortens_a_named_design_to_nothing_or_folds_it_without_a_warning(name):
+    arm = named(name)
+    facts = sr.describe(arm)
+    assert facts.extension[0] > 0.3
+    warned = any("|κ| R2" in warning for warning in facts.warnings)
+    assert warned == (sharpest_bending(arm).value >= 1)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_named_design_says_where_it_comes_from(name):
+    assert re.search(r"\[[A-Z]\w+\]", getattr(designs, name).__doc__)
+
+
+@pytest.mark.parametrize("trunk", [designs.minimal_trunk, designs.redundant_trunk])
+def test_the_material_of_a_trunk_changes_its_stiffness_and_none_of_its_shapes(trunk):
+    plain, silicone = trunk(), trunk(material=named_material("dragon_skin_30"))
+    gamma = in_box(plain, 3)
+    np.testing.assert_allclose(
+        sr.tip_positions(silicone, gamma), sr.tip_positions(plain, gamma), rtol=0, atol=1e-15
+    )
+    radius = plain.profile.outer_radius
+    stiffer = silicone.section.stiffness(radius).axial / plain.section.stiffness(radius).axial
+    assert stiffer == pytest.approx(silicone.section.rings[0].material.young_modulus)
+    assert silicone.section.mass_per_length(radius) == pytest.approx(1080 * math.pi * radius**2)
+
+
+def test_the_arm_of_the_laboratory_is_as_stiff_as_its_code_says():
+    """A core and three rings in one place, each with 48/360 of the fibers' modulus."""
+    arm = designs.lce_arm()
+    outer, inner = 0.0045, 0.00375
+    fiber, core = 3 * 1.4e6 * 48 / 360, 0.1278e6
+    bending = math.pi / 4 * (fiber * (outer**4 - inner**4) + core * inner**4)
+    twist = fiber * (outer**4 - inner**4) / 1.495 + core * inner**4 / 1.5
+    stiffness = arm.section.stiffness(outer)
+    assert stiffness.axial == pytest.approx(16.53165, rel=1e-6)
+    assert stiffness.bending == pytest.approx(1.132275e-4, rel=1e-6) == bending
+    assert stiffness.torsion == pytest.approx(7.569322e-5, rel=1e-6) == math.pi / 4 * twist
+    assert arm.section.mass_per_length(outer) == pytest.approx(1000 * math.pi * outer**2)
+
+
+def test_the_arm_of_the_laboratory_is_its_own_mirror_image():
+    arm = designs.lce_arm()
+    gamma = in_box(arm, 5)
+    mirrored = sr.tip_positions(arm, gamma[:, [1, 0, 2]], tol=1e-10) @ MIRROR
+    np.testing.assert_allclose(
+        mirrored, sr.tip_positions(arm, gamma, tol=1e-10), rtol=0, atol=1e-11
+    )
+
+
+def test_the_filament_turns_with_its_sectors():
+    """A third of a turn moves each activation on to the next sector."""
+    arm = designs.filament()
+    gamma = in_box(arm, 5)
+    turned = sr.tip_positions(arm, np.roll(gamma, 1, axis=1), tol=1e-10)
+    np.testing.assert_allclose(
+        turned, sr.tip_positions(arm, gamma, tol=1e-10) @ about_z(2 * math.pi / 3).T, atol=1e-9
+    )
+
+
+def test_the_right_and_left_muscles_of_the_trunk_are_mirror_images():
+    arm = designs.elephant_trunk()
+    swapped = [k ^ 1 for k in range(arm.bundles)]
+    assert all(
+        arm.bundle_names[k].replace("right", "left") == arm.bundle_names[k + 1]
+        for k in range(0, arm.bundles, 2)
+    )
+    gamma = in_box(arm, 5)
+    mirrored = sr.tip_positions(arm, gamma[:, swapped], tol=1e-10) @ MIRROR
+    np.testing.assert_allclose(mirrored, sr.tip_positions(arm, gamma, tol=1e-10), rtol=0, atol=1e-9)
+
+
+def test_the_muscles_of_the_trunk_do_what_elephants_do_with_them():
+    """Dorsal muscles lift the tip, obliques of one hand twist, radial ones stretch."""
+    arm = designs.elephant_trunk()
+
+    def contracted(*groups: str) -> list[float]:
+        return [-0.3 * any(group in name for group in groups) for name in arm.bundle_names]
+
+    lifted = tip(arm, *contracted("dorsal longitudinal"))
+    assert lifted[1] < -0.5
+    assert abs(lifted[0]) < 1e-12
+    assert tip(arm, *contracted("radial"))[2] > arm.length
+    left_handed = ("outer oblique right", "inner oblique left")
+    right_handed = ("outer oblique left", "inner oblique right")
+    twists = [
+        sr.configuration(arm, contracted(*hand)).curvature.values[..., 2]
+        for hand in (left_handed, right_handed)
+    ]
+    assert (twists[0] > 0).all()
+    np.testing.assert_allclose(twists[1], -twists[0])
+
+
+def test_a_tendon_bends_the_robot_to_a_circle():
+    """κ = τ ρt/EI, a quarter turn over 0.2 m at 8 N, and the wire is shortened by τ/EA."""
+    arm = designs.three_tendon_robot()
+    stiffness = 54e9 * math.pi / 4 * 0.0007**4
+    curvature = 8 * 0.01 / stiffness
+    angle = curvature * 0.2 * (1 - 8 / (54e9 * math.pi * 0.0007**2))
+    assert angle == pytest.approx(math.pi / 2, rel=1e-3)
+    circle = [0, (1 - math.cos(angle)) / curvature, math.sin(angle) / curvature]
+    np.testing.assert_allclose(tip(arm, 8, 0, 0), circle, rtol=0, atol=1e-12)
+
+
+def test_the_second_segment_stays_straight_under_the_tendons_of_the_first():
+    two, one = designs.three_tendon_robot(segments=2), designs.three_tendon_robot()
+    shape = sr.configuration(two, [5, 0, 2, 0, 0, 0], stations=[0.2, 0.4], tol=1e-12)
+    middle, end = shape.position.values
+    np.testing.assert_allclose(middle, tip(one, 5, 0, 2), rtol=0, atol=1e-12)
+    straight = middle + 0.2 * shape.directors.values[0, 2]
+    np.testing.assert_allclose(end, straight, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("segments", [0, 3, 1.5, True, "two"])
+def test_a_robot_of_another_number_of_segments_is_refused(segments):
+    with pytest.raises(sr.InvalidInput, match="segments"):
+        designs.three_tendon_robot(segments=segments)
+
+
+def test_the_next_helical_tendon_does_the_same_a_quarter_turn_on():
+    arm = designs.helical_tendon_robot()
+    first, second = tip(arm, 15, 0, 0, 0), tip(arm, 0, 15, 0, 0)
+    assert np.linalg.norm(first[:2]) > 1e-3
+    np.testing.assert_allclose(second, about_z(math.pi / 2) @ first, rtol=0, atol=1e-10)
+
+
+def test_a_helical_tendon_bends_by_the_offset_and_the_slope_of_its_route():
+    """κ = τ ρt t3/EI with the slope ρt Ω/L = 0.1893 that the numbers of the source give."""
+    arm = designs.helical_tendon_robot()
+    slope = 0.01506 * 2 * math.pi / 0.5
+    assert slope == pytest.approx(0.1893, abs=1e-4)
+    expected = 15 * 0.01506 / math.hypot(1, slope) / (200e9 * math.pi / 4 * 0.001**4)
+    curvature = sr.configuration(arm, [15, 0, 0, 0]).curvature.values
+    np.testing.assert_allclose(np.linalg.norm(curvature[:, :2], axis=1), expected, rtol=1e-12)
+
+
+def test_a_chamber_bends_the_pneumatic_arm_to_a_circle_away_from_it():
+    arm = designs.three_chamber_arm()
+    area, modulus = math.pi * 0.004**2, 82.7e3
+    pressure = 50e3
+    curvature = pressure * area * 0.0075 / (modulus * math.pi / 4 * 0.0125**4)
+    angle = curvature * 0.15 * (1 + pressure * area / (modulus * math.pi * 0.0125**2))
+    circle = [0, -(1 - math.cos(angle)) / curvature, math.sin(angle) / curvature]
+    np.testing.assert_allclose(tip(arm, pressure, 0, 0), circle, rtol=0, atol=1e-12)
+
+
+def test_equal_pressures_stretch_the_pneumatic_arm():
+    arm = designs.three_chamber_arm()
+    stretch = 3 * 1e5 * math.pi * 0.004**2 / arm.section.stiffness(0.0125).axial
+    stretched = 0.15 * (1 + float(stretch))
+    np.testing.assert_allclose(tip(arm, 1e5, 1e5, 1e5), [0.0, 0.0, stretched], atol=1e-12)

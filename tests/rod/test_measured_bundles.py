@@ -1,0 +1,62 @@
+"""Activations of different units are compared in their own ranges."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import softreach as sr
+from softreach.arm import Chamber, LinearTaper, Material, Ring, Section, Tendon
+from softreach.rod.measured_bundles import activation_measures, measured_bundles
+from softreach.rod.tip_map import tip_map
+from tests.laws import in_box
+
+TENDONS = Tendon(name="tendon", distance_ratio=0.9, bundles=3, activation_bounds=(0, 8))
+CHAMBER = Chamber(name="core", distance_ratio=0, radius_ratio=0.25, activation_bounds=(0, 5e4))
+
+
+def arm_of(*actuators):
+    ring = Ring(inner_ratio=0.5, material=Material(young_modulus=1e5))
+    return sr.Manipulator(
+        profile=LinearTaper(length=0.2, outer_radius=0.015, taper=0.01),
+        section=Section(rings=(ring,)),
+        actuators=actuators,
+    )
+
+
+def test_strains_count_as_they_are(trunk):
+    np.testing.assert_array_equal(activation_measures(trunk), np.ones(trunk.bundles))
+    assert measured_bundles(tip_map(trunk)) is tip_map(trunk)
+
+
+def test_activations_of_one_unit_keep_their_proportions():
+    arm = arm_of(TENDONS).with_bounds(((0, 8), (0, 4), (0, 2)))
+    np.testing.assert_array_equal(activation_measures(arm), [8, 8, 8])
+
+
+def test_activations_of_different_units_count_in_their_ranges():
+    np.testing.assert_array_equal(activation_measures(arm_of(TENDONS, CHAMBER)), [8, 8, 8, 5e4])
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_a_held_bundle_has_a_measure_too(held):
+    bounds = ((0, 8), (0, 4), (3, 3) if held else (0, 3), (0, 5e4))
+    assert (activation_measures(arm_of(TENDONS, CHAMBER).with_bounds(bounds)) > 0).all()
+
+
+def test_the_map_is_the_same_in_other_measures():
+    rod = tip_map(arm_of(TENDONS, CHAMBER))
+    other, gamma = measured_bundles(rod), in_box(rod.arm, 20)
+    shares = gamma / activation_measures(rod.arm)
+    np.testing.assert_allclose(other.tips(shares), rod.tips(gamma), atol=1e-14)
+    slopes = rod.tips_and_slopes(gamma)[1] * activation_measures(rod.arm)
+    np.testing.assert_allclose(other.tips_and_slopes(shares)[1], slopes, atol=1e-12)
+    assert (other.box.widths <= 1.0).all()
+
+
+def test_a_large_unit_does_not_drown_the_others():
+    found = sr.activation_distance(sr.compute_cloud(arm_of(TENDONS, CHAMBER), n=2_000), 0.02)
+    assert found.attrs["units"] == "1"
+    assert 0 < float(found.max()) < np.sqrt(4)  # no farther than corners of the unit cube
+    alike = sr.activation_distance(sr.compute_cloud(arm_of(TENDONS), n=2_000), 0.02)
+    assert alike.attrs["units"] == "N"
