@@ -63,3 +63,11 @@ def test_a_path_is_followed_in_the_units_of_the_arm(mixed):
     followed = sr.track_path(mixed, path, start=gamma[0])
     np.testing.assert_allclose(followed.activation[0], gamma[0], rtol=1e-6)
     np.testing.assert_allclose(sr.tip_positions(mixed, followed.activation), path, atol=1e-8)
+
+
+def test_held_bundles_stay_where_they_are(mixed):
+    held = mixed.with_bounds(((0, 8), (2, 2), (0, 8), (1e4, 5e4)))
+    gamma = in_box(held, 20)
+    found = sr.solve_inverse(held, sr.tip_positions(held, gamma), near=gamma)
+    assert (found.statuses == 0).all()
+    np.testing.assert_allclose(found.activations[:, 1], 2)

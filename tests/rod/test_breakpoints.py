@@ -236,6 +236,14 @@ def test_stations_on_and_beside_breakpoints_have_the_places_and_frames_of_the_wa
     np.testing.assert_allclose(places[beyond], ahead, atol=1e-10)
 
 
+@pytest.mark.parametrize("tol", [1e-6, 1e-9])
+def test_steps_end_at_breakpoints_that_no_station_asks_for(walk, tol):
+    ends, states = walk
+    found = FreeRod(broken(), tol).frames(in_box(broken(), 1), ends[[0, -2, -1]])
+    missed = np.linalg.norm(found.position[0] - states[[0, -2, -1], :3], axis=1)
+    assert missed.max() <= tol
+
+
 def test_frames_are_orthonormal_at_breakpoints():
     arm = broken()
     z = np.union1d(arm.breakpoints, np.linspace(0, 1, 11))
@@ -245,11 +253,20 @@ def test_frames_are_orthonormal_at_breakpoints():
 
 
 def test_strains_at_a_breakpoint_are_those_of_the_piece_that_begins_there():
+    """At the base too; and at the tip those of the piece that ends."""
     arm = broken()
-    z = np.array([np.nextafter(0.83, 0), 0.83, 0.83 + 1e-12])
-    ending, here, after = FreeRod(arm, 1e-6).strains_at(z)(in_box(arm, 1)).curvature[0]
+    z = np.array([0.0, *BREAKS])
+    strains = FreeRod(arm, 1e-6).strains_at
+    here, after, before = (
+        strains(places)(in_box(arm, 1)).curvature[0]
+        for places in (z, z + 1e-12, z - 1e-12 * (z > 0))
+    )
     np.testing.assert_allclose(here, after, rtol=1e-9, atol=1e-9)
-    assert np.abs(here - ending).max() > 1e-3
+    jumps = dict(zip(z, np.abs(here - before).max(axis=1), strict=True))
+    assert min(jumps[end] for end in (0.1, 0.3, 0.41, 0.83, 0.9)) > 1e-3  # ends of segments
+    assert min(jumps[end] for end in (0.5, 0.55)) > 1e-3  # kinks of routing and angle
+    last = strains([1 - 1e-12, 1.0])(in_box(arm, 1)).curvature[0]
+    np.testing.assert_allclose(last[1], last[0], rtol=1e-9)
 
 
 def test_a_breakpoint_where_nothing_changes_changes_nothing(trunk):
