@@ -246,7 +246,7 @@ helical_angle_deg = 0.0
         (["desgin"], 'Did you mean "design"'),
         (["design"], "requires an argument"),
         (["design", "nowhere.toml"], "nowhere.toml: must be a file that exists"),
-        (["design", "elephant"], "elephant: must be a .toml file, or one of minimal_trunk"),
+        (["design", "elephant"], "elephant: must be a .toml file, or one of elephant_trunk"),
         (["design", "minimal_trunk", "--tapr-deg", "3"], "Did you mean --taper-deg"),
         (["design", "minimal_trunk", "--taper-deg", "steep"], '"steep" into float'),
         (["cloud", "minimal_trunk", "--n", "many"], '"many" into int'),
