@@ -64,10 +64,12 @@ class Row(NamedTuple):
 def measured(name: str) -> Row:
     """The exact numbers of a design; of many bundles to 1 %, within the same memory everywhere."""
     arm = getattr(designs, name)()
-    options = {} if arm.bundles <= 3 else {"accuracy": 0.01, "memory": _MEMORY}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sr.errors.SoftreachWarning)  # the error is on the page
-        found = sr.reachable_set(arm, **options)
+        if arm.bundles <= 3:
+            found = sr.reachable_set(arm)
+        else:
+            found = sr.reachable_set(arm, accuracy=0.01, memory=_MEMORY)
     share, error = 100 * found.unreachability, 100 * found.unreachability_error
     return Row(quantity(found.volume, "m³", found.volume_error), quantity(share, "%", error))
 

@@ -258,6 +258,10 @@ def test_arithmetic_is_that_of_julia(text, value):
         ("R = radius(3)\n" + PLAIN.replace("0.2", "R"), 1, "radius"),
         ("rings = [1]\nrings .*= 2\n" + PLAIN.replace(f"[{RING}]", "rings"), 2, "rings"),
         ("r = []\npush!(r, 1)\n" + PLAIN.replace(f"[{RING}]", "r"), 2, "push!"),
+        ("R = 0.2\n3 > 2 && (R = 0.4)\n" + PLAIN.replace("0.2", "R"), 2, "plain assignment"),
+        ("R = 0.2\nR, r = 0.3, 0.1\n" + PLAIN.replace("0.2", "R"), 2, "plain assignment"),
+        ("r = [1.0]\nx = pop!(r)\n" + PLAIN.replace(f"[{RING}]", "r"), 2, "plain assignment"),
+        ("r = [1.0]\nr[1] = 2.0\n" + PLAIN.replace(f"[{RING}]", "r"), 2, "plain assignment"),
         ("\n\nfor i in 1:3\n  x = i\nend\n" + PLAIN, 3, "for"),
         (PLAIN.replace("0.2", "0.2 +"), 1, "'\\)'"),
         (PLAIN.replace("0.2", "2^2000"), 1, "finite"),
@@ -314,6 +318,17 @@ def test_any_text_is_read_or_refused_in_one_line(text, tmp_path_factory):
     with pytest.raises(sr.InvalidInput) as error:
         read_design(path)
     assert "\n" not in str(error.value)
+
+
+def test_statements_that_change_no_name_are_passed_over(read):
+    """Comparisons, pairs, keyword arguments and conditions."""
+    more = "sol = solve(filament; L = 3.0)\nL <= R\nL => R\nx = L != R\nplot(R, L = 2)\n"
+    definition = "L = 1.0; R = 0.2\n" + PLAIN.replace("0.2", "R").replace("1.0)", "L)")
+    assert read(definition.replace("filament =", more + "filament =") + more) == read(PLAIN)
+
+
+def test_a_mark_at_the_beginning_of_the_file_does_no_harm(read):
+    assert read(b"\xef\xbb\xbfR = 0.2\r\n" + PLAIN.replace("0.2", "R").encode()) == read(PLAIN)
 
 
 def test_names_may_be_given_twice_and_statements_share_a_line(read):

@@ -126,7 +126,7 @@ def _table(path: Path, columns: int, meaning: str) -> Array:
     _check_file(path)
     try:
         # NumPy would unpack or fetch what it is given by name.
-        with warnings.catch_warnings(), path.open(encoding="utf-8") as file:
+        with warnings.catch_warnings(), path.open(encoding="utf-8-sig") as file:
             warnings.simplefilter("ignore", UserWarning)  # of an empty file, which is refused below
             table = np.loadtxt(file, delimiter=",", comments=None, ndmin=2)
     except (ValueError, OverflowError, MemoryError) as error:
