@@ -275,6 +275,8 @@ def test_arithmetic_is_that_of_julia(text, value):
         (PLAIN.replace("0.1, 0.2", '"a", 0.2'), 1, "a"),
         ("x = (1, 2]\n" + PLAIN, 1, "']'"),
         (PLAIN + "x = [1, 2\n", 3, "closes"),
+        (PLAIN + 'x = "text\n', 3, "quotation mark"),
+        (PLAIN + "#= no end\n", 3, "end of the comment"),
         (PLAIN + "γBounds = [([-1.0, 0.0], [0.0, 0.0])]", 1, "1 numbers each"),
         ("x = " + "(" * 60 + "1" + ")" * 60 + "\n" + PLAIN.replace("0.2", "x"), 1, "levels"),
     ],

@@ -20,7 +20,7 @@ from softreach.exchange.activefilaments.tokens import Token, refused, statements
 
 __all__ = ["read_design"]
 
-_LARGEST = 1_000_000  # bytes
+_LARGEST = 100_000  # bytes
 _BLOCKS = {
     "for", "while", "if", "function", "macro", "let", "begin", "struct", "mutable", "try", "do",
     "quote", "module", "baremodule", "end", "else", "elseif", "catch", "finally", "return",
