@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+from tools.designs import FOLDER, design_file
 
 import softreach as sr
 from softreach.arm import designs
@@ -182,3 +183,14 @@ def test_equal_pressures_stretch_the_pneumatic_arm():
     stretch = 3 * 1e5 * math.pi * 0.004**2 / arm.section.stiffness(0.0125).axial
     stretched = 0.15 * (1 + float(stretch))
     np.testing.assert_allclose(tip(arm, 1e5, 1e5, 1e5), [0.0, 0.0, stretched], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_file_of_a_named_design_is_written_by_the_tool(name):
+    written = (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
+    assert written == design_file(name)
+    assert sr.Manipulator.from_toml(written) == named(name)
+
+
+def test_every_file_is_that_of_a_named_design():
+    assert sorted(path.stem for path in FOLDER.glob("*.toml")) == sorted(NAMES)

@@ -32,6 +32,7 @@ def lce_arm() -> Manipulator:
     matter = fibers.replace(
         young_modulus=share * (fibers.young_modulus or 0.0),
         density=(fibers.density or 0.0) / len(_FAMILIES),
+        name="fibers",
     )
     core = Material(young_modulus=0.1278e6, poisson_ratio=0.5, density=1000.0, name="core")
     rings = tuple(Ring(inner_ratio=5 / 6, material=matter, name=name) for name, _, _ in _FAMILIES)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 import warnings
 from os import PathLike, fspath
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ Array = NDArray[np.float64]
 _SAME = 1e-5  # of L; their fixed 100 steps of order five err by less
 _BLOCK = 1 << 16
 _ENDING = "_gamma"
+_NO_NUMBER = re.compile(r"could not convert string (.*) to float64 at row (\d+), column (\d+)")
 
 
 def gamma_path(path: str | PathLike[str]) -> Path:
@@ -124,7 +126,7 @@ def _table(path: Path, columns: int, meaning: str) -> Array:
     _check_file(path)
     try:
         # NumPy would unpack or fetch what it is given by name.
-        with warnings.catch_warnings(), path.open(encoding="utf-8") as file:
+        with warnings.catch_warnings(), path.open(encoding="utf-8-sig") as file:
             warnings.simplefilter("ignore", UserWarning)  # of an empty file, which is refused below
             table = np.loadtxt(file, delimiter=",", comments=None, ndmin=2)
     except (ValueError, OverflowError, MemoryError) as error:
@@ -150,10 +152,12 @@ def _check_file(path: Path) -> None:
         raise InvalidInput(fspath(path), f"{size / 1e9:.1f} GB", allowed)
 
 
-def _reason(error: Exception) -> Any:
+def _reason(error: Exception) -> str:
     """What is wrong with a table, in a few printable words."""
     if isinstance(error, UnicodeDecodeError):
         return "no text"
     text = str(error).partition(";")[0] or type(error).__name__
+    if found := _NO_NUMBER.search(text):
+        text = f"{found[1]} in row {int(found[2]) + 1}, column {found[3]}"
     shown = "".join(one if one.isprintable() else "?" for one in text)
     return shown if len(shown) < 120 else f"{shown[:60]} ... {shown[-40:]}"

@@ -6,7 +6,7 @@ passed over, unless the filament depends on it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from softreach.exchange.activefilaments.tokens import Token, refused, statements
 
 __all__ = ["read_design"]
 
-_LARGEST = 1_000_000  # bytes
+_LARGEST = 100_000  # bytes
 _BLOCKS = {
     "for", "while", "if", "function", "macro", "let", "begin", "struct", "mutable", "try", "do",
     "quote", "module", "baremodule", "end", "else", "elseif", "catch", "finally", "return",
@@ -61,7 +61,7 @@ def _text(path: Path) -> str:
     if (size := path.stat().st_size) > _LARGEST:
         raise InvalidInput(fspath(path), f"{size} bytes", f"at most {_LARGEST}")
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
         raise InvalidInput(fspath(path), "no text", "Julia source in UTF-8") from None
 
@@ -84,22 +84,31 @@ def _follow(source: str, statement: list[Token], known: dict[str, Any]) -> None:
     if first.kind == "name" and first.text in _BLOCKS:
         hint = "keep only the definition of the filament in the file"
         raise refused(source, first, "a plain assignment", hint)
-    signs = [k for k, token in enumerate(statement) if _assigns(statement, k, token)]
-    if signs == [1] and statement[1].text == "=" and first.kind == "name" and statement[2:]:
+    signs = list(_assignments(statement))
+    changes = any(token.kind == "name" and token.text.endswith("!") for token in statement)
+    plain = signs == [1] and statement[1].text == "=" and first.kind == "name"
+    if plain and not changes and statement[2:]:
         known[first.text] = _read(source, statement[2:], known)
-    else:
-        changed = statement if first.text.endswith("!") else statement[: max(signs, default=0)]
+    elif signs or changes:
+        changed = statement if changes else statement[: signs[-1]]
         error = refused(source, first, "a plain assignment such as `R2 = 0.01`")
         names = frozenset(token.text for token in statement if token.kind == "name")
         known.update({t.text: Unreadable(error, names) for t in changed if t.kind == "name"})
 
 
-def _assigns(statement: Sequence[Token], place: int, token: Token) -> bool:
-    """Whether a token is an `=`, `*=`, `.=`, ... outside of brackets."""
-    if token.kind != "sign" or token.text not in _ASSIGNMENTS:
-        return False
-    before = [one.text for one in statement[:place] if one.kind == "sign"]
-    return sum(text in "([{" for text in before) == sum(text in ")]}" for text in before)
+def _assignments(statement: Sequence[Token]) -> Iterator[int]:
+    """Where a statement has an `=`, `*=`, `.=`, ... that does not name an argument of a call."""
+    of_calls: list[bool] = []
+    for place, token in enumerate(statement):
+        if token.kind != "sign":
+            continue
+        if token.text in "([{":
+            named = token.touches and statement[place - 1].kind == "name"
+            of_calls.append(named and token.text == "(")
+        elif token.text in ")]}":
+            of_calls.pop()
+        elif token.text in _ASSIGNMENTS and not (of_calls and of_calls[-1]):
+            yield place
 
 
 def _read(source: str, tokens: Sequence[Token], known: dict[str, Any]) -> Any:

@@ -17,12 +17,13 @@ _PATTERN = re.compile(
   | (?P<newline>\n)
   | (?P<text>\"\"\".*?\"\"\"|"(?:\\.|[^"\\\n])*")
   | (?P<number>(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)
-  | (?P<name>[^\W\d]\w*!?)
-  | (?P<sign>==|[-+*/^]=|\.[-+*/^]?=|.)
+  | (?P<name>[^\W\d]\w*(?:!(?!=))?)
+  | (?P<sign>[=<>!]=|[=-]>|[-+*/^]=|\.[-+*/^]?=|.)
     """,
     re.VERBOSE | re.DOTALL,
 )
 _PAIRS = {"(": ")", "[": "]", "{": "}"}
+_ENDLESS = {'"': "a quotation mark in the same line", "#": "the end of the comment, =#"}
 _CONTINUES = {"+", "-", "*", "/", "^", "=", ","}  # a line that ends so goes on in the next
 
 
@@ -49,11 +50,11 @@ def statements(source: str, text: str) -> Iterator[list[Token]]:
         text: Julia source.
 
     Raises:
-        InvalidInput: A bracket without its partner.
+        InvalidInput: A bracket, a quotation mark or a comment without its end.
     """
     held: list[Token] = []
     brackets: list[Token] = []
-    for token in _tokens(text):
+    for token in _tokens(source, text):
         _match_brackets(source, token, brackets)
         if brackets or not _ends(token, held):
             held += [token] if token.kind != "newline" else []
@@ -93,7 +94,7 @@ def _ends(token: Token, held: list[Token]) -> bool:
     return token.kind == "sign" and token.text == ";"
 
 
-def _tokens(text: str) -> Iterator[Token]:
+def _tokens(source: str, text: str) -> Iterator[Token]:
     place, line, touches = 0, 1, False
     while place < len(text):
         match = _PATTERN.match(text, place)
@@ -102,6 +103,9 @@ def _tokens(text: str) -> Iterator[Token]:
         if kind in ("space", "comment"):
             touches = False
         else:
-            yield Token(kind, match[0], line, touches)
+            token = Token(kind, match[0], line, touches)
+            if token.text in _ENDLESS:
+                raise refused(source, token, f"followed by {_ENDLESS[token.text]}")
+            yield token
             touches = kind != "newline"
         place, line = match.end(), line + match[0].count("\n")
