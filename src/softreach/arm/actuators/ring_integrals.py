@@ -24,7 +24,7 @@ _STEEP, _FULL = 16.0, 0.05
 
 
 class RingIntegrals(NamedTuple):
-    """Integrals over the ring x = R/R2 in [ρ, 1] [-], theory (3)."""
+    """Integrals over the ring x = R/R2 from ρ to 1 [-], theory (3)."""
 
     axial: Array
     """I0 = ∫ x k dx."""
