@@ -293,7 +293,7 @@ def plot_metric_map(of):
     bar = ax.figure.axes[-1]
     # every design in its own length, of which there are two
     yield bar.get_ylabel(), bar.get_ylim(), atlas.reach_height * LENGTH / atlas.length
-    assert ax.get_xlabel() == "length (m)"
+    assert ax.get_xlabel() == "L (m)"
     yield "", ax.get_xlim(), atlas.length
 
 
