@@ -46,7 +46,6 @@ SHIFT = 60 * LANES
 SIZE = 63 * LANES
 
 DIRECT, FAILED = 1, 2
-_WIDEST = 1.2  # longest Newton step [rad] that is trusted
 _CONTRACTION = 0.6
 _MOST_TURNS = 8
 _SMALLEST_INCREMENT = 1 / 4096
@@ -229,7 +228,7 @@ def _move(w, i, step):
 
 
 @inline
-def _predict(w, i):
+def _predict(w, i, widest):
     """The next load to try, and G(L) there by the secant through the last two."""
     w[LOAD + i] = min(1.0, w[HELD_LOAD + i] + w[INCREMENT + i])
     ratio = 0.0
@@ -242,12 +241,12 @@ def _predict(w, i):
         g[2] + ratio * (g[2] - p[2]),
     )
     _put(w, TRIAL, i, _unit(guess))
-    w[LAST + i] = _WIDEST
+    w[LAST + i] = widest
     w[TURNS + i] = 0.0
 
 
 @inline
-def _advance(w, i, small):
+def _advance(w, i, small, widest):
     """Take a Newton step, go on to the next load, or go back to a smaller one."""
     step = _newton(w, i)
     size = math.sqrt(dot(step, step))
@@ -257,7 +256,7 @@ def _advance(w, i, small):
         if w[INCREMENT + i] < _SMALLEST_INCREMENT:
             w[DONE + i] = FAILED
             return
-        _predict(w, i)
+        _predict(w, i, widest)
         return
     _move(w, i, step)
     w[LAST + i] = _CONTRACTION * size
@@ -273,7 +272,7 @@ def _advance(w, i, small):
     w[HELD_LOAD + i] = w[LOAD + i]
     if w[TURNS + i] <= 3.0:
         w[INCREMENT + i] *= 2.0
-    _predict(w, i)
+    _predict(w, i, widest)
 
 
 @inline
@@ -305,7 +304,7 @@ def _aim(w, work, gravity):
 
 
 @inline
-def _set_out(w, work, guesses, first, count, increment):
+def _set_out(w, work, guesses, first, count, increment, widest):
     """Begin from the unloaded arm, or where a guess is given, there."""
     for i in range(LANES):
         t = _three(w, TARGET, i)
@@ -315,7 +314,7 @@ def _set_out(w, work, guesses, first, count, increment):
         w[PAST_LOAD + i] = 0.0
         w[INCREMENT + i] = increment
         w[DONE + i] = 0.0
-        _predict(w, i)
+        _predict(w, i, widest)
         if guesses.shape[0] > 0:
             n = first + min(i, count - 1)
             g = (guesses[n, 0], guesses[n, 1], guesses[n, 2])
@@ -348,7 +347,7 @@ def _broyden(w, i, step):
 
 
 @kernel
-def solve(gamma, gravity, tip, guesses, coarse, fine, increment, small, tiny, most, out):
+def solve(gamma, gravity, tip, guesses, coarse, fine, limits, most, out):
     """Equilibria, tips and stability margins.
 
     Args:
@@ -358,13 +357,13 @@ def solve(gamma, gravity, tip, guesses, coarse, fine, increment, small, tiny, mo
         guesses: G(L) as the base of the unloaded arm sees it (n, 3), or (0, 3).
         coarse: Tables (pieces, lengths, scalars) for Newton steps.
         fine: Tables for the last steps.
-        increment: First share of the load to try.
-        small: Newton step at which the coarse tables have done their work.
-        tiny: Step at which the fine ones have.
+        limits: First share of the load to try; longest first Newton step [rad] that is trusted;
+            step at which the coarse tables have done their work; step at which the fine ones have.
         most: Walks (coarse, fine) allowed.
         out: Filled with the tip, G(L), the margin, the state (0 not found, 1 found, 2 given up),
             walks, (n, 10).
     """
+    increment, widest, small, tiny = limits
     lanes = np.zeros((coarse[0].shape[2] - 1, LANES))
     work, w = np.zeros(REST_WORK), np.zeros(SIZE)
     rest = np.zeros((coarse[1].shape[0], STEP_ROWS * LANES))
@@ -377,7 +376,7 @@ def solve(gamma, gravity, tip, guesses, coarse, fine, increment, small, tiny, mo
                 lanes[j, i] = lanes[j, count - 1]
         rest_frames(work, lanes, coarse[0], coarse[1], rest)
         _aim(w, work, gravity)
-        _set_out(w, work, guesses, first, count, increment)
+        _set_out(w, work, guesses, first, count, increment, widest)
         walks = 0
         for turn in range(most[0]):
             _walk_tangents(w, rest, coarse[2], tip)
@@ -385,7 +384,7 @@ def solve(gamma, gravity, tip, guesses, coarse, fine, increment, small, tiny, mo
             waiting = 0
             for i in range(LANES):
                 if w[DONE + i] == 0.0:
-                    _advance(w, i, small)
+                    _advance(w, i, small, widest)
                 waiting += w[DONE + i] == 0.0
             if waiting == 0:
                 break

@@ -12,15 +12,13 @@ import math
 import numpy as np
 
 from softreach.kernels.compiler import inline
+from softreach.kernels.explicit_rk8 import NODES
 from softreach.kernels.rod import LANES, node_values, nodes_at
 from softreach.kernels.vector import cross
 
-__all__ = ["NODES", "STEP_ROWS", "TURN", "WORK", "pack_lengths", "rest_frames"]
+__all__ = ["STEP_ROWS", "TURN", "WORK", "pack_lengths", "rest_frames"]
 
 _FIRST, _SECOND = math.sqrt(15) / 3, 10 / 3
-_S = math.sqrt(21)
-NODES = (0.0, (7 - _S) / 14, 0.5, (7 + _S) / 14, 1.0)
-"""Lobatto nodes of the unit step."""
 
 # A step is a row of a table: ζ̂ dZ, d1, d2, d3 of each of its nodes, tip first, LANES numbers each.
 STEP_ROWS = 4 * len(NODES)
@@ -133,4 +131,3 @@ def _half_exponent(base, middle, tip):
         0.5 * m1 + r1 / 24 + last[1] / 480,
         0.5 * m2 + r2 / 24 + last[2] / 480,
     )
-
