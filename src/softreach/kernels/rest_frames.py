@@ -16,12 +16,14 @@ from softreach.kernels.explicit_rk8 import NODES
 from softreach.kernels.rod import LANES, node_values, nodes_at
 from softreach.kernels.vector import cross
 
-__all__ = ["STEP_ROWS", "TURN", "WORK", "pack_lengths", "rest_frames"]
+__all__ = ["STEP_ROWS", "TURN", "TURN_ROWS", "WORK", "pack_lengths", "rest_frames"]
 
 _FIRST, _SECOND = math.sqrt(15) / 3, 10 / 3
 
 # A step is a row of a table: ζ̂ dZ, d1, d2, d3 of each of its nodes, tip first, LANES numbers each.
 STEP_ROWS = 4 * len(NODES)
+# Where asked for, the turn so far at each node follows, as quaternions.
+TURN_ROWS = 4 * len(NODES)
 # The workspace: 12 node values of a piece between nodes, then the turn so far as a quaternion.
 TURN = 12 * LANES
 WORK = TURN + 4 * LANES
@@ -43,7 +45,7 @@ def pack_lengths(measure, stretch):
 
 @inline
 def rest_frames(work, lanes, pieces, lengths, steps):
-    """Fill `steps` (step, 20 LANES), tip first, and leave the turn from tip to base in `work`."""
+    """Fill `steps` (step, rows), tip first, and leave the turn from tip to base in `work`."""
     for i in range(LANES):
         work[TURN + i] = 1.0
         work[TURN + LANES + i] = 0.0
@@ -53,10 +55,15 @@ def rest_frames(work, lanes, pieces, lengths, steps):
         for node in range(5):
             _fill_lengths(steps[k, 4 * node * LANES :], lanes, lengths[k, node])
         _fill_tangents(steps[k], work)
+        if steps.shape[1] > STEP_ROWS * LANES:
+            steps[k, STEP_ROWS * LANES : (STEP_ROWS + 4) * LANES] = work[TURN : TURN + 4 * LANES]
         for piece in range(4):
             node_values(work, lanes, pieces, 4 * k + piece)
             _turn(work)
             _fill_tangents(steps[k, 4 * (piece + 1) * LANES :], work)
+            if steps.shape[1] > STEP_ROWS * LANES:
+                at = (STEP_ROWS + 4 * (piece + 1)) * LANES
+                steps[k, at : at + 4 * LANES] = work[TURN : TURN + 4 * LANES]
 
 
 @inline
