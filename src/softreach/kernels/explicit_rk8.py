@@ -10,11 +10,18 @@ import math
 
 from softreach.kernels.compiler import inline
 
-__all__ = ["NODES", "step_function", "sum3", "sum6"]
+__all__ = ["NODES", "at_stages", "step_function", "sum3", "sum6"]
 
 _S = math.sqrt(21)
 NODES = (0.0, (7 - _S) / 14, 0.5, (7 + _S) / 14, 1.0)
 """Lobatto nodes of the unit step."""
+
+
+@inline
+def at_stages(nodes):
+    """The nodes of the eleven stages from the five of a step."""
+    n0, n1, n2, n3, n4 = nodes
+    return n0, n2, n2, n3, n3, n2, n1, n1, n2, n3, n4
 
 
 @inline
@@ -46,7 +53,10 @@ def sum6(x, c, a, b, e, f, g, h):
 
 
 def step_function(rates, plus):
-    """The state at the far end of a step from its five nodes and the state at the near end.
+    """A function that takes a state from the near end of a step to the far end.
+
+    The step takes the eleven nodes of its stages (`at_stages`) and returns the states of all stages
+    beside the last.
 
     Args:
         rates: Change of a state over the step, by a node and the state there.
@@ -55,16 +65,20 @@ def step_function(rates, plus):
 
     @inline
     def step(nodes, s):
-        n0, n1, n2, n3, n4 = nodes
-        k1 = rates(n0, s)
-        k2 = rates(n2, plus(s, (1 / 2, 0.0, 0.0, 0.0, 0.0, 0.0), k1, k1, k1, k1, k1, k1))
-        k3 = rates(n2, plus(s, (1 / 4, 1 / 4, 0.0, 0.0, 0.0, 0.0), k1, k2, k1, k1, k1, k1))
+        k1 = rates(nodes[0], s)
+        s2 = plus(s, (1 / 2, 0.0, 0.0, 0.0, 0.0, 0.0), k1, k1, k1, k1, k1, k1)
+        k2 = rates(nodes[1], s2)
+        s3 = plus(s, (1 / 4, 1 / 4, 0.0, 0.0, 0.0, 0.0), k1, k2, k1, k1, k1, k1)
+        k3 = rates(nodes[2], s3)
         c = (1 / 7, (-7 - 3 * _S) / 98, (21 + 5 * _S) / 49, 0.0, 0.0, 0.0)
-        k4 = rates(n3, plus(s, c, k1, k2, k3, k1, k1, k1))
+        s4 = plus(s, c, k1, k2, k3, k1, k1, k1)
+        k4 = rates(nodes[3], s4)
         c = ((11 + _S) / 84, (18 + 4 * _S) / 63, (21 - _S) / 252, 0.0, 0.0, 0.0)
-        k5 = rates(n3, plus(s, c, k1, k3, k4, k1, k1, k1))
+        s5 = plus(s, c, k1, k3, k4, k1, k1, k1)
+        k5 = rates(nodes[4], s5)
         c = ((5 + _S) / 48, (9 + _S) / 36, (-231 + 14 * _S) / 360, (63 - 7 * _S) / 80, 0.0, 0.0)
-        k6 = rates(n2, plus(s, c, k1, k3, k4, k5, k1, k1))
+        s6 = plus(s, c, k1, k3, k4, k5, k1, k1)
+        k6 = rates(nodes[5], s6)
         c = (
             (10 - _S) / 42,
             (-432 + 92 * _S) / 315,
@@ -73,9 +87,11 @@ def step_function(rates, plus):
             (63 - 13 * _S) / 35,
             0.0,
         )
-        k7 = rates(n1, plus(s, c, k1, k3, k4, k5, k6, k1))
+        s7 = plus(s, c, k1, k3, k4, k5, k6, k1)
+        k7 = rates(nodes[6], s7)
         c = (1 / 14, (14 - 3 * _S) / 126, (13 - 3 * _S) / 63, 1 / 9, 0.0, 0.0)
-        k8 = rates(n1, plus(s, c, k1, k5, k6, k7, k1, k1))
+        s8 = plus(s, c, k1, k5, k6, k7, k1, k1)
+        k8 = rates(nodes[7], s8)
         c = (
             1 / 32,
             (91 - 21 * _S) / 576,
@@ -84,7 +100,8 @@ def step_function(rates, plus):
             (63 + 13 * _S) / 128,
             0.0,
         )
-        k9 = rates(n2, plus(s, c, k1, k5, k6, k7, k8, k1))
+        s9 = plus(s, c, k1, k5, k6, k7, k8, k1)
+        k9 = rates(nodes[8], s9)
         c = (
             1 / 14,
             1 / 9,
@@ -93,7 +110,8 @@ def step_function(rates, plus):
             (-51 - 11 * _S) / 56,
             (132 + 28 * _S) / 245,
         )
-        k10 = rates(n3, plus(s, c, k1, k5, k6, k7, k8, k9))
+        s10 = plus(s, c, k1, k5, k6, k7, k8, k9)
+        k10 = rates(nodes[9], s10)
         c = (
             (-42 + 7 * _S) / 18,
             (-18 + 28 * _S) / 45,
@@ -102,8 +120,10 @@ def step_function(rates, plus):
             (28 - 28 * _S) / 45,
             (49 - 7 * _S) / 18,
         )
-        k11 = rates(n4, plus(s, c, k5, k6, k7, k8, k9, k10))
+        s11 = plus(s, c, k5, k6, k7, k8, k9, k10)
+        k11 = rates(nodes[10], s11)
         c = (1 / 20, 49 / 180, 16 / 45, 49 / 180, 1 / 20, 0.0)
-        return plus(s, c, k1, k8, k9, k10, k11, k1)
+        end = plus(s, c, k1, k8, k9, k10, k11, k1)
+        return end, (s, s2, s3, s4, s5, s6, s7, s8, s9, s10, s11)
 
     return step

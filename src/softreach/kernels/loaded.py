@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.explicit_rk8 import at_stages
 from softreach.kernels.loaded_step import tangent_step, tip_step
 from softreach.kernels.rest_frames import STEP_ROWS, TURN, rest_frames
 from softreach.kernels.rest_frames import WORK as REST_WORK
@@ -84,12 +85,14 @@ def _node(rest, scalars, n, i, share):
 @inline
 def _nodes(w, rest, scalars, i):
     share = w[LOAD + i]
-    return (
-        _node(rest, scalars, 0, i, share),
-        _node(rest, scalars, 1, i, share),
-        _node(rest, scalars, 2, i, share),
-        _node(rest, scalars, 3, i, share),
-        _node(rest, scalars, 4, i, share),
+    return at_stages(
+        (
+            _node(rest, scalars, 0, i, share),
+            _node(rest, scalars, 1, i, share),
+            _node(rest, scalars, 2, i, share),
+            _node(rest, scalars, 3, i, share),
+            _node(rest, scalars, 4, i, share),
+        )
     )
 
 
@@ -127,7 +130,7 @@ def _walk_tip(w, rest, scalars, tip):
     for k in range(rest.shape[0]):
         r, c = rest[k], scalars[k]
         for i in range(LANES):
-            x, y = tip_step(_nodes(w, r, c, i), (_six(w, X, i), _three(w, Y, i)))
+            (x, y), _ = tip_step(_nodes(w, r, c, i), (_six(w, X, i), _three(w, Y, i)))
             _put_six(w, X, i, x)
             _put(w, Y, i, y)
 
@@ -150,7 +153,7 @@ def _walk_tangents(w, rest, scalars, tip):
         r, c = rest[k], scalars[k]
         for i in range(LANES):
             state = _six(w, X, i), _six(w, A, i), _six(w, B, i)
-            x, a, b = tangent_step(_nodes(w, r, c, i), state)
+            (x, a, b), _ = tangent_step(_nodes(w, r, c, i), state)
             _put_six(w, X, i, x)
             _put_six(w, A, i, a)
             _put_six(w, B, i, b)
@@ -378,7 +381,7 @@ def solve(gamma, gravity, tip, guesses, coarse, fine, limits, most, out):
         _aim(w, work, gravity)
         _set_out(w, work, guesses, first, count, increment, widest)
         walks = 0
-        for turn in range(most[0]):
+        for _ in range(most[0]):
             _walk_tangents(w, rest, coarse[2], tip)
             walks += 1
             waiting = 0

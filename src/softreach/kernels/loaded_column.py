@@ -1,4 +1,4 @@
-"""One step of a rod under any loads, with one tangent: `loaded_step` with a whole frame.
+"""One step of a rod under any loads, and of its tangents: `loaded_step` with a whole frame.
 
 State: two orthonormal directions G, H of the world as the section sees them (the third is G × H), a
 force F that follows the tip, the moment M, and the tip y, five tuples of three. With
@@ -18,7 +18,7 @@ from softreach.kernels.compiler import inline
 from softreach.kernels.explicit_rk8 import step_function, sum3
 from softreach.kernels.vector import cross, dot
 
-__all__ = ["column_step"]
+__all__ = ["column_step", "state_step"]
 
 
 @inline
@@ -41,50 +41,61 @@ def _span(c, g, h, k):
 
 
 @inline
-def _rates(node, s):
-    """Changes over the step; node = (ℓ, d, 1/K1, 1/K3 - 1/K1, 1/K0, (n1, n2, n3), drive)."""
-    length, d, bending, twisting, axial, load, (d_length, d_turn, unit) = node
-    (g, h, f, m, y), (dg, dh, df, dm, dy) = s
-    k = cross(g, h)
-    n = _plus3(_span(load, g, h, k), f)
-    dk = _plus3(cross(dg, h), cross(g, dh))
-    dn = _plus3(_plus3(_span(load, dg, dh, dk), df), _span(unit, g, h, k))
+def _internal(node, s):
+    """Force, twist and stretch of a section, and how the step turns the frame."""
+    length, d, bending, twisting, axial, load = node
+    g, h, f, m, _ = s
+    n = _plus3(_span(load, g, h, cross(g, h)), f)
+    twist, stretch = twisting * dot(d, m), 1.0 + axial * dot(d, n)
+    return n, twist, stretch, _mix(length * bending, m, length * twist, d)
 
-    twist, d_twist = twisting * dot(d, m), twisting * dot(d, dm)
-    stretch, d_stretch = 1.0 + axial * dot(d, n), axial * dot(d, dn)
-    beta, zeta = length * twist, length * stretch
-    d_beta, d_zeta = length * d_twist + d_length * twist, length * d_stretch + d_length * stretch
-    turn = _mix(length * bending, m, beta, d)
-    turned = _plus3(_mix(length * bending, dm, d_beta, d), d_turn)
-    turned = (
-        turned[0] + d_length * bending * m[0],
-        turned[1] + d_length * bending * m[1],
-        turned[2] + d_length * bending * m[2],
-    )
-    push = _mix(beta, m, zeta, n)
-    pushed = _plus3(_mix(d_beta, m, beta, dm), _mix(d_zeta, n, zeta, dn))
-    along = (zeta * d[0], zeta * d[1], zeta * d[2])
-    further = (d_zeta * d[0], d_zeta * d[1], d_zeta * d[2])
+
+@inline
+def _rates(node, s):
+    """Changes over the step; node = (ℓ, d, 1/K1, 1/K3 - 1/K1, 1/K0, (n1, n2, n3))."""
+    length, d = node[0], node[1]
+    g, h, f, m, y = s
+    n, twist, stretch, turn = _internal(node, s)
+    push = _mix(length * twist, m, length * stretch, n)
+    along = _times(length * stretch, d)
     return (
-        (
-            cross(turn, g),
-            cross(turn, h),
-            cross(turn, f),
-            cross(d, push),
-            _plus3(cross(turn, y), along),
-        ),
-        (
-            _plus3(cross(turn, dg), cross(turned, g)),
-            _plus3(cross(turn, dh), cross(turned, h)),
-            _plus3(cross(turn, df), cross(turned, f)),
-            _plus3(cross(d, pushed), cross(d_turn, m)),
-            _plus3(_plus3(cross(turn, dy), cross(turned, y)), further),
-        ),
+        cross(turn, g),
+        cross(turn, h),
+        cross(turn, f),
+        cross(d, push),
+        _plus3(cross(turn, y), along),
     )
 
 
 @inline
-def _five(s, c, a, b, e, f, g, h):
+def _tangent_rates(place, t):
+    """Product rule on `_rates`; place = (node, state, (δℓ, turn, unit force))."""
+    node, s, (d_length, d_turn, unit) = place
+    length, d, bending, twisting, axial, load = node
+    (g, h, _, m, y), (dg, dh, df, dm, dy) = s, t
+    n, twist, stretch, turn = _internal(node, s)
+    k, dk = cross(g, h), _plus3(cross(dg, h), cross(g, dh))
+    dn = _plus3(_plus3(_span(load, dg, dh, dk), df), _span(unit, g, h, k))
+    d_beta = length * twisting * dot(d, dm) + d_length * twist
+    d_zeta = length * axial * dot(d, dn) + d_length * stretch
+    turned = _plus3(_mix(length * bending, dm, d_beta, d), _mix(d_length * bending, m, 1.0, d_turn))
+    pushed = _plus3(_mix(d_beta, m, length * twist, dm), _mix(d_zeta, n, length * stretch, dn))
+    return (
+        _plus3(cross(turn, dg), cross(turned, g)),
+        _plus3(cross(turn, dh), cross(turned, h)),
+        _plus3(cross(turn, df), cross(turned, s[2])),
+        _plus3(cross(d, pushed), cross(d_turn, m)),
+        _plus3(_plus3(cross(turn, dy), cross(turned, y)), _times(d_zeta, d)),
+    )
+
+
+@inline
+def _times(a, x):
+    return a * x[0], a * x[1], a * x[2]
+
+
+@inline
+def _plus(s, c, a, b, e, f, g, h):
     return (
         sum3(s[0], c, a[0], b[0], e[0], f[0], g[0], h[0]),
         sum3(s[1], c, a[1], b[1], e[1], f[1], g[1], h[1]),
@@ -94,13 +105,7 @@ def _five(s, c, a, b, e, f, g, h):
     )
 
 
-@inline
-def _plus(s, c, a, b, e, f, g, h):
-    return (
-        _five(s[0], c, a[0], b[0], e[0], f[0], g[0], h[0]),
-        _five(s[1], c, a[1], b[1], e[1], f[1], g[1], h[1]),
-    )
-
-
-column_step = step_function(_rates, _plus)
-"""Step of (state, tangent)."""
+state_step = step_function(_rates, _plus)
+"""Step of a state."""
+column_step = step_function(_tangent_rates, _plus)
+"""Step of a tangent, given the states at the stages."""

@@ -12,7 +12,8 @@ import math
 import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
-from softreach.kernels.loaded_column import column_step
+from softreach.kernels.explicit_rk8 import at_stages
+from softreach.kernels.loaded_column import column_step, state_step
 from softreach.kernels.rest_frames import STEP_ROWS, TURN, TURN_ROWS, rest_frames
 from softreach.kernels.rest_frames import WORK as REST_WORK
 from softreach.kernels.rod import LANES, load
@@ -24,7 +25,6 @@ TRACE = 16
 """Numbers kept of a section: G, H, M, y, and the turn of the unloaded arm as a quaternion."""
 
 STATE = 0  # G, H, F, M, y
-NEXT = 15 * LANES
 DRIVE = 30 * LANES  # turn of the unloaded arm per unit of an activation at five nodes
 TARGET = 45 * LANES  # G, H that the base must see
 TRIAL = 51 * LANES  # G, H at the tip
@@ -40,7 +40,10 @@ DONE = 75 * LANES
 MARGIN = 76 * LANES
 PLANE = 77 * LANES  # rotations by the first three columns, in the directions of the world
 STEP = 86 * LANES
-SIZE = 89 * LANES
+COLUMN = 89 * LANES  # the tangent in hand
+STAGES = 104 * LANES  # states at the stages of a step
+REST = 269 * LANES  # the unloaded arm at the nodes of a step
+SIZE = REST + STEP_ROWS * LANES
 
 _FOUND, _GIVEN_UP = 1.0, 2.0
 _CONTRACTION = 0.6
@@ -109,23 +112,94 @@ def _back(q):
 
 
 @inline
-def _node(w, rest, scalars, lengths, unit, n, i):
-    at, share = 4 * n * LANES + i, w[LOAD + i]
-    d = (rest[at + LANES], rest[at + 2 * LANES], rest[at + 3 * LANES])
-    n3 = (share * scalars[n, 3], share * scalars[n, 4], share * scalars[n, 5])
-    drive = (lengths[n], _get(w, DRIVE + 3 * n * LANES, i), unit)
-    return rest[at], d, scalars[n, 0], scalars[n, 1], scalars[n, 2], n3, drive
+def _constants(scalars, n):
+    """1/K1, 1/K3 - 1/K1, 1/K0 and the force at one node; read before the loop over lanes."""
+    force = (scalars[n, 3], scalars[n, 4], scalars[n, 5])
+    return scalars[n, 0], scalars[n, 1], scalars[n, 2], force
 
 
 @inline
-def _nodes(w, rest, scalars, lengths, unit, i):
+def _all_constants(scalars):
     return (
-        _node(w, rest, scalars, lengths, unit, 0, i),
-        _node(w, rest, scalars, lengths, unit, 1, i),
-        _node(w, rest, scalars, lengths, unit, 2, i),
-        _node(w, rest, scalars, lengths, unit, 3, i),
-        _node(w, rest, scalars, lengths, unit, 4, i),
+        _constants(scalars, 0),
+        _constants(scalars, 1),
+        _constants(scalars, 2),
+        _constants(scalars, 3),
+        _constants(scalars, 4),
     )
+
+
+@inline
+def _node(w, c, n, i):
+    at, share = REST + 4 * n * LANES, w[LOAD + i]
+    bending, twisting, axial, force = c[n]
+    return w[at + i], _get(w, at + LANES, i), bending, twisting, axial, _times(share, force)
+
+
+@inline
+def _nodes(w, c, i):
+    return at_stages(
+        (
+            _node(w, c, 0, i),
+            _node(w, c, 1, i),
+            _node(w, c, 2, i),
+            _node(w, c, 3, i),
+            _node(w, c, 4, i),
+        )
+    )
+
+
+@inline
+def _drives(w, change, unit, i):
+    a, b, c, d, e = change
+    return at_stages(
+        (
+            (a, _get(w, DRIVE, i), unit),
+            (b, _get(w, DRIVE + 3 * LANES, i), unit),
+            (c, _get(w, DRIVE + 6 * LANES, i), unit),
+            (d, _get(w, DRIVE + 9 * LANES, i), unit),
+            (e, _get(w, DRIVE + 12 * LANES, i), unit),
+        )
+    )
+
+
+@inline
+def _step_state(w, c):
+    for i in range(LANES):
+        s, at = state_step(_nodes(w, c, i), _get_five(w, STATE, i))
+        _put_five(w, STATE, i, s)
+        _put_five(w, STAGES, i, at[0])
+        _put_five(w, STAGES + 15 * LANES, i, at[1])
+        _put_five(w, STAGES + 30 * LANES, i, at[2])
+        _put_five(w, STAGES + 45 * LANES, i, at[3])
+        _put_five(w, STAGES + 60 * LANES, i, at[4])
+        _put_five(w, STAGES + 75 * LANES, i, at[5])
+        _put_five(w, STAGES + 90 * LANES, i, at[6])
+        _put_five(w, STAGES + 105 * LANES, i, at[7])
+        _put_five(w, STAGES + 120 * LANES, i, at[8])
+        _put_five(w, STAGES + 135 * LANES, i, at[9])
+        _put_five(w, STAGES + 150 * LANES, i, at[10])
+
+
+@inline
+def _step_column(w, c, change, unit):
+    for i in range(LANES):
+        n, v = _nodes(w, c, i), _drives(w, change, unit, i)
+        places = (
+            (n[0], _get_five(w, STAGES, i), v[0]),
+            (n[1], _get_five(w, STAGES + 15 * LANES, i), v[1]),
+            (n[2], _get_five(w, STAGES + 30 * LANES, i), v[2]),
+            (n[3], _get_five(w, STAGES + 45 * LANES, i), v[3]),
+            (n[4], _get_five(w, STAGES + 60 * LANES, i), v[4]),
+            (n[5], _get_five(w, STAGES + 75 * LANES, i), v[5]),
+            (n[6], _get_five(w, STAGES + 90 * LANES, i), v[6]),
+            (n[7], _get_five(w, STAGES + 105 * LANES, i), v[7]),
+            (n[8], _get_five(w, STAGES + 120 * LANES, i), v[8]),
+            (n[9], _get_five(w, STAGES + 135 * LANES, i), v[9]),
+            (n[10], _get_five(w, STAGES + 150 * LANES, i), v[10]),
+        )
+        t, _ = column_step(places, _get_five(w, COLUMN, i))
+        _put_five(w, COLUMN, i, t)
 
 
 @inline
@@ -264,7 +338,7 @@ def _watch(w, columns, i):
 
 
 @inline
-def _walk(w, columns, lanes, rest, tables, jumps, bundles, unit_at):
+def _walk(w, columns, lanes, rest, tables, jumps, bundles, unit_at, trace):
     """From tip to base: three columns of rotations, some of activations, some of unit forces."""
     _, lengths, scalars, bends = tables
     zero = np.zeros(5)
@@ -275,7 +349,11 @@ def _walk(w, columns, lanes, rest, tables, jumps, bundles, unit_at):
             if k == 0:
                 for i in range(LANES):
                     _put_rotations(w, columns, i)
-        r, c = rest[k], scalars[k]
+        r, c = rest[k], _all_constants(scalars[k])
+        w[REST : REST + STEP_ROWS * LANES] = r[: STEP_ROWS * LANES]
+        if k == 0 and trace.shape[0] > 0:
+            _keep(w, r, STEP_ROWS * LANES, trace[:, 0])
+        _step_state(w, c)
         w[DRIVE : DRIVE + 15 * LANES] = 0.0
         for n in range(columns.shape[0]):
             j = n - 3
@@ -287,17 +365,28 @@ def _walk(w, columns, lanes, rest, tables, jumps, bundles, unit_at):
                 w[DRIVE : DRIVE + 15 * LANES] = 0.0
             u = n - unit_at
             unit = (1.0 if u == 0 else 0.0, 1.0 if u == 1 else 0.0, 1.0 if u == 2 else 0.0)
-            column = columns[n]
-            for i in range(LANES):
-                s, t = column_step(
-                    _nodes(w, r, c, change, unit, i),
-                    (_get_five(w, STATE, i), _get_five(column, 0, i)),
-                )
-                _put_five(column, 0, i, t)
-                _put_five(w, NEXT, i, s)
-        w[STATE : STATE + 15 * LANES] = w[NEXT : NEXT + 15 * LANES]
+            dz = (change[0], change[1], change[2], change[3], change[4])
+            w[COLUMN : COLUMN + 15 * LANES] = columns[n]
+            _step_column(w, c, dz, unit)
+            columns[n] = w[COLUMN : COLUMN + 15 * LANES]
         for i in range(LANES):
             _watch(w, columns, i)
+        if trace.shape[0] > 0:
+            _keep(w, r, (STEP_ROWS + 16) * LANES, trace[:, k + 1])
+
+
+@inline
+def _keep(w, rest, turn, trace):
+    """Put the sections that the lanes are at into their places."""
+    for i in range(min(LANES, trace.shape[0])):
+        s, q = _get_five(w, STATE, i), _turn_at(rest, turn, i)
+        for row in range(3):
+            trace[i, row] = s[0][row]
+            trace[i, 3 + row] = s[1][row]
+            trace[i, 6 + row] = s[3][row]
+            trace[i, 9 + row] = s[4][row]
+        for row in range(4):
+            trace[i, 12 + row] = q[row]
 
 
 @inline
@@ -424,7 +513,7 @@ def _set_out(w, work, axes, guesses, first, count, increment, widest):
 
 
 @kernel
-def solve(gamma, axes, jumps, guesses, tables, limits, most, found, slopes, compliance):
+def solve(gamma, axes, jumps, guesses, tables, limits, most, found, slopes, compliance, trace):
     """Equilibria of n rods and what the answers ask for.
 
     Args:
@@ -440,6 +529,7 @@ def solve(gamma, axes, jumps, guesses, tables, limits, most, found, slopes, comp
             found, 1 found, 2 given up), walks, (n, 12).
         slopes: Filled with (v, ω) of the tip per activation, (n, 6, bundle); or (0, 6, bundle).
         compliance: Filled with the change of the tip per force there, (n, 3, 3); or (0, 3, 3).
+        trace: Filled with the sections between steps, tip first, (n, step + 1, 16); or (0, 1, 16).
     """
     increment, widest, small = limits
     lanes = np.zeros((tables[0].shape[2] - 1, LANES))
@@ -447,7 +537,9 @@ def solve(gamma, axes, jumps, guesses, tables, limits, most, found, slopes, comp
     rest = np.zeros((tables[1].shape[0], (STEP_ROWS + TURN_ROWS) * LANES))
     bundles = gamma.shape[1] if slopes.shape[0] > 0 else 0
     units = 3 if compliance.shape[0] > 0 else 0
-    rotations, columns = np.zeros((3, 15 * LANES)), np.zeros((3 + bundles + units, 15 * LANES))
+    asked = bundles + units > 0 or trace.shape[0] > 0
+    rotations = np.zeros((3, 15 * LANES))
+    columns = np.zeros((3 + bundles + units, 15 * LANES))
     for first in range(0, gamma.shape[0], LANES):
         count = min(LANES, gamma.shape[0] - first)
         load(lanes, gamma, first, count)
@@ -456,11 +548,19 @@ def solve(gamma, axes, jumps, guesses, tables, limits, most, found, slopes, comp
                 lanes[j, i] = lanes[j, count - 1]
         rest_frames(work, lanes, tables[0], tables[1], rest)
         _set_out(w, work, axes, guesses, first, count, increment, widest)
-        walks = _find(w, rotations, lanes, rest, tables, jumps, small, widest, most)
-        if bundles + units > 0:
-            _walk(w, columns, lanes, rest, tables, jumps, bundles, 3 + bundles)
+        walks, waiting = 0, LANES
+        while True:
+            last = waiting == 0 or walks >= most
+            if last and not asked:
+                break
+            current = columns if last else rotations
+            _walk(w, current, lanes, rest, tables, jumps, bundles, 3 + bundles, trace[first:])
             _steps(w)
-            _respond(w, work, columns, axes, first, count, slopes, compliance)
+            if last:
+                break
+            walks, waiting = walks + 1, _advance_all(w, small, widest)
+        if asked:
+            _respond(w, columns, axes, first, count, slopes, compliance)
         else:
             columns[:] = rotations
         _store(w, work, columns, first, count, walks, found)
@@ -473,20 +573,14 @@ def _steps(w):
 
 
 @inline
-def _find(w, columns, lanes, rest, tables, jumps, small, widest, most):
-    walks = 0
-    while walks < most:
-        _walk(w, columns, lanes, rest, tables, jumps, 0, 3)
-        _steps(w)
-        walks += 1
-        waiting = 0
-        for i in range(LANES):
-            if w[DONE + i] == 0.0:
-                _advance(w, i, small, widest)
-            waiting += w[DONE + i] == 0.0
-        if waiting == 0:
-            break
-    return walks
+def _advance_all(w, small, widest):
+    """One Newton step for all lanes; how many are still at work."""
+    waiting = 0
+    for i in range(LANES):
+        if w[DONE + i] == 0.0:
+            _advance(w, i, small, widest)
+        waiting += w[DONE + i] == 0.0
+    return waiting
 
 
 @inline
@@ -506,7 +600,7 @@ def _in_base(axes, g, h, k, v):
 
 
 @inline
-def _respond(w, work, columns, axes, first, count, slopes, compliance):
+def _respond(w, columns, axes, first, count, slopes, compliance):
     for i in range(count):
         g, h = _get(w, STATE, i), _get(w, STATE + 3 * LANES, i)
         k = cross(g, h)
