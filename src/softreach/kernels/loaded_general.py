@@ -21,8 +21,8 @@ from softreach.kernels.vector import cross, dot
 
 __all__ = ["TRACE", "solve"]
 
-TRACE = 16
-"""Numbers kept of a section: G, H, M, y, and the turn of the unloaded arm as a quaternion."""
+TRACE = 19
+"""Numbers kept of a section: G, H, M, y, the turn of the unloaded arm as a quaternion, F."""
 
 STATE = 0  # G, H, F, M, y
 DRIVE = 30 * LANES  # turn of the unloaded arm per unit of an activation at five nodes
@@ -385,6 +385,7 @@ def _keep(w, rest, turn, trace):
             trace[i, 3 + row] = s[1][row]
             trace[i, 6 + row] = s[3][row]
             trace[i, 9 + row] = s[4][row]
+            trace[i, 16 + row] = s[2][row]
         for row in range(4):
             trace[i, 12 + row] = q[row]
 
@@ -426,8 +427,9 @@ def _orthonormal(g, h):
 
 @inline
 def _move(w, i, x):
-    """Turn the frame of the tip by the rotation x (Cayley)."""
-    a = _times(0.5, x)
+    """Turn the frame of the tip by the rotation x."""
+    angle = math.sqrt(dot(x, x))
+    a = _times(math.tan(0.5 * min(angle, 3.0)) / angle if angle > 1e-9 else 0.5, x)
     f = 2.0 / (1.0 + dot(a, a))
     g, h = _get(w, TRIAL, i), _get(w, TRIAL + 3 * LANES, i)
     c, d = cross(a, g), cross(a, h)
@@ -470,13 +472,12 @@ def _advance(w, i, small, widest):
         return
     w[LAST + i] = _CONTRACTION * size
     w[TURNS + i] += 1.0
+    _move(w, i, x)
     if size >= small:
-        _move(w, i, x)
         return
     if w[LOAD + i] >= 1.0:
         w[DONE + i] = _FOUND
         return
-    _move(w, i, x)
     w[PAST_LOAD + i] = w[HELD_LOAD + i]
     w[HELD_LOAD + i] = w[LOAD + i]
     for row in range(6):

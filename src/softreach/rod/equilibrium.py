@@ -1,0 +1,317 @@
+"""The equilibria of a loaded rod at many activations: a ladder of ever more patient searches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property, partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.kernels import loaded, loaded_general
+from softreach.rod.load_tables import LoadTables, StepTables
+from softreach.rod.tip_map import Frames, TipStatus
+
+__all__ = ["Equilibria", "Response", "Rung", "Shapes", "Solver"]
+
+Array = NDArray[np.float64]
+
+
+class Rung(IntEnum):
+    """How an equilibrium was found."""
+
+    DIRECT = 0
+    """Newton's method from the unloaded arm, all load at once."""
+    CONTINUATION = 1
+    """The load grown in steps along the branch."""
+    PATIENT = 2
+    """The same in steps an order smaller."""
+    NONE = 3
+    """Not found: the branch ends before all of the load is on."""
+
+
+class _Search(NamedTuple):
+    """How boldly the kernels search."""
+
+    increment: float
+    """First share of the load to try."""
+    widest: float
+    """Longest first Newton step that is trusted [rad]."""
+    walks: int
+    """Walks allowed."""
+
+
+# An arm that jumps to another branch on its way lands on an unstable one (design/loaded_rod.md);
+# so whatever is not found stable is searched again, more patiently.
+_DIRECT = _Search(1.0, 1.2, 7)
+_CONTINUATION = _Search(0.25, 0.1, 400)
+_PATIENT = _Search(1 / 64, 0.03, 2000)
+_COARSE_STEP = 0.05  # Newton step at which coarse steps have done their work
+_FOUND = 1.0
+
+
+class Equilibria(NamedTuple):
+    """Where tips come to rest."""
+
+    tips: Array
+    """r [m], shape (n, 3); NaN where there is no equilibrium on the branch."""
+    status: NDArray[np.int8]
+    """`TipStatus`, shape (n,)."""
+    margin: Array
+    """How far from the loss of stability, from 1 to below 0 [-], shape (n,)."""
+    rung: NDArray[np.int8]
+    """`Rung`, shape (n,)."""
+    frame: Array
+    """First two axes of the world at the tip, as the base of the unloaded arm sees them, (n, 6)."""
+
+    @classmethod
+    def empty(cls, n: int) -> Equilibria:
+        """Room for n."""
+        return cls(
+            np.full((n, 3), np.nan),
+            np.full(n, TipStatus.NO_EQUILIBRIUM, np.int8),
+            np.full(n, np.nan),
+            np.full(n, Rung.NONE, np.int8),
+            np.zeros((n, 6)),
+        )
+
+    def at(self, rows: slice) -> Equilibria:
+        """Some of them, sharing memory."""
+        return Equilibria(*(field[rows] for field in self))
+
+
+class Response(NamedTuple):
+    """How tips answer to activations and forces."""
+
+    tips: Array
+    """r [m], shape (n, 3)."""
+    twists: Array
+    """(v, ω) per activation, shape (n, 6, bundles)."""
+    compliance: Array
+    """∂r/∂F [m/N], shape (n, 3, 3)."""
+
+
+class Shapes(NamedTuple):
+    """Arms at stations."""
+
+    frames: Frames
+    moment: Array
+    """m [N m] in the directors, shape (n, station, 3)."""
+    force: Array
+    """n [N] in the directors, shape (n, station, 3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solver:
+    """Equilibria with a given number of steps.
+
+    Args:
+        tables: Of the arm and its loads.
+        steps: Least number of steps.
+        tol: Largest tip error, in L, of which the search uses up a thousandth.
+    """
+
+    tables: LoadTables
+    steps: int
+    tol: float
+
+    @cached_property
+    def _fine(self) -> StepTables:
+        return self.tables.uniform(self.steps)
+
+    @cached_property
+    def _coarse(self) -> StepTables:
+        return self.tables.uniform(max(2, (self.steps + 1) // 2))
+
+    def halved(self) -> Solver:
+        """The same with twice the steps."""
+        return Solver(self.tables, 2 * self.steps, self.tol)
+
+    def task(self, gamma: Array, found: Equilibria) -> Callable[[], None]:
+        """The work of filling `found`, to be run on any thread."""
+        return partial(self._fill, gamma, found)
+
+    def find(self, gamma: Array) -> Equilibria:
+        """The equilibria of activations (n, bundles), on the calling thread."""
+        found = Equilibria.empty(len(gamma))
+        self._fill(gamma, found)
+        return found
+
+    def near(self, gamma: Array, known: Equilibria) -> Equilibria:
+        """Equilibria near known ones of other steps."""
+        found = Equilibria.empty(len(gamma))
+        self._try(gamma, np.arange(len(gamma)), _DIRECT, Rung.DIRECT, found, known.frame)
+        return found
+
+    def _fill(self, gamma: Array, found: Equilibria) -> None:
+        self._try(gamma, np.arange(len(gamma)), _DIRECT, Rung.DIRECT, found)
+        for search, rung in ((_CONTINUATION, Rung.CONTINUATION), (_PATIENT, Rung.PATIENT)):
+            rest = np.flatnonzero(found.status != TipStatus.STABLE)
+            if rung == Rung.PATIENT:
+                rest = np.flatnonzero(found.status == TipStatus.NO_EQUILIBRIUM)
+            if len(rest):
+                self._try(gamma, rest, search, rung, found)
+        found.tips[found.status == TipStatus.NO_EQUILIBRIUM] = np.nan
+
+    def _try(
+        self,
+        gamma: Array,
+        rows: NDArray[np.intp],
+        search: _Search,
+        rung: Rung,
+        found: Equilibria,
+        guesses: Array | None = None,
+    ) -> None:
+        """Search at some rows, and put down what is found."""
+        of_kind = self._along_one if self.tables.one_direction else self._in_general
+        tips, frame, margin, state = of_kind(_columns(gamma[rows]), search, guesses)
+        good = state == _FOUND
+        at = rows[good]
+        found.tips[at], found.frame[at], found.margin[at] = tips[good], frame[good], margin[good]
+        found.rung[at] = rung
+        found.status[at] = np.where(margin[good] > 0, TipStatus.STABLE, TipStatus.UNSTABLE)
+        lost = rows[~good]
+        found.status[lost], found.rung[lost] = TipStatus.NO_EQUILIBRIUM, Rung.NONE
+
+    def _along_one(self, gamma: Array, search: _Search, guesses: Array | None):
+        fine = self._fine.for_one_direction
+        direct = search is _DIRECT
+        coarse = self._coarse.for_one_direction if direct else fine
+        tiny = max(1e-3 * self.tol, 1e-13)
+        small = _COARSE_STEP if direct else min(_COARSE_STEP, 1e-3)
+        out = np.empty((len(gamma), 10))
+        loaded.solve(
+            gamma,
+            self.tables.axes[0],
+            self.tables.at_tip,
+            np.zeros((0, 3)) if guesses is None else np.ascontiguousarray(guesses[:, :3]),
+            coarse,
+            fine,
+            (search.increment, search.widest, small, tiny),
+            (search.walks, 10),
+            out,
+        )
+        frame = np.concatenate([out[:, 3:6], self._second_axis(out[:, 3:6])], axis=1)
+        return out[:, :3], frame, out[:, 6], out[:, 7]
+
+    def _second_axis(self, first: Array) -> Array:
+        """The second axis turned as the first one is, by the shortest way."""
+        g, h = self.tables.axes[0], self.tables.axes[1]
+        axis, cosine = np.cross(g, first), first @ g
+        along = axis @ h
+        safe = np.maximum(1.0 + cosine, 1e-6)
+        turned = cosine[:, None] * h + np.cross(axis, h) + (along / safe)[:, None] * axis
+        turned -= (turned * first).sum(axis=1, keepdims=True) * first
+        return turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-12)
+
+    def _in_general(self, gamma: Array, search: _Search, guesses: Array | None):
+        found = self._general(gamma, self._fine, search, guesses)[0]
+        return found[:, :3], found[:, 3:9], found[:, 9], found[:, 10]
+
+    def _general(
+        self,
+        gamma: Array,
+        table: StepTables,
+        search: _Search,
+        guesses: Array | None,
+        *,
+        slopes: bool = False,
+        compliance: bool = False,
+        trace: bool = False,
+    ) -> tuple[Array, Array, Array, Array]:
+        n, steps = len(gamma), len(table.lengths)
+        found = np.empty((n, 12))
+        twists = np.zeros((n if slopes else 0, 6, gamma.shape[1]))
+        yields = np.zeros((n if compliance else 0, 3, 3))
+        traced = np.zeros((n if trace else 0, steps + 1, loaded_general.TRACE))
+        loaded_general.solve(
+            gamma,
+            self.tables.axes,
+            table.jumps,
+            np.zeros((0, 6)) if guesses is None else guesses,
+            (table.pieces, table.lengths, table.scalars, table.bends),
+            (search.increment, search.widest, 1e-5),
+            search.walks,
+            found,
+            twists,
+            yields,
+            traced,
+        )
+        return found, twists, yields, traced
+
+    def respond(self, gamma: Array, *, compliance: bool = False) -> Response:
+        """Tips with their derivatives; NaN where there is no equilibrium."""
+        known = self.find(gamma)
+        found, twists, yields, _ = self._general(
+            _columns(gamma),
+            self._fine,
+            _NEAR,
+            known.frame,
+            slopes=True,
+            compliance=compliance,
+        )
+        lost = (known.status == TipStatus.NO_EQUILIBRIUM) | (found[:, 10] != _FOUND)
+        tips = found[:, :3].copy()
+        for values in (tips, twists, yields):
+            if len(values):
+                values[lost] = np.nan
+        in_base = yields @ self.tables.axes if compliance else yields
+        return Response(tips, twists[:, :, : gamma.shape[1]], in_base)
+
+    def shapes(self, gamma: Array, stations: Array) -> Shapes:
+        """Arms at ascending stations Z [m]; NaN where there is no equilibrium."""
+        known = self.find(gamma)
+        edges = self.tables.edges(stations, self.steps)
+        table = self.tables.of_edges(edges)
+        found, _, _, trace = self._general(_columns(gamma), table, _NEAR, known.frame, trace=True)
+        lost = (known.status == TipStatus.NO_EQUILIBRIUM) | (found[:, 10] != _FOUND)
+        z = self.tables.arm.profile.station(edges)
+        rows = np.abs(z[None] - stations[:, None]).argmin(axis=1)
+        return _shapes(found[:, :3], trace[:, rows], self._force_at(table, rows), lost, self.tables)
+
+    def _force_at(self, table: StepTables, rows: NDArray[np.intp]) -> Array:
+        """Dead force at boundaries along the world's axes, as the step beyond has it, (row, 3)."""
+        at_ends = np.concatenate([table.scalars[:1, 0, 3:], table.scalars[:, -1, 3:]])
+        return at_ends[rows]
+
+
+# From a known equilibrium: only the rotation about gravity may be far off.
+_NEAR = _Search(1.0, 4.0, 12)
+
+
+def _columns(gamma: Array) -> Array:
+    """Activations for kernels, which want one bundle at least."""
+    return gamma if gamma.shape[1] else np.zeros((len(gamma), 1))
+
+
+def _shapes(
+    tips: Array, trace: Array, force: Array, lost: NDArray[np.bool_], tables: LoadTables
+) -> Shapes:
+    """Shapes from what the kernel keeps of sections: axes, moment and tip as each sees them."""
+    g, h = trace[..., 0:3], trace[..., 3:6]
+    seen = np.stack([g, h, np.cross(g, h)], axis=-2)  # axes of the world, in the frame of the walk
+    turn = _matrix(trace[..., 12:16])
+    world = seen @ turn  # axes of the world in the directors
+    directors = np.swapaxes(world, -1, -2) @ tables.axes
+    back = np.einsum("nsac,nsc->nsa", seen, trace[..., 9:12]) @ tables.axes
+    position = tips[:, None] - back
+    moment = np.einsum("nsc,nscd->nsd", trace[..., 6:9], turn)
+    follower = np.einsum("nsc,nscd->nsd", trace[..., 16:19], turn)
+    thrust = np.einsum("sa,nsad->nsd", force, world) + follower
+    for values in (position, directors, moment, thrust):
+        values[lost] = np.nan
+    return Shapes(Frames(position, directors), moment, thrust)
+
+
+def _matrix(q: Array) -> Array:
+    """Rotation matrices of unit quaternions, shape (..., 3, 3)."""
+    w, x, y, z = np.moveaxis(q, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
