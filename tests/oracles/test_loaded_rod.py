@@ -1,0 +1,121 @@
+"""The shooting of loaded rods against closed forms, published numbers and other programs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.oracles import sorosim
+from tests.oracles.loaded_rod import equilibrium
+from tests.oracles.rod import Loads, PointLoad, Rod
+
+HORIZONTAL = ((0.0, 0.0, -1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
+ROD = Rod(
+    length=1.0, axial=lambda z: 40.0, bending=lambda z: 1.0, torsion=lambda z: 0.7, base=HORIZONTAL
+)
+WOUND = replace(
+    ROD,
+    bending=lambda z: (1 - 0.3 * z) ** 4,
+    stretch=lambda z: 0.9 + 0.1 * z,
+    curvature=lambda z: (math.cos(3 * z), math.sin(3 * z), 0.5),
+    mass=lambda z: 1 - 0.3 * z,
+)
+
+
+def test_without_loads_the_rod_has_the_shape_it_was_given():
+    """Constant û and ζ̂ wind it on a helix, here an arc."""
+    arc = replace(ROD, stretch=lambda z: 0.8, curvature=lambda z: (0.0, 2.0, 0.0))
+    found = equilibrium(arc, Loads())
+    turn = 0.8 * 2.0
+    expected = [math.sin(turn) / 2, 0.0, -(1 - math.cos(turn)) / 2]
+    np.testing.assert_allclose(found.tip, expected, atol=1e-12)
+    np.testing.assert_array_equal(found.base_moment, 0)
+
+
+def test_a_hanging_rod_stretches_by_the_weight_beyond_each_section():
+    hanging = replace(
+        ROD, mass=lambda z: 1.5, base=((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0))
+    )
+    found = equilibrium(hanging, Loads(gravity=(0, 0, -10.0), payload=0.4))
+    np.testing.assert_allclose(found.tip, [0, 0, -(1 + (7.5 + 4.0) / 40.0)], atol=1e-12)
+
+
+def test_a_tip_moment_bends_to_an_arc():
+    found = equilibrium(ROD, Loads(tip_moment=(0.0, -2.0, 0.0)))
+    np.testing.assert_allclose(found.tip, [math.sin(2) / 2, 0, (1 - math.cos(2)) / 2], atol=1e-11)
+
+
+def test_a_tip_moment_along_the_rod_twists_it():
+    found = equilibrium(ROD, Loads(tip_moment=(0.3, 0.0, 0.0)))
+    assert math.acos(found.frame[-1, 1, 1]) == pytest.approx(0.3 / 0.7, rel=1e-10)
+
+
+def test_a_following_force_is_the_dead_one_that_it_has_become():
+    followed = equilibrium(
+        WOUND, Loads(following_force=(0.6, -0.4, -1.0), following_moment=(0.2, 0.1, -0.3))
+    )
+    force, moment = (np.array(v) @ followed.frame[-1] for v in ((0.6, -0.4, -1), (0.2, 0.1, -0.3)))
+    dead = equilibrium(WOUND, Loads(tip_force=tuple(force), tip_moment=tuple(moment)))
+    assert followed.converged
+    np.testing.assert_allclose(dead.tip, followed.tip, atol=1e-9)
+    np.testing.assert_allclose(dead.base_moment, followed.base_moment, atol=1e-9)
+
+
+def test_a_payload_is_a_force_and_the_moment_of_its_lever():
+    loads = Loads(gravity=(0.5, -1.0, -3.0), payload=0.3, lever=(0.05, 0.02, 0.1))
+    found = equilibrium(WOUND, loads)
+    weight = 0.3 * np.array(loads.gravity)
+    moment = np.cross(np.array(loads.lever) @ found.frame[-1], weight)
+    other = replace(loads, payload=0.0, tip_force=tuple(weight), tip_moment=tuple(moment))
+    np.testing.assert_allclose(equilibrium(WOUND, other).tip, found.tip, atol=1e-9)
+    np.testing.assert_allclose(found.moment[-1], moment, atol=1e-9)
+
+
+def test_a_force_per_length_is_the_limit_of_many_forces_on_points():
+    spread = Loads(force_per_length=lambda z: (0.0, 1.0, -1.0))
+    places = (np.arange(8) + 0.5) / 8
+    many = tuple(PointLoad(place=float(z), force=(0.0, 0.125, -0.125)) for z in places)
+    smooth, rough = (equilibrium(WOUND, loads).tip for loads in (spread, Loads(points=many)))
+    assert 1e-5 < np.linalg.norm(smooth - rough) < 1e-3
+
+
+def test_the_moment_at_the_base_is_that_of_all_loads():
+    """The balance of the whole arm, which the shooting does not impose."""
+    points = (PointLoad(place=0.4, force=(0.2, 0.3, 0.5), moment=(0.1, 0.0, -0.2)),)
+    loads = Loads(
+        gravity=(0, -1.0, -2.0), points=points, tip_force=(0.1, 0, 0.4), tip_moment=(0, 0.2, 0)
+    )
+    half, weights = np.polynomial.legendre.leggauss(16)
+    z = np.concatenate([0.2 + 0.2 * half, [0.4], 0.7 + 0.3 * half, [1.0]])
+    found = equilibrium(WOUND, loads, z)
+    mass = np.array([WOUND.mass(s) for s in z]) * [*(0.2 * weights), 0, *(0.3 * weights), 0]
+    expected = mass @ np.cross(found.place, loads.gravity)
+    expected += np.cross(found.place[16], points[0].force) + points[0].moment
+    expected += np.cross(found.place[-1], loads.tip_force) + loads.tip_moment
+    np.testing.assert_allclose(found.base_moment, expected, atol=1e-10)
+
+
+@pytest.mark.parametrize("number", [0, 5, 24])
+def test_sorosim_has_the_same_equilibria(number):
+    """Its numbers are rounded, and its strains are polynomials: a thousandth of the length."""
+    case = sorosim.cases()[number]
+    found = equilibrium(sorosim.steel_rod(), case.loads, sorosim.STATIONS, rtol=1e-9)
+    assert np.linalg.norm(found.place - case.place, axis=1).max() < 1e-3 * sorosim.LENGTH
+    x_axis, y_axis, z_axis = found.frame[:, [2, 0, 1]].transpose(1, 0, 2)
+    angles = np.stack(
+        [
+            np.arctan2(-z_axis[:, 1], z_axis[:, 2]),
+            np.arcsin(z_axis[:, 0]),
+            np.arctan2(-y_axis[:, 0], x_axis[:, 0]),
+        ],
+        axis=1,
+    )
+    np.testing.assert_allclose(angles, case.angles, atol=5e-3)
+
+
+@pytest.mark.slow
+def test_every_twentieth_of_sorosims_equilibria_is_found():
+    assert max(sorosim.deviation(case) for case in sorosim.cases()[::20]) < 0.65e-3
