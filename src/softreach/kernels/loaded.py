@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.compiler import inline, kernel, pasted
 from softreach.kernels.explicit_rk8 import at_stages
 from softreach.kernels.loaded_step import tangent_step, tip_step
 from softreach.kernels.rest_frames import STEP_ROWS, TURN, rest_frames
@@ -122,7 +122,7 @@ def _begin_tip(w, tip, i):
     return g
 
 
-@inline
+@pasted
 def _walk_tip(w, rest, scalars, tip):
     for i in range(LANES):
         _begin_tip(w, tip, i)
@@ -135,7 +135,7 @@ def _walk_tip(w, rest, scalars, tip):
             _put(w, Y, i, y)
 
 
-@inline
+@pasted
 def _walk_tangents(w, rest, scalars, tip):
     for i in range(LANES):
         g, share = _begin_tip(w, tip, i), w[LOAD + i]

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.compiler import inline, kernel, pasted
 from softreach.kernels.explicit_rk8 import at_stages
 from softreach.kernels.loaded_column import column_step, state_step
 from softreach.kernels.rest_frames import STEP_ROWS, TURN, TURN_ROWS, rest_frames
@@ -163,7 +163,7 @@ def _drives(w, change, unit, i):
     )
 
 
-@inline
+@pasted
 def _step_state(w, c):
     for i in range(LANES):
         s, at = state_step(_nodes(w, c, i), _get_five(w, STATE, i))
@@ -181,7 +181,7 @@ def _step_state(w, c):
         _put_five(w, STAGES + 150 * LANES, i, at[10])
 
 
-@inline
+@pasted
 def _step_column(w, c, change, unit):
     for i in range(LANES):
         n, v = _nodes(w, c, i), _drives(w, change, unit, i)
@@ -337,7 +337,7 @@ def _watch(w, columns, i):
     w[MARGIN + i] = min(w[MARGIN + i], min(determinant, min(trace, minors)))
 
 
-@inline
+@pasted
 def _walk(w, columns, lanes, rest, tables, jumps, bundles, unit_at, trace):
     """From tip to base: three columns of rotations, some of activations, some of unit forces."""
     _, lengths, scalars, bends = tables
