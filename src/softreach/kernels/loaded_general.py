@@ -64,6 +64,13 @@ def _put(w, at, i, v):
 
 
 @inline
+def _copy(into, at, values, start, count):
+    """A loop: an assignment of slices would compile messages for shapes that do not fit."""
+    for i in range(count):
+        into[at + i] = values[start + i]
+
+
+@inline
 def _get_five(w, at, i):
     return (
         _get(w, at, i),
@@ -350,7 +357,7 @@ def _walk(w, columns, lanes, rest, tables, jumps, bundles, unit_at, trace):
                 for i in range(LANES):
                     _put_rotations(w, columns, i)
         r, c = rest[k], _all_constants(scalars[k])
-        w[REST : REST + STEP_ROWS * LANES] = r[: STEP_ROWS * LANES]
+        _copy(w, REST, r, 0, STEP_ROWS * LANES)
         if k == 0 and trace.shape[0] > 0:
             _keep(w, r, STEP_ROWS * LANES, trace[:, 0])
         _step_state(w, c)
@@ -366,9 +373,9 @@ def _walk(w, columns, lanes, rest, tables, jumps, bundles, unit_at, trace):
             u = n - unit_at
             unit = (1.0 if u == 0 else 0.0, 1.0 if u == 1 else 0.0, 1.0 if u == 2 else 0.0)
             dz = (change[0], change[1], change[2], change[3], change[4])
-            w[COLUMN : COLUMN + 15 * LANES] = columns[n]
+            _copy(w, COLUMN, columns[n], 0, 15 * LANES)
             _step_column(w, c, dz, unit)
-            columns[n] = w[COLUMN : COLUMN + 15 * LANES]
+            _copy(columns[n], 0, w, COLUMN, 15 * LANES)
         for i in range(LANES):
             _watch(w, columns, i)
         if trace.shape[0] > 0:
@@ -563,7 +570,8 @@ def solve(gamma, axes, jumps, guesses, tables, limits, most, found, slopes, comp
         if asked:
             _respond(w, columns, axes, first, count, slopes, compliance)
         else:
-            columns[:] = rotations
+            for n in range(3):
+                _copy(columns[n], 0, rotations[n], 0, 15 * LANES)
         _store(w, work, columns, first, count, walks, found)
 
 

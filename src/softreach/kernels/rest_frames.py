@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from softreach.kernels.compiler import inline
+from softreach.kernels.compiler import inline, pasted
 from softreach.kernels.explicit_rk8 import NODES
 from softreach.kernels.rod import LANES, node_values, nodes_at
 from softreach.kernels.vector import cross
@@ -43,7 +43,7 @@ def pack_lengths(measure, stretch):
     return table
 
 
-@inline
+@pasted
 def rest_frames(work, lanes, pieces, lengths, steps):
     """Fill `steps` (step, rows), tip first, and leave the turn from tip to base in `work`."""
     for i in range(LANES):
@@ -56,14 +56,19 @@ def rest_frames(work, lanes, pieces, lengths, steps):
             _fill_lengths(steps[k, 4 * node * LANES :], lanes, lengths[k, node])
         _fill_tangents(steps[k], work)
         if steps.shape[1] > STEP_ROWS * LANES:
-            steps[k, STEP_ROWS * LANES : (STEP_ROWS + 4) * LANES] = work[TURN : TURN + 4 * LANES]
+            _keep_turn(steps[k, STEP_ROWS * LANES :], work)
         for piece in range(4):
             node_values(work, lanes, pieces, 4 * k + piece)
             _turn(work)
             _fill_tangents(steps[k, 4 * (piece + 1) * LANES :], work)
             if steps.shape[1] > STEP_ROWS * LANES:
-                at = (STEP_ROWS + 4 * (piece + 1)) * LANES
-                steps[k, at : at + 4 * LANES] = work[TURN : TURN + 4 * LANES]
+                _keep_turn(steps[k, (STEP_ROWS + 4 * (piece + 1)) * LANES :], work)
+
+
+@inline
+def _keep_turn(values, work):
+    for i in range(4 * LANES):
+        values[i] = work[TURN + i]
 
 
 @inline
