@@ -78,8 +78,8 @@ class Equilibria(NamedTuple):
             np.zeros((n, 6)),
         )
 
-    def at(self, rows: slice) -> Equilibria:
-        """Some of them, sharing memory."""
+    def of(self, rows: slice | NDArray[np.bool_]) -> Equilibria:
+        """Some of them; a slice shares memory."""
         return Equilibria(*(field[rows] for field in self))
 
 
@@ -144,6 +144,12 @@ class Solver:
         """Equilibria near known ones of other steps."""
         found = Equilibria.empty(len(gamma))
         self._try(gamma, np.arange(len(gamma)), _DIRECT, Rung.DIRECT, found, known.frame)
+        return found
+
+    def slowly(self, gamma: Array) -> Equilibria:
+        """Equilibria found by the most patient continuation alone."""
+        found = Equilibria.empty(len(gamma))
+        self._try(gamma, np.arange(len(gamma)), _PATIENT, Rung.PATIENT, found)
         return found
 
     def _fill(self, gamma: Array, found: Equilibria) -> None:

@@ -118,7 +118,7 @@ class LoadedRod(TipMap):
         gamma = self.box.check(activations)
         found = Equilibria.empty(len(gamma))
         parallel.run(
-            self._solver.task(gamma[b], found.at(b))
+            self._solver.task(gamma[b], found.of(b))
             for b in parallel.blocks(len(gamma), BLOCK // 8)
         )
         return found
