@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.kernels import loaded, loaded_general
+from softreach.rod.activation_box import ActivationBox
 from softreach.rod.load_tables import LoadTables, StepTables
+from softreach.rod.start_grid import StartGrid, grid_sizes
 from softreach.rod.tip_map import Frames, TipStatus
 
 __all__ = ["Equilibria", "Response", "Rung", "Shapes", "Solver"]
@@ -24,7 +26,7 @@ class Rung(IntEnum):
     """How an equilibrium was found."""
 
     DIRECT = 0
-    """Newton's method from the unloaded arm, all load at once."""
+    """Newton's method, all load at once."""
     CONTINUATION = 1
     """The load grown in steps along the branch."""
     PATIENT = 2
@@ -50,6 +52,7 @@ _DIRECT = _Search(1.0, 1.2, 7)
 _CONTINUATION = _Search(0.25, 0.1, 400)
 _PATIENT = _Search(1 / 64, 0.03, 2000)
 _COARSE_STEP = 0.05  # Newton step at which coarse steps have done their work
+_OF_TOL = 1e-2  # what the search may use up of the tolerance
 _FOUND = 1.0
 
 
@@ -65,17 +68,18 @@ class Equilibria(NamedTuple):
     rung: NDArray[np.int8]
     """`Rung`, shape (n,)."""
     frame: Array
-    """First two axes of the world at the tip, as the base of the unloaded arm sees them, (n, 6)."""
+    """First axis of the world at the tip, as the base of the unloaded arm sees it, (n, 3); with
+    loads of several directions also the second one, (n, 6)."""
 
     @classmethod
-    def empty(cls, n: int) -> Equilibria:
+    def empty(cls, n: int, components: int) -> Equilibria:
         """Room for n."""
         return cls(
             np.full((n, 3), np.nan),
             np.full(n, TipStatus.NO_EQUILIBRIUM, np.int8),
             np.full(n, np.nan),
             np.full(n, Rung.NONE, np.int8),
-            np.zeros((n, 6)),
+            np.zeros((n, components)),
         )
 
     def of(self, rows: slice | NDArray[np.bool_]) -> Equilibria:
@@ -111,12 +115,22 @@ class Solver:
     Args:
         tables: Of the arm and its loads.
         steps: Least number of steps.
-        tol: Largest tip error, in L, of which the search uses up a thousandth.
+        tol: Largest tip error, in L, of which the search uses up a hundredth.
     """
 
     tables: LoadTables
     steps: int
     tol: float
+    starts: StartGrid | None = None
+    """Where to begin."""
+
+    def with_starts(self, box: ActivationBox) -> Solver:
+        """The same, beginning from equilibria on a grid over the box where that is worth it."""
+        sizes = grid_sizes(box)
+        if sizes is None:
+            return self
+        grid = StartGrid.over(box, sizes, lambda gamma: self.find(gamma).frame)
+        return Solver(self.tables, self.steps, self.tol, grid)
 
     @cached_property
     def _fine(self) -> StepTables:
@@ -134,26 +148,31 @@ class Solver:
         """The work of filling `found`, to be run on any thread."""
         return partial(self._fill, gamma, found)
 
+    def empty(self, n: int) -> Equilibria:
+        """Room for n equilibria."""
+        return Equilibria.empty(n, 3 if self.tables.one_direction else 6)
+
     def find(self, gamma: Array) -> Equilibria:
         """The equilibria of activations (n, bundles), on the calling thread."""
-        found = Equilibria.empty(len(gamma))
+        found = self.empty(len(gamma))
         self._fill(gamma, found)
         return found
 
     def near(self, gamma: Array, known: Equilibria) -> Equilibria:
         """Equilibria near known ones of other steps."""
-        found = Equilibria.empty(len(gamma))
-        self._try(gamma, np.arange(len(gamma)), _DIRECT, Rung.DIRECT, found, known.frame)
+        found = self.empty(len(gamma))
+        self._try(gamma, slice(None), _DIRECT, Rung.DIRECT, found, known.frame)
         return found
 
     def slowly(self, gamma: Array) -> Equilibria:
         """Equilibria found by the most patient continuation alone."""
-        found = Equilibria.empty(len(gamma))
-        self._try(gamma, np.arange(len(gamma)), _PATIENT, Rung.PATIENT, found)
+        found = self.empty(len(gamma))
+        self._try(gamma, slice(None), _PATIENT, Rung.PATIENT, found)
         return found
 
     def _fill(self, gamma: Array, found: Equilibria) -> None:
-        self._try(gamma, np.arange(len(gamma)), _DIRECT, Rung.DIRECT, found)
+        guesses = None if self.starts is None else self.starts.at(gamma)
+        self._try(gamma, slice(None), _DIRECT, Rung.DIRECT, found, guesses)
         for search, rung in ((_CONTINUATION, Rung.CONTINUATION), (_PATIENT, Rung.PATIENT)):
             rest = np.flatnonzero(found.status != TipStatus.STABLE)
             if rung == Rung.PATIENT:
@@ -165,7 +184,7 @@ class Solver:
     def _try(
         self,
         gamma: Array,
-        rows: NDArray[np.intp],
+        rows: slice | NDArray[np.intp],
         search: _Search,
         rung: Rung,
         found: Equilibria,
@@ -175,43 +194,44 @@ class Solver:
         of_kind = self._along_one if self.tables.one_direction else self._in_general
         tips, frame, margin, state = of_kind(_columns(gamma[rows]), search, guesses)
         good = state == _FOUND
-        at = rows[good]
-        found.tips[at], found.frame[at], found.margin[at] = tips[good], frame[good], margin[good]
-        found.rung[at] = rung
-        found.status[at] = np.where(margin[good] > 0, TipStatus.STABLE, TipStatus.UNSTABLE)
-        lost = rows[~good]
-        found.status[lost], found.rung[lost] = TipStatus.NO_EQUILIBRIUM, Rung.NONE
+        stable = np.where(margin > 0, TipStatus.STABLE, TipStatus.UNSTABLE)
+        found.tips[rows], found.frame[rows], found.margin[rows] = tips, frame, margin
+        found.status[rows] = np.where(good, stable, TipStatus.NO_EQUILIBRIUM)
+        found.rung[rows] = np.where(good, rung, Rung.NONE)
 
     def _along_one(self, gamma: Array, search: _Search, guesses: Array | None):
         fine = self._fine.for_one_direction
         direct = search is _DIRECT
         coarse = self._coarse.for_one_direction if direct else fine
-        tiny = max(1e-3 * self.tol, 1e-13)
+        tiny = max(_OF_TOL * self.tol, 1e-13)
         small = _COARSE_STEP if direct else min(_COARSE_STEP, 1e-3)
         out = np.empty((len(gamma), 10))
         loaded.solve(
             gamma,
             self.tables.axes[0],
             self.tables.at_tip,
-            np.zeros((0, 3)) if guesses is None else np.ascontiguousarray(guesses[:, :3]),
+            np.zeros((0, 3)) if guesses is None else guesses,
             coarse,
             fine,
             (search.increment, search.widest, small, tiny),
             (search.walks, 10),
             out,
         )
-        frame = np.concatenate([out[:, 3:6], self._second_axis(out[:, 3:6])], axis=1)
-        return out[:, :3], frame, out[:, 6], out[:, 7]
+        return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7]
 
-    def _second_axis(self, first: Array) -> Array:
-        """The second axis turned as the first one is, by the shortest way."""
+    def _whole(self, frame: Array) -> Array:
+        """Both axes; the second is turned as the first one is, by the shortest way."""
+        if frame.shape[1] == 6:
+            return frame
+        first = frame
         g, h = self.tables.axes[0], self.tables.axes[1]
         axis, cosine = np.cross(g, first), first @ g
         along = axis @ h
         safe = np.maximum(1.0 + cosine, 1e-6)
         turned = cosine[:, None] * h + np.cross(axis, h) + (along / safe)[:, None] * axis
         turned -= (turned * first).sum(axis=1, keepdims=True) * first
-        return turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-12)
+        turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-12)
+        return np.concatenate([first, turned], axis=1)
 
     def _in_general(self, gamma: Array, search: _Search, guesses: Array | None):
         found = self._general(gamma, self._fine, search, guesses)[0]
@@ -255,7 +275,7 @@ class Solver:
             _columns(gamma),
             self._fine,
             _NEAR,
-            known.frame,
+            self._whole(known.frame),
             slopes=True,
             compliance=compliance,
         )
@@ -272,7 +292,9 @@ class Solver:
         known = self.find(gamma)
         edges = self.tables.edges(stations, self.steps)
         table = self.tables.of_edges(edges)
-        found, _, _, trace = self._general(_columns(gamma), table, _NEAR, known.frame, trace=True)
+        found, _, _, trace = self._general(
+            _columns(gamma), table, _NEAR, self._whole(known.frame), trace=True
+        )
         lost = (known.status == TipStatus.NO_EQUILIBRIUM) | (found[:, 10] != _FOUND)
         z = self.tables.arm.profile.station(edges)
         rows = np.abs(z[None] - stations[:, None]).argmin(axis=1)

@@ -111,12 +111,12 @@ class LoadedRod(TipMap):
 
     @cached_property
     def _solver(self) -> Solver:
-        return self._solver_of(self.steps)
+        return self._solver_of(self.steps).with_starts(self.box)
 
     def equilibria(self, activations: ArrayLike) -> Equilibria:
         """Tips with their status, the margin of stability, and how each was found."""
         gamma = self.box.check(activations)
-        found = Equilibria.empty(len(gamma))
+        found = self._solver.empty(len(gamma))
         parallel.run(
             self._solver.task(gamma[b], found.of(b))
             for b in parallel.blocks(len(gamma), BLOCK // 8)
