@@ -11,7 +11,9 @@ import pytest
 from softreach.arm import designs
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.tables import tables
-from softreach.errors import InvalidDesign
+from softreach.errors import InvalidDesign, InvalidInput
+from softreach.kernels import loaded_reference
+from softreach.rod.all_equilibria import all_equilibria
 from softreach.rod.equilibrium import Rung, Solver
 from softreach.rod.free import FreeRod
 from softreach.rod.load_tables import Body, LoadTables
@@ -306,3 +308,59 @@ def test_loads_that_are_no_numbers_are_refused_by_name():
         Loads(gravity=(0, 0))
     with pytest.raises(InvalidDesign, match="payload"):
         Loads(payload=-1)
+
+
+def rest_turn(arm, gamma, steps=400):
+    """Directors of the unloaded tip as rows."""
+    return FreeRod(arm, 1e-12).frames(gamma, [arm.length]).directors[:, 0]
+
+
+def test_the_walk_is_that_of_the_reference():
+    found = loaded(Loads(gravity=SIDE, payload=0.3, payload_arm=(0.0, 0.05, 0.1)))
+    gamma, of_tables = GAMMA[:1], found.tables
+    solved = found.equilibria(gamma)
+    turn = rest_turn(TRUNK, gamma)[0]
+
+    def weight(z):
+        f = np.pi * 1000.0 * 9.81 * TRUNK.profile.radius(z) ** 3 / (3 * math.tan(math.radians(2)))
+        return f
+
+    def section(z):
+        at = tables(TRUNK, [z])
+        axial, bending, torsion = (float(c[0]) for c in found.body.compliance(np.array([z])))
+        force = float(weight(z) - weight(TRUNK.length)) + 0.3 * 9.81
+        return loaded_reference.Section(
+            1.0 + float(at.extension[0] @ gamma[0]),
+            at.curvature[0] @ gamma[0],
+            np.array([bending, bending, torsion]),
+            axial,
+            force,
+        )
+
+    g = turn @ solved.frame[0]
+    m = np.cross(of_tables.at_tip[:3], g)
+    seen, _, tip = loaded_reference.walk(section, TRUNK.length, g, m, 600)
+    np.testing.assert_allclose(seen, of_tables.axes[0], atol=1e-7)
+    np.testing.assert_allclose(tip, solved.tips[0], atol=1e-7)
+
+
+@pytest.mark.parametrize(("load", "most"), [(0.5, 1), (12.0, 3), (25.0, 9)])
+def test_all_equilibria_are_counted(load, most):
+    """The degree is 1, the branch of the unloaded arm is among them, and light arms have no other.
+
+    Only one is stable each time: bent either way, an upright arm can swing over sideways.
+    """
+    young = 1000 * 9.81 / (load * TRUNK.profile.outer_radius**2)
+    solver = Solver(loaded(Loads(gravity=UP), young=young).tables, 40, 1e-8)
+    for gamma in np.random.default_rng(0).uniform(-5 / 3, 0, (6, 1, 3)):
+        every, branch = all_equilibria(solver, gamma), solver.find(gamma)
+        assert every.degree == 1
+        assert len(every.tips) % 2 == 1
+        assert len(every.tips) <= most
+        assert np.linalg.norm(every.tips - branch.tips, axis=1).min() < 1e-6
+
+
+def test_equilibria_under_crossed_loads_are_not_counted():
+    solver = Solver(loaded(Loads(gravity=SIDE, tip_force=(0, 1.0, 0))).tables, 8, 1e-6)
+    with pytest.raises(InvalidInput, match="one direction"):
+        all_equilibria(solver, GAMMA[:1])

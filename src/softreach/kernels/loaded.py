@@ -20,7 +20,7 @@ from softreach.kernels.rest_frames import WORK as REST_WORK
 from softreach.kernels.rod import LANES, load
 from softreach.kernels.vector import cross, dot
 
-__all__ = ["DIRECT", "FAILED", "solve"]
+__all__ = ["DIRECT", "FAILED", "base_directions", "solve"]
 
 # Rows of the workspace, LANES numbers each.
 X = 0  # G, M as walked
@@ -364,7 +364,7 @@ def solve(gamma, gravity, tip, guesses, coarse, fine, limits, most, out):
             step at which the coarse tables have done their work; step at which the fine ones have.
         most: Walks (coarse, fine) allowed.
         out: Filled with the tip, G(L), the margin, the state (0 not found, 1 found, 2 given up),
-            walks, (n, 10).
+            walks, and the determinant of the tangents at the base, (n, 10).
     """
     increment, widest, small, tiny = limits
     lanes = np.zeros((coarse[0].shape[2] - 1, LANES))
@@ -426,4 +426,37 @@ def solve(gamma, gravity, tip, guesses, coarse, fine, limits, most, out):
             if w[DONE + i] == DIRECT and w[LAST + i] > tiny * tiny:
                 out[n, 7] = 0.0
             out[n, 8] = walks
-            out[n, 9] = math.sqrt(w[LAST + i])
+            out[n, 9] = w[PLANE + i] * w[PLANE + 3 * LANES + i]
+            out[n, 9] -= w[PLANE + LANES + i] * w[PLANE + 2 * LANES + i]
+
+
+@kernel
+def base_directions(gamma, tip, directions, fine, out):
+    """Directions of gravity that the base must see, for those that the tip of one rod sees.
+
+    Args:
+        gamma: One activation (1, bundle).
+        tip: As of `solve`.
+        directions: G(L) as the base of the unloaded arm sees them (n, 3).
+        fine: As of `solve`.
+        out: Filled, (n, 3).
+    """
+    lanes = np.zeros((fine[0].shape[2] - 1, LANES))
+    work, w = np.zeros(REST_WORK), np.zeros(SIZE)
+    rest = np.zeros((fine[1].shape[0], STEP_ROWS * LANES))
+    for j in range(gamma.shape[1]):
+        for i in range(LANES):
+            lanes[j, i] = gamma[0, j]
+    rest_frames(work, lanes, fine[0], fine[1], rest)
+    for first in range(0, directions.shape[0], LANES):
+        count = min(LANES, directions.shape[0] - first)
+        for i in range(LANES):
+            n = first + min(i, count - 1)
+            g = (directions[n, 0], directions[n, 1], directions[n, 2])
+            _put(w, TRIAL, i, _turned_into(work, i, g))
+            w[LOAD + i] = 1.0
+        _walk_tip(w, rest, fine[2], tip)
+        for i in range(count):
+            g = _turned_back(work, i, _three(w, X, i))
+            for axis in range(3):
+                out[first + i, axis] = g[axis]

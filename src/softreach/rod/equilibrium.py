@@ -192,7 +192,19 @@ class Solver:
     ) -> None:
         """Search at some rows, and put down what is found."""
         of_kind = self._along_one if self.tables.one_direction else self._in_general
-        tips, frame, margin, state = of_kind(_columns(gamma[rows]), search, guesses)
+        self._put(found, rows, rung, *of_kind(_columns(gamma[rows]), search, guesses))
+
+    def _put(
+        self,
+        found: Equilibria,
+        rows: slice | NDArray[np.intp],
+        rung: Rung,
+        tips: Array,
+        frame: Array,
+        margin: Array,
+        state: Array,
+    ) -> None:
+        """Put down what a search found at some rows."""
         good = state == _FOUND
         stable = np.where(margin > 0, TipStatus.STABLE, TipStatus.UNSTABLE)
         found.tips[rows], found.frame[rows], found.margin[rows] = tips, frame, margin
@@ -200,6 +212,9 @@ class Solver:
         found.rung[rows] = np.where(good, rung, Rung.NONE)
 
     def _along_one(self, gamma: Array, search: _Search, guesses: Array | None):
+        return self._one(gamma, search, guesses)[:4]
+
+    def _one(self, gamma: Array, search: _Search, guesses: Array | None):
         fine = self._fine.for_one_direction
         direct = search is _DIRECT
         coarse = self._coarse.for_one_direction if direct else fine
@@ -217,7 +232,25 @@ class Solver:
             (search.walks, 10),
             out,
         )
-        return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7]
+        return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7], out[:, 9]
+
+    def base_directions(self, gamma: Array, directions: Array) -> Array:
+        """What the base of one arm (1, bundles) must see of gravity, for what its tip sees, (n, 3).
+
+        Both as the base of the unloaded arm sees them; loads along one direction only.
+        """
+        out = np.empty_like(directions)
+        fine = self._fine.for_one_direction
+        loaded.base_directions(_columns(gamma), self.tables.at_tip, directions, fine, out)
+        return out
+
+    def polished(self, gamma: Array, directions: Array) -> tuple[Equilibria, Array]:
+        """Equilibria of one arm near directions G(L), and the sign of each: -1 to its index."""
+        found = self.empty(len(directions))
+        many = np.repeat(_columns(gamma), len(directions), axis=0)
+        tips, frame, margin, state, sign = self._one(many, _POLISH, directions)
+        self._put(found, slice(None), Rung.DIRECT, tips, frame, margin, state)
+        return found, np.sign(sign)
 
     def _whole(self, frame: Array) -> Array:
         """Both axes; the second is turned as the first one is, by the shortest way."""
@@ -308,6 +341,7 @@ class Solver:
 
 # From a known equilibrium: only the rotation about gravity may be far off.
 _NEAR = _Search(1.0, 4.0, 12)
+_POLISH = _Search(1.0, 0.3, 10)
 
 
 def _columns(gamma: Array) -> Array:
