@@ -357,6 +357,7 @@ def test_all_equilibria_are_counted(load, most):
         assert every.degree == 1
         assert len(every.tips) % 2 == 1
         assert len(every.tips) <= most
+        assert (every.status == TipStatus.STABLE).sum() == 1
         assert np.linalg.norm(every.tips - branch.tips, axis=1).min() < 1e-6
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from softreach.kernels.compiler import kernel
+from softreach.kernels.compiler import inline, kernel
 
 __all__ = ["interpolate"]
 
@@ -22,7 +22,7 @@ def interpolate(values, points, low, scale, sizes, out):
         out: Filled, (n, component).
     """
     axes = sizes.shape[0]
-    fraction, first, stride = np.zeros(axes), np.zeros(axes, np.int64), np.ones(axes, np.int64)
+    fraction, stride = np.zeros(axes), np.ones(axes, np.int64)
     for axis in range(axes - 2, -1, -1):
         stride[axis] = stride[axis + 1] * sizes[axis + 1]
     for n in range(points.shape[0]):
@@ -30,18 +30,26 @@ def interpolate(values, points, low, scale, sizes, out):
         for axis in range(axes):
             x = (points[n, axis] - low[axis]) * scale[axis]
             cell = min(max(int(np.floor(x)), 0), max(sizes[axis] - 2, 0))
-            first[axis], fraction[axis] = cell, x - cell
+            fraction[axis] = x - cell
             at += cell * stride[axis]
         for component in range(out.shape[1]):
             out[n, component] = 0.0
         for corner in range(1 << axes):
-            weight, node = 1.0, at
-            for axis in range(axes):
-                if corner >> axis & 1:
-                    weight *= fraction[axis]
-                    node += stride[axis]
-                else:
-                    weight *= 1.0 - fraction[axis]
-            if weight != 0.0:
-                for component in range(out.shape[1]):
-                    out[n, component] += weight * values[node, component]
+            weight, node = _corner(corner, at, fraction, stride)
+            for component in range(out.shape[1]):
+                out[n, component] += weight * values[node, component]
+
+
+@inline
+def _corner(corner, at, fraction, stride):
+    """Weight and node of one corner of a cell; never a node outside of the grid."""
+    weight, node = 1.0, at
+    for axis in range(stride.shape[0]):
+        if not corner >> axis & 1:
+            weight *= 1.0 - fraction[axis]
+        elif fraction[axis] == 0.0:
+            weight = 0.0
+        else:
+            weight *= fraction[axis]
+            node += stride[axis]
+    return weight, node

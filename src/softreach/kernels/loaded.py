@@ -20,7 +20,7 @@ from softreach.kernels.rest_frames import WORK as REST_WORK
 from softreach.kernels.rod import LANES, load
 from softreach.kernels.vector import cross, dot
 
-__all__ = ["DIRECT", "FAILED", "base_directions", "solve"]
+__all__ = ["FAILED", "FOUND", "base_directions", "solve"]
 
 # Rows of the workspace, LANES numbers each.
 X = 0  # G, M as walked
@@ -46,7 +46,7 @@ BEFORE = 57 * LANES  # G(0) of the walk before, and the change of G(L) since
 SHIFT = 60 * LANES
 SIZE = 63 * LANES
 
-DIRECT, FAILED = 1, 2
+FOUND, FAILED = 1, 2
 _CONTRACTION = 0.6
 _MOST_TURNS = 8
 _SMALLEST_INCREMENT = 1 / 4096
@@ -267,7 +267,7 @@ def _advance(w, i, small, widest):
     if size >= small:
         return
     if w[LOAD + i] >= 1.0:
-        w[DONE + i] = DIRECT
+        w[DONE + i] = FOUND
         return
     _put(w, PAST, i, _three(w, HELD, i))
     w[PAST_LOAD + i] = w[HELD_LOAD + i]
@@ -325,7 +325,7 @@ def _set_out(w, work, guesses, first, count, increment, widest):
 
 
 @inline
-def _broyden(w, i, step):
+def _broyden(w, i):
     """Improve the chord by what the last step did, and keep what the next one needs."""
     g = _three(w, X, i)
     b, s = _three(w, BEFORE, i), _three(w, SHIFT, i)
@@ -373,61 +373,80 @@ def solve(gamma, gravity, tip, guesses, coarse, fine, limits, most, out):
     fine_rest = np.zeros((fine[1].shape[0], STEP_ROWS * LANES))
     for first in range(0, gamma.shape[0], LANES):
         count = min(LANES, gamma.shape[0] - first)
-        load(lanes, gamma, first, count)
-        for j in range(lanes.shape[0]):
-            for i in range(count, LANES):
-                lanes[j, i] = lanes[j, count - 1]
+        _load_all(lanes, gamma, first, count)
         rest_frames(work, lanes, coarse[0], coarse[1], rest)
         _aim(w, work, gravity)
         _set_out(w, work, guesses, first, count, increment, widest)
         walks = 0
-        for _ in range(most[0]):
+        while walks < most[0]:
             _walk_tangents(w, rest, coarse[2], tip)
             walks += 1
-            waiting = 0
-            for i in range(LANES):
-                if w[DONE + i] == 0.0:
-                    _advance(w, i, small, widest)
-                waiting += w[DONE + i] == 0.0
-            if waiting == 0:
+            if _advance_all(w, small, widest) == 0:
                 break
         rest_frames(work, lanes, fine[0], fine[1], fine_rest)
         _aim(w, work, gravity)
-        for i in range(LANES):
-            _put(w, SHIFT, i, (0.0, 0.0, 0.0))
-            _put(w, BEFORE, i, (0.0, 0.0, 0.0))
         for turn in range(most[1]):
             _walk_tip(w, fine_rest, fine[2], tip)
             walks += 1
-            largest = 0.0
-            for i in range(LANES):
-                if turn > 0:
-                    _broyden(w, i, 0)
-                step = _chord(w, i)
-                size = dot(step, step)
-                if w[DONE + i] == DIRECT:
-                    largest = max(largest, size)
-                w[LAST + i] = size
-                _put(w, BEFORE, i, _three(w, X, i))
-                _put(w, SHIFT, i, step)
-            if largest < tiny * tiny or turn == most[1] - 1:
+            if _chord_all(w, turn) < tiny * tiny or turn == most[1] - 1:
                 break
             for i in range(LANES):
                 _move(w, i, _three(w, SHIFT, i))
-        for i in range(count):
-            r = _turned_back(work, i, _three(w, Y, i))
-            g = _turned_back(work, i, _three(w, TRIAL, i))
-            n = first + i
-            for j in range(3):
-                out[n, j] = r[j]
-                out[n, 3 + j] = g[j]
-            out[n, 6] = w[MARGIN + i]
-            out[n, 7] = w[DONE + i]
-            if w[DONE + i] == DIRECT and w[LAST + i] > tiny * tiny:
-                out[n, 7] = 0.0
-            out[n, 8] = walks
-            out[n, 9] = w[PLANE + i] * w[PLANE + 3 * LANES + i]
-            out[n, 9] -= w[PLANE + LANES + i] * w[PLANE + 2 * LANES + i]
+        _store(w, work, first, count, tiny, walks, out)
+
+
+@inline
+def _load_all(lanes, gamma, first, count):
+    """Lay activations side by side; lanes to spare repeat the last one."""
+    load(lanes, gamma, first, count)
+    for j in range(lanes.shape[0]):
+        for i in range(count, LANES):
+            lanes[j, i] = lanes[j, count - 1]
+
+
+@inline
+def _advance_all(w, small, widest):
+    """One Newton step for all lanes; how many are still at work."""
+    waiting = 0
+    for i in range(LANES):
+        if w[DONE + i] == 0.0:
+            _advance(w, i, small, widest)
+        waiting += w[DONE + i] == 0.0
+    return waiting
+
+
+@inline
+def _chord_all(w, turn):
+    """Chord steps for all lanes, kept in SHIFT; the largest squared size of one that matters."""
+    largest = 0.0
+    for i in range(LANES):
+        if turn > 0:
+            _broyden(w, i)
+        step = _chord(w, i)
+        size = dot(step, step)
+        if w[DONE + i] == FOUND:
+            largest = max(largest, size)
+        w[LAST + i] = size
+        _put(w, BEFORE, i, _three(w, X, i))
+        _put(w, SHIFT, i, step)
+    return largest
+
+
+@inline
+def _store(w, work, first, count, tiny, walks, out):
+    for i in range(count):
+        r, g = _turned_back(work, i, _three(w, Y, i)), _turned_back(work, i, _three(w, TRIAL, i))
+        n = first + i
+        for j in range(3):
+            out[n, j] = r[j]
+            out[n, 3 + j] = g[j]
+        out[n, 6] = w[MARGIN + i]
+        out[n, 7] = w[DONE + i]
+        if w[DONE + i] == FOUND and w[LAST + i] > tiny * tiny:
+            out[n, 7] = 0.0
+        out[n, 8] = walks
+        out[n, 9] = w[PLANE + i] * w[PLANE + 3 * LANES + i]
+        out[n, 9] -= w[PLANE + LANES + i] * w[PLANE + 2 * LANES + i]
 
 
 @kernel

@@ -345,6 +345,25 @@ def _watch(w, columns, i):
 
 
 @pasted
+def _step_columns(w, columns, lanes, r, c, lengths, bends, bundles, unit_at, zero):
+    """All tangents across one step."""
+    for n in range(columns.shape[0]):
+        j = n - 3
+        driven = 0 <= j < bundles
+        change = lengths[:, j] if driven else zero
+        if driven:
+            _drive(w, lanes, r, bends, change, j)
+        elif j == bundles:
+            w[DRIVE : DRIVE + 15 * LANES] = 0.0
+        u = n - unit_at
+        unit = (1.0 if u == 0 else 0.0, 1.0 if u == 1 else 0.0, 1.0 if u == 2 else 0.0)
+        dz = (change[0], change[1], change[2], change[3], change[4])
+        _copy(w, COLUMN, columns[n], 0, 15 * LANES)
+        _step_column(w, c, dz, unit)
+        _copy(columns[n], 0, w, COLUMN, 15 * LANES)
+
+
+@pasted
 def _walk(w, columns, lanes, rest, tables, jumps, bundles, unit_at, trace):
     """From tip to base: three columns of rotations, some of activations, some of unit forces."""
     _, lengths, scalars, bends = tables
@@ -362,20 +381,7 @@ def _walk(w, columns, lanes, rest, tables, jumps, bundles, unit_at, trace):
             _keep(w, r, STEP_ROWS * LANES, trace[:, 0])
         _step_state(w, c)
         w[DRIVE : DRIVE + 15 * LANES] = 0.0
-        for n in range(columns.shape[0]):
-            j = n - 3
-            driven = 0 <= j < bundles
-            change = lengths[k, :, j] if driven else zero
-            if driven:
-                _drive(w, lanes, r, bends[k], change, j)
-            elif j == bundles:
-                w[DRIVE : DRIVE + 15 * LANES] = 0.0
-            u = n - unit_at
-            unit = (1.0 if u == 0 else 0.0, 1.0 if u == 1 else 0.0, 1.0 if u == 2 else 0.0)
-            dz = (change[0], change[1], change[2], change[3], change[4])
-            _copy(w, COLUMN, columns[n], 0, 15 * LANES)
-            _step_column(w, c, dz, unit)
-            _copy(columns[n], 0, w, COLUMN, 15 * LANES)
+        _step_columns(w, columns, lanes, r, c, lengths[k], bends[k], bundles, unit_at, zero)
         for i in range(LANES):
             _watch(w, columns, i)
         if trace.shape[0] > 0:
@@ -551,9 +557,7 @@ def solve(gamma, axes, jumps, guesses, tables, limits, most, found, slopes, comp
     for first in range(0, gamma.shape[0], LANES):
         count = min(LANES, gamma.shape[0] - first)
         load(lanes, gamma, first, count)
-        for j in range(lanes.shape[0]):
-            for i in range(count, LANES):
-                lanes[j, i] = lanes[j, count - 1]
+        _repeat_last(lanes, count)
         rest_frames(work, lanes, tables[0], tables[1], rest)
         _set_out(w, work, axes, guesses, first, count, increment, widest)
         walks, waiting = 0, LANES
@@ -573,6 +577,14 @@ def solve(gamma, axes, jumps, guesses, tables, limits, most, found, slopes, comp
             for n in range(3):
                 _copy(columns[n], 0, rotations[n], 0, 15 * LANES)
         _store(w, work, columns, first, count, walks, found)
+
+
+@inline
+def _repeat_last(lanes, count):
+    """Lanes to spare repeat the last activation."""
+    for j in range(lanes.shape[0]):
+        for i in range(count, LANES):
+            lanes[j, i] = lanes[j, count - 1]
 
 
 @inline

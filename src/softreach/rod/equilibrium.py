@@ -52,6 +52,7 @@ _DIRECT = _Search(1.0, 1.2, 7)
 _CONTINUATION = _Search(0.25, 0.1, 400)
 _PATIENT = _Search(1 / 64, 0.03, 2000)
 _COARSE_STEP = 0.05  # Newton step at which coarse steps have done their work
+_DOUBTFUL = 0.02  # margin below which the tangents of coarse steps decide nothing
 _OF_TOL = 1e-2  # what the search may use up of the tolerance
 _FOUND = 1.0
 
@@ -84,7 +85,8 @@ class Equilibria(NamedTuple):
 
     def of(self, rows: slice | NDArray[np.bool_]) -> Equilibria:
         """Some of them; a slice shares memory."""
-        return Equilibria(*(field[rows] for field in self))
+        tips, status, margin, rung, frame = self
+        return Equilibria(tips[rows], status[rows], margin[rows], rung[rows], frame[rows])
 
 
 class Response(NamedTuple):
@@ -174,9 +176,9 @@ class Solver:
         guesses = None if self.starts is None else self.starts.at(gamma)
         self._try(gamma, slice(None), _DIRECT, Rung.DIRECT, found, guesses)
         for search, rung in ((_CONTINUATION, Rung.CONTINUATION), (_PATIENT, Rung.PATIENT)):
-            rest = np.flatnonzero(found.status != TipStatus.STABLE)
-            if rung == Rung.PATIENT:
-                rest = np.flatnonzero(found.status == TipStatus.NO_EQUILIBRIUM)
+            lost = found.status == TipStatus.NO_EQUILIBRIUM
+            doubtful = lost | (found.margin < _DOUBTFUL)
+            rest = np.flatnonzero(lost if rung == Rung.PATIENT else doubtful)
             if len(rest):
                 self._try(gamma, rest, search, rung, found)
         found.tips[found.status == TipStatus.NO_EQUILIBRIUM] = np.nan

@@ -73,8 +73,8 @@ class LoadTables:
         first = first / np.linalg.norm(first)
         other = np.eye(3)[np.argmin(np.abs(first))]
         second = np.cross(first, other)
-        second /= np.linalg.norm(second)
-        return np.stack([first, second, np.cross(first, second)])
+        second = second / np.linalg.norm(second)
+        return np.array([first, second, np.cross(first, second)], float)
 
     @cached_property
     def one_direction(self) -> bool:
