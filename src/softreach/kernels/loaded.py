@@ -44,7 +44,8 @@ DONE = 47 * LANES  # 0 at work, 1 found, 2 given up
 INVERSE = 48 * LANES  # change of G(L) per change of G(0), 3 x 3
 BEFORE = 57 * LANES  # G(0) of the walk before, and the change of G(L) since
 SHIFT = 60 * LANES
-SIZE = 63 * LANES
+KEPT = 63 * LANES  # margin and determinant when the search was over
+SIZE = 65 * LANES
 
 FOUND, FAILED = 1, 2
 _CONTRACTION = 0.6
@@ -268,6 +269,9 @@ def _advance(w, i, small, widest):
         return
     if w[LOAD + i] >= 1.0:
         w[DONE + i] = FOUND
+        w[KEPT + i] = w[MARGIN + i]
+        w[KEPT + LANES + i] = w[PLANE + i] * w[PLANE + 3 * LANES + i]
+        w[KEPT + LANES + i] -= w[PLANE + LANES + i] * w[PLANE + 2 * LANES + i]
         return
     _put(w, PAST, i, _three(w, HELD, i))
     w[PAST_LOAD + i] = w[HELD_LOAD + i]
@@ -388,10 +392,9 @@ def solve(gamma, gravity, tip, guesses, coarse, fine, limits, most, out):
         for turn in range(most[1]):
             _walk_tip(w, fine_rest, fine[2], tip)
             walks += 1
-            if _chord_all(w, turn) < tiny * tiny or turn == most[1] - 1:
+            if _chord_all(w, turn, tiny * tiny) == 0 or turn == most[1] - 1:
                 break
-            for i in range(LANES):
-                _move(w, i, _three(w, SHIFT, i))
+            _move_all(w)
         _store(w, work, first, count, tiny, walks, out)
 
 
@@ -416,20 +419,33 @@ def _advance_all(w, small, widest):
 
 
 @inline
-def _chord_all(w, turn):
-    """Chord steps for all lanes, kept in SHIFT; the largest squared size of one that matters."""
-    largest = 0.0
+def _chord_all(w, turn, least):
+    """Chord steps for all lanes, kept in SHIFT; how many are still longer than the least one.
+
+    A lane that has arrived stays where it is, so that it does not depend on its neighbors.
+    """
+    waiting = 0
     for i in range(LANES):
+        if turn > 0 and w[LAST + i] <= least:
+            continue
         if turn > 0:
             _broyden(w, i)
         step = _chord(w, i)
-        size = dot(step, step)
-        if w[DONE + i] == FOUND:
-            largest = max(largest, size)
-        w[LAST + i] = size
+        w[LAST + i] = dot(step, step)
+        if w[LAST + i] <= least:
+            step = (0.0, 0.0, 0.0)
+        waiting += w[DONE + i] == FOUND and w[LAST + i] > least
         _put(w, BEFORE, i, _three(w, X, i))
         _put(w, SHIFT, i, step)
-    return largest
+    return waiting
+
+
+@inline
+def _move_all(w):
+    for i in range(LANES):
+        s = _three(w, SHIFT, i)
+        if dot(s, s) > 0.0:
+            _move(w, i, s)
 
 
 @inline
@@ -440,13 +456,12 @@ def _store(w, work, first, count, tiny, walks, out):
         for j in range(3):
             out[n, j] = r[j]
             out[n, 3 + j] = g[j]
-        out[n, 6] = w[MARGIN + i]
+        out[n, 6] = w[KEPT + i]
         out[n, 7] = w[DONE + i]
         if w[DONE + i] == FOUND and w[LAST + i] > tiny * tiny:
             out[n, 7] = 0.0
         out[n, 8] = walks
-        out[n, 9] = w[PLANE + i] * w[PLANE + 3 * LANES + i]
-        out[n, 9] -= w[PLANE + LANES + i] * w[PLANE + 2 * LANES + i]
+        out[n, 9] = w[KEPT + LANES + i]
 
 
 @kernel

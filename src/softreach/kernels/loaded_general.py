@@ -551,7 +551,6 @@ def solve(gamma, axes, jumps, guesses, tables, limits, most, found, slopes, comp
     rest = np.zeros((tables[1].shape[0], (STEP_ROWS + TURN_ROWS) * LANES))
     bundles = gamma.shape[1] if slopes.shape[0] > 0 else 0
     units = 3 if compliance.shape[0] > 0 else 0
-    asked = bundles + units > 0 or trace.shape[0] > 0
     rotations = np.zeros((3, 15 * LANES))
     columns = np.zeros((3 + bundles + units, 15 * LANES))
     for first in range(0, gamma.shape[0], LANES):
@@ -563,19 +562,13 @@ def solve(gamma, axes, jumps, guesses, tables, limits, most, found, slopes, comp
         walks, waiting = 0, LANES
         while True:
             last = waiting == 0 or walks >= most
-            if last and not asked:
-                break
             current = columns if last else rotations
             _walk(w, current, lanes, rest, tables, jumps, bundles, 3 + bundles, trace[first:])
             _steps(w)
             if last:
                 break
             walks, waiting = walks + 1, _advance_all(w, small, widest)
-        if asked:
-            _respond(w, columns, axes, first, count, slopes, compliance)
-        else:
-            for n in range(3):
-                _copy(columns[n], 0, rotations[n], 0, 15 * LANES)
+        _respond(w, columns, axes, first, count, slopes, compliance)
         _store(w, work, columns, first, count, walks, found)
 
 

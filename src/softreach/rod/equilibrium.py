@@ -333,7 +333,9 @@ class Solver:
         lost = (known.status == TipStatus.NO_EQUILIBRIUM) | (found[:, 10] != _FOUND)
         z = self.tables.arm.profile.station(edges)
         rows = np.abs(z[None] - stations[:, None]).argmin(axis=1)
-        return _shapes(found[:, :3], trace[:, rows], self._force_at(table, rows), lost, self.tables)
+        return _shapes(
+            found[:, :3], trace[:, rows], self._force_at(table, rows), stations, lost, self.tables
+        )
 
     def _force_at(self, table: StepTables, rows: NDArray[np.intp]) -> Array:
         """Dead force at boundaries along the world's axes, as the step beyond has it, (row, 3)."""
@@ -352,22 +354,36 @@ def _columns(gamma: Array) -> Array:
 
 
 def _shapes(
-    tips: Array, trace: Array, force: Array, lost: NDArray[np.bool_], tables: LoadTables
+    tips: Array,
+    trace: Array,
+    force: Array,
+    stations: Array,
+    lost: NDArray[np.bool_],
+    tables: LoadTables,
 ) -> Shapes:
     """Shapes from what the kernel keeps of sections: axes, moment and tip as each sees them."""
-    g, h = trace[..., 0:3], trace[..., 3:6]
-    seen = np.stack([g, h, np.cross(g, h)], axis=-2)  # axes of the world, in the frame of the walk
+    seen = _orthonormal(trace[..., 0:3], trace[..., 3:6])
     turn = _matrix(trace[..., 12:16])
     world = seen @ turn  # axes of the world in the directors
     directors = np.swapaxes(world, -1, -2) @ tables.axes
     back = np.einsum("nsac,nsc->nsa", seen, trace[..., 9:12]) @ tables.axes
     position = tips[:, None] - back
+    position[:, stations == 0.0] = 0.0
+    directors[:, stations == 0.0] = np.eye(3)
     moment = np.einsum("nsc,nscd->nsd", trace[..., 6:9], turn)
     follower = np.einsum("nsc,nscd->nsd", trace[..., 16:19], turn)
     thrust = np.einsum("sa,nsad->nsd", force, world) + follower
     for values in (position, directors, moment, thrust):
         values[lost] = np.nan
     return Shapes(Frames(position, directors), moment, thrust)
+
+
+def _orthonormal(g: Array, h: Array) -> Array:
+    """Axes of the world in the frame of the walk, without the errors of the steps."""
+    g = g / np.linalg.norm(g, axis=-1, keepdims=True)
+    h = h - (g * h).sum(axis=-1, keepdims=True) * g
+    h /= np.linalg.norm(h, axis=-1, keepdims=True)
+    return np.stack([g, h, np.cross(g, h)], axis=-2)
 
 
 def _matrix(q: Array) -> Array:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +22,16 @@ Array = NDArray[np.float64]
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 
 
-class Body(NamedTuple):
-    """How an arm yields and what it weighs, as functions of stations Z [m]."""
+class Body(Protocol):
+    """How an arm yields and what it weighs, at stations Z [m]."""
 
-    compliance: Callable[[Array], tuple[Array, Array, Array]]
-    """1/K0 [1/N], 1/K1 and 1/K3 [1/(N m²)]."""
-    mass_per_length: Callable[[Array], Array]
-    """[kg/m], before activation."""
+    def compliance(self, z: Array) -> tuple[Array, Array, Array]:
+        """1/K0 [1/N], 1/K1 and 1/K3 [1/(N m²)]."""
+        ...
+
+    def mass_per_length(self, z: Array) -> Array:
+        """[kg/m], before activation."""
+        ...
 
 
 class StepTables(NamedTuple):

@@ -152,7 +152,10 @@ class LoadedRod(TipMap):
         return self._solver_of(self._shape_steps).shapes(gamma, z).frames
 
     def strains_at(self, stations: ArrayLike) -> Callable[[ArrayLike], Strains]:
-        """u = û + K⁻¹m and ζ = ζ̂ (1 + n3/K0) at stations Z [m] as a function of activations."""
+        """(û + K⁻¹m) ζ̂/ζ and ζ = ζ̂ (1 + n3/K0) at stations Z [m] as a function of activations.
+
+        Curvature is per length as it is, stretched by loads too, so that dᵢ' = ζ u × dᵢ.
+        """
         z = self.check_stations(stations, ascending=False)
         table, (axial, bending, torsion) = tables(self.arm, z), self.body.compliance(z)
         ascending, back = np.unique(z, return_inverse=True)
@@ -162,11 +165,9 @@ class LoadedRod(TipMap):
             rest = linear_strains(table, gamma)
             shape = self._solver_of(self._shape_steps).shapes(gamma, ascending)
             yielded = np.stack([bending, bending, torsion], axis=1)
-            thrust = shape.force[:, back, 2]
-            return Strains(
-                rest.curvature + shape.moment[:, back] * yielded,
-                rest.extension * (1.0 + thrust * axial),
-            )
+            stretch = 1.0 + shape.force[:, back, 2] * axial
+            u = rest.curvature + shape.moment[:, back] * yielded
+            return Strains(u / stretch[..., None], rest.extension * stretch)
 
         return strains
 
