@@ -1,0 +1,44 @@
+"""What arms are made of, for tests of loaded rods."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from softreach.arm import Manipulator
+
+
+@dataclass(frozen=True)
+class Rubber:
+    """One material throughout."""
+
+    arm: Manipulator
+    young: float = 1e6
+    density: float = 1000.0
+
+    def compliance(self, z):
+        stiffness = self.arm.section.stiffness(self.arm.profile.radius(z))
+        return tuple(1.0 / (self.young * k) for k in stiffness)
+
+    def mass_per_length(self, z):
+        return self.density * np.pi * self.arm.profile.radius(z) ** 2
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """The same everywhere."""
+
+    yields: tuple[float, float, float]
+    mass: float
+
+    def compliance(self, z):
+        return tuple(np.full(np.shape(z), c) for c in self.yields)
+
+    def mass_per_length(self, z):
+        return np.full(np.shape(z), self.mass)
+
+
+def uniform(bending, axial=np.inf, torsion=None, mass=0.0):
+    """The body of an untapered rod from its stiffnesses."""
+    return Uniform((1.0 / axial, 1.0 / bending, 1.0 / (torsion or bending)), mass)
