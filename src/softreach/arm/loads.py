@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from softreach.errors import Fault, InvalidDesign
+from softreach.arm.variable import Variable
+from softreach.errors import Fault, InvalidDesign, Range
+
+if TYPE_CHECKING:
+    from softreach.arm.section import Section
 
 __all__ = ["Loads", "PointLoad"]
 
@@ -43,6 +47,19 @@ class Loads:
         InvalidDesign: A field is not what it must be.
     """
 
+    variables: ClassVar[tuple[Variable, ...]] = (
+        Variable("payload", "mp", "mass at the tip", Range(0.0, unit="kg")),
+    )
+    series: ClassVar[tuple[Variable, ...]] = (
+        Variable("gravity", "g", "acceleration of what falls", Range(unit="m/s²")),
+        Variable("payload_arm", "a", "lever arm of the payload", Range(unit="m")),
+        Variable("tip_force", "F", "force on the tip", Range(unit="N")),
+        Variable("tip_moment", "M", "moment on the tip", Range(unit="N m")),
+        Variable("follower_force", "F'", "force that follows the tip", Range(unit="N")),
+        Variable("follower_moment", "M'", "moment that follows the tip", Range(unit="N m")),
+        Variable("force_per_length", "f", "force per length", Range(unit="N/m")),
+    )
+
     gravity: Triple = (0.0, 0.0, -9.81)
     """Acceleration of what falls [m/s²]; the base tangent is +z, so that an arm whose base points
     up has -z here."""
@@ -71,6 +88,22 @@ class Loads:
         ):
             raise InvalidDesign([Fault("point_loads", points, "must be PointLoads")])
         object.__setattr__(self, "point_loads", tuple(points))
+
+    def replace(self, **changes: Any) -> Self:
+        """A copy with some fields changed, checked like a new one."""
+        return replace(self, **changes)
+
+    def section_faults(self, section: Section, length: float) -> list[Fault]:
+        """What keeps them from acting on an arm: moduli, densities, places off the arm."""
+        faults = section.modulus_faults("where loads act")
+        if any(self.gravity):
+            faults += section.density_faults("where weight counts")
+        allowed = f"must be on the arm, at most {length:g} m"
+        return faults + [
+            Fault(f"loads.point_loads[{k}].station", one.station, allowed)
+            for k, one in enumerate(self.point_loads)
+            if one.station > length
+        ]
 
     @property
     def conservative(self) -> bool:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.tables import tables
+from softreach.arm.tables import compliance, tables
 from softreach.kernels import magnus, rest_frames, rod
 from softreach.kernels.explicit_rk8 import NODES
 
-__all__ = ["Body", "LoadTables", "StepTables"]
+__all__ = ["ArmBody", "Body", "LoadTables", "StepTables"]
 
 Array = NDArray[np.float64]
 
@@ -32,6 +32,23 @@ class Body(Protocol):
     def mass_per_length(self, z: Array) -> Array:
         """[kg/m], before activation."""
         ...
+
+
+@dataclass(frozen=True)
+class ArmBody:
+    """The body of an arm; it weighs nothing where nothing falls."""
+
+    arm: Manipulator
+
+    def compliance(self, z: Array) -> tuple[Array, Array, Array]:
+        """1/K0 [1/N], 1/K1 and 1/K3 [1/(N m²)]."""
+        return compliance(self.arm, z)
+
+    def mass_per_length(self, z: Array) -> Array:
+        """[kg/m], before activation."""
+        if self.arm.loads is None or not any(self.arm.loads.gravity):
+            return np.zeros(np.shape(z))
+        return self.arm.section.mass_per_length(self.arm.profile.radius(z))
 
 
 class StepTables(NamedTuple):
@@ -115,7 +132,7 @@ class LoadTables:
         No step is longer in S than those of `steps` uniform ones.
         """
         profile = self.arm.profile
-        breaks = [*(profile.breakpoints or ()), *(one.station for one in self.loads.point_loads)]
+        breaks = [*self.arm.breakpoints, *(one.station for one in self.loads.point_loads)]
         z = np.unique(np.concatenate([[0.0, self.arm.length], breaks, stations]))
         s = profile.slender_coordinate(z)
         gaps = np.diff(s)

@@ -18,7 +18,7 @@ from softreach.errors import InvalidInput
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.equilibrium import Equilibria, Solver
 from softreach.rod.linear_strains import linear_strains
-from softreach.rod.load_tables import Body, LoadTables
+from softreach.rod.load_tables import ArmBody, Body, LoadTables
 from softreach.rod.pilot import pilot_activations
 from softreach.rod.steps import check_tol
 from softreach.rod.tip_map import (
@@ -29,6 +29,7 @@ from softreach.rod.tip_map import (
     TipMap,
     TipStatus,
     position_slopes,
+    tip_map,
 )
 
 __all__ = ["LoadedRod"]
@@ -55,9 +56,7 @@ class LoadedRod(TipMap):
     supports_unstable: ClassVar[bool] = True
 
     arm: Manipulator
-    tol: float
-    loads: Loads
-    body: Body
+    tol: float = 1e-6
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "tol", check_tol(self.tol))
@@ -74,7 +73,17 @@ class LoadedRod(TipMap):
 
     def refined(self, tol: float) -> TipMap:
         """The map of the same arm to a smaller tolerance; itself if its own is no larger."""
-        return self if self.tol <= tol else LoadedRod(self.arm, tol, self.loads, self.body)
+        return self if self.tol <= tol else tip_map(self.arm, tol)
+
+    @property
+    def loads(self) -> Loads:
+        """What acts on the arm beside its actuators."""
+        return self.arm.loads or Loads(gravity=(0.0, 0.0, 0.0))
+
+    @property
+    def body(self) -> Body:
+        """How the arm yields and what it weighs."""
+        return ArmBody(self.arm)
 
     @cached_property
     def tables(self) -> LoadTables:
