@@ -6,23 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from softreach.arm import Manipulator
+from softreach.arm import Loads, Manipulator
 
 
-@dataclass(frozen=True)
-class Rubber:
-    """One material throughout."""
-
-    arm: Manipulator
-    young: float = 1e6
-    density: float = 1000.0
-
-    def compliance(self, z):
-        stiffness = self.arm.section.stiffness(self.arm.profile.radius(z))
-        return tuple(1.0 / (self.young * k) for k in stiffness)
-
-    def mass_per_length(self, z):
-        return self.density * np.pi * self.arm.profile.radius(z) ** 2
+def rubber(arm: Manipulator, loads: Loads, young: float = 1e6, density: float = 1000.0):
+    """The arm of one heavy elastic material throughout, under loads."""
+    ring = arm.section.rings[0]
+    material = ring.material.replace(young_modulus=young, density=density)
+    section = arm.section.replace(rings=(ring.replace(material=material),))
+    return arm.replace(section=section, loads=loads)
 
 
 @dataclass(frozen=True)

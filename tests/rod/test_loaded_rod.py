@@ -19,7 +19,7 @@ from softreach.rod.free import FreeRod
 from softreach.rod.load_tables import LoadTables
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.tip_map import TipStatus
-from tests.bodies import Rubber, uniform
+from tests.bodies import rubber, uniform
 from tests.oracles import column, elastica, loaded_rod, rod, sorosim
 
 TRUNK = designs.minimal_trunk()
@@ -52,7 +52,7 @@ of_kinds = pytest.mark.parametrize("loads", KINDS.values(), ids=KINDS.keys())
 
 
 def loaded(loads, tol=1e-9, arm=TRUNK, **material):
-    return LoadedRod(arm, tol, loads, Rubber(arm, **material))
+    return LoadedRod(rubber(arm, loads, **material), tol)
 
 
 def straight(body, loads, length=1.0, steps=32):

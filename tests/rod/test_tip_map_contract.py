@@ -21,7 +21,7 @@ from softreach.errors import InvalidDesign, InvalidInput
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.tip_map import BLOCK, TipMap, TipStatus, tip_map
-from tests.bodies import Rubber
+from tests.bodies import rubber
 from tests.laws import arms, in_box, integrated_tip
 
 Make = Callable[[Manipulator, float], TipMap]
@@ -29,7 +29,7 @@ Make = Callable[[Manipulator, float], TipMap]
 
 def sideways(arm: Manipulator, tol: float) -> LoadedRod:
     """An arm that stands out from a wall and carries 100 g."""
-    return LoadedRod(arm, tol, Loads(gravity=(9.81, 0.0, 0.0), payload=0.1), Rubber(arm))
+    return LoadedRod(rubber(arm, Loads(gravity=(9.81, 0.0, 0.0), payload=0.1)), tol)
 
 
 MAKERS: dict[str, Make] = {"free": FreeRod, "loaded": sideways}

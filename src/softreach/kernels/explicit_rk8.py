@@ -1,7 +1,7 @@
 """The explicit Runge-Kutta method of order eight by Cooper and Verner, a maker of step functions.
 
-Eleven stages, all on the five Lobatto nodes of a step, so that whatever depends on the place alone
-is tabulated at four new places a step.
+[CooperVerner1972]: eleven stages, all on the five Lobatto nodes of a step, so that whatever depends
+on the place alone is tabulated at four new places a step.
 """
 
 from __future__ import annotations

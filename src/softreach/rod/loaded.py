@@ -90,8 +90,13 @@ class LoadedRod(TipMap):
         """What the kernels read."""
         return LoadTables(self.arm, self.loads, self.body)
 
-    @cached_property
+    @property
     def steps(self) -> int:
+        """The number of steps that `tol` needs; see `_fewest_steps` for the rule."""
+        return self._fewest_steps
+
+    @cached_property
+    def _fewest_steps(self) -> int:
         """The number of steps that `tol` needs.
 
         The rule: the pilot of the free rod is solved with n and with 2n steps; n is the smallest
@@ -139,6 +144,11 @@ class LoadedRod(TipMap):
     def fill_tips(self, gamma: Array, out: Array) -> None:
         """Put the tips [m] of checked activations into `out`, (n, 3), on the calling thread."""
         out[:] = self._solver.find(gamma).tips
+
+    def fill_tips_and_status(self, gamma: Array, out: Array, status: NDArray[np.int8]) -> None:
+        """Put tips [m] (n, 3) and their `TipStatus` (n,) into place, on the calling thread."""
+        found = self._solver.find(gamma)
+        out[:], status[:] = found.tips, found.status
 
     def fill_slopes(self, gamma: Array, tips: Array, slopes: Array) -> None:
         """Put tips (n, 3) and ∂r/∂γ (n, 3, bundles) [m] into place."""

@@ -200,6 +200,11 @@ class TipMap(ABC):
         """The work of filling `out` with the tips of `gamma`, to be run on any thread."""
         return partial(self.fill_tips, gamma, out)
 
+    def fill_tips_and_status(self, gamma: Array, out: Array, status: NDArray[np.int8]) -> None:
+        """Put tips [m] (n, 3) and their `TipStatus` (n,) into place, on the calling thread."""
+        self.fill_tips(gamma, out)
+        status[:] = TipStatus.STABLE
+
     def tips_and_slopes(self, activations: ArrayLike) -> tuple[Array, Array]:
         """Tips [m], shape (n, 3), and their derivatives ∂r/∂γ [m], shape (n, 3, bundles)."""
         gamma = self.box.check(activations)
