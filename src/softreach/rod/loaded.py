@@ -123,6 +123,11 @@ class LoadedRod(TipMap):
     def _solver_of(self, steps: int) -> Solver:
         return Solver(self.tables, steps, self.tol)
 
+    @property
+    def solver(self) -> Solver:
+        """What finds equilibria with the steps that `tol` needs."""
+        return self._solver
+
     @cached_property
     def _solver(self) -> Solver:
         return self._solver_of(self.steps).with_starts(self.box)
