@@ -16,6 +16,7 @@ from . import workspace as workspace
 from .arm import Chamber as Chamber
 from .arm import FiberArchitecture as FiberArchitecture
 from .arm import LinearTaper as LinearTaper
+from .arm import Loads as Loads
 from .arm import Manipulator as Manipulator
 from .arm import Material as Material
 from .arm import Ring as Ring

@@ -52,8 +52,9 @@ def compute_cloud(
             shown on a terminal when the cloud is large.
 
     Returns:
-        Dataset with `tip` (sample, axis) [m] and `activation` (sample, bundle) [-]; its attributes
-        hold the design, seed, sampler, tol and versions.
+        Dataset with `tip` (sample, axis) [m] and `activation` (sample, bundle) [its unit]; its
+        attributes hold the design, seed, sampler, tol and versions. For an arm under loads also
+        `status` (sample), a `TipStatus`; a tip without equilibrium is NaN.
 
     Raises:
         InvalidInput: An argument out of range; the message says what to use instead.
@@ -62,11 +63,13 @@ def compute_cloud(
     bundles = rod.box.bundles
     check_sampler(sampler, n, bundles, seed)
     activation, tip = np.empty((n, bundles)), np.empty((n, 3))
+    status = np.empty(n if rod.supports_unstable else 0, np.int8)
     with _shown(progress, n) as shown:
-        _fill(rod, activation, tip, sampler, seed, shown)
-    return schema.cloud_dataset(
+        _fill(rod, activation, tip, status, sampler, seed, shown)
+    cloud = schema.cloud_dataset(
         rod.arm, activation, tip, seed=int(seed), sampler=sampler, tol=rod.tol
     )
+    return schema.with_status(cloud, status) if rod.supports_unstable else cloud
 
 
 def save_cloud(cloud: xr.Dataset, path: str | PathLike[str]) -> None:
@@ -112,7 +115,13 @@ _LONG = 5_000_000  # samples from which a bar is worth showing
 
 
 def _fill(
-    rod: TipMap, activation: Array, tip: Array, sampler: str, seed: int, progress: Progress
+    rod: TipMap,
+    activation: Array,
+    tip: Array,
+    status: NDArray[np.int8],
+    sampler: str,
+    seed: int,
+    progress: Progress,
 ) -> None:
     """Draw activations block by block and let the threads turn them into tips meanwhile."""
 
@@ -122,6 +131,9 @@ def _fill(
             block = slice(first, first := first + len(cube))
             rod.box.from_cube(cube, out=activation[block])
             task = rod.tip_task(activation[block], tip[block])
+            if len(status):
+                asked = activation[block], tip[block], status[block]
+                task = partial(rod.fill_tips_and_status, *asked)
             yield partial(_reported, task, progress, len(cube))
 
     parallel.run(tasks())

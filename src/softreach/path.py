@@ -14,6 +14,7 @@ from softreach.inverse.continuation import BranchEnd, BranchPoint, Continuation
 from softreach.inverse.request import checked_activations, checked_residual, checked_targets
 from softreach.rod.free_bundles import free_bundles
 from softreach.rod.measured_bundles import bundle_measures, measured_bundles
+from softreach.rod.settled import check_settled
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 
@@ -60,7 +61,7 @@ def track_path(
         InvalidInput: Arguments of another shape or not finite, or fewer than three free bundles.
     """
     points = checked_targets("path", path)
-    rod = measured_bundles(tip_map(arm, tol))
+    rod = measured_bundles(check_settled(tip_map(arm, tol)))
     if rod.box.dimension < 3:
         raise InvalidInput("free bundles", rod.box.dimension, "3 or more to follow a path in space")
     if not len(points):

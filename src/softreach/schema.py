@@ -30,6 +30,7 @@ __all__ = [
     "provenance",
     "storable",
     "tip_cells",
+    "with_status",
 ]
 
 AXES = ("x", "y", "z")
@@ -64,6 +65,15 @@ def cloud_dataset(
     cloud = xr.Dataset(variables, {"axis": list(AXES), **bundle_coordinates(arm)}, attrs)
     cloud.tip.attrs["length"] = arm.length
     return cloud
+
+
+_STATUS = "0=stable 1=unstable 2=no_equilibrium"
+
+
+def with_status(cloud: xr.Dataset, status: NDArray[np.int8]) -> xr.Dataset:
+    """The cloud, with whether each tip is a stable equilibrium."""
+    about = {"units": "1", "long_name": "status of the tip", "meanings": _STATUS}
+    return cloud.assign(status=("sample", status, about))
 
 
 def configuration_dataset(

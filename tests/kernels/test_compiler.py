@@ -88,7 +88,8 @@ def kind(function: Dispatcher) -> str:
     if not options["fastmath"]:
         return "strict"
     assert options["fastmath"] == FAST
-    return "inline" if options.get("forceinline") else "kernel"
+    pasted = options.get("inline") == "always"
+    return "inline" if pasted or options.get("forceinline") else "kernel"
 
 
 def callees(function: Dispatcher) -> Iterator[Dispatcher]:

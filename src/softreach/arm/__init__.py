@@ -14,6 +14,7 @@ from softreach.arm.actuators import (
 )
 from softreach.arm.actuators.ring_integrals import RingIntegrals
 from softreach.arm.along import AlongArm, Pieces, Samples
+from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import Material
 from softreach.arm.materials import material_names, named_material
@@ -30,12 +31,14 @@ __all__ = [
     "FiberArchitecture",
     "Layer",
     "LinearTaper",
+    "Loads",
     "Manipulator",
     "Material",
     "ObliqueMuscle",
     "Outline",
     "Pieces",
     "PiecewiseTaper",
+    "PointLoad",
     "Profile",
     "RadialMuscle",
     "Resultants",

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm import file
 from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
 from softreach.arm.checks import bounds_faults, name_faults, tube_faults
+from softreach.arm.loads import Loads
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.section import Ring, Section
@@ -45,6 +46,8 @@ class Manipulator:
     """The core and the ring of actuators, in proportion to R2(Z)."""
     actuators: tuple[Actuator, ...]
     """What drives the arm; activations follow their order, bundle by bundle."""
+    loads: Loads | None = None
+    """What acts on the arm beside them; None for nothing, not even its weight."""
 
     def __post_init__(self) -> None:
         if faults := list(_part_faults(self)):
@@ -160,7 +163,12 @@ class Manipulator:
         """
         parts = file.parse(text, source)
         try:
-            arm = cls(profile=parts.profile, section=parts.section, actuators=parts.actuators)
+            arm = cls(
+                profile=parts.profile,
+                section=parts.section,
+                actuators=parts.actuators,
+                loads=parts.loads,
+            )
             return arm if parts.bounds is None else arm.with_bounds(parts.bounds)
         except InvalidDesign as error:
             raise file.in_file_terms(error, source) from None
@@ -171,7 +179,7 @@ class Manipulator:
         Raises:
             InvalidDesign: A profile or an actuator of one's own that no table can describe.
         """
-        return file.render(self.profile, self.section, self.actuators)
+        return file.render(self.profile, self.section, self.actuators, self.loads)
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Self:
@@ -285,6 +293,8 @@ def _part_faults(arm: Manipulator) -> Iterator[Fault]:
         yield Fault("profile", arm.profile, "must be a Profile, such as LinearTaper")
     if not isinstance(arm.section, Section):
         yield Fault("section", arm.section, "must be a Section")
+    if not isinstance(arm.loads, Loads | None):
+        yield Fault("loads", arm.loads, "must be Loads or None")
     yield from _actuator_faults(arm.actuators)
 
 
@@ -298,7 +308,9 @@ def _actuator_faults(actuators: Any) -> Iterator[Fault]:
 
 
 def _fit_faults(arm: Manipulator) -> Iterator[Fault]:
-    """What keeps actuators from driving this profile and section."""
+    """What keeps actuators and loads from acting on this profile and section."""
+    if arm.loads is not None:
+        yield from arm.loads.section_faults(arm.section, arm.length)
     for actuator in arm.actuators:
         faults = actuator.section_faults(arm.profile, arm.section)
         yield from (

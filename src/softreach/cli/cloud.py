@@ -32,7 +32,7 @@ def cloud(
     from time import perf_counter
 
     from softreach.cloud import compute_cloud, save_cloud
-    from softreach.rod.free import FreeRod
+    from softreach.rod.tip_map import tip_map
 
     arm = design_from(design, revolution_deg, taper_deg)
     start = perf_counter()
@@ -43,7 +43,7 @@ def cloud(
         "samples": (n, ""),
         "sampler": (sampler, ""),
         "seed": (seed, ""),
-        "steps per arm": (FreeRod(arm, tol).steps, ""),
+        "steps per arm": (tip_map(arm, tol).steps, ""),
         "time to compute": (round(seconds, 3), "s"),
         "highest tip": (float(dataset.tip[:, 2].max()) / arm.length, "L"),
         "lowest tip": (float(dataset.tip[:, 2].min()) / arm.length, "L"),

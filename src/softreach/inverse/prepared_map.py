@@ -17,6 +17,7 @@ from softreach.kernels.activation_mesh import ActivationMesh
 from softreach.kernels.space_tree import SpaceTree
 from softreach.rod.free_bundles import free_bundles
 from softreach.rod.measured_bundles import bundle_measures, measured_bundles
+from softreach.rod.settled import check_settled
 from softreach.rod.tip_map import TipMap, tip_map
 
 __all__ = ["PreparedMap", "prepared_map"]
@@ -98,7 +99,7 @@ def prepared_map(
     """
     if isinstance(arm, PreparedMap):
         return arm
-    return _of_map(measured_bundles(tip_map(arm, tol)), cells, depth)
+    return _of_map(measured_bundles(check_settled(tip_map(arm, tol))), cells, depth)
 
 
 @lru_cache(maxsize=4)

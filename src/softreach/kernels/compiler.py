@@ -17,7 +17,7 @@ from numba.core import event
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
 
-__all__ = ["FAST", "inline", "kernel", "strict"]
+__all__ = ["FAST", "inline", "kernel", "pasted", "strict"]
 
 _LOG = logging.getLogger(__name__)
 
@@ -38,6 +38,11 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 def inline(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a small function into its callers; a call left in a loop stops vectorization."""
     return njit(forceinline=True, nogil=True, fastmath=FAST, error_model="numpy")(function)
+
+
+def pasted(function: Callable[..., Any]) -> Callable[..., Any]:
+    """As `inline`, but before compilation: a large function is then not compiled by itself too."""
+    return njit(inline="always", nogil=True, fastmath=FAST, error_model="numpy")(function)
 
 
 def strict(function: Callable[..., Any]) -> Callable[..., Any]:

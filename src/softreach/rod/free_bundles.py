@@ -55,6 +55,10 @@ class FreeBundles(TipMap):
         """Put the tips [m] of checked activations into `out`, (n, 3), on the calling thread."""
         self.whole.fill_tips(self._all(gamma), out)
 
+    def fill_tips_and_status(self, gamma: Array, out: Array, status: NDArray[np.int8]) -> None:
+        """Put tips [m] (n, 3) and their `TipStatus` (n,) into place, on the calling thread."""
+        self.whole.fill_tips_and_status(self._all(gamma), out, status)
+
     def fill_slopes(self, gamma: Array, tips: Array, slopes: Array) -> None:
         """Put tips (n, 3) and ∂r/∂γ (n, 3, bundles) [m] into place."""
         of_all = np.empty((len(gamma), 3, self.whole.box.bundles))

@@ -83,6 +83,10 @@ class MeasuredBundles(TipMap):
         """Put the tips [m] of checked activations into `out`, (n, 3), on the calling thread."""
         self.whole.fill_tips(gamma * self.measures, out)
 
+    def fill_tips_and_status(self, gamma: Array, out: Array, status: NDArray[np.int8]) -> None:
+        """Put tips [m] (n, 3) and their `TipStatus` (n,) into place, on the calling thread."""
+        self.whole.fill_tips_and_status(gamma * self.measures, out, status)
+
     def fill_slopes(self, gamma: Array, tips: Array, slopes: Array) -> None:
         """Put tips (n, 3) and ∂r/∂γ (n, 3, bundles) [m] into place."""
         self.whole.fill_slopes(gamma * self.measures, tips, slopes)

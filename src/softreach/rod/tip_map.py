@@ -180,6 +180,11 @@ class TipMap(ABC):
     def radius(self, stations: ArrayLike) -> Array:
         """Outer radius R2 before activation at stations Z [m]."""
 
+    @property
+    def steps(self) -> int:
+        """Steps that an integrator makes along the arm; 0 for a map that has none of its own."""
+        return 0
+
     def strains(self, activations: ArrayLike, stations: ArrayLike) -> Strains:
         """Curvature and extension at ascending stations Z [m]."""
         return self.strains_at(stations)(activations)
@@ -194,6 +199,11 @@ class TipMap(ABC):
     def tip_task(self, gamma: Array, out: Array) -> Callable[[], object]:
         """The work of filling `out` with the tips of `gamma`, to be run on any thread."""
         return partial(self.fill_tips, gamma, out)
+
+    def fill_tips_and_status(self, gamma: Array, out: Array, status: NDArray[np.int8]) -> None:
+        """Put tips [m] (n, 3) and their `TipStatus` (n,) into place, on the calling thread."""
+        self.fill_tips(gamma, out)
+        status[:] = TipStatus.STABLE
 
     def tips_and_slopes(self, activations: ArrayLike) -> tuple[Array, Array]:
         """Tips [m], shape (n, 3), and their derivatives ∂r/∂γ [m], shape (n, 3, bundles)."""
@@ -271,6 +281,10 @@ def tip_map(arm: Manipulator | TipMap, tol: float = 1e-6) -> TipMap:
 
 @lru_cache(maxsize=64)
 def _of_arm(arm: Manipulator, tol: float) -> TipMap:
+    if arm.loads is not None:
+        from softreach.rod.loaded import LoadedRod
+
+        return LoadedRod(arm, tol)
     from softreach.rod.free import FreeRod
 
     return FreeRod(arm, tol)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.errors import InvalidInput
 from softreach.kernels.contour import stretches
 from softreach.rod.tip_map import TipMap
 
@@ -23,7 +24,11 @@ def grid_tips(rod: TipMap, cells: int) -> Array:
         Shape ((cells + 1)^m, 3), the last free bundle varying fastest.
     """
     ticks = [np.linspace(0.0, 1.0, cells + 1)] * rod.box.dimension
-    return rod.tips(rod.box.from_free_cube(_product(ticks)))
+    tips = rod.tips(rod.box.from_free_cube(_product(ticks)))
+    if rod.supports_unstable and not np.isfinite(tips).all():
+        lost = f"{int(np.isnan(tips[:, 0]).sum())} of {len(tips)} activations have no equilibrium"
+        raise InvalidInput("loads", lost, "such that every activation has one", "lighten the load")
+    return tips
 
 
 def grid_stretches(rod: TipMap, tips: Array, cells: int) -> Array:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from softreach import parallel
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
+from softreach.rod.settled import check_settled
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.sampling import sample_cube
 from softreach.schema import provenance
@@ -64,7 +65,7 @@ def direction_spread(
     """
     if cell is not None and not 0 < cell < np.inf:
         raise InvalidInput("cell", cell, "a length > 0 [m]")
-    rod = tip_map(arm, tol)
+    rod = check_settled(tip_map(arm, tol))
     tips, directions = _tips_and_directions(rod, sample_cube("sobol", n, rod.box.bundles, seed))
     if cell is None:
         cell = float(np.cbrt(np.prod(np.ptp(tips, axis=0).clip(1e-3 * rod.length)) * _PER_CELL / n))

@@ -13,6 +13,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput, SoftreachWarning
 from softreach.memory import free_memory
 from softreach.progress import Progress, silent
+from softreach.rod.settled import check_settled
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.workspace import measure
 from softreach.workspace.box_grid import every_second, grid_stretches, grid_tips
@@ -82,7 +83,7 @@ def reachable_set(
     """
     if not 1e-6 <= accuracy <= 0.2:
         raise InvalidInput("accuracy", accuracy, "1e-6 to 0.2")
-    rod = tip_map(arm, tol)
+    rod = check_settled(tip_map(arm, tol))
     m = rod.box.dimension
     if m < 3:
         return thin_set(rod)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from softreach.arm.actuators import Actuator
 from softreach.arm.file.degrees import Written
+from softreach.arm.loads import Loads
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.errors import Fault, InvalidDesign
@@ -26,6 +27,7 @@ class Parts(NamedTuple):
     actuators: tuple[Actuator, ...]
     bounds: Any = None
     """Activation bounds for all bundles together; None where the actuators hold their own."""
+    loads: Loads | None = None
 
 
 def text_of(path: str | PathLike[str]) -> str:

@@ -25,6 +25,7 @@ from softreach.arm.file.body_tables import (
     SectionTable,
 )
 from softreach.arm.file.layout import Layout
+from softreach.arm.file.load_table import LoadTable
 from softreach.arm.file.table import Table
 
 __all__ = ["json_schema"]
@@ -49,6 +50,7 @@ class _Design(Layout):
         list[FiberTable | ObliqueTable | RadialTable | TendonTable | ChamberTable | OwnTable],
         Field(min_length=1),
     ]
+    loads: LoadTable | None = None  # pyright: ignore
 
 
 class _WithoutNull(GenerateJsonSchema):

@@ -11,6 +11,7 @@ from pydantic import Field
 from softreach.arm.file.actuator_tables import ACTUATORS
 from softreach.arm.file.along import AlongTable
 from softreach.arm.file.body_tables import PROFILES, InlineMaterial, RingTable, SectionTable
+from softreach.arm.file.load_table import LoadTable, PointLoadTable
 from softreach.arm.file.table import Table
 
 __all__ = ["Layout", "unknown_key"]
@@ -33,6 +34,7 @@ class Layout(Table):
     actuators: Annotated[list[_TableOf], Field(min_length=1)] = Field(
         description="What drives the arm, in the order of the activations"
     )
+    loads: _TableOf | None = Field(default=None, description="What acts on the arm beside them")
 
 
 def unknown_key(table: type[Table], location: list[Any]) -> str:
@@ -44,7 +46,11 @@ def unknown_key(table: type[Table], location: list[Any]) -> str:
     """
     key = str(location[-1])
     if len(location) > 1:
-        inside: dict[Any, type[Table]] = {"material": InlineMaterial, "core": InlineMaterial}
+        inside: dict[Any, type[Table]] = {
+            "material": InlineMaterial,
+            "core": InlineMaterial,
+            "point_loads": PointLoadTable,
+        }
         table = inside.get(location[0], AlongTable)
     elif table is Layout and (place := _place(key)):
         return f"unknown key; {place}"
@@ -65,6 +71,7 @@ def _place(key: str) -> str:
         "[section]": SectionTable,
         "[[rings]]": RingTable,
         "[materials.NAME]": InlineMaterial,
+        "[loads]": LoadTable,
     }
     found = (home for home, table in homes.items() if key in table.keys().values())
     home = next(found, "")

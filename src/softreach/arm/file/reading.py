@@ -19,10 +19,12 @@ from softreach.arm.file.body_tables import (
 )
 from softreach.arm.file.document import Parts, document_of
 from softreach.arm.file.layout import Layout
+from softreach.arm.file.load_table import LoadTable
 from softreach.arm.file.own_kind import made_own_kind, own_kinds
 from softreach.arm.file.table_reader import TableReader
 from softreach.arm.file.toml_text import key_text
 from softreach.arm.file.version_1 import ROOT_KEYS, parts_of_version_1
+from softreach.arm.loads import Loads
 from softreach.arm.material import Material
 from softreach.arm.materials import material_names, named_material
 from softreach.arm.profile import Profile
@@ -78,12 +80,15 @@ class _DesignReader(TableReader):
         rings = [self._ring(k, raw) for k, raw in self._tables("rings")]
         section = self._section(rings)
         actuators = [(k, self._actuator(k, raw)) for k, raw in self._tables("actuators")]
+        loads = self._loads()
         self._check_names()
         if profile is None or section is None:
             return None
         made = [(k, one) for k, one in actuators if one is not None]
         self._check_fit(profile, section, made)
-        return Parts(profile, section, tuple(one for _, one in made))
+        if loads is not None:
+            self.faults += self._of_section(loads.section_faults(section, profile.length))
+        return Parts(profile, section, tuple(one for _, one in made), loads=loads)
 
     def _table(self, key: str) -> dict[str, Any] | None:
         """A table at the top; None if there is none, or something else."""
@@ -105,6 +110,10 @@ class _DesignReader(TableReader):
             self.faults.append(Fault("profile.kind", kind, f"must be one of {', '.join(PROFILES)}"))
             return None
         return self.read(PROFILES[kind], raw, "profile", lambda table: table.made())
+
+    def _loads(self) -> Loads | None:
+        raw = self._table("loads")
+        return None if raw is None else self.read(LoadTable, raw, "loads", lambda one: one.made())
 
     def _own_materials(self) -> Iterator[tuple[str, Material | None]]:
         for name, raw in (self._table("materials") or {}).items():
@@ -171,6 +180,8 @@ class _DesignReader(TableReader):
     def _place(self, path: str) -> str:
         """Where the file has a field of the section, of a ring or of a material of one."""
         owner, _, field = path.rpartition(".")
+        if path.startswith("loads."):
+            return path
         if not path.startswith(("rings", "core")):
             return f"section.{path}"
         key = MaterialTable.keys().get(field)

@@ -15,9 +15,11 @@ from softreach.arm.file.body_tables import (
     RingTable,
 )
 from softreach.arm.file.degrees import degrees_text
+from softreach.arm.file.load_table import LoadTable, PointLoadTable
 from softreach.arm.file.own_kind import own_kind_lines
 from softreach.arm.file.table import Table
 from softreach.arm.file.toml_text import inline_table, key_text, value_text
+from softreach.arm.loads import Loads
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.sampled_profiles import PiecewiseTaper, SampledTaper
@@ -28,7 +30,7 @@ __all__ = ["render"]
 
 _PROFILE_KINDS = {LinearTaper: "linear", PiecewiseTaper: "piecewise", SampledTaper: "sampled"}
 
-_ALWAYS = {"activation_bounds", "offset", "taper"}
+_ALWAYS = {"activation_bounds", "gravity", "offset", "taper"}
 """What is written even where it is the default, for people to change."""
 
 _ORDER = (
@@ -52,7 +54,9 @@ _ORDER = (
 """Of an actuator: what distinguishes it first, what all share last."""
 
 
-def render(profile: Profile, section: Section, actuators: Sequence[Actuator]) -> str:
+def render(
+    profile: Profile, section: Section, actuators: Sequence[Actuator], loads: Loads | None = None
+) -> str:
     """TOML text of a design, of version 2.
 
     Raises:
@@ -70,6 +74,12 @@ def render(profile: Profile, section: Section, actuators: Sequence[Actuator]) ->
         kind = kind_of(actuator)
         lines = own_kind_lines(actuator) if kind is None else _actuator_lines(kind, actuator)
         blocks.append(["[[actuators]]", *lines])
+    if loads is not None:
+        blocks.append(["[loads]", *_lines(LoadTable, {**vars(loads), "point_loads": None})])
+        blocks += [
+            ["[[loads.point_loads]]", *_lines(PointLoadTable, vars(one))]
+            for one in loads.point_loads
+        ]
     return "\n\n".join("\n".join(block) for block in blocks) + "\n"
 
 
@@ -134,8 +144,13 @@ def _pairs(table: type[Table], values: Mapping[str, Any]) -> Iterator[tuple[str,
     order = {field: place for place, field in enumerate(_ORDER)}
     for field, key in sorted(keys.items(), key=lambda one: order.get(one[0], 0)):
         value, default = values.get(field), table.model_fields[field].default
-        if value is not None and (field in _ALWAYS or repr(value) != repr(default)):
+        if value is not None and (field in _ALWAYS or not _is_default(value, default)):
             yield key, _text(key, value)
+
+
+def _is_default(value: Any, default: Any) -> bool:
+    plain = list(value) if isinstance(value, tuple) else value
+    return repr(plain) == repr(default)
 
 
 def _text(key: str, value: Any) -> str:

@@ -13,7 +13,7 @@ from softreach.arm.variable import Variable
 
 __all__ = ["WHOLE", "Series", "actuator_key", "part_of", "parts", "prefix_of", "series_of"]
 
-WHOLE = {"profile": "", "section": ""}
+WHOLE = {"profile": "", "section": "", "loads": "loads."}
 """Fields of an arm that are parts, and what the names of their variables begin with."""
 
 _STATION = Variable("stations_over_length", "Z/L", "place of a value", INSIDE_RANGE)

@@ -1,0 +1,219 @@
+"""Tables of a loaded rod: what its kernels read at the nodes of every step, from tip to base."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.loads import Loads
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.tables import compliance, tables
+from softreach.kernels import magnus, rest_frames, rod
+from softreach.kernels.explicit_rk8 import NODES
+
+__all__ = ["ArmBody", "Body", "LoadTables", "StepTables"]
+
+Array = NDArray[np.float64]
+
+_GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+
+
+class Body(Protocol):
+    """How an arm yields and what it weighs, at stations Z [m]."""
+
+    def compliance(self, z: Array) -> tuple[Array, Array, Array]:
+        """1/K0 [1/N], 1/K1 and 1/K3 [1/(N m²)]."""
+        ...
+
+    def mass_per_length(self, z: Array) -> Array:
+        """[kg/m], before activation."""
+        ...
+
+
+@dataclass(frozen=True)
+class ArmBody:
+    """The body of an arm; it weighs nothing where nothing falls."""
+
+    arm: Manipulator
+
+    def compliance(self, z: Array) -> tuple[Array, Array, Array]:
+        """1/K0 [1/N], 1/K1 and 1/K3 [1/(N m²)]."""
+        return compliance(self.arm, z)
+
+    def mass_per_length(self, z: Array) -> Array:
+        """[kg/m], before activation."""
+        if self.arm.loads is None or not any(self.arm.loads.gravity):
+            return np.zeros(np.shape(z))
+        return self.arm.section.mass_per_length(self.arm.profile.radius(z))
+
+
+class StepTables(NamedTuple):
+    """Steps from tip to base."""
+
+    pieces: Array
+    """Packed Magnus nodes of the pieces between the nodes of steps, (4 step, 12, bundle + 1)."""
+    lengths: Array
+    """ζ̂ dZ at the nodes, (step, 5, bundle + 1)."""
+    scalars: Array
+    """1/K1, 1/K3 - 1/K1, 1/K0 and the dead force along the world's axes, (step, 5, 6)."""
+    bends: Array
+    """U at the nodes, (step, 5, 3, bundle)."""
+    jumps: Array
+    """What acts at the tip end of a step, (step, 18)."""
+
+    @property
+    def for_one_direction(self) -> tuple[Array, Array, Array]:
+        """What the kernel of loads along one direction reads."""
+        return self.pieces, self.lengths, np.ascontiguousarray(self.scalars[..., :4])
+
+
+@dataclass(frozen=True, eq=False)
+class LoadTables:
+    """Tables of one arm under given loads, for any number of steps."""
+
+    arm: Manipulator
+    loads: Loads
+    body: Body
+
+    @cached_property
+    def axes(self) -> Array:
+        """Orthonormal directions of the world in the base frame, as rows, the first of gravity.
+
+        Without gravity that of the largest dead force, so that a tip force alone needs no more than
+        one direction.
+        """
+        forces = [self._at_tip, *(np.array(one.force) for one in self.loads.point_loads)]
+        forces = [np.array(self.loads.gravity), np.array(self.loads.force_per_length), *forces]
+        first = next((f for f in forces if np.any(f)), np.array([0.0, 0.0, -1.0]))
+        first = first / np.linalg.norm(first)
+        other = np.eye(3)[np.argmin(np.abs(first))]
+        second = np.cross(first, other)
+        second = second / np.linalg.norm(second)
+        return np.array([first, second, np.cross(first, second)], float)
+
+    @cached_property
+    def one_direction(self) -> bool:
+        """Whether all forces are dead and along the first axis, so that two unknowns are enough."""
+        loads = self.loads
+        dead = [self._at_tip, loads.gravity, loads.force_per_length]
+        dead += [one.force for one in loads.point_loads]
+        across = np.array(dead) @ self.axes[1:].T
+        size = np.abs(np.array(dead)).max(axis=1, keepdims=True)
+        moments = [loads.tip_moment, loads.follower_force]
+        moments += [one.moment for one in loads.point_loads]
+        return bool((np.abs(across) <= 1e-14 * size).all()) and not np.any(moments)
+
+    @cached_property
+    def at_tip(self) -> Array:
+        """Lever of the payload times its weight along the first axis, then the moment, (6,)."""
+        lever = np.array(self.loads.payload_arm) * float(self._weight @ self.axes[0])
+        return np.concatenate([lever, self.loads.follower_moment])
+
+    @property
+    def _weight(self) -> Array:
+        """Of the payload [N]."""
+        return self.loads.payload * np.array(self.loads.gravity)
+
+    @property
+    def _at_tip(self) -> Array:
+        return self._weight + np.array(self.loads.tip_force)
+
+    def uniform(self, steps: int) -> StepTables:
+        """At least `steps` steps, with boundaries where the arm or its loads are not smooth."""
+        return self.between(np.array([]), steps)
+
+    def edges(self, stations: Array, steps: int) -> Array:
+        """Boundaries S of steps from tip to base, among them stations Z [m] and all breaks.
+
+        No step is longer in S than those of `steps` uniform ones.
+        """
+        profile = self.arm.profile
+        breaks = [*self.arm.breakpoints, *(one.station for one in self.loads.point_loads)]
+        z = np.unique(np.concatenate([[0.0, self.arm.length], breaks, stations]))
+        s = profile.slender_coordinate(z)
+        gaps = np.diff(s)
+        counts = np.maximum(1, np.ceil(gaps / (profile.slender_length / steps) * (1 - 1e-12)))
+        inner = [
+            start + gap * np.arange(count) / count
+            for start, gap, count in zip(s[:-1], gaps, counts, strict=True)
+        ]
+        return np.concatenate([*inner, s[-1:]])[::-1]
+
+    def between(self, stations: Array, steps: int) -> StepTables:
+        """Tables with a boundary at every station Z [m] too."""
+        return self.of_edges(self.edges(stations, steps))
+
+    def of_edges(self, edges: Array) -> StepTables:
+        """Tables of steps between boundaries S, tip first."""
+        profile, bundles = self.arm.profile, self.arm.bundles
+        width, fractions = -np.diff(edges), np.array(NODES)
+        s = edges[:-1, None] - width[:, None] * fractions
+        z = profile.station(s)
+        z[:, 0], z[:, -1] = profile.station(edges[:-1]), profile.station(edges[1:])
+        inward = _inward(z)
+        at = tables(self.arm, inward.ravel())
+        radius = profile.radius(inward)
+        measure = width[:, None] * radius
+        axial, bending, torsion = (c.reshape(z.shape) for c in self.body.compliance(inward.ravel()))
+        force = self._forces(z) @ self.axes.T
+        scalars = np.concatenate(
+            [np.stack([bending, torsion - bending, axial], axis=-1), force], axis=-1
+        )
+        return StepTables(
+            self._pieces(s, width),
+            rest_frames.pack_lengths(measure, at.extension.reshape(*z.shape, bundles)),
+            np.ascontiguousarray(scalars),
+            np.ascontiguousarray(at.curvature.reshape(*z.shape, 3, bundles)),
+            self._jumps(profile.station(edges[:-1])),
+        )
+
+    def _pieces(self, s: Array, width: Array) -> Array:
+        """Packed Magnus nodes between the nodes of steps."""
+        profile, bundles = self.arm.profile, self.arm.bundles
+        wide = (width[:, None] * np.diff(np.array(NODES))).ravel()
+        gauss = s[:, 1:].ravel()[:, None] + wide[:, None] * np.array(magnus.NODES)
+        z = profile.station(gauss)
+        at = tables(self.arm, z.ravel())
+        return rod.pack(
+            wide[:, None] * profile.radius(z),
+            at.extension.reshape(*z.shape, bundles),
+            at.curvature.reshape(*z.shape, 3, bundles),
+        )
+
+    def _forces(self, z: Array) -> Array:
+        """Dead force n [N] at the nodes of steps, (step, 5, 3)."""
+        loads, length = self.loads, self.arm.length
+        order = z.ravel()
+        ahead = np.concatenate([[length], order[:-1]])
+        half = 0.5 * (ahead - order)
+        at = order[:, None] + half[:, None] * (1.0 + _GAUSS)
+        mass = self.body.mass_per_length(at.ravel()).reshape(at.shape)
+        beyond = np.cumsum(half * (mass @ _WEIGHTS)).reshape(z.shape)
+        force = self._at_tip + beyond[..., None] * np.array(loads.gravity)
+        force = force + (length - z)[..., None] * np.array(loads.force_per_length)
+        for one in loads.point_loads:
+            force[z[:, 0] <= one.station * (1 + 1e-12)] += one.force
+        return force
+
+    def _jumps(self, z: Array) -> Array:
+        """Moments, and forces that follow, at the tip end of every step."""
+        loads, jumps = self.loads, np.zeros((len(z), 18))
+        jumps[0, :9] = np.outer(loads.payload_arm, self.axes @ self._weight).ravel()
+        jumps[0, 9:12] = self.axes @ np.array(loads.tip_moment)
+        jumps[0, 12:15], jumps[0, 15:18] = loads.follower_force, loads.follower_moment
+        for one in loads.point_loads:
+            jumps[np.argmin(np.abs(z - one.station)), 9:12] += self.axes @ np.array(one.moment)
+        return jumps
+
+
+def _inward(z: Array) -> Array:
+    """Nodes a hair inside their steps, so that what jumps at a boundary is taken from within."""
+    hair = 1e-9 * (z[:, :1] - z[:, -1:])
+    inward = z.copy()
+    inward[:, :1] -= hair
+    inward[:, -1:] += hair
+    return inward

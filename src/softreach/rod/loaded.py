@@ -1,0 +1,240 @@
+"""The loaded rod: an arm under gravity, payload and forces, and whether its rest is stable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach import parallel
+from softreach.arm.loads import Loads
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.tables import check_extension, tables
+from softreach.errors import InvalidInput
+from softreach.rod.activation_box import ActivationBox
+from softreach.rod.equilibrium import Equilibria, Solver
+from softreach.rod.linear_strains import linear_strains
+from softreach.rod.load_tables import ArmBody, Body, LoadTables
+from softreach.rod.pilot import pilot_activations
+from softreach.rod.steps import check_tol
+from softreach.rod.tip_map import (
+    BLOCK,
+    Frames,
+    StrainRange,
+    Strains,
+    TipMap,
+    TipStatus,
+    position_slopes,
+    tip_map,
+)
+
+__all__ = ["LoadedRod"]
+
+Array = NDArray[np.float64]
+
+_SAFETY = 2.0
+_FEWEST_STEPS, _MOST_STEPS = 4, 256
+# A sample this near to the loss of stability magnifies every error, and does not choose the steps.
+_CRITICAL = 0.02
+
+
+@dataclass(frozen=True, repr=False)
+class LoadedRod(TipMap):
+    """r' = ζ d3, dᵢ' = ζ̂ u × dᵢ with u = û + K⁻¹m, ζ = ζ̂ (1 + n3/K0), shot from the tip.
+
+    The equilibrium is the one that an arm comes to which is activated first and loaded slowly then.
+
+    Raises:
+        InvalidInput: `tol` out of range.
+        InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
+    """
+
+    supports_unstable: ClassVar[bool] = True
+
+    arm: Manipulator
+    tol: float = 1e-6
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tol", check_tol(self.tol))
+        check_extension(self.arm)
+
+    @property
+    def box(self) -> ActivationBox:
+        """The activations within bounds."""
+        return self._box
+
+    @cached_property
+    def _box(self) -> ActivationBox:
+        return ActivationBox.between(self.arm.bounds, self.arm.bundle_names)
+
+    def refined(self, tol: float) -> TipMap:
+        """The map of the same arm to a smaller tolerance; itself if its own is no larger."""
+        return self if self.tol <= tol else tip_map(self.arm, tol)
+
+    @property
+    def loads(self) -> Loads:
+        """What acts on the arm beside its actuators."""
+        return self.arm.loads or Loads(gravity=(0.0, 0.0, 0.0))
+
+    @property
+    def body(self) -> Body:
+        """How the arm yields and what it weighs."""
+        return ArmBody(self.arm)
+
+    @cached_property
+    def tables(self) -> LoadTables:
+        """What the kernels read."""
+        return LoadTables(self.arm, self.loads, self.body)
+
+    @property
+    def steps(self) -> int:
+        """The number of steps that `tol` needs; see `_fewest_steps` for the rule."""
+        return self._fewest_steps
+
+    @cached_property
+    def _fewest_steps(self) -> int:
+        """The number of steps that `tol` needs.
+
+        The rule: the pilot of the free rod is solved with n and with 2n steps; n is the smallest
+        number whose largest difference of a tip, doubled for safety, is within `tol`. Activations
+        for which the arm is about to lose its stability are left out.
+        """
+        return self._fewest(_FEWEST_STEPS, _tip_differences)
+
+    @cached_property
+    def _shape_steps(self) -> int:
+        """Steps with which `tol` holds all along the arm."""
+        return self._fewest(self.steps, _shape_differences)
+
+    def _fewest(self, steps: int, differences: Callable[[Solver, Array], Array]) -> int:
+        allowed = self.tol * self.length / _SAFETY
+        gamma = pilot_activations(self.arm, self.box)
+        while steps <= _MOST_STEPS:
+            error = float(differences(self._solver_of(steps), gamma).max(initial=0.0))
+            if error <= allowed:
+                return steps
+            steps = max(steps + 1, int(0.97 * steps * (error / allowed) ** (1 / 8)))
+        raise InvalidInput("tol", self.tol, f"reachable within {_MOST_STEPS} steps", "enlarge it")
+
+    def _solver_of(self, steps: int) -> Solver:
+        return Solver(self.tables, steps, self.tol)
+
+    @property
+    def solver(self) -> Solver:
+        """What finds equilibria with the steps that `tol` needs."""
+        return self._solver
+
+    @cached_property
+    def _solver(self) -> Solver:
+        return self._solver_of(self.steps).with_starts(self.box)
+
+    def equilibria(self, activations: ArrayLike) -> Equilibria:
+        """Tips with their status, the margin of stability, and how each was found."""
+        gamma = self.box.check(activations)
+        found = self._solver.empty(len(gamma))
+        parallel.run(
+            self._solver.task(gamma[b], found.of(b))
+            for b in parallel.blocks(len(gamma), BLOCK // 8)
+        )
+        return found
+
+    def status(self, activations: ArrayLike) -> NDArray[np.int8]:
+        """`TipStatus` of each activation, shape (n,)."""
+        return self.equilibria(activations).status
+
+    def fill_tips(self, gamma: Array, out: Array) -> None:
+        """Put the tips [m] of checked activations into `out`, (n, 3), on the calling thread."""
+        out[:] = self._solver.find(gamma).tips
+
+    def fill_tips_and_status(self, gamma: Array, out: Array, status: NDArray[np.int8]) -> None:
+        """Put tips [m] (n, 3) and their `TipStatus` (n,) into place, on the calling thread."""
+        found = self._solver.find(gamma)
+        out[:], status[:] = found.tips, found.status
+
+    def fill_slopes(self, gamma: Array, tips: Array, slopes: Array) -> None:
+        """Put tips (n, 3) and ∂r/∂γ (n, 3, bundles) [m] into place."""
+        response = self._solver.respond(gamma)
+        tips[:] = response.tips
+        position_slopes(tips, response.twists, slopes)
+
+    def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:
+        """Tips [m] and the spatial twist of the tip frame per unit of each activation."""
+        response = self._solver.respond(self.box.check(activations))
+        return response.tips, response.twists
+
+    def compliance(self, activations: ArrayLike) -> Array:
+        """∂r/∂F [m/N]: how a tip yields to a small dead force on it, shape (n, 3, 3)."""
+        return self._solver.respond(self.box.check(activations), compliance=True).compliance
+
+    def frames(self, activations: ArrayLike, stations: ArrayLike) -> Frames:
+        """Centerline and directors at ascending stations Z [m]."""
+        gamma, z = self.box.check(activations), self.check_stations(stations)
+        return self._solver_of(self._shape_steps).shapes(gamma, z).frames
+
+    def strains_at(self, stations: ArrayLike) -> Callable[[ArrayLike], Strains]:
+        """(û + K⁻¹m) ζ̂/ζ and ζ = ζ̂ (1 + n3/K0) at stations Z [m] as a function of activations.
+
+        Curvature is per length as it is, stretched by loads too, so that dᵢ' = ζ u × dᵢ.
+        """
+        z = self.check_stations(stations, ascending=False)
+        table, (axial, bending, torsion) = tables(self.arm, z), self.body.compliance(z)
+        ascending, back = np.unique(z, return_inverse=True)
+
+        def strains(activations: ArrayLike) -> Strains:
+            gamma = self.box.check(activations)
+            rest = linear_strains(table, gamma)
+            shape = self._solver_of(self._shape_steps).shapes(gamma, ascending)
+            yielded = np.stack([bending, bending, torsion], axis=1)
+            stretch = 1.0 + shape.force[:, back, 2] * axial
+            u = rest.curvature + shape.moment[:, back] * yielded
+            return Strains(u / stretch[..., None], rest.extension * stretch)
+
+        return strains
+
+    def strain_range(self, stations: ArrayLike) -> StrainRange:
+        """Ranges of the strains at stations Z [m] over the pilot of the activation box."""
+        gamma = pilot_activations(self.arm, self.box)
+        found = self.strains(gamma, self.check_stations(stations))
+        bend = np.hypot(found.curvature[..., 0], found.curvature[..., 1])
+        return StrainRange(
+            np.stack([np.zeros(bend.shape[1]), np.nanmax(bend, axis=0)], axis=1),
+            _range(found.curvature[..., 2]),
+            _range(found.extension),
+        )
+
+    def radius(self, stations: ArrayLike) -> Array:
+        """Outer radius R2 before activation at stations Z [m]."""
+        return self.arm.profile.radius(stations)
+
+
+def _range(values: Array) -> Array:
+    return np.stack([np.nanmin(values, axis=0), np.nanmax(values, axis=0)], axis=1)
+
+
+def _both(solver: Solver, gamma: Array) -> tuple[Solver, Array]:
+    """A solver of twice the steps, and which activations judge the steps."""
+    found = solver.find(gamma)
+    settled = (found.status != TipStatus.NO_EQUILIBRIUM) & (np.abs(found.margin) > _CRITICAL)
+    return solver.halved(), gamma[settled]
+
+
+def _tip_differences(solver: Solver, gamma: Array) -> Array:
+    fine, gamma = _both(solver, gamma)
+    coarse = solver.find(gamma)
+    return _distances(coarse.tips, fine.near(gamma, coarse).tips)
+
+
+def _shape_differences(solver: Solver, gamma: Array) -> Array:
+    fine, gamma = _both(solver, gamma)
+    stations = np.linspace(0.0, solver.tables.arm.length, 9)
+    apart = solver.shapes(gamma, stations), fine.shapes(gamma, stations)
+    return _distances(apart[0].frames.position, apart[1].frames.position)
+
+
+def _distances(a: Array, b: Array) -> Array:
+    apart = np.linalg.norm(a - b, axis=-1)
+    return apart[np.isfinite(apart)]

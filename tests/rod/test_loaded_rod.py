@@ -1,0 +1,348 @@
+"""Laws of loaded rods: closed forms, symmetries, and a solver written in another way."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from softreach.arm import designs
+from softreach.arm.loads import Loads, PointLoad
+from softreach.arm.tables import tables
+from softreach.errors import InvalidDesign, InvalidInput
+from softreach.kernels import loaded_reference
+from softreach.rod.all_equilibria import all_equilibria
+from softreach.rod.equilibrium import Rung, Solver
+from softreach.rod.free import FreeRod
+from softreach.rod.load_tables import LoadTables
+from softreach.rod.loaded import LoadedRod
+from softreach.rod.tip_map import TipStatus
+from tests.bodies import rubber, uniform
+from tests.oracles import column, elastica, loaded_rod, rod, sorosim
+
+TRUNK = designs.minimal_trunk()
+# The base frame stands upright; seen from it, gravity pulls back (up), aside, or ahead (down).
+UP, SIDE, DOWN = (0.0, 0.0, -9.81), (9.81, 0.0, 0.0), (0.0, 0.0, 9.81)
+GAMMA = np.array([[-1.2, -0.3, -0.8], [-0.2, -1.5, 0.0], [-1.6, -1.6, -1.6], [0.0, 0.0, -0.4]])
+
+KINDS = {
+    "gravity": Loads(gravity=SIDE),
+    "payload with a lever": Loads(gravity=SIDE, payload=0.5, payload_arm=(0.05, 0.02, 0.1)),
+    "moment that follows": Loads(gravity=(3.0, 1.0, -9.0), follower_moment=(0.3, 0.2, -0.5)),
+    "tip force": Loads(gravity=SIDE, tip_force=(0.0, 3.0, -2.0)),
+    "tip moment": Loads(gravity=SIDE, tip_moment=(0.2, 0.3, -0.4)),
+    "force that follows": Loads(
+        gravity=SIDE, follower_force=(1.0, 2.0, -2.0), follower_moment=(0.1, 0.2, 0.1)
+    ),
+    "along the arm": Loads(
+        gravity=SIDE,
+        point_loads=(
+            PointLoad(station=0.5, force=(0.0, 2.0, 1.0), moment=(0.1, 0.2, -0.3)),
+            PointLoad(station=0.8, force=(1.0, 0.0, 0.0)),
+        ),
+        force_per_length=(0.0, 2.0, 0.0),
+    ),
+    "a lever in a field of two forces": Loads(
+        gravity=SIDE, payload=0.5, payload_arm=(0.05, 0.02, 0.1), tip_force=(0.0, 1.0, 0.0)
+    ),
+}
+of_kinds = pytest.mark.parametrize("loads", KINDS.values(), ids=KINDS.keys())
+
+
+def loaded(loads, tol=1e-9, arm=TRUNK, **material):
+    return LoadedRod(rubber(arm, loads, **material), tol)
+
+
+def straight(body, loads, length=1.0, steps=32):
+    """The solver of a straight passive rod."""
+    arm = designs.minimal_trunk(taper=0.0, length=length)
+    return Solver(LoadTables(arm, loads, body), steps, 1e-10)
+
+
+def oracle(arm, body, gamma, loads):
+    """The same rod and loads for the shooting from the base."""
+
+    def at(function):
+        return lambda z: float(function(np.array([z]))[0])
+
+    def table(z):
+        return tables(arm, [z])
+
+    return rod.Rod(
+        length=arm.length,
+        axial=at(lambda z: 1 / body.compliance(z)[0]),
+        bending=at(lambda z: 1 / body.compliance(z)[1]),
+        torsion=at(lambda z: 1 / body.compliance(z)[2]),
+        mass=at(body.mass_per_length),
+        stretch=lambda z: 1.0 + float(table(z).extension[0] @ gamma),
+        curvature=lambda z: table(z).curvature[0] @ gamma,
+    ), rod.Loads(
+        gravity=loads.gravity,
+        payload=loads.payload,
+        lever=loads.payload_arm,
+        tip_force=loads.tip_force,
+        tip_moment=loads.tip_moment,
+        following_force=loads.follower_force,
+        following_moment=loads.follower_moment,
+        points=tuple(
+            rod.PointLoad(place=one.station, force=one.force, moment=one.moment)
+            for one in loads.point_loads
+        ),
+        force_per_length=lambda z: loads.force_per_length,
+    )
+
+
+def differences(f, gamma, step):
+    """Fourth-order central differences of f along every column of gamma, on a last axis."""
+    columns = []
+    for e in step * np.eye(gamma.shape[1]):
+        near, far = (f(gamma + k * e) - f(gamma - k * e) for k in (1, 2))
+        columns.append((8 * near - far) / (12 * step))
+    return np.stack(columns, axis=-1)
+
+
+@of_kinds
+@pytest.mark.slow
+def test_a_shooting_from_the_base_finds_the_same_rod(loads):
+    found = loaded(loads)
+    stations = np.array([0.0, 0.3, 0.5, 0.9, 1.0])
+    gamma = GAMMA[:2]
+    shapes = Solver(found.tables, found.steps, 1e-9).shapes(gamma, stations)
+    tips = found.tips(gamma)
+    for k, one in enumerate(gamma):
+        expected = loaded_rod.equilibrium(
+            *oracle(TRUNK, found.body, one, loads), stations, rtol=1e-10
+        )
+        moment = np.einsum("sd,sdc->sc", shapes.moment[k], shapes.frames.directors[k])
+        np.testing.assert_allclose(tips[k], expected.tip, atol=1e-9)
+        np.testing.assert_allclose(shapes.frames.position[k], expected.place, atol=2e-9)
+        np.testing.assert_allclose(shapes.frames.directors[k], expected.frame, atol=1e-8)
+        np.testing.assert_allclose(moment, expected.moment, atol=5e-8)
+
+
+@pytest.mark.parametrize("load", [1.0, 10.0])
+def test_a_tip_force_bends_an_elastica(load):
+    found = straight(uniform(1.0), Loads(gravity=(0, 0, 0), tip_force=(load, 0, 0)))
+    tip = found.find(np.zeros((1, 3))).tips[0]
+    np.testing.assert_allclose(tip[[0, 2]], elastica.tip_loaded(load), atol=1e-9)
+
+
+@pytest.mark.parametrize("load", [1.0, 4.0, 10.0, 50.0])
+def test_a_heavy_cantilever_drops_as_published(load):
+    found = straight(uniform(1.0, mass=1.0), Loads(gravity=(0, load, 0)), steps=48)
+    tip = found.find(np.zeros((1, 3))).tips[0]
+    np.testing.assert_allclose(tip[[1, 2]], elastica.heavy(load), atol=1e-9)
+
+
+def test_a_column_is_stable_up_to_its_own_greatest_height():
+    greatest = column.greenhill()
+    for share, status in ((0.999, TipStatus.STABLE), (1.001, TipStatus.UNSTABLE)):
+        found = straight(uniform(1.0, mass=1.0), Loads(gravity=(0, 0, -share * greatest)))
+        of_column = found.find(np.zeros((1, 3)))
+        assert of_column.status[0] == status
+        np.testing.assert_allclose(of_column.tips[0], [0, 0, 1], atol=1e-12)
+
+
+def test_a_hanging_rod_stretches_by_the_weight_beyond_each_section():
+    loads = Loads(gravity=(0, 0, 10.0), payload=0.4)
+    found = straight(uniform(1.0, axial=40.0, mass=1.5), loads)
+    tip = found.find(np.zeros((1, 3))).tips[0]
+    np.testing.assert_allclose(tip, [0, 0, 1 + (7.5 + 4.0) / 40.0], atol=1e-12)
+
+
+def test_a_tip_moment_winds_an_arc_and_a_following_one_the_same():
+    for loads in (Loads(tip_moment=(0, 2.0, 0)), Loads(follower_moment=(0, 2.0, 0))):
+        found = straight(uniform(1.0), loads)
+        tip = found.find(np.zeros((1, 3))).tips[0]
+        np.testing.assert_allclose(tip, [(1 - math.cos(2)) / 2, 0, math.sin(2) / 2], atol=1e-11)
+
+
+@pytest.mark.slow
+def test_steel_rods_lie_where_another_program_puts_them():
+    """Every 25th of the 500, whose places are rounded to 0.1 mm."""
+    steel, arm = sorosim.steel_rod(), designs.minimal_trunk(taper=0.0, length=sorosim.LENGTH)
+    base = np.array(steel.base)
+    body = uniform(steel.bending(0), steel.axial(0), steel.torsion(0), steel.mass(0))
+    stations = np.unique(sorosim.STATIONS)
+    for case in sorosim.cases()[::25]:
+        point = case.loads.points[0]
+        loads = Loads(
+            gravity=base @ case.loads.gravity,
+            tip_force=base @ case.loads.tip_force,
+            tip_moment=base @ case.loads.tip_moment,
+            point_loads=(
+                PointLoad(
+                    station=point.place, force=base @ point.force, moment=base @ point.moment
+                ),
+            ),
+        )
+        found = Solver(LoadTables(arm, loads, body), 16, 1e-8).shapes(np.zeros((1, 3)), stations)
+        places = np.delete(case.place, 7, axis=0)
+        apart = np.linalg.norm(found.frames.position[0] @ base - places, axis=1)
+        assert apart.max() < 0.7e-3
+
+
+def test_stiff_arms_approach_the_free_one_as_one_over_their_stiffness():
+    free = FreeRod(TRUNK, 1e-12).tips(GAMMA)
+    apart = [
+        np.linalg.norm(loaded(Loads(gravity=SIDE), 1e-12, young=young).tips(GAMMA) - free, axis=1)
+        for young in (1e9, 1e10)
+    ]
+    np.testing.assert_allclose(apart[0] / apart[1], 10.0, rtol=0.02)
+
+
+@pytest.mark.parametrize("load", [0.1, 2.5, 8.0])
+@pytest.mark.parametrize("gravity", [UP, SIDE, DOWN], ids=["up", "side", "down"])
+def test_the_tolerance_is_kept_over_the_box(gravity, load):
+    young = 1000 * 9.81 / (load * TRUNK.profile.outer_radius**2)
+    found = loaded(Loads(gravity=gravity), 1e-6, young=young)
+    exact = Solver(found.tables, 4 * found.steps, 1e-10)
+    corners = np.array(list(itertools.product((-5 / 3, 0.0), repeat=3)))
+    inside = np.random.default_rng(0).uniform(-5 / 3, 0, (300, 3))
+    gamma = np.concatenate([corners, inside])
+    of_rule = found.equilibria(gamma)
+    settled = (of_rule.status != TipStatus.NO_EQUILIBRIUM) & (np.abs(of_rule.margin) > 0.02)
+    assert settled.mean() > 0.98
+    apart = of_rule.tips[settled] - exact.near(gamma[settled], of_rule.of(settled)).tips
+    assert np.linalg.norm(apart, axis=1).max() <= 1e-6
+
+
+@of_kinds
+def test_slopes_and_turns_are_the_differences_of_tips_and_frames(loads):
+    found = loaded(loads, 1e-10)
+    motions = found.tip_motions(GAMMA)
+    np.testing.assert_allclose(motions.tips, found.tips(GAMMA), atol=1e-11)
+    np.testing.assert_allclose(motions.slopes, differences(found.tips, GAMMA, 1e-3), atol=2e-8)
+
+    def directors(gamma):
+        return found.frames(gamma, [1.0]).directors[:, 0]
+
+    turned = differences(directors, GAMMA, 1e-3)
+    expected = np.cross(motions.rotations[:, None], directors(GAMMA)[..., None], axis=2)
+    np.testing.assert_allclose(turned, expected, atol=1e-7)
+
+
+def test_compliance_is_the_difference_of_tips_by_a_force_and_symmetric():
+    force = 1e-2
+    compliance = loaded(Loads(gravity=SIDE)).compliance(GAMMA)
+    for axis, e in enumerate(force * np.eye(3)):
+        there, back = (
+            loaded(Loads(gravity=SIDE, tip_force=tuple(sign * e))).tips(GAMMA) for sign in (1, -1)
+        )
+        measured = (there - back) / (2 * force)
+        np.testing.assert_allclose(measured, compliance[:, :, axis], atol=1e-6)
+    np.testing.assert_allclose(compliance, np.swapaxes(compliance, 1, 2), atol=1e-8)
+
+
+def test_gravity_in_the_plane_of_symmetry_mirrors_mirrored_activations():
+    found = loaded(Loads(gravity=(0.0, 6.0, -3.0)))
+    mirrored = found.tips(GAMMA[:, [1, 0, 2]]) * [-1, 1, 1]
+    np.testing.assert_allclose(mirrored, found.tips(GAMMA), atol=1e-9)
+
+
+def test_strains_are_how_frames_change_along_the_arm():
+    found = loaded(Loads(gravity=SIDE, payload=0.3), 1e-10)
+    middle, step = np.array([0.3, 0.7]), 1e-3
+    frames = found.frames(GAMMA, (middle[:, None] + step * np.arange(-2, 3)).ravel())
+    r = frames.position.reshape(len(GAMMA), 2, 5, 3)
+    d = frames.directors.reshape(len(GAMMA), 2, 5, 3, 3)
+    weights = np.array([1, -8, 0, 8, -1]) / (12 * step)
+    dr, dd = np.einsum("nsoc,o->nsc", r, weights), np.einsum("nsoic,o->nsic", d, weights)
+    strains = found.strains(GAMMA, middle)
+    np.testing.assert_allclose(dr, strains.extension[..., None] * d[:, :, 2, 2], atol=1e-7)
+    u = np.einsum("nsi,nsic->nsc", strains.curvature, d[:, :, 2])
+    expected = strains.extension[..., None, None] * np.cross(u[:, :, None], d[:, :, 2])
+    np.testing.assert_allclose(dd, expected, atol=1e-6)
+
+
+def test_a_payload_is_the_limit_of_a_short_heavy_end():
+    payload = loaded(Loads(gravity=SIDE, payload=0.2)).tips(GAMMA)
+    spread = PointLoad(station=1.0 - 1e-6, force=(0.2 * 9.81, 0.0, 0.0))
+    np.testing.assert_allclose(
+        loaded(Loads(gravity=SIDE, point_loads=(spread,))).tips(GAMMA), payload, atol=1e-5
+    )
+
+
+def test_tips_do_not_depend_on_the_other_activations():
+    found = loaded(Loads(gravity=SIDE), 1e-6)
+    many = np.random.default_rng(1).uniform(-5 / 3, 0, (300, 3))
+    alone = np.concatenate([found.tips(many[k : k + 1]) for k in (0, 150, 299)])
+    np.testing.assert_allclose(alone, found.tips(many)[[0, 150, 299]], atol=1e-8)
+
+
+def test_what_is_stable_at_once_is_stable_and_the_same_when_loaded_slowly():
+    young = 1000 * 9.81 / (5.0 * TRUNK.profile.outer_radius**2)
+    solver = Solver(loaded(Loads(gravity=UP), young=young).tables, 16, 1e-8)
+    gamma = np.random.default_rng(2).uniform(-5 / 3, 0, (256, 3))
+    found = solver.find(gamma)
+    slowly = solver.slowly(gamma)
+    both = found.status != TipStatus.NO_EQUILIBRIUM
+    assert (found.rung == Rung.DIRECT).mean() > 0.5
+    np.testing.assert_allclose(found.tips[both], slowly.tips[both], atol=1e-7)
+    np.testing.assert_array_equal(found.status, slowly.status)
+
+
+def test_loads_that_are_no_numbers_are_refused_by_name():
+    with pytest.raises(InvalidDesign, match="gravity"):
+        Loads(gravity=(0, 0))
+    with pytest.raises(InvalidDesign, match="payload"):
+        Loads(payload=-1)
+
+
+def rest_turn(arm, gamma, steps=400):
+    """Directors of the unloaded tip as rows."""
+    return FreeRod(arm, 1e-12).frames(gamma, [arm.length]).directors[:, 0]
+
+
+def test_the_walk_is_that_of_the_reference():
+    found = loaded(Loads(gravity=SIDE, payload=0.3, payload_arm=(0.0, 0.05, 0.1)))
+    gamma, of_tables = GAMMA[:1], found.tables
+    solved = found.equilibria(gamma)
+    turn = rest_turn(TRUNK, gamma)[0]
+
+    def weight(z):
+        f = np.pi * 1000.0 * 9.81 * TRUNK.profile.radius(z) ** 3 / (3 * math.tan(math.radians(2)))
+        return f
+
+    def section(z):
+        at = tables(TRUNK, [z])
+        axial, bending, torsion = (float(c[0]) for c in found.body.compliance(np.array([z])))
+        force = float(weight(z) - weight(TRUNK.length)) + 0.3 * 9.81
+        return loaded_reference.Section(
+            1.0 + float(at.extension[0] @ gamma[0]),
+            at.curvature[0] @ gamma[0],
+            np.array([bending, bending, torsion]),
+            axial,
+            force,
+        )
+
+    g = turn @ solved.frame[0]
+    m = np.cross(of_tables.at_tip[:3], g)
+    seen, _, tip = loaded_reference.walk(section, TRUNK.length, g, m, 600)
+    np.testing.assert_allclose(seen, of_tables.axes[0], atol=1e-7)
+    np.testing.assert_allclose(tip, solved.tips[0], atol=1e-7)
+
+
+@pytest.mark.parametrize(("load", "most"), [(0.5, 1), (12.0, 3), (25.0, 9)])
+def test_all_equilibria_are_counted(load, most):
+    """The degree is 1, the branch of the unloaded arm is among them, and light arms have no other.
+
+    Only one is stable each time: bent either way, an upright arm can swing over sideways.
+    """
+    young = 1000 * 9.81 / (load * TRUNK.profile.outer_radius**2)
+    solver = Solver(loaded(Loads(gravity=UP), young=young).tables, 40, 1e-8)
+    for gamma in np.random.default_rng(0).uniform(-5 / 3, 0, (6, 1, 3)):
+        every, branch = all_equilibria(solver, gamma), solver.find(gamma)
+        assert every.degree == 1
+        assert len(every.tips) % 2 == 1
+        assert len(every.tips) <= most
+        assert (every.status == TipStatus.STABLE).sum() == 1
+        assert np.linalg.norm(every.tips - branch.tips, axis=1).min() < 1e-6
+
+
+def test_equilibria_under_crossed_loads_are_not_counted():
+    solver = Solver(loaded(Loads(gravity=SIDE, tip_force=(0, 1.0, 0))).tables, 8, 1e-6)
+    with pytest.raises(InvalidInput, match="one direction"):
+        all_equilibria(solver, GAMMA[:1])
