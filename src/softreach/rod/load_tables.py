@@ -196,7 +196,7 @@ class LoadTables:
         force = self._at_tip + beyond[..., None] * np.array(loads.gravity)
         force = force + (length - z)[..., None] * np.array(loads.force_per_length)
         for one in loads.point_loads:
-            force[z[:, 0] <= one.station * (1 + 1e-12)] += one.force
+            force[_step_inward(z[:, 0], one.station) :] += one.force
         return force
 
     def _jumps(self, z: Array) -> Array:
@@ -206,8 +206,14 @@ class LoadTables:
         jumps[0, 9:12] = self.axes @ np.array(loads.tip_moment)
         jumps[0, 12:15], jumps[0, 15:18] = loads.follower_force, loads.follower_moment
         for one in loads.point_loads:
-            jumps[np.argmin(np.abs(z - one.station)), 9:12] += self.axes @ np.array(one.moment)
+            step = _step_inward(z, one.station)
+            jumps[step : step + 1, 9:12] += self.axes @ np.array(one.moment)
         return jumps
+
+
+def _step_inward(ends: Array, station: float) -> int:
+    """The step whose tip end, of these, is the station; one past the last for the base."""
+    return int(np.argmin(np.abs(ends - station))) if station > 0.0 else len(ends)
 
 
 def _inward(z: Array) -> Array:
