@@ -190,7 +190,8 @@ def solve(gamma, axes, jumps, guesses, tables, limits, most, found, slopes, comp
             found, 1 found, 2 given up), walks, (n, 12).
         slopes: Filled with (v, ω) of the tip per activation, (n, 6, bundle); or (0, 6, bundle).
         compliance: Filled with the change of the tip per force there, (n, 3, 3); or (0, 3, 3).
-        trace: Filled with the sections between steps, tip first, (n, step + 1, 16); or (0, 1, 16).
+        trace: Filled with the sections between steps, tip first, (n, step + 1,
+            `TRACE`); or (0, 1, `TRACE`).
     """
     increment, widest, small = limits
     lanes = np.zeros((tables[0].shape[2] - 1, LANES))

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach import parallel
 from softreach.kernels import loaded, loaded_general
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.load_tables import LoadTables, StepTables
@@ -55,6 +56,7 @@ _COARSE_STEP = 0.05  # Newton step at which coarse steps have done their work
 _DOUBTFUL = 0.02  # margin below which the tangents of coarse steps decide nothing
 _OF_TOL = 1e-2  # what the search may use up of the tolerance
 _FOUND = 1.0
+_TRACED = 1 << 20  # numbers kept of the sections of all arms in one task, 8 MB
 
 
 class Equilibria(NamedTuple):
@@ -97,7 +99,13 @@ class Response(NamedTuple):
     twists: Array
     """(v, ω) per activation, shape (n, 6, bundles)."""
     compliance: Array
-    """∂r/∂F [m/N], shape (n, 3, 3)."""
+    """∂r/∂F [m/N], shape (n, 3, 3), or (0, 3, 3)."""
+
+    @classmethod
+    def empty(cls, n: int, bundles: int, *, compliance: bool) -> Response:
+        """Room for n."""
+        forces = n if compliance else 0
+        return cls(np.empty((n, 3)), np.empty((n, 6, bundles)), np.empty((forces, 3, 3)))
 
 
 class Shapes(NamedTuple):
@@ -108,6 +116,17 @@ class Shapes(NamedTuple):
     """m [N m] in the directors, shape (n, station, 3)."""
     force: Array
     """n [N] in the directors, shape (n, station, 3)."""
+
+    @classmethod
+    def empty(cls, n: int, stations: int) -> Shapes:
+        """Room for n."""
+        position, moment, force = np.empty((3, n, stations, 3))
+        return cls(Frames(position, np.empty((n, stations, 3, 3))), moment, force)
+
+    def put(self, rows: slice, some: Shapes) -> None:
+        """Put some into place."""
+        self.frames.position[rows], self.frames.directors[rows] = some.frames
+        self.moment[rows], self.force[rows] = some.moment, some.force
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +200,6 @@ class Solver:
             rest = np.flatnonzero(lost if rung == Rung.PATIENT else doubtful)
             if len(rest):
                 self._try(gamma, rest, search, rung, found)
-        found.tips[found.status == TipStatus.NO_EQUILIBRIUM] = np.nan
 
     def _try(
         self,
@@ -209,7 +227,8 @@ class Solver:
         """Put down what a search found at some rows."""
         good = state == _FOUND
         stable = np.where(margin > 0, TipStatus.STABLE, TipStatus.UNSTABLE)
-        found.tips[rows], found.frame[rows], found.margin[rows] = tips, frame, margin
+        found.tips[rows] = np.where(good[:, None], tips, np.nan)
+        found.frame[rows], found.margin[rows] = frame, margin
         found.status[rows] = np.where(good, stable, TipStatus.NO_EQUILIBRIUM)
         found.rung[rows] = np.where(good, rung, Rung.NONE)
 
@@ -324,15 +343,27 @@ class Solver:
 
     def shapes(self, gamma: Array, stations: Array) -> Shapes:
         """Arms at ascending stations Z [m]; NaN where there is no equilibrium."""
-        known = self.find(gamma)
         edges = self.tables.edges(stations, self.steps)
-        table = self.tables.of_edges(edges)
+        table, z = self.tables.of_edges(edges), self.tables.arm.profile.station(edges)
+        rows = np.abs(z[None] - stations[:, None]).argmin(axis=1)
+        shapes = Shapes.empty(len(gamma), len(stations))
+
+        def fill(block: slice) -> None:
+            shapes.put(block, self._shapes_of(gamma[block], stations, table, rows))
+
+        size = max(1, _TRACED // (len(edges) * loaded_general.TRACE))
+        parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), size))
+        return shapes
+
+    def _shapes_of(
+        self, gamma: Array, stations: Array, table: StepTables, rows: NDArray[np.intp]
+    ) -> Shapes:
+        """Arms at stations, which are these boundaries of the steps; on the calling thread."""
+        known = self.find(gamma)
         found, _, _, trace = self._general(
             _columns(gamma), table, _NEAR, self._whole(known.frame), trace=True
         )
         lost = (known.status == TipStatus.NO_EQUILIBRIUM) | (found[:, 10] != _FOUND)
-        z = self.tables.arm.profile.station(edges)
-        rows = np.abs(z[None] - stations[:, None]).argmin(axis=1)
         return _shapes(
             found[:, :3], trace[:, rows], self._force_at(table, rows), stations, lost, self.tables
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import ClassVar
 
 import numpy as np
@@ -16,7 +16,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import check_extension, tables
 from softreach.errors import InvalidInput
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.equilibrium import Equilibria, Solver
+from softreach.rod.equilibrium import Equilibria, Response, Solver
 from softreach.rod.linear_strains import linear_strains
 from softreach.rod.load_tables import ArmBody, Body, LoadTables
 from softreach.rod.pilot import pilot_activations
@@ -40,6 +40,7 @@ _SAFETY = 2.0
 _FEWEST_STEPS, _MOST_STEPS = 4, 256
 # A sample this near to the loss of stability magnifies every error, and does not choose the steps.
 _CRITICAL = 0.02
+_BLOCK = BLOCK // 8  # samples per task
 
 
 @dataclass(frozen=True, repr=False)
@@ -110,6 +111,10 @@ class LoadedRod(TipMap):
         """Steps with which `tol` holds all along the arm."""
         return self._fewest(self.steps, _shape_differences)
 
+    @cached_property
+    def _shape_solver(self) -> Solver:
+        return self._solver_of(self._shape_steps)
+
     def _fewest(self, steps: int, differences: Callable[[Solver, Array], Array]) -> int:
         allowed = self.tol * self.length / _SAFETY
         gamma = pilot_activations(self.arm, self.box)
@@ -138,7 +143,7 @@ class LoadedRod(TipMap):
         found = self._solver.empty(len(gamma))
         parallel.run(
             self._solver.task(gamma[b], found.of(b))
-            for b in parallel.blocks(len(gamma), BLOCK // 8)
+            for b in parallel.blocks(len(gamma), _BLOCK)
         )
         return found
 
@@ -163,17 +168,29 @@ class LoadedRod(TipMap):
 
     def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:
         """Tips [m] and the spatial twist of the tip frame per unit of each activation."""
-        response = self._solver.respond(self.box.check(activations))
+        response = self._responses(activations)
         return response.tips, response.twists
 
     def compliance(self, activations: ArrayLike) -> Array:
         """∂r/∂F [m/N]: how a tip yields to a small dead force on it, shape (n, 3, 3)."""
-        return self._solver.respond(self.box.check(activations), compliance=True).compliance
+        return self._responses(activations, compliance=True).compliance
+
+    def _responses(self, activations: ArrayLike, *, compliance: bool = False) -> Response:
+        gamma, solver = self.box.check(activations), self._solver
+        found = Response.empty(len(gamma), self.box.bundles, compliance=compliance)
+
+        def fill(block: slice) -> None:
+            response = solver.respond(gamma[block], compliance=compliance)
+            for all_values, values in zip(found, response, strict=True):
+                all_values[block] = values
+
+        parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), _BLOCK))
+        return found
 
     def frames(self, activations: ArrayLike, stations: ArrayLike) -> Frames:
         """Centerline and directors at ascending stations Z [m]."""
         gamma, z = self.box.check(activations), self.check_stations(stations)
-        return self._solver_of(self._shape_steps).shapes(gamma, z).frames
+        return self._shape_solver.shapes(gamma, z).frames
 
     def strains_at(self, stations: ArrayLike) -> Callable[[ArrayLike], Strains]:
         """(û + K⁻¹m) ζ̂/ζ and ζ = ζ̂ (1 + n3/K0) at stations Z [m] as a function of activations.
@@ -182,13 +199,13 @@ class LoadedRod(TipMap):
         """
         z = self.check_stations(stations, ascending=False)
         table, (axial, bending, torsion) = tables(self.arm, z), self.body.compliance(z)
+        yielded = np.stack([bending, bending, torsion], axis=1)
         ascending, back = np.unique(z, return_inverse=True)
 
         def strains(activations: ArrayLike) -> Strains:
             gamma = self.box.check(activations)
             rest = linear_strains(table, gamma)
-            shape = self._solver_of(self._shape_steps).shapes(gamma, ascending)
-            yielded = np.stack([bending, bending, torsion], axis=1)
+            shape = self._shape_solver.shapes(gamma, ascending)
             stretch = 1.0 + shape.force[:, back, 2] * axial
             u = rest.curvature + shape.moment[:, back] * yielded
             return Strains(u / stretch[..., None], rest.extension * stretch)
