@@ -13,6 +13,8 @@ from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.tables import tables
 from softreach.errors import InvalidDesign, InvalidInput
 from softreach.kernels import loaded_reference
+from softreach.rod import equilibrium
+from softreach.rod import loaded as loaded_module
 from softreach.rod.all_equilibria import all_equilibria
 from softreach.rod.equilibrium import Rung, Solver
 from softreach.rod.free import FreeRod
@@ -270,6 +272,32 @@ def test_tips_do_not_depend_on_the_other_activations():
     many = np.random.default_rng(1).uniform(-5 / 3, 0, (300, 3))
     alone = np.concatenate([found.tips(many[k : k + 1]) for k in (0, 150, 299)])
     np.testing.assert_allclose(alone, found.tips(many)[[0, 150, 299]], atol=1e-8)
+
+
+def test_shapes_do_not_depend_on_the_blocks_they_are_found_in(monkeypatch):
+    rod, stations = loaded(KINDS["along the arm"], 1e-6), [0.0, 0.5, 0.7, 1.0]
+    together, strains = rod.frames(GAMMA, stations), rod.strains(GAMMA, stations)
+    monkeypatch.setattr(equilibrium, "_TRACED", 1)
+    monkeypatch.setattr(loaded_module, "_BLOCK", 1)
+    for found, expected in zip(rod.frames(GAMMA, stations), together, strict=True):
+        np.testing.assert_array_equal(found, expected)
+    for found, expected in zip(rod.strains(GAMMA, stations), strains, strict=True):
+        np.testing.assert_array_equal(found, expected)
+    alone = [rod.tip_twists(gamma[None])[1][0] for gamma in GAMMA]
+    np.testing.assert_array_equal(rod.tip_twists(GAMMA)[1], alone)
+
+
+def test_what_acts_on_the_base_section_moves_nothing():
+    at_base = PointLoad(station=0.0, force=(0.0, 50.0, 0.0), moment=(0.0, 50.0, 0.0))
+    without = loaded(Loads(gravity=SIDE))
+    found = loaded(Loads(gravity=SIDE, point_loads=(at_base,))).tips(GAMMA)
+    np.testing.assert_allclose(found, without.tips(GAMMA), atol=1e-9)
+
+
+def test_steps_of_an_arm_that_never_rests_are_no_fewer_than_those_of_the_free_one():
+    rod = loaded(Loads(gravity=(0.0, 3e4, -9e4)), 1e-6)
+    assert (rod.status(GAMMA) == TipStatus.NO_EQUILIBRIUM).all()
+    assert rod.steps >= FreeRod(rod.arm, 1e-6).steps
 
 
 def test_what_is_stable_at_once_is_stable_and_the_same_when_loaded_slowly():

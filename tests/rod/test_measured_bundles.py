@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.arm import Chamber, LinearTaper, Material, Ring, Section, Tendon
+from softreach.arm import Chamber, LinearTaper, Loads, Material, Ring, Section, Tendon
+from softreach.rod.free_bundles import free_bundles
 from softreach.rod.measured_bundles import activation_measures, measured_bundles
 from softreach.rod.tip_map import tip_map
 from tests.laws import in_box
@@ -52,6 +53,18 @@ def test_the_map_is_the_same_in_other_measures():
     slopes = rod.tips_and_slopes(gamma)[1] * activation_measures(rod.arm)
     np.testing.assert_allclose(other.tips_and_slopes(shares)[1], slopes, atol=1e-12)
     assert (other.box.widths <= 1.0).all()
+
+
+def test_held_and_measured_bundles_of_a_loaded_arm_keep_its_status():
+    arm = arm_of(TENDONS, CHAMBER).with_bounds(((0, 8), (0, 4), (3, 3), (0, 5e4)))
+    whole = tip_map(arm.replace(loads=Loads(gravity=(0, 0, 0), tip_force=(0.02, 0, 0))))
+    restricted = free_bundles(measured_bundles(whole))
+    assert restricted.supports_unstable
+    assert not tip_map(arm).supports_unstable
+    gamma = in_box(arm, 5)
+    shares = (gamma / activation_measures(arm))[:, whole.box.free]
+    np.testing.assert_array_equal(restricted.status(shares), whole.status(gamma))
+    np.testing.assert_allclose(restricted.tips(shares), whole.tips(gamma), atol=1e-12)
 
 
 def test_a_large_unit_does_not_drown_the_others():

@@ -35,6 +35,11 @@ class FreeBundles(TipMap):
     """The map of all bundles."""
 
     @property
+    def supports_unstable(self) -> bool:
+        """Whether a tip can have another status than stable."""
+        return self.whole.supports_unstable
+
+    @property
     def box(self) -> ActivationBox:
         """The activations within bounds, of the free bundles."""
         return self._box

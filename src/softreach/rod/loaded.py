@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +16,7 @@ from softreach.arm.tables import check_extension, tables
 from softreach.errors import InvalidInput
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.equilibrium import Equilibria, Response, Solver
+from softreach.rod.free import FreeRod
 from softreach.rod.linear_strains import linear_strains
 from softreach.rod.load_tables import ArmBody, Body, LoadTables
 from softreach.rod.pilot import pilot_activations
@@ -54,14 +54,17 @@ class LoadedRod(TipMap):
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
     """
 
-    supports_unstable: ClassVar[bool] = True
-
     arm: Manipulator
     tol: float = 1e-6
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "tol", check_tol(self.tol))
         check_extension(self.arm)
+
+    @property
+    def supports_unstable(self) -> bool:
+        """Whether a tip can have another status than stable."""
+        return True
 
     @property
     def box(self) -> ActivationBox:
@@ -102,7 +105,8 @@ class LoadedRod(TipMap):
 
         The rule: the pilot of the free rod is solved with n and with 2n steps; n is the smallest
         number whose largest difference of a tip, doubled for safety, is within `tol`. Activations
-        for which the arm is about to lose its stability are left out.
+        for which the arm is about to lose its stability are left out. Where none is left, the
+        steps are no fewer than those of the free rod.
         """
         return self._fewest(_FEWEST_STEPS, _tip_differences)
 
@@ -119,7 +123,10 @@ class LoadedRod(TipMap):
         allowed = self.tol * self.length / _SAFETY
         gamma = pilot_activations(self.arm, self.box)
         while steps <= _MOST_STEPS:
-            error = float(differences(self._solver_of(steps), gamma).max(initial=0.0))
+            found = differences(self._solver_of(steps), gamma)
+            if not len(found):
+                return max(steps, FreeRod(self.arm, self.tol).steps)
+            error = float(found.max())
             if error <= allowed:
                 return steps
             steps = max(steps + 1, int(0.97 * steps * (error / allowed) ** (1 / 8)))
@@ -142,8 +149,7 @@ class LoadedRod(TipMap):
         gamma = self.box.check(activations)
         found = self._solver.empty(len(gamma))
         parallel.run(
-            self._solver.task(gamma[b], found.of(b))
-            for b in parallel.blocks(len(gamma), _BLOCK)
+            self._solver.task(gamma[b], found.of(b)) for b in parallel.blocks(len(gamma), _BLOCK)
         )
         return found
 
@@ -232,23 +238,22 @@ def _range(values: Array) -> Array:
     return np.stack([np.nanmin(values, axis=0), np.nanmax(values, axis=0)], axis=1)
 
 
-def _both(solver: Solver, gamma: Array) -> tuple[Solver, Array]:
-    """A solver of twice the steps, and which activations judge the steps."""
+def _settled(solver: Solver, gamma: Array) -> tuple[Array, Equilibria]:
+    """The activations that judge the steps, and their equilibria."""
     found = solver.find(gamma)
     settled = (found.status != TipStatus.NO_EQUILIBRIUM) & (np.abs(found.margin) > _CRITICAL)
-    return solver.halved(), gamma[settled]
+    return gamma[settled], found.of(settled)
 
 
 def _tip_differences(solver: Solver, gamma: Array) -> Array:
-    fine, gamma = _both(solver, gamma)
-    coarse = solver.find(gamma)
-    return _distances(coarse.tips, fine.near(gamma, coarse).tips)
+    gamma, coarse = _settled(solver, gamma)
+    return _distances(coarse.tips, solver.halved().near(gamma, coarse).tips)
 
 
 def _shape_differences(solver: Solver, gamma: Array) -> Array:
-    fine, gamma = _both(solver, gamma)
+    gamma, _ = _settled(solver, gamma)
     stations = np.linspace(0.0, solver.tables.arm.length, 9)
-    apart = solver.shapes(gamma, stations), fine.shapes(gamma, stations)
+    apart = solver.shapes(gamma, stations), solver.halved().shapes(gamma, stations)
     return _distances(apart[0].frames.position, apart[1].frames.position)
 
 

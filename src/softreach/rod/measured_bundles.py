@@ -65,6 +65,11 @@ class MeasuredBundles(TipMap):
         return bundle_measures(self.whole)
 
     @property
+    def supports_unstable(self) -> bool:
+        """Whether a tip can have another status than stable."""
+        return self.whole.supports_unstable
+
+    @property
     def box(self) -> ActivationBox:
         """The activations within bounds."""
         return self._box

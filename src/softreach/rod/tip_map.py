@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from enum import IntEnum
 from functools import lru_cache, partial
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -99,9 +99,6 @@ class TipMap(ABC):
     bounds are allowed, but `tol` is promised inside them. Results do not depend on threads.
     """
 
-    supports_unstable: ClassVar[bool] = False
-    """Whether a tip can have another status than stable."""
-
     arm: Manipulator
     """The design, to be stored beside results; nothing here looks inside it."""
     tol: float
@@ -111,6 +108,11 @@ class TipMap(ABC):
     def length(self) -> float:
         """L [m], the scale of everything in space."""
         return self.arm.length
+
+    @property
+    def supports_unstable(self) -> bool:
+        """Whether a tip can have another status than stable."""
+        return False
 
     @property
     @abstractmethod
