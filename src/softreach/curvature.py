@@ -126,7 +126,14 @@ def _strains(rod: TipMap, activations: Iterable[Array], z: Array) -> Iterator[St
     strains = rod.strains_at(z)
     for block in activations:
         for rows in parallel.blocks(len(block), max(1, _AT_A_TIME // len(z))):
-            yield strains(block[rows])
+            found = strains(block[rows])
+            yield _in_equilibrium(found) if rod.supports_unstable else found
+
+
+def _in_equilibrium(strains: Strains) -> Strains:
+    """Those of the samples that have an equilibrium; the others are NaN."""
+    settled = np.isfinite(strains.extension).all(axis=1)
+    return Strains(strains.curvature[settled], strains.extension[settled])
 
 
 def _at_station(strains: Strains, k: int) -> dict[str, Array]:

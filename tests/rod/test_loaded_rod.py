@@ -11,6 +11,7 @@ import pytest
 from softreach.arm import designs
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.tables import tables
+from softreach.curvature import stream_statistics
 from softreach.errors import InvalidDesign, InvalidInput
 from softreach.kernels import loaded_reference
 from softreach.rod import equilibrium
@@ -298,6 +299,28 @@ def test_steps_of_an_arm_that_never_rests_are_no_fewer_than_those_of_the_free_on
     rod = loaded(Loads(gravity=(0.0, 3e4, -9e4)), 1e-6)
     assert (rod.status(GAMMA) == TipStatus.NO_EQUILIBRIUM).all()
     assert rod.steps >= FreeRod(rod.arm, 1e-6).steps
+
+
+def test_ranges_of_strains_without_any_equilibrium_are_refused():
+    with pytest.raises(InvalidInput, match="no equilibrium"):
+        loaded(Loads(gravity=(0.0, 3e4, -9e4)), 1e-6).strain_range([0.5])
+
+
+def test_statistics_of_strains_count_only_arms_that_have_an_equilibrium(monkeypatch):
+    rod, stations = loaded(Loads(gravity=SIDE), 1e-6), [0.7, 0.3]
+    expected = stream_statistics(rod, [GAMMA[[0, 3]]], stations, bins=64)
+    whole = rod.strains_at(stations)
+
+    def torn(gamma):
+        found = whole(gamma)
+        found.curvature[1:3], found.extension[1:3] = np.nan, np.nan
+        return found
+
+    monkeypatch.setattr(LoadedRod, "strains_at", lambda rod, stations: torn)
+    found = stream_statistics(rod, [GAMMA], stations, bins=64)
+    np.testing.assert_array_equal(found.bending_count.sum("bin"), [2, 2])
+    for name in ("bending_mean", "torsion_mean", "extension_mean"):
+        np.testing.assert_allclose(found[name], expected[name], rtol=1e-9)
 
 
 def test_what_is_stable_at_once_is_stable_and_the_same_when_loaded_slowly():

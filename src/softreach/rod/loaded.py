@@ -219,9 +219,16 @@ class LoadedRod(TipMap):
         return strains
 
     def strain_range(self, stations: ArrayLike) -> StrainRange:
-        """Ranges of the strains at stations Z [m] over the pilot of the activation box."""
+        """Ranges of the strains at stations Z [m] over the pilot of the activation box.
+
+        Raises:
+            InvalidInput: None of the pilot has an equilibrium.
+        """
         gamma = pilot_activations(self.arm, self.box)
-        found = self.strains(gamma, self.check_stations(stations))
+        found = self.strains_at(stations)(gamma)
+        if np.isnan(found.extension).all():
+            tried = f"{len(gamma)} activations tried have no equilibrium"
+            raise InvalidInput("loads", tried, "such that some have one", "lighten the load")
         bend = np.hypot(found.curvature[..., 0], found.curvature[..., 1])
         return StrainRange(
             np.stack([np.zeros(bend.shape[1]), np.nanmax(bend, axis=0)], axis=1),
