@@ -49,6 +49,11 @@ def test_an_activation_that_leaves_no_shape_is_refused(tmp_path, capsys):
     assert not out.exists()
 
 
+def test_a_cloud_is_not_exported_at_one_activation(capsys):
+    assert run(["export", "cloud.zarr", "cloud.ply", "--activation=0,0,0"]) == 2
+    assert "activation = 0,0,0: must be left out for a cloud" in capsys.readouterr().err
+
+
 def test_a_proof_of_the_least_activation_is_asked_for(capsys):
     arm = sr.designs.redundant_trunk()
     place = sr.tip_positions(arm, [[-0.5, -0.2, -0.8, -0.4]])[0]

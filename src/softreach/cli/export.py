@@ -39,6 +39,8 @@ def export(
     if format not in (None, "activefilaments"):
         raise InvalidInput("format", format, "activefilaments, or left out")
     if source.rstrip("/").endswith(".zarr"):
+        if activation is not None:
+            raise InvalidInput("activation", activation, "left out for a cloud, which has many")
         written = _cloud(source, out, format)
     else:
         written = _design(source, out, activation, format)
