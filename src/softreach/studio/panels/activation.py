@@ -65,9 +65,8 @@ class ActivationPanel:
             ]
 
     def _slider(self, name: str, low: float, high: float, value: float) -> Any:
-        high = max(
-            high, low + 1e-6 * max(1.0, abs(low))
-        )  # a slider needs room; the state keeps to the bounds
+        room = 1e-6 * max(1.0, abs(low))
+        high = max(high, low + room)  # a slider needs room; the state keeps to the bounds
         slider = self._gui.add_slider(name, low, high, _step(high - low), value)
         bind(slider, self._session, self._wanted)
         return slider
