@@ -36,6 +36,24 @@ def test_targets_come_from_a_file_with_or_without_a_header(tmp_path, target, cap
         assert found[1]["gap_m"] > 1
 
 
+def test_activations_are_told_in_their_units(capsys):
+    assert run(["solve", "three_tendon_robot", "--target=0,0,1"]) == 0
+    assert capsys.readouterr().out.count(" N") == 3
+
+
+def test_an_activation_that_leaves_no_shape_is_refused(tmp_path, capsys):
+    out = tmp_path / "arm.glb"
+    given = ["export", "three_chamber_arm", str(out), "--activation=-1e9,0,0"]
+    assert run(given) == 2
+    assert "activation = -1e9,0,0: must be such that the arm has a shape" in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_a_cloud_is_not_exported_at_one_activation(capsys):
+    assert run(["export", "cloud.zarr", "cloud.ply", "--activation=0,0,0"]) == 2
+    assert "activation = 0,0,0: must be left out for a cloud" in capsys.readouterr().err
+
+
 def test_a_proof_of_the_least_activation_is_asked_for(capsys):
     arm = sr.designs.redundant_trunk()
     place = sr.tip_positions(arm, [[-0.5, -0.2, -0.8, -0.4]])[0]

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import softreach as sr
 from softreach.arm import Chamber, LinearTaper, Manipulator, Material, Ring, Section, Tendon
+from softreach.arm.summary import design_warnings
 from softreach.arm.tables import tables
 from softreach.errors import InvalidDesign
 from tests.kinds import any_arms, layers_at
@@ -29,6 +30,12 @@ def arm(*actuators, profile=CYLINDER):
 def chamber(**fields):
     given = {"distance": 0.008, "radius": 0.004, "activation_bounds": (-2e4, 1e5)}
     return Chamber(**(given | fields))
+
+
+@pytest.mark.parametrize(("distance", "warned"), [(0.5, False), (0.75, False), (0.76, True)])
+def test_a_chamber_that_leaves_the_arm_is_warned_of(distance, warned):
+    inside = arm(chamber(distance=None, distance_ratio=distance, radius=None, radius_ratio=0.25))
+    assert any("does not enclose" in line for line in design_warnings(inside)) == warned
 
 
 @given(body=any_arms(Chamber), share=st.floats(0.0, 0.999))

@@ -151,7 +151,7 @@ TWO = BODY.replace("0.5 }", "0.5, material = 'a' }, { inner_ratio = 0.6 }")
         (f"{BODY}{FIBER}ring = 'x'", "actuators[0].ring = 'x': must be one of the section's"),
         (
             f"{BODY}{FIBER}activation_bounds = [[0, 1], [0, 2]]",
-            "actuators[0].activation_bounds = [[0, 1], [0, 2]]: must be one pair, or 1 pairs",
+            "actuators[0].activation_bounds = [[0, 1], [0, 2]]: must be one pair",
         ),
         (
             BODY.replace("0.05 }", "0.05, taper_deg = 3 }") + FIBER,

@@ -37,7 +37,7 @@ from tests.laws import arm_of, arms, in_box
         ({"name": 3}, "name = 3: must be text"),
         ({"name": None}, "name: must be text"),
         ({"activation_bounds": (1, 0)}, "lower <= upper"),
-        ({"activation_bounds": ((-1, 0),) * 2}, "must be one pair, or 1 pairs"),
+        ({"activation_bounds": ((-1, 0),) * 2}, "must be one pair"),
         ({"activation_bounds": ("a", "b")}, "must be a pair"),
         ({"activation_bounds": None}, "activation_bounds: must be a pair"),
     ],

@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 
 import softreach as sr
 from softreach.arm import PointLoad
+from softreach.arm.file.load_table import LoadTable
 from softreach.arm.parameters import changed, find_parameter
+from softreach.arm.parameters.written import written_parameters
 from softreach.errors import InvalidDesign
 from tests.bodies import rubber
 
@@ -83,6 +85,13 @@ def test_payload_and_gravity_are_parameters(trunk):
     found = changed(arm, {"loads.payload": 0.3, "loads.gravity[2]": -1.62}).loads
     assert found == sr.Loads(payload=0.3, gravity=(0, 0, -1.62))
     assert not any(name.startswith("loads") for name in sr.arm.parameters.parameters(trunk))
+
+
+def test_parameters_of_loads_are_written_as_the_keys_of_files(trunk):
+    written = written_parameters(rubber(trunk, sr.Loads()))
+    names = {name.partition("[")[0] for name in written if name.startswith("loads.")}
+    keys = {f"loads.{key}" for key in LoadTable.keys().values()}
+    assert names == keys - {"loads.point_loads"}
 
 
 def test_a_cloud_of_a_loaded_arm_says_which_samples_are_stable(trunk):

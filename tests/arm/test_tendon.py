@@ -264,7 +264,7 @@ def test_a_tendon_is_measured_in_newtons():
         ({"revolution": math.inf}, "revolution = inf"),
         ({"offset": None}, "offset: must be a finite number rad"),
         ({"activation_bounds": (-1, 5)}, "must be at least 0 N: a tendon pulls and cannot push"),
-        ({"activation_bounds": ((0, 5), (0, 6))}, "must be one pair, or 1 pairs"),
+        ({"activation_bounds": ((0, 5), (0, 6))}, "must be one pair"),
         ({"activation_bounds": (5, 1)}, "must have lower <= upper"),
         ({"activation_bounds": (0, math.inf)}, "must hold finite numbers"),
         ({"activation_bounds": None}, "activation_bounds: must be a pair"),

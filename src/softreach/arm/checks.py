@@ -277,7 +277,8 @@ def bounds_faults(bounds: Any, bundles: int | None) -> list[Fault]:
     if (pairs[..., 0] > pairs[..., 1]).any():
         return [Fault("activation_bounds", bounds, "must have lower <= upper")]
     if pairs.ndim == 2 and bundles is not None and len(pairs) != bundles:
-        allowed = f"must be one pair, or {bundles} pairs: one for each bundle"
+        several = f", or {bundles} pairs: one for each bundle" if bundles > 1 else ""
+        allowed = f"must be one pair{several}"
         return [Fault("activation_bounds", bounds, allowed)]
     return []
 

@@ -340,4 +340,4 @@ def _name_faults(arm: Manipulator) -> Iterator[Fault]:
     names = arm.bundle_names
     if not faults and len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        yield Fault("actuators", twice, "names two bundles: rename an architecture")
+        yield Fault("actuators", twice, "names two bundles: rename an actuator")

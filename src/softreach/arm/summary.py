@@ -144,7 +144,12 @@ def _angle_at_start(fiber: FiberArchitecture, arm: Manipulator) -> float:
 
 def design_warnings(arm: Manipulator) -> tuple[str, ...]:
     """One line for each limit that the design touches: none of them makes a result impossible."""
-    return (*_overlaps(arm), *_sharp_bending(arm), *_large_activations(arm))
+    return (
+        *_overlaps(arm),
+        *_chambers_outside(arm),
+        *_sharp_bending(arm),
+        *_large_activations(arm),
+    )
 
 
 def _sharp_bending(arm: Manipulator) -> Iterator[str]:
@@ -182,6 +187,20 @@ def _overlaps(arm: Manipulator) -> Iterator[str]:
             yield (
                 f"sectors of {names} overlap by up to {np.degrees(depth):.3g}° "
                 f"(from Z = {place / arm.length:.2f} L): both contract the same matter"
+            )
+
+
+def _chambers_outside(arm: Manipulator) -> Iterator[str]:
+    """Lumens that the arm does not enclose somewhere along it."""
+    z = both_sides(arm, np.linspace(0.0, arm.length, 201))
+    outline = arm.outline(z)
+    reached = np.where(outline.acts, outline.outer_ratio, 0.0)
+    for bundle, name in enumerate(arm.bundle_names):
+        outer, place = float(reached[:, bundle].max()), z[int(reached[:, bundle].argmax())]
+        if outline.shape[bundle] == "lumen" and outer > 1 + 1e-9:
+            yield (
+                f"{name} reaches out to {outer:.3g} R2 at Z = {place / arm.length:.2f} L: "
+                "the arm does not enclose its lumen there"
             )
 
 

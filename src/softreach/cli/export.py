@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from softreach.cli.inputs import Activation, Source, activation_of, design_from
+from softreach.cli.inputs import Activation, Source, design_from, shape_of
 from softreach.errors import InvalidInput
 
 __all__ = ["export"]
@@ -39,6 +39,8 @@ def export(
     if format not in (None, "activefilaments"):
         raise InvalidInput("format", format, "activefilaments, or left out")
     if source.rstrip("/").endswith(".zarr"):
+        if activation is not None:
+            raise InvalidInput("activation", activation, "left out for a cloud, which has many")
         written = _cloud(source, out, format)
     else:
         written = _design(source, out, activation, format)
@@ -74,7 +76,6 @@ def _design(source: str, out: Path, activation: str | None, format: str | None) 
     if format is not None:
         raise InvalidInput("out", out, "a file name ending in .jl for a filament's definition")
     from softreach.export import export_arm
-    from softreach.rod.kinematics import configuration
 
-    export_arm(arm, configuration(arm, activation_of(activation, arm)), out)
+    export_arm(arm, shape_of(activation, arm), out)
     return [out]

@@ -28,6 +28,7 @@ __all__ = [
     "design_from",
     "points_of",
     "radius_of",
+    "shape_of",
 ]
 
 Design = Annotated[
@@ -44,7 +45,8 @@ AsJson = Annotated[bool, Parameter(name="--json", negative="", help="Print JSON 
 Activation = Annotated[
     str | None,
     Parameter(
-        help="Activations, one per bundle, comma-separated: -1,0,-0.5", allow_leading_hyphen=True
+        help="Activations, one per bundle in its unit ([-], N or Pa): -1,0,-0.5",
+        allow_leading_hyphen=True,
     ),
 ]
 
@@ -91,7 +93,7 @@ def cloud_of(source: str, n: int, seed: int, sampler: str) -> xr.Dataset:
 
 
 def activation_of(text: str | None, arm: Manipulator) -> list[float]:
-    """Numbers from `-1,0,-0.5`; all bundles fully contracted when there is none."""
+    """Numbers from `-1,0,-0.5`; every bundle at its lower bound when there is none."""
     if text is None:
         return arm.bounds[:, 0].tolist()
     try:
@@ -102,6 +104,20 @@ def activation_of(text: str | None, arm: Manipulator) -> list[float]:
         allowed = f"{arm.bundles} comma-separated numbers ({', '.join(arm.bundle_names)})"
         raise InvalidInput("activation", text, allowed)
     return values
+
+
+def shape_of(text: str | None, arm: Manipulator) -> xr.Dataset:
+    """The arm as activations bend it, which must leave it a shape."""
+    import numpy as np
+
+    from softreach.rod.kinematics import configuration
+
+    shape = configuration(arm, activation_of(text, arm))
+    if not np.isfinite(shape.position.values).all():
+        lower, upper = (",".join(f"{bound:g}" for bound in ends) for ends in arm.bounds.T)
+        allowed = f"such that the arm has a shape, as from {lower} to {upper}"
+        raise InvalidInput("activation", text, allowed)
+    return shape
 
 
 def points_of(text: str | None, file: Path | None) -> list[list[float]]:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from softreach.cli.inputs import Activation, Sampler, Source, activation_of, cloud_of
+from softreach.cli.inputs import Activation, Sampler, Source, cloud_of, shape_of
 from softreach.errors import InvalidInput
 
 __all__ = ["show"]
@@ -31,12 +31,11 @@ def show(
 
     from softreach import plot
     from softreach.cloud import design_of
-    from softreach.rod.kinematics import configuration
 
     _check_suffix(out)
     cloud = cloud_of(source, n, seed, sampler)
     arm = design_of(cloud)
-    shape = None if activation is None else configuration(arm, activation_of(activation, arm))
+    shape = None if activation is None else shape_of(activation, arm)
     plot.save_figure(plot.plot_views(cloud, arm, shape, color=color), out)
     sys.stdout.write(f"{out}\n")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json as json_format
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,6 +14,7 @@ from softreach.cli.inputs import AsJson, Design, RevolutionDeg, TaperDeg, design
 from softreach.errors import InvalidInput
 
 if TYPE_CHECKING:
+    from softreach.arm.manipulator import Manipulator
     from softreach.inverse import Solution
 
 __all__ = ["solve"]
@@ -52,7 +54,7 @@ def solve(
         sys.stdout.write("\n")
         return
     for solution in solutions:
-        sys.stdout.write("\n".join(_lines(solution, arm.bundle_names)) + "\n")
+        sys.stdout.write("\n".join(_lines(solution, arm)) + "\n")
 
 
 def _as_json(solution: Solution) -> dict[str, object]:
@@ -72,7 +74,23 @@ def _as_json(solution: Solution) -> dict[str, object]:
     }
 
 
-def _lines(solution: Solution, names: tuple[str, ...]) -> list[str]:
+def _activation(arm: Manipulator, values: Iterable[float]) -> str:
+    """Activations with their names and units."""
+    return ", ".join(
+        f"{name} {value:.6f}" if unit == "1" else f"{name} {value:.6g} {unit}"
+        for name, value, unit in zip(arm.bundle_names, values, arm.bundle_units, strict=True)
+    )
+
+
+def _size_unit(arm: Manipulator) -> str:
+    """What the size of an activation is in."""
+    units = set(arm.bundle_units)
+    if len(units) > 1:
+        return " (each over its range)"
+    return "" if units == {"1"} else f" {units.pop()}"
+
+
+def _lines(solution: Solution, arm: Manipulator) -> list[str]:
     at = ", ".join(f"{x:.6g}" for x in solution.target)
     lines = [f"target ({at}) m: {solution.status.name.lower().replace('_', ' ')}"]
     for gamma, residual, condition, margin in zip(
@@ -82,17 +100,16 @@ def _lines(solution: Solution, names: tuple[str, ...]) -> list[str]:
         solution.margins,
         strict=True,
     ):
-        shown = ", ".join(f"{name} {g:.6f}" for name, g in zip(names, gamma, strict=True))
         quality = f"residual {residual:.1e} m, condition {condition:.3g}, margin {margin:.3g}"
-        lines.append(f"  {shown}  ({quality})")
+        lines.append(f"  {_activation(arm, gamma)}  ({quality})")
     if solution.least_proved:
         lines.append("  proved to be the least")
     elif solution.change_bound:
-        lines.append(f"  no activation of |γ| below {solution.change_bound:.6g} reaches it")
+        least = f"{solution.change_bound:.6g}{_size_unit(arm)}"
+        lines.append(f"  no activation of a size below {least} reaches it")
     if not len(solution):
         near = ", ".join(f"{x:.6g}" for x in solution.nearest)
         bound = f", proved to be at least {solution.gap_bound:.4g} m" if solution.gap_bound else ""
         lines.append(f"  nearest ({near}) m, {solution.gap:.4g} m away{bound}")
-        shown = zip(names, solution.nearest_activation, strict=True)
-        lines.append("  reached by " + ", ".join(f"{name} {g:.6f}" for name, g in shown))
+        lines.append(f"  reached by {_activation(arm, solution.nearest_activation)}")
     return lines

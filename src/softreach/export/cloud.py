@@ -31,7 +31,7 @@ def export_cloud(cloud: xr.Dataset, path: str | PathLike[str]) -> None:
     picture's colors too.
 
     Args:
-        cloud: tip(sample, axis) [m] and activation(sample, bundle) [-].
+        cloud: tip(sample, axis) [m] and activation(sample, bundle), each in its unit.
         path: The file; it is replaced only when the new one is complete.
 
     Raises:

@@ -57,7 +57,7 @@ def cloud_table(cloud: xr.Dataset) -> CloudTable:
     """The arrays and the description of a cloud.
 
     Args:
-        cloud: tip(sample, axis) [m] and activation(sample, bundle) [-].
+        cloud: tip(sample, axis) [m] and activation(sample, bundle), each in its unit.
 
     Raises:
         InvalidInput: The dataset is not a cloud.

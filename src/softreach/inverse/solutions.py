@@ -43,7 +43,7 @@ class Solution:
     status: Status
     """Outcome of the search."""
     activations: Array
-    """Each activation that reaches the target [-], shape (k, bundles); k = 0 if none does."""
+    """Each activation that reaches the target [unit of each], shape (k, bundles); k = 0 if none."""
     residuals: Array
     """|tip - target| [m], shape (k,)."""
     conditions: Array
@@ -53,14 +53,15 @@ class Solution:
     nearest: Array
     """The reachable point nearest to the target that was found [m], shape (3,)."""
     nearest_activation: Array
-    """An activation that leads there [-], shape (bundles,)."""
+    """An activation that leads there [unit of each], shape (bundles,)."""
     gap: float
     """|nearest - target| [m]."""
     gap_bound: float
     """A proved lower bound of the distance to the reachable set [m]; 0 if nothing is proved."""
     change_bound: float
-    """A proved lower bound of |γ - near| of all activations that reach the target [-]; 0 if nothing
-    is proved, which it is only where `prove_least` asks for it."""
+    """A proved lower bound of |γ - near| of all activations that reach the target, in their unit,
+    or of each over its range where units differ; 0 if nothing is proved, which it is only where
+    `prove_least` asks for it."""
     least_proved: bool
     """Whether the bound is the |γ - near| of the first activation, but for 1e-6."""
 
@@ -87,7 +88,7 @@ class Solutions(Sequence[Solution]):
     offsets: Index
     """Activations of target i are rows offsets[i]:offsets[i + 1], shape (t + 1,)."""
     activations: Array
-    """Shape (n, bundles) [-]."""
+    """Shape (n, bundles) [unit of each]."""
     residuals: Array
     """Shape (n,) [m]."""
     conditions: Array
@@ -99,7 +100,7 @@ class Solutions(Sequence[Solution]):
     nearest: Array
     """The nearest reachable points, shape (t, 3) [m]."""
     nearest_activations: Array
-    """Shape (t, bundles) [-]."""
+    """Shape (t, bundles) [unit of each]."""
     gaps: Array
     """Shape (t,) [m]."""
     gap_bounds: Array
@@ -216,7 +217,7 @@ class Solutions(Sequence[Solution]):
                 "nearest_activation": (per_target, self.nearest_activations, units),
                 "gap": ("target", self.gaps, {"units": "m"}),
                 "gap_bound": ("target", self.gap_bounds, {"units": "m"}),
-                "change_bound": ("target", self.change_bounds, {"units": "1"}),
+                "change_bound": ("target", self.change_bounds, {"units": "1", **units}),
                 "least_proved": ("target", self.least_proved),
                 "target_of": ("solution", np.repeat(np.arange(len(self)), self.counts)),
                 "activation": (per_solution, self.activations, units),

@@ -36,7 +36,7 @@ def plot_cloud(
 
     Args:
         cloud: tip(sample, axis) [m], with the attribute `length` [m] if known, and
-            activation(sample, bundle) [-].
+            activation(sample, bundle), each in its unit.
         ax: Axes to draw in; None for a new figure.
         view: "front", "side", "top", "oblique", "back", "left", or azimuth and elevation of the eye
             [rad].

@@ -71,7 +71,7 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike = "rgb") -> Co
     """Color samples by all activations, by one bundle's magnitude, or by given values.
 
     Args:
-        cloud: activation(sample, bundle) [-].
+        cloud: activation(sample, bundle), each in its unit.
         color: "rgb" for |γ| / max |γ| of all bundles, of each where their units differ; the name or
             index of one bundle; one number per sample, whose attributes `long_name` and `units` go
             to the key if it is a DataArray; or RGB from 0 to 1 per sample.

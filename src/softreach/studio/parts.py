@@ -57,7 +57,9 @@ def parts(arm: Manipulator) -> list[Part]:
         found.append(Part(ring_label(arm, k), owners, ring.name, ring=k))
     for one in arm.actuators:
         home = one.ring if isinstance(one, SectorActuator) else None
-        found.append(Part(one.name, (one.name,), one.name, actuator=one.name, home=home))
+        taken = any(part.label == one.name for part in found)
+        label = f"{one.name} (actuator)" if taken else one.name
+        found.append(Part(label, (one.name,), one.name, actuator=one.name, home=home))
     return found
 
 

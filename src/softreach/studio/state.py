@@ -101,7 +101,7 @@ class StudioState:
 
     design: Manipulator
     activation: tuple[float, ...] = ()
-    """γ of each bundle, within the bounds [-]; rest, or what is nearest to it, by default."""
+    """Of each bundle in its unit, within the bounds; rest, or what is nearest to it, by default."""
     appearance: Appearance = field(default_factory=Appearance)
     target: Vector | None = None
     """Where the tip should go [m]."""

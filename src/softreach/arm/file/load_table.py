@@ -57,7 +57,7 @@ class LoadTable(Table):
         default=_ZERO, alias="follower_moment_n_m", description="In the directors of the tip [N m]"
     )
     force_per_length: Triple = Field(
-        default=_ZERO, alias="force_per_length_n_m", description="Beside weight [N/m]"
+        default=_ZERO, alias="force_per_length_n_per_m", description="Beside weight [N/m]"
     )
     point_loads: list[PointLoadTable] = Field(
         default=[], description="Forces and moments anywhere along the arm"

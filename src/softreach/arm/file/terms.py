@@ -57,9 +57,18 @@ def pydantic_fault(problem: Any) -> Fault:
         value = problem["input"]
         shown = value.get(context["key"]) if below and isinstance(value, dict) else value
         return Fault(dotted([*location, *below]), shown, context["allowed"])
+    if context.get("min_length", 0) > 1 or "max_length" in context:
+        return Fault(dotted(location), problem["input"], _length_allowed(context))
     message = str(problem["msg"]).replace("Input should be", "must be")
     allowed = _ALLOWED.get(problem["type"], message)
     return Fault(dotted(location), problem["input"], allowed)
+
+
+def _length_allowed(context: dict[str, Any]) -> str:
+    """How long a list must be that is too short or too long."""
+    if "min_length" in context:
+        return f"must have at least {context['min_length']} values"
+    return f"must have at most {context['max_length']} values"
 
 
 def dotted(location: list[Any]) -> str:

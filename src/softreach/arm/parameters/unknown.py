@@ -27,6 +27,8 @@ def unknown_parameter(name: str, known: Mapping[str, Parameter]) -> InvalidInput
     """
     close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
     hint = f'did you mean "{close[0]}"?' if close else ""
+    if name.startswith("loads.") and not any(key.startswith("loads.") for key in known):
+        hint = "the arm has no loads: give it some first"
     owners = list(dict.fromkeys(one.owner for one in known.values() if one.owner))
     meant = max((own for own in owners if name.startswith(f"{own}.")), key=len, default="")
     own = [key for key, one in known.items() if one.owner == meant]

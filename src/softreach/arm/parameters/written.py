@@ -11,7 +11,17 @@ from softreach.arm.parameters.parameter import Parameter
 
 __all__ = ["from_written", "with_suffix", "written_name", "written_parameters"]
 
-_SUFFIX = {"rad": "_deg", "m": "_m", "1": "", "Pa": "_pa", "kg/m³": "_kg_m3", "N": "_n"}
+_SUFFIX = {
+    "rad": "_deg",
+    "m": "_m",
+    "1": "",
+    "Pa": "_pa",
+    "kg/m³": "_kg_m3",
+    "N": "_n",
+    "m/s²": "_m_s2",
+    "N m": "_n_m",
+    "N/m": "_n_per_m",
+}
 _PLACE = re.compile(r"(\[\d+\])?$")
 
 

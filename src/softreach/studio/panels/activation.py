@@ -65,7 +65,8 @@ class ActivationPanel:
             ]
 
     def _slider(self, name: str, low: float, high: float, value: float) -> Any:
-        high = max(high, low + 1e-6)  # a slider needs room; the state keeps to the bounds
+        room = 1e-6 * max(1.0, abs(low))
+        high = max(high, low + room)  # a slider needs room; the state keeps to the bounds
         slider = self._gui.add_slider(name, low, high, _step(high - low), value)
         bind(slider, self._session, self._wanted)
         return slider
@@ -77,8 +78,8 @@ class ActivationPanel:
 
 
 def _step(width: float) -> float:
-    """A round step, a thousandth of usual ranges."""
-    return min(1e-3, width) if width < 10 else 10.0 ** (math.floor(math.log10(width)) - 3)
+    """A round step, a thousandth of the range or less."""
+    return 10.0 ** (math.floor(math.log10(width)) - 3)
 
 
 def _slider_ends(arm: Manipulator) -> list[tuple[str, float, float]]:
