@@ -109,8 +109,10 @@ class DesignPanel:
             except InvalidDesign as error:
                 self._complain(name, str(in_file_terms(error, "")))
                 return
-            self._made = made
+            known, self._made = self._made, made
             self._complain(name, "")
+        if made == known:
+            return  # a page reports sliders that were only drawn anew, perhaps late
         self._session.update(lambda s: s.replace(design=made), by_widget=True)
 
     def _values(self) -> dict[str, float]:

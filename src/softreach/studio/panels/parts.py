@@ -128,13 +128,15 @@ class PartsPanel:
     def _number(self, one: Number) -> Any:
         step = 1 if one.whole else 10.0 ** (math.floor(math.log10(abs(_shown(one)) or 1.0)) - 2)
         widget = self._gui.add_number(one.label, _shown(one), step=step, hint=one.hint)
-        return self._on(widget, lambda: self._change(one, widget.value))
+        return self._on(widget, lambda: self._change(one.parameter, widget))
 
-    def _change(self, one: Number, value: float) -> None:
+    def _change(self, parameter: str, widget: Any) -> None:
         """One number typed; what a field only shows rounded is left as it is."""
-        known, _ = self._typed[one.parameter]
-        if value != _shown(known):
-            self._apply(lambda arm: changed(arm, {one.parameter: value * one.scale}))
+        known, current = self._typed.get(parameter, (None, None))
+        if known is None or current is not widget or widget.value == _shown(known):
+            return  # of a field that is gone, or no change
+        value = widget.value * known.scale
+        self._apply(lambda arm: changed(arm, {parameter: value}))
 
     def _material(self, label: str, name: str, ring: int | None) -> Any:
         none = _AS_TYPED if ring is not None else "as the innermost ring"
