@@ -54,8 +54,12 @@ def test_an_activation_puts_the_tip_where_the_library_says(tab):
     tip = sr.tip_positions(state.design, [state.activation])[0] / state.design.length
     assert np.linalg.norm(tip - start) > 0.05
     np.testing.assert_allclose(tab.session.tip, tip, atol=2e-5)
-    x, y, z = tab.session.tip
-    tab.page.get_by_text(f"tip at ({x:.6f}, {y:.6f}, {z:.6f}) L").wait_for()
+
+    def shown():
+        x, y, z = tab.session.tip
+        return tab.page.get_by_text(f"tip at ({x:.6f}, {y:.6f}, {z:.6f}) L").count()
+
+    tab.wait(shown, "the page says where the tip is")
 
 
 def test_a_click_on_a_point_of_the_cloud_finds_activations_that_reach_it(tab):
@@ -218,7 +222,10 @@ def test_a_link_opens_the_state_in_another_tab(tab, studio):
     tab.wait(lambda: other.state == kept, "the state is there")
     assert other.settle(PATIENCE)
     assert other.reach.arm == kept.design
-    np.testing.assert_allclose(other.eye.camera().position, kept.camera.position, atol=1e-6)
+    tab.wait(
+        lambda: np.allclose(other.eye.camera().position, kept.camera.position, atol=1e-6),
+        "the page looks from where the first one did",
+    )
     page.close()
     tab.wait(lambda: set(studio.sessions) == known, "the session of the closed tab ends")
 
