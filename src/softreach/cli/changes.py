@@ -98,7 +98,6 @@ class Changes:
                 without moduli or densities.
             InvalidDesign: No such arm can exist.
         """
-        from softreach.arm.loads import Loads
         from softreach.arm.parameters import changed
 
         pairs = dict(self._pairs())
@@ -106,10 +105,8 @@ class Changes:
         others = {name: text for name, text in pairs.items() if name not in of_loads}
         arm = changed(arm, _values(arm, others, self._angles()))
         if of_loads or {"payload", "gravity", "tip_force"} & self.given.keys():
-            arm = self._loaded(arm)
+            arm = self._loaded(arm, bool(of_loads))
             arm = changed(arm, _values(arm, of_loads))
-            idle = arm.loads == Loads(gravity=_GRAVITY["none"])
-            arm = arm.replace(loads=None) if idle else arm
         return arm
 
     def refuse(self, why: str) -> None:
@@ -133,13 +130,40 @@ class Changes:
             named.add(name)
             yield name, value
 
-    def _loaded(self, arm: Manipulator) -> Manipulator:
-        """The arm with the loads that it has and those that are given."""
+    def _loaded(self, arm: Manipulator, others: bool) -> Manipulator:
+        """The arm with the loads that it has and those that are given; none where all are zero.
+
+        Args:
+            arm: The arm.
+            others: Whether settings change more of its loads.
+        """
         from softreach.arm.loads import Loads
 
         loads = (arm.loads or Loads()).replace(**self._loads())
-        _check_matter(loads, arm)
+        if not others and loads == Loads(gravity=_GRAVITY["none"]):
+            return arm.replace(loads=None)
+        self._check_matter(loads, arm)
         return arm.replace(loads=loads)
+
+    def _check_matter(self, loads: Loads, arm: Manipulator) -> None:
+        """Ask in one line for the moduli and densities that loads need."""
+        lacking = [
+            fault.path
+            for fault in loads.section_faults(arm.section, arm.length)
+            if fault.path.endswith(("young_modulus", "density"))
+        ]
+        if lacking:
+            given = {name: value for name, value in self.given.items() if "_deg" not in name}
+            examples = {"young_modulus": "1MPa", "density": "1000kg/m3"}
+            options = (f"--set {path}={examples[path.rpartition('.')[2]]}" for path in lacking)
+            weightless = any(path.endswith("density") for path in lacking)
+            raise InvalidInput(
+                ", ".join(given),
+                ", ".join(map(str, given.values())),
+                f"on an arm with {' and '.join(lacking)}",
+                f"give them in the design file, or as {' '.join(options)}"
+                + (" (no density is needed with --gravity none)" if weightless else ""),
+            )
 
     def _loads(self) -> dict[str, object]:
         found: dict[str, object] = {}
@@ -192,11 +216,7 @@ def _number_and_unit(text: str, unit: str) -> tuple[float, str]:
 
     plain = text.strip()
     written = next(
-        (
-            one
-            for one in sorted(unit_names(unit), key=len, reverse=True)
-            if plain.endswith(one)
-        ),
+        (one for one in sorted(unit_names(unit), key=len, reverse=True) if plain.endswith(one)),
         "",
     )
     shown = written or unit_names(unit)[0]
@@ -254,21 +274,3 @@ def _of_name(parameter: DesignParameter, name: str, text: str) -> float:
     except ValueError:
         allowed = "a finite number without a unit, which the name holds"
         raise InvalidInput(name, text, allowed) from None
-
-
-def _check_matter(loads: Loads, arm: Manipulator) -> None:
-    """Ask in one line for the moduli and densities that loads need."""
-    lacking = [
-        fault.path
-        for fault in loads.section_faults(arm.section, arm.length)
-        if fault.path.endswith(("young_modulus", "density"))
-    ]
-    if lacking:
-        examples = {"young_modulus": "1MPa", "density": "1000kg/m3"}
-        options = (f"--set {path}={examples[path.rpartition('.')[2]]}" for path in lacking)
-        raise InvalidInput(
-            "loads",
-            f"on an arm without {', '.join(lacking)}",
-            "on an arm of known Young's modulus, and of known density where it weighs",
-            f"give them in the file, or as {' '.join(options)}",
-        )

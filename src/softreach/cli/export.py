@@ -72,9 +72,7 @@ def _cloud(source: str, out: Path, format: str | None) -> list[Path]:
     return [out, activefilaments.gamma_path(out)]
 
 
-def _design(
-    arm: Manipulator, out: Path, activation: str | None, format: str | None
-) -> list[Path]:
+def _design(arm: Manipulator, out: Path, activation: str | None, format: str | None) -> list[Path]:
     if out.suffix == ".jl":
         from softreach.exchange.activefilaments import write_design
 

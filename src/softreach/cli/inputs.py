@@ -66,7 +66,8 @@ def design_from(text: str, changes: Changes = UNCHANGED) -> Manipulator:
         check_extension(varied)
         return varied
     except InvalidDesign as error:
-        raise file.in_file_terms(error, text) from None
+        one_option = len(error.faults) == 1 and changes.given
+        raise file.in_file_terms(error, "" if one_option else text) from None
 
 
 def _loaded(path: str) -> Manipulator:
