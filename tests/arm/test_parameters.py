@@ -120,7 +120,10 @@ def test_no_values_change_nothing(trunk):
     assert changed(trunk, {}) is trunk
 
 
-@given(st.lists(st.text(min_size=1, max_size=8), min_size=2, max_size=3, unique=True))
+LETTERS = st.characters(exclude_categories=["C", "Z"], exclude_characters=".[]")
+
+
+@given(st.lists(st.text(LETTERS, min_size=1, max_size=8), min_size=2, max_size=3, unique=True))
 def test_every_actuator_has_parameters_of_its_own_whatever_it_is_called(names):
     fibers = [FiberArchitecture(name=name, revolution=0.5, extent=0.3) for name in names]
     arm = arm_of(*fibers)
@@ -428,7 +431,7 @@ def test_other_names_head_the_paths_of_their_actuator(trunk, name):
 
 @pytest.mark.parametrize("name", [3, None, ("taper",), 1.5])
 def test_a_name_that_is_no_text_is_unknown(trunk, name):
-    with pytest.raises(InvalidInput, match="parameter = .*must be one of revolution"):
+    with pytest.raises(InvalidInput, match=r"parameter = .*must be one of revolution"):
         changed(trunk, {name: 1.0})
 
 

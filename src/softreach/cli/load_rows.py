@@ -43,8 +43,10 @@ def load_rows(loads: Loads | None) -> Rows:
 def _base(gravity: tuple[float, float, float]) -> str:
     """How the base stands: an arm at rest points along +z, gravity pulls downward."""
     angle = math.degrees(math.acos(-gravity[2] / math.hypot(*gravity)))
-    named = {0: "upright", 90: "sideways", 180: "hanging"}
-    return named.get(round(angle, 6), f"tilted from upright by {angle:.4g}°")
+    for exactly, name in ((0, "upright"), (90, "sideways"), (180, "hanging")):
+        if abs(angle - exactly) < 1e-6:
+            return name
+    return f"tilted from upright by {angle:.4g}°"
 
 
 def rest_rows(arm: Manipulator) -> Rows:
