@@ -18,6 +18,7 @@ from softreach.arm.section import Stiffness
 from softreach.arm.tables import both_sides, check_extension, extension_range
 from softreach.arm.weight import (
     VERIFIED_LOAD_NUMBER,
+    is_overloaded,
     load_number,
     load_number_faults,
     mass,
@@ -179,10 +180,9 @@ def _large_activations(arm: Manipulator) -> Iterator[str]:
 
 
 def _large_loads(arm: Manipulator) -> Iterator[str]:
-    number = 0.0 if load_number_faults(arm) else load_number(arm)
-    if number > VERIFIED_LOAD_NUMBER:
+    if not load_number_faults(arm) and is_overloaded(arm):
         yield (
-            f"the load number is {number:.3g}: shapes under loads were verified up to "
+            f"the load number is {load_number(arm):.3g}: shapes under loads were verified up to "
             f"{VERIFIED_LOAD_NUMBER:g}"
         )
 

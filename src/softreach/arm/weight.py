@@ -10,7 +10,14 @@ from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import Fault, InvalidDesign
 
-__all__ = ["GRAVITY", "VERIFIED_LOAD_NUMBER", "load_number", "load_number_faults", "mass"]
+__all__ = [
+    "GRAVITY",
+    "VERIFIED_LOAD_NUMBER",
+    "is_overloaded",
+    "load_number",
+    "load_number_faults",
+    "mass",
+]
 
 GRAVITY = 9.81
 """g, by which load numbers are told where no loads act [m/s²]."""
@@ -53,6 +60,15 @@ def load_number(arm: Manipulator) -> float:
     per_length, force = (_own_weight(arm), 0.0) if arm.loads is None else _of_loads(arm, arm.loads)
     stiffness = arm.section.stiffness(base).bending
     return float((per_length + force / arm.length) * arm.length**3 / (4.0 * stiffness))
+
+
+def is_overloaded(arm: Manipulator) -> bool:
+    """Whether the load number is above what was verified, by more than rounding.
+
+    Raises:
+        InvalidDesign: A layer without Young's modulus, or without a density where it weighs.
+    """
+    return load_number(arm) > VERIFIED_LOAD_NUMBER * (1 + 1e-9)
 
 
 def load_number_faults(arm: Manipulator) -> list[Fault]:

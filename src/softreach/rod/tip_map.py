@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.weight import VERIFIED_LOAD_NUMBER, load_number
+from softreach.arm.weight import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.errors import InvalidInput, SoftreachWarning, counted
 from softreach.rod.activation_box import ActivationBox, as_floats
 from softreach.rod.steps import check_tol
@@ -301,7 +301,7 @@ def _warn_of_large_loads(arm: Manipulator) -> None:
     Raises:
         InvalidDesign: Moduli or densities are missing.
     """
-    if load_number(arm) > VERIFIED_LOAD_NUMBER:
+    if is_overloaded(arm):
         warnings.warn(
             f"the load number is above {VERIFIED_LOAD_NUMBER:g}, up to which shapes under loads "
             "were verified: look at the status of the samples, and compare with a smaller tol",
