@@ -22,8 +22,8 @@ from softreach.rod.free import FreeRod
 from softreach.rod.load_tables import LoadTables
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.tip_map import TipStatus
-from tests.bodies import rubber, uniform
-from tests.oracles import column, elastica, loaded_rod, rod, sorosim
+from tests.bodies import oracle_rod, rubber, uniform
+from tests.oracles import column, elastica, loaded_rod, sorosim
 
 TRUNK = designs.minimal_trunk()
 # The base frame stands upright; seen from it, gravity pulls back (up), aside, or ahead (down).
@@ -64,39 +64,6 @@ def straight(body, loads, length=1.0, steps=32):
     return Solver(LoadTables(arm, loads, body), steps, 1e-10)
 
 
-def oracle(arm, body, gamma, loads):
-    """The same rod and loads for the shooting from the base."""
-
-    def at(function):
-        return lambda z: float(function(np.array([z]))[0])
-
-    def table(z):
-        return tables(arm, [z])
-
-    return rod.Rod(
-        length=arm.length,
-        axial=at(lambda z: 1 / body.compliance(z)[0]),
-        bending=at(lambda z: 1 / body.compliance(z)[1]),
-        torsion=at(lambda z: 1 / body.compliance(z)[2]),
-        mass=at(body.mass_per_length),
-        stretch=lambda z: 1.0 + float(table(z).extension[0] @ gamma),
-        curvature=lambda z: table(z).curvature[0] @ gamma,
-    ), rod.Loads(
-        gravity=loads.gravity,
-        payload=loads.payload,
-        lever=loads.payload_arm,
-        tip_force=loads.tip_force,
-        tip_moment=loads.tip_moment,
-        following_force=loads.follower_force,
-        following_moment=loads.follower_moment,
-        points=tuple(
-            rod.PointLoad(place=one.station, force=one.force, moment=one.moment)
-            for one in loads.point_loads
-        ),
-        force_per_length=lambda z: loads.force_per_length,
-    )
-
-
 def differences(f, gamma, step):
     """Fourth-order central differences of f along every column of gamma, on a last axis."""
     columns = []
@@ -116,7 +83,7 @@ def test_a_shooting_from_the_base_finds_the_same_rod(loads):
     tips = found.tips(gamma)
     for k, one in enumerate(gamma):
         expected = loaded_rod.equilibrium(
-            *oracle(TRUNK, found.body, one, loads), stations, rtol=1e-10
+            *oracle_rod(TRUNK, found.body, one, loads), stations, rtol=1e-10
         )
         moment = np.einsum("sd,sdc->sc", shapes.moment[k], shapes.frames.directors[k])
         np.testing.assert_allclose(tips[k], expected.tip, atol=1e-9)
