@@ -48,9 +48,7 @@ def uniform(bending, axial=np.inf, torsion=None, mass=0.0):
 def oracle_rod(arm: Manipulator, body: Body, gamma, loads: Loads) -> tuple[rod.Rod, rod.Loads]:
     """An activated arm and its loads as the oracles take them."""
     breaks = tuple(arm.breakpoints)
-    at = _polynomials(
-        lambda z: _sections(arm, body, gamma, z), sorted({0.0, *breaks, arm.length})
-    )
+    at = _polynomials(lambda z: _sections(arm, body, gamma, z), sorted({0.0, *breaks, arm.length}))
     return rod.Rod(
         length=arm.length,
         axial=lambda z: at(z)[0],
