@@ -85,18 +85,19 @@ def _sections(arm: Manipulator, body: Body, gamma, z):
 def _polynomials(values: Callable, ends: list[float]) -> Callable:
     """Smooth functions of Z as fast polynomials between ends, exact but for rounding."""
     orders = np.arange(_DEGREE + 1)
-    pieces = []
-    for low, high in pairwise(ends):
-        middle, half = 0.5 * (low + high), 0.5 * (high - low)
-        pieces.append(
-            (middle, half, chebyshev.chebinterpolate(lambda x: values(middle + half * x), _DEGREE))
-        )
+    pieces = [(0.5 * (a + b), 0.5 * (b - a)) for a, b in pairwise(ends)]
+    coefficients = [_coefficients(values, *piece) for piece in pieces]
 
     @lru_cache(maxsize=8)
     def at(z: float):
-        inside = int(np.searchsorted(ends[1:-1], z, side="left"))
-        middle, half, coefficients = pieces[inside]
+        inside = int(np.searchsorted(ends[1:-1], z))
+        middle, half = pieces[inside]
         x = min(max((z - middle) / half, -1.0), 1.0)
-        return np.cos(orders * np.arccos(x)) @ coefficients
+        return np.cos(orders * np.arccos(x)) @ coefficients[inside]
 
     return at
+
+
+def _coefficients(values: Callable, middle: float, half: float):
+    """Of Chebyshev polynomials."""
+    return chebyshev.chebinterpolate(lambda x: values(middle + half * x), _DEGREE)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,7 @@ from softreach.rod.load_tables import ArmBody, LoadTables
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.tip_map import TipStatus
 from tests.bodies import oracle_rod, uniform
-from tests.oracles import bend, elastica, loaded_rod, sorosim
+from tests.oracles import bend, elastica, loaded_rod
 
 NOTHING = Loads(gravity=(0.0, 0.0, 0.0))
 REST = np.zeros((1, 3))

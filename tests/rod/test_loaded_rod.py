@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
@@ -23,7 +22,7 @@ from softreach.rod.load_tables import LoadTables
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.tip_map import TipStatus
 from tests.bodies import oracle_rod, rubber, uniform
-from tests.oracles import column, elastica, loaded_rod, sorosim
+from tests.oracles import column, elastica, loaded_rod
 
 TRUNK = designs.minimal_trunk()
 # The base frame stands upright; seen from it, gravity pulls back (up), aside, or ahead (down).
