@@ -164,3 +164,17 @@ def test_every_equilibrium_has_the_index_of_its_energy(arm, load, gamma):
         ways = index(chain, moments(chain, turn @ direction), tip)
         assert (ways == 0) == (status == TipStatus.STABLE)
         assert of_map == (-1) ** ways
+
+
+def test_arms_that_lean_a_little_fall_to_the_side_they_lean_to():
+    """Beside a plane of symmetry in which they would be unstable; the branch stays stable."""
+    solver = solver_of(weighed(CYLINDER, 5.0))
+    leaning = SYMMETRIC + np.array([0.0, 1.0, 0.0]) * [[1e-3], [0.003], [0.01]]
+    gamma = np.concatenate([SYMMETRIC, leaning, leaning[:, [1, 0, 2]]])
+    found, slowly = solver.find(gamma), solver.slowly(gamma)
+    assert (found.status[:3] == TipStatus.UNSTABLE).all()
+    assert (found.status[3:] == TipStatus.STABLE).all()
+    np.testing.assert_allclose(found.tips, slowly.tips, atol=1e-7)
+    sides = found.tips[3:6, 0], found.tips[6:, 0]
+    np.testing.assert_allclose(sides[0], -sides[1], atol=1e-7)
+    assert np.abs(sides[0]).min() > 0.01
