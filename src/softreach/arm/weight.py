@@ -30,7 +30,7 @@ def mass(arm: Manipulator) -> float:
 
 
 def load_number(arm: Manipulator) -> float:
-    """Λ = w L³/(4 K1) with weight per length and bending stiffness at the base [-].
+    """Λ = w L³/(4 K1) with weight per length and bending stiffness at the base [-], theory (79).
 
     It is ρ g L³/(E R2²) for a solid arm of one material. An upright cylinder buckles under its own
     weight at 1.96.
