@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ import pytest
 from softreach.arm import designs
 from softreach.arm.loads import Loads, PointLoad
 from softreach.rod.equilibrium import Solver
-from softreach.rod.load_tables import ArmBody, LoadTables
+from softreach.rod.load_tables import ArmBody, Body, LoadTables
 from tests.bodies import rubber
 
 TRUNK = designs.minimal_trunk()
@@ -91,6 +91,35 @@ def test_an_arm_of_another_size_with_loads_to_match_has_the_same_shape(loads):
     small = small.replace(point_loads=points, payload=size**3 * loads.payload)
     found = tips(designs.minimal_trunk(length=size), small)
     np.testing.assert_allclose(found / size, tips(TRUNK, loads), atol=2e-9)
+
+
+@dataclass(frozen=True)
+class HeavyEnd:
+    """A body with a mass spread over the end of the arm."""
+
+    whole: Body
+    start: float
+    extra: float
+
+    def compliance(self, z):
+        return self.whole.compliance(z)
+
+    def mass_per_length(self, z):
+        return self.whole.mass_per_length(z) + np.where(z > self.start, self.extra, 0.0)
+
+
+def test_a_payload_is_the_limit_of_a_short_heavy_end():
+    """The end's center is half its length before the tip, so that it tends there in proportion."""
+    mass, side = 0.2, Loads(gravity=(9.81, 0.0, 0.0))
+    apart = []
+    for length in (0.002, 0.001):
+        edge = PointLoad(station=1.0 - length)  # where steps end
+        arm = rubber(TRUNK, side.replace(point_loads=(edge,)))
+        body = HeavyEnd(ArmBody(arm), edge.station, mass / length)
+        found = Solver(LoadTables(arm, arm.loads, body), 24, 1e-9).find(GAMMA).tips
+        apart.append(np.linalg.norm(found - tips(TRUNK, side.replace(payload=mass)), axis=1))
+    assert 1e-5 < apart[0].min() < apart[0].max() < 2e-3
+    np.testing.assert_allclose(apart[0] / apart[1], 2.0, rtol=0.02)
 
 
 def test_small_loads_add_up():
