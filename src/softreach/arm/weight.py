@@ -43,7 +43,7 @@ def mass(arm: Manipulator) -> float:
 
 
 def load_number(arm: Manipulator) -> float:
-    """Λ = (w + P/L) L³/(4 K1), with bending stiffness K1 at the base [-].
+    """Λ = (w + P/L) L³/(4 K1), with bending stiffness K1 at the base [-], theory (79).
 
     Without loads, w is the weight per length at the base under g = 9.81 m/s², and P is 0: Λ is
     ρ g L³/(E R2²) for a solid arm of one material, and an upright cylinder buckles under its own

@@ -48,7 +48,8 @@ class _Search(NamedTuple):
 
 
 # An arm that jumps to another branch on its way lands on an unstable one (design/loaded_rod.md);
-# so whatever is not found stable is searched again, more patiently.
+# so whatever is not found stable is searched again, more patiently. Where an arm almost buckles to
+# either side, only the last search follows it to the side to which it leans.
 _DIRECT = _Search(1.0, 1.2, 7)
 _CONTINUATION = _Search(0.25, 0.1, 400)
 _PATIENT = _Search(1 / 64, 0.03, 2000)
@@ -196,8 +197,8 @@ class Solver:
         self._try(gamma, slice(None), _DIRECT, Rung.DIRECT, found, guesses)
         for search, rung in ((_CONTINUATION, Rung.CONTINUATION), (_PATIENT, Rung.PATIENT)):
             lost = found.status == TipStatus.NO_EQUILIBRIUM
-            doubtful = lost | (found.margin < _DOUBTFUL)
-            rest = np.flatnonzero(lost if rung == Rung.PATIENT else doubtful)
+            least = 0.0 if rung == Rung.PATIENT else _DOUBTFUL
+            rest = np.flatnonzero(lost | (found.margin < least))
             if len(rest):
                 self._try(gamma, rest, search, rung, found)
 
