@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import base64
-import html
 import io
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.studio import markup
 from softreach.studio.colors import key_html
 from softreach.studio.panels.status import reach_text
 from softreach.studio.reach import Reach
@@ -58,9 +58,9 @@ def _draw(scene: Scene, state: StudioState, reach: Reach) -> str:
 
 
 def _caption(state: StudioState, reach: Reach, key: str) -> str:
-    numbers = html.escape(reach_text(reach).replace("**", ""))
-    design = f"<details><summary>design</summary><pre>{html.escape(state.design.to_toml())}</pre>"
-    return f'<div style="{_BOX}">{numbers}{key}{design}</details></div>'
+    numbers, file = markup.inline(*reach_text(reach)), markup.inline(state.design.to_toml())
+    design = f"<details><summary>design</summary><pre>{file}</pre></details>"
+    return f'<div style="{_BOX}">{numbers}{key}{design}</div>'
 
 
 def _image(picture: NDArray[np.uint8] | None) -> str:

@@ -73,6 +73,8 @@ class Appearance:
     alpha_shape: bool = False
     trail: bool = False
     """Where the tip has been."""
+    free: bool = True
+    """The cloud without loads, faint, around that of a loaded arm."""
     ghosts: bool = True
     """The shapes of all solutions of the inverse problem at once."""
     map: MapView = field(default_factory=MapView)
