@@ -30,8 +30,8 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-UNSTABLE = (224, 0, 153)
-"""Magenta, RGB from 0 to 255, of samples whose equilibrium is unstable."""
+UNSTABLE = (255, 125, 0)
+"""Orange, RGB from 0 to 255, of samples whose equilibrium is unstable."""
 
 _RADIUS = 1 / 60  # [L], within which D̄ compares activations
 

@@ -105,7 +105,7 @@ def _check(typed: TypedLoads) -> None:
         good = np.isfinite(numbers) & (numbers >= low) & (numbers <= _MOST)
         if not good.all():
             wrong = f"{numbers[np.flatnonzero(~good)[0]]:g} {unit}"
-            raise InvalidInput(label, wrong, f"{low:g} to {_MOST:g} {unit}")
+            raise InvalidInput(label, wrong, f"{low:,.0f} to {_MOST:,.0f} {unit}")
 
 
 def _in_si(name: str, value: Vector | float) -> Vector | float:

@@ -118,12 +118,14 @@ class Scene:
         if look.alpha_shape and len(reach.alpha_shape.faces):
             self._surface("/alpha-shape", reach.alpha_shape, reach, look.slice, _HULL)
 
-    def draw_axes(self, reach: Reach, look: Appearance) -> None:
-        """The box with numbers around cloud and arm."""
+    def draw_axes(self, reach: Reach, look: Appearance, free: Reach | None = None) -> None:
+        """The box with numbers around cloud and arm, and the cloud without loads."""
         self.remove("/axes")
         if not look.axes:
             return
-        box = axes_box(cloud_points(reach, 14), np.array([[0, 0, 0], [0, 0, 1.0]]))
+        clouds = [reach] if free is None or not look.free else [reach, free]
+        around = (cloud_points(one, 14) for one in clouds)
+        box = axes_box(*around, np.array([[0, 0, 0], [0, 0, 1.0]]))
         self._api.add_line_segments(
             "/axes/lines", box.lines.astype(np.float32), (170, 170, 175), thickness=0.003
         )

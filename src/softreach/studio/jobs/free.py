@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from softreach.arm.manipulator import Manipulator
 from softreach.studio.jobs.job import Job
+from softreach.studio.jobs.reach import draw_axes
 from softreach.studio.reach import Reach, stages
 from softreach.studio.state import StudioState
 from softreach.studio.worker import StaleCheck
@@ -50,6 +51,7 @@ class DrawFree(Job):
         known: Reach | None = session.free
         with session.drawing, session.client.atomic():
             session.scene.draw_free(known, session.state.appearance)
+            draw_axes(session)
         session.show()
 
 

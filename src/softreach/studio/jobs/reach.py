@@ -13,7 +13,7 @@ from softreach.studio.worker import StaleCheck
 if TYPE_CHECKING:
     from softreach.studio.session import Session
 
-__all__ = ["ComputeReach", "DrawCloud", "DrawSurfaces"]
+__all__ = ["ComputeReach", "DrawCloud", "DrawSurfaces", "draw_axes"]
 
 
 class ComputeReach(Job):
@@ -105,4 +105,11 @@ def _draw_points(session: Session) -> None:
         return
     with session.drawing, session.client.atomic():
         session.key = session.scene.draw_cloud(reach, look)
-        session.scene.draw_axes(reach, look)
+        draw_axes(session)
+
+
+def draw_axes(session: Session) -> None:
+    """The box around what is drawn; to be called by whoever holds `Session.drawing`."""
+    if session.reach is not None:
+        free = session.free if session.state.design.loads is not None else None
+        session.scene.draw_axes(session.reach, session.state.appearance, free)

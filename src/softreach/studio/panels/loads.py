@@ -18,7 +18,7 @@ from softreach.studio.loading import (
 )
 from softreach.studio.panels.binding import bind
 from softreach.studio.panels.line import Line
-from softreach.studio.panels.status import comparison_text, tip_text
+from softreach.studio.panels.status import tip_text
 from softreach.studio.rod import rod_of
 from softreach.studio.state import vector
 
@@ -62,14 +62,14 @@ class LoadsPanel:
             self._message = Line(gui)
             gui.add_button("Take all loads off").on_click(lambda _: self._clear())
             self._free = gui.add_checkbox("show the cloud without loads", True)
-            self._comparison, self._posture, self._others = Line(gui), Line(gui), Line(gui)
+            self._posture, self._others = Line(gui), Line(gui)
         self._on(self._direction, self._directed)
         for widget in (self._gravity, self._payload, self._arm, self._force):
             self._on(widget, self._typed)
         bind(self._free, session, lambda s, on: s.showing(free=on))
 
     def show(self, session: Session) -> None:
-        """Show the loads of the design, and what they cost."""
+        """Show the loads of the design, and whether the arm rests under them."""
         design = session.state.design
         with self._lock:
             if design != self._shown:
@@ -79,7 +79,6 @@ class LoadsPanel:
                 others = ", ".join(other_loads(design))
                 self._others.say(*([f"From the design file act too: {others}."] if others else []))
         self._free.value = session.state.appearance.free
-        self._comparison.say(*comparison_text(session))
         self._posture.say(*(tip_text(session) if design.loads is not None else ()))
 
     def _fill(self, loads: TypedLoads) -> None:

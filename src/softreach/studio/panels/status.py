@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from softreach.studio.reach import Reach, Size
     from softreach.studio.session import Session
 
-__all__ = ["StatusPanel", "comparison_text", "reach_text", "tip_text"]
+__all__ = ["StatusPanel", "reach_text", "tip_text"]
 
 _GRAY = Swatch((196, 198, 206))
 _POSTURES = {
@@ -35,14 +35,17 @@ class StatusPanel:
         self._comparison = Line(gui)
         self._key = Line(gui)
         self._legend = Line(gui)
+        self._refusal = Line(gui)
         self._note = Line(gui)
 
     def show(self, session: Session) -> None:
         """Show what is known, and whether it is about to change."""
         self._numbers.say(*_numbers_text(session))
-        self._comparison.say(*comparison_text(session))
+        self._comparison.say(*_comparison_text(session))
         self._key.show(key_html(session.key))
         self._legend.say(*_legend_text(session))
+        refusal = session.reach.refusal if session.reach is not None else ""
+        self._refusal.say(*((f"No exact volume: {refusal}",) if refusal else ()))
         self._note.say(*((session.note,) if session.note else ()))
 
 
@@ -74,7 +77,7 @@ def reach_text(reach: Reach) -> list[Part]:
     return parts
 
 
-def comparison_text(session: Session) -> list[Part]:
+def _comparison_text(session: Session) -> list[Part]:
     """How much of its reach the loads leave an arm; nothing for an arm without loads."""
     if session.state.design.loads is None:
         return []
@@ -109,7 +112,7 @@ def _legend_text(session: Session) -> list[Part]:
         parts.append("every sample rests in a stable equilibrium \N{EN SPACE} ")
     if session.state.appearance.free and session.free is not None:
         parts += [_GRAY, " without loads"]
-    return parts + ([f". No exact volume: {reach.refusal}"] if reach.refusal else [])
+    return parts
 
 
 def _percent(share: float) -> str:
