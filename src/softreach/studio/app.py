@@ -95,6 +95,7 @@ class Studio:
 
     def _connected(self, client: ClientHandle) -> None:
         session = Session(client, self.start)
+        session.compiling = self._compilation.running
         with self._lock:
             self.sessions[client.client_id] = session
         _furnish(session, self.url)

@@ -21,6 +21,11 @@ class CompilationWatch(event.Listener):
         self._changed, self._running, self._lock = changed, 0, threading.Lock()
         event.register(_KIND, self)
 
+    @property
+    def running(self) -> bool:
+        """Whether anything is being compiled."""
+        return self._running > 0
+
     def close(self) -> None:
         """Watch no longer."""
         event.unregister(_KIND, self)
