@@ -19,6 +19,7 @@ from softreach.studio.worker import all_cores
 from softreach.workspace import ReachableSolid
 
 __all__ = [
+    "FAINT",
     "UNSTABLE",
     "color_label",
     "color_names",
@@ -32,6 +33,8 @@ Array = NDArray[np.float64]
 
 UNSTABLE = (255, 125, 0)
 """Orange, RGB from 0 to 255, of samples whose equilibrium is unstable."""
+FAINT = (196, 198, 206)
+"""Gray, of the cloud without loads."""
 
 _RADIUS = 1 / 60  # [L], within which D̄ compares activations
 

@@ -133,6 +133,11 @@ class Reach:
         lost = np.isnan(self.cloud.tip.values).any(axis=1)
         return np.where(lost, TipStatus.NO_EQUILIBRIUM, self.cloud.status.values).astype(np.int8)
 
+    @property
+    def lost_share(self) -> float:
+        """Share of the activation box that the exact set leaves out [-]."""
+        return float(getattr(self.exact, "lost_share", 0.0))  # only sets of loaded arms lose any
+
     def share(self, status: TipStatus) -> float:
         """How many of the samples have a status [-]."""
         return float((self.status == status).mean())

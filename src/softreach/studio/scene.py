@@ -14,7 +14,7 @@ from softreach.arm_shape import arm_surface, bundle_skins
 from softreach.palette import BODY, bundle_color
 from softreach.rod.kinematics import configuration
 from softreach.studio.axes import axes_box
-from softreach.studio.colors import UNSTABLE, sample_colors
+from softreach.studio.colors import FAINT, UNSTABLE, sample_colors
 from softreach.studio.reach import Reach, cloud_points, unstable_samples
 from softreach.studio.rod import solvable_rod
 from softreach.studio.slicing import in_slice, sliced_faces
@@ -36,7 +36,7 @@ _LIFT = 0.02  # of the fibers above the body, in R2
 _CLEAR = 0.45  # opacity of a body that has something inside
 _GHOST, _REFERENCE, _SURFACE, _HULL = 0.35, (150, 150, 158), (90, 140, 200), (220, 150, 60)
 _MARK: Color = (220, 30, 120)
-_FAINT, _FREE_LEVEL, _FREE_SIZE = (196, 198, 206), 15, 0.6
+_FREE_LEVEL, _FREE_SIZE = 15, 0.6
 _UNSTABLE_SIZE = 2.0  # times that of other points: they are few, and not to be overlooked
 
 
@@ -73,7 +73,7 @@ class Scene:
             return
         points = cloud_points(reach, _FREE_LEVEL)
         kept = in_slice(points, look.slice)
-        gray = np.array(_FAINT, np.uint8)
+        gray = np.array(FAINT, np.uint8)
         self._points("/free", points[kept], gray, _FREE_SIZE * look.point_size)
 
     def draw_arm(self, arm: Manipulator, activation: Sequence[float], path: str = "/arm") -> Array:

@@ -106,6 +106,7 @@ class LoadsPanel:
         self._apply()
 
     def _clear(self) -> None:
+        self._fill(TypedLoads())
         self._change(lambda arm: arm.replace(loads=None))
 
     def _apply(self) -> None:

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from softreach.rod.tip_map import TipStatus
-from softreach.studio.colors import UNSTABLE, key_html
+from softreach.studio.colors import FAINT, UNSTABLE, key_html
 from softreach.studio.markup import Part, Strong, Swatch
 from softreach.studio.panels.line import Line
 
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from softreach.studio.reach import Reach, Size
     from softreach.studio.session import Session
 
-__all__ = ["StatusPanel", "reach_text", "tip_text"]
+__all__ = ["StatusPanel", "legend_text", "reach_text", "tip_text"]
 
-_GRAY = Swatch((196, 198, 206))
+_GAP = "\N{EN SPACE} "
 _POSTURES = {
     TipStatus.STABLE: "a stable equilibrium",
     TipStatus.UNSTABLE: "an unstable equilibrium: a real arm leaves it",
@@ -43,10 +43,15 @@ class StatusPanel:
         self._numbers.say(*_numbers_text(session))
         self._comparison.say(*_comparison_text(session))
         self._key.show(key_html(session.key))
-        self._legend.say(*_legend_text(session))
-        refusal = session.reach.refusal if session.reach is not None else ""
-        self._refusal.say(*((f"No exact volume: {refusal}",) if refusal else ()))
+        self._explain_marks(session)
         self._note.say(*((session.note,) if session.note else ()))
+
+    def _explain_marks(self, session: Session) -> None:
+        reach = session.reach
+        free = session.state.appearance.free and session.free is not None
+        self._legend.say(*(legend_text(reach, free=free) if reach is not None else ()))
+        refusal = reach.refusal if reach is not None else ""
+        self._refusal.say(*((f"No exact volume: {refusal}",) if refusal else ()))
 
 
 def _numbers_text(session: Session) -> list[Part]:
@@ -71,6 +76,8 @@ def reach_text(reach: Reach) -> list[Part]:
         parts += [Strong(f"{name} {value:.4f} ± {error:.1g} {unit}"), " · "]
     if not math.isnan(reach.unreachability):
         parts += [Strong(f"UNR {100 * reach.unreachability:.2f} %"), " · "]
+    if reach.lost_share:
+        parts.append(f"{_percent(reach.lost_share)} of the activations left out · ")
     parts.append(f"{reach.samples:,} samples")
     if reach.fine and reach.samples < reach.wanted:
         parts.append(f" of {reach.wanted:,}: those of a loaded arm take long")
@@ -98,21 +105,23 @@ def _present_size(session: Session) -> Size | None:
     return reach.size if reach is not None and reach.arm == session.state.design else None
 
 
-def _legend_text(session: Session) -> list[Part]:
-    """What marks stand for, how many samples they are, and what is left out."""
-    reach = session.reach
-    if session.state.design.loads is None or reach is None or reach.arm.loads is None:
+def legend_text(reach: Reach, *, free: bool) -> list[Part]:
+    """What marks stand for, how many samples they are, and what is left out.
+
+    Args:
+        reach: What is shown; of an arm without loads there is nothing to say.
+        free: Whether the cloud without loads is shown too.
+    """
+    if reach.arm.loads is None:
         return []
     parts: list[Part] = []
     if unstable := reach.share(TipStatus.UNSTABLE):
-        parts += [Swatch(UNSTABLE), f" unstable: {_percent(unstable)} of the samples \N{EN SPACE} "]
+        parts += [Swatch(UNSTABLE), f" unstable: {_percent(unstable)} of the samples {_GAP}"]
     if lost := reach.share(TipStatus.NO_EQUILIBRIUM):
-        parts.append(f"no equilibrium, not shown: {_percent(lost)} \N{EN SPACE} ")
+        parts.append(f"no equilibrium, not shown: {_percent(lost)} {_GAP}")
     if not unstable and not lost:
-        parts.append("every sample rests in a stable equilibrium \N{EN SPACE} ")
-    if session.state.appearance.free and session.free is not None:
-        parts += [_GRAY, " without loads"]
-    return parts
+        parts.append(f"every sample rests in a stable equilibrium {_GAP}")
+    return [*parts, Swatch(FAINT), " without loads"] if free else parts
 
 
 def _percent(share: float) -> str:
