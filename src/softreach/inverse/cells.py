@@ -47,7 +47,8 @@ def activation_cells(
     corner = np.concatenate(kept)
     mesh, torn = _mesh(lattice, corner), np.zeros(len(corner), bool)
     if rod.supports_unstable:
-        torn = ~(mesh.interpolation_error <= _TORN * rod.length)
+        torn = ~np.isfinite(lattice.det[corner]).all(axis=1)
+        torn |= mesh.interpolation_error > _TORN * rod.length
     if torn.any():
         mesh = _mesh(lattice, corner[~torn])
     return mesh, _torn(lattice, corner[torn], cells)

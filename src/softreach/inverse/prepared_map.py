@@ -118,11 +118,14 @@ def prepared_map(
         arm: The design, or its tip map; what is prepared already is returned as it is.
         tol: Largest tip error, in L.
         cells: With three free bundles: cells along each axis of the activation box.
-        depth: How often a cell is halved where det ∂r/∂γ changes sign or is uneven.
+        depth: How often a cell is halved where det ∂r/∂γ changes sign or is uneven; once at least
+            for an arm under loads.
     """
     if isinstance(arm, PreparedMap):
         return arm
-    return _of_map(measured_bundles(tip_map(arm, tol)), cells, depth)
+    rod = measured_bundles(tip_map(arm, tol))
+    # Loads make the map steep before an equilibrium is lost.
+    return _of_map(rod, cells, max(depth, 1) if rod.supports_unstable else depth)
 
 
 @lru_cache(maxsize=4)
