@@ -63,7 +63,7 @@ class PreparedMap:
     @cached_property
     def proves(self) -> bool:
         """Whether what a cell of activations reaches is bounded; of loaded arms it is not."""
-        return bool(np.isfinite(self.whole.linearization_error(self.whole.box.widths)))
+        return bool(np.isfinite(self.whole.farthest()))
 
     @property
     def dimension(self) -> int:

@@ -220,7 +220,7 @@ def _solutions(
     yielding = request.direction is not None and prepared.dimension <= 3
     if proved_gaps is not None:
         bounds[out] = proved_gaps[out]
-    elif len(out) and not yielding and prepared.proves:
+    elif len(out) and not yielding and (prepared.proves or not prepared.dimension):
         bounds[out] = gap_bounds(rod, prepared.coarse_cells, request.targets[out], far)
     proved = bounds[out] > request.residual
     statuses[out] = np.where(proved, Status.UNREACHABLE, Status.NOT_FOUND)
