@@ -109,5 +109,5 @@ def _expanded(
 
 def _cautious(gradient: Array, scales: Array) -> Array:
     """Instead of a Hessian next to where the function ends: steps down, of a tenth of the ranges."""
-    size = np.abs(gradient * scales).max(axis=1)
+    size = np.abs(gradient * scales).max(axis=1, initial=0.0)
     return (10.0 * size / scales[:, None] ** 2).T[:, :, None] * np.eye(len(scales))
