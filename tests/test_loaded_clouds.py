@@ -121,7 +121,9 @@ def test_unstable_samples_have_a_color_of_their_own_and_a_key(cloud, color):
     assert not (coloring.rgb[~unstable] == marks[0]).all(axis=1).any()
     assert coloring.key is not None
     assert coloring.key.unstable
-    assert not color_samples(kept(cloud), color).key.unstable
+    plain = color_samples(kept(cloud), color).key
+    assert plain is not None
+    assert not plain.unstable
 
 
 def test_a_cloud_of_free_bundles_is_that_of_the_arm():

@@ -33,7 +33,8 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
     With J = ∂r/∂γ, of shape (3, m): manipulability is √det(J Jᵀ) [Yoshikawa1985], for three
     bundles |det J|, the volume that the tip sweeps per unit of activations; with fewer bundles
     √det(Jᵀ J), the area or length. It vanishes, and the condition number is infinite, on a fold.
-    Under loads J is that of the equilibrium; samples without a stable one are NaN, of orientation 0.
+    Under loads J is that of the equilibrium; of samples without a stable one all is NaN
+    and the orientation 0.
 
     Args:
         cloud: A cloud; its design and tolerance are in its attributes. It is read in blocks.

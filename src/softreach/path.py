@@ -41,8 +41,8 @@ def track_path(
 
     Each substep is predicted by the Jacobian and corrected by Newton's method; it is halved while
     the correction is large, while det J changes sign (three free bundles), while a bound is
-    overstepped or while there is no stable equilibrium. With more free bundles the change of activation is least in every substep, and
-    bundles wait at their bounds.
+    overstepped or while there is no stable equilibrium. With more free bundles the change of
+    activation is least in every substep, and bundles wait at their bounds.
 
     Args:
         arm: A design with three free bundles or more, or its tip map.

@@ -72,7 +72,7 @@ _STATUS = "0=stable 1=unstable 2=no_equilibrium"
 
 
 def with_status(cloud: xr.Dataset, status: NDArray[np.int8]) -> xr.Dataset:
-    """The cloud, with whether each tip is a stable equilibrium: a coordinate, so that tips keep it."""
+    """The cloud, with a coordinate that says whether each tip is a stable equilibrium."""
     about = {"units": "1", "long_name": "status of the tip", "meanings": _STATUS}
     return cloud.assign_coords(status=("sample", status, about))
 

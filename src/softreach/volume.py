@@ -156,7 +156,7 @@ def _positions(points: np.ndarray | xr.DataArray) -> np.ndarray:
     array = np.asarray(points)
     if getattr(points, "dims", None) == ("axis", "sample"):
         array = array.T
-    if "status" in getattr(points, "coords", ()):
+    if not isinstance(points, np.ndarray) and "status" in getattr(points, "coords", ()):
         array = array[is_stable(points)]
     return finite_points(array)
 

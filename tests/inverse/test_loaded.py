@@ -1,4 +1,4 @@
-"""The inverse problem and paths of arms whose loads leave some activations without a stable rest."""
+"""The inverse problem and paths of arms whose loads leave some activations no stable rest."""
 
 from __future__ import annotations
 
@@ -19,6 +19,13 @@ from tests.rod.test_loaded_rod import oracle
 TARGETS = 300
 
 
+def loaded(arm: Manipulator) -> LoadedRod:
+    """The tip map that has equilibria."""
+    rod = tip_map(arm)
+    assert isinstance(rod, LoadedRod)
+    return rod
+
+
 def hanging(payload: float, **loads) -> Manipulator:
     return designs.lce_arm().replace(
         loads=Loads(gravity=(0.0, 0.0, 9.81), payload=payload, **loads)
@@ -35,10 +42,8 @@ def heavy() -> Manipulator:
 @pytest.fixture(scope="module")
 def samples(heavy):
     """Random activations with their equilibria."""
-    gamma = np.random.default_rng(0).uniform(*heavy.bounds.T, (20_000, 3))
-    rod = tip_map(heavy)
-    assert isinstance(rod, LoadedRod)
-    return gamma, rod.equilibria(gamma)
+    gamma = np.random.default_rng(0).uniform(heavy.bounds[:, 0], heavy.bounds[:, 1], (20_000, 3))
+    return gamma, loaded(heavy).equilibria(gamma)
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +64,7 @@ def stable(heavy, samples):
 )
 def test_tips_under_general_loads_are_solved_back(loads):
     arm = designs.lce_arm().replace(loads=loads)
-    gamma = np.random.default_rng(1).uniform(*arm.bounds.T, (20, 3))
+    gamma = np.random.default_rng(1).uniform(arm.bounds[:, 0], arm.bounds[:, 1], (20, 3))
     solutions = solve_inverse(arm, tip_map(arm).tips(gamma))
     for solution, wanted in zip(solutions, gamma, strict=True):
         assert solution.status is Status.REACHED
@@ -83,7 +88,7 @@ def test_some_tips_have_several_stable_activations(stable):
 
 def test_every_root_is_a_stable_equilibrium_at_its_target(heavy, stable):
     _, targets, solutions = stable
-    found = tip_map(heavy).equilibria(solutions.activations)
+    found = loaded(heavy).equilibria(solutions.activations)
     assert (found.status == TipStatus.STABLE).all()
     missed = np.linalg.norm(found.tips - np.repeat(targets, solutions.counts, axis=0), axis=1)
     assert missed.max() <= 1e-6 * heavy.length
@@ -91,7 +96,7 @@ def test_every_root_is_a_stable_equilibrium_at_its_target(heavy, stable):
 
 
 def test_the_most_patient_continuation_finds_the_roots_stable_too(heavy, stable):
-    rod, gamma = tip_map(heavy), stable[2].activations[:100]
+    rod, gamma = loaded(heavy), stable[2].activations[:100]
     slowly = rod.solver.slowly(gamma)
     assert (slowly.status == TipStatus.STABLE).all()
     assert np.abs(slowly.tips - rod.tips(gamma)).max() <= 1e-6 * heavy.length
@@ -101,7 +106,7 @@ def test_a_shooting_from_the_base_puts_the_tip_of_a_root_at_its_target(heavy, st
     _, targets, solutions = stable
     several = np.flatnonzero(solutions.counts > 1)[0]
     for gamma in solutions[several].activations:
-        asked = oracle(heavy, tip_map(heavy).body, gamma, heavy.loads)
+        asked = oracle(heavy, loaded(heavy).body, gamma, heavy.loads)
         tip = loaded_rod.equilibrium(*asked, rtol=1e-10).tip
         assert np.linalg.norm(tip - targets[several]) <= 1e-6 * heavy.length
 
@@ -124,7 +129,7 @@ def test_nothing_is_proved_of_a_loaded_arm(heavy):
     far = solve_inverse(heavy, [[10 * heavy.length, 0.0, 0.0]])[0]
     assert far.status is Status.NOT_FOUND
     assert far.gap_bound == 0.0
-    nearest = tip_map(heavy).equilibria(far.nearest_activation[None])
+    nearest = loaded(heavy).equilibria(far.nearest_activation[None])
     assert nearest.status[0] == TipStatus.STABLE
     assert np.linalg.norm(nearest.tips[0] - far.nearest) <= 1e-6 * heavy.length
 
@@ -147,7 +152,7 @@ def torn_line(rod: LoadedRod, samples) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_a_path_into_an_edge_of_stability_ends_there_by_name(heavy, samples):
-    rod = tip_map(heavy)
+    rod = loaded(heavy)
     line, status = torn_line(rod, samples)
     last = int(np.argmax(status != TipStatus.STABLE)) - 1
     tips = rod.tips_and_slopes(line[: last + 1])[0]
@@ -173,7 +178,7 @@ def test_a_path_into_an_edge_of_stability_ends_there_by_name(heavy, samples):
 
 
 def test_the_end_of_a_path_is_where_its_length_says(heavy, samples):
-    rod = tip_map(heavy)
+    rod = loaded(heavy)
     line, status = torn_line(rod, samples)
     last = int(np.argmax(status != TipStatus.STABLE)) - 1
     tips = rod.tips_and_slopes(line[: last + 1])[0]

@@ -21,9 +21,7 @@ _TORN = 0.05  # interpolation error in L beyond which corners are taken to be on
 _MOST_CELLS = 300_000
 
 
-def activation_cells(
-    rod: TipMap, cells: int, depth: int = 0
-) -> tuple[ActivationMesh, TornCells]:
+def activation_cells(rod: TipMap, cells: int, depth: int = 0) -> tuple[ActivationMesh, TornCells]:
     """Cells of the activation box with tips and Jacobians at their corners; those without apart.
 
     Args:

@@ -108,6 +108,6 @@ def _expanded(
 
 
 def _cautious(gradient: Array, scales: Array) -> Array:
-    """Instead of a Hessian next to where the function ends: steps down, of a tenth of the ranges."""
+    """In place of a Hessian, next to where a function ends: steps down of a tenth of the ranges."""
     size = np.abs(gradient * scales).max(axis=1, initial=0.0)
     return (10.0 * size / scales[:, None] ** 2).T[:, :, None] * np.eye(len(scales))

@@ -229,7 +229,7 @@ class LoadedRod(TipMap):
     def strain_range(self, stations: ArrayLike) -> StrainRange:
         """Ranges of the strains at stations Z [m] over the pilot of the activation box.
 
-        Unlike those of a free rod they are no bounds: other activations may strain it a little more.
+        Unlike those of a free rod they are no bounds: others may strain it a little more.
 
         Raises:
             InvalidInput: None of the pilot has an equilibrium.
