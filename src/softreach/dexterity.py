@@ -121,7 +121,7 @@ def _tasks(slope: Array, measure: Array, condition: Array, sign: Signs) -> Itera
 
 
 def _measure(slope: Array, measure: Array, condition: Array, sign: Signs) -> None:
-    known = np.isfinite(slope).all(axis=(1, 2))
+    known = np.asarray(np.isfinite(slope).all(axis=(1, 2)))
     if not known.all():
         slope = np.where(known[:, None, None], slope, 0.0)
     sigma = np.linalg.svd(slope, compute_uv=False)

@@ -40,7 +40,7 @@ class CellGrid:
             InvalidInput: Points of another shape, infinite or none; an edge that is not positive,
                 or so small that the grid would not fit into memory.
         """
-        placed = ~np.isnan(points).all(axis=-1)
+        placed = np.asarray(~np.isnan(points).all(axis=-1))
         points = finite_points(points[placed])
         if len(points) == 0:
             raise InvalidInput("points", "none", "at least one")

@@ -119,10 +119,11 @@ def _starts(
 def _with_torn(prepared: PreparedMap, request: Request, starts: _Starts) -> _Starts:
     """The starts, and more from corners of cells that have no image."""
     target, gamma = prepared.torn_cells.starts(request.targets)
-    more = _Starts(target, np.full(len(target), -1), gamma)
-    both = _Starts(*(np.concatenate(columns) for columns in zip(starts, more, strict=True)))
-    order = np.argsort(both.target, kind="stable")
-    return _Starts(*(column[order] for column in both))
+    target = np.concatenate([starts.target, target])
+    cell = np.concatenate([starts.cell, np.full(len(target) - len(starts.cell), -1)])
+    gamma = np.concatenate([starts.gamma, gamma])
+    order = np.argsort(target, kind="stable")
+    return _Starts(target[order], cell[order], gamma[order])
 
 
 def _newton(prepared: PreparedMap, request: Request, starts: _Starts) -> Roots:

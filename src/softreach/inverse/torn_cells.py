@@ -34,7 +34,9 @@ class TornCells(NamedTuple):
     @classmethod
     def at(cls, gamma: Array, tip: Array, slope: Array, widths: Array) -> TornCells:
         """Vertices (n, 3) with ∂r/∂γ [m], of cells of these widths, shape (3,)."""
-        inverse = np.linalg.pinv(slope * widths) if len(slope) else slope
+        inverse = np.empty_like(slope)
+        if len(slope):
+            inverse[:] = np.linalg.pinv(slope * widths)
         return cls(gamma, tip, inverse)
 
     def starts(self, targets: Array) -> tuple[Index, Array]:
