@@ -95,7 +95,7 @@ def placed(rod: TipMap, gamma: Array) -> tuple[Array, NDArray[np.bool_]]:
     tips, slopes = np.empty((len(gamma), 3)), np.empty((len(gamma), 3, rod.box.bundles))
     status = np.empty(len(gamma), np.int8)
     parallel.run(
-        partial(rod.fill_slopes_and_status, gamma[b], tips[b], slopes[b], status[b])
+        partial(rod.fill_slopes_and_status, gamma[b], tips[b], slopes[b], status=status[b])
         for b in parallel.blocks(len(gamma), BLOCK // 8)
     )
     return tips, status == TipStatus.STABLE

@@ -173,7 +173,7 @@ class LoadedRod(TipMap):
         position_slopes(tips, response.twists, slopes)
 
     def fill_slopes_and_status(
-        self, gamma: Array, tips: Array, slopes: Array, status: NDArray[np.int8]
+        self, gamma: Array, tips: Array, slopes: Array, *, status: NDArray[np.int8]
     ) -> None:
         """Put tips, ∂r/∂γ (n, 3, bundles) [m] and `TipStatus` (n,) into place."""
         response = self._solver.respond(gamma)

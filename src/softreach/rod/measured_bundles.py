@@ -98,10 +98,10 @@ class MeasuredBundles(TipMap):
         slopes *= self.measures
 
     def fill_slopes_and_status(
-        self, gamma: Array, tips: Array, slopes: Array, status: NDArray[np.int8]
+        self, gamma: Array, tips: Array, slopes: Array, *, status: NDArray[np.int8]
     ) -> None:
         """Put tips, ∂r/∂γ (n, 3, bundles) [m] and `TipStatus` (n,) into place."""
-        self.whole.fill_slopes_and_status(gamma * self.measures, tips, slopes, status)
+        self.whole.fill_slopes_and_status(gamma * self.measures, tips, slopes, status=status)
         slopes *= self.measures
 
     def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:

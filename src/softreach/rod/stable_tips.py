@@ -69,13 +69,13 @@ class StableTips(TipMap):
 
     def fill_slopes(self, gamma: Array, tips: Array, slopes: Array) -> None:
         """Put tips (n, 3) and ∂r/∂γ (n, 3, bundles) [m] into place."""
-        self.fill_slopes_and_status(gamma, tips, slopes, np.empty(len(gamma), np.int8))
+        self.fill_slopes_and_status(gamma, tips, slopes, status=np.empty(len(gamma), np.int8))
 
     def fill_slopes_and_status(
-        self, gamma: Array, tips: Array, slopes: Array, status: NDArray[np.int8]
+        self, gamma: Array, tips: Array, slopes: Array, *, status: NDArray[np.int8]
     ) -> None:
         """Put tips, ∂r/∂γ (n, 3, bundles) [m] and `TipStatus` (n,) into place."""
-        self.whole.fill_slopes_and_status(gamma, tips, slopes, status)
+        self.whole.fill_slopes_and_status(gamma, tips, slopes, status=status)
         _drop(status, tips, slopes)
 
     def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:

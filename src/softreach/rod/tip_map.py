@@ -208,7 +208,7 @@ class TipMap(ABC):
         status[:] = TipStatus.STABLE
 
     def fill_slopes_and_status(
-        self, gamma: Array, tips: Array, slopes: Array, status: NDArray[np.int8]
+        self, gamma: Array, tips: Array, slopes: Array, *, status: NDArray[np.int8]
     ) -> None:
         """Put tips, ∂r/∂γ (n, 3, bundles) [m] and `TipStatus` (n,) into place."""
         self.fill_slopes(gamma, tips, slopes)
