@@ -17,6 +17,9 @@ from softreach.arm.manipulator import Manipulator
 from softreach.atomic import replacing
 from softreach.errors import InvalidInput
 from softreach.progress import Progress, bar, silent
+from softreach.rod.free_bundles import FreeBundles
+from softreach.rod.measured_bundles import MeasuredBundles
+from softreach.rod.stable_tips import StableTips
 from softreach.rod.tip_map import BLOCK, TipMap, tip_map
 from softreach.sampling import check_sampler, cube_blocks
 
@@ -43,7 +46,8 @@ def compute_cloud(
     Memory is the result's own, (3 + bundles) 8 bytes a sample, and a few blocks.
 
     Args:
-        arm: The design, or its tip map.
+        arm: The design, or its tip map; of one restricted to some bundles or in other measures,
+            the whole.
         n: Number of samples.
         seed: Seed of the sampler.
         sampler: `uniform` (the paper's), `boundary`, `sobol` or `grid`; see `sampling.sample_cube`.
@@ -54,12 +58,14 @@ def compute_cloud(
     Returns:
         Dataset with `tip` (sample, axis) [m] and `activation` (sample, bundle) [its unit]; its
         attributes hold the design, seed, sampler, tol and versions. For an arm under loads also
-        `status` (sample), a `TipStatus`; a tip without equilibrium is NaN.
+        the coordinate `status` (sample), a `TipStatus`; a tip without equilibrium is NaN.
 
     Raises:
         InvalidInput: An argument out of range; the message says what to use instead.
     """
-    rod = tip_map(arm, tol)
+    rod = _of_all_bundles(tip_map(arm, tol))
+    if rod.supports_unstable:
+        rod.tips(rod.box.low[None])  # what all samples need, once and not on every thread
     bundles = rod.box.bundles
     check_sampler(sampler, n, bundles, seed)
     activation, tip = np.empty((n, bundles)), np.empty((n, 3))
@@ -109,6 +115,13 @@ def design_of(cloud: xr.Dataset) -> Manipulator:
 def tip_map_of(cloud: xr.Dataset) -> TipMap:
     """The tip map that a cloud was computed with."""
     return tip_map(design_of(cloud), float(cloud.attrs["tol"]))
+
+
+def _of_all_bundles(rod: TipMap) -> TipMap:
+    """The map of every bundle, in its own unit, of which this one may be a restriction."""
+    while isinstance(rod, FreeBundles | MeasuredBundles | StableTips):
+        rod = rod.whole
+    return rod
 
 
 _LONG = 5_000_000  # samples from which a bar is worth showing

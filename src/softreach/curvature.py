@@ -18,6 +18,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.cloud import tip_map_of
 from softreach.errors import InvalidInput
 from softreach.rod.activation_box import as_floats
+from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import Strains, TipMap, tip_map
 from softreach.schema import provenance
 
@@ -60,7 +61,9 @@ def curvature_statistics(
     number of stations times samples.
 
     Two things limit the numbers: quantiles are accurate to one bin, and all of them are those of a
-    sample, whose mean is off by about `..._std` / √n, with n in the attribute `samples`.
+    sample, whose mean is off by about `..._std` / √n, with n in the attribute `samples`. Of an arm
+    under loads only stable equilibria count, and bins span the strains of a pilot of activations:
+    what is beyond counts in the last bin, with exact extremes and moments.
 
     Args:
         cloud: A cloud; its design and activations are used.
@@ -101,7 +104,7 @@ def stream_statistics(
     Raises:
         InvalidInput: As for `curvature_statistics`; also no activations at all.
     """
-    rod = tip_map(arm)
+    rod = stable_tips(tip_map(arm))
     asked = distal_stations(rod) if stations is None else stations
     z = rod.check_stations(np.atleast_1d(as_floats("stations", asked)), ascending=False)
     _check_resolution(bins, quantiles)
@@ -131,7 +134,7 @@ def _strains(rod: TipMap, activations: Iterable[Array], z: Array) -> Iterator[St
 
 
 def _in_equilibrium(strains: Strains) -> Strains:
-    """Those of the samples that have an equilibrium; the others are NaN."""
+    """Those of the samples that have a stable equilibrium; the others are NaN."""
     settled = np.isfinite(strains.extension).all(axis=1)
     return Strains(strains.curvature[settled], strains.extension[settled])
 

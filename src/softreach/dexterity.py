@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from softreach import parallel
 from softreach.cloud import tip_map_of
 from softreach.errors import InvalidInput
+from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import BLOCK
 from softreach.schema import cell_dataset, check_cloud, tip_cells
 
@@ -32,6 +33,8 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
     With J = ∂r/∂γ, of shape (3, m): manipulability is √det(J Jᵀ) [Yoshikawa1985], for three
     bundles |det J|, the volume that the tip sweeps per unit of activations; with fewer bundles
     √det(Jᵀ J), the area or length. It vanishes, and the condition number is infinite, on a fold.
+    Under loads J is that of the equilibrium; of samples without a stable one all is NaN
+    and the orientation 0.
 
     Args:
         cloud: A cloud; its design and tolerance are in its attributes. It is read in blocks.
@@ -46,14 +49,15 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
     import xarray as xr
 
     check_cloud(cloud)
-    rod, n = tip_map_of(cloud), cloud.sizes["sample"]
+    rod, n = stable_tips(tip_map_of(cloud)), cloud.sizes["sample"]
     measure, condition = np.empty(n), np.empty(n)
     sign = np.empty(n, np.int8)
     for rows in parallel.blocks(n, 8 * BLOCK):
         _, slope = rod.tips_and_slopes(cloud.activation[rows].values)
         parallel.run(_tasks(slope, measure[rows], condition[rows], sign[rows]))
     unit = {1: "m", 2: "m2"}.get(rod.box.bundles, "m3")
-    result = xr.Dataset(attrs=cloud.attrs)
+    status = {"status": cloud.coords["status"]} if "status" in cloud.coords else {}
+    result = xr.Dataset(coords=status, attrs=cloud.attrs)
     result["manipulability"] = ("sample", measure, {"units": unit, "long_name": "√det(J Jᵀ)"})
     result["condition"] = (
         "sample",
@@ -73,7 +77,8 @@ def solution_measure(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Data
     No inverse problem is solved: by the coarea formula ([Federer1969], 3.2.12) the integral of that
     measure over a cell is ∫ √det(J Jᵀ) dγ over the activations that lead into it, here the mean
     over a cloud that fills the activation box evenly. Values are means over a cell; a cell that
-    the border of the reachable set cuts has a mean over its empty part too.
+    the border of the reachable set cuts has a mean over its empty part too. Activations without a
+    stable equilibrium reach nothing.
 
     Args:
         cloud: A cloud of three bundles or more, sampled evenly: uniform or sobol.
@@ -116,7 +121,11 @@ def _tasks(slope: Array, measure: Array, condition: Array, sign: Signs) -> Itera
 
 
 def _measure(slope: Array, measure: Array, condition: Array, sign: Signs) -> None:
+    known = np.asarray(np.isfinite(slope).all(axis=(1, 2)))
+    if not known.all():
+        slope = np.where(known[:, None, None], slope, 0.0)
     sigma = np.linalg.svd(slope, compute_uv=False)
+    sigma[~known] = np.nan
     measure[:] = sigma.prod(axis=1)  # theory (41)
     with np.errstate(divide="ignore", invalid="ignore"):  # no motion at all: 0/0 is NaN
         condition[:] = sigma[:, 0] / sigma[:, -1]

@@ -12,9 +12,10 @@ from softreach.errors import InvalidInput
 from softreach.inverse import PathStatus, solve_inverse
 from softreach.inverse.continuation import BranchEnd, BranchPoint, Continuation
 from softreach.inverse.request import checked_activations, checked_residual, checked_targets
+from softreach.inverse.roots import placed
 from softreach.rod.free_bundles import free_bundles
 from softreach.rod.measured_bundles import bundle_measures, measured_bundles
-from softreach.rod.settled import check_settled
+from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 
@@ -39,9 +40,9 @@ def track_path(
     """Follow a path of tip positions, straight between its points, on one branch.
 
     Each substep is predicted by the Jacobian and corrected by Newton's method; it is halved while
-    the correction is large, while det J changes sign (three free bundles) or while a bound is
-    overstepped. With more free bundles the change of activation is least in every substep, and
-    bundles wait at their bounds.
+    the correction is large, while det J changes sign (three free bundles), while a bound is
+    overstepped or while there is no stable equilibrium. With more free bundles the change of
+    activation is least in every substep, and bundles wait at their bounds.
 
     Args:
         arm: A design with three free bundles or more, or its tip map.
@@ -54,20 +55,22 @@ def track_path(
     Returns:
         Dataset over `point` with `activation` [-] and `tip_error` [m], NaN beyond the end of the
         branch, and `status` (`PathStatus`); `end_activation` and `end_position` are the last on
-        the branch, and the attributes name how it ended: `end` ("" if the whole path is
-        followed), `end_bundle` and `end_bound`.
+        the branch, `end_length` the length of path up to there and `end_length_error` how much
+        farther the branch may go [m]; the attributes name how it ended: `end` ("" if the whole
+        path is followed, else `fold`, `bound`, `unstable` or `no_start`), `end_bundle` and
+        `end_bound`.
 
     Raises:
         InvalidInput: Arguments of another shape or not finite, or fewer than three free bundles.
     """
     points = checked_targets("path", path)
-    rod = measured_bundles(check_settled(tip_map(arm, tol)))
+    rod = measured_bundles(tip_map(arm, tol))
     if rod.box.dimension < 3:
         raise InvalidInput("free bundles", rod.box.dimension, "3 or more to follow a path in space")
     if not len(points):
         raise InvalidInput("path.shape", points.shape, "of shape (k, 3) with one point or more")
     residual = checked_residual(residual_over_length)
-    tracker = Continuation(free_bundles(rod), residual * rod.length)
+    tracker = Continuation(free_bundles(stable_tips(rod)), residual * rod.length)
     if start is not None:
         gamma = checked_activations("start", start, rod.box, 1)[0]
         gamma = gamma / bundle_measures(rod)[rod.box.free]
@@ -115,12 +118,13 @@ def _dataset(
     status = np.full(len(points), int(outcome), np.int8)
     status[:n] = PathStatus.FOLLOWED
     activation, measures = np.full((len(points), box.bundles), np.nan), bundle_measures(rod)
+    length, length_error = _end_length(points, n, end)
     error = np.full(len(points), np.nan)
     end_activation, end_position = np.full(box.bundles, np.nan), np.full(3, np.nan)
     bundle = bound = ""
     if end is not None:
         activation[:n] = box.with_held(np.array(followed))
-        error[:n] = np.linalg.norm(rod.tips(activation[:n]) - points[:n], axis=1)
+        error[:n] = np.linalg.norm(placed(rod, activation[:n])[0] - points[:n], axis=1)
         end_activation, end_position = box.with_held(end.point.gamma[None])[0], end.point.tip
         if end.status == PathStatus.BOUND:
             bundle, bound = box.names[box.free[end.bundle]], "upper" if end.upper else "lower"
@@ -132,6 +136,8 @@ def _dataset(
             "status": ("point", status, {"units": "1", "meanings": _MEANINGS}),
             "end_activation": ("bundle", end_activation * measures, units),
             "end_position": ("axis", end_position, {"units": "m"}),
+            "end_length": ((), length, {"units": "m"}),
+            "end_length_error": ((), length_error, {"units": "m"}),
         },
         {"axis": list(AXES), **bundle_coordinates(rod.arm)},
         {
@@ -141,3 +147,14 @@ def _dataset(
             "end_bound": bound,
         },
     )
+
+
+def _end_length(points: Array, followed: int, end: BranchEnd | None) -> tuple[float, float]:
+    """The length of path up to the end of the branch [m], and its error."""
+    if end is None:
+        return np.nan, np.nan
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    length = float(lengths[: followed - 1].sum())
+    if end.status != PathStatus.FOLLOWED:
+        length += end.done * float(lengths[followed - 1])
+    return length, end.error

@@ -14,7 +14,7 @@ from softreach.errors import InvalidInput
 from softreach.geometry.neighbors import mean_value_distance
 from softreach.quantity import quantity
 from softreach.rod.measured_bundles import activation_measures
-from softreach.schema import cell_dataset, check_cloud, tip_cells
+from softreach.schema import cell_dataset, check_cloud, is_stable, tip_cells
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,7 +41,8 @@ def activation_distance(
     D̄(p_i, r) = Σ_j ‖Γ_j - Γ_i‖₂ / K over the K *other* points j with |p_j - p_i| <= r. Point i
     itself is not counted; another point at the same place is. Where K = 0 the point is isolated
     and D̄ is NaN. Neighbors always come from the full cloud, whatever is evaluated. Where bundles
-    have different units, the activation of each counts in its own range.
+    have different units, the activation of each counts in its own range. Of an arm under loads the
+    tips that are no stable equilibria are nobody's neighbors, and D̄ there is NaN.
 
     Memory is a sorted copy of the cloud and a few blocks, however many neighbors there are; the
     result does not depend on the number of threads.
@@ -67,8 +68,11 @@ def activation_distance(
     tip, activation = cloud["tip"].values, cloud["activation"].values
     if "unit" in cloud.coords:
         activation = activation / activation_measures(Manipulator.from_toml(cloud.attrs["design"]))
-    mean, others = mean_value_distance(tip, activation, radius, chosen)
     sample = np.arange(cloud.sizes["sample"]) if chosen is None else chosen
+    if (stable := is_stable(cloud)).all():
+        mean, others = mean_value_distance(tip, activation, radius, chosen)
+    else:
+        mean, others = _among(stable, tip, activation, radius, sample)
     counted = {"long_name": "other tips within the radius", "units": "1"}
     return xr.DataArray(
         mean,
@@ -84,6 +88,17 @@ def activation_distance(
     )
 
 
+def _among(
+    stable: NDArray[np.bool_], tip: Array, activation: Array, radius: float, sample: Index
+) -> tuple[Array, Index]:
+    """D̄ and K of some samples among the stable ones; NaN and 0 of those that are not."""
+    mean, others = np.full(len(sample), np.nan), np.zeros(len(sample), np.intp)
+    asked, number = stable[sample], np.cumsum(stable) - 1
+    found = mean_value_distance(tip[stable], activation[stable], radius, number[sample[asked]])
+    mean[asked], others[asked] = found
+    return mean, others
+
+
 @dataclass(frozen=True, kw_only=True, repr=False)
 class RedundancySummary:
     """D̄ of a cloud in numbers; isolated points count in `isolated` alone.
@@ -93,7 +108,7 @@ class RedundancySummary:
     """
 
     evaluated: int
-    """Number of points evaluated."""
+    """Number of points evaluated, stable equilibria all of them."""
     isolated: float
     """Share of them without a neighbor [-]."""
     median: float
@@ -171,12 +186,13 @@ def redundancy_summary(
     """
     values = distance.values[np.isfinite(distance.values)]
     grid, evaluated = tip_cells(cloud, cell), _samples(distance, cloud)
+    stable = is_stable(cloud)[evaluated]
     mean = grid.mean(distance.values, evaluated)
     known = np.isfinite(mean)
     found = np.quantile(values, quantiles) if len(values) else np.full(len(quantiles), np.nan)
     return RedundancySummary(
-        evaluated=len(evaluated),
-        isolated=_share(np.isnan(distance.values)),
+        evaluated=int(stable.sum()),
+        isolated=_share(np.isnan(distance.values[stable])),
         median=float(np.median(values)) if len(values) else np.nan,
         median_error=_median_error(values),
         quantiles=dict(zip(map(float, quantiles), found.tolist(), strict=True)),

@@ -27,6 +27,7 @@ __all__ = [
     "check_cloud",
     "cloud_dataset",
     "configuration_dataset",
+    "is_stable",
     "provenance",
     "storable",
     "tip_cells",
@@ -71,9 +72,16 @@ _STATUS = "0=stable 1=unstable 2=no_equilibrium"
 
 
 def with_status(cloud: xr.Dataset, status: NDArray[np.int8]) -> xr.Dataset:
-    """The cloud, with whether each tip is a stable equilibrium."""
+    """The cloud, with a coordinate that says whether each tip is a stable equilibrium."""
     about = {"units": "1", "long_name": "status of the tip", "meanings": _STATUS}
-    return cloud.assign(status=("sample", status, about))
+    return cloud.assign_coords(status=("sample", status, about))
+
+
+def is_stable(data: xr.Dataset | xr.DataArray) -> NDArray[np.bool_]:
+    """Which samples hold the arm in a stable equilibrium; all, of an arm without loads."""
+    if "status" not in data.coords:
+        return np.ones(data.sizes["sample"], bool)
+    return np.asarray(data.coords["status"].values == 0)
 
 
 def configuration_dataset(
@@ -170,7 +178,7 @@ def storable(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def tip_cells(cloud: xr.Dataset, edge: float | None = None) -> CellGrid:
-    """The tips of a cloud sorted into cubes.
+    """The tips of a cloud sorted into cubes; those that are no stable equilibria in none.
 
     Args:
         cloud: tip(sample, axis) [m].
@@ -182,7 +190,10 @@ def tip_cells(cloud: xr.Dataset, edge: float | None = None) -> CellGrid:
     from softreach.geometry.cell_grid import CellGrid
 
     tip = check_cloud(cloud)["tip"]
-    return CellGrid.around(tip.values, _CELL * float(tip.attrs["length"]) if edge is None else edge)
+    points = tip.values
+    if "status" in cloud.coords:
+        points = np.where(is_stable(cloud)[:, None], points, np.nan)
+    return CellGrid.around(points, _CELL * float(tip.attrs["length"]) if edge is None else edge)
 
 
 def cell_dataset(

@@ -14,6 +14,7 @@ from softreach.geometry import hull as hulls
 from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.geometry.delaunay import delaunay, finite_points
 from softreach.geometry.hull import Hull
+from softreach.schema import is_stable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,7 +53,8 @@ def concave_hull(
     Points in one plane, on one line or fewer than four have volume 0 and no faces.
 
     Args:
-        points: Tips [m], shape (n, 3), or ``cloud.tip``.
+        points: Tips [m], shape (n, 3), or ``cloud.tip``, of which those that are no stable
+            equilibria are left out.
         alpha: Radius [m]; ``"critical"``; or None for 0.05 of ``points.attrs["length"]``.
         bias: Whether to estimate the sampling bias.
         method: Who triangulates, see `softreach.geometry.delaunay.delaunay`.
@@ -82,7 +84,8 @@ def convex_hull(points: np.ndarray | xr.DataArray) -> Hull:
     Points in one plane, on one line or fewer than four have volume 0 and no faces.
 
     Args:
-        points: Tips [m], shape (n, 3), or ``cloud.tip``.
+        points: Tips [m], shape (n, 3), or ``cloud.tip``, of which those that are no stable
+            equilibria are left out.
 
     Raises:
         InvalidInput: Points of another shape, or not finite.
@@ -104,7 +107,8 @@ def unreachability(
     says nothing.
 
     Args:
-        points: Tips [m], shape (n, 3), or ``cloud.tip``.
+        points: Tips [m], shape (n, 3), or ``cloud.tip``, of which those that are no stable
+            equilibria are left out.
         alpha: Radius as in `concave_hull`.
         method: Who triangulates.
 
@@ -129,7 +133,8 @@ def volume_curve(
     """Volumes of the alpha shapes of many radii, from one triangulation.
 
     Args:
-        points: Tips [m], shape (n, 3), or ``cloud.tip``.
+        points: Tips [m], shape (n, 3), or ``cloud.tip``, of which those that are no stable
+            equilibria are left out.
         alphas: Radii [m], any shape.
         method: Who triangulates.
 
@@ -144,10 +149,15 @@ def volume_curve(
 
 
 def _positions(points: np.ndarray | xr.DataArray) -> np.ndarray:
-    """Points as an array (n, 3); a labeled one may have its axes in either order."""
+    """Points as an array (n, 3); a labeled one may have its axes in either order.
+
+    Of an arm under loads those tips that are stable equilibria.
+    """
     array = np.asarray(points)
     if getattr(points, "dims", None) == ("axis", "sample"):
         array = array.T
+    if not isinstance(points, np.ndarray) and "status" in getattr(points, "coords", ()):
+        array = array[is_stable(points)]
     return finite_points(array)
 
 

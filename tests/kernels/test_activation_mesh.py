@@ -59,7 +59,7 @@ def depth(planes: np.ndarray, points: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("name", [(108, 2), (36, 3), (0, 0), *range(6)])
 def test_no_tip_is_farther_from_its_linear_interpolant_than_estimated(name):
     arm, rng = any_arm(name), np.random.default_rng(0)
-    mesh = activation_cells(tip_map(arm, TOL), CELLS)
+    mesh, _ = activation_cells(tip_map(arm, TOL), CELLS)
     tetrahedron, v, weights, gamma = sampled(mesh, 30_000, rng)
     tip = tip_positions(arm, gamma, TOL)
     error = np.linalg.norm(tip - np.einsum("ni,nik->nk", weights, mesh.tip[v]), axis=1)

@@ -12,7 +12,7 @@ from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import AsJson, Design, design_from, points_of
-from softreach.errors import InvalidInput
+from softreach.errors import InvalidInput, counted
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -71,6 +71,7 @@ def _as_json(solution: Solution) -> dict[str, object]:
         "gap_bound_m": solution.gap_bound,
         "change_bound": solution.change_bound,
         "least_proved": solution.least_proved,
+        "unstable": solution.unstable,
     }
 
 
@@ -102,6 +103,9 @@ def _lines(solution: Solution, arm: Manipulator) -> list[str]:
     ):
         quality = f"residual {residual:.1e} m, condition {condition:.3g}, margin {margin:.3g}"
         lines.append(f"  {_activation(arm, gamma)}  ({quality})")
+    if solution.unstable:
+        left = counted(solution.unstable, "activation")
+        lines.append(f"  {left} left out whose equilibrium there is unstable")
     if solution.least_proved:
         lines.append("  proved to be the least")
     elif solution.change_bound:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import Design, activation_of, design_from, points_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["track"]
 
@@ -36,8 +39,24 @@ def track(
     header = ",".join([*column_names(arm.bundle_names), "tip_error_m"])
     _write(out, [header, *(",".join(f"{x:.12g}" for x in (*g, error)) for g, error in rows)])
     followed = int((found.status == 0).sum())
-    end = found.attrs["end"] or "the end of the path"
-    sys.stdout.write(f"{followed} of {found.sizes['point']} points followed, up to {end}: {out}\n")
+    of_all = f"{followed} of {found.sizes['point']} points followed"
+    sys.stdout.write(f"{of_all}, up to {_end(found)}: {out}\n")
+
+
+def _end(found: xr.Dataset) -> str:
+    """Where the branch ends, and why."""
+    end = found.attrs["end"]
+    at = f"{float(found.end_length):.7g} m of path"
+    if end == "unstable":
+        error = float(found.end_length_error)
+        return f"{at} (± {error:.1g} m), where the arm loses its stability"
+    named = {
+        "": "the end of the path",
+        "fold": f"{at}, where the branch turns back (a fold)",
+        "no_start": "nowhere: the first point is not reached",
+    }
+    bound = f"{at}, where {found.attrs['end_bundle']} is at its {found.attrs['end_bound']} bound"
+    return named.get(end, bound)
 
 
 def _write(path: Path, lines: list[str]) -> None:

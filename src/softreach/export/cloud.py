@@ -26,9 +26,10 @@ def export_cloud(cloud: xr.Dataset, path: str | PathLike[str]) -> None:
     """Write a cloud as .ply, .csv, .parquet, .npz, .mat, .vtu or .vtk, chosen by the suffix.
 
     Tables have the columns x, y, z [m] and one activation per bundle, such as ``gamma_left``;
-    NPZ and MAT hold the arrays tip, activation and bundle. Design, seed, tolerance, version and
-    units go along, except in CSV, VTU and VTK, which have no place for them. PLY carries the
-    picture's colors too.
+    NPZ and MAT hold the arrays tip, activation and bundle. Clouds of arms under loads have the
+    column or array status too: 0 stable, 1 unstable, 2 no equilibrium, whose tip is NaN. Design,
+    seed, tolerance, version and units go along, except in CSV, VTU and VTK, which have no place for
+    them. PLY carries the picture's colors too.
 
     Args:
         cloud: tip(sample, axis) [m] and activation(sample, bundle), each in its unit.
@@ -57,7 +58,10 @@ def _write_ply(table: CloudTable, path: Path) -> None:
 
 def _write_csv(table: CloudTable, path: Path) -> None:
     pa, csv = load_library("pyarrow"), load_library("pyarrow.csv")
-    schema = pa.schema([(name, pa.float64()) for name in ("x", "y", "z", *table.gammas)])
+    fields = [(name, pa.float64()) for name in ("x", "y", "z", *table.gammas)]
+    if table.status is not None:
+        fields.append(("status", pa.uint8()))
+    schema = pa.schema(fields)
     with csv.CSVWriter(path, schema) as writer:
         for block in table.blocks():
             writer.write_batch(pa.record_batch(block, schema=schema))
@@ -70,6 +74,8 @@ def _write_parquet(table: CloudTable, path: Path) -> None:
         pa.field(name, pa.float64(), metadata={"units": unit})
         for name, unit in zip(table.gammas, table.units, strict=True)
     ]
+    if table.status is not None:
+        fields.append(pa.field("status", pa.uint8(), metadata={"units": "1"}))
     schema = pa.schema(fields, metadata={key: str(v) for key, v in table.metadata.items()})
     with parquet.ParquetWriter(path, schema, compression="zstd") as writer:
         for block in table.blocks():
@@ -79,6 +85,8 @@ def _write_parquet(table: CloudTable, path: Path) -> None:
 def _write_npz(table: CloudTable, path: Path) -> None:
     described = {key: np.array(value) for key, value in table.metadata.items()}
     arrays = {"tip": table.tip, "activation": table.activation, "bundle": np.array(table.bundles)}
+    if table.status is not None:
+        arrays["status"] = table.status
     np.savez(path, **{**described, **arrays})
 
 
@@ -88,9 +96,11 @@ def _write_mat(table: CloudTable, path: Path) -> None:
     size = max(table.tip.nbytes, table.activation.nbytes)
     if size >= _MAT_LIMIT:
         raise InvalidInput("cloud", f"{size} bytes", "below 2 GiB for MAT", "use .parquet or .npz")
+    status = {} if table.status is None else {"status": table.status}
     savemat(
         path,
         {
+            **status,
             "tip": table.tip,
             "activation": table.activation,
             "bundle": np.array(table.bundles, dtype=object),
@@ -113,9 +123,9 @@ def _write_vtk(table: CloudTable, path: Path) -> None:
 def _point_mesh(table: CloudTable) -> Any:
     meshio = load_library("meshio")
     columns = table.columns()
-    activations = {name: columns[name] for name in table.gammas}
+    data = {name: values for name, values in columns.items() if name not in ("x", "y", "z")}
     cells = [("vertex", np.arange(len(table.tip))[:, None])]
-    return meshio.Mesh(table.tip, cells, point_data=activations)
+    return meshio.Mesh(table.tip, cells, point_data=data)
 
 
 _WRITERS = {

@@ -33,6 +33,8 @@ class CloudTable(NamedTuple):
     """Names of the bundles as the cloud has them."""
     units: tuple[str, ...]
     """Unit of the activation of each bundle."""
+    status: NDArray[np.uint8] | None
+    """0 stable, 1 unstable, 2 no equilibrium, of an arm under loads, shape (sample,)."""
     metadata: dict[str, str | int | float]
     """Design (TOML), seed, tolerance, versions and units."""
 
@@ -41,13 +43,16 @@ class CloudTable(NamedTuple):
         """Names of the activation columns."""
         return column_names(self.bundles)
 
-    def columns(self, rows: slice = slice(None)) -> dict[str, Array]:
-        """Contiguous columns by name: x, y, z, then the activations."""
+    def columns(self, rows: slice = slice(None)) -> dict[str, NDArray[Any]]:
+        """Contiguous columns by name: x, y, z, the activations, and the status if there is one."""
         arrays = [*self.tip[rows].T, *self.activation[rows].T]
         names = ["x", "y", "z", *self.gammas]
+        if self.status is not None:
+            arrays.append(self.status[rows])
+            names.append("status")
         return {name: np.ascontiguousarray(a) for name, a in zip(names, arrays, strict=True)}
 
-    def blocks(self) -> Iterator[dict[str, Array]]:
+    def blocks(self) -> Iterator[dict[str, NDArray[Any]]]:
         """The columns, a bounded number of rows at a time."""
         for start in range(0, len(self.tip), _BLOCK) or [0]:
             yield self.columns(slice(start, start + _BLOCK))
@@ -72,6 +77,7 @@ def cloud_table(cloud: xr.Dataset) -> CloudTable:
         activation.transpose("sample", "bundle").values.astype(float, copy=False),
         _bundle_names(activation),
         _bundle_units(activation),
+        cloud["status"].values.astype(np.uint8) if "status" in cloud else None,
         _metadata(cloud),
     )
 

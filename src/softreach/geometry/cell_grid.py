@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,17 +30,18 @@ class CellGrid:
     shape: tuple[int, ...]
     """Number of cubes along each axis."""
     cells: Index
-    """The cube of each point, in C order, shape (n,)."""
+    """The cube of each point, in C order, shape (n,); their number for a point that is NaN."""
 
     @classmethod
     def around(cls, points: Array, edge: float) -> CellGrid:
-        """The grid around points [m], shape (n, 3).
+        """The grid around points [m], shape (n, 3); rows of NaN are in no cube.
 
         Raises:
-            InvalidInput: Points of another shape, not finite or none; an edge that is not positive,
+            InvalidInput: Points of another shape, infinite or none; an edge that is not positive,
                 or so small that the grid would not fit into memory.
         """
-        points = finite_points(points)
+        placed = np.asarray(~np.isnan(points).all(axis=-1))
+        points = finite_points(points[placed])
         if len(points) == 0:
             raise InvalidInput("points", "none", "at least one")
         if not 0 < edge < np.inf:  # NaN too
@@ -49,8 +51,9 @@ class CellGrid:
         if not np.prod(high - low + 1) <= _MOST_CELLS:
             raise InvalidInput("cell", edge, f"so large that {_MOST_CELLS:,} cells hold all points")
         shape = tuple(int(n) for n in high - low + 1)
-        cells = np.ravel_multi_index(tuple((place - low).astype(np.intp).T), shape)
-        return cls(edge=float(edge), first=low.astype(np.intp), shape=shape, cells=np.array(cells))
+        cells = np.full(len(placed), int(np.prod(shape)))
+        cells[placed] = np.ravel_multi_index(tuple((place - low).astype(np.intp).T), shape)
+        return cls(edge=float(edge), first=low.astype(np.intp), shape=shape, cells=cells)
 
     @property
     def volume(self) -> float:
@@ -64,22 +67,26 @@ class CellGrid:
 
     def count(self, points: Index | slice = slice(None)) -> Index:
         """How many of some points, all by default, each cube holds."""
-        return np.bincount(self.cells[points], minlength=self._size).reshape(self.shape)
+        return self._shaped(np.bincount(self.cells[points], minlength=self._size))
 
     def sum(self, values: Array) -> Array:
         """Sum of a value of every point in each cube."""
-        return np.bincount(self.cells, values, self._size).astype(float).reshape(self.shape)
+        return self._shaped(np.bincount(self.cells, values, self._size).astype(float))
 
     def mean(self, values: Array, points: Index | slice = slice(None)) -> Array:
         """Mean of the finite values of some points in each cube; NaN where there is none."""
         known = np.isfinite(values)
         cells = self.cells[points][known]
         total, count = (
-            np.bincount(cells, values[known], self._size),
-            np.bincount(cells, None, self._size),
+            self._shaped(np.bincount(cells, values[known], self._size)),
+            self._shaped(np.bincount(cells, None, self._size)),
         )
-        mean = np.full(self._size, np.nan)
-        return np.divide(total, count, out=mean, where=count > 0).reshape(self.shape)
+        mean = np.full(self.shape, np.nan)
+        return np.divide(total, count, out=mean, where=count > 0)
+
+    def _shaped(self, of_cubes: NDArray[Any]) -> NDArray[Any]:
+        """What each cube has, without what is in none."""
+        return of_cubes[: self._size].reshape(self.shape)
 
     @property
     def _size(self) -> int:

@@ -14,6 +14,9 @@
    opposite, along the null direction of the Jacobian (`kernels.folds`), and is searched as well.
 7. Roots between which the tip hardly leaves the target are one.
 8. Targets left without a root are searched by descent, for Newton fails where J is singular.
+
+Under loads some activations have no equilibrium, and a tip that is NaN is a failed step. Cells that
+they tear have no image; their other corners begin searches instead (`torn_cells`).
 """
 
 from __future__ import annotations
@@ -28,9 +31,9 @@ from softreach import parallel
 from softreach.inverse.nearest import local_minima
 from softreach.inverse.prepared_map import PreparedMap
 from softreach.inverse.request import Request
-from softreach.inverse.roots import Roots, no_roots, roots_at, smallest_singular_values
+from softreach.inverse.roots import Roots, no_roots, placed, roots_at, smallest_singular_values
 from softreach.kernels import candidates, folds, newton
-from softreach.kernels.newton import CONVERGED, RUNNING, Search
+from softreach.kernels.newton import CONVERGED, RUNNING, STAGNATED, Search
 
 __all__ = ["distinct", "every_branch"]
 
@@ -55,7 +58,7 @@ class _Starts(NamedTuple):
 
 
 def every_branch(prepared: PreparedMap, request: Request) -> Roots:
-    """All roots inside the bounds, sorted by target.
+    """All roots inside the bounds, sorted by target; those of loaded arms stable or not.
 
     Args:
         prepared: A tip map of three free bundles.
@@ -64,7 +67,10 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
     count = len(request.targets)
     if not count:
         return no_roots(prepared.rod)
-    roots = _newton(prepared, request, _starts(prepared, request, np.arange(count)))
+    starts = _starts(prepared, request, np.arange(count))
+    if len(prepared.torn_cells.tip):
+        starts = _with_torn(prepared, request, starts)
+    roots = _newton(prepared, request, starts)
     # Where the quadratics say that nothing leads there, look once more without believing them.
     again = _starts(prepared, request, roots.missing(count), with_root=False)
     roots = distinct(prepared, request, roots.joined(_newton(prepared, request, again)))
@@ -84,6 +90,8 @@ def _starts(
         with_root: Whether to leave out tetrahedra whose quadratic does not reach the target.
     """
     box, targets = prepared.rod.box, request.targets[rows]
+    if not len(prepared.mesh.corner):
+        return _Starts(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 3)))
     blocks = list(parallel.blocks(len(targets), _BLOCK))
     parts: list[list[_Starts]] = [[] for _ in blocks]
 
@@ -108,9 +116,19 @@ def _starts(
     return _Starts(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))
 
 
+def _with_torn(prepared: PreparedMap, request: Request, starts: _Starts) -> _Starts:
+    """The starts, and more from corners of cells that have no image."""
+    target, gamma = prepared.torn_cells.starts(request.targets)
+    target = np.concatenate([starts.target, target])
+    cell = np.concatenate([starts.cell, np.full(len(target) - len(starts.cell), -1)])
+    gamma = np.concatenate([starts.gamma, gamma])
+    order = np.argsort(target, kind="stable")
+    return _Starts(target[order], cell[order], gamma[order])
+
+
 def _newton(prepared: PreparedMap, request: Request, starts: _Starts) -> Roots:
     """Step 5: damped Newton from every start; the roots that are within the bounds."""
-    rod, goal = prepared.rod, request.targets[starts.target]
+    rod, goal = prepared.branch_map, request.targets[starts.target]
     low, high = rod.box.low.copy(), rod.box.high.copy()
     search = _search(goal, starts.gamma)
     for _ in range(_MOST_ITERATIONS):
@@ -119,18 +137,28 @@ def _newton(prepared: PreparedMap, request: Request, starts: _Starts) -> Roots:
             break
         tips, slopes = rod.tips_and_slopes(search.trial[active])
         newton.newton_step(search, active, tips, slopes, low, high, request.residual)
+        if rod.supports_unstable:
+            _give_up(search, active)
     converged = np.flatnonzero(search.state == CONVERGED)
     # The trial holds the step that convergence left untaken; it may overstep a bound a little.
     gamma = rod.box.clip(search.trial[converged])
-    residual = np.linalg.norm(rod.tips(gamma) - goal[converged], axis=1)
+    tips, stable = placed(rod, gamma)
+    residual = np.linalg.norm(tips - goal[converged], axis=1)
     roots = Roots(
         starts.target[converged],
         gamma,
         search.slope[converged],
         residual,
         starts.cell[converged],
+        stable,
     )
     return roots.where(residual <= request.residual)
+
+
+def _give_up(search: Search, active: Index) -> None:
+    """End searches whose step leads nowhere, as where the tip moves without limit."""
+    lost = active[~np.isfinite(search.trial[active]).all(axis=1)]
+    search.trial[lost], search.state[lost] = search.gamma[lost], STAGNATED
 
 
 def _search(goal: Array, start: Array) -> Search:
@@ -162,6 +190,7 @@ def _with_partners(prepared: PreparedMap, request: Request, roots: Roots) -> Roo
 
 def _partner_starts(prepared: PreparedMap, roots: Roots) -> _Starts:
     """Near the second preimage of every root that has a fold near."""
+    roots = roots.where(roots.cell >= 0)
     box, smallest = prepared.rod.box, smallest_singular_values(roots.slope)
     start, near = np.empty_like(roots.gamma), np.zeros(len(roots.target), bool)
     folds.second_preimages(

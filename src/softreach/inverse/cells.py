@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.inverse.torn_cells import TornCells
 from softreach.kernels.activation_mesh import ActivationMesh, interpolation_errors
 from softreach.kernels.simplices import corner_bits
 from softreach.rod.tip_map import TipMap
@@ -16,11 +17,12 @@ Index = NDArray[np.int64]
 
 _CORNERS = corner_bits(3)
 _EVEN = 0.3  # ratio of det J at a cell's corners below which the cell is cut in eight
+_TORN = 0.05  # interpolation error in L beyond which corners are taken to be on different branches
 _MOST_CELLS = 300_000
 
 
-def activation_cells(rod: TipMap, cells: int, depth: int = 0) -> ActivationMesh:
-    """Cells of the activation box with tips and Jacobians at their corners.
+def activation_cells(rod: TipMap, cells: int, depth: int = 0) -> tuple[ActivationMesh, TornCells]:
+    """Cells of the activation box with tips and Jacobians at their corners; those without apart.
 
     Args:
         rod: A tip map of three bundles, each free to move.
@@ -40,7 +42,14 @@ def activation_cells(rod: TipMap, cells: int, depth: int = 0) -> ActivationMesh:
         total += 7 * int(uneven.sum())
         width //= 2
         low = (low[uneven, None] + width * _CORNERS).reshape(-1, 3)
-    return _mesh(lattice, np.concatenate(kept))
+    corner = np.concatenate(kept)
+    mesh, torn = _mesh(lattice, corner), np.zeros(len(corner), bool)
+    if rod.supports_unstable:
+        torn = ~np.isfinite(lattice.det[corner]).all(axis=1)
+        torn |= mesh.interpolation_error > _TORN * rod.length
+    if torn.any():
+        mesh = _mesh(lattice, corner[~torn])
+    return mesh, _torn(lattice, corner[torn], cells)
 
 
 def _even_cells(cells: int, depth: int) -> tuple[Index, int]:
@@ -82,7 +91,16 @@ class _Lattice:
         self.gamma = np.concatenate([self.gamma, gamma])
         self.tip = np.concatenate([self.tip, tip])
         self.slope = np.concatenate([self.slope, slope])
-        self.det = np.concatenate([self.det, np.linalg.det(slope)])
+        with np.errstate(invalid="ignore"):  # where there is no equilibrium
+            self.det = np.concatenate([self.det, np.linalg.det(slope)])
+
+
+def _torn(lattice: _Lattice, corner: Index, cells: int) -> TornCells:
+    """The corners that have a tip, of cells of which some have none or are on another branch."""
+    vertex = np.unique(corner)
+    vertex = vertex[np.isfinite(lattice.det[vertex])]
+    widths = lattice.rod.box.widths / cells
+    return TornCells.at(lattice.gamma[vertex], lattice.tip[vertex], lattice.slope[vertex], widths)
 
 
 def _mesh(lattice: _Lattice, corner: Index) -> ActivationMesh:

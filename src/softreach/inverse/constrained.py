@@ -60,5 +60,6 @@ def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Arr
 def _multipliers(rod: TipMap, request: Request, gamma: Array) -> Array:
     """λ for which γ - near + Jᵀλ is least, at the start: those of a solution were it one."""
     slopes = rod.tips_and_slopes(gamma)[1] / rod.length
+    slopes = np.nan_to_num(slopes, nan=0.0)  # of a start without a tip, which leads nowhere
     inverse = np.linalg.pinv(slopes.transpose(0, 2, 1), rcond=1e-3)
     return -np.einsum("nij,nj->ni", inverse, gamma - request.near)

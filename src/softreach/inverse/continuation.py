@@ -17,7 +17,9 @@ Mask = NDArray[np.bool_]
 
 _LONGEST = 0.1  # predicted change of activation in one substep, in ranges
 _SHORTEST = 1e-10  # substep at which a branch is at its end, in L
+_SHORTEST_TORN = 1e-7  # the same where stability is lost: there the tip moves without limit
 _CORRECTION = 0.25  # against the prediction, beyond which the branch may have been left
+_FOLDED = 1e-3  # smallest singular value at the end of a branch that is a fold, in L
 _AT_BOUND = 1e-9  # in ranges
 _MOST_CORRECTIONS = 10
 _SINGULAR = 1e-10  # singular values below this part of the largest do not count
@@ -34,6 +36,8 @@ class PathStatus(IntEnum):
     """Beyond a bound: too few bundles could move on within theirs."""
     NO_START = 3
     """The first point cannot be reached, or not from the start given."""
+    UNSTABLE = 4
+    """Beyond a loss of stability: there the arm leaps to another equilibrium as the load grows."""
 
 
 class BranchPoint(NamedTuple):
@@ -57,6 +61,10 @@ class BranchEnd(NamedTuple):
     """The bundle at its bound."""
     upper: bool = False
     """Which bound that is."""
+    done: float = 0.0
+    """The part of the way to the next point that was followed [-]."""
+    error: float = 0.0
+    """How much farther the branch may go [m]."""
 
 
 class _Substep(NamedTuple):
@@ -65,6 +73,8 @@ class _Substep(NamedTuple):
     point: BranchPoint | None = None
     shorten: float = 1.0
     end: BranchEnd | None = None
+    torn: bool = False
+    """Whether it met a place without a stable equilibrium."""
 
 
 class Continuation:
@@ -73,6 +83,7 @@ class Continuation:
     def __init__(self, rod: TipMap, residual: float) -> None:
         """Set up for tips within `residual` [m] of their points."""
         self.rod, self.box, self.residual = rod, rod.box, residual
+        self._torn = False  # whether the last correction met a place without a stable equilibrium
 
     def at(self, gamma: Array) -> BranchPoint:
         """The tip map linearized at an activation (m,)."""
@@ -88,22 +99,28 @@ class Continuation:
 
     def follow(self, point: BranchPoint, begin: Array, end: Array) -> BranchEnd:
         """Move the tip from one place straight to another, as far as the branch goes."""
-        done, part = 0.0, 1.0
+        done, part, torn = 0.0, 1.0, False
         distance = float(np.linalg.norm(end - begin))
         if distance == 0.0:
-            return BranchEnd(PathStatus.FOLLOWED, point)
+            return BranchEnd(PathStatus.FOLLOWED, point, done=1.0)
         shortest = _SHORTEST * self.rod.length / distance
+        shortest_torn = _SHORTEST_TORN * self.rod.length / distance
         while done < 1.0:
             part = min(part, 1.0 - done)
             last = part >= 1.0 - done
             substep = self._substep(point, end if last else begin + (done + part) * (end - begin))
             if substep.end is not None:
-                return substep.end
+                return substep.end._replace(done=done, error=shortest * distance)
+            torn = torn or substep.torn
             if substep.point is not None:
                 point, done, part = substep.point, 1.0 if last else done + part, 2 * part
-            elif (part := part * substep.shorten) < shortest:
-                return BranchEnd(PathStatus.FOLD, point)
-        return BranchEnd(PathStatus.FOLLOWED, point)
+                torn = False
+            elif part * substep.shorten < (shortest_torn if torn else shortest):
+                why = PathStatus.UNSTABLE if torn or self._leaps(point) else PathStatus.FOLD
+                return BranchEnd(why, point, done=done, error=part * distance)
+            else:
+                part *= substep.shorten
+        return BranchEnd(PathStatus.FOLLOWED, point, done=1.0)
 
     def _substep(self, point: BranchPoint, target: Array) -> _Substep:
         """Predict and correct; bundles that would leave their bounds are held there."""
@@ -118,7 +135,9 @@ class Continuation:
                 if size > _LONGEST:
                     return _Substep(shorten=0.9 * _LONGEST / size)
                 found = self._corrected(ahead, target, moving)
-                if found is None or self._left_branch(point, ahead, found):
+                if found is None:
+                    return _Substep(shorten=0.5, torn=self._torn)
+                if self._left_branch(point, ahead, found):
                     return _Substep(shorten=0.5)
                 over = self.box.excess(found.gamma) > _AT_BOUND
                 if not over.any():
@@ -134,9 +153,12 @@ class Continuation:
 
     def _corrected(self, gamma: Array, target: Array, moving: Mask) -> BranchPoint | None:
         """Newton's method with the least-norm step of the moving bundles; None if it fails."""
-        least = np.inf
+        least, self._torn = np.inf, False
         for _ in range(_MOST_CORRECTIONS):
             point = self.at(gamma)
+            if not np.isfinite(point.slope).all():
+                self._torn = True
+                return None
             error = target - point.tip
             residual = float(np.linalg.norm(error))
             if residual <= 0.1 * self.residual:
@@ -158,6 +180,13 @@ class Continuation:
         if point.slope.shape[1] > 3:
             return False
         return bool(np.linalg.det(point.slope) * np.linalg.det(found.slope) <= 0)
+
+    def _leaps(self, point: BranchPoint) -> bool:
+        """Whether a branch ends here though no fold is near: an arm under loads leaps."""
+        if not self.rod.supports_unstable:
+            return False
+        sizes = np.linalg.svd(point.slope * self.box.scales, compute_uv=False)
+        return bool(sizes[2] > _FOLDED * self.rod.length)
 
     def _clipped(self, point: BranchPoint) -> BranchPoint:
         """The point moved inside the bounds."""

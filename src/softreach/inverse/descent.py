@@ -53,9 +53,11 @@ def descend(
     """
     scales = rod.box.scales
     tip, slope = rod.tips_and_slopes(start)
-    found = Descent(start.copy(), tip, slope, np.linalg.norm(tip - targets, axis=1))
+    away = np.linalg.norm(tip - targets, axis=1)
+    # A start without a tip leads nowhere, and a step to a place without one fails.
+    found = Descent(start.copy(), tip, slope, np.where(np.isnan(away), np.inf, away))
     damping, floor = np.full(len(start), _FIRST_DAMPING), 1e-3 * residual
-    active = np.flatnonzero(found.residual > floor)
+    active = np.flatnonzero((found.residual > floor) & (found.residual < np.inf))
     stay = np.zeros(len(start), np.int64)
     for _ in range(most):
         if not len(active):

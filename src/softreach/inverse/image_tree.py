@@ -22,7 +22,7 @@ _OCTANTS = np.array([[o >> 2 & 1, o >> 1 & 1, o & 1] for o in range(8)])
 def image_tree(mesh: ActivationMesh) -> SpaceTree:
     """Divide space until few tetrahedra remain in each place."""
     planes = np.empty((6 * len(mesh.corner), 4, 4))
-    face_planes(mesh, 1e-9 * float(np.ptp(mesh.tip)), planes)
+    face_planes(mesh, 1e-9 * float(np.nanmax(mesh.tip) - np.nanmin(mesh.tip)), planes)
     boxes = np.repeat(_image_boxes(mesh), 6, axis=0)
     low = boxes[:, 0].min(axis=0)
     size = float((boxes[:, 1].max(axis=0) - low).max())

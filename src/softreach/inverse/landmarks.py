@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.errors import InvalidInput
 from softreach.kernels.spread import choose_apart
 from softreach.rod.tip_map import TipMap
 from softreach.sampling import sample_cube
@@ -74,7 +75,11 @@ def landmarks(rod: TipMap) -> Landmarks:
         gamma = box.from_cube(np.array(sample_cube("grid", int(_MOST ** (1 / m)) ** m, m)))
     else:
         gamma = box.from_cube(np.array(sample_cube("sobol", _SOBOL, m)))
-    return Landmarks(gamma, rod.tips(gamma), box.scales)
+    found = _with_tips(rod, gamma)
+    if not len(found.gamma):
+        tried = f"{len(gamma)} activations tried have no stable equilibrium"
+        raise InvalidInput("loads", tried, "such that some have one", "lighten the load")
+    return found
 
 
 def face_landmarks(rod: TipMap) -> Landmarks:
@@ -85,4 +90,13 @@ def face_landmarks(rod: TipMap) -> Landmarks:
     dimension = rng.integers(0, min(m, _FACE_DIMENSION) + 1, count)
     free = rng.random((count, m)).argsort(axis=1).argsort(axis=1) < dimension[:, None]
     gamma = box.from_cube(np.where(free, rng.random((count, m)), corner))
-    return Landmarks(gamma, rod.tips(gamma), box.scales)
+    return _with_tips(rod, gamma)
+
+
+def _with_tips(rod: TipMap, gamma: Array) -> Landmarks:
+    """Landmarks at those activations that have a stable equilibrium."""
+    tip = rod.tips(gamma)
+    if rod.supports_unstable:
+        known = np.isfinite(tip[:, 0])
+        gamma, tip = gamma[known], tip[known]
+    return Landmarks(gamma, tip, rod.box.scales)

@@ -61,6 +61,7 @@ def minimize(evaluate: Evaluate, start: Array, box: ActivationBox) -> Minima:
     gamma, damping = start.copy(), np.zeros(len(start))
     active, converged = np.arange(len(start)), np.zeros(len(start), bool)
     value, gradient, hessian = _expanded(evaluate, active, gamma, scales, ~converged)
+    active = active[np.isfinite(value)]
     for _ in range(_MOST_ITERATIONS):
         if not len(active):
             break
@@ -101,4 +102,12 @@ def _expanded(
     change = gradient[n:].reshape(k, m, m) - gradient[:n][curved, None]
     hessian = np.full((n, m, m), np.nan)
     hessian[curved] = change / (_DIFFERENCE * scales)[:, None]
+    torn = np.isfinite(value[:n]) & curved & np.isnan(hessian).any(axis=(1, 2))
+    hessian[torn] = _cautious(gradient[:n][torn], scales)
     return _Expansion(value[:n], gradient[:n], hessian)
+
+
+def _cautious(gradient: Array, scales: Array) -> Array:
+    """In place of a Hessian, next to where a function ends: steps down of a tenth of the ranges."""
+    size = np.abs(gradient * scales).max(axis=1, initial=0.0)
+    return (10.0 * size / scales[:, None] ** 2).T[:, :, None] * np.eye(len(scales))

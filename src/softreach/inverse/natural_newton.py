@@ -72,7 +72,7 @@ def natural_newton(rod: TipMap, targets: Array, start: Array, residual: float) -
     low, high = box.low - _OUTSIDE * scales, box.high + _OUTSIDE * scales
     valley = _Valley(rod, low, high)
     gamma, miss, slope = valley.floor(targets, start, _FIRST_RETURNS)
-    damping, active = np.ones(len(start)), np.arange(len(start))
+    damping, active = np.ones(len(start)), np.flatnonzero(np.isfinite(miss[:, 0]))
     for _ in range(_MOST_ITERATIONS):
         if not len(active):
             break
@@ -106,14 +106,21 @@ class _Valley(NamedTuple):
 
     def floor(self, targets: Array, gamma: Array, steps: int) -> tuple[Array, Array, Array]:
         """Activations after some steps along that direction, target - tip and ∂r/∂γ [m] there."""
-        scales = self.rod.box.scales
         tip, slope = self.rod.tips_and_slopes(gamma)
         for _ in range(steps):
-            left, sizes, right = np.linalg.svd(slope * scales)
-            step = np.einsum("ni,ni->n", left[:, :, 0], targets - tip) / sizes[:, 0]
-            gamma = np.clip(gamma + scales * step[:, None] * right[:, 0], self.low, self.high)
+            gamma = self._stepped(targets, gamma, tip, slope)
             tip, slope = self.rod.tips_and_slopes(gamma)
         return gamma, targets - tip, slope
+
+    def _stepped(self, targets: Array, gamma: Array, tip: Array, slope: Array) -> Array:
+        """Activations a step nearer to the floor; those without a tip stay."""
+        scales = self.rod.box.scales
+        lost = np.isnan(tip[:, 0]) if self.rod.supports_unstable else np.zeros(len(tip), bool)
+        known = np.where(lost[:, None, None], np.eye(3), slope * scales)
+        left, sizes, right = np.linalg.svd(known)
+        step = np.einsum("ni,ni->n", left[:, :, 0], targets - tip) / sizes[:, 0]
+        ahead = np.clip(gamma + scales * step[:, None] * right[:, 0], self.low, self.high)
+        return np.where(lost[:, None], gamma, ahead)
 
 
 def _inverses(matrices: Array) -> Array:

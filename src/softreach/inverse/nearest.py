@@ -12,7 +12,7 @@ from softreach.inverse.minimizer import Minima, minimize
 from softreach.inverse.objective import Objective
 from softreach.inverse.prepared_map import PreparedMap
 from softreach.inverse.request import Request
-from softreach.inverse.roots import Roots
+from softreach.inverse.roots import Roots, placed
 from softreach.rod.tip_map import TipMap
 
 __all__ = ["Nearest", "local_minima", "nearest", "nearest_from"]
@@ -55,13 +55,13 @@ def nearest(prepared: PreparedMap, request: Request, known: Roots | None = None)
     order = np.lexsort((minima.value, target))
     best = order[np.searchsorted(target[order], np.arange(len(targets)))]
     gamma = minima.gamma[best]
-    return Nearest(gamma, rod.tips(gamma), minima.converged[best])
+    return Nearest(gamma, placed(rod, gamma)[0], minima.converged[best])
 
 
 def nearest_from(rod: TipMap, request: Request, gamma: Array) -> Nearest:
     """The local minimum of distance from one activation for each target."""
     minima = local_minima(rod, replace(request, direction=None), gamma)
-    return Nearest(minima.gamma, rod.tips(minima.gamma), minima.converged)
+    return Nearest(minima.gamma, placed(rod, minima.gamma)[0], minima.converged)
 
 
 def local_minima(rod: TipMap, request: Request, start: Array) -> Minima:

@@ -13,11 +13,12 @@ from softreach.inverse.bisection import CoarseCells
 from softreach.inverse.cells import activation_cells
 from softreach.inverse.image_tree import image_tree
 from softreach.inverse.landmarks import Landmarks, face_landmarks, landmarks
+from softreach.inverse.torn_cells import TornCells
 from softreach.kernels.activation_mesh import ActivationMesh
 from softreach.kernels.space_tree import SpaceTree
 from softreach.rod.free_bundles import free_bundles
 from softreach.rod.measured_bundles import bundle_measures, measured_bundles
-from softreach.rod.settled import check_settled
+from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap, tip_map
 
 __all__ = ["PreparedMap", "prepared_map"]
@@ -48,8 +49,21 @@ class PreparedMap:
 
     @cached_property
     def rod(self) -> TipMap:
-        """The tip map of the free bundles; held ones are no variables of any search."""
+        """The tip map of the free bundles; held ones are no variables of any search.
+
+        Where an arm under loads has no stable equilibrium, it is NaN.
+        """
+        return free_bundles(stable_tips(self.whole))
+
+    @cached_property
+    def branch_map(self) -> TipMap:
+        """The same with unstable equilibria, to say which activations end in one."""
         return free_bundles(self.whole)
+
+    @cached_property
+    def proves(self) -> bool:
+        """Whether what a cell of activations reaches is bounded; of loaded arms it is not."""
+        return bool(np.isfinite(self.whole.farthest()))
 
     @property
     def dimension(self) -> int:
@@ -57,9 +71,18 @@ class PreparedMap:
         return self.whole.box.dimension
 
     @cached_property
+    def _cut(self) -> tuple[ActivationMesh, TornCells]:
+        return activation_cells(self.branch_map, self.cells, self.depth)
+
+    @property
     def mesh(self) -> ActivationMesh:
         """The cells of the activation box of three free bundles."""
-        return activation_cells(self.rod, self.cells, self.depth)
+        return self._cut[0]
+
+    @property
+    def torn_cells(self) -> TornCells:
+        """Where roots are searched that lie in cells without an image."""
+        return self._cut[1]
 
     @cached_property
     def tree(self) -> SpaceTree:
@@ -95,11 +118,14 @@ def prepared_map(
         arm: The design, or its tip map; what is prepared already is returned as it is.
         tol: Largest tip error, in L.
         cells: With three free bundles: cells along each axis of the activation box.
-        depth: How often a cell is halved where det ∂r/∂γ changes sign or is uneven.
+        depth: How often a cell is halved where det ∂r/∂γ changes sign or is uneven; once at least
+            for an arm under loads.
     """
     if isinstance(arm, PreparedMap):
         return arm
-    return _of_map(measured_bundles(check_settled(tip_map(arm, tol))), cells, depth)
+    rod = measured_bundles(tip_map(arm, tol))
+    # Loads make the map steep before an equilibrium is lost.
+    return _of_map(rod, cells, max(depth, 1) if rod.supports_unstable else depth)
 
 
 @lru_cache(maxsize=4)

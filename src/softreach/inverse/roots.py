@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach import parallel
 from softreach.kernels import newton
-from softreach.rod.tip_map import TipMap
+from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
 
-__all__ = ["Roots", "conditions", "no_roots", "roots_at", "smallest_singular_values"]
+__all__ = ["Roots", "conditions", "no_roots", "placed", "roots_at", "smallest_singular_values"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -28,7 +30,9 @@ class Roots(NamedTuple):
     residual: Array
     """|tip - target| [m], shape (n,)."""
     cell: Index
-    """Cell of the mesh where the search began; 0 if in none, shape (n,)."""
+    """Cell of the mesh where the search began; -1 if in none, shape (n,)."""
+    stable: NDArray[np.bool_]
+    """Whether the arm can be there, shape (n,)."""
 
     def where(self, chosen: NDArray[np.bool_] | Index) -> Roots:
         """Those chosen by a mask or an index."""
@@ -38,6 +42,7 @@ class Roots(NamedTuple):
             self.slope[chosen],
             self.residual[chosen],
             self.cell[chosen],
+            self.stable[chosen],
         )
 
     def joined(self, other: Roots) -> Roots:
@@ -48,25 +53,52 @@ class Roots(NamedTuple):
             np.concatenate([self.slope, other.slope]),
             np.concatenate([self.residual, other.residual]),
             np.concatenate([self.cell, other.cell]),
+            np.concatenate([self.stable, other.stable]),
         )
         return both.where(np.argsort(both.target, kind="stable"))
 
     def missing(self, targets: int) -> Index:
-        """Which of so many targets have no root."""
-        return np.flatnonzero(np.bincount(self.target, minlength=targets) == 0)
+        """Which of so many targets have no stable root."""
+        return np.flatnonzero(np.bincount(self.target[self.stable], minlength=targets) == 0)
 
 
 def no_roots(rod: TipMap) -> Roots:
     """An empty set of roots."""
     none, m = np.empty(0, np.int64), rod.box.bundles
-    return Roots(none, np.empty((0, m)), np.empty((0, 3, m)), np.empty(0), none)
+    stable = np.empty(0, bool)
+    return Roots(none, np.empty((0, m)), np.empty((0, 3, m)), np.empty(0), none, stable)
 
 
 def roots_at(rod: TipMap, targets: Array, target: Index, gamma: Array) -> Roots:
-    """Activations (n, m) as roots for targets `target` (n,), whatever their residual."""
+    """Activations (n, m) as roots for targets `target` (n,), whatever their residual.
+
+    Args:
+        rod: A tip map of stable equilibria.
+        targets: Shape (t, 3) [m].
+        target: Shape (n,).
+        gamma: Shape (n, m).
+    """
     tips, slopes = rod.tips_and_slopes(gamma)
     residual = np.linalg.norm(tips - targets[target], axis=1)
-    return Roots(target, gamma, slopes, residual, np.zeros(len(target), np.int64))
+    nowhere, stable = np.full(len(target), -1), np.isfinite(residual)
+    return Roots(target, gamma, slopes, residual, nowhere, stable)
+
+
+def placed(rod: TipMap, gamma: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Tips to rounding [m], (n, 3), and whether the arm can be there, (n,).
+
+    `TipMap.tips` of loaded arms ends the search for an equilibrium within a part of `tol` that is
+    larger than the residual of a root.
+    """
+    if not rod.supports_unstable:
+        return rod.tips(gamma), np.ones(len(gamma), bool)
+    tips, slopes = np.empty((len(gamma), 3)), np.empty((len(gamma), 3, rod.box.bundles))
+    status = np.empty(len(gamma), np.int8)
+    parallel.run(
+        partial(rod.fill_slopes_and_status, gamma[b], tips[b], slopes[b], status=status[b])
+        for b in parallel.blocks(len(gamma), BLOCK // 8)
+    )
+    return tips, status == TipStatus.STABLE
 
 
 def smallest_singular_values(slope: Array) -> Array:

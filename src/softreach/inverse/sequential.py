@@ -94,7 +94,7 @@ def _searched(
         price=np.full(n, price),
         proximity=np.full(n, _FIRST_PROXIMITY),
     )
-    active = np.arange(n)
+    active = np.flatnonzero(np.isfinite(tip[:, 0]))
     for _ in range(most):
         if not len(active):
             break

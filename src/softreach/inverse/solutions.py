@@ -27,7 +27,7 @@ class Status(IntEnum):
     """Outcome of the search for a target."""
 
     REACHED = 0
-    """Some activation within the bounds puts the tip there."""
+    """Some activation within the bounds puts the tip there, in a stable equilibrium."""
     UNREACHABLE = 1
     """None does, which is proved: `gap_bound` is positive."""
     NOT_FOUND = 2
@@ -64,6 +64,9 @@ class Solution:
     `prove_least` asks for it."""
     least_proved: bool
     """Whether the bound is the |γ - near| of the first activation, but for 1e-6."""
+    unstable: int
+    """How many activations were found, with three free bundles, that would put the tip of an arm
+    under loads at the target, but in an unstable equilibrium; they are left out."""
 
     def __len__(self) -> int:
         return len(self.activations)
@@ -71,10 +74,13 @@ class Solution:
     def __repr__(self) -> str:
         place = ", ".join(f"{x:.6g}" for x in self.target)
         outcome = self.status.name.lower().replace("_", " ")
+        unstable = f", {self.unstable} unstable left out" if self.unstable else ""
         if not len(self):
-            return f"<Solution for ({place}) m: {outcome}, nearest point {self.gap:.3g} m away>"
+            near = f"nearest point {self.gap:.3g} m away"
+            return f"<Solution for ({place}) m: {outcome}, {near}{unstable}>"
         count, worst = counted(len(self), "activation"), self.residuals.max()
-        return f"<Solution for ({place}) m: {outcome}, {count}, largest residual {worst:.1e} m>"
+        found = f"{count}, largest residual {worst:.1e} m"
+        return f"<Solution for ({place}) m: {outcome}, {found}{unstable}>"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -112,6 +118,8 @@ class Solutions(Sequence[Solution]):
     """
     least_proved: NDArray[np.bool_]
     """Whether the first activation of a target is proved to change least, to 1e-6, shape (t,)."""
+    unstable: Index
+    """Activations found that end in an unstable equilibrium and are left out, shape (t,)."""
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
@@ -170,6 +178,8 @@ class Solutions(Sequence[Solution]):
         if len(self.residuals):
             parts.append(counted(len(self.residuals), "activation"))
             parts.append(f"largest residual {self.residuals.max():.1e} m")
+        if self.unstable.any():
+            parts.append(f"{self.unstable.sum()} unstable left out")
         targets = counted(len(self), "target")
         return f"<Solutions for {targets}{': ' if parts else ''}{', '.join(parts)}>"
 
@@ -188,6 +198,7 @@ class Solutions(Sequence[Solution]):
             gap_bound=float(self.gap_bounds[i]),
             change_bound=float(self.change_bounds[i]),
             least_proved=bool(self.least_proved[i]),
+            unstable=int(self.unstable[i]),
         )
 
     def _several(self, chosen: Index) -> Solutions:
@@ -219,6 +230,7 @@ class Solutions(Sequence[Solution]):
                 "gap_bound": ("target", self.gap_bounds, {"units": "m"}),
                 "change_bound": ("target", self.change_bounds, {"units": "1", **units}),
                 "least_proved": ("target", self.least_proved),
+                "unstable": ("target", self.unstable, {"units": "1"}),
                 "target_of": ("solution", np.repeat(np.arange(len(self)), self.counts)),
                 "activation": (per_solution, self.activations, units),
                 "residual": ("solution", self.residuals, {"units": "m"}),
@@ -239,5 +251,6 @@ _PER_TARGET = (
     "gap_bounds",
     "change_bounds",
     "least_proved",
+    "unstable",
 )
 _PER_SOLUTION = ("activations", "residuals", "conditions", "margins")

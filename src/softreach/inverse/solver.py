@@ -35,6 +35,7 @@ __all__ = ["solve_inverse"]
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+_NEARLY = 1e-2  # gap in L at which a target may have a root where ∂r/∂γ is nearly singular
 _BLOCK = 32_768  # targets at once: bounds the memory of a call
 
 
@@ -59,6 +60,10 @@ def solve_inverse(
     request. With fewer, or out of reach: the nearest reachable point found, and whether a bound
     proves the target to be out of reach. The arm is prepared at the
     first call and remembered.
+
+    Of an arm under loads every activation given holds the arm in a stable equilibrium, the one that
+    follows from the unloaded arm as the load grows; nothing is proved, so that a target that no
+    search reaches is `NOT_FOUND`.
 
     Args:
         arm: The design, its tip map, or what `prepared_map` made of it.
@@ -120,28 +125,47 @@ def _solved(prepared: PreparedMap, request: Request) -> Solutions:
 
 def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     """All roots, and the nearest points to the targets that have none."""
-    roots = every_branch(prepared, request)
-    missing = roots.missing(len(request.targets))
+    found = every_branch(prepared, request)
+    count = len(request.targets)
+    unstable = np.bincount(found.target[~found.stable], minlength=count)
+    roots = found.where(found.stable)
+    missing = roots.missing(count)
     closest = nearest(prepared, request.of(missing))
     solutions = _solutions(prepared, request, roots, missing, closest)
-    left = np.flatnonzero(solutions.statuses == Status.NOT_FOUND)
-    if not len(left):
-        return solutions
-    late = distinct(prepared, request, nearly_singular_roots(prepared, request, left))
-    if not len(late.target):
-        return solutions
-    roots = roots.joined(late)
-    again = roots.missing(len(request.targets))
-    closest = closest.of(np.flatnonzero(np.isin(missing, again)))
-    return _solutions(prepared, request, roots, again, closest, solutions.gap_bounds)
+    left = np.flatnonzero(_perhaps_singular(prepared, solutions))
+    if len(left):
+        late = distinct(prepared, request, nearly_singular_roots(prepared, request, left))
+        if len(late.target):
+            roots = roots.joined(late)
+            again = roots.missing(count)
+            closest = closest.of(np.flatnonzero(np.isin(missing, again)))
+            bounds = solutions.gap_bounds
+            solutions = _solutions(prepared, request, roots, again, closest, bounds)
+    return replace(solutions, unstable=unstable)
+
+
+def _perhaps_singular(prepared: PreparedMap, solutions: Solutions) -> NDArray[np.bool_]:
+    """Which targets may have roots that only a search of nearly singular ones finds.
+
+    Those not proved to be out of reach; where nothing is proved, those that are nearly reached.
+    """
+    left = solutions.statuses == Status.NOT_FOUND
+    if prepared.proves:
+        return left
+    return left & (solutions.gaps <= _NEARLY * prepared.whole.length)
 
 
 def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
     """Nearest points, or compromises between distance and direction."""
-    roots = every_branch(prepared, request) if prepared.dimension == 3 else None
+    roots = _stable_roots(prepared, request) if prepared.dimension == 3 else None
     everything = np.arange(len(request.targets))
     closest = nearest(prepared, request, roots)
     return _solutions(prepared, request, no_roots(prepared.rod), everything, closest)
+
+
+def _stable_roots(prepared: PreparedMap, request: Request) -> Roots:
+    found = every_branch(prepared, request)
+    return found.where(found.stable)
 
 
 def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
@@ -151,7 +175,8 @@ def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
     missing = roots.missing(len(request.targets))
     closest = nearest_from(prepared.rod, request.of(missing), best.gamma[missing])
     solutions = _solutions(prepared, request, roots, missing, closest)
-    return _with_proofs(prepared, request, solutions) if request.prove_least else solutions
+    provable = request.prove_least and prepared.proves
+    return _with_proofs(prepared, request, solutions) if provable else solutions
 
 
 def _with_proofs(prepared: PreparedMap, request: Request, solutions: Solutions) -> Solutions:
@@ -195,7 +220,7 @@ def _solutions(
     yielding = request.direction is not None and prepared.dimension <= 3
     if proved_gaps is not None:
         bounds[out] = proved_gaps[out]
-    elif len(out) and not yielding:
+    elif len(out) and not yielding and (prepared.proves or not prepared.dimension):
         bounds[out] = gap_bounds(rod, prepared.coarse_cells, request.targets[out], far)
     proved = bounds[out] > request.residual
     statuses[out] = np.where(proved, Status.UNREACHABLE, Status.NOT_FOUND)
@@ -223,4 +248,5 @@ def _solutions(
         gap_bounds=bounds,
         change_bounds=np.zeros(count),
         least_proved=np.zeros(count, bool),
+        unstable=np.zeros(count, np.int64),
     )

@@ -34,6 +34,7 @@ Array = NDArray[np.float64]
 
 COLORMAP = "viridis"
 _MISSING = 204  # light gray
+_UNSTABLE = (255, 0, 200)  # magenta, which no other coloring has
 _LINE = 44  # characters above axes of a column's width
 
 
@@ -44,6 +45,8 @@ class BundleKey(NamedTuple):
     colors: NDArray[np.uint8]
     symbols: tuple[str, ...]
     """What formulas call the activation of each: γ, τ or P."""
+    unstable: bool = False
+    """Whether some samples are marked as unstable equilibria."""
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -58,6 +61,8 @@ class ScalarKey(NamedTuple):
     label: str
     low: float
     high: float
+    unstable: bool = False
+    """Whether some samples are marked as unstable equilibria."""
 
 
 class Coloring(NamedTuple):
@@ -76,9 +81,25 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike = "rgb") -> Co
             index of one bundle; one number per sample, whose attributes `long_name` and `units` go
             to the key if it is a DataArray; or RGB from 0 to 1 per sample.
 
+    Unstable equilibria of arms under loads are magenta, whatever the color of the others.
+
     Raises:
         InvalidInput: No such bundle, or an array of another length.
     """
+    return _marked(_colored(cloud, color), cloud)
+
+
+def _marked(coloring: Coloring, cloud: xr.Dataset) -> Coloring:
+    """Unstable samples in their own color, which the key explains."""
+    unstable = cloud["status"].values == 1 if "status" in cloud else np.zeros(0, bool)
+    if not unstable.any():
+        return coloring
+    rgb = np.where(unstable[:, None], np.array(_UNSTABLE, np.uint8), coloring.rgb)
+    key = None if coloring.key is None else coloring.key._replace(unstable=True)
+    return Coloring(rgb, key)
+
+
+def _colored(cloud: xr.Dataset, color: str | int | ArrayLike) -> Coloring:
     activation = bundle_activations(cloud)
     names, units = bundle_names(cloud), activation_units(activation)
     symbols = activation_symbols(units)
@@ -126,6 +147,8 @@ def draw_key(ax: Axes, key: BundleKey | ScalarKey | None) -> None:
     elif key is not None:
         bar = {"label": key.label, "fraction": 0.046, "pad": 0.03}
         ax.figure.colorbar(color_map(key), ax=ax, **bar)
+        if key.unstable:
+            ax.legend(handles=_marks(key), **_ABOVE)
 
 
 def draw_figure_key(figure: Figure, key: BundleKey | ScalarKey | None, top: float) -> None:
@@ -143,6 +166,9 @@ def draw_figure_key(figure: Figure, key: BundleKey | ScalarKey | None, top: floa
         bar = figure.add_axes((0.4, 1 - 0.5 * top, 0.4, 0.2 * top))
         figure.colorbar(color_map(key), cax=bar, orientation="horizontal")
         bar.set_ylabel(key.label, rotation=0, ha="right", va="center")
+        if key.unstable:
+            options = _ABOVE | {"loc": "center", "bbox_to_anchor": (0.88, 1 - 0.4 * top)}
+            figure.legend(handles=_marks(key), **options)
 
 
 _ABOVE: dict[str, Any] = {
@@ -205,4 +231,12 @@ def _patches(key: BundleKey) -> list[Any]:
     from matplotlib.patches import Patch
 
     named = zip(key.labels, key.colors / 255, strict=True)
-    return [Patch(facecolor=tuple(rgb), label=label) for label, rgb in named]
+    return [*(Patch(facecolor=tuple(rgb), label=label) for label, rgb in named), *_marks(key)]
+
+
+def _marks(key: BundleKey | ScalarKey) -> list[Any]:
+    """What marks unstable samples, if there are any."""
+    from matplotlib.patches import Patch
+
+    color = tuple(np.array(_UNSTABLE) / 255)
+    return [Patch(facecolor=color, label="unstable")] if key.unstable else []

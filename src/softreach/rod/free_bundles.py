@@ -70,6 +70,14 @@ class FreeBundles(TipMap):
         self.whole.fill_slopes(self._all(gamma), tips, of_all)
         slopes[:] = of_all[:, :, self.whole.box.free]
 
+    def fill_slopes_and_status(
+        self, gamma: Array, tips: Array, slopes: Array, *, status: NDArray[np.int8]
+    ) -> None:
+        """Put tips, ∂r/∂γ (n, 3, bundles) [m] and `TipStatus` (n,) into place."""
+        of_all = np.empty((len(gamma), 3, self.whole.box.bundles))
+        self.whole.fill_slopes_and_status(self._all(gamma), tips, of_all, status=status)
+        slopes[:] = of_all[:, :, self.whole.box.free]
+
     def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:
         """Tips [m] and the spatial twist of the tip frame per unit of each activation."""
         tips, twists = self.whole.tip_twists(self._all(self.box.check(activations)))

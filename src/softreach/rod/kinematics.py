@@ -99,6 +99,8 @@ def configuration(
         extension=extension,
         radius=rod.radius(z),
     )
+    if rod.supports_unstable:
+        dataset = schema.with_status(dataset, rod.status(gamma))
     return dataset.isel(sample=0) if np.ndim(activation) == 1 else dataset
 
 

@@ -172,6 +172,14 @@ class LoadedRod(TipMap):
         tips[:] = response.tips
         position_slopes(tips, response.twists, slopes)
 
+    def fill_slopes_and_status(
+        self, gamma: Array, tips: Array, slopes: Array, *, status: NDArray[np.int8]
+    ) -> None:
+        """Put tips, ∂r/∂γ (n, 3, bundles) [m] and `TipStatus` (n,) into place."""
+        response = self._solver.respond(gamma)
+        tips[:], status[:] = response.tips, response.status
+        position_slopes(tips, response.twists, slopes)
+
     def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:
         """Tips [m] and the spatial twist of the tip frame per unit of each activation."""
         response = self._responses(activations)
@@ -220,6 +228,8 @@ class LoadedRod(TipMap):
 
     def strain_range(self, stations: ArrayLike) -> StrainRange:
         """Ranges of the strains at stations Z [m] over the pilot of the activation box.
+
+        Unlike those of a free rod they are no bounds: others may strain it a little more.
 
         Raises:
             InvalidInput: None of the pilot has an equilibrium.

@@ -97,6 +97,13 @@ class MeasuredBundles(TipMap):
         self.whole.fill_slopes(gamma * self.measures, tips, slopes)
         slopes *= self.measures
 
+    def fill_slopes_and_status(
+        self, gamma: Array, tips: Array, slopes: Array, *, status: NDArray[np.int8]
+    ) -> None:
+        """Put tips, ∂r/∂γ (n, 3, bundles) [m] and `TipStatus` (n,) into place."""
+        self.whole.fill_slopes_and_status(gamma * self.measures, tips, slopes, status=status)
+        slopes *= self.measures
+
     def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:
         """Tips [m] and the spatial twist of the tip frame per unit of each activation."""
         tips, twists = self.whole.tip_twists(self._own(activations))

@@ -209,6 +209,13 @@ class TipMap(ABC):
         self.fill_tips(gamma, out)
         status[:] = TipStatus.STABLE
 
+    def fill_slopes_and_status(
+        self, gamma: Array, tips: Array, slopes: Array, *, status: NDArray[np.int8]
+    ) -> None:
+        """Put tips, ∂r/∂γ (n, 3, bundles) [m] and `TipStatus` (n,) into place."""
+        self.fill_slopes(gamma, tips, slopes)
+        status[:] = TipStatus.STABLE
+
     def tips_and_slopes(self, activations: ArrayLike) -> tuple[Array, Array]:
         """Tips [m], shape (n, 3), and their derivatives ∂r/∂γ [m], shape (n, 3, bundles)."""
         gamma = self.box.check(activations)

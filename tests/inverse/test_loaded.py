@@ -1,0 +1,190 @@
+"""The inverse problem and paths of arms whose loads leave some activations no stable rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from softreach.arm import Loads, designs
+from softreach.arm.manipulator import Manipulator
+from softreach.errors import InvalidInput
+from softreach.inverse import PathStatus, Status, solve_inverse
+from softreach.path import track_path
+from softreach.rod import tip_map
+from softreach.rod.loaded import LoadedRod
+from softreach.rod.tip_map import TipStatus
+from tests.oracles import loaded_rod
+from tests.rod.test_loaded_rod import oracle
+
+TARGETS = 300
+
+
+def loaded(arm: Manipulator) -> LoadedRod:
+    """The tip map that has equilibria."""
+    rod = tip_map(arm)
+    assert isinstance(rod, LoadedRod)
+    return rod
+
+
+def hanging(payload: float, **loads) -> Manipulator:
+    return designs.lce_arm().replace(
+        loads=Loads(gravity=(0.0, 0.0, 9.81), payload=payload, **loads)
+    )
+
+
+@pytest.fixture(scope="module")
+def heavy() -> Manipulator:
+    """An arm that is torn: a quarter of a percent of its activations are unstable, some have no
+    equilibrium."""
+    return hanging(0.020)
+
+
+@pytest.fixture(scope="module")
+def samples(heavy):
+    """Random activations with their equilibria."""
+    gamma = np.random.default_rng(0).uniform(heavy.bounds[:, 0], heavy.bounds[:, 1], (20_000, 3))
+    return gamma, loaded(heavy).equilibria(gamma)
+
+
+@pytest.fixture(scope="module")
+def stable(heavy, samples):
+    """Stable activations, the tips that they are solved for, and the answers."""
+    gamma, found = samples
+    gamma = gamma[found.status == TipStatus.STABLE][:TARGETS]
+    targets = tip_map(heavy).tips_and_slopes(gamma)[0]
+    return gamma, targets, solve_inverse(heavy, targets)
+
+
+@pytest.mark.parametrize(
+    "loads",
+    [
+        Loads(gravity=(0.0, 0.0, 9.81), payload=0.004, tip_force=(0.01, 0.0, 0.0)),
+        Loads(gravity=(0.0, 0.0, 9.81), follower_force=(0.02, 0.0, -0.01)),
+    ],
+)
+def test_tips_under_general_loads_are_solved_back(loads):
+    arm = designs.lce_arm().replace(loads=loads)
+    gamma = np.random.default_rng(1).uniform(arm.bounds[:, 0], arm.bounds[:, 1], (20, 3))
+    solutions = solve_inverse(arm, tip_map(arm).tips(gamma))
+    for solution, wanted in zip(solutions, gamma, strict=True):
+        assert solution.status is Status.REACHED
+        assert np.abs(solution.activations - wanted).max(axis=1).min() < 1e-6
+
+
+def test_stable_tips_are_solved_back_to_their_activations(stable):
+    gamma, _, solutions = stable
+    assert (solutions.statuses == Status.REACHED).all()
+    missed = [
+        np.abs(solution.activations - wanted).max(axis=1).min()
+        for solution, wanted in zip(solutions, gamma, strict=True)
+    ]
+    assert max(missed) < 1e-6
+
+
+def test_some_tips_have_several_stable_activations(stable):
+    solutions = stable[2]
+    assert (solutions.counts > 1).any()
+
+
+def test_every_root_is_a_stable_equilibrium_at_its_target(heavy, stable):
+    _, targets, solutions = stable
+    found = loaded(heavy).equilibria(solutions.activations)
+    assert (found.status == TipStatus.STABLE).all()
+    missed = np.linalg.norm(found.tips - np.repeat(targets, solutions.counts, axis=0), axis=1)
+    assert missed.max() <= 1e-6 * heavy.length
+    assert solutions.residuals.max() <= 1e-10 * heavy.length
+
+
+def test_the_most_patient_continuation_finds_the_roots_stable_too(heavy, stable):
+    rod, gamma = loaded(heavy), stable[2].activations[:100]
+    slowly = rod.solver.slowly(gamma)
+    assert (slowly.status == TipStatus.STABLE).all()
+    assert np.abs(slowly.tips - rod.tips(gamma)).max() <= 1e-6 * heavy.length
+
+
+def test_a_shooting_from_the_base_puts_the_tip_of_a_root_at_its_target(heavy, stable):
+    _, targets, solutions = stable
+    several = np.flatnonzero(solutions.counts > 1)[0]
+    for gamma in solutions[several].activations:
+        asked = oracle(heavy, loaded(heavy).body, gamma, heavy.loads)
+        tip = loaded_rod.equilibrium(*asked, rtol=1e-10).tip
+        assert np.linalg.norm(tip - targets[several]) <= 1e-6 * heavy.length
+
+
+def test_unstable_activations_are_no_answers(heavy, samples):
+    gamma, found = samples
+    unstable = found.status == TipStatus.UNSTABLE
+    assert unstable.sum() >= 10
+    solutions = solve_inverse(heavy, found.tips[unstable][:10])
+    for solution, wanted in zip(solutions, gamma[unstable][:10], strict=True):
+        assert (np.abs(solution.activations - wanted).max(axis=1, initial=0.0) > 1e-6).all() or (
+            not len(solution)
+        )
+    assert solutions.unstable.sum() > 0
+    status = tip_map(heavy).status(solutions.activations)
+    assert (status == TipStatus.STABLE).all()
+
+
+def test_nothing_is_proved_of_a_loaded_arm(heavy):
+    far = solve_inverse(heavy, [[10 * heavy.length, 0.0, 0.0]])[0]
+    assert far.status is Status.NOT_FOUND
+    assert far.gap_bound == 0.0
+    nearest = loaded(heavy).equilibria(far.nearest_activation[None])
+    assert nearest.status[0] == TipStatus.STABLE
+    assert np.linalg.norm(nearest.tips[0] - far.nearest) <= 1e-6 * heavy.length
+
+
+def test_an_arm_without_any_stable_equilibrium_is_refused():
+    arm = designs.lce_arm().with_bounds([(-1e-3, 0.0)] * 3)
+    upright = arm.replace(loads=Loads(gravity=(0.0, 0.0, -9.81), payload=5.0))
+    with pytest.raises(InvalidInput, match="no stable equilibrium"):
+        solve_inverse(upright, [[0.0, 0.0, 0.05]])
+
+
+def torn_line(rod: LoadedRod, samples) -> tuple[np.ndarray, np.ndarray]:
+    """Activations on a line that begins stable and whose end is not, and their status."""
+    gamma, found = samples
+    lost = gamma[found.status != TipStatus.STABLE][1]
+    near = np.argsort(np.linalg.norm(gamma - lost, axis=1))[:30]
+    start = gamma[near[found.status[near] == TipStatus.STABLE][-1]]
+    line = start + np.linspace(0.0, 1.0, 41)[:, None] * (lost - start)
+    return line, rod.status(line)
+
+
+def test_a_path_into_an_edge_of_stability_ends_there_by_name(heavy, samples):
+    rod = loaded(heavy)
+    line, status = torn_line(rod, samples)
+    last = int(np.argmax(status != TipStatus.STABLE)) - 1
+    tips = rod.tips_and_slopes(line[: last + 1])[0]
+    beyond = tips[-1] + np.arange(1, 20)[:, None] * (tips[-1] - tips[-2])
+    track = track_path(heavy, np.concatenate([tips, beyond]), line[0])
+    assert track.attrs["end"] == "unstable"
+    assert (track.status[track.status != PathStatus.FOLLOWED] == PathStatus.UNSTABLE).all()
+    followed = int((track.status == PathStatus.FOLLOWED).sum())
+    assert followed >= last
+    assert 0.0 < float(track.end_length_error) <= 1e-6 * heavy.length
+    on_branch = track.activation.values[:followed]
+    assert (rod.status(on_branch) == TipStatus.STABLE).all()
+    end = track.end_activation.values
+    assert rod.status(end[None])[0] == TipStatus.STABLE
+    # beyond, where the Jacobian at the end leads, there is none to go to, or it is elsewhere
+    path = track.position.values
+    ahead = (path[followed] - path[followed - 1]) / np.linalg.norm(path[1] - path[0])
+    tip, slope = (x[0] for x in rod.tips_and_slopes(end[None]))
+    step = 1e-4 * heavy.length * ahead / np.linalg.norm(ahead)
+    there = rod.equilibria((end + np.linalg.solve(slope, step))[None])
+    missed = np.linalg.norm(there.tips[0] - tip - step)
+    assert there.status[0] != TipStatus.STABLE or missed > 0.1 * np.linalg.norm(step)
+
+
+def test_the_end_of_a_path_is_where_its_length_says(heavy, samples):
+    rod = loaded(heavy)
+    line, status = torn_line(rod, samples)
+    last = int(np.argmax(status != TipStatus.STABLE)) - 1
+    tips = rod.tips_and_slopes(line[: last + 1])[0]
+    beyond = tips[-1] + np.arange(1, 20)[:, None] * (tips[-1] - tips[-2])
+    path = np.concatenate([tips, beyond])
+    track = track_path(heavy, path, line[0])
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    at = [np.interp(float(track.end_length), lengths, x) for x in path.T]
+    assert np.allclose(at, track.end_position, atol=1e-9 * heavy.length)
