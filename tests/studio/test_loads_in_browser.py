@@ -157,7 +157,8 @@ def test_all_loads_are_taken_off_at_once(loads_tab):
     assert not tab.drawn("/free")
     assert tab.session.reach.arm == designs.lce_arm()
     tab.wait(lambda: field(tab, "gravity").input_value() == "none", "the fields are empty")
-    assert tab.page.get_by_text("equilibrium").count() == 0
+    told = tab.page.get_by_text("equilibrium")
+    tab.wait(lambda: told.count() == 0, "nothing is said of equilibria")
 
 
 def test_matter_without_a_modulus_is_told_where_to_set_it(loads_tab):
