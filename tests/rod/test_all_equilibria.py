@@ -29,10 +29,10 @@ def trunk(load, gravity=UP, arm=TRUNK, **loads):
 
 
 @pytest.mark.parametrize("gravity", [UP, SIDE, DOWN], ids=["up", "side", "down"])
-@pytest.mark.parametrize(("load", "most"), [(0.5, 1), (12.0, 5), (25.0, 11)])
+@pytest.mark.parametrize(("load", "most"), [(0.5, 1), (12.0, 5)])
 def test_their_number_is_odd_and_one_is_the_branch_of_the_unloaded_arm(gravity, load, most):
     arm = trunk(load, gravity)
-    for gamma in np.random.default_rng(0).uniform(-5 / 3, 0, (4, 3)):
+    for gamma in np.random.default_rng(0).uniform(-5 / 3, 0, (3, 3)):
         every, branch = sr.equilibria(arm, gamma), tip_map(arm).equilibria(gamma[None])
         assert every.complete
         assert every.degree == 1

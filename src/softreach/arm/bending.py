@@ -48,6 +48,8 @@ def bending_at(arm: Manipulator, stations: ArrayLike) -> tuple[Array, Array]:
         Least and largest bending [1/m], each of shape (station,).
     """
     center, halves = _zonogons(arm, stations)
+    if not arm.bundles:
+        return np.zeros(len(center)), np.zeros(len(center))
     vertices = _vertices(center, halves)
     largest = np.linalg.norm(vertices, axis=-1).max(axis=1)
     edge = _distance_to_edges(vertices)

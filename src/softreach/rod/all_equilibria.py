@@ -18,10 +18,12 @@ from softreach import schema
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput, SoftreachWarning
+from softreach.geometry.sphere_mesh import icosphere
 from softreach.geometry.sphere_rings import is_axisymmetric, pole_rings
 from softreach.geometry.sphere_roots import Map, Roots, polished_roots, sphere_roots
 from softreach.rod.activation_box import as_floats
 from softreach.rod.equilibrium import Solver
+from softreach.rod.free import FreeRod
 from softreach.rod.kinematics import configuration, even_stations
 from softreach.rod.load_tables import LoadTables
 from softreach.rod.loaded import LoadedRod
@@ -37,6 +39,7 @@ Array = NDArray[np.float64]
 _SEARCHES = ((4, 1.0), (5, 3.0), (6, 10.0))
 """Levels of the first mesh, and caution: the later ones where the degree is not 1."""
 _MOST_STEPS = 512
+_ROUGHLY = 0.01  # [rad]
 _SYMMETRIC = 1e-6  # [rad], of the directions that the base would have to see
 _NEUTRAL = 1e-5  # what tolerances leave of the margin of a ring, which is 0
 _SAME = 1e-3  # [rad], of equilibria that were found in two ways
@@ -171,7 +174,7 @@ def equilibria(
     if not isinstance(rod, LoadedRod):
         return _without_loads(rod, gamma)
     _check_loads(rod.tables)
-    solver = Solver(rod.tables, rod.steps, rod.tol)
+    solver = _resolving(Solver(rod.tables, FreeRod(rod.arm, rod.tol).steps, rod.tol), gamma)
     branch = solver.find(gamma)
     known = branch.frame[branch.status != TipStatus.NO_EQUILIBRIUM]
     solver, found = _accurate(solver, gamma, _search(solver, gamma, known))
@@ -256,13 +259,32 @@ def _of_roots(roots: Roots, *, complete: bool) -> _Found:
 
 
 def _image(solver: Solver, gamma: Array) -> Map:
-    return lambda points: solver.base_directions(gamma, np.ascontiguousarray(points))
+    """What the base would have to see, of what the tip sees; steps do not keep its length."""
+
+    def image(points: Array) -> Array:
+        images = solver.base_directions(gamma, np.ascontiguousarray(points))
+        return images / np.linalg.norm(images, axis=1, keepdims=True)
+
+    return image
+
+
+def _resolving(solver: Solver, gamma: Array) -> Solver:
+    """With steps halved until the whole map of directions is roughly right."""
+    points = icosphere(2)[0]
+    while 2 * solver.steps <= _MOST_STEPS:
+        finer = solver.halved()
+        apart = _image(solver, gamma)(points) - _image(finer, gamma)(points)
+        if np.linalg.norm(apart, axis=1).max() <= _ROUGHLY:
+            break
+        solver = finer
+    return solver
 
 
 def _accurate(solver: Solver, gamma: Array, found: _Found) -> tuple[Solver, _Found]:
     """With steps halved until no tip moves by more than half of the tolerance.
 
-    The steps of the tip map are those of the branch that it follows; others may bend more.
+    Those to begin with are enough without loads. The steps of the tip map are those of the branch
+    that it follows anywhere in the box: others may bend more.
     """
     allowed = 0.5 * solver.tol * solver.tables.arm.length
     while 2 * solver.steps <= _MOST_STEPS:
