@@ -226,5 +226,5 @@ def test_all_numbers_are_in_a_dataset():
     data = every.to_dataset()
     np.testing.assert_array_equal(data.tip, every.tips)
     assert data.attrs["degree"] == 1
-    assert int(data.is_followed.argmax()) == every.followed
+    assert int(data.is_followed.values.argmax()) == every.followed
     assert f"{len(every)}, of which 1 stable" in repr(every)

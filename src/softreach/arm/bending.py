@@ -168,4 +168,4 @@ def _turns(arm: Manipulator) -> float:
     """Turns about the axis that some bundle makes relative to another."""
     center = arm.outline(np.linspace(0.0, arm.length, _STATIONS)).center
     relative = np.abs(np.diff(center - center[:, :1], axis=0)).sum(axis=0)
-    return float(relative.max()) / (2 * np.pi)
+    return float(relative.max(initial=0.0)) / (2 * np.pi)
