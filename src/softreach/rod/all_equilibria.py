@@ -42,6 +42,7 @@ _MOST_STEPS = 512
 _ROUGHLY = 0.01  # [rad]
 _SYMMETRIC = 1e-6  # [rad], of the directions that the base would have to see
 _NEUTRAL = 1e-5  # what tolerances leave of the margin of a ring, which is 0
+_SMALL = 1e-9  # of a length, below which it is shown as 0, in L
 _SAME = 1e-3  # [rad], of equilibria that were found in two ways
 
 
@@ -133,7 +134,8 @@ class AllEquilibria:
         return "\n".join([head, *(f"  {self._line(k)}" for k in range(len(self)))]) + ">"
 
     def _line(self, k: int) -> str:
-        tip = ", ".join(f"{x:.4g}" for x in self.tips[k])
+        small = _SMALL * self.rod.length
+        tip = ", ".join(f"{x:.4g}" if abs(x) > small else "0" for x in self.tips[k])
         kind = TipStatus(self.status[k]).name.lower() + (" ring" if self.is_ring[k] else "")
         which = ", follows from the unloaded arm" if k == self.followed else ""
         return f"{kind}: tip ({tip}) m, margin {self.margin[k]:.3g}{which}"

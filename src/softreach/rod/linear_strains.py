@@ -31,7 +31,9 @@ def linear_strains(table: Tables, gamma: Array) -> Strains:
     total, term = np.empty((len(rows), 4, len(gamma))), np.empty((4, len(gamma)))
     if not len(bundles):
         total[:] = 0.0
-    for row, out in zip(rows if len(bundles) else (), total, strict=False):  # station by station, so that terms stay cached
+    for row, out in zip(
+        rows if len(bundles) else (), total, strict=False
+    ):  # station by station, so that terms stay cached
         np.multiply(row[:, :1], bundles[0], out=out)
         for j in range(1, len(bundles)):
             out += np.multiply(row[:, j : j + 1], bundles[j], out=term)
