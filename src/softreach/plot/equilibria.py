@@ -64,7 +64,7 @@ def plot_equilibria(
     stable = equilibria.status == TipStatus.STABLE
     pale = [shapes[k] for k in np.flatnonzero(stable) if k != equilibria.followed]
     followed = [] if equilibria.followed is None else [shapes[equilibria.followed]]
-    circles = {k: _circle(equilibria, k) for k in np.flatnonzero(equilibria.is_ring)}
+    circles = {k: _circle(equilibria, k) for k, ring in enumerate(equilibria.is_ring) if ring}
     with figure_style(ax):
         rim = _rim(float(arm.profile.radius(0.0)) / arm.length)
         points = [rim, *(arm_points(arm, shape) for shape in shapes), *circles.values()]

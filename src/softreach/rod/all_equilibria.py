@@ -8,6 +8,7 @@ base is covered once more forward than backward, and the number of equilibria is
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -246,13 +247,16 @@ def _search(solver: Solver, gamma: Array, known: Array) -> _Found:
     return _isolated(image, axis, known)
 
 
-def _isolated(image: Map, axis: Array, known: Array) -> _Found:
-    for levels, caution in _SEARCHES:
-        roots, cut = sphere_roots(image, axis, levels=levels, caution=caution, starts=known)
-        complete = cut and np.sign(roots.determinants).sum() == 1
-        if complete:
-            break
-    return _of_roots(roots, complete=complete)
+def _isolated(
+    image: Map, axis: Array, known: Array, searches: Sequence[tuple[int, float]] = _SEARCHES
+) -> _Found:
+    """Those of an arm that is not axisymmetric, searched more finely if the degree is not 1."""
+    (levels, caution), *finer = searches
+    roots, cut = sphere_roots(image, axis, levels=levels, caution=caution, starts=known)
+    complete = cut and int(np.sign(roots.determinants).sum()) == 1
+    if complete or not finer:
+        return _of_roots(roots, complete=complete)
+    return _isolated(image, axis, known, finer)
 
 
 def _of_roots(roots: Roots, *, complete: bool) -> _Found:
