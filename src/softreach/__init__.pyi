@@ -37,6 +37,7 @@ from .inverse import solve_inverse as solve_inverse
 from .path import track_path as track_path
 from .redundancy import activation_distance as activation_distance
 from .rod import configuration as configuration
+from .rod import equilibria as equilibria
 from .rod import tip_jacobian as tip_jacobian
 from .rod import tip_positions as tip_positions
 from .volume import concave_hull as concave_hull

@@ -48,7 +48,7 @@ def sample_cube(sampler: str, n: int, dim: int, seed: int = 0) -> Array:
 def cube_blocks(sampler: str, n: int, dim: int, seed: int, size: int) -> Iterator[Array]:
     """The points of `sample_cube` in consecutive blocks of at most `size`."""
     check_sampler(sampler, n, dim, seed)
-    draw = SAMPLERS[sampler].begin(n, dim, seed)
+    draw = SAMPLERS[sampler].begin(n, dim, seed) if dim else _nothing
     for first in range(0, n, size):
         yield draw(first, min(size, n - first))
 
@@ -61,8 +61,14 @@ def check_sampler(sampler: str, n: int, dim: int, seed: int) -> None:
         raise InvalidInput("n", n, "a whole number, 1 or more")
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise InvalidInput("seed", seed, "a whole number, 0 or more")
-    if (advice := SAMPLERS[sampler].refusal(int(n), dim)) is not None:
+    if dim and (advice := SAMPLERS[sampler].refusal(int(n), dim)) is not None:
         raise InvalidInput("n", n, advice)
+
+
+def _nothing(first: int, count: int) -> Array:
+    """The only point of a cube without dimensions, again and again."""
+    del first
+    return np.empty((count, 0))
 
 
 def _uniform(n: int, dim: int, seed: int) -> Draw:

@@ -15,7 +15,6 @@ from softreach.errors import InvalidDesign, InvalidInput
 from softreach.kernels import loaded_reference
 from softreach.rod import equilibrium
 from softreach.rod import loaded as loaded_module
-from softreach.rod.all_equilibria import all_equilibria
 from softreach.rod.equilibrium import Rung, Solver
 from softreach.rod.free import FreeRod
 from softreach.rod.load_tables import LoadTables
@@ -285,26 +284,3 @@ def test_the_walk_is_that_of_the_reference():
     seen, _, tip = loaded_reference.walk(section, TRUNK.length, g, m, 600)
     np.testing.assert_allclose(seen, of_tables.axes[0], atol=1e-7)
     np.testing.assert_allclose(tip, solved.tips[0], atol=1e-7)
-
-
-@pytest.mark.parametrize(("load", "most"), [(0.5, 1), (12.0, 3), (25.0, 9)])
-def test_all_equilibria_are_counted(load, most):
-    """The degree is 1, the branch of the unloaded arm is among them, and light arms have no other.
-
-    Only one is stable each time: bent either way, an upright arm can swing over sideways.
-    """
-    young = 1000 * 9.81 / (load * TRUNK.profile.outer_radius**2)
-    solver = Solver(loaded(Loads(gravity=UP), young=young).tables, 40, 1e-8)
-    for gamma in np.random.default_rng(0).uniform(-5 / 3, 0, (6, 1, 3)):
-        every, branch = all_equilibria(solver, gamma), solver.find(gamma)
-        assert every.degree == 1
-        assert len(every.tips) % 2 == 1
-        assert len(every.tips) <= most
-        assert (every.status == TipStatus.STABLE).sum() == 1
-        assert np.linalg.norm(every.tips - branch.tips, axis=1).min() < 1e-6
-
-
-def test_equilibria_under_crossed_loads_are_not_counted():
-    solver = Solver(loaded(Loads(gravity=SIDE, tip_force=(0, 1.0, 0))).tables, 8, 1e-6)
-    with pytest.raises(InvalidInput, match="one direction"):
-        all_equilibria(solver, GAMMA[:1])

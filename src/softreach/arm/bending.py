@@ -48,6 +48,8 @@ def bending_at(arm: Manipulator, stations: ArrayLike) -> tuple[Array, Array]:
         Least and largest bending [1/m], each of shape (station,).
     """
     center, halves = _zonogons(arm, stations)
+    if not arm.bundles:
+        return np.zeros(len(center)), np.zeros(len(center))
     vertices = _vertices(center, halves)
     largest = np.linalg.norm(vertices, axis=-1).max(axis=1)
     edge = _distance_to_edges(vertices)
@@ -166,4 +168,4 @@ def _turns(arm: Manipulator) -> float:
     """Turns about the axis that some bundle makes relative to another."""
     center = arm.outline(np.linspace(0.0, arm.length, _STATIONS)).center
     relative = np.abs(np.diff(center - center[:, :1], axis=0)).sum(axis=0)
-    return float(relative.max()) / (2 * np.pi)
+    return float(relative.max(initial=0.0)) / (2 * np.pi)

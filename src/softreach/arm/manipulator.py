@@ -45,7 +45,8 @@ class Manipulator:
     section: Section
     """The core and the ring of actuators, in proportion to R2(Z)."""
     actuators: tuple[Actuator, ...]
-    """What drives the arm; activations follow their order, bundle by bundle."""
+    """What drives the arm; activations follow their order, bundle by bundle. Empty for a passive
+    rod."""
     loads: Loads | None = None
     """What acts on the arm beside them; None for nothing, not even its weight."""
 
@@ -121,8 +122,8 @@ class Manipulator:
         if faults := bounds_faults(activation_bounds, self.bundles):
             raise InvalidDesign(faults)
         pairs = np.broadcast_to(np.asarray(activation_bounds, float), (self.bundles, 2))
-        ends = np.cumsum([actuator.bundles for actuator in self.actuators])[:-1]
-        parts = zip(self.actuators, np.split(pairs, ends), strict=True)
+        ends = np.cumsum([actuator.bundles for actuator in self.actuators], dtype=int)
+        parts = zip(self.actuators, np.split(pairs, ends)[:-1], strict=True)
         return self.replace(actuators=tuple(one.with_bounds(part) for one, part in parts))
 
     def split(self, fiber: str | int, count: int, *, keep_extent: bool = True) -> Self:
@@ -224,7 +225,7 @@ class Manipulator:
     @cached_property
     def bounds(self) -> Array:
         """Lower and upper activation of each bundle [unit], shape (bundles, 2), read-only."""
-        bounds = np.concatenate([actuator.bounds for actuator in self.actuators])
+        bounds = np.concatenate([np.empty((0, 2)), *(one.bounds for one in self.actuators)])
         bounds.setflags(write=False)
         return bounds
 
@@ -248,6 +249,7 @@ class Manipulator:
         """Where all bundles lie in the sections at stations Z [m], shape (station,)."""
         stations = np.atleast_1d(np.asarray(z, float))
         each = [one.outline(self.profile, self.section, stations) for one in self.actuators]
+        each = each or [_no_bundles(len(stations))]
         return Outline(
             center=np.concatenate([one.center for one in each], axis=1),
             extent=np.concatenate([one.extent for one in each]),
@@ -259,7 +261,7 @@ class Manipulator:
 
     def __repr__(self) -> str:
         base, tip = self.profile.radius([0.0, self.length])
-        names = ", ".join(self.bundle_names[:_NAMES])
+        names = ", ".join(self.bundle_names[:_NAMES]) or "none, a passive rod"
         more = f", ... ({self.bundles} in all)" if self.bundles > _NAMES else ""
         return (
             f"{type(self).__name__}: L = {self.length:g} m, R2 = {base:.4g} to {tip:.4g} m\n"
@@ -287,6 +289,19 @@ class Manipulator:
         raise InvalidInput("fiber", repr(fiber), f"the name or index of one architecture: {known}")
 
 
+def _no_bundles(stations: int) -> Outline:
+    """The outline of a passive rod."""
+    nowhere = np.empty((stations, 0))
+    return Outline(
+        center=nowhere,
+        extent=np.empty(0),
+        inner_ratio=nowhere,
+        outer_ratio=nowhere,
+        shape=(),
+        acts=np.empty((stations, 0), bool),
+    )
+
+
 def _part_faults(arm: Manipulator) -> Iterator[Fault]:
     """Parts of the wrong type."""
     if not isinstance(arm.profile, Profile):
@@ -299,8 +314,8 @@ def _part_faults(arm: Manipulator) -> Iterator[Fault]:
 
 
 def _actuator_faults(actuators: Any) -> Iterator[Fault]:
-    if not isinstance(actuators, Sequence) or isinstance(actuators, str) or not actuators:
-        yield Fault("actuators", actuators, "must be a sequence of one actuator or more")
+    if not isinstance(actuators, Sequence) or isinstance(actuators, str):
+        yield Fault("actuators", actuators, "must be a sequence of actuators")
         return
     for k, part in enumerate(actuators):
         if not isinstance(part, Actuator):

@@ -92,13 +92,18 @@ def describe(arm: Manipulator) -> DesignSummary:
             smallest_bending(arm).value * arm.length,
             largest_bending(arm).value * arm.length,
         ),
-        bundle_extension=np.array([extension_range(one) for one in _alone(arm)]),
-        bundle_bending=np.array([_slender_bending(one) for one in _alone(arm)]),
+        bundle_extension=_pairs(extension_range(one) for one in _alone(arm)),
+        bundle_bending=_pairs(_slender_bending(one) for one in _alone(arm)),
         breakpoints=arm.breakpoints,
         validity=tuple(dict.fromkeys(_validity(one) for one in arm.actuators if one.validity)),
         warnings=design_warnings(arm),
         **_of_matter(arm),
     )
+
+
+def _pairs(values: Iterator[tuple[float, float]]) -> Array:
+    """Shape (n, 2), also of none."""
+    return np.array(list(values)).reshape(-1, 2)
 
 
 def _of_matter(arm: Manipulator) -> dict[str, Any]:

@@ -51,7 +51,8 @@ def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
         stations: Z [m], shape (station,).
     """
     z = np.atleast_1d(np.asarray(stations, float))
-    loads = [_resultants(actuator, arm, z) for actuator in arm.actuators]
+    loads = [Resultants(np.empty((len(z), 0)), np.empty((len(z), 3, 0)))]
+    loads += [_resultants(actuator, arm, z) for actuator in arm.actuators]
     stiffness = arm.section.stiffness(arm.profile.radius(z))
     resistance = np.stack([stiffness.bending, stiffness.bending, stiffness.torsion], axis=1)
     return Tables(

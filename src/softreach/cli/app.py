@@ -54,6 +54,10 @@ _COMMANDS = {
         "The exact reachable set: volume, multiplicity, folds, boundary.",
         "softreach reach minimal_trunk --surface reach.stl --figure reach.png",
     ),
+    "equilibria": (
+        "Every equilibrium of a loaded arm at given activations, stable or not.",
+        "softreach equilibria arm.toml --activation=-1,0,-0.5 --figure equilibria.png",
+    ),
     "solve": (
         "Every activation that puts the tip at a target.",
         "softreach solve minimal_trunk --target 0.2,0.1,0.6",

@@ -11,7 +11,7 @@ from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import Activation, Sampler, Source, cloud_of, shape_of
 from softreach.errors import InvalidInput
 
-__all__ = ["show"]
+__all__ = ["check_picture", "show"]
 
 
 def show(
@@ -34,7 +34,7 @@ def show(
     from softreach import plot
     from softreach.cloud import design_of
 
-    _check_suffix(out)
+    check_picture("out", out)
     cloud = cloud_of(source, n, seed, sampler, changes)
     arm = design_of(cloud)
     shape = None if activation is None else shape_of(activation, arm)
@@ -42,10 +42,10 @@ def show(
     sys.stdout.write(f"{out}\n")
 
 
-def _check_suffix(out: Path) -> None:
+def check_picture(name: str, out: Path) -> None:
     """Refuse a picture format that matplotlib cannot write, before anything is computed."""
     from softreach.plot.style import pyplot
 
     known = pyplot().Figure().canvas.get_supported_filetypes()
     if out.suffix.lower().removeprefix(".") not in known:
-        raise InvalidInput("out", out, "a file name ending in .png, .pdf, .svg or the like")
+        raise InvalidInput(name, out, "a file name ending in .png, .pdf, .svg or the like")

@@ -47,8 +47,8 @@ def quartered(points: Array, triangles: Indices) -> tuple[Array, Indices]:
         All points, the old ones first, and the new triangles only.
     """
     sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    pairs, which = np.unique(sides, axis=0, return_inverse=True)
-    middles = points[pairs].sum(axis=1)
+    keys, which = np.unique(sides @ [len(points), 1], return_inverse=True)
+    middles = points[keys // len(points)] + points[keys % len(points)]
     middles /= np.linalg.norm(middles, axis=1, keepdims=True)
     a, b, c = triangles.T
     ab, bc, ca = (len(points) + which.reshape(-1, 3)).T

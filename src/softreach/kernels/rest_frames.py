@@ -38,7 +38,7 @@ def pack_lengths(measure, stretch):
         stretch: z [-], shape (step, node, bundle).
     """
     bundles = stretch.shape[2]
-    table = np.zeros((*measure.shape, -(-bundles // 4) * 4 + 1))
+    table = np.zeros((*measure.shape, -(-max(bundles, 1) // 4) * 4 + 1))
     table[..., :bundles] = measure[..., None] * stretch
     table[..., -1] = measure
     return table

@@ -28,7 +28,8 @@ _GROUP = 4  # bundles added at once
 def pack(measure, stretch, curvature):
     """Node tables as one array (step, 12, bundle + 1): rows ℓ, u1, u2, u3 of each node.
 
-    The last column is the value at rest; bundles are padded with zeros to a multiple of four.
+    The last column is the value at rest; bundles are padded with zeros to a multiple
+    of four, and at least four.
 
     Args:
         measure: Length of the step as each node sees it [m], shape (step, 3).
@@ -36,7 +37,7 @@ def pack(measure, stretch, curvature):
         curvature: U [1/m], shape (step, 3, 3, bundle).
     """
     steps, _, bundles = stretch.shape
-    table = np.zeros((steps, 3, 4, -(-bundles // _GROUP) * _GROUP + 1))
+    table = np.zeros((steps, 3, 4, -(-max(bundles, 1) // _GROUP) * _GROUP + 1))
     table[:, :, 0, :bundles] = measure[..., None] * stretch
     table[:, :, 0, -1] = measure
     table[:, :, 1:, :bundles] = curvature

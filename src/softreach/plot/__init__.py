@@ -12,6 +12,7 @@ from softreach.plot.cross_section import plot_cross_section
 from softreach.plot.curvature import plot_curvature
 from softreach.plot.designs import DesignPanel, plot_designs
 from softreach.plot.distance import plot_distance, plot_distance_histograms
+from softreach.plot.equilibria import plot_equilibria
 from softreach.plot.hull import plot_hull
 from softreach.plot.metric_map import plot_metric_map
 from softreach.plot.redundancy import plot_redundancy
@@ -35,6 +36,7 @@ __all__ = [
     "plot_designs",
     "plot_distance",
     "plot_distance_histograms",
+    "plot_equilibria",
     "plot_hull",
     "plot_hull_sheet",
     "plot_metric_map",

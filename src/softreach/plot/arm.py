@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from softreach.arm.manipulator import Manipulator
 
-__all__ = ["arm_points", "plot_arm", "shapes_of"]
+__all__ = ["arm_points", "draw_arms", "plot_arm", "shapes_of"]
 
 Array = NDArray[np.float64]
 
@@ -69,8 +69,8 @@ def plot_arm(
         points = np.concatenate([arm_points(arm, shape) for shape in shapes + resting])
         panel = Panel.opened(points, in_lengths(arm.length), ax, view, box)
         drawn = range(arm.bundles) if bundles is None else bundles
-        _show(panel, arm, resting, drawn, _FADE if shapes else 0.0)
-        _show(panel, arm, shapes, drawn)
+        draw_arms(panel, arm, resting, drawn, _FADE if shapes else 0.0)
+        draw_arms(panel, arm, shapes, drawn)
     return panel.ax
 
 
@@ -94,7 +94,7 @@ def arm_points(arm: Manipulator, shape: xr.Dataset) -> Array:
     return np.concatenate([surface.vertices for surface in surfaces]) / arm.length
 
 
-def _show(
+def draw_arms(
     panel: Panel,
     arm: Manipulator,
     shapes: list[xr.Dataset],

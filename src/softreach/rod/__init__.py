@@ -1,6 +1,7 @@
 """The rod: activation box, tip map, and the kinematics that a user asks."""
 
 from softreach.rod.activation_box import ActivationBox
+from softreach.rod.all_equilibria import AllEquilibria, equilibria
 from softreach.rod.equilibrium import Equilibria, Rung
 from softreach.rod.free_bundles import FreeBundles, free_bundles
 from softreach.rod.kinematics import configuration, tip_jacobian, tip_positions
@@ -17,6 +18,7 @@ from softreach.rod.tip_map import (
 
 __all__ = [
     "ActivationBox",
+    "AllEquilibria",
     "Equilibria",
     "Frames",
     "FreeBundles",
@@ -28,6 +30,7 @@ __all__ = [
     "TipMotions",
     "TipStatus",
     "configuration",
+    "equilibria",
     "free_bundles",
     "tip_jacobian",
     "tip_map",

@@ -169,7 +169,7 @@ class ActivationBox:
 
     def corners(self) -> Array:
         """All corners, shape (2^bundles, bundles), the last bundle varying fastest."""
-        upper = np.indices((2,) * self.bundles).reshape(self.bundles, -1).T
+        upper = np.indices((2,) * self.bundles).reshape(self.bundles, 2**self.bundles).T
         return np.where(upper, self.high, self.low)
 
 

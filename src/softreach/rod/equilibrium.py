@@ -269,13 +269,21 @@ class Solver:
         loaded.base_directions(_columns(gamma), self.tables.at_tip, directions, fine, out)
         return out
 
-    def polished(self, gamma: Array, directions: Array) -> tuple[Equilibria, Array]:
-        """Equilibria of one arm near directions G(L), and the sign of each: -1 to its index."""
-        found = self.empty(len(directions))
-        many = np.repeat(_columns(gamma), len(directions), axis=0)
-        tips, frame, margin, state, sign = self._one(many, _POLISH, directions)
-        self._put(found, slice(None), Rung.DIRECT, tips, frame, margin, state)
-        return found, np.sign(sign)
+    def held(self, gamma: Array, directions: Array, stations: Array) -> tuple[Shapes, Array]:
+        """Shapes of arms whose tips see gravity along given directions, and their margins.
+
+        Nothing is searched: the directions (n, 3), as in `base_directions`, are those of equilibria
+        of loads along one direction.
+        """
+        edges = self.tables.edges(stations, self.steps)
+        table, z = self.tables.of_edges(edges), self.tables.arm.profile.station(edges)
+        rows = np.abs(z[None] - np.append(stations, 0.0)[:, None]).argmin(axis=1)
+        frames, nowhere = self._whole(directions), np.full(len(rows), np.nan)
+        found, *_, trace = self._general(_columns(gamma), table, _HELD, frames, trace=True)
+        at, lost = np.zeros((len(gamma), 3)), np.zeros(len(gamma), bool)
+        force = self._force_at(table, rows)
+        shapes = _shapes(at, trace[:, rows], force, nowhere, lost, self.tables)
+        return _on_base(shapes), found[:, 9]
 
     def _whole(self, frame: Array) -> Array:
         """Both axes; the second is turned as the first one is, by the shortest way."""
@@ -381,7 +389,8 @@ class Solver:
 
 # From a known equilibrium: only the rotation about gravity may be far off.
 _NEAR = _Search(1.0, 4.0, 12)
-_POLISH = _Search(1.0, 0.3, 10)
+# One walk from where it is.
+_HELD = _Search(1.0, 4.0, 0)
 
 
 def _columns(gamma: Array) -> Array:
@@ -412,6 +421,14 @@ def _shapes(
     for values in (position, directors, moment, thrust):
         values[lost] = np.nan
     return Shapes(Frames(position, directors), moment, thrust)
+
+
+def _on_base(shapes: Shapes) -> Shapes:
+    """Shapes moved and turned so that their last station stands on the base, and without it."""
+    (position, directors), moment, force = shapes
+    turn = np.swapaxes(directors[:, -1], -1, -2)
+    position, directors = (position - position[:, -1:]) @ turn, directors @ turn[:, None]
+    return Shapes(Frames(position[:, :-1], directors[:, :-1]), moment[:, :-1], force[:, :-1])
 
 
 def _orthonormal(g: Array, h: Array) -> Array:

@@ -19,7 +19,7 @@ from softreach.rod.tip_map import TipMap, tip_map
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["configuration", "tip_jacobian", "tip_positions"]
+__all__ = ["configuration", "even_stations", "tip_jacobian", "tip_positions"]
 
 Array = NDArray[np.float64]
 
@@ -86,7 +86,7 @@ def configuration(
     """
     rod = tip_map(arm, tol)
     gamma = rod.box.check(np.atleast_2d(as_floats("activation", activation)))
-    z = _even_stations(rod, stations) if np.ndim(stations) == 0 else rod.check_stations(stations)
+    z = even_stations(rod, stations) if np.ndim(stations) == 0 else rod.check_stations(stations)
     position, directors = rod.frames(gamma, z)
     curvature, extension = rod.strains(gamma, z)
     dataset = schema.configuration_dataset(
@@ -104,7 +104,8 @@ def configuration(
     return dataset.isel(sample=0) if np.ndim(activation) == 1 else dataset
 
 
-def _even_stations(rod: TipMap, stations: object) -> Array:
+def even_stations(rod: TipMap, stations: object) -> Array:
+    """Z [m] of a number of stations, evenly spaced from base to tip."""
     if isinstance(stations, bool) or not isinstance(stations, int | np.integer) or stations < 2:
         raise InvalidInput("stations", stations, "2 or more, or the stations' Z in m")
     return np.linspace(0.0, rod.length, int(stations))

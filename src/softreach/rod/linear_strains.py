@@ -29,7 +29,11 @@ def linear_strains(table: Tables, gamma: Array) -> Strains:
     rows = np.concatenate([table.curvature, table.extension[:, None]], axis=1)
     bundles = np.ascontiguousarray(gamma.T)
     total, term = np.empty((len(rows), 4, len(gamma))), np.empty((4, len(gamma)))
-    for row, out in zip(rows, total, strict=True):  # station by station, so that terms stay cached
+    if not len(bundles):
+        total[:] = 0.0
+    for row, out in zip(
+        rows if len(bundles) else (), total, strict=False
+    ):  # station by station, so that terms stay cached
         np.multiply(row[:, :1], bundles[0], out=out)
         for j in range(1, len(bundles)):
             out += np.multiply(row[:, j : j + 1], bundles[j], out=term)

@@ -212,16 +212,24 @@ class LoadedRod(TipMap):
         Curvature is per length as it is, stretched by loads too, so that dᵢ' = ζ u × dᵢ.
         """
         z = self.check_stations(stations, ascending=False)
-        table, (axial, bending, torsion) = tables(self.arm, z), self.body.compliance(z)
-        yielded = np.stack([bending, bending, torsion], axis=1)
+        of_shapes = self.strains_of_shapes(z)
         ascending, back = np.unique(z, return_inverse=True)
 
         def strains(activations: ArrayLike) -> Strains:
             gamma = self.box.check(activations)
-            rest = linear_strains(table, gamma)
             shape = self._shape_solver.shapes(gamma, ascending)
-            stretch = 1.0 + shape.force[:, back, 2] * axial
-            u = rest.curvature + shape.moment[:, back] * yielded
+            return of_shapes(gamma, shape.moment[:, back], shape.force[:, back])
+
+        return strains
+
+    def strains_of_shapes(self, z: Array) -> Callable[[Array, Array, Array], Strains]:
+        """The strains at stations Z [m] as a function of activations, and of m and n there."""
+        table, (axial, bending, torsion) = tables(self.arm, z), self.body.compliance(z)
+        yielded = np.stack([bending, bending, torsion], axis=1)
+
+        def strains(gamma: Array, moment: Array, force: Array) -> Strains:
+            rest, stretch = linear_strains(table, gamma), 1.0 + force[..., 2] * axial
+            u = rest.curvature + moment * yielded
             return Strains(u / stretch[..., None], rest.extension * stretch)
 
         return strains

@@ -38,12 +38,13 @@ def pilot_activations(arm: Manipulator, box: ActivationBox) -> Array:
     """
     m, rng = box.bundles, np.random.default_rng(0)
     if 2**m <= _MOST_CORNERS:
-        corners = np.indices((2,) * m).reshape(m, -1).T.astype(float)
+        corners = np.indices((2,) * m).reshape(m, 2**m).T.astype(float)
     else:
         corners = rng.integers(0, 2, (_MOST_CORNERS, m)).astype(float)
         corners[:2] = [[0.0], [1.0]]
     inside, faces = rng.random((2, _INSIDE, m))
-    faces[np.arange(_INSIDE), rng.integers(0, m, _INSIDE)] = rng.integers(0, 2, _INSIDE)
+    if m:
+        faces[np.arange(_INSIDE), rng.integers(0, m, _INSIDE)] = rng.integers(0, 2, _INSIDE)
     cube = np.concatenate([corners, faces, inside])
     if 2**m > _MOST_CORNERS:
         cube = np.concatenate([cube, _bending_corners(arm)])

@@ -46,9 +46,8 @@ class _Design(Layout):
     materials: dict[str, MaterialTable] = Field(default={})  # pyright: ignore
     section: SectionTable = SectionTable()  # pyright: ignore
     rings: Annotated[list[RingTable], Field(min_length=1)]  # pyright: ignore
-    actuators: Annotated[  # pyright: ignore
-        list[FiberTable | ObliqueTable | RadialTable | TendonTable | ChamberTable | OwnTable],
-        Field(min_length=1),
+    actuators: list[  # pyright: ignore
+        FiberTable | ObliqueTable | RadialTable | TendonTable | ChamberTable | OwnTable
     ]
     loads: LoadTable | None = None  # pyright: ignore
 

@@ -31,8 +31,8 @@ class Layout(Table):
     rings: Annotated[list[_TableOf], Field(min_length=1)] = Field(
         description="Layers that actuators live in"
     )
-    actuators: Annotated[list[_TableOf], Field(min_length=1)] = Field(
-        description="What drives the arm, in the order of the activations"
+    actuators: list[_TableOf] = Field(
+        description="What drives the arm, in the order of the activations; [] for a passive rod"
     )
     loads: _TableOf | None = Field(default=None, description="What acts on the arm beside them")
 

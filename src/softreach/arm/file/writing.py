@@ -65,7 +65,7 @@ def render(
     """
     names = _named_materials(section)
     blocks = [
-        ["version = 2"],
+        ["version = 2"] if actuators else ["version = 2", "actuators = []"],
         ["[profile]", *_profile_lines(profile)],
         *(_material_block(name, material) for name, material in names.items()),
         *_section_blocks(section, names),
