@@ -11,9 +11,9 @@ import softreach as sr
 from softreach.arm.loads import PointLoad
 from softreach.rod import TipStatus, all_equilibria, tip_map
 from tests.bodies import rubber
+from tests.bodies import oracle_rod
 from tests.oracles import column
 from tests.oracles.chain import Chain
-from tests.rod.test_loaded_rod import oracle
 
 TRUNK = sr.designs.minimal_trunk()
 UP, SIDE, DOWN = (0.0, 0.0, -9.81), (9.81, 0.0, 0.0), (0.0, 0.0, 9.81)
@@ -50,7 +50,7 @@ def test_no_random_start_of_a_chain_of_links_comes_to_another(load):
     """Newton's method on the energy of a chain, from shapes with random bending."""
     arm = trunk(load)
     every = sr.equilibria(arm, BENT)
-    chain = Chain(*oracle(arm, every.rod.body, BENT, arm.loads), 20)
+    chain = Chain(*oracle_rod(arm, every.rod.body, BENT, arm.loads), 20)
     tips = [tip for seed in range(60) if (tip := come_to_rest(chain, seed)) is not None]
     assert len(tips) > 20
     apart = np.linalg.norm(np.array(tips)[:, None] - every.tips, axis=2)
@@ -87,7 +87,7 @@ def test_stable_ones_are_minima_and_signs_count_the_ways_to_fall(load, gravity):
 def softest_of(every, links=48):
     """The smallest eigenvalues of the energy of a chain at each equilibrium."""
     rod = every.rod
-    chain = Chain(*oracle(rod.arm, rod.body, every.activation, rod.arm.loads), links)
+    chain = Chain(*oracle_rod(rod.arm, rod.body, every.activation, rod.arm.loads), links)
     many = np.repeat(every.activation[None], len(every), axis=0)
     shapes = every.solver.held(many, every.directions, chain.joints)[0]
     frames, moments = shapes.frames.directors, shapes.moment
