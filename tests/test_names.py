@@ -32,6 +32,7 @@ MODULES = [
         "plot",
         "redundancy",
         "rod",
+        "stiffness",
         "volume",
         "workspace",
     )

@@ -11,6 +11,7 @@ from . import path as path
 from . import plot as plot
 from . import redundancy as redundancy
 from . import rod as rod
+from . import stiffness as stiffness
 from . import volume as volume
 from . import workspace as workspace
 from .arm import Chamber as Chamber
@@ -38,6 +39,7 @@ from .redundancy import activation_distance as activation_distance
 from .rod import configuration as configuration
 from .rod import tip_jacobian as tip_jacobian
 from .rod import tip_positions as tip_positions
+from .stiffness import tip_compliance as tip_compliance
 from .volume import concave_hull as concave_hull
 from .volume import convex_hull as convex_hull
 from .workspace import reachable_set as reachable_set

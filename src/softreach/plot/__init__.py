@@ -8,6 +8,7 @@ from __future__ import annotations
 from softreach.plot.arm import plot_arm
 from softreach.plot.atlas_axes import SheetAxis, box_over_length, sheet_axes
 from softreach.plot.cloud import plot_cloud
+from softreach.plot.compliance import plot_compliance
 from softreach.plot.cross_section import plot_cross_section
 from softreach.plot.curvature import plot_curvature
 from softreach.plot.designs import DesignPanel, plot_designs
@@ -30,6 +31,7 @@ __all__ = [
     "plot_arm",
     "plot_cloud",
     "plot_cloud_sheet",
+    "plot_compliance",
     "plot_cross_section",
     "plot_curvature",
     "plot_designs",
