@@ -53,7 +53,7 @@ def tip_compliance(arm: Manipulator | TipMap, activations: ArrayLike, tol: float
             the arm's own.
         InvalidDesign: A material has no Young's modulus.
     """
-    return _yielding(tip_map(arm, tol)).compliance(activations)
+    return yielding_rod(tip_map(arm, tol)).compliance(activations)
 
 
 class PrincipalCompliances(NamedTuple):
@@ -135,7 +135,7 @@ def cloud_compliance(cloud: xr.Dataset) -> xr.Dataset:
     """
     import xarray as xr
 
-    rod = _yielding(tip_map_of(check_cloud(cloud)))
+    rod = yielding_rod(tip_map_of(check_cloud(cloud)))
     n = cloud.sizes["sample"]
     matrices, soft = np.empty((n, 3, 3)), np.empty((n, 3))
     largest, smallest = np.empty((2, n))
@@ -195,7 +195,7 @@ def _checked_compliance(compliance: ArrayLike) -> Array:
     return matrices
 
 
-def _yielding(rod: TipMap) -> LoadedRod:
+def yielding_rod(rod: TipMap) -> LoadedRod:
     """The rod of a tip map that also knows how it yields; without loads nothing weighs on it."""
     if isinstance(rod, LoadedRod):
         return rod
