@@ -67,7 +67,9 @@ def blocked_force(
         Dataset over `place`: `force` [N] with `force_error` from the tip error, the `activation`
         and the `start_activation`, `tip_force`, which then acts on the tip [N], `status`, which
         says what ended the growth, and `limit` (place, bundle), true for bundles at the bounds that
-        did. NaN where no stable start was found.
+        did. `settles` says whether the arm comes to rest in the end so if it is activated first and
+        loaded slowly then, as the other functions have it; else only the way there, along which
+        the tip was held, leads to that equilibrium. NaN where no stable start was found.
 
     Raises:
         InvalidInput: Arguments of another shape or not finite, or fewer than three free bundles.
@@ -94,6 +96,7 @@ class _Best(NamedTuple):
     start: Array
     end: Grown
     tip_error: float
+    settles: bool
 
 
 def _force(one: _Best) -> float:
@@ -124,9 +127,10 @@ def _grown(rod: LoadedRod, direction: Array, place: Array, start: Array) -> _Bes
         end = growth.grown()
         if end is None or growth.first is None:
             return None
-        error = pushing.error(end.held.gamma, end.held.force)
+        error = pushing.error(*end.held)
         if error <= 0.5 * allowed or pushing.steps >= _MOST_STEPS:
-            return _Best(growth.first.gamma, end, error + growth.residual)
+            settles = pushing.settles(*end.held)
+            return _Best(growth.first.gamma, end, error + growth.residual, settles)
         pushing = pushing.finer()
 
 
@@ -143,10 +147,11 @@ def _dataset(
     force, error = np.full((2, n), np.nan)
     activation, begun = np.full((2, n, bundles), np.nan)
     status, limit = np.full(n, Stop.NO_START, np.int8), np.zeros((n, bundles), bool)
+    settles = np.zeros(n, bool)
     for k, one in _rows(best):
         force[k], status[k], limit[k] = one.end.held.force, one.end.stop, one.end.limits
         error[k] = one.end.slope * one.tip_error
-        activation[k], begun[k] = one.end.held.gamma, one.start
+        activation[k], begun[k], settles[k] = one.end.held.gamma, one.start, one.settles
     units = activation_attributes(rod.arm)
     acting = np.array(rod.loads.tip_force) - force[:, None] * directions
     return xr.Dataset(
@@ -163,6 +168,11 @@ def _dataset(
             "activation": (("place", "bundle"), activation, units),
             "start_activation": (("place", "bundle"), begun, units),
             "status": ("place", status, {"units": "1", "meanings": _MEANINGS}),
+            "settles": (
+                "place",
+                settles,
+                {"units": "1", "long_name": "also at rest if activated first, then loaded"},
+            ),
             "limit": (
                 ("place", "bundle"),
                 limit,

@@ -27,13 +27,15 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _FIRST, _LONGEST, _SHORTEST = 0.05, 0.2, 1e-7  # largest change of an activation, of its range
-_LOCAL = 1e-3  # below it the largest force is near, but not in a corner of the bounds
+_LOCAL = 1e-3  # below it the largest force is near, and bounds alone do not fix it
+_TURNING = 1e-5  # the same on a curve, where the force then turns back
 _REJECTED, _CURVED, _STRAIGHT = 0.1, 0.4, 0.8  # of the growth foreseen
 _MOST_STEPS, _CORRECTIONS = 300, 8
 _AT_BOUND = 1e-9  # of the range
 _NO_GROWTH = 1e-6  # units of force per range of activation
 _UNIT = 0.1  # L, by which the unit of force moves the tip
 _FARTHEST = 0.5  # L, by which the force of one step may move it
+_NEAR_LOSS = 0.1  # margin of stability below which what cannot be followed has lost it
 _MULTIPLIER = 1e-4  # of the largest one, below which a bound does not count
 
 
@@ -110,16 +112,22 @@ class Growth:
         return self.pushing.box
 
     @cached_property
+    def _begun(self) -> TipResponse:
+        """The tip near its place, without force."""
+        return self.pushing.respond(self.box.clip(self.start), 0.0)
+
+    @cached_property
     def first(self) -> Held | None:
         """The tip at its place without force; None if it is not there or not stable."""
-        held = self._corrected(self.box.clip(self.start), 0.0, 0.0)
-        return held if held and self.pushing.is_stable(held.gamma, held.force) else None
+        if not np.isfinite(self._begun.tip).all():
+            return None
+        held = self._corrected(self.box.clip(self.start), 0.0, 0.0, self._begun)
+        return held if held and self._is_stable(held) else None
 
     @cached_property
     def unit(self) -> float:
         """A force that moves the tip by a fair part of the arm [N]."""
-        first = self.pushing.respond(self.box.clip(self.start), 0.0)
-        return _UNIT * self.pushing.rod.length / float(np.linalg.norm(first.retreat))
+        return _UNIT * self.pushing.rod.length / float(np.linalg.norm(self._begun.retreat))
 
     def grown(self) -> Grown | None:
         """The end of the growth; None without a start."""
@@ -130,22 +138,29 @@ class Growth:
             best = self._program(held, reach)
             if best.rate <= _NO_GROWTH:
                 return self._end(held, best)
-            tried, stable = self._tried(held, best)
+            tried = self._tried(held, best)
             share = (tried.force - held.force) / best.force if tried else 0.0
+            stable = self._is_stable(tried) if tried else held.response.margin > _NEAR_LOSS
             if tried is None or not stable or share < _REJECTED:
                 reach, unstable = 0.5 * reach, not stable
             else:
                 held, unstable = tried, False
                 reach *= 0.5 if share < _CURVED else 2.0 if share > _STRAIGHT else 1.0
                 reach = min(reach, _LONGEST)
-            if reach < (_SHORTEST if unstable else _LOCAL):
+            if reach < (_SHORTEST if unstable else self._shortest):
                 break
         else:
             return self._end(held, self._program(held, _LOCAL), Stop.UNFINISHED)
         if unstable:
             return self._end(held, self._program(held, _LOCAL), Stop.UNSTABLE)
-        held = self._polished(held)
+        if self.box.dimension > 3:
+            held = self._polished(held)
         return self._end(held, self._program(held, _LOCAL))
+
+    @property
+    def _shortest(self) -> float:
+        """The step below which nothing is gained by further ones."""
+        return _LOCAL if self.box.dimension > 3 else _TURNING
 
     def _end(self, held: Held, best: _Program, stop: Stop | None = None) -> Grown:
         """The end, by what stopped it; by default bounds if some cost force, else the shape."""
@@ -155,13 +170,13 @@ class Growth:
             stop = Stop.BOUND if limits.any() else Stop.SINGULAR
         return Grown(held, stop, limits & (stop == Stop.BOUND), best.slope)
 
-    def _tried(self, held: Held, best: _Program) -> tuple[Held | None, bool]:
-        """The tip back at its place after a step, if it can be, and whether it rests stably."""
+    def _tried(self, held: Held, best: _Program) -> Held | None:
+        """The tip back at its place after a step, if it can be."""
         gamma, force = self.box.clip(held.gamma + best.gamma), held.force + best.force
-        tried = self._corrected(gamma, force, self.unit)
-        if tried is None:
-            return None, self.pushing.is_stable(gamma, force)
-        return tried, self.pushing.is_stable(tried.gamma, tried.force)
+        return self._corrected(gamma, force, self.unit, held.response)
+
+    def _is_stable(self, held: Held) -> bool:
+        return self.pushing.is_stable(held.gamma, held.force, held.response)
 
     def _program(self, held: Held, reach: float) -> _Program:
         """The change that lets the force grow most while no activation changes by more.
@@ -205,23 +220,31 @@ class Growth:
         room = np.minimum(gamma - box.low, box.high - gamma) / box.scales
         return box.is_free & (room <= _AT_BOUND)
 
-    def _corrected(self, gamma: Array, force: float, unit: float) -> Held | None:
-        """The tip put to its place by Newton's method; the force yields too if `unit` is not 0.
+    def _corrected(
+        self, gamma: Array, force: float, unit: float, near: TipResponse
+    ) -> Held | None:
+        """The tip put to its place by Newton's method; None if it does not come there.
 
         Bundles that begin at a bound stay there, if enough others are left.
+
+        Args:
+            gamma: Activations to begin with.
+            force: Force to begin with [N].
+            unit: Of the force, which yields too [N]; 0 to keep it.
+            near: An equilibrium near to begin with.
         """
         length = self.pushing.rod.length
         moves = self.box.is_free & ~self._at_bound(gamma)
         if moves.sum() + (unit > 0) < 3:
             moves = self.box.is_free.copy()
         for _ in range(_CORRECTIONS):
-            response = self.pushing.respond(gamma, force)
+            response = self.pushing.respond(gamma, force, near)
             missing = self.place - response.tip
             if not np.isfinite(missing).all():
                 return None
             if np.linalg.norm(missing) <= self.residual:
                 return Held(gamma, force, response) if force >= 0 else None
-            columns = self._columns(response, unit)
+            columns, near = self._columns(response, unit), response
             step = self._bounded_step(gamma, moves, columns, missing / length)
             gamma = self.box.clip(gamma + step[:-1] * self.box.scales)
             force = force + float(step[-1]) * unit
@@ -250,7 +273,9 @@ class Growth:
         box, length = self.box, self.pushing.rod.length
         x = np.append(box.to_cube(held.gamma[None])[0], held.force / self.unit)
         at = _remembered(
-            lambda x: self.pushing.respond(box.low + x[:-1] * box.scales, x[-1] * self.unit)
+            lambda x: self.pushing.respond(
+                box.low + x[:-1] * box.scales, x[-1] * self.unit, held.response
+            )
         )
         gradient = np.append(np.zeros(box.bundles), -1.0)
         found: Any = minimize(
@@ -264,13 +289,13 @@ class Growth:
                 "fun": lambda x: (at(x).tip - self.place) / length,
                 "jac": lambda x: self._columns(at(x), self.unit),
             },
-            options={"ftol": 1e-13, "maxiter": 60},
+            options={"ftol": 1e-10, "maxiter": 25},
         )
         gamma = box.clip(box.low + found.x[:-1] * box.scales)
-        better = self._corrected(gamma, float(found.x[-1]) * self.unit, self.unit)
+        better = self._corrected(gamma, float(found.x[-1]) * self.unit, self.unit, held.response)
         if better is None or better.force < held.force:
             return held
-        return better if self.pushing.is_stable(better.gamma, better.force) else held
+        return better if self._is_stable(better) else held
 
 
 def _remembered(respond: Callable[[Array], TipResponse]) -> Callable[[Array], TipResponse]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.equilibrium import Solver
+from softreach.rod.equilibrium import Equilibria, Solver
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.tip_force_tables import TipForceTables
 from softreach.rod.tip_map import TipStatus, position_slopes
@@ -21,6 +21,8 @@ from softreach.rod.tip_map import TipStatus, position_slopes
 __all__ = ["PushingTip", "TipResponse"]
 
 Array = NDArray[np.float64]
+
+_DOUBTFUL = 0.05  # margin of stability below which a quick search decides nothing
 
 
 class TipResponse(NamedTuple):
@@ -32,6 +34,13 @@ class TipResponse(NamedTuple):
     """∂r/∂γ [m], shape (3, bundles)."""
     retreat: Array
     """How the tip yields to the force with which it pushes, -∂r/∂F [m/N], shape (3,)."""
+    rest: Equilibria
+    """The equilibrium."""
+
+    @property
+    def margin(self) -> float:
+        """How far from the loss of stability, from 1 to below 0 [-]."""
+        return float(self.rest.margin[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,24 +69,39 @@ class PushingTip:
     def _solver(self, force: float, steps: int) -> Solver:
         return Solver(self._tables.under(force), steps, self.rod.tol)
 
-    def respond(self, gamma: Array, force: float) -> TipResponse:
-        """The tip and its derivatives at an activation (bundles,), pushing with a force [N]."""
-        found = self._solver(force, self.steps).respond(gamma[None], compliance=True)
+    def respond(self, gamma: Array, force: float, near: TipResponse | None = None) -> TipResponse:
+        """The tip and its derivatives.
+
+        Args:
+            gamma: Activations, shape (bundles,).
+            force: With which the tip pushes [N].
+            near: Where the search begins; None for the unloaded arm, by way of the whole load.
+        """
+        solver, one = self._solver(force, self.steps), gamma[None]
+        rest = solver.find(one) if near is None else solver.near(one, near.rest)
+        found = solver.respond(one, compliance=True, known=rest)
         slopes = np.empty_like(found.twists[:, :3])
         position_slopes(found.tips, found.twists, slopes)
-        return TipResponse(found.tips[0], slopes[0], found.compliance[0] @ self.direction)
+        retreat = found.compliance[0] @ self.direction
+        return TipResponse(found.tips[0], slopes[0], retreat, rest)
 
-    def is_stable(self, gamma: Array, force: float) -> bool:
-        """Whether the rod rests stably so."""
-        found = self._solver(force, self.steps).find(gamma[None])
-        return bool(found.status[0] == TipStatus.STABLE)
+    def is_stable(self, gamma: Array, force: float, response: TipResponse) -> bool:
+        """Whether this equilibrium is stable; in doubt steps half as long decide."""
+        if abs(response.margin) > _DOUBTFUL:
+            return response.margin > 0
+        fine = self._solver(force, 2 * self.steps).near(gamma[None], response.rest)
+        return bool(fine.status[0] == TipStatus.STABLE)
 
-    def error(self, gamma: Array, force: float) -> float:
+    def error(self, gamma: Array, force: float, response: TipResponse) -> float:
         """How far the tip moves if the steps are halved [m]."""
-        tips = [
-            self._solver(force, n).find(gamma[None]).tips[0] for n in (self.steps, 2 * self.steps)
-        ]
-        return float(np.linalg.norm(tips[1] - tips[0]))
+        fine = self._solver(force, 2 * self.steps).near(gamma[None], response.rest)
+        return float(np.linalg.norm(fine.tips[0] - response.tip))
+
+    def settles(self, gamma: Array, force: float, response: TipResponse) -> bool:
+        """Whether the arm that is activated first and loaded slowly then comes to rest there."""
+        found = self._solver(force, self.steps).find(gamma[None])
+        apart = float(np.linalg.norm(found.tips[0] - response.tip))
+        return apart <= self.rod.tol * self.rod.length
 
     def finer(self) -> PushingTip:
         """The same with steps half as long."""

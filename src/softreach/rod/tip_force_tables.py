@@ -26,13 +26,17 @@ class TipForceTables(LoadTables):
     """Unit vector of the force in the base frame."""
     force: float = 0.0
     """[N]."""
+    origin: TipForceTables | None = None
+    """The tables of another size of the force, with which all that does not change is shared."""
     steps_made: dict[int, StepTables] = field(default_factory=dict)
-    """Tables without the force, by their number of steps; shared by all sizes."""
+    """Tables without the force, by their number of steps."""
 
     def under(self, force: float) -> TipForceTables:
         """The same with another size of the force [N]."""
+        kept = self.origin or self
+        made = self.steps_made
         return TipForceTables(
-            self.arm, self.loads, self.body, self.direction, force, self.steps_made
+            self.arm, self.loads, self.body, self.direction, force, origin=kept, steps_made=made
         )
 
     @cached_property
@@ -42,6 +46,8 @@ class TipForceTables(LoadTables):
     @cached_property
     def axes(self) -> Array:
         """Those of the loads; where no force acts otherwise, the first is along this one."""
+        if self.origin is not None:
+            return self.origin.axes
         loads = self.loads
         forces = [loads.gravity, loads.force_per_length, loads.tip_force]
         if any(map(any, (*forces, *(one.force for one in loads.point_loads)))):
@@ -52,6 +58,8 @@ class TipForceTables(LoadTables):
     @cached_property
     def one_direction(self) -> bool:
         """Whether all forces, this one included, are dead and along the first axis."""
+        if self.origin is not None:
+            return self.origin.one_direction
         along = np.abs(self.axes[1:] @ self.direction).max() <= 1e-14
         return bool(along) and self._given.one_direction
 
