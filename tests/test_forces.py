@@ -102,7 +102,9 @@ def test_no_optimizer_finds_a_larger_force(arm, start):
 def test_it_is_the_largest_over_all_activations_that_reach_the_place():
     place = sr.tip_positions(LOADED, START[:1])
     solution = sr.solve_inverse(LOADED, place)[0]
-    every = blocked_force(LOADED, np.repeat(place, len(solution), 0), UP, start=solution.activations)
+    every = blocked_force(
+        LOADED, np.repeat(place, len(solution), 0), UP, start=solution.activations
+    )
     best = blocked_force(LOADED, place, UP)
     assert float(best.force[0]) == pytest.approx(float(every.force.max()), rel=1e-6)
 

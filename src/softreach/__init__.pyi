@@ -6,8 +6,10 @@ from . import dexterity as dexterity
 from . import errors as errors
 from . import exchange as exchange
 from . import export as export
+from . import forces as forces
 from . import inverse as inverse
 from . import path as path
+from . import payload as payload
 from . import plot as plot
 from . import redundancy as redundancy
 from . import rod as rod
@@ -33,8 +35,10 @@ from .cloud import open_cloud as open_cloud
 from .cloud import save_cloud as save_cloud
 from .errors import InvalidDesign as InvalidDesign
 from .errors import InvalidInput as InvalidInput
+from .forces import blocked_force as blocked_force
 from .inverse import solve_inverse as solve_inverse
 from .path import track_path as track_path
+from .payload import payload_curve as payload_curve
 from .redundancy import activation_distance as activation_distance
 from .rod import configuration as configuration
 from .rod import tip_jacobian as tip_jacobian

@@ -54,6 +54,10 @@ _COMMANDS = {
         "The exact reachable set: volume, multiplicity, folds, boundary.",
         "softreach reach minimal_trunk --surface reach.stl --figure reach.png",
     ),
+    "payload": (
+        "How much of its reach a payload costs, and the largest that keeps a share of it.",
+        "softreach payload lce_arm --gravity-m-s2 0,0,9.81 --share 0.8",
+    ),
     "solve": (
         "Every activation that puts the tip at a target.",
         "softreach solve minimal_trunk --target 0.2,0.1,0.6",

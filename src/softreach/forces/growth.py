@@ -220,9 +220,7 @@ class Growth:
         room = np.minimum(gamma - box.low, box.high - gamma) / box.scales
         return box.is_free & (room <= _AT_BOUND)
 
-    def _corrected(
-        self, gamma: Array, force: float, unit: float, near: TipResponse
-    ) -> Held | None:
+    def _corrected(self, gamma: Array, force: float, unit: float, near: TipResponse) -> Held | None:
         """The tip put to its place by Newton's method; None if it does not come there.
 
         Bundles that begin at a bound stay there, if enough others are left.

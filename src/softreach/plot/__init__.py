@@ -15,6 +15,7 @@ from softreach.plot.designs import DesignPanel, plot_designs
 from softreach.plot.distance import plot_distance, plot_distance_histograms
 from softreach.plot.hull import plot_hull
 from softreach.plot.metric_map import plot_metric_map
+from softreach.plot.payload_curve import plot_payload_curve
 from softreach.plot.redundancy import plot_redundancy
 from softreach.plot.sheet import plot_cloud_sheet, plot_hull_sheet
 from softreach.plot.sides import plot_opposite_sides
@@ -41,6 +42,7 @@ __all__ = [
     "plot_hull_sheet",
     "plot_metric_map",
     "plot_opposite_sides",
+    "plot_payload_curve",
     "plot_redundancy",
     "plot_slab",
     "plot_slice",
