@@ -10,6 +10,8 @@ import softreach as sr
 from softreach.arm.loads import Loads
 from softreach.errors import InvalidDesign, InvalidInput
 from softreach.forces import Stop, blocked_force
+from softreach.rod.equilibrium import Solver
+from softreach.rod.load_tables import LoadTables
 from softreach.rod.tip_map import TipStatus, tip_map
 from softreach.stiffness import tip_compliance
 from tests.bodies import rubber
@@ -67,12 +69,16 @@ def test_the_force_begins_to_grow_by_the_compliance():
 
 
 def largest_by_optimizer(arm, place, direction, gamma, force):
-    """The largest force by a general optimizer on tip maps, from a given start."""
-    d, width = np.array(direction), np.ptp(arm.bounds, axis=1)
+    """The largest force by a general optimizer on tips, from a given start."""
+    d, width, rod = np.array(direction), np.ptp(arm.bounds, axis=1), tip_map(arm)
 
     def gap(x):
-        rod = under(arm, np.array(arm.loads.tip_force) - x[-1] * force * d, 1e-7)
-        return (rod.tips((arm.bounds[:, 0] + x[:-1] * width)[None])[0] - place) / arm.length
+        """The tip by the whole ladder from the unloaded arm, with twice the steps."""
+        acting = tuple(np.array(arm.loads.tip_force) - x[-1] * force * d)
+        tables = LoadTables(arm, arm.loads.replace(tip_force=acting), rod.body)
+        gamma = arm.bounds[:, 0] + x[:-1] * width
+        found = Solver(tables, 2 * rod.steps, rod.tol).find(gamma[None])
+        return (found.tips[0] - place) / arm.length
 
     start = np.append((gamma - arm.bounds[:, 0]) / width, 0.9)
     found = minimize(
@@ -81,7 +87,7 @@ def largest_by_optimizer(arm, place, direction, gamma, force):
         method="SLSQP",
         bounds=[(0.0, 1.0)] * arm.bundles + [(0.0, 1.5)],
         constraints={"type": "eq", "fun": gap},
-        options={"ftol": 1e-9, "maxiter": 30},
+        options={"ftol": 1e-8, "maxiter": 20},
     )
     return found.x[-1] * force if np.linalg.norm(gap(found.x)) < 1e-6 else 0.0
 

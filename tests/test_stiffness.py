@@ -139,3 +139,42 @@ def test_a_cloud_has_the_compliance_of_each_sample_and_none_where_nothing_rests(
     axes = principal_compliances(expected)
     np.testing.assert_array_equal(found.largest_compliance.values, axes.largest)
     assert found.largest_compliance.attrs["units"] == "m/N"
+
+
+def test_a_cloud_is_colored_by_compliance_in_ratios_where_these_are_large():
+    coloring = pytest.importorskip("softreach.plot.coloring")
+    cloud = sr.compute_cloud(rubber(TRUNK, None), n=500)
+    soft = cloud_compliance(cloud).largest_compliance
+    values = soft.values.copy()
+    values[:] = np.geomspace(0.01, 1.0, 500)
+    wide = coloring.color_samples(cloud, soft.copy(data=values))
+    assert wide.key.label == "largest compliance [m/N]"
+    assert wide.key.logarithmic
+    table = coloring.color_map(wide.key).to_rgba(values, bytes=True)[:, :3].astype(int)
+    assert np.abs(table - wide.rgb).max() <= 4
+    narrow = coloring.color_samples(cloud, soft.copy(data=np.linspace(0.5, 1.0, 500)))
+    assert not narrow.key.logarithmic
+
+
+def test_the_ellipse_drawn_is_the_outline_of_where_forces_move_the_tip():
+    plot = pytest.importorskip("softreach.plot")
+    arm = rubber(TRUNK, LOADS["gravity"])
+    found, shapes = tip_compliance(arm, GAMMA[:1]), sr.configuration(arm, GAMMA[:1])
+    for view, columns in (("front", [0, 2]), ("top", [0, 1]), ("back", [0, 2])):
+        ax = plot.plot_compliance(arm, shapes, found, view=view, force=0.1)
+        outline = ax.lines[-1].get_xydata() * arm.length
+        forces = np.random.default_rng(0).normal(size=(4000, 3))
+        forces *= 0.1 / np.linalg.norm(forces, axis=1, keepdims=True)
+        moved = (sr.tip_positions(arm, GAMMA[:1]) + forces @ found[0].T)[:, columns]
+        np.testing.assert_allclose(outline.min(axis=0), moved.min(axis=0), atol=2e-4)
+        np.testing.assert_allclose(outline.max(axis=0), moved.max(axis=0), atol=2e-4)
+    with pytest.raises(InvalidInput, match="one each of 1"):
+        plot.plot_compliance(arm, shapes, np.repeat(found, 2, axis=0))
+
+
+def test_the_command_line_colors_a_cloud_by_compliance(tmp_path):
+    from softreach.cli.app import run
+
+    out = tmp_path / "soft.png"
+    assert run(["show", "lce_arm", "--n", "2000", "--color", "compliance", "--out", str(out)]) == 0
+    assert out.stat().st_size > 10_000
