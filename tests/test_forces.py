@@ -119,6 +119,8 @@ def test_what_cannot_be_asked_is_refused_in_one_line():
     two = LOADED.with_bounds([(-5.0, 0.0), (-5.0, 0.0), (-1.0, -1.0)])
     with pytest.raises(InvalidInput, match="free bundles = 2: must be 3 or more"):
         blocked_force(two, None, UP, start=[-1.0, -1.0, -1.0])
+    with pytest.raises(InvalidInput, match="places = None: must be given, or `start`"):
+        blocked_force(LOADED, None, UP)
     with pytest.raises(InvalidInput, match="direction"):
         blocked_force(LOADED, None, (0, 0, 0), start=START)
     with pytest.raises(InvalidInput, match="start"):

@@ -14,6 +14,8 @@ from softreach.cli.app import run
 from softreach.errors import InvalidDesign, InvalidInput
 from softreach.payload import payload_curve
 
+pytestmark = pytest.mark.slow
+
 HANGING = sr.designs.lce_arm().replace(loads=Loads(gravity=(0, 0, 9.81)))
 
 

@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from softreach.forces.blocked import blocked_force
-from softreach.forces.growth import Stop
+from softreach.forces.stop import Stop
 
 __all__ = ["Stop", "blocked_force"]

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
-from softreach.forces.growth import Grown, Growth, Stop
+from softreach.forces.growth import Grown, Growth
+from softreach.forces.stop import Stop
 from softreach.inverse import solve_inverse
 from softreach.inverse.request import checked_activations, checked_targets
 from softreach.progress import Progress, silent
@@ -108,14 +109,16 @@ def _starts(
 ) -> tuple[Array, list[Array]]:
     """Places, and activations (k, bundles) to start from for each."""
     if start is None:
-        targets = checked_targets("places", places if places is not None else [])
+        if places is None:
+            raise InvalidInput("places", None, "given, or `start`")
+        targets = checked_targets("places", places)
         solutions = solve_inverse(rod, targets, family=family)
         return targets, [one.activations for one in solutions]
     if places is None:
         gamma = rod.box.check(np.atleast_2d(as_floats("start", start)))
         return rod.tips(gamma), list(gamma[:, None])
     targets = checked_targets("places", places)
-    gamma = checked_activations("start", start, rod.box, len(targets))
+    gamma = rod.box.with_held(checked_activations("start", start, rod.box, len(targets)))
     return targets, list(gamma[:, None])
 
 

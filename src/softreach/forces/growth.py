@@ -11,17 +11,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import IntEnum
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.forces.stop import Stop
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.pushing_tip import PushingTip, TipResponse
 
-__all__ = ["Grown", "Growth", "Held", "Stop"]
+__all__ = ["Grown", "Growth", "Held"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -37,21 +37,6 @@ _UNIT = 0.1  # L, by which the unit of force moves the tip
 _FARTHEST = 0.5  # L, by which the force of one step may move it
 _NEAR_LOSS = 0.1  # margin of stability below which what cannot be followed has lost it
 _MULTIPLIER = 1e-4  # of the largest one, below which a bound does not count
-
-
-class Stop(IntEnum):
-    """Why a force grows no further."""
-
-    BOUND = 0
-    """Bundles are at their bounds."""
-    SINGULAR = 1
-    """No change of activations lets it grow: the arm has a singular shape."""
-    UNSTABLE = 2
-    """The arm would lose its stability."""
-    NO_START = 3
-    """No stable activation that was found puts the tip at the place."""
-    UNFINISHED = 4
-    """The search took too many steps; the force is reached, and may grow further."""
 
 
 class Held(NamedTuple):
