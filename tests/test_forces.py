@@ -69,7 +69,7 @@ def test_the_force_begins_to_grow_by_the_compliance():
 
 
 def largest_by_optimizer(arm, place, direction, gamma, force):
-    """The largest force by a general optimizer on tips, from a given start."""
+    """The largest force by a general optimizer on tips, from a given start at nine tenths."""
     d, width, rod = np.array(direction), np.ptp(arm.bounds, axis=1), tip_map(arm)
 
     def gap(x):
@@ -87,22 +87,23 @@ def largest_by_optimizer(arm, place, direction, gamma, force):
         method="SLSQP",
         bounds=[(0.0, 1.0)] * arm.bundles + [(0.0, 1.5)],
         constraints={"type": "eq", "fun": gap},
-        options={"ftol": 1e-8, "maxiter": 20},
+        options={"ftol": 1e-8, "maxiter": 12},
     )
     return found.x[-1] * force if np.linalg.norm(gap(found.x)) < 1e-6 else 0.0
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("arm", "start"), [(LOADED, START[:1]), (MANY, MANY_START)], ids=["three", "four"]
+    ("arm", "start"), [(LOADED, START[1:]), (MANY, MANY_START)], ids=["three", "four"]
 )
 def test_no_optimizer_finds_a_larger_force(arm, start):
     found = blocked_force(arm, None, SIDE, start=start)
     assert found.settles.values[0]
     force = float(found.force[0])
     place, end = found.position.values[0], found.activation.values[0]
-    for gamma in (start[0], end):
-        assert largest_by_optimizer(arm, place, SIDE, gamma, force) <= force * (1 + 1e-4)
+    other = largest_by_optimizer(arm, place, SIDE, end, force)
+    assert other == pytest.approx(force, rel=1e-3)
+    assert other <= force * (1 + 1e-4)
 
 
 def test_it_is_the_largest_over_all_activations_that_reach_the_place():
