@@ -106,6 +106,7 @@ def test_no_optimizer_finds_a_larger_force(arm, start):
     assert other <= force * (1 + 1e-4)
 
 
+@pytest.mark.slow
 def test_it_is_the_largest_over_all_activations_that_reach_the_place():
     place = sr.tip_positions(LOADED, START[:1])
     solution = sr.solve_inverse(LOADED, place)[0]
