@@ -58,6 +58,10 @@ _COMMANDS = {
         "Every equilibrium of a loaded arm at given activations, stable or not.",
         "softreach equilibria arm.toml --activation=-1,0,-0.5 --figure equilibria.png",
     ),
+    "payload": (
+        "How much of its reach a payload costs, and the largest that keeps a share of it.",
+        "softreach payload lce_arm --gravity up --share 0.8",
+    ),
     "solve": (
         "Every activation that puts the tip at a target.",
         "softreach solve minimal_trunk --target 0.2,0.1,0.6",

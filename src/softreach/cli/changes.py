@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
     from softreach.arm.parameters.parameter import Parameter as DesignParameter
 
-__all__ = ["UNCHANGED", "Changes"]
+__all__ = ["UNCHANGED", "Changes", "read_mass"]
 
 _GRAVITY = {
     "down": (0.0, 0.0, -9.81),
@@ -168,7 +168,7 @@ class Changes:
     def _loads(self) -> dict[str, object]:
         found: dict[str, object] = {}
         if self.payload is not None:
-            found["payload"] = _mass(self.payload)
+            found["payload"] = read_mass("payload", self.payload)
         if self.gravity is not None:
             found["gravity"] = _GRAVITY.get(self.gravity) or _triple(
                 "gravity", self.gravity, "m/s²", f"{', '.join(_GRAVITY)}, or "
@@ -181,7 +181,12 @@ class Changes:
 UNCHANGED = Changes()
 
 
-def _mass(text: str) -> float:
+def read_mass(name: str, text: str) -> float:
+    """A mass [kg] that was written with its unit.
+
+    Raises:
+        InvalidInput: Anything else.
+    """
     from softreach.quantity import read_quantity, unit_names
 
     try:
@@ -190,7 +195,7 @@ def _mass(text: str) -> float:
         mass = -1.0
     if mass < 0:
         units = ", ".join(unit_names("kg"))
-        raise InvalidInput("payload", text, f"a mass >= 0 with its unit ({units}), such as 200g")
+        raise InvalidInput(name, text, f"a mass >= 0 with its unit ({units}), such as 200g")
     return mass
 
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import Activation, Sampler, Source, cloud_of, shape_of
 from softreach.errors import InvalidInput
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["check_picture", "show"]
 
@@ -18,7 +21,9 @@ def show(
     source: Source,
     *,
     out: Annotated[Path, Parameter(help="Picture file: .png .pdf .svg")] = Path("cloud.png"),
-    color: Annotated[str, Parameter(help="rgb, or the name of a bundle.")] = "rgb",
+    color: Annotated[
+        str, Parameter(help="rgb, the name of a bundle, or compliance: how far the tip yields.")
+    ] = "rgb",
     activation: Activation = None,
     n: Annotated[int, Parameter(help="Samples, when the source is a design.")] = 400_000,
     seed: int = 0,
@@ -38,8 +43,18 @@ def show(
     cloud = cloud_of(source, n, seed, sampler, changes)
     arm = design_of(cloud)
     shape = None if activation is None else shape_of(activation, arm)
-    plot.save_figure(plot.plot_views(cloud, arm, shape, color=color), out)
+    plot.save_figure(plot.plot_views(cloud, arm, shape, color=_colors(cloud, color)), out)
     sys.stdout.write(f"{out}\n")
+
+
+def _colors(cloud: xr.Dataset, color: str) -> str | xr.DataArray:
+    """What colors the samples: a name that figures know, or numbers that they do not compute."""
+    from softreach.plot.coloring import bundle_names
+    from softreach.stiffness import cloud_compliance
+
+    if color != "compliance" or color in bundle_names(cloud):
+        return color
+    return cloud_compliance(cloud)["largest_compliance"]
 
 
 def check_picture(name: str, out: Path) -> None:

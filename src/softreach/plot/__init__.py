@@ -8,6 +8,7 @@ from __future__ import annotations
 from softreach.plot.arm import plot_arm
 from softreach.plot.atlas_axes import SheetAxis, box_over_length, sheet_axes
 from softreach.plot.cloud import plot_cloud
+from softreach.plot.compliance import plot_compliance
 from softreach.plot.cross_section import plot_cross_section
 from softreach.plot.curvature import plot_curvature
 from softreach.plot.designs import DesignPanel, plot_designs
@@ -15,6 +16,7 @@ from softreach.plot.distance import plot_distance, plot_distance_histograms
 from softreach.plot.equilibria import plot_equilibria
 from softreach.plot.hull import plot_hull
 from softreach.plot.metric_map import plot_metric_map
+from softreach.plot.payload_curve import plot_payload_curve
 from softreach.plot.redundancy import plot_redundancy
 from softreach.plot.sheet import plot_cloud_sheet, plot_hull_sheet
 from softreach.plot.sides import plot_opposite_sides
@@ -31,6 +33,7 @@ __all__ = [
     "plot_arm",
     "plot_cloud",
     "plot_cloud_sheet",
+    "plot_compliance",
     "plot_cross_section",
     "plot_curvature",
     "plot_designs",
@@ -41,6 +44,7 @@ __all__ = [
     "plot_hull_sheet",
     "plot_metric_map",
     "plot_opposite_sides",
+    "plot_payload_curve",
     "plot_redundancy",
     "plot_slab",
     "plot_slice",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -36,6 +37,7 @@ COLORMAP = "viridis"
 _MISSING = 204  # light gray
 _UNSTABLE = (255, 0, 200)  # magenta, which no other coloring has
 _LINE = 44  # characters above axes of a column's width
+_WIDE = 8.0  # ratio of the largest to the smallest value from which ratios are shown
 
 
 class BundleKey(NamedTuple):
@@ -63,6 +65,8 @@ class ScalarKey(NamedTuple):
     high: float
     unstable: bool = False
     """Whether some samples are marked as unstable equilibria."""
+    logarithmic: bool = False
+    """Whether equal ratios, and not equal differences, are equal steps of color."""
 
 
 class Coloring(NamedTuple):
@@ -79,7 +83,8 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike = "rgb") -> Co
         cloud: activation(sample, bundle), each in its unit.
         color: "rgb" for |γ| / max |γ| of all bundles, of each where their units differ; the name or
             index of one bundle; one number per sample, whose attributes `long_name` and `units` go
-            to the key if it is a DataArray; or RGB from 0 to 1 per sample.
+            to the key if it is a DataArray, and of which the attribute `scale` is "log" if ratios
+            count; or RGB from 0 to 1 per sample.
 
     Unstable equilibria of arms under loads are magenta, whatever the color of the others.
 
@@ -192,6 +197,8 @@ def _bundle(names: tuple[str, ...], color: str | int | np.integer) -> int:
 def _given(color: ArrayLike, samples: int) -> Coloring:
     values = np.asarray(color, float)
     if values.shape == (samples,):
+        if _spans_decades(values, color):
+            return _logarithmic(values, _described(color))
         return _scalar(values, _described(color))
     if values.shape == (samples, 3):
         return Coloring(np.rint(255 * np.clip(values, 0, 1)).astype(np.uint8), None)
@@ -203,6 +210,21 @@ def _described(color: ArrayLike) -> str:
     attrs = getattr(color, "attrs", {})
     name, unit = attrs.get("long_name", ""), attrs.get("units")
     return f"{name} [{'-' if unit == '1' else unit}]" if unit else name
+
+
+def _spans_decades(values: Array, color: ArrayLike) -> bool:
+    """Whether an array whose ratios count has some that are too large for even steps of color."""
+    if getattr(color, "attrs", {}).get("scale") != "log":
+        return False
+    known = values[np.isfinite(values)]
+    return known.size > 0 and 0.0 < _WIDE * known.min() < known.max()
+
+
+def _logarithmic(values: Array, label: str) -> Coloring:
+    """Colors in even steps of the logarithm of positive values."""
+    rgb, key = _scalar(np.log(values), label)
+    assert isinstance(key, ScalarKey)
+    return Coloring(rgb, ScalarKey(label, math.exp(key.low), math.exp(key.high), True))
 
 
 def _scalar(values: NDArray[np.float64], label: str, low: float | None = None) -> Coloring:
@@ -222,9 +244,10 @@ def _scalar(values: NDArray[np.float64], label: str, low: float | None = None) -
 def color_map(key: ScalarKey) -> Any:
     """What matplotlib draws a color bar of."""
     from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
+    from matplotlib.colors import LogNorm, Normalize
 
-    return ScalarMappable(Normalize(key.low, key.high), COLORMAP)
+    norm = LogNorm if key.logarithmic else Normalize
+    return ScalarMappable(norm(key.low, key.high), COLORMAP)
 
 
 def _patches(key: BundleKey) -> list[Any]:

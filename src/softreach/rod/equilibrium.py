@@ -334,9 +334,11 @@ class Solver:
         )
         return found, twists, yields, traced
 
-    def respond(self, gamma: Array, *, compliance: bool = False) -> Response:
+    def respond(
+        self, gamma: Array, *, compliance: bool = False, known: Equilibria | None = None
+    ) -> Response:
         """Tips with their derivatives; NaN where there is no equilibrium."""
-        known = self.find(gamma)
+        known = self.find(gamma) if known is None else known
         found, twists, yields, _ = self._general(
             _columns(gamma),
             self._fine,

@@ -1,0 +1,108 @@
+"""A tip that pushes: where a rod comes to rest while a force along one direction acts on its tip.
+
+Every force has tables of its own, but only a column of them is new.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.rod.activation_box import ActivationBox
+from softreach.rod.equilibrium import Equilibria, Solver
+from softreach.rod.loaded import LoadedRod
+from softreach.rod.tip_force_tables import TipForceTables
+from softreach.rod.tip_map import TipStatus, position_slopes
+
+__all__ = ["PushingTip", "TipResponse"]
+
+Array = NDArray[np.float64]
+
+_DOUBTFUL = 0.05  # margin of stability below which a quick search decides nothing
+
+
+class TipResponse(NamedTuple):
+    """Where one tip is, and how it moves."""
+
+    tip: Array
+    """r [m], shape (3,); NaN where there is no equilibrium."""
+    slope: Array
+    """∂r/∂γ [m], shape (3, bundles)."""
+    retreat: Array
+    """How the tip yields to the force with which it pushes, -∂r/∂F [m/N], shape (3,)."""
+    rest: Equilibria
+    """The equilibrium."""
+
+    @property
+    def margin(self) -> float:
+        """How far from the loss of stability, from 1 to below 0 [-]."""
+        return float(self.rest.margin[0])
+
+
+@dataclass(frozen=True, eq=False)
+class PushingTip:
+    """The tip of a rod that pushes along a direction, and on which as much pushes back.
+
+    Args:
+        rod: The rod with its other loads.
+        direction: Unit vector along which the tip pushes.
+        steps: Along the arm.
+    """
+
+    rod: LoadedRod
+    direction: Array
+    steps: int
+
+    @property
+    def box(self) -> ActivationBox:
+        """The activations within bounds."""
+        return self.rod.box
+
+    @cached_property
+    def _tables(self) -> TipForceTables:
+        return TipForceTables(self.rod.arm, self.rod.loads, self.rod.body, -self.direction)
+
+    def _solver(self, force: float, steps: int) -> Solver:
+        return Solver(self._tables.under(force), steps, self.rod.tol)
+
+    def respond(self, gamma: Array, force: float, near: TipResponse | None = None) -> TipResponse:
+        """The tip and its derivatives.
+
+        Args:
+            gamma: Activations, shape (bundles,).
+            force: With which the tip pushes [N].
+            near: Where the search begins; None for the unloaded arm, by way of the whole load.
+        """
+        solver, one = self._solver(force, self.steps), gamma[None]
+        rest = solver.find(one) if near is None else solver.near(one, near.rest)
+        found = solver.respond(one, compliance=True, known=rest)
+        slopes = np.empty_like(found.twists[:, :3])
+        position_slopes(found.tips, found.twists, slopes)
+        retreat = found.compliance[0] @ self.direction
+        return TipResponse(found.tips[0], slopes[0], retreat, rest)
+
+    def is_stable(self, gamma: Array, force: float, response: TipResponse) -> bool:
+        """Whether this equilibrium is stable; in doubt steps half as long decide."""
+        if abs(response.margin) > _DOUBTFUL:
+            return response.margin > 0
+        fine = self._solver(force, 2 * self.steps).near(gamma[None], response.rest)
+        return bool(fine.status[0] == TipStatus.STABLE)
+
+    def error(self, gamma: Array, force: float, response: TipResponse) -> float:
+        """How far the tip moves if the steps are halved [m]."""
+        fine = self._solver(force, 2 * self.steps).near(gamma[None], response.rest)
+        return float(np.linalg.norm(fine.tips[0] - response.tip))
+
+    def settles(self, gamma: Array, force: float, response: TipResponse) -> bool:
+        """Whether the arm that is activated first and loaded slowly then comes to rest there."""
+        found = self._solver(force, self.steps).find(gamma[None])
+        apart = float(np.linalg.norm(found.tips[0] - response.tip))
+        return apart <= self.rod.tol * self.rod.length
+
+    def finer(self) -> PushingTip:
+        """The same with steps half as long."""
+        return PushingTip(self.rod, self.direction, 2 * self.steps)

@@ -1,0 +1,212 @@
+"""How far the tip yields to a force, and in which directions it is soft."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach import parallel
+from softreach.arm.manipulator import Manipulator
+from softreach.cloud import tip_map_of
+from softreach.errors import InvalidDesign, InvalidInput
+from softreach.rod.activation_box import as_floats
+from softreach.rod.loaded import LoadedRod
+from softreach.rod.tip_map import BLOCK, TipMap, tip_map
+from softreach.schema import AXES, check_cloud
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "PrincipalCompliances",
+    "cloud_compliance",
+    "principal_compliances",
+    "stiffness_along",
+    "tip_compliance",
+]
+
+Array = NDArray[np.float64]
+
+
+def tip_compliance(arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6) -> Array:
+    """∂r/∂F: how a tip yields to a small force on it that keeps its direction.
+
+    It is the exact derivative of the computed tip, loads and their change with the shape included;
+    without loads the arm yields about its activated shape. Under loads that have a potential it is
+    symmetric, under those that follow the tip it need not be. At an unstable equilibrium it has
+    negative eigenvalues.
+
+    Args:
+        arm: The design, with or without loads, or its tip map.
+        activations: γ [-], shape (n, bundles).
+        tol: Largest tip error, in L.
+
+    Returns:
+        Compliances [m/N], shape (n, 3, 3), the force's axis last; NaN where there is no
+        equilibrium.
+
+    Raises:
+        InvalidInput: Activations of another shape or not finite, or a tip map of another kind than
+            the arm's own.
+        InvalidDesign: A material has no Young's modulus.
+    """
+    return yielding_rod(tip_map(arm, tol)).compliance(activations)
+
+
+class PrincipalCompliances(NamedTuple):
+    """What forces of one size in all directions do: they move the tip to an ellipsoid."""
+
+    values: Array
+    """|∂r| per |F| along each axis of the ellipsoid, largest first [m/N], shape (n, 3)."""
+    displacements: Array
+    """Unit vectors along which the tip moves, as rows, shape (n, 3, 3)."""
+    forces: Array
+    """Unit vectors along which a force moves it so, as rows, shape (n, 3, 3).
+
+    Those of `displacements` where the compliance is symmetric and the equilibrium stable.
+    """
+
+    @property
+    def largest(self) -> Array:
+        """How far the tip yields where it is softest [m/N], shape (n,)."""
+        return self.values[:, 0]
+
+    @property
+    def smallest(self) -> Array:
+        """How far the tip yields where it is stiffest [m/N], shape (n,)."""
+        return self.values[:, 2]
+
+
+def principal_compliances(compliance: ArrayLike) -> PrincipalCompliances:
+    """The axes of the ellipsoids to which forces of unit size move the tips.
+
+    They are the singular values of the compliance; of a symmetric one with positive eigenvalues
+    these are its eigenvalues.
+
+    Args:
+        compliance: What `tip_compliance` gives [m/N], shape (n, 3, 3).
+
+    Raises:
+        InvalidInput: Another shape.
+    """
+    matrices = _checked_compliance(compliance)
+    known = np.isfinite(matrices).all(axis=(1, 2))
+    values = np.full((len(matrices), 3), np.nan)
+    left, right = np.full((2, len(matrices), 3, 3), np.nan)
+    left[known], values[known], right[known] = np.linalg.svd(matrices[known])
+    return PrincipalCompliances(values, np.swapaxes(left, 1, 2), right)
+
+
+def stiffness_along(compliance: ArrayLike, direction: ArrayLike) -> Array:
+    """Force along a direction per displacement along it, 1/(d·Cd) [N/m], shape (n,).
+
+    The tip is free to give way sideways. Infinite where it does not yield at all.
+
+    Args:
+        compliance: What `tip_compliance` gives [m/N], shape (n, 3, 3).
+        direction: d, of any length, shape (3,) or (n, 3).
+
+    Raises:
+        InvalidInput: Another shape, or a direction without length.
+    """
+    matrices = _checked_compliance(compliance)
+    d = unit_directions(direction, len(matrices))
+    with np.errstate(divide="ignore"):
+        return 1.0 / np.einsum("na,nab,nb->n", d, matrices, d)
+
+
+def cloud_compliance(cloud: xr.Dataset) -> xr.Dataset:
+    """The compliance of the tip at each sample of a cloud.
+
+    Args:
+        cloud: A cloud; its design and tolerance are in its attributes. It is read in blocks.
+
+    Returns:
+        Dataset over `sample`: `compliance` (sample, axis, force) [m/N], the `largest_compliance`
+        and the `smallest_compliance` [m/N], and the `softest_direction` (sample, axis) along which
+        the tip moves by the largest. NaN where there is no equilibrium.
+
+    Raises:
+        InvalidInput: The dataset is no cloud.
+        InvalidDesign: A material has no Young's modulus.
+    """
+    import xarray as xr
+
+    rod = yielding_rod(tip_map_of(check_cloud(cloud)))
+    n = cloud.sizes["sample"]
+    matrices, soft = np.empty((n, 3, 3)), np.empty((n, 3))
+    largest, smallest = np.empty((2, n))
+    for rows in parallel.blocks(n, 8 * BLOCK):
+        matrices[rows] = rod.compliance(cloud.activation[rows].values)
+        axes = principal_compliances(matrices[rows])
+        largest[rows], smallest[rows] = axes.largest, axes.smallest
+        soft[rows] = axes.displacements[:, 0]
+    named = {"units": "m/N", "scale": "log"}
+    return xr.Dataset(
+        {
+            "compliance": (
+                ("sample", "axis", "force"),
+                matrices,
+                {"units": "m/N", "long_name": "compliance of the tip"},
+            ),
+            "largest_compliance": ("sample", largest, named | {"long_name": "largest compliance"}),
+            "smallest_compliance": (
+                "sample",
+                smallest,
+                named | {"long_name": "smallest compliance"},
+            ),
+            "softest_direction": (
+                ("sample", "axis"),
+                soft,
+                {"units": "1", "long_name": "direction of the largest compliance"},
+            ),
+        },
+        {"axis": list(AXES), "force": list(AXES)},
+        cloud.attrs,
+    )
+
+
+def unit_directions(direction: ArrayLike, n: int) -> Array:
+    """Directions as unit vectors, one for each of n, shape (n, 3).
+
+    Args:
+        direction: Of any length, shape (3,) or (n, 3).
+        n: How many.
+
+    Raises:
+        InvalidInput: Another shape, or a direction without length.
+    """
+    d = as_floats("direction", direction)
+    if d.shape not in ((3,), (n, 3)):
+        raise InvalidInput("direction.shape", d.shape, f"(3,) or ({n}, 3)")
+    size = np.linalg.norm(d, axis=-1, keepdims=True)
+    if not (np.isfinite(size).all() and (size > 0).all()):
+        raise InvalidInput("direction", direction, "finite vectors longer than 0")
+    return np.broadcast_to(d / size, (n, 3))
+
+
+def _checked_compliance(compliance: ArrayLike) -> Array:
+    matrices = as_floats("compliance", compliance)
+    if matrices.ndim != 3 or matrices.shape[1:] != (3, 3):
+        raise InvalidInput("compliance.shape", matrices.shape, "of shape (n, 3, 3)")
+    return matrices
+
+
+def yielding_rod(rod: TipMap) -> LoadedRod:
+    """The rod of a tip map that also knows how it yields; without loads nothing weighs on it."""
+    if isinstance(rod, LoadedRod):
+        return rod
+    if rod != tip_map(rod.arm, rod.tol):
+        raise InvalidInput("arm", repr(rod), "a Manipulator, or the tip map that it has")
+    return _without_loads(rod)
+
+
+@lru_cache(maxsize=16)
+def _without_loads(rod: TipMap) -> LoadedRod:
+    faults = rod.arm.section.modulus_faults("for a compliance")
+    if faults:
+        raise InvalidDesign(faults)
+    return LoadedRod(rod.arm, rod.tol)

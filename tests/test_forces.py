@@ -1,0 +1,137 @@
+"""Laws of the blocked force: what balances it, what ends it, and that none is larger."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+import softreach as sr
+from softreach.arm.loads import Loads
+from softreach.errors import InvalidDesign, InvalidInput
+from softreach.forces import Stop, blocked_force
+from softreach.rod.equilibrium import Solver
+from softreach.rod.load_tables import LoadTables
+from softreach.rod.tip_map import TipStatus, tip_map
+from softreach.stiffness import tip_compliance
+from tests.bodies import rubber
+
+LOADED = sr.designs.lce_arm().replace(loads=Loads(gravity=(0, 0, 9.81), payload=0.002))
+MANY = rubber(sr.designs.redundant_trunk(), Loads(gravity=(9.81, 0.0, 0.0)))
+START = np.array([[-1.0, -2.5, -0.5], [-0.5, -0.5, -3.0]])
+MANY_START = np.array([[-0.9, -0.2, -0.6, -0.5]])
+UP, SIDE = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+
+
+def under(arm, force, tol=1e-8):
+    """The tip map of the arm with one more force on the tip."""
+    loads = arm.loads or Loads(gravity=(0.0, 0.0, 0.0))
+    return tip_map(arm.replace(loads=loads.replace(tip_force=tuple(force))), tol)
+
+
+@pytest.mark.parametrize("arm", [sr.designs.lce_arm(), LOADED], ids=["free", "loaded"])
+@pytest.mark.parametrize("direction", [UP, SIDE])
+def test_the_force_balances_the_tip_at_its_place(arm, direction):
+    found = blocked_force(arm, None, direction, start=START)
+    places = sr.tip_positions(arm, START)
+    np.testing.assert_allclose(found.position, places, atol=1e-15)
+    assert found.settles.values.any()
+    for k in np.flatnonzero(found.settles.values):
+        rod, gamma = under(arm, found.tip_force.values[k]), found.activation.values[k : k + 1]
+        apart = np.linalg.norm(rod.tips(gamma)[0] - places[k])
+        assert apart <= 2e-6 * arm.length
+        assert rod.status(gamma)[0] == TipStatus.STABLE
+        assert (rod.box.excess(gamma) <= 0).all()
+    assert (found.force.values > 0).all()
+
+
+def test_the_bundles_named_are_at_their_bounds():
+    found = blocked_force(LOADED, None, SIDE, start=START)
+    bound = found.status.values == Stop.BOUND
+    assert bound.any()
+    gamma, low, high = found.activation.values, *LOADED.bounds.T
+    at = np.minimum(np.abs(gamma - low), np.abs(gamma - high)) < 1e-8 * (high - low)
+    limit = found.limit.values
+    assert (limit <= at).all()
+    np.testing.assert_array_equal(limit.any(axis=1), bound)
+
+
+def test_the_force_begins_to_grow_by_the_compliance():
+    """dγ/dF = J⁻¹C d: two narrow boxes around the start let the force grow in proportion."""
+    gamma = START[:1]
+    slope = tip_map(LOADED).tips_and_slopes(gamma)[1][0]
+    rate = np.linalg.solve(slope, tip_compliance(LOADED, gamma)[0] @ SIDE)
+    width = 1e-3
+    narrow = LOADED.with_bounds(np.stack([gamma[0] - width, gamma[0] + width], axis=1))
+    found = blocked_force(narrow, None, SIDE, start=gamma)
+    assert float(found.force[0]) == pytest.approx(width / np.abs(rate).max(), rel=1e-2)
+    assert found.limit.values[0].argmax() == np.abs(rate).argmax()
+
+
+def largest_by_optimizer(arm, place, direction, gamma, force):
+    """The largest force by a general optimizer on tips, from a given start at nine tenths."""
+    d, width, rod = np.array(direction), np.ptp(arm.bounds, axis=1), tip_map(arm)
+
+    def gap(x):
+        """The tip by the whole ladder from the unloaded arm, with twice the steps."""
+        acting = tuple(np.array(arm.loads.tip_force) - x[-1] * force * d)
+        tables = LoadTables(arm, arm.loads.replace(tip_force=acting), rod.body)
+        gamma = arm.bounds[:, 0] + x[:-1] * width
+        found = Solver(tables, 2 * rod.steps, rod.tol).find(gamma[None])
+        return (found.tips[0] - place) / arm.length
+
+    start = np.append((gamma - arm.bounds[:, 0]) / width, 0.9)
+    found = minimize(
+        lambda x: -x[-1],
+        start,
+        method="SLSQP",
+        bounds=[(0.0, 1.0)] * arm.bundles + [(0.0, 1.5)],
+        constraints={"type": "eq", "fun": gap},
+        options={"ftol": 1e-8, "maxiter": 12},
+    )
+    return found.x[-1] * force if np.linalg.norm(gap(found.x)) < 1e-6 else 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("arm", "start"), [(LOADED, START[1:]), (MANY, MANY_START)], ids=["three", "four"]
+)
+def test_no_optimizer_finds_a_larger_force(arm, start):
+    found = blocked_force(arm, None, SIDE, start=start)
+    assert found.settles.values[0]
+    force = float(found.force[0])
+    place, end = found.position.values[0], found.activation.values[0]
+    other = largest_by_optimizer(arm, place, SIDE, end, force)
+    assert other == pytest.approx(force, rel=1e-3)
+    assert other <= force * (1 + 1e-4)
+
+
+@pytest.mark.slow
+def test_it_is_the_largest_over_all_activations_that_reach_the_place():
+    place = sr.tip_positions(LOADED, START[:1])
+    solution = sr.solve_inverse(LOADED, place)[0]
+    every = blocked_force(
+        LOADED, np.repeat(place, len(solution), 0), UP, start=solution.activations
+    )
+    best = blocked_force(LOADED, place, UP)
+    assert float(best.force[0]) == pytest.approx(float(every.force.max()), rel=1e-6)
+
+
+def test_what_cannot_be_asked_is_refused_in_one_line():
+    two = LOADED.with_bounds([(-5.0, 0.0), (-5.0, 0.0), (-1.0, -1.0)])
+    with pytest.raises(InvalidInput, match="free bundles = 2: must be 3 or more"):
+        blocked_force(two, None, UP, start=[-1.0, -1.0, -1.0])
+    with pytest.raises(InvalidInput, match="places = None: must be given, or `start`"):
+        blocked_force(LOADED, None, UP)
+    with pytest.raises(InvalidInput, match="direction"):
+        blocked_force(LOADED, None, (0, 0, 0), start=START)
+    with pytest.raises(InvalidInput, match="start"):
+        blocked_force(LOADED, [[0.0, 0.0, 0.08]], UP, start=[[0.0, 0.0]])
+    with pytest.raises(InvalidDesign, match="young_modulus"):
+        blocked_force(sr.designs.minimal_trunk(), None, UP, start=[-1.0, -1.0, -1.0])
+
+
+def test_a_place_out_of_reach_has_no_force():
+    found = blocked_force(LOADED, [[0.0, 0.0, 1.0]], UP)
+    assert found.status.values[0] == Stop.NO_START
+    assert np.isnan(found.force.values[0])
