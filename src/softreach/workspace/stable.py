@@ -1,0 +1,50 @@
+"""Tips and slopes of stable equilibria only: what counts as reached."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach import parallel
+from softreach.errors import InvalidInput
+from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
+
+__all__ = ["fill_stable_slopes", "none_stable", "stable_tips"]
+
+Array = NDArray[np.float64]
+
+
+def stable_tips(rod: TipMap, gamma: Array) -> Array:
+    """Tips [m] of activations (n, bundles), NaN where there is no stable equilibrium, (n, 3)."""
+    if not rod.supports_unstable:
+        return rod.tips(gamma)
+    gamma = rod.box.check(gamma)
+    out = np.empty((len(gamma), 3))
+
+    def fill(block: slice) -> None:
+        status = np.empty(len(gamma[block]), np.int8)
+        rod.fill_tips_and_status(gamma[block], out[block], status)
+        out[block][status != TipStatus.STABLE] = np.nan
+
+    parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), BLOCK // 8))
+    return out
+
+
+def fill_stable_slopes(rod: TipMap, gamma: Array, tips: Array, slopes: Array) -> None:
+    """Put tips (n, 3) and ∂r/∂γ (n, 3, bundles) [m] into place, on the calling thread.
+
+    Where there is no stable equilibrium the tips are NaN, and the slopes mean nothing.
+    """
+    rod.fill_slopes(gamma, tips, slopes)
+    if rod.supports_unstable:
+        again, status = np.empty_like(tips), np.empty(len(gamma), np.int8)
+        rod.fill_tips_and_status(gamma, again, status)
+        tips[status != TipStatus.STABLE] = np.nan
+
+
+def none_stable(tried: int) -> InvalidInput:
+    """What to raise where nothing is reached, after as many activations."""
+    found = f"none of {tried} activations tried has a stable equilibrium"
+    return InvalidInput("loads", found, "such that some have one", "lighten the load")
