@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach import parallel
 from softreach.errors import InvalidInput
-from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
+from softreach.rod.tip_map import TipMap, TipStatus
 
 __all__ = ["fill_stable_slopes", "none_stable", "stable_tips"]
 
@@ -20,16 +17,9 @@ def stable_tips(rod: TipMap, gamma: Array) -> Array:
     """Tips [m] of activations (n, bundles), NaN where there is no stable equilibrium, (n, 3)."""
     if not rod.supports_unstable:
         return rod.tips(gamma)
-    gamma = rod.box.check(gamma)
-    out = np.empty((len(gamma), 3))
-
-    def fill(block: slice) -> None:
-        status = np.empty(len(gamma[block]), np.int8)
-        rod.fill_tips_and_status(gamma[block], out[block], status)
-        out[block][status != TipStatus.STABLE] = np.nan
-
-    parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), BLOCK // 8))
-    return out
+    tips, status = rod.tips_and_status(gamma)
+    tips[status != TipStatus.STABLE] = np.nan
+    return tips
 
 
 def fill_stable_slopes(rod: TipMap, gamma: Array, tips: Array, slopes: Array) -> None:
