@@ -207,6 +207,13 @@ class TipMap(ABC):
         self.fill_tips(gamma, out)
         status[:] = TipStatus.STABLE
 
+    def fill_slopes_and_status(
+        self, gamma: Array, tips: Array, slopes: Array, status: NDArray[np.int8]
+    ) -> None:
+        """`fill_slopes`, and the `TipStatus` (n,) of each, on the calling thread."""
+        self.fill_slopes(gamma, tips, slopes)
+        self.fill_tips_and_status(gamma, np.empty_like(tips), status)
+
     def tips_and_status(self, activations: ArrayLike) -> tuple[Array, NDArray[np.int8]]:
         """Tips [m], shape (n, 3), NaN without an equilibrium, and their `TipStatus`, (n,)."""
         gamma = self.box.check(activations)

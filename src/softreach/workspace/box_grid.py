@@ -17,6 +17,7 @@ __all__ = ["corners_of", "every_second", "grid_stretches", "grid_tips", "image_m
 Array = NDArray[np.float64]
 
 _TOL = 1e-9  # far fewer evaluations than on the grids: their steps may be short
+_NEARLY_ALL = 0.9
 _DIFFERENCES = 200.0  # over n², more than differences on n cells err by, of the largest det J
 
 
@@ -55,13 +56,20 @@ def grid_stretches(rod: TipMap, tips: Array, cells: int, left_out: NDArray[np.bo
     found = stretches(tips, np.array([cells] * 3))
     found *= cells**3 / (8.0 * rod.box.volume)
     unsure = corners_of(left_out).ravel()
-    largest = np.abs(found[~unsure]).max(initial=0.0)
+    largest = _largest(rod, np.abs(found[~unsure]))
     small = np.flatnonzero(unsure | (np.abs(found) <= _DIFFERENCES / cells**2 * largest))
     small = small[np.isfinite(tips[small, 0])]
     places = np.stack(np.unravel_index(small, (cells + 1,) * 3), axis=1) / cells
     found[small] = _stretch(rod, rod.box.from_free_cube(places))
     found[~np.isfinite(found)] = 0.0
     return found
+
+
+def _largest(rod: TipMap, stretch: Array) -> float:
+    """The largest |det J|; nearly so where it has no bound, as it grows toward instability."""
+    if rod.supports_unstable and len(stretch):
+        return float(np.quantile(stretch, _NEARLY_ALL))
+    return float(stretch.max(initial=0.0))
 
 
 def corners_of(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -25,7 +25,7 @@ class Remainder(NamedTuple):
     """What cells that are left out still reach."""
 
     volume: float
-    """Outside the image [m³]; it may be nothing, and it may be twice as much."""
+    """Outside the image [m³], right to a half of itself."""
     tips: Array
     """Some of the tips [m], shape (n, 3)."""
 
@@ -38,7 +38,7 @@ def remainder(
     A place counts with the |det J| of the cell's corners, the median of those that are stable, if
     it is stable and its tip lies outside the image. Where stability is lost at a fold, det J grows
     like 1/√x toward it and twice as much is swept as this tells: one and a half times is taken,
-    which is right to what it is itself.
+    which is right to a third of itself, and a half is stated as the error.
 
     Args:
         rod: The tip map, with three free bundles.

@@ -62,8 +62,8 @@ def partial_volume(fine: Image, common: Image, coarse: Image, remainder: float) 
 
     As `solid_volume`, with the signed volume of the mapped tetrahedra for the integral of det J.
     What that errs by, O(1/n²), is removed as far as the cells tell that both grids hold. All that
-    is removed is part of the error, and so is all that cells at the edge of the part are taken to
-    reach: n times finer cells there would hold an n-th of it.
+    is removed is part of the error, and so is half of what cells at the edge of the part are taken
+    to reach.
 
     Args:
         fine: What the cells of the grid reach that are not left out.
@@ -75,7 +75,7 @@ def partial_volume(fine: Image, common: Image, coarse: Image, remainder: float) 
     at_fine, at_common, at_coarse = (_covered(image, sense) for image in (fine, common, coarse))
     removed = (at_common.value - at_coarse.value) / 3.0
     unknown = 0.0 if at_coarse.value > 0.0 else at_fine.value  # nothing to compare with
-    error = abs(removed) + at_fine.error + remainder + unknown
+    error = abs(removed) + at_fine.error + 0.5 * remainder + unknown
     return Estimate(at_fine.value + removed + remainder, error)
 
 

@@ -83,7 +83,9 @@ def _descend(rod: TipMap, targets: Array, enough: float, found: Nearest) -> None
         found.distance[taken], slopes[taken] = distance[better], ahead[better]
         good = now - distance > 0.25 * (now - left)
         believed = damping[active] <= _BELIEVED
-        factor = np.where(good, 0.1, np.where(better, 1.0, 10.0))
+        # Searches beyond the loss of stability take long: a step into it is shortened much.
+        worse = np.where(np.isinf(distance), 100.0, 10.0)
+        factor = np.where(good, 0.1, np.where(better, 1.0, worse))
         damping[active] = np.maximum(damping[active] * factor, _LEAST_DAMPING)
         # What the linear map promises bounds what is left to gain, once it is to be believed.
         small = (now - left <= _PROGRESS * np.minimum(enough, now)) & believed

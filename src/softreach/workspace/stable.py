@@ -27,11 +27,12 @@ def fill_stable_slopes(rod: TipMap, gamma: Array, tips: Array, slopes: Array) ->
 
     Where there is no stable equilibrium the tips are NaN, and the slopes mean nothing.
     """
-    rod.fill_slopes(gamma, tips, slopes)
-    if rod.supports_unstable:
-        again, status = np.empty_like(tips), np.empty(len(gamma), np.int8)
-        rod.fill_tips_and_status(gamma, again, status)
-        tips[status != TipStatus.STABLE] = np.nan
+    if not rod.supports_unstable:
+        return rod.fill_slopes(gamma, tips, slopes)
+    status = np.empty(len(gamma), np.int8)
+    rod.fill_slopes_and_status(gamma, tips, slopes, status)
+    tips[status != TipStatus.STABLE] = np.nan
+    return None
 
 
 def none_stable(tried: int) -> InvalidInput:
