@@ -119,7 +119,7 @@ _COMPUTE: dict[Need, Callable[[Intermediates], Any]] = {
     Need.LENGTH: lambda of: of.arm.length,
     Need.ACTIVATIONS: lambda of: _stable(of, activations_of(of.rod, of.cube)),
     Need.TIPS: lambda of: _stable(of, of.tips),
-    Need.LOST_SHARE: lambda of: 1.0 - float(of.stable.mean()),
+    Need.LOST_SHARE: lambda of: float((~of.stable).mean()),
     Need.ALPHA: lambda of: of.command.alpha_over_length * of.arm.length,
     Need.ALPHA_COMPLEX: _alpha_complex,
     Need.CONVEX_VOLUME: _convex_volume,

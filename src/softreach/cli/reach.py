@@ -40,7 +40,7 @@ def reach(
     arm = design_from(design, revolution_deg, taper_deg)
     with progress.bar("mapping the activation box", None) as shown:
         found = reachable_set(arm, accuracy=accuracy, progress=shown)
-    print_rows(f"reachable set of {design}", _rows(found), json)
+    print_rows(f"reachable set of {design}", _rows(found) | _lost(found), json)
     if surface is not None:
         from softreach.export import export_mesh
 
@@ -70,6 +70,13 @@ def _rows(found: ReachableSet) -> dict[str, tuple[Any, str]]:
             places = zip("xyz", found.tip, strict=True)
             return {axis: (float(place) / length, "L") for axis, place in places}
     raise AssertionError(found)
+
+
+def _lost(found: ReachableSet) -> dict[str, tuple[Any, str]]:
+    """What is left out, if anything is: no stable equilibrium, or torn."""
+    if not found.lost_share > 0.0:
+        return {}
+    return {"activation box left out": (100.0 * found.lost_share, "%")}
 
 
 def _size(
