@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -81,7 +81,7 @@ def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
     """The cloud of the design at, or nearest to, these parameters, like those of `compute_cloud`.
 
     Stored tips are rounded to 1e-5 of the shortest length; without them the cloud is computed
-    again, exactly as it was.
+    again, exactly as it was, and so are those of loaded designs, whose samples have a status.
 
     Args:
         atlas: A store, or a dataset from `open_atlas`.
@@ -99,14 +99,15 @@ def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
     arm = command.design(int(row["number"]))
     rod = tip_map(arm, command.tol)
     activation = activations_of(rod, opened["unit_activation"].values)
-    if "tip" in opened and not rod.supports_unstable:
+    drawn: Any = {"seed": command.seed, "sampler": command.sampler, "tol": command.tol}
+    if rod.supports_unstable:
+        tip, stability = rod.tips_and_status(activation)
+        return with_status(cloud_dataset(arm, activation, tip, **drawn), stability)
+    if "tip" in opened:
         tip = np.ascontiguousarray(row["tip"].values.T, dtype=float)
     else:
-        tip, tip_status = rod.tips_and_status(activation)
-    cloud = cloud_dataset(
-        arm, activation, tip, seed=command.seed, sampler=command.sampler, tol=command.tol
-    )
-    return with_status(cloud, tip_status) if rod.supports_unstable else cloud
+        tip = rod.tips(activation)
+    return cloud_dataset(arm, activation, tip, **drawn)
 
 
 def _messages(atlas: xr.Dataset, told: np.ndarray) -> dict[int, str]:

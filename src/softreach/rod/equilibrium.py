@@ -107,8 +107,8 @@ class Response(NamedTuple):
     def empty(cls, n: int, bundles: int, *, compliance: bool) -> Response:
         """Room for n."""
         forces = n if compliance else 0
-        twists, compliance = np.empty((n, 6, bundles)), np.empty((forces, 3, 3))
-        return cls(np.empty((n, 3)), twists, compliance, np.empty(n, np.int8))
+        twists, yields = np.empty((n, 6, bundles)), np.empty((forces, 3, 3))
+        return cls(np.empty((n, 3)), twists, yields, np.empty(n, np.int8))
 
 
 class Shapes(NamedTuple):

@@ -208,7 +208,7 @@ class TipMap(ABC):
         status[:] = TipStatus.STABLE
 
     def fill_slopes_and_status(
-        self, gamma: Array, tips: Array, slopes: Array, status: NDArray[np.int8]
+        self, gamma: Array, tips: Array, slopes: Array, *, status: NDArray[np.int8]
     ) -> None:
         """`fill_slopes`, and the `TipStatus` (n,) of each, on the calling thread."""
         self.fill_slopes(gamma, tips, slopes)

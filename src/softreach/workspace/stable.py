@@ -30,7 +30,7 @@ def fill_stable_slopes(rod: TipMap, gamma: Array, tips: Array, slopes: Array) ->
     if not rod.supports_unstable:
         return rod.fill_slopes(gamma, tips, slopes)
     status = np.empty(len(gamma), np.int8)
-    rod.fill_slopes_and_status(gamma, tips, slopes, status)
+    rod.fill_slopes_and_status(gamma, tips, slopes, status=status)
     tips[status != TipStatus.STABLE] = np.nan
     return None
 

@@ -46,11 +46,11 @@ def left_out_cells(rod: TipMap, tips: Array, cells: int) -> Bools:
     if not rod.supports_unstable:
         return np.zeros((cells,) * m, bool)
     field = tips.reshape(*(cells + 1,) * m, 3)
-    lost = corner_values(~np.isfinite(field[..., 0])).any(axis=-1)
+    lost: Bools = np.any(corner_values(~np.isfinite(field[..., 0])), axis=-1)
     for axis in range(m):
         torn = _torn_edges(rod, field, axis)
         others = [other for other in range(m) if other != axis]
-        lost |= corner_values(torn, others).any(axis=-1)
+        lost = lost | np.any(corner_values(torn, others), axis=-1)
     return lost
 
 

@@ -248,8 +248,8 @@ def _sizes(tips: Array, cells: int, m: int) -> Array:
     if m == 1:
         return np.linalg.norm(corners[:, 1] - corners[:, 0], axis=-1)
     first, second, third = (corners[..., k, :] - corners[..., 0, :] for k in (1, 3, 2))
-    pair = np.cross(first, second), np.cross(second, third)
-    return sum(np.linalg.norm(each, axis=-1) for each in pair) / 2.0
+    pair = np.stack([np.cross(first, second), np.cross(second, third)])
+    return np.linalg.norm(pair, axis=-1).sum(axis=0) / 2.0
 
 
 def _largest_neighbor(sizes: Array) -> Array:
