@@ -25,6 +25,7 @@ from softreach.atlas import (
 from softreach.atlas.metrics import chosen_metrics
 from softreach.atlas.store import AtlasStore
 from softreach.errors import InvalidInput, SoftreachWarning
+from softreach.rod.tip_map import TipMap
 from tests.atlas.families import SMALL, assert_same, command, similar_designs, small_space
 
 
