@@ -1,10 +1,11 @@
 """The rod: activation box, tip map, and the kinematics that a user asks."""
 
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.equilibrium import Equilibria, Rung
+from softreach.rod.found_equilibria import Equilibria
 from softreach.rod.free_bundles import FreeBundles, free_bundles
 from softreach.rod.kinematics import configuration, tip_jacobian, tip_positions
 from softreach.rod.loaded import LoadedRod
+from softreach.rod.search import Rung
 from softreach.rod.tip_map import (
     Frames,
     StrainRange,

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import IntEnum
 from functools import cached_property, partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,119 +12,23 @@ from numpy.typing import NDArray
 from softreach import parallel
 from softreach.kernels import loaded, loaded_general
 from softreach.rod.activation_box import ActivationBox
+from softreach.rod.found_equilibria import Equilibria, Response
 from softreach.rod.load_tables import LoadTables, StepTables
+from softreach.rod.loaded_shapes import Shapes, shapes_of
+from softreach.rod.search import CONTINUATION, DIRECT, NEAR, PATIENT, POLISH, Rung, Search
 from softreach.rod.start_grid import StartGrid, grid_sizes
-from softreach.rod.tip_map import Frames, TipStatus
+from softreach.rod.tip_map import TipStatus
 
 __all__ = ["Equilibria", "Response", "Rung", "Shapes", "Solver"]
 
 Array = NDArray[np.float64]
 
 
-class Rung(IntEnum):
-    """How an equilibrium was found."""
-
-    DIRECT = 0
-    """Newton's method, all load at once."""
-    CONTINUATION = 1
-    """The load grown in steps along the branch."""
-    PATIENT = 2
-    """The same in steps an order smaller."""
-    NONE = 3
-    """Not found: the branch ends before all of the load is on."""
-
-
-class _Search(NamedTuple):
-    """How boldly the kernels search."""
-
-    increment: float
-    """First share of the load to try."""
-    widest: float
-    """Longest first Newton step that is trusted [rad]."""
-    walks: int
-    """Walks allowed."""
-
-
-# An arm that jumps to another branch on its way lands on an unstable one (design/loaded_rod.md);
-# so whatever is not found stable is searched again, more patiently.
-_DIRECT = _Search(1.0, 1.2, 7)
-_CONTINUATION = _Search(0.25, 0.1, 400)
-_PATIENT = _Search(1 / 64, 0.03, 2000)
 _COARSE_STEP = 0.05  # Newton step at which coarse steps have done their work
 _DOUBTFUL = 0.02  # margin below which the tangents of coarse steps decide nothing
 _OF_TOL = 1e-2  # what the search may use up of the tolerance
 _FOUND = 1.0
 _TRACED = 1 << 20  # numbers kept of the sections of all arms in one task, 8 MB
-
-
-class Equilibria(NamedTuple):
-    """Where tips come to rest."""
-
-    tips: Array
-    """r [m], shape (n, 3); NaN where there is no equilibrium on the branch."""
-    status: NDArray[np.int8]
-    """`TipStatus`, shape (n,)."""
-    margin: Array
-    """How far from the loss of stability, from 1 to below 0 [-], shape (n,)."""
-    rung: NDArray[np.int8]
-    """`Rung`, shape (n,)."""
-    frame: Array
-    """First axis of the world at the tip, as the base of the unloaded arm sees it, (n, 3); with
-    loads of several directions also the second one, (n, 6)."""
-
-    @classmethod
-    def empty(cls, n: int, components: int) -> Equilibria:
-        """Room for n."""
-        return cls(
-            np.full((n, 3), np.nan),
-            np.full(n, TipStatus.NO_EQUILIBRIUM, np.int8),
-            np.full(n, np.nan),
-            np.full(n, Rung.NONE, np.int8),
-            np.zeros((n, components)),
-        )
-
-    def of(self, rows: slice | NDArray[np.bool_]) -> Equilibria:
-        """Some of them; a slice shares memory."""
-        tips, status, margin, rung, frame = self
-        return Equilibria(tips[rows], status[rows], margin[rows], rung[rows], frame[rows])
-
-
-class Response(NamedTuple):
-    """How tips answer to activations and forces."""
-
-    tips: Array
-    """r [m], shape (n, 3)."""
-    twists: Array
-    """(v, ω) per activation, shape (n, 6, bundles)."""
-    compliance: Array
-    """∂r/∂F [m/N], shape (n, 3, 3), or (0, 3, 3)."""
-
-    @classmethod
-    def empty(cls, n: int, bundles: int, *, compliance: bool) -> Response:
-        """Room for n."""
-        forces = n if compliance else 0
-        return cls(np.empty((n, 3)), np.empty((n, 6, bundles)), np.empty((forces, 3, 3)))
-
-
-class Shapes(NamedTuple):
-    """Arms at stations."""
-
-    frames: Frames
-    moment: Array
-    """m [N m] in the directors, shape (n, station, 3)."""
-    force: Array
-    """n [N] in the directors, shape (n, station, 3)."""
-
-    @classmethod
-    def empty(cls, n: int, stations: int) -> Shapes:
-        """Room for n."""
-        position, moment, force = np.empty((3, n, stations, 3))
-        return cls(Frames(position, np.empty((n, stations, 3, 3))), moment, force)
-
-    def put(self, rows: slice, some: Shapes) -> None:
-        """Put some into place."""
-        self.frames.position[rows], self.frames.directors[rows] = some.frames
-        self.moment[rows], self.force[rows] = some.moment, some.force
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,19 +84,19 @@ class Solver:
     def near(self, gamma: Array, known: Equilibria) -> Equilibria:
         """Equilibria near known ones of other steps."""
         found = self.empty(len(gamma))
-        self._try(gamma, slice(None), _DIRECT, Rung.DIRECT, found, known.frame)
+        self._try(gamma, slice(None), DIRECT, Rung.DIRECT, found, known.frame)
         return found
 
     def slowly(self, gamma: Array) -> Equilibria:
         """Equilibria found by the most patient continuation alone."""
         found = self.empty(len(gamma))
-        self._try(gamma, slice(None), _PATIENT, Rung.PATIENT, found)
+        self._try(gamma, slice(None), PATIENT, Rung.PATIENT, found)
         return found
 
     def _fill(self, gamma: Array, found: Equilibria) -> None:
         guesses = None if self.starts is None else self.starts.at(gamma)
-        self._try(gamma, slice(None), _DIRECT, Rung.DIRECT, found, guesses)
-        for search, rung in ((_CONTINUATION, Rung.CONTINUATION), (_PATIENT, Rung.PATIENT)):
+        self._try(gamma, slice(None), DIRECT, Rung.DIRECT, found, guesses)
+        for search, rung in ((CONTINUATION, Rung.CONTINUATION), (PATIENT, Rung.PATIENT)):
             lost = found.status == TipStatus.NO_EQUILIBRIUM
             doubtful = lost | (found.margin < _DOUBTFUL)
             rest = np.flatnonzero(lost if rung == Rung.PATIENT else doubtful)
@@ -205,7 +107,7 @@ class Solver:
         self,
         gamma: Array,
         rows: slice | NDArray[np.intp],
-        search: _Search,
+        search: Search,
         rung: Rung,
         found: Equilibria,
         guesses: Array | None = None,
@@ -232,12 +134,12 @@ class Solver:
         found.status[rows] = np.where(good, stable, TipStatus.NO_EQUILIBRIUM)
         found.rung[rows] = np.where(good, rung, Rung.NONE)
 
-    def _along_one(self, gamma: Array, search: _Search, guesses: Array | None):
+    def _along_one(self, gamma: Array, search: Search, guesses: Array | None):
         return self._one(gamma, search, guesses)[:4]
 
-    def _one(self, gamma: Array, search: _Search, guesses: Array | None):
+    def _one(self, gamma: Array, search: Search, guesses: Array | None):
         fine = self._fine.for_one_direction
-        direct = search is _DIRECT
+        direct = search is DIRECT
         coarse = self._coarse.for_one_direction if direct else fine
         tiny = max(_OF_TOL * self.tol, 1e-13)
         small = _COARSE_STEP if direct else min(_COARSE_STEP, 1e-3)
@@ -269,7 +171,7 @@ class Solver:
         """Equilibria of one arm near directions G(L), and the sign of each: -1 to its index."""
         found = self.empty(len(directions))
         many = np.repeat(_columns(gamma), len(directions), axis=0)
-        tips, frame, margin, state, sign = self._one(many, _POLISH, directions)
+        tips, frame, margin, state, sign = self._one(many, POLISH, directions)
         self._put(found, slice(None), Rung.DIRECT, tips, frame, margin, state)
         return found, np.sign(sign)
 
@@ -287,7 +189,7 @@ class Solver:
         turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-12)
         return np.concatenate([first, turned], axis=1)
 
-    def _in_general(self, gamma: Array, search: _Search, guesses: Array | None):
+    def _in_general(self, gamma: Array, search: Search, guesses: Array | None):
         found = self._general(gamma, self._fine, search, guesses)[0]
         return found[:, :3], found[:, 3:9], found[:, 9], found[:, 10]
 
@@ -295,7 +197,7 @@ class Solver:
         self,
         gamma: Array,
         table: StepTables,
-        search: _Search,
+        search: Search,
         guesses: Array | None,
         *,
         slopes: bool = False,
@@ -328,7 +230,7 @@ class Solver:
         found, twists, yields, _ = self._general(
             _columns(gamma),
             self._fine,
-            _NEAR,
+            NEAR,
             self._whole(known.frame),
             slopes=True,
             compliance=compliance,
@@ -361,11 +263,16 @@ class Solver:
         """Arms at stations, which are these boundaries of the steps; on the calling thread."""
         known = self.find(gamma)
         found, _, _, trace = self._general(
-            _columns(gamma), table, _NEAR, self._whole(known.frame), trace=True
+            _columns(gamma), table, NEAR, self._whole(known.frame), trace=True
         )
         lost = (known.status == TipStatus.NO_EQUILIBRIUM) | (found[:, 10] != _FOUND)
-        return _shapes(
-            found[:, :3], trace[:, rows], self._force_at(table, rows), stations, lost, self.tables
+        return shapes_of(
+            found[:, :3],
+            trace[:, rows],
+            self._force_at(table, rows),
+            stations,
+            lost,
+            self.tables.axes,
         )
 
     def _force_at(self, table: StepTables, rows: NDArray[np.intp]) -> Array:
@@ -374,55 +281,6 @@ class Solver:
         return at_ends[rows]
 
 
-# From a known equilibrium: only the rotation about gravity may be far off.
-_NEAR = _Search(1.0, 4.0, 12)
-_POLISH = _Search(1.0, 0.3, 10)
-
-
 def _columns(gamma: Array) -> Array:
     """Activations for kernels, which want one bundle at least."""
     return gamma if gamma.shape[1] else np.zeros((len(gamma), 1))
-
-
-def _shapes(
-    tips: Array,
-    trace: Array,
-    force: Array,
-    stations: Array,
-    lost: NDArray[np.bool_],
-    tables: LoadTables,
-) -> Shapes:
-    """Shapes from what the kernel keeps of sections: axes, moment and tip as each sees them."""
-    seen = _orthonormal(trace[..., 0:3], trace[..., 3:6])
-    turn = _matrix(trace[..., 12:16])
-    world = seen @ turn  # axes of the world in the directors
-    directors = np.swapaxes(world, -1, -2) @ tables.axes
-    back = np.einsum("nsac,nsc->nsa", seen, trace[..., 9:12]) @ tables.axes
-    position = tips[:, None] - back
-    position[:, stations == 0.0] = 0.0
-    directors[:, stations == 0.0] = np.eye(3)
-    moment = np.einsum("nsc,nscd->nsd", trace[..., 6:9], turn)
-    follower = np.einsum("nsc,nscd->nsd", trace[..., 16:19], turn)
-    thrust = np.einsum("sa,nsad->nsd", force, world) + follower
-    for values in (position, directors, moment, thrust):
-        values[lost] = np.nan
-    return Shapes(Frames(position, directors), moment, thrust)
-
-
-def _orthonormal(g: Array, h: Array) -> Array:
-    """Axes of the world in the frame of the walk, without the errors of the steps."""
-    g = g / np.linalg.norm(g, axis=-1, keepdims=True)
-    h = h - (g * h).sum(axis=-1, keepdims=True) * g
-    h /= np.linalg.norm(h, axis=-1, keepdims=True)
-    return np.stack([g, h, np.cross(g, h)], axis=-2)
-
-
-def _matrix(q: Array) -> Array:
-    """Rotation matrices of unit quaternions, shape (..., 3, 3)."""
-    w, x, y, z = np.moveaxis(q, -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
