@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,8 @@ Array = NDArray[np.float64]
 
 
 _COARSE_STEP = 0.05  # Newton step at which coarse steps have done their work
+_CAREFUL_STEP = 1e-3  # the same of a continuation, on fine steps
+_NEAR_STEP = 1e-7  # Newton step that may be taken linearly
 _DOUBTFUL = 0.02  # margin below which the tangents of coarse steps decide nothing
 _OF_TOL = 1e-2  # what the search may use up of the tolerance
 _FOUND = 1.0
@@ -134,24 +137,31 @@ class Solver:
         found.status[rows] = np.where(good, stable, TipStatus.NO_EQUILIBRIUM)
         found.rung[rows] = np.where(good, rung, Rung.NONE)
 
+    def _first_phase(self, search: Search) -> tuple[StepTables, float]:
+        """Steps for Newton's method, and how near [rad] it is to come."""
+        if search is DIRECT:
+            return self._coarse, _COARSE_STEP
+        return self._fine, _CAREFUL_STEP
+
+    @property
+    def _tiny(self) -> float:
+        """What the search may leave [rad]."""
+        return max(_OF_TOL * self.tol, 1e-13)
+
     def _along_one(self, gamma: Array, search: Search, guesses: Array | None):
         return self._one(gamma, search, guesses)[:4]
 
     def _one(self, gamma: Array, search: Search, guesses: Array | None):
-        fine = self._fine.for_one_direction
-        direct = search is DIRECT
-        coarse = self._coarse.for_one_direction if direct else fine
-        tiny = max(_OF_TOL * self.tol, 1e-13)
-        small = _COARSE_STEP if direct else min(_COARSE_STEP, 1e-3)
+        coarse, small = self._first_phase(search)
         out = np.empty((len(gamma), 10))
         loaded.solve(
             gamma,
             self.tables.axes[0],
             self.tables.at_tip,
             np.zeros((0, 3)) if guesses is None else guesses,
-            coarse,
-            fine,
-            (search.increment, search.widest, small, tiny),
+            coarse.for_one_direction,
+            self._fine.for_one_direction,
+            (search.increment, search.widest, small, self._tiny),
             (search.walks, 10),
             out,
         )
@@ -175,73 +185,35 @@ class Solver:
         self._put(found, slice(None), Rung.DIRECT, tips, frame, margin, state)
         return found, np.sign(sign)
 
-    def _whole(self, frame: Array) -> Array:
-        """Both axes; the second is turned as the first one is, by the shortest way."""
-        if frame.shape[1] == 6:
-            return frame
-        first = frame
-        g, h = self.tables.axes[0], self.tables.axes[1]
-        axis, cosine = np.cross(g, first), first @ g
-        along = axis @ h
-        safe = np.maximum(1.0 + cosine, 1e-6)
-        turned = cosine[:, None] * h + np.cross(axis, h) + (along / safe)[:, None] * axis
-        turned -= (turned * first).sum(axis=1, keepdims=True) * first
-        turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-12)
-        return np.concatenate([first, turned], axis=1)
-
     def _in_general(self, gamma: Array, search: Search, guesses: Array | None):
-        found = self._general(gamma, self._fine, search, guesses)[0]
+        coarse, small = self._first_phase(search)
+        limits = (search.increment, search.widest, small, self._tiny, 0.0)
+        found = _general(
+            gamma, self.tables.axes, guesses, coarse, self._fine, limits, (search.walks, 10)
+        ).found
         return found[:, :3], found[:, 3:9], found[:, 9], found[:, 10]
 
-    def _general(
-        self,
-        gamma: Array,
-        table: StepTables,
-        search: Search,
-        guesses: Array | None,
-        *,
-        slopes: bool = False,
-        compliance: bool = False,
-        trace: bool = False,
-    ) -> tuple[Array, Array, Array, Array]:
-        n, steps = len(gamma), len(table.lengths)
-        found = np.empty((n, 12))
-        twists = np.zeros((n if slopes else 0, 6, gamma.shape[1]))
-        yields = np.zeros((n if compliance else 0, 3, 3))
-        traced = np.zeros((n if trace else 0, steps + 1, loaded_general.TRACE))
-        loaded_general.solve(
-            gamma,
-            self.tables.axes,
-            table.jumps,
-            np.zeros((0, 6)) if guesses is None else guesses,
-            (table.pieces, table.lengths, table.scalars, table.bends),
-            (search.increment, search.widest, 1e-5),
-            search.walks,
-            found,
-            twists,
-            yields,
-            traced,
+    def _near(self, gamma: Array, known: Equilibria, table: StepTables, **asked: bool) -> _Walked:
+        """The last walk again, from known equilibria, with whatever more is asked for."""
+        one = self.tables.one_direction
+        limits = (NEAR.increment, NEAR.widest, _NEAR_STEP, 0.0, float(one))
+        frame = np.concatenate([known.frame, _across(known.frame)], axis=1) if one else known.frame
+        walked = _general(
+            gamma, self.tables.axes, frame, table, table, limits, (NEAR.walks, 0), **asked
         )
-        return found, twists, yields, traced
+        lost = (known.status == TipStatus.NO_EQUILIBRIUM) | (walked.found[:, 10] != _FOUND)
+        for values in (walked.found[:, :3], walked.slopes, walked.compliance):
+            if len(values):
+                values[lost] = np.nan
+        return walked
 
     def respond(self, gamma: Array, *, compliance: bool = False) -> Response:
         """Tips with their derivatives; NaN where there is no equilibrium."""
-        known = self.find(gamma)
-        found, twists, yields, _ = self._general(
-            _columns(gamma),
-            self._fine,
-            NEAR,
-            self._whole(known.frame),
-            slopes=True,
-            compliance=compliance,
+        walked = self._near(
+            _columns(gamma), self.find(gamma), self._fine, slopes=True, compliance=compliance
         )
-        lost = (known.status == TipStatus.NO_EQUILIBRIUM) | (found[:, 10] != _FOUND)
-        tips = found[:, :3].copy()
-        for values in (tips, twists, yields):
-            if len(values):
-                values[lost] = np.nan
-        in_base = yields @ self.tables.axes if compliance else yields
-        return Response(tips, twists[:, :, : gamma.shape[1]], in_base)
+        twists = walked.slopes[:, :, : gamma.shape[1]]
+        return Response(walked.found[:, :3].copy(), twists, walked.compliance)
 
     def shapes(self, gamma: Array, stations: Array) -> Shapes:
         """Arms at ascending stations Z [m]; NaN where there is no equilibrium."""
@@ -261,24 +233,56 @@ class Solver:
         self, gamma: Array, stations: Array, table: StepTables, rows: NDArray[np.intp]
     ) -> Shapes:
         """Arms at stations, which are these boundaries of the steps; on the calling thread."""
-        known = self.find(gamma)
-        found, _, _, trace = self._general(
-            _columns(gamma), table, NEAR, self._whole(known.frame), trace=True
-        )
-        lost = (known.status == TipStatus.NO_EQUILIBRIUM) | (found[:, 10] != _FOUND)
-        return shapes_of(
-            found[:, :3],
-            trace[:, rows],
-            self._force_at(table, rows),
-            stations,
-            lost,
-            self.tables.axes,
-        )
+        walked = self._near(_columns(gamma), self.find(gamma), table, trace=True)
+        force = self._force_at(table, rows)
+        return shapes_of(walked.found[:, :3], walked.trace, rows, force, stations)
 
     def _force_at(self, table: StepTables, rows: NDArray[np.intp]) -> Array:
         """Dead force at boundaries along the world's axes, as the step beyond has it, (row, 3)."""
         at_ends = np.concatenate([table.scalars[:1, 0, 3:], table.scalars[:, -1, 3:]])
         return at_ends[rows]
+
+
+class _Walked(NamedTuple):
+    """What the kernel of general loads gives."""
+
+    found: Array
+    slopes: Array
+    compliance: Array
+    trace: Array
+
+
+def _general(
+    gamma: Array,
+    axes: Array,
+    guesses: Array | None,
+    coarse: StepTables,
+    fine: StepTables,
+    limits: tuple[float, ...],
+    most: tuple[int, int],
+    *,
+    slopes: bool = False,
+    compliance: bool = False,
+    trace: bool = False,
+) -> _Walked:
+    """See `loaded_general.solve`."""
+    n = len(gamma)
+    walked = _Walked(
+        np.empty((n, 13)),
+        np.zeros((n if slopes else 0, 6, gamma.shape[1])),
+        np.zeros((n if compliance else 0, 3, 3)),
+        np.zeros((n if trace else 0, len(coarse.lengths) + 1, loaded_general.TRACE)),
+    )
+    guessed = np.zeros((0, 6)) if guesses is None else guesses
+    loaded_general.solve(gamma, axes, guessed, tuple(coarse), tuple(fine), limits, most, *walked)
+    return walked
+
+
+def _across(directions: Array) -> Array:
+    """Some unit vector normal to each (n, 3)."""
+    other = np.eye(3)[np.abs(directions).argmin(axis=1)]
+    across = np.cross(directions, other)
+    return across / np.linalg.norm(across, axis=1, keepdims=True)
 
 
 def _columns(gamma: Array) -> Array:

@@ -36,28 +36,40 @@ class Shapes(NamedTuple):
 
 
 def shapes_of(
-    tips: Array,
-    trace: Array,
-    force: Array,
-    stations: Array,
-    lost: NDArray[np.bool_],
-    axes: Array,
+    tips: Array, trace: Array, rows: NDArray[np.intp], force: Array, stations: Array
 ) -> Shapes:
-    """Shapes from what the kernel keeps of sections: axes, moment and tip as each sees them."""
-    seen = _orthonormal(trace[..., 0:3], trace[..., 3:6])
-    turn = _matrix(trace[..., 12:16])
-    world = seen @ turn  # axes of the world in the directors
+    """Shapes from what the kernel keeps of sections; NaN where a tip is.
+
+    Args:
+        tips: r [m], shape (n, 3).
+        trace: Of all boundaries of steps, tip first, as `loaded_general.solve` fills it.
+        rows: The boundary of each station.
+        force: Dead force at the stations along the world's axes [N], shape (station, 3).
+        stations: Z [m].
+    """
+    axes = _world(trace[:, -1])[:, None]
+    trace = trace[:, rows]
+    world, turn = _world(trace), _matrix(trace[..., 12:16])
     directors = np.swapaxes(world, -1, -2) @ axes
-    back = np.einsum("nsac,nsc->nsa", seen, trace[..., 9:12]) @ axes
-    position = tips[:, None] - back
+    back = _rows(trace[..., 9:12], turn) @ np.swapaxes(world, -1, -2) @ axes
+    position = tips[:, None] - back[..., 0, :]
     position[:, stations == 0.0] = 0.0
     directors[:, stations == 0.0] = np.eye(3)
-    moment = np.einsum("nsc,nscd->nsd", trace[..., 6:9], turn)
-    follower = np.einsum("nsc,nscd->nsd", trace[..., 16:19], turn)
-    thrust = np.einsum("sa,nsad->nsd", force, world) + follower
+    moment = _rows(trace[..., 6:9], turn)[..., 0, :]
+    thrust = _rows(force + trace[..., 16:19], world)[..., 0, :]
     for values in (position, directors, moment, thrust):
-        values[lost] = np.nan
+        values[np.isnan(tips).any(axis=1)] = np.nan
     return Shapes(Frames(position, directors), moment, thrust)
+
+
+def _rows(vectors: Array, matrices: Array) -> Array:
+    """Row vectors times matrices, shape (..., 1, 3)."""
+    return vectors[..., None, :] @ matrices
+
+
+def _world(trace: Array) -> Array:
+    """Axes of the world in the directors of sections, as rows, shape (..., 3, 3)."""
+    return _orthonormal(trace[..., 0:3], trace[..., 3:6]) @ _matrix(trace[..., 12:16])
 
 
 def _orthonormal(g: Array, h: Array) -> Array:
