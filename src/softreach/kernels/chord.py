@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from softreach.kernels.compiler import inline
+from softreach.kernels.compiler import inner
 from softreach.kernels.continuation import BEFORE, DONE, FOUND, INVERSE, LEFT, STEP
 from softreach.kernels.lanes import get, put
 from softreach.kernels.rod import LANES
 from softreach.kernels.vector import dot, minus, times
 
-__all__ = ["chord_with", "by_inverse", "keep_inverse"]
+__all__ = ["by_inverse", "chord_with", "keep_inverse"]
 
 
-@inline
+@inner
 def by_inverse(w, i, r):
     """The step at the tip that makes up for what is missing at the base."""
     return (
@@ -21,7 +21,7 @@ def by_inverse(w, i, r):
     )
 
 
-@inline
+@inner
 def keep_inverse(w, i, rows):
     """Put an inverse into place."""
     put(w, INVERSE, i, rows[0])
@@ -29,7 +29,7 @@ def keep_inverse(w, i, rows):
     put(w, INVERSE + 6 * LANES, i, rows[2])
 
 
-@inline
+@inner
 def _correct(w, i, y):
     """Broyden's correction, after the last step changed what is missing by -y."""
     s, cy = get(w, STEP, i), by_inverse(w, i, y)
@@ -62,7 +62,7 @@ def chord_with(missing, move):
         move: Takes the step in STEP.
     """
 
-    @inline
+    @inner
     def step(w, i, turn, least):
         r = missing(w, i)
         if turn > 0:
@@ -74,7 +74,7 @@ def chord_with(missing, move):
         if w[LEFT + i] > least:
             move(w, i)
 
-    @inline
+    @inner
     def chord_all(w, turn, least):
         waiting = 0
         for i in range(LANES):

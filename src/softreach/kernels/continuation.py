@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from softreach.kernels.compiler import inline
+from softreach.kernels.compiler import inner
 from softreach.kernels.lanes import copy, get
 from softreach.kernels.rod import LANES
 from softreach.kernels.vector import dot
@@ -64,37 +64,23 @@ def advance_with(newton, move, extrapolate):
         move: Takes it.
         extrapolate: Puts the secant through HELD and PAST into TRIAL, for a ratio of increments.
     """
+    predict = _predict_with(extrapolate)
+    advance = _advance_with(newton, move, _go_back_with(predict), _go_on_with(predict))
 
-    @inline
-    def predict(w, i, widest):
-        w[LOAD + i] = min(1.0, w[HELD_LOAD + i] + w[INCREMENT + i])
-        ratio = 0.0
-        if w[HELD_LOAD + i] > w[PAST_LOAD + i]:
-            ratio = (w[LOAD + i] - w[HELD_LOAD + i]) / (w[HELD_LOAD + i] - w[PAST_LOAD + i])
-        extrapolate(w, i, ratio)
-        w[LEFT + i] = widest
-        w[TURNS + i] = 0.0
+    @inner
+    def advance_all(w, small, widest):
+        waiting = 0
+        for i in range(LANES):
+            if w[DONE + i] == 0.0:
+                advance(w, i, small, widest)
+            waiting += w[DONE + i] == 0.0
+        return waiting
 
-    @inline
-    def go_back(w, i, widest):
-        w[INCREMENT + i] *= 0.5
-        if w[INCREMENT + i] < _SMALLEST_INCREMENT:
-            w[DONE + i] = FAILED
-        else:
-            predict(w, i, widest)
+    return advance_all
 
-    @inline
-    def go_on(w, i, widest):
-        w[PAST_LOAD + i] = w[HELD_LOAD + i]
-        w[HELD_LOAD + i] = w[LOAD + i]
-        for row in range(6):
-            w[PAST + row * LANES + i] = w[HELD + row * LANES + i]
-            w[HELD + row * LANES + i] = w[TRIAL + row * LANES + i]
-        if w[TURNS + i] <= 3.0:
-            w[INCREMENT + i] *= 2.0
-        predict(w, i, widest)
 
-    @inline
+def _advance_with(newton, move, go_back, go_on):
+    @inner
     def advance(w, i, small, widest):
         newton(w, i)
         step = get(w, STEP, i)
@@ -110,19 +96,51 @@ def advance_with(newton, move, extrapolate):
             if size < small:
                 go_on(w, i, widest)
 
-    @inline
-    def advance_all(w, small, widest):
-        waiting = 0
-        for i in range(LANES):
-            if w[DONE + i] == 0.0:
-                advance(w, i, small, widest)
-            waiting += w[DONE + i] == 0.0
-        return waiting
-
-    return advance_all
+    return advance
 
 
-@inline
+def _predict_with(extrapolate):
+    @inner
+    def predict(w, i, widest):
+        w[LOAD + i] = min(1.0, w[HELD_LOAD + i] + w[INCREMENT + i])
+        ratio = 0.0
+        if w[HELD_LOAD + i] > w[PAST_LOAD + i]:
+            ratio = (w[LOAD + i] - w[HELD_LOAD + i]) / (w[HELD_LOAD + i] - w[PAST_LOAD + i])
+        extrapolate(w, i, ratio)
+        w[LEFT + i] = widest
+        w[TURNS + i] = 0.0
+
+    return predict
+
+
+def _go_back_with(predict):
+    @inner
+    def go_back(w, i, widest):
+        w[INCREMENT + i] *= 0.5
+        if w[INCREMENT + i] < _SMALLEST_INCREMENT:
+            w[DONE + i] = FAILED
+        else:
+            predict(w, i, widest)
+
+    return go_back
+
+
+def _go_on_with(predict):
+    @inner
+    def go_on(w, i, widest):
+        w[PAST_LOAD + i] = w[HELD_LOAD + i]
+        w[HELD_LOAD + i] = w[LOAD + i]
+        for row in range(6):
+            w[PAST + row * LANES + i] = w[HELD + row * LANES + i]
+            w[HELD + row * LANES + i] = w[TRIAL + row * LANES + i]
+        if w[TURNS + i] <= 3.0:
+            w[INCREMENT + i] *= 2.0
+        predict(w, i, widest)
+
+    return go_on
+
+
+@inner
 def start(w, increment, widest):
     """Begin at TRIAL, with a first share of the load; HELD and PAST are of no load."""
     copy(w, HELD, w, TRIAL, 6 * LANES)

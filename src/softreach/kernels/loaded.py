@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from softreach.kernels.chord import by_inverse, chord_with, keep_inverse
-from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.compiler import inner, kernel
 from softreach.kernels.continuation import (
     DONE,
     FOUND,
@@ -50,19 +50,19 @@ TARGET = SIZE  # gravity as seen by the base, in the frame of the walk
 WHOLE = SIZE + 3 * LANES
 
 
-@inline
+@inner
 def _unit(v):
     return times(1.0 / math.sqrt(dot(v, v)), v)
 
 
-@inline
+@inner
 def _missing(w, i):
     """What is missing at the base, in the plane normal to G(0), which steps do not keep at 1."""
     g, t = get(w, X, i), get(w, TARGET, i)
     return minus(t, times(dot(g, t) / dot(g, g), g))
 
 
-@inline
+@inner
 def _newton(w, i):
     """The Newton step of G(L), and the linear map that gives it, kept for the chord steps."""
     g, a, b = get(w, X, i), get(w, A, i), get(w, B, i)
@@ -80,18 +80,18 @@ def _newton(w, i):
     put(w, STEP, i, by_inverse(w, i, _missing(w, i)))
 
 
-@inline
+@inner
 def _move(w, i):
     put(w, TRIAL, i, _unit(plus(get(w, TRIAL, i), get(w, STEP, i))))
 
 
-@inline
+@inner
 def _move_all(w):
     for i in range(LANES):
         _move(w, i)
 
 
-@inline
+@inner
 def _extrapolate(w, i, ratio):
     g, p = get(w, HELD, i), get(w, PAST, i)
     put(w, TRIAL, i, _unit(plus(g, times(ratio, minus(g, p)))))
@@ -101,7 +101,7 @@ _advance_all = advance_with(_newton, _move, _extrapolate)
 _chord_all = chord_with(_missing, _move)
 
 
-@inline
+@inner
 def _aim(w, work, gravity):
     """What the base must see, in the frame of the walk."""
     for i in range(LANES):
@@ -109,7 +109,7 @@ def _aim(w, work, gravity):
         put(w, TARGET, i, turned(q, (gravity[0], gravity[1], gravity[2])))
 
 
-@inline
+@inner
 def _set_out(w, work, guesses, first, count, increment, widest):
     """Begin from the unloaded arm, or where a guess is given, there."""
     for i in range(LANES):
@@ -167,7 +167,7 @@ def solve(gamma, gravity, tip, guesses, coarse, fine, limits, most, out):
         _store(w, work, first, count, tiny, walks, out)
 
 
-@inline
+@inner
 def _store(w, work, first, count, tiny, walks, out):
     for i in range(count):
         q, n = back(turn_at(work, TURN, i)), first + i

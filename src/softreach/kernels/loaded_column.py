@@ -18,19 +18,19 @@ driven by its values at the tip, by a change of force u, or by a change of activ
 
 from __future__ import annotations
 
-from softreach.kernels.compiler import inline
+from softreach.kernels.compiler import inner
 from softreach.kernels.explicit_rk8 import step_function, sum3
 from softreach.kernels.vector import combination, cross, dot, plus, times
 
 __all__ = ["column_step", "state_step"]
 
 
-@inline
+@inner
 def _mix(a, x, b, y):
     return a * x[0] + b * y[0], a * x[1] + b * y[1], a * x[2] + b * y[2]
 
 
-@inline
+@inner
 def _internal(node, s):
     """Force, twist and stretch of a section, and how the step turns the frame."""
     length, d, bending, twisting, axial, load = node
@@ -40,7 +40,7 @@ def _internal(node, s):
     return n, twist, stretch, _mix(length * bending, m, length * twist, d)
 
 
-@inline
+@inner
 def _rates(node, s):
     """Changes over the step; node = (ℓ, d, 1/K1, 1/K3 - 1/K1, 1/K0, (n1, n2, n3))."""
     length, d = node[0], node[1]
@@ -51,7 +51,7 @@ def _rates(node, s):
     return cross(turn, g), cross(turn, h), cross(d, push), plus(cross(turn, y), along)
 
 
-@inline
+@inner
 def _tangent_rates(place, t):
     """Product rule on `_rates`; place = (node, state, (δℓ, turn, u))."""
     node, s, (d_length, d_turn, unit) = place
@@ -70,7 +70,7 @@ def _tangent_rates(place, t):
     )
 
 
-@inline
+@inner
 def _plus(s, c, a, b, e, f, g, h):
     return (
         sum3(s[0], c, a[0], b[0], e[0], f[0], g[0], h[0]),
@@ -80,7 +80,7 @@ def _plus(s, c, a, b, e, f, g, h):
     )
 
 
-@inline
+@inner
 def _plus_tangent(s, c, a, b, e, f, g, h):
     return (
         sum3(s[0], c, a[0], b[0], e[0], f[0], g[0], h[0]),

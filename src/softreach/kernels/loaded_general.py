@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from softreach.kernels.chord import by_inverse, chord_with, keep_inverse
-from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.compiler import inner, kernel
 from softreach.kernels.continuation import (
     DONE,
     FOUND,
@@ -43,7 +43,7 @@ AXIAL = SIZE  # whether no load turns with the world about its first axis
 WHOLE = SIZE + 1
 
 
-@inline
+@inner
 def _missing(w, i):
     """The rotation that the base lacks, along the directions of the world.
 
@@ -61,13 +61,13 @@ def _missing(w, i):
     return times(scale, (dot(twice, g), dot(twice, h), dot(twice, k)))
 
 
-@inline
+@inner
 def _determinant(w, i):
     a, b, c = get(w, PLANE, i), get(w, PLANE + 3 * LANES, i), get(w, PLANE + 6 * LANES, i)
     return dot(a, cross(b, c))
 
 
-@inline
+@inner
 def _newton(w, i):
     """The Newton step of the frame at the tip, and the inverse that gives it."""
     a, b, c = get(w, PLANE, i), get(w, PLANE + 3 * LANES, i), get(w, PLANE + 6 * LANES, i)
@@ -78,21 +78,21 @@ def _newton(w, i):
     put(w, STEP, i, by_inverse(w, i, _missing(w, i)))
 
 
-@inline
+@inner
 def _orthonormal(g, h):
     g = times(1.0 / math.sqrt(dot(g, g)), g)
     h = minus(h, times(dot(g, h), g))
     return g, times(1.0 / math.sqrt(dot(h, h)), h)
 
 
-@inline
+@inner
 def _put_frame(w, i, g, h):
     g, h = _orthonormal(g, h)
     put(w, TRIAL, i, g)
     put(w, TRIAL + 3 * LANES, i, h)
 
 
-@inline
+@inner
 def _move(w, i):
     """Turn the frame of the tip by the step."""
     x = get(w, STEP, i)
@@ -106,7 +106,7 @@ def _move(w, i):
     _put_frame(w, i, g, h)
 
 
-@inline
+@inner
 def _extrapolate(w, i, ratio):
     g, p = get(w, HELD, i), get(w, PAST, i)
     h, q = get(w, HELD + 3 * LANES, i), get(w, PAST + 3 * LANES, i)
@@ -117,7 +117,7 @@ _advance_all = advance_with(_newton, _move, _extrapolate)
 _chord_all = chord_with(_missing, _move)
 
 
-@inline
+@inner
 def _aim(w, work, axes):
     """What the base must see, in the frame of the walk."""
     for i in range(LANES):
@@ -126,7 +126,7 @@ def _aim(w, work, axes):
         put(w, TARGET + 3 * LANES, i, turned(q, (axes[1, 0], axes[1, 1], axes[1, 2])))
 
 
-@inline
+@inner
 def _set_out(w, work, guesses, first, count, increment, widest):
     """Begin from the unloaded arm, or where a guess is given, there."""
     copy(w, TRIAL, w, TARGET, 6 * LANES)
@@ -137,6 +137,20 @@ def _set_out(w, work, guesses, first, count, increment, widest):
             g = turned(q, (guesses[n, 0], guesses[n, 1], guesses[n, 2]))
             h = turned(q, (guesses[n, 3], guesses[n, 4], guesses[n, 5]))
             _put_frame(w, i, g, h)
+
+
+@inner
+def _improve(w, turn, limits):
+    """A Newton step before the first turn of chord steps; how many lanes are at work still."""
+    if turn < 0:
+        return _advance_all(w, limits[2], limits[1])
+    return _chord_all(w, turn, limits[3] * limits[3])
+
+
+@inner
+def _move_all(w):
+    for i in range(LANES):
+        _move(w, i)
 
 
 @kernel
@@ -163,7 +177,7 @@ def solve(gamma, axes, guesses, coarse, fine, limits, most, found, slopes, compl
         trace: Filled with the sections between steps, tip first, (n, step + 1, `TRACE`); or
             (0, 1, `TRACE`).
     """
-    increment, widest, small, tiny, axial = limits
+    increment, widest, _, tiny, axial = limits
     lanes = np.zeros((coarse[0].shape[2] - 1, LANES))
     work, w = np.zeros(REST_WORK), np.zeros(WHOLE)
     w[AXIAL] = axial
@@ -184,22 +198,19 @@ def solve(gamma, axes, guesses, coarse, fine, limits, most, found, slopes, compl
                 _set_out(w, work, guesses, first, count, increment, widest)
             walk(w, columns, tangents, lanes, rest, tables, bundles, trace[first:])
             walks += 1
-            if turn >= 0:
-                waiting = _chord_all(w, turn, tiny * tiny)
-                turn += 1
-                if waiting == 0 or turn == most[1]:
-                    break
-            elif _advance_all(w, small, widest) == 0 or walks >= most[0]:
-                if most[1] == 0:
-                    break
-                turn, tables, tangents = 0, fine, 0
-                for i in range(LANES):
-                    _move(w, i)
+            waiting = _improve(w, turn, limits)
+            turn += turn >= 0
+            if waiting > 0 and (walks < most[0] if turn < 0 else turn < most[1]):
+                continue
+            if turn > 0 or most[1] == 0:
+                break
+            turn, tables, tangents = 0, fine, 0
+            _move_all(w)
         respond(w, work, columns, first, count, bundles, slopes, compliance)
         _store(w, work, columns, first, count, turn, walks, tiny, found)
 
 
-@inline
+@inner
 def _store(w, work, columns, first, count, turn, walks, tiny, found):
     for i in range(count):
         q, n = back(turn_at(work, TURN, i)), first + i

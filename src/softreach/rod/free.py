@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, repr=False)
 class FreeRod(ArmRod):
-    """r' = ζ d3, dᵢ' = ζ u × dᵢ with ζ = 1 + z·γ, u = Uγ, by Magnus steps of order 6: theory (18)."""
+    """r' = ζ d3, dᵢ' = ζ u × dᵢ with ζ = 1 + z·γ, u = Uγ, in Magnus steps of order 6: (18)."""
 
     @cached_property
     def rule(self) -> StepRule:
