@@ -127,7 +127,7 @@ def by_collocation(arm: sr.Manipulator, gamma: Array) -> Array:
     for share in (0.25, 0.5, 0.75, 1.0):
         part = rod._replace(force=lambda z, share=share: share * rod.force(z))
         found = solve_bvp(
-            lambda z, y, part=part: _rates(part, z, y), ends, z, guess, _TOL, max_nodes=20_000
+            lambda z, y, part=part: _rates(part, z, y), ends, z, guess, tol=_TOL, max_nodes=20_000
         )
         z, guess = found.x, found.y
     return guess[:3, -1]
