@@ -45,14 +45,9 @@ def inner(function: Callable[..., Any]) -> Callable[..., Any]:
 
     What would make them callable from there takes as long to compile as they do.
     """
-    return njit(
-        forceinline=True,
-        no_cpython_wrapper=True,
-        no_cfunc_wrapper=True,
-        nogil=True,
-        fastmath=FAST,
-        error_model="numpy",
-    )(function)
+    no_wrapper: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    options = {"nogil": True, "fastmath": FAST, "error_model": "numpy"} | no_wrapper
+    return njit(forceinline=True, **options)(function)
 
 
 def pasted(function: Callable[..., Any]) -> Callable[..., Any]:
