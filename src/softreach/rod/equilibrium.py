@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import NamedTuple
@@ -20,7 +19,7 @@ from softreach.rod.search import CONTINUATION, DIRECT, NEAR, PATIENT, POLISH, Ru
 from softreach.rod.start_grid import StartGrid, grid_sizes
 from softreach.rod.tip_map import TipStatus
 
-__all__ = ["Equilibria", "Response", "Rung", "Shapes", "Solver"]
+__all__ = ["LATER_RUNGS", "Solver"]
 
 Array = NDArray[np.float64]
 
@@ -31,6 +30,8 @@ _NEAR_STEP = 1e-7  # Newton step that may be taken linearly
 _DOUBTFUL = 0.02  # margin below which the tangents of coarse steps decide nothing
 _OF_TOL = 1e-2  # what the search may use up of the tolerance
 _FOUND = 1.0
+LATER_RUNGS = {Rung.CONTINUATION: CONTINUATION, Rung.PATIENT: PATIENT}
+"""How what the first rung leaves in doubt is searched again, in this order."""
 _TRACED = 1 << 20  # numbers kept of the sections of all arms in one task, 8 MB
 
 
@@ -70,10 +71,6 @@ class Solver:
         """The same with twice the steps."""
         return Solver(self.tables, 2 * self.steps, self.tol)
 
-    def task(self, gamma: Array, found: Equilibria) -> Callable[[], None]:
-        """The work of filling `found`, to be run on any thread."""
-        return partial(self._fill, gamma, found)
-
     def empty(self, n: int) -> Equilibria:
         """Room for n equilibria."""
         return Equilibria.empty(n, 3 if self.tables.one_direction else 6)
@@ -81,8 +78,26 @@ class Solver:
     def find(self, gamma: Array) -> Equilibria:
         """The equilibria of activations (n, bundles), on the calling thread."""
         found = self.empty(len(gamma))
-        self._fill(gamma, found)
+        self.direct(gamma, found)
+        for rung in LATER_RUNGS:
+            rows = self.doubtful(found, rung)
+            if len(rows):
+                self.again(gamma, rows, rung, found)
         return found
+
+    def direct(self, gamma: Array, found: Equilibria) -> None:
+        """The first rung, for all of some activations (n, bundles), on the calling thread."""
+        guesses = None if self.starts is None else self.starts.at(gamma)
+        self._try(gamma, slice(None), DIRECT, Rung.DIRECT, found, guesses)
+
+    def doubtful(self, found: Equilibria, rung: Rung) -> NDArray[np.intp]:
+        """Rows that a later rung is to search again."""
+        lost = found.status == TipStatus.NO_EQUILIBRIUM
+        return np.flatnonzero(lost if rung == Rung.PATIENT else lost | (found.margin < _DOUBTFUL))
+
+    def again(self, gamma: Array, rows: NDArray[np.intp], rung: Rung, found: Equilibria) -> None:
+        """A later rung, for some rows of all activations, on the calling thread."""
+        self._try(gamma, rows, LATER_RUNGS[rung], rung, found)
 
     def near(self, gamma: Array, known: Equilibria) -> Equilibria:
         """Equilibria near known ones of other steps."""
@@ -95,16 +110,6 @@ class Solver:
         found = self.empty(len(gamma))
         self._try(gamma, slice(None), PATIENT, Rung.PATIENT, found)
         return found
-
-    def _fill(self, gamma: Array, found: Equilibria) -> None:
-        guesses = None if self.starts is None else self.starts.at(gamma)
-        self._try(gamma, slice(None), DIRECT, Rung.DIRECT, found, guesses)
-        for search, rung in ((CONTINUATION, Rung.CONTINUATION), (PATIENT, Rung.PATIENT)):
-            lost = found.status == TipStatus.NO_EQUILIBRIUM
-            doubtful = lost | (found.margin < _DOUBTFUL)
-            rest = np.flatnonzero(lost if rung == Rung.PATIENT else doubtful)
-            if len(rest):
-                self._try(gamma, rest, search, rung, found)
 
     def _try(
         self,

@@ -13,8 +13,9 @@ from softreach import parallel
 from softreach.arm.loads import Loads
 from softreach.arm.tables import tables
 from softreach.errors import InvalidInput
+from softreach.kernels.rod import LANES
 from softreach.rod.arm_rod import ArmRod
-from softreach.rod.equilibrium import Solver
+from softreach.rod.equilibrium import LATER_RUNGS, Solver
 from softreach.rod.found_equilibria import Equilibria, Response
 from softreach.rod.free import FreeRod
 from softreach.rod.linear_strains import linear_strains
@@ -118,12 +119,18 @@ class LoadedRod(ArmRod):
         return self._solver_of(self.steps).with_starts(self.box)
 
     def equilibria(self, activations: ArrayLike) -> Equilibria:
-        """Tips with their status, the margin of stability, and how each was found."""
-        gamma = self.box.check(activations)
-        found = self._solver.empty(len(gamma))
-        parallel.run(
-            self._solver.task(gamma[b], found.of(b)) for b in parallel.blocks(len(gamma), _BLOCK)
-        )
+        """Tips with their status, the margin of stability, and how each was found.
+
+        What is to be searched again is gathered from all samples, so that kernels get whole blocks.
+        """
+        gamma, solver = self.box.check(activations), self._solver
+        found = solver.empty(len(gamma))
+        blocks = parallel.blocks(len(gamma), _BLOCK)
+        parallel.run(partial(solver.direct, gamma[b], found.of(b)) for b in blocks)
+        for rung in LATER_RUNGS:
+            rows = solver.doubtful(found, rung)
+            blocks = parallel.blocks(len(rows), LANES)
+            parallel.run(partial(solver.again, gamma, rows[b], rung, found) for b in blocks)
         return found
 
     def status(self, activations: ArrayLike) -> NDArray[np.int8]:
