@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
+from numpy.polynomial import chebyshev
 
 from softreach.arm import Loads, Manipulator
+from softreach.arm.tables import tables
+from softreach.rod.load_tables import Body
+from tests.oracles import rod
+
+_DEGREE = 40
 
 
 def rubber(arm: Manipulator, loads: Loads, young: float = 1e6, density: float = 1000.0):
@@ -34,3 +43,61 @@ class Uniform:
 def uniform(bending, axial=np.inf, torsion=None, mass=0.0):
     """The body of an untapered rod from its stiffnesses."""
     return Uniform((1.0 / axial, 1.0 / bending, 1.0 / (torsion or bending)), mass)
+
+
+def oracle_rod(arm: Manipulator, body: Body, gamma, loads: Loads) -> tuple[rod.Rod, rod.Loads]:
+    """An activated arm and its loads as the oracles take them."""
+    breaks = tuple(arm.breakpoints)
+    at = _polynomials(lambda z: _sections(arm, body, gamma, z), sorted({0.0, *breaks, arm.length}))
+    return rod.Rod(
+        length=arm.length,
+        axial=lambda z: at(z)[0],
+        bending=lambda z: at(z)[1],
+        torsion=lambda z: at(z)[2],
+        mass=lambda z: at(z)[3],
+        stretch=lambda z: at(z)[4],
+        curvature=lambda z: at(z)[5:],
+        breaks=breaks,
+    ), rod.Loads(
+        gravity=loads.gravity,
+        payload=loads.payload,
+        lever=loads.payload_arm,
+        tip_force=loads.tip_force,
+        tip_moment=loads.tip_moment,
+        following_force=loads.follower_force,
+        following_moment=loads.follower_moment,
+        points=tuple(
+            rod.PointLoad(place=one.station, force=one.force, moment=one.moment)
+            for one in loads.point_loads
+        ),
+        force_per_length=lambda z: loads.force_per_length,
+    )
+
+
+def _sections(arm: Manipulator, body: Body, gamma, z):
+    """K0, K1, K3, mass per length, ζ̂ and û at stations, shape (station, 8)."""
+    table, yields = tables(arm, z), body.compliance(z)
+    stiff = [1.0 / np.maximum(one, 1e-300) for one in yields]
+    stretch, bend = 1.0 + table.extension @ gamma, table.curvature @ gamma
+    return np.column_stack([*stiff, body.mass_per_length(z), stretch, bend])
+
+
+def _polynomials(values: Callable, ends: list[float]) -> Callable:
+    """Smooth functions of Z as fast polynomials between ends, exact but for rounding."""
+    orders = np.arange(_DEGREE + 1)
+    pieces = [(0.5 * (a + b), 0.5 * (b - a)) for a, b in pairwise(ends)]
+    coefficients = [_coefficients(values, *piece) for piece in pieces]
+
+    @lru_cache(maxsize=8)
+    def at(z: float):
+        inside = int(np.searchsorted(ends[1:-1], z))
+        middle, half = pieces[inside]
+        x = min(max((z - middle) / half, -1.0), 1.0)
+        return np.cos(orders * np.arccos(x)) @ coefficients[inside]
+
+    return at
+
+
+def _coefficients(values: Callable, middle: float, half: float):
+    """Of Chebyshev polynomials."""
+    return chebyshev.chebinterpolate(lambda x: values(middle + half * x), _DEGREE)

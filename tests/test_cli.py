@@ -325,7 +325,7 @@ def test_a_variation_that_cannot_exist_is_refused_in_degrees(capsys):
     assert run(["design", "minimal_trunk", "--taper-deg", "10"]) == 2
     text = capsys.readouterr().err
     assert "taper_deg = 10" in text
-    assert "3.576°" in text
+    assert "3.57633 deg" in text
 
 
 def test_every_fault_of_a_design_file_has_its_line(folder, capsys):

@@ -31,6 +31,7 @@ MODULES = [
         "path",
         "plot",
         "redundancy",
+        "rest",
         "rod",
         "volume",
         "workspace",

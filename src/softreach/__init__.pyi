@@ -10,6 +10,7 @@ from . import inverse as inverse
 from . import path as path
 from . import plot as plot
 from . import redundancy as redundancy
+from . import rest as rest
 from . import rod as rod
 from . import volume as volume
 from . import workspace as workspace

@@ -56,6 +56,8 @@ class Range(NamedTuple):
     open_low: bool = False
     open_high: bool = False
     whole: bool = False
+    why: str = ""
+    """What lies beyond the limits, if they follow from other values."""
 
     def admits(self, value: object) -> bool:
         """Whether the value is a finite number (a whole one where asked) in the range."""
@@ -75,7 +77,8 @@ class Range(NamedTuple):
         high = f"{'<' if self.open_high else '<='} {self.high:.6g}" if self.high < math.inf else ""
         limits = " and ".join(text for text in (low, high) if text)
         number = "a whole number" if self.whole else "a finite number"
-        return f"must be {number} {limits}".rstrip() + unit
+        allowed = f"must be {number} {limits}".rstrip() + unit
+        return f"{self.why}; {allowed}" if self.why else allowed
 
 
 def _is_finite(number: float) -> bool:

@@ -3,11 +3,27 @@
 from __future__ import annotations
 
 import math
+import re
+from decimal import Decimal
 
-__all__ = ["quantity"]
+__all__ = ["quantity", "read_quantity", "unit_names"]
 
 _SMALLEST = 1e-3  # below it, numbers are written with a power of ten
 _FINEST = 1e-9  # of the value: what follows is rounding
+
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
+_UNITS = {
+    "kg": {"kg": "1", "g": "1e-3", "mg": "1e-6"},
+    "m": {"m": "1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "µm": "1e-6"},
+    "N": {"N": "1", "mN": "1e-3", "kN": "1e3"},
+    "N m": {"N m": "1", "Nm": "1", "mN m": "1e-3", "mNm": "1e-3", "N mm": "1e-3", "Nmm": "1e-3"},
+    "N/m": {"N/m": "1", "mN/m": "1e-3", "N/mm": "1e3"},
+    "Pa": {"Pa": "1", "kPa": "1e3", "MPa": "1e6", "GPa": "1e9", "bar": "1e5"},
+    "kg/m³": {"kg/m3": "1", "kg/m³": "1", "g/cm3": "1e3", "g/cm³": "1e3"},
+    "m/s²": {"m/s2": "1", "m/s²": "1"},
+}
+"""SI unit -> units that may be written in its place, with their size in it."""
+_ANGLES = ("deg", "°", "rad")
 
 
 def quantity(value: float, unit: str = "", error: float = math.nan) -> str:
@@ -31,3 +47,34 @@ def _with_error(value: float, error: float) -> str:
     decimals = max(0, -math.floor(math.log10(error / scale)))
     text = f"{value / scale:.{decimals}f} ± {error / scale:.{decimals}f}"
     return f"({text})e{power}" if power else text
+
+
+def unit_names(unit: str) -> tuple[str, ...]:
+    """The units that a quantity of this SI unit may be written in; none for a plain number."""
+    if unit == "rad":
+        return _ANGLES
+    return () if unit == "1" else tuple(_UNITS.get(unit, (unit,)))
+
+
+def read_quantity(text: str, unit: str) -> float:
+    """The value of a number with its unit, such as "200g" or "1.5 MPa", in an SI unit.
+
+    Args:
+        text: A number and one of `unit_names(unit)`.
+        unit: SI unit of what is read; "1" for a plain number.
+
+    Raises:
+        ValueError: No finite number, or another unit.
+    """
+    found = _NUMBER.fullmatch(text)
+    if found is None or found[2] not in (unit_names(unit) or ("",)):
+        raise ValueError(text)
+    number, given = found.groups()
+    value = float(number)
+    if given in _ANGLES:
+        value = value if given == "rad" else math.radians(value)
+    elif abs(value) < math.inf:  # decimals, so that 200 g are 0.2 kg to the last bit
+        value = float(Decimal(number) * Decimal(_UNITS.get(unit, {}).get(given, "1")))
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return value

@@ -86,8 +86,8 @@ materials."a b".density_kg_m3 = -3: must be a finite number > 0 kg/m³
 rings[0].inner_ratio = 0.7: must be below outer_ratio = 0.6
 rings[1].material.poisson = 0.3: unknown key; did you mean "poisson_ratio"?
 rings[2].inner_ratio: required key is missing
-rings[2].material = 'nothing': must be a material of this file (lce, a b), or of the library:
-section.core = 'ecoflex_00_31': must be a material of this file (lce, a b), or of the library:
+rings[2].material = 'nothing': must be a material of this file (lce, a b), or of the library;
+section.core = 'ecoflex_00_31': must be a material of this file (lce, a b), or of the library;
 actuators[0].bundles = 1.5: must be a valid integer
 actuators[0].offset_deg = nan: must be a finite number deg
 actuators[0].extent_deg = 400: must be a finite number > 0 and <= 360 deg

@@ -152,8 +152,15 @@ def test_the_core_fills_what_is_between_bore_and_innermost_ring():
 def test_a_ring_is_found_by_its_index_or_name():
     inner = Ring(inner_ratio=0.3, outer_ratio=0.6, name="inner")
     section = Section(rings=(inner, Ring(inner_ratio=0.6)))
-    assert section.ring("inner") is section.ring(0) is section.ring(-2) is inner
-    assert [section.ring_index(which) for which in ("inner", 0, 1, -1)] == [0, 0, 1, 1]
+    assert section.ring("inner") is section.ring(0) is inner
+    assert [section.ring_index(which) for which in ("inner", 0, 1)] == [0, 0, 1]
+
+
+@pytest.mark.parametrize("which", [-1, 2, "outer"])
+def test_no_ring_is_counted_from_behind_or_beyond_the_last(which):
+    section = Section(rings=(Ring(inner_ratio=0.3, outer_ratio=0.6), Ring(inner_ratio=0.6)))
+    with pytest.raises(InvalidDesign, match=f"ring = .*{which}.*: must be one of .*: 0, 1"):
+        section.ring_index(which)
 
 
 class TestYoungsModulus:

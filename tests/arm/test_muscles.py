@@ -167,9 +167,19 @@ def test_a_radial_muscle_on_one_side_bends_away_from_it():
         (lambda: RadialMuscle(extent=0), "extent = 0: .*> 0"),
         (lambda: RadialMuscle(extent=math.nan), "extent = nan"),
         (lambda: RadialMuscle(extent="1"), "extent = '1'"),
-        (lambda: RadialMuscle(extent=1.0, ring=1.0), "ring = 1: must be the index or the name"),
-        (lambda: RadialMuscle(extent=1.0, ring=True), "ring = True: must be the index or the name"),
-        (lambda: RadialMuscle(extent=1.0, ring=None), "ring: must be the index or the name"),
+        (
+            lambda: RadialMuscle(extent=1.0, ring=1.0),
+            "ring = 1: must be the index, from 0, or the name",
+        ),
+        (
+            lambda: RadialMuscle(extent=1.0, ring=True),
+            "ring = True: must be the index, from 0, or the name",
+        ),
+        (lambda: RadialMuscle(extent=1.0, ring=-1), "ring = -1: must be the index, from 0"),
+        (
+            lambda: RadialMuscle(extent=1.0, ring=None),
+            "ring: must be the index, from 0, or the name",
+        ),
         (lambda: RadialMuscle(extent=1.0, bundles=10**400), "bundles = 1000"),
         (
             lambda: arm(RadialMuscle(extent=1.0, ring="skin", name="m")),

@@ -79,7 +79,7 @@ class TestOverlaps:
     SHARED = Section(rings=(Ring(inner_ratio=0.6, name="one"), Ring(inner_ratio=0.6, name="two")))
 
     def test_of_one_ring_are_warned_of_whatever_it_is_called_by(self):
-        for which in (0, -1, "one"):
+        for which in (0, "one"):
             (line,) = self.lines(self.ONE, self.fiber(0), self.fiber(30, ring=which))
             assert "by up to 20°" in line
         assert not self.lines(self.ONE, self.fiber(0), self.fiber(51))

@@ -14,6 +14,7 @@ from softreach.arm import (
     Manipulator,
     Material,
     PiecewiseTaper,
+    PointLoad,
     Profile,
     Ring,
     SampledTaper,
@@ -83,6 +84,60 @@ def test_a_bore_makes_an_arm_stand_more_easily():
     assert load_number(arm(section=hollow)) == pytest.approx(
         load_number(arm()) * (1 - bore**2) / (1 - bore**4), rel=1e-13
     )
+
+
+@pytest.mark.parametrize(
+    "loads",
+    [
+        sr.Loads(gravity=(0, 0, 9.81)),
+        sr.Loads(gravity=(9.81, 0, 0)),
+        sr.Loads(gravity=(0, -9.81 * 0.6, 9.81 * 0.8)),
+    ],
+)
+def test_weight_counts_the_same_whatever_its_direction(loads):
+    assert load_number(arm().replace(loads=loads)) == pytest.approx(load_number(arm()), rel=1e-13)
+
+
+LEVER = dict(payload=0.02, payload_arm=(0, 0.3, 0))
+
+
+@pytest.mark.parametrize(
+    ("changes", "force"),
+    [
+        ({"payload": 0.02}, 0.02 * 9.81),
+        ({"tip_force": (0.3, 0, 0.4)}, 0.5),
+        ({"follower_force": (0.3, 0, 0.4)}, 0.5),
+        ({"force_per_length": (0, 2.0, 0)}, 2.0 * 0.3),
+        ({"tip_moment": (0, 0.6, 0)}, 0.6 / 0.3),
+        ({"follower_moment": (0, 0.6, 0)}, 0.6 / 0.3),
+        ({"point_loads": (PointLoad(station=0.1, force=(0, 0, 2), moment=(0.3, 0, 0)),)}, 3.0),
+        (LEVER, 0.02 * 9.81 * 2),
+    ],
+)
+def test_every_force_adds_f_l2_over_four_times_the_bending_stiffness(changes, force):
+    """And every moment M what the force M/L would."""
+    stiffness = 1e5 * math.pi / 4 * 0.012**4
+    added = load_number(arm().replace(loads=sr.Loads(**changes))) - load_number(arm())
+    assert added == pytest.approx(force * 0.3**2 / (4 * stiffness), rel=1e-12)
+
+
+def test_where_nothing_weighs_the_load_number_needs_no_density():
+    light = arm(
+        section=Section(rings=(Ring(inner_ratio=0.7, material=Material(young_modulus=1e5)),))
+    )
+    pulled = light.replace(loads=sr.Loads(gravity=(0, 0, 0), tip_force=(0, 0, 1e-3)))
+    stiffness = 1e5 * math.pi / 4 * 0.012**4
+    assert describe(pulled).load_number == pytest.approx(1e-3 * 0.3**2 / (4 * stiffness))
+
+
+def test_loads_beyond_the_verified_ones_are_warned_of_with_their_number():
+    number = load_number(arm())
+    heavy = arm().replace(loads=sr.Loads(gravity=(0, 0, 9.81 * 12.5 / number)))
+    (warning,) = [line for line in describe(heavy).warnings if "load number" in line]
+    assert "12.5" in warning
+    assert "up to 12" in warning
+    less = arm().replace(loads=sr.Loads(gravity=(0, 0, 9.81 * 11.9 / number)))
+    assert not any("load number" in line for line in describe(less).warnings)
 
 
 def test_a_summary_tells_stiffness_mass_and_load_number():

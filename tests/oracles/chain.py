@@ -119,7 +119,10 @@ class Chain:
 
     def near(self, found: Equilibrium) -> Array:
         """Coordinates of an equilibrium of the rod whose stations are the joints."""
-        moment = np.einsum("sij,sj->si", found.frame, found.moment)
+        return self.bent_by(np.einsum("sij,sj->si", found.frame, found.moment))
+
+    def bent_by(self, moment: Array) -> Array:
+        """Coordinates under moments in the directors of the joints [N m], shape (links + 1, 3)."""
         return self._coordinates(self.curvature + moment / self.stiffness, self.stretch)
 
     def solve(self, start: Array | None = None) -> Array:

@@ -75,3 +75,25 @@ def test_ritz_s_method_gives_the_closed_forms_of_the_uniform_column_and_the_cone
 def test_a_heavy_payload_buckles_the_column_at_eulers_load():
     gravity = column.buckling_gravity(1.0, lambda z: 1.0, lambda z: 0.0, payload=2.0)
     assert gravity == pytest.approx(np.pi**2 / 4 / 2, rel=1e-10)
+
+
+def test_the_elastica_of_a_force_is_the_limit_of_small_moments():
+    near, far = (np.array(elastica.tip_loaded_with_moment(1.0, m)) for m in (0.02, 0.04))
+    np.testing.assert_allclose(2 * near - far, elastica.tip_loaded(1.0), atol=2e-4)
+
+
+def test_without_a_force_the_moment_bends_an_arc():
+    arc = [1 - np.cos(1.2), np.sin(1.2)]
+    found = elastica.tip_loaded_with_moment(0.0, 1.2)
+    np.testing.assert_allclose(found, np.array(arc) / 1.2, atol=1e-12)
+
+
+def test_the_helix_of_a_force_and_a_moment_balances():
+    helix = elastica.Helix(1.5, 1.0, 2.0, bending=1.0, twisting=0.7, axial=30.0)
+    force = tuple(helix.force.tolist())
+    found = equilibrium(
+        Rod(length=0.8, axial=lambda z: 30.0, bending=lambda z: 1.0, torsion=lambda z: 0.7),
+        Loads(tip_force=force, tip_moment=tuple(helix.moment(0.8).tolist())),
+    )
+    np.testing.assert_allclose(found.tip, helix.place(0.8), atol=1e-10)
+    np.testing.assert_allclose(found.base_moment, helix.base_moment, atol=1e-10)

@@ -13,7 +13,7 @@ from softreach.rod.tip_map import tip_map
 from tests.laws import in_box
 
 TENDONS = Tendon(name="tendon", distance_ratio=0.9, bundles=3, activation_bounds=(0, 8))
-CHAMBER = Chamber(name="core", distance_ratio=0, radius_ratio=0.25, activation_bounds=(0, 5e4))
+CHAMBER = Chamber(name="middle", distance_ratio=0, radius_ratio=0.25, activation_bounds=(0, 5e4))
 
 
 def arm_of(*actuators):

@@ -36,10 +36,10 @@ def test_a_moved_slider_shows_its_own_value_in_the_new_design(design):
 def test_sliders_of_fibers_bear_their_names_whatever_these_are():
     fibers = [
         FiberArchitecture(name=name, revolution=turn, extent=0.3)
-        for name, turn in (("a.b", 0.0), ("a_b", 0.5))
+        for name, turn in (("a b", 0.0), ("a_b", 0.5))
     ]
     labels = [control.label for control in controls(arm_of(*fibers))]
-    wanted = ["bundles of a.b", "offset of a.b [deg]", "offset of a_b [deg]"]
+    wanted = ["bundles of a b", "offset of a b [deg]", "offset of a_b [deg]"]
     assert [label for label in labels if " of " in label] == wanted
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from hypothesis import given
 
+from softreach.arm import Loads, designs
 from softreach.arm.parameters import changed
 from softreach.studio.jobs import (
     JOBS,
     ComputeReach,
     DrawArm,
     DrawCloud,
+    DrawFree,
     DrawMap,
     DrawReference,
     DrawSurfaces,
@@ -42,3 +44,16 @@ def test_each_change_makes_stale_what_depends_on_it(trunk):
     }
     for new, jobs in changes.items():
         assert what_follows(state, new) == jobs
+
+
+def test_the_cloud_without_loads_follows_the_design_but_not_its_loads(trunk):
+    arm = designs.lce_arm()
+    bare = StudioState(design=arm)
+    light, heavy = (
+        bare.replace(design=arm.replace(loads=Loads(payload=payload))) for payload in (0.0, 0.001)
+    )
+    assert DrawFree in what_follows(bare, light)
+    assert DrawFree not in what_follows(light, heavy)
+    assert DrawFree in what_follows(heavy, heavy.showing(free=False))
+    assert DrawFree in what_follows(heavy, bare)
+    assert DrawFree not in what_follows(bare, bare.replace(design=trunk))

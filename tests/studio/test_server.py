@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 import socket
+from http.client import HTTPConnection
 from pathlib import Path
 
 import pytest
 
 import softreach.studio
 from softreach.errors import InvalidInput
-from softreach.studio.server import page_url, same_origin, start_server, stop_server
+from softreach.studio.server import page_headers, page_url, same_origin, start_server, stop_server
 
 
 @pytest.fixture(scope="module")
@@ -76,6 +77,27 @@ def test_the_address_of_the_client_build_is_a_plain_page(server):
         assert line.recv(20).startswith(b"HTTP/1.1 200")
 
 
+@pytest.mark.parametrize(
+    ("host", "named"),
+    [("localhost:80", True), ("[::1]:80", True), ("a b", False), ("x; script-src *", False)],
+)
+def test_only_a_plain_host_is_named_as_a_place_to_connect_to(host, named):
+    rules = page_headers(host)["Content-Security-Policy"].split("; ")
+    allowed = "".join(rule for rule in rules if rule.startswith("connect-src"))
+    assert (f"ws://{host}" in allowed) is named
+    assert not any(rule.startswith("script-src *") for rule in rules)
+
+
+def test_the_page_is_served_with_rules_and_not_to_be_framed(server):
+    line = HTTPConnection("127.0.0.1", server.get_port(), timeout=10)
+    line.request("GET", "/")
+    headers = line.getresponse().headers
+    line.close()
+    policy = headers["Content-Security-Policy"]
+    assert "frame-ancestors 'none'" in policy
+    assert f"ws://127.0.0.1:{server.get_port()}" in policy
+
+
 def test_viser_still_has_no_public_way_to_the_sockets_of_its_pages():
     """If this fails, see whether studio/connections.py and the upper pin of viser can go."""
     import viser
@@ -95,6 +117,14 @@ def test_viser_still_has_no_public_way_to_the_sockets_of_its_pages():
 
 def test_only_one_file_uses_names_that_viser_keeps_to_itself():
     room = Path(softreach.studio.__file__).parent
-    private = re.compile(r"server\._[a-z]|_live_connections|_websock")
+    private = re.compile(r"server\._[a-z]|_live_connections|_websock|sockets\.serve")
     users = {p.name for p in room.rglob("*.py") if private.search(p.read_text(encoding="utf-8"))}
     assert users == {"connections.py"}
+
+
+def test_text_becomes_markup_in_one_file_only():
+    room = Path(softreach.studio.__file__).parent
+    sources = {p.name: p.read_text(encoding="utf-8") for p in room.rglob("*.py")}
+    assert {name for name, text in sources.items() if "import html" in text} == {"markup.py"}
+    assert {name for name, text in sources.items() if "add_html(" in text} == {"line.py"}
+    assert not {name for name, text in sources.items() if "add_markdown(" in text}

@@ -78,6 +78,8 @@ _TUBE_RANGES = {
     **MATERIAL_RANGES,
 }
 
+_PARTS = ("actuators", "core", "loads", "profile", "rings", "section")
+
 _OPTIONAL = {"helical_angle", "revolution", "young_modulus", "density"}
 
 
@@ -165,9 +167,11 @@ def sector_faults(values: Mapping[str, Any]) -> list[Fault]:
 
 def which_ring_faults(ring: Any) -> list[Fault]:
     """What names no ring."""
-    if isinstance(ring, str) or (isinstance(ring, int) and not isinstance(ring, bool)):
+    if isinstance(ring, str) or (
+        isinstance(ring, int) and not isinstance(ring, bool) and ring >= 0
+    ):
         return []
-    return [Fault("ring", ring, "must be the index or the name of a ring")]
+    return [Fault("ring", ring, "must be the index, from 0, or the name of a ring")]
 
 
 def angle_faults(angle: Any) -> list[Fault]:
@@ -213,7 +217,7 @@ def one_length_faults(
     ratio = f"{field}_ratio"
     given = [name for name in (field, ratio) if values[name] is not None]
     if len(given) != 1:
-        both = tuple(values[name] for name in (field, ratio))
+        both = tuple(values[name] for name in (field, ratio)) if given else None
         return [Fault(f"{field}, {ratio}", both, f"give exactly one of {field} and {ratio}")]
     along = _values_along(values[field]) if sampled else None
     if along is not None:
@@ -284,11 +288,26 @@ def bounds_faults(bounds: Any, bundles: int | None) -> list[Fault]:
 
 
 def name_faults(names: list[Any], path: str) -> Iterator[Fault]:
-    """Names given twice; an empty name does not count."""
+    """Names given twice, or that paths of parameters would mix up; an empty one does not count."""
     for k, name in enumerate(names):
+        if isinstance(name, str) and (wrong := _mixed_up(name, path)):
+            yield Fault(f"{path}[{k}].name", name, wrong)
         if name and name in names[:k]:
             first = names.index(name)
             yield Fault(f"{path}[{k}].name", name, f"must differ from {path}[{first}].name")
+
+
+def _mixed_up(name: str, path: str) -> str:
+    """What is wrong with the name of an actuator or a ring in the path of a parameter."""
+    if not name.isprintable() or name != name.strip() or set(name) & set(".[]"):
+        return "must be one line without dots and brackets, and without spaces around it"
+    if path == "actuators" and name in _PARTS:
+        return f"must not be one of {', '.join(_PARTS)}, by which paths name parts of the arm"
+    return "must not be a number, by which paths count rings" if _counts(name, path) else ""
+
+
+def _counts(name: str, path: str) -> bool:
+    return path == "rings" and name.isdecimal()
 
 
 def plain_number(value: Any) -> Any:
@@ -331,7 +350,8 @@ def _one_winding(angle: Any, revolution: Any) -> list[Fault]:
     if (angle is None) != (revolution is None):
         return []
     allowed = "give exactly one of helical_angle and revolution (0 for a longitudinal fiber)"
-    return [Fault("helical_angle, revolution", (angle, revolution), allowed)]
+    both = None if angle is None else (angle, revolution)
+    return [Fault("helical_angle, revolution", both, allowed)]
 
 
 def _inner_radius_faults(outer: float | None, inner: float | None) -> Iterator[Fault]:
@@ -346,9 +366,5 @@ def _taper_faults(sound: Mapping[str, Any]) -> Iterator[Fault]:
     tip = radius - length * math.tan(taper)
     if tip <= 0:
         limit = math.atan(radius / length)
-        allowed = f"leaves no tip (R2(L) = {tip:.4g} m)"
-        yield Fault("taper", taper, f"{allowed}; must be below {limit:.6g} rad ({_degrees(limit)})")
-
-
-def _degrees(angle: float) -> str:
-    return f"{math.degrees(angle):.4g}°"
+        why = f"leaves no tip (R2(L) = {tip:.4g} m)"
+        yield Fault("taper", taper, Range(high=limit, unit="rad", open_high=True, why=why))

@@ -14,7 +14,16 @@ from typing import Any
 from softreach.arm.material import Material
 from softreach.errors import InvalidInput
 
-__all__ = ["MaterialRecord", "material_names", "material_record", "named_material"]
+__all__ = [
+    "LISTED",
+    "MaterialRecord",
+    "material_names",
+    "material_record",
+    "named_material",
+]
+
+LISTED = "the page Materials of the guide lists them, and so does arm.materials.material_names()"
+"""Where to look for the names of materials."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,5 +96,5 @@ def _record(name: str, row: Mapping[str, Any]) -> MaterialRecord:
 def _unknown(name: object, names: tuple[str, ...]) -> InvalidInput:
     spelled = str(name).strip().lower().replace(" ", "_").replace("-", "_")
     close = difflib.get_close_matches(spelled, names, n=3, cutoff=0.5)
-    hint = f"did you mean {' or '.join(close)}?" if close else ""
-    return InvalidInput("material", name, f"one of {', '.join(names)}", hint)
+    hint = f"did you mean {' or '.join(close)}?" if close else LISTED
+    return InvalidInput("material", name, "a material of the library", hint)

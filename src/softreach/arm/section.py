@@ -138,7 +138,7 @@ class Section:
         return self.rings[self.ring_index(which)]
 
     def ring_index(self, which: int | str) -> int:
-        """The index of a ring, from 0, by its index (from behind if negative) or name.
+        """The index of a ring, from 0, by its index or name.
 
         Raises:
             InvalidDesign: There is none.
@@ -146,8 +146,8 @@ class Section:
         names = [ring.name for ring in self.rings]
         if isinstance(which, str) and which in names:
             return names.index(which)
-        if isinstance(which, int) and -len(names) <= which < len(names):
-            return which % len(names)
+        if isinstance(which, int) and 0 <= which < len(names):
+            return which
         known = ", ".join(f"{k} ({name})" if name else str(k) for k, name in enumerate(names))
         raise InvalidDesign([Fault("ring", which, f"must be one of the section's rings: {known}")])
 

@@ -16,7 +16,13 @@ from softreach.arm.bending import bending_at, largest_bending, sharpest_bending,
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.section import Stiffness
 from softreach.arm.tables import both_sides, check_extension, extension_range
-from softreach.arm.weight import load_number, mass
+from softreach.arm.weight import (
+    VERIFIED_LOAD_NUMBER,
+    is_overloaded,
+    load_number,
+    load_number_faults,
+    mass,
+)
 from softreach.errors import Fault
 
 __all__ = ["DesignSummary", "describe", "design_warnings"]
@@ -53,7 +59,8 @@ class DesignSummary:
     mass: float | None
     """Mass of the arm [kg]; None without density."""
     load_number: float | None
-    """Λ = ρ g L³/(E R2²), or w L³/(4 K1) at the base [-]; None without E or ρ."""
+    """Λ = ρ g L³/(E R2²), or (w + P/L) L³/(4 K1) at the base for loads P beside weight [-]; None
+    without E or ρ."""
     lacking: tuple[str, ...]
     """What to give so that the numbers above are known."""
     breakpoints: tuple[float, ...]
@@ -101,7 +108,7 @@ def _of_matter(arm: Manipulator) -> dict[str, Any]:
     return {
         "stiffness": None if moduli else arm.section.stiffness(ends),
         "mass": None if densities else mass(arm),
-        "load_number": None if moduli or densities else load_number(arm),
+        "load_number": None if load_number_faults(arm) else load_number(arm),
         "lacking": (
             *_lacking("Young's modulus [Pa]", moduli, "the stiffnesses and the load number"),
             *_lacking("the density [kg/m³]", densities, "the mass and the load number"),
@@ -149,6 +156,7 @@ def design_warnings(arm: Manipulator) -> tuple[str, ...]:
         *_chambers_outside(arm),
         *_sharp_bending(arm),
         *_large_activations(arm),
+        *_large_loads(arm),
     )
 
 
@@ -168,6 +176,14 @@ def _large_activations(arm: Manipulator) -> Iterator[str]:
         yield (
             f"activations reach |γ| = {largest:.3g}: above 1 a fiber would shorten by more than "
             "its length, so γ is a load on the matrix there, not a strain of the fiber"
+        )
+
+
+def _large_loads(arm: Manipulator) -> Iterator[str]:
+    if not load_number_faults(arm) and is_overloaded(arm):
+        yield (
+            f"the load number is {load_number(arm):.3g}: shapes under loads were verified up to "
+            f"{VERIFIED_LOAD_NUMBER:g}"
         )
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
+from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import AsJson, Sampler, design_from
 from softreach.cli.output import print_rows
 from softreach.errors import InvalidInput, MissingExtra
@@ -39,6 +40,7 @@ def build(
             "rings[0].material.young_modulus_pa=1e5,1e6."
         ),
     ] = None,
+    changes: Changes = UNCHANGED,
     n: Annotated[int, Parameter(help="Samples of each design.")] = 400_000,
     seed: Annotated[int, Parameter(help="Seed of the sampler.")] = 0,
     sampler: Sampler = "uniform",
@@ -67,7 +69,7 @@ def build(
     from softreach.atlas import build_atlas
 
     build_atlas(
-        _space_of(space, design, vary),
+        _space_of(space, design, vary, changes),
         store,
         n,
         seed,
@@ -152,17 +154,20 @@ def figures(
         pyplot().close(figure.get_figure(root=True))
 
 
-def _space_of(path: Path | None, design: str, vary: list[str] | None) -> DesignSpace:
+def _space_of(
+    path: Path | None, design: str, vary: list[str] | None, changes: Changes
+) -> DesignSpace:
     from softreach.atlas.space import DesignSpace
     from softreach.atlas.space_file import parse_parameter, parse_space
 
     if (path is None) == (vary is None):
         raise InvalidInput("space", path, "given, or --vary, and not both")
     if path is not None:
+        changes.refuse("left out with --space, whose file names the design")
         if not path.is_file():
             raise InvalidInput("space", path, "a file that exists")
         return parse_space(path.read_text(encoding="utf-8"), design_from)
-    base = design_from(design)
+    base = design_from(design, changes)
     return DesignSpace.grid(
         base, **dict(parse_parameter(base, *_key_and_values(text)) for text in vary or ())
     )

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from softreach.cli.inputs import AsJson, Design, RevolutionDeg, Sampler, TaperDeg, design_from
+from softreach.cli.changes import UNCHANGED, Changes
+from softreach.cli.inputs import AsJson, Design, Sampler, design_from
+from softreach.cli.load_rows import load_rows
 from softreach.cli.output import print_rows
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["cloud"]
 
@@ -21,8 +26,7 @@ def cloud(
     seed: Annotated[int, Parameter(help="Seed of the sampler.")] = 0,
     sampler: Sampler = "uniform",
     tol: Annotated[float, Parameter(help="Largest tip error, in L.")] = 1e-6,
-    revolution_deg: RevolutionDeg = None,
-    taper_deg: TaperDeg = None,
+    changes: Changes = UNCHANGED,
     json: AsJson = False,
 ) -> None:
     """Compute the reachability cloud of a design and store it as Zarr.
@@ -34,7 +38,7 @@ def cloud(
     from softreach.cloud import compute_cloud, save_cloud
     from softreach.rod.tip_map import tip_map
 
-    arm = design_from(design, revolution_deg, taper_deg)
+    arm = design_from(design, changes)
     start = perf_counter()
     dataset = compute_cloud(arm, n, seed, sampler, tol=tol)
     seconds = perf_counter() - start
@@ -45,8 +49,22 @@ def cloud(
         "seed": (seed, ""),
         "steps per arm": (tip_map(arm, tol).steps, ""),
         "time to compute": (round(seconds, 3), "s"),
+        **load_rows(arm.loads),
+        **_status_rows(dataset),
         "highest tip": (float(dataset.tip[:, 2].max()) / arm.length, "L"),
         "lowest tip": (float(dataset.tip[:, 2].min()) / arm.length, "L"),
         "cloud": (str(out), ""),
     }
     print_rows(f"cloud of {design}", rows, json)
+
+
+def _status_rows(cloud: xr.Dataset) -> dict[str, tuple[Any, str]]:
+    """How many samples of a loaded arm are stable, unstable, and without equilibrium."""
+    if "status" not in cloud:
+        return {}
+    from softreach.rod.tip_map import TipStatus
+
+    return {
+        status.name.lower().replace("_", " "): (int((cloud.status == status).sum()), "")
+        for status in TipStatus
+    }

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from softreach.cli.inputs import AsJson, Design, RevolutionDeg, TaperDeg, design_from
+from softreach.cli.changes import UNCHANGED, Changes
+from softreach.cli.inputs import AsJson, Design, design_from
+from softreach.cli.load_rows import load_rows, rest_rows
 from softreach.cli.output import print_rows
 
 if TYPE_CHECKING:
@@ -22,8 +24,7 @@ Rows = dict[str, tuple[Any, str]]
 def design(
     design: Design | None = None,
     *,
-    revolution_deg: RevolutionDeg = None,
-    taper_deg: TaperDeg = None,
+    changes: Changes = UNCHANGED,
     save: Annotated[Path | None, Parameter(help="Write the design to this TOML file.")] = None,
     schema: Annotated[
         bool, Parameter(negative="", help="Print the JSON schema of design files for editors.")
@@ -47,7 +48,7 @@ def design(
         return
     if design is None:
         raise InvalidInput("design", design, "a design file or a built-in design, or use --schema")
-    arm = design_from(design, revolution_deg, taper_deg)
+    arm = design_from(design, changes)
     facts = describe(arm)
     if save is not None:
         arm.save(save)
@@ -87,7 +88,7 @@ def _rows(arm: Manipulator, facts: DesignSummary) -> Rows:
         "extension": (list(facts.extension), ""),
         "curvature times L": (list(facts.curvature), ""),
     }
-    return rows | _rows_of_matter(facts)
+    return rows | _rows_of_matter(facts) | load_rows(arm.loads) | rest_rows(arm)
 
 
 def _rows_of_matter(facts: DesignSummary) -> Rows:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import Activation, Source, design_from, shape_of
 from softreach.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from softreach.arm.manipulator import Manipulator
 
 __all__ = ["export"]
 
@@ -24,6 +28,7 @@ def export(
     *,
     activation: Activation = None,
     format: Format = None,
+    changes: Changes = UNCHANGED,
 ) -> None:
     """Write a cloud (.ply .csv .parquet .npz .mat .vtu .vtk), or a design's arm as a surface mesh.
 
@@ -41,9 +46,10 @@ def export(
     if source.rstrip("/").endswith(".zarr"):
         if activation is not None:
             raise InvalidInput("activation", activation, "left out for a cloud, which has many")
+        changes.refuse("left out for a stored cloud: give the design instead")
         written = _cloud(source, out, format)
     else:
-        written = _design(source, out, activation, format)
+        written = _design(design_from(source, changes), out, activation, format)
     sys.stdout.writelines(f"{path}\n" for path in written)
 
 
@@ -66,8 +72,7 @@ def _cloud(source: str, out: Path, format: str | None) -> list[Path]:
     return [out, activefilaments.gamma_path(out)]
 
 
-def _design(source: str, out: Path, activation: str | None, format: str | None) -> list[Path]:
-    arm = design_from(source)
+def _design(arm: Manipulator, out: Path, activation: str | None, format: str | None) -> list[Path]:
     if out.suffix == ".jl":
         from softreach.exchange.activefilaments import write_design
 

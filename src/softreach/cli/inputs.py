@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from softreach.cli.changes import UNCHANGED, Changes
 from softreach.errors import InvalidDesign, InvalidInput
 
 if TYPE_CHECKING:
@@ -19,10 +20,8 @@ __all__ = [
     "Activation",
     "AsJson",
     "Design",
-    "RevolutionDeg",
     "Sampler",
     "Source",
-    "TaperDeg",
     "activation_of",
     "cloud_of",
     "design_from",
@@ -35,11 +34,6 @@ Design = Annotated[
     str, Parameter(help="Design file (.toml), or a built-in design such as minimal_trunk.")
 ]
 Source = Annotated[str, Parameter(help="Cloud (.zarr), design file (.toml) or built-in design.")]
-RevolutionDeg = Annotated[
-    float | None,
-    Parameter(help="Give every helical fiber this revolution [deg], each in its own sense."),
-]
-TaperDeg = Annotated[float | None, Parameter(help="Use this taper angle instead [deg].")]
 Sampler = Annotated[str, Parameter(help="uniform, boundary, sobol or grid.")]
 AsJson = Annotated[bool, Parameter(name="--json", negative="", help="Print JSON for machines.")]
 Activation = Annotated[
@@ -51,28 +45,29 @@ Activation = Annotated[
 ]
 
 
-def design_from(
-    text: str, revolution_deg: float | None = None, taper_deg: float | None = None
-) -> Manipulator:
-    """The design of that name or file, varied as asked."""
+def design_from(text: str, changes: Changes = UNCHANGED) -> Manipulator:
+    """The design of that name or file, changed as asked."""
     from softreach.arm import designs, file
-    from softreach.arm.parameters import changed
     from softreach.arm.tables import check_extension
 
     built_in = {name: getattr(designs, name) for name in designs.__all__}
     if text in built_in:
         arm = built_in[text]()
+    elif text.endswith(".jl"):
+        allowed = f"a .toml file, or one of {', '.join(built_in)}"
+        hint = f"softreach import {text} {text[:-3]}.toml makes one of a filament"
+        raise InvalidInput("design", text, allowed, hint)
     elif text.endswith(".toml") or Path(text).is_file():
         arm = _loaded(text)
     else:
         raise InvalidInput("design", text, f"a .toml file, or one of {', '.join(built_in)}")
-    angles = {"revolution": revolution_deg, "taper": taper_deg}
     try:
-        varied = changed(arm, {k: math.radians(v) for k, v in angles.items() if v is not None})
+        varied = changes.applied_to(arm)
         check_extension(varied)
         return varied
     except InvalidDesign as error:
-        raise file.in_file_terms(error, text) from None
+        one_option = len(error.faults) == 1 and changes.given
+        raise file.in_file_terms(error, "" if one_option else text) from None
 
 
 def _loaded(path: str) -> Manipulator:
@@ -83,13 +78,16 @@ def _loaded(path: str) -> Manipulator:
     return Manipulator.load(path)
 
 
-def cloud_of(source: str, n: int, seed: int, sampler: str) -> xr.Dataset:
+def cloud_of(
+    source: str, n: int, seed: int, sampler: str, changes: Changes = UNCHANGED
+) -> xr.Dataset:
     """The stored cloud, or one computed from the design."""
     from softreach.cloud import compute_cloud, open_cloud
 
     if source.rstrip("/").endswith(".zarr"):
+        changes.refuse("left out for a stored cloud: give the design instead")
         return open_cloud(source)
-    return compute_cloud(design_from(source), n, seed, sampler)
+    return compute_cloud(design_from(source, changes), n, seed, sampler)
 
 
 def activation_of(text: str | None, arm: Manipulator) -> list[float]:

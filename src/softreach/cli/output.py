@@ -42,6 +42,10 @@ _SUFFIX = {
     "N m²": "_n_m2",
     "kg": "_kg",
     "kg/m³": "_kg_m3",
+    "m/s²": "_m_s2",
+    "N m": "_n_m",
+    "N/m": "_n_per_m",
+    "mm": "_mm",
 }
 
 

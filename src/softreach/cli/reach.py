@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from softreach.cli.inputs import AsJson, Design, RevolutionDeg, TaperDeg, design_from
+from softreach.cli.changes import UNCHANGED, Changes
+from softreach.cli.inputs import AsJson, Design, design_from
+from softreach.cli.load_rows import load_rows
 from softreach.cli.output import print_rows
 from softreach.errors import InvalidInput
 
@@ -23,8 +25,7 @@ def reach(
     design: Design,
     *,
     accuracy: Annotated[float, Parameter(help="Relative error allowed in the volume.")] = 3e-3,
-    revolution_deg: RevolutionDeg = None,
-    taper_deg: TaperDeg = None,
+    changes: Changes = UNCHANGED,
     surface: Annotated[
         Path | None, Parameter(help="Write the boundary: .ply .stl .obj .glb .vtu .vtk")
     ] = None,
@@ -37,10 +38,10 @@ def reach(
     from softreach import progress
     from softreach.workspace import ReachableSolid, ReachableSurface, reachable_set
 
-    arm = design_from(design, revolution_deg, taper_deg)
+    arm = design_from(design, changes)
     with progress.bar("mapping the activation box", None) as shown:
         found = reachable_set(arm, accuracy=accuracy, progress=shown)
-    print_rows(f"reachable set of {design}", _rows(found), json)
+    print_rows(f"reachable set of {design}", load_rows(arm.loads) | _rows(found), json)
     if surface is not None:
         from softreach.export import export_mesh
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import Activation, Sampler, Source, cloud_of, shape_of
 from softreach.errors import InvalidInput
 
@@ -22,6 +23,7 @@ def show(
     n: Annotated[int, Parameter(help="Samples, when the source is a design.")] = 400_000,
     seed: int = 0,
     sampler: Sampler = "uniform",
+    changes: Changes = UNCHANGED,
 ) -> None:
     """Draw a cloud in three orthogonal views and an oblique one, with the arm in it.
 
@@ -33,7 +35,7 @@ def show(
     from softreach.cloud import design_of
 
     _check_suffix(out)
-    cloud = cloud_of(source, n, seed, sampler)
+    cloud = cloud_of(source, n, seed, sampler, changes)
     arm = design_of(cloud)
     shape = None if activation is None else shape_of(activation, arm)
     plot.save_figure(plot.plot_views(cloud, arm, shape, color=color), out)

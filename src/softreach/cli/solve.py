@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from softreach.cli.inputs import AsJson, Design, RevolutionDeg, TaperDeg, design_from, points_of
+from softreach.cli.changes import UNCHANGED, Changes
+from softreach.cli.inputs import AsJson, Design, design_from, points_of
 from softreach.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -37,8 +38,7 @@ def solve(
             help="With more than three free bundles: say whether least activation is proved.",
         ),
     ] = False,
-    revolution_deg: RevolutionDeg = None,
-    taper_deg: TaperDeg = None,
+    changes: Changes = UNCHANGED,
     json: AsJson = False,
 ) -> None:
     """Every activation that reaches a target, or the nearest point that can be reached."""
@@ -46,7 +46,7 @@ def solve(
 
     if (target is None) == (targets is None):
         raise InvalidInput("target", target, "given, or --targets, and not both")
-    arm = design_from(design, revolution_deg, taper_deg)
+    arm = design_from(design, changes)
     points = points_of(target, targets)
     solutions = solve_inverse(arm, points, family=family, prove_least=prove_least)
     if json:

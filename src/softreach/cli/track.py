@@ -8,14 +8,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from softreach.cli.inputs import (
-    Design,
-    RevolutionDeg,
-    TaperDeg,
-    activation_of,
-    design_from,
-    points_of,
-)
+from softreach.cli.changes import UNCHANGED, Changes
+from softreach.cli.inputs import Design, activation_of, design_from, points_of
 
 __all__ = ["track"]
 
@@ -29,14 +23,13 @@ def track(
         str | None,
         Parameter(help="Activations to start from: -1,0,-0.5", allow_leading_hyphen=True),
     ] = None,
-    revolution_deg: RevolutionDeg = None,
-    taper_deg: TaperDeg = None,
+    changes: Changes = UNCHANGED,
 ) -> None:
     """Follow a path of tip positions on one branch of activations, and say where it ends."""
     from softreach.export.table import column_names
     from softreach.path import track_path
 
-    arm = design_from(design, revolution_deg, taper_deg)
+    arm = design_from(design, changes)
     first = None if start is None else activation_of(start, arm)
     found = track_path(arm, points_of(None, path), first)
     rows = zip(found.activation.values.tolist(), found.tip_error.values.tolist(), strict=True)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import AsJson, Sampler, Source, cloud_of, radius_of
 from softreach.cli.output import print_rows
 
@@ -28,6 +29,7 @@ def volume(
     hull: Annotated[
         Path | None, Parameter(help="Write the α-shape here: .ply .stl .obj .glb .vtu .vtk")
     ] = None,
+    changes: Changes = UNCHANGED,
     json: AsJson = False,
 ) -> None:
     """Volume of a cloud's α-shape and convex hull, its unreachability, and the sampling bias.
@@ -36,7 +38,7 @@ def volume(
     """
     from softreach.volume import concave_hull, convex_hull
 
-    cloud = cloud_of(source, n, seed, sampler)
+    cloud = cloud_of(source, n, seed, sampler, changes)
     length = float(cloud.tip.attrs["length"])
     concave = concave_hull(
         cloud.tip, radius_of(alpha, length), bias=cloud.attrs["sampler"] == "uniform"

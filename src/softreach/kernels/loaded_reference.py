@@ -1,4 +1,4 @@
-"""The reference of loaded rods: the equations in the directors, from tip to base, on one page.
+"""The reference of loaded rods: theory (61), in the directors, from tip to base, on one page.
 
 The fast kernels walk in the frames of the unloaded arm and by another method; they are held to
 these functions, which take plain functions of Z.

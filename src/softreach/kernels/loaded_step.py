@@ -1,7 +1,7 @@
 """One step of the loaded rod, from its tip end to its base end, in the frames of the unloaded arm.
 
-There gravity G and the moment M turn with the load alone. With d the tangent of the unloaded arm,
-ℓ = ζ̂ dZ and n = w G,
+There gravity G and the moment M turn with the load alone, theory (64). With d the tangent of the
+unloaded arm, ℓ = ζ̂ dZ and n = w G,
 
     dG = ω × G,  dM = d × (β M + ζ w G),  dy = ω × y + ζ d,
     ω = ℓ M/K1 + β d,  β = ℓ (1/K3 - 1/K1) (d·M),  ζ = ℓ (1 + w (d·G)/K0),
@@ -45,7 +45,7 @@ def _tip_rate(node, x, y):
 
 @inner
 def _tangent_rate(node, x, t):
-    """Product rule on `_rate`."""
+    """Product rule on `_rate`, for the tangents of theory (68)."""
     length, d, bending, twisting, axial, w = node
     g, m, dg, dm = x[:3], x[3:], t[:3], t[3:]
     a, beta = length * bending, length * twisting * dot(d, m)

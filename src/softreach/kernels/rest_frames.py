@@ -1,8 +1,9 @@
 """The arm before its loads: its tangents at the nodes of every step, seen from its own tip.
 
-A load turns an arm by less than its activations bend it, so that an integrator of the load alone,
-in the frames of the unloaded arm, needs a fifth of the steps (`design/loaded_rod.md`). What it
-needs of those frames is d3 at the five Lobatto nodes of a step and the activated length.
+They are d and P of theory (63). A load turns an arm by less than its activations bend it, so that
+an integrator of the load alone, in the frames of the unloaded arm, needs a fifth of the steps
+(`design/loaded_rod.md`). What it needs of those frames is d3 at the five Lobatto nodes of a step
+and the activated length.
 """
 
 from __future__ import annotations

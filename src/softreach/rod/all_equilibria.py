@@ -1,9 +1,9 @@
 """Every equilibrium of a loaded arm at given activations, stable or not.
 
 The direction of gravity that the tip sees decides which one the base would have to see: a map of
-the sphere to itself. Unloaded it is a rotation, so that its degree is 1: every direction at the
-base is covered once more forward than backward. A mesh of the sphere, finer where the map stretches
-it, shows all triangles whose image covers the direction that the base does see.
+the sphere to itself. Unloaded it is a rotation, so that its degree is 1, theory (80): every
+direction at the base is covered once more forward than backward. A mesh of the sphere, finer where
+the map stretches it, shows all triangles whose image covers the direction that the base does see.
 """
 
 from __future__ import annotations

@@ -93,7 +93,8 @@ class Solver:
     def doubtful(self, found: Equilibria, rung: Rung) -> NDArray[np.intp]:
         """Rows that a later rung is to search again."""
         lost = found.status == TipStatus.NO_EQUILIBRIUM
-        return np.flatnonzero(lost if rung == Rung.PATIENT else lost | (found.margin < _DOUBTFUL))
+        least = 0.0 if rung == Rung.PATIENT else _DOUBTFUL
+        return np.flatnonzero(lost | (found.margin < least))
 
     def again(self, gamma: Array, rows: NDArray[np.intp], rung: Rung, found: Equilibria) -> None:
         """A later rung, for some rows of all activations, on the calling thread."""

@@ -41,7 +41,8 @@ class Search(NamedTuple):
 
 
 # An arm that jumps to another branch on its way lands on an unstable one (design/loaded_rod.md);
-# so whatever is not found stable is searched again, more patiently.
+# so whatever is not found stable is searched again, more patiently. Where an arm almost buckles to
+# either side, only the last search follows it to the side to which it leans.
 DIRECT = Search(1.0, 1.2, 7)
 CONTINUATION = Search(0.25, 0.1, 400)
 PATIENT = Search(1 / 64, 0.03, 2000)

@@ -6,6 +6,7 @@ Whoever asks where an arm can go asks a tip map, never the fields of the arm.
 
 from __future__ import annotations
 
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from enum import IntEnum
@@ -17,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import InvalidInput, counted
+from softreach.arm.weight import VERIFIED_LOAD_NUMBER, is_overloaded
+from softreach.errors import InvalidInput, SoftreachWarning, counted
 from softreach.rod.activation_box import ActivationBox, as_floats
 from softreach.rod.steps import check_tol
 
@@ -286,7 +288,23 @@ def _of_arm(arm: Manipulator, tol: float) -> TipMap:
     if arm.loads is not None:
         from softreach.rod.loaded import LoadedRod
 
+        _warn_of_large_loads(arm)
         return LoadedRod(arm, tol)
     from softreach.rod.free import FreeRod
 
     return FreeRod(arm, tol)
+
+
+def _warn_of_large_loads(arm: Manipulator) -> None:
+    """Say that an arm is loaded beyond what was verified; one text for all, so that it comes once.
+
+    Raises:
+        InvalidDesign: Moduli or densities are missing.
+    """
+    if is_overloaded(arm):
+        warnings.warn(
+            f"the load number is above {VERIFIED_LOAD_NUMBER:g}, up to which shapes under loads "
+            "were verified: look at the status of the samples, and compare with a smaller tol",
+            SoftreachWarning,
+            stacklevel=2,
+        )

@@ -7,6 +7,7 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
+from softreach.studio.compiling import CompilationWatch
 from softreach.studio.connections import asked_path, close_all
 from softreach.studio.link import state_in_request
 from softreach.studio.panels.binding import attempt
@@ -14,6 +15,7 @@ from softreach.studio.server import LOOPBACK, page_url, start_server, stop_serve
 from softreach.studio.session import Session
 from softreach.studio.source import Start
 from softreach.studio.state import Camera
+from softreach.studio.worker import Latest
 
 if TYPE_CHECKING:
     from viser import ClientHandle
@@ -42,6 +44,8 @@ class Studio:
         self.start = start
         self.sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
+        self._notice = Latest(_ignored)
+        self._compilation = CompilationWatch(self._compiling)
         self.server = start_server(host, port)
         camera = start.state.camera or (_EYE if start.atlas is None else _EYE_ON_MAP)
         self.server.initial_camera.position = camera.position
@@ -56,6 +60,7 @@ class Studio:
 
     def stop(self) -> None:
         """Stop serving."""
+        self._compilation.close()
         for session in list(self.sessions.values()):
             session.close()
         self._disconnect_tabs()
@@ -79,8 +84,18 @@ class Studio:
     ) -> None:
         self.stop()
 
+    def _compiling(self, running: bool) -> None:
+        """Tell every tab, on another thread: this one holds the compiler's lock."""
+        self._notice.submit(lambda _: self._tell(running))
+
+    def _tell(self, running: bool) -> None:
+        for session in list(self.sessions.values()):
+            session.compiling = running
+            session.show()
+
     def _connected(self, client: ClientHandle) -> None:
         session = Session(client, self.start)
+        session.compiling = self._compilation.running
         with self._lock:
             self.sessions[client.client_id] = session
         _furnish(session, self.url)
@@ -102,6 +117,11 @@ class Studio:
             session.close()
 
 
+def _ignored(error: Exception) -> None:
+    """A tab that is told may be gone."""
+    del error
+
+
 def _furnish(session: Session, url: str) -> None:
     """Add the panels, and let clicks in the scene reach those that wait for them."""
     from softreach.studio.panels.activation import ActivationPanel
@@ -109,6 +129,7 @@ def _furnish(session: Session, url: str) -> None:
     from softreach.studio.panels.design import DesignPanel
     from softreach.studio.panels.export import ExportPanel
     from softreach.studio.panels.inverse import InversePanel
+    from softreach.studio.panels.loads import LoadsPanel
     from softreach.studio.panels.parts import PartsPanel
     from softreach.studio.panels.status import StatusPanel
     from softreach.studio.panels.view import ViewPanel
@@ -119,6 +140,7 @@ def _furnish(session: Session, url: str) -> None:
     kinds = {
         "Design": DesignPanel,
         "Parts": PartsPanel,
+        "Loads": LoadsPanel,
         "Activation": ActivationPanel,
         "Inverse": InversePanel,
         "View": ViewPanel,

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import html
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,16 +10,17 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.plot.coloring import BundleKey, Coloring, ScalarKey, color_samples
 from softreach.redundancy import activation_distance
+from softreach.rod.tip_map import TipStatus
 from softreach.schema import activation_symbols
-from softreach.studio.reach import Reach, shown_samples
+from softreach.studio import markup
+from softreach.studio.reach import Reach, shown_rows, shown_samples
 from softreach.studio.rod import rod_of
 from softreach.studio.worker import all_cores
 from softreach.workspace import ReachableSolid
 
-if TYPE_CHECKING:
-    import xarray as xr
-
 __all__ = [
+    "FAINT",
+    "UNSTABLE",
     "color_label",
     "color_names",
     "key_html",
@@ -30,6 +30,11 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
+
+UNSTABLE = (255, 125, 0)
+"""Orange, RGB from 0 to 255, of samples whose equilibrium is unstable."""
+FAINT = (196, 198, 206)
+"""Gray, of the cloud without loads."""
 
 _RADIUS = 1 / 60  # [L], within which D̄ compares activations
 
@@ -62,9 +67,10 @@ def sample_values(reach: Reach, level: int, color: str) -> Literal["rgb"] | int 
         return int(color[7:])
     if color not in _VALUES or color not in color_names(reach.arm):
         return "rgb"
-    cloud = reach.cloud[["tip", "activation"]].isel(sample=shown_samples(reach, level))
+    if color == "multiplicity" and not isinstance(reach.exact, ReachableSolid):
+        return "rgb"  # what counts it is not there yet, or never
     with all_cores:
-        return _VALUES[color](reach, cloud)
+        return _VALUES[color](reach, shown_rows(reach, level))
 
 
 def color_label(color: str) -> str:
@@ -86,41 +92,36 @@ def key_html(key: BundleKey | ScalarKey | None) -> str:
     """The colors explained, as HTML without anything from elsewhere."""
     if isinstance(key, BundleKey):
         named = zip(key.labels, key.colors.tolist(), strict=True)
-        parts = (f"{_swatch(rgb)} {html.escape(label)}" for label, rgb in named)
-        return _line(" &ensp; ".join(parts))
+        parts = ((markup.Swatch(rgb), f" {label} \N{EN SPACE} ") for label, rgb in named)
+        return _line(markup.inline(*(part for pair in parts for part in pair)))
     if key is None:
         return ""
     stops = ("#440154", "#3b528b", "#21918c", "#5ec962", "#fde725")  # viridis
     bar = f"background:linear-gradient(90deg,{','.join(stops)});height:0.6em;margin:0.2em 0"
-    ends = f"<span>{key.low:.3g}</span><span>{html.escape(key.label)}</span><span>{key.high:.3g}"
-    flex = "display:flex;justify-content:space-between"
-    return _line(f'<div style="{bar}"></div><div style="{flex}">{ends}</span></div>')
-
-
-def _swatch(rgb: list[int]) -> str:
-    color = ",".join(map(str, rgb))
-    return f'<span style="color:rgb({color})">\N{BLACK SQUARE}</span>'
+    ends = markup.spread(f"{key.low:.3g}", key.label, f"{key.high:.3g}")
+    return _line(f'<div style="{bar}"></div>{ends}')
 
 
 def _line(content: str) -> str:
     return f'<div style="font-size:0.8em;padding:0 0.8em 0.4em">{content}</div>'
 
 
-def _multiplicity(reach: Reach, cloud: xr.Dataset) -> Array:
-    assert isinstance(reach.exact, ReachableSolid)  # as three free bundles make it
+def _multiplicity(reach: Reach, rows: NDArray[np.int64]) -> Array:
+    assert isinstance(reach.exact, ReachableSolid)
     # A sample is reached by its own activation at least, whatever the grid says at the rim.
-    return np.maximum(reach.exact.image.counts_at(cloud.tip.values), 1).astype(float)
+    return np.maximum(reach.exact.image.counts_at(reach.cloud.tip.values[rows]), 1).astype(float)
 
 
-def _manipulability(reach: Reach, cloud: xr.Dataset) -> Array:
-    return manipulability(reach.arm, cloud.activation.values)
+def _manipulability(reach: Reach, rows: NDArray[np.int64]) -> Array:
+    return manipulability(reach.arm, reach.cloud.activation.values[rows])
 
 
-def _activation_distance(reach: Reach, cloud: xr.Dataset) -> Array:
-    """D̄ of the samples that are shown, among all there are; NaN where isolated."""
-    shown = np.arange(reach.samples)[shown_samples(reach, cloud.sizes["sample"].bit_length() - 1)]
-    rows = np.sort(shown)
-    found = activation_distance(reach.cloud, _RADIUS * reach.arm.length, queries=rows)
+def _activation_distance(reach: Reach, rows: NDArray[np.int64]) -> Array:
+    """D̄ of the samples that are shown, among all that have a tip; NaN where isolated."""
+    settled = np.flatnonzero(reach.status != TipStatus.NO_EQUILIBRIUM)
+    cloud = reach.cloud if len(settled) == reach.samples else reach.cloud.isel(sample=settled)
+    shown = np.searchsorted(settled, rows)
+    found = activation_distance(cloud, _RADIUS * reach.arm.length, queries=np.sort(shown))
     return found.values[np.argsort(np.argsort(shown))]
 
 

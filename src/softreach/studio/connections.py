@@ -1,18 +1,23 @@
 """The sockets behind the tabs: the one place that uses names which viser keeps to itself.
 
-viser offers no public way to see the request of a socket, to refuse it, or to close all of them.
+viser offers no public way to see the request of a socket, to refuse it, to close all of them, or to
+send headers with its page.
 The upper pin of viser in `pyproject.toml` is there for this file; a test tells when it can go.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from viser import ViserServer
 
-__all__ = ["asked_path", "close_all", "refuse_unless"]
+__all__ = ["asked_path", "close_all", "refuse_unless", "sending_headers"]
+
+_starting = threading.Lock()
 
 
 def asked_path(server: ViserServer, client_id: int) -> str:
@@ -37,3 +42,30 @@ def refuse_unless(server: ViserServer, welcome: Callable[[Any], bool]) -> None:
         request = live.request
         if request is None or not welcome(request.headers):
             await live.close(1008, "not our page")
+
+
+@contextmanager
+def sending_headers(headers: Callable[[str], Mapping[str, str]]) -> Iterator[None]:
+    """A server that starts inside the block sends these headers with everything it serves.
+
+    Args:
+        headers: From the host that was asked for, as the request names it.
+    """
+    import websockets.asyncio.server as sockets
+
+    plain = sockets.serve
+
+    def add(connection: Any, request: Any, response: Any) -> None:
+        del connection
+        for name, value in headers(request.headers.get("Host", "")).items():
+            response.headers[name] = value
+
+    def serve(*arguments: Any, **options: Any) -> Any:
+        return plain(*arguments, process_response=add, **options)
+
+    with _starting:
+        sockets.serve = serve  # pyright: ignore[reportAttributeAccessIssue]
+        try:
+            yield
+        finally:
+            sockets.serve = plain

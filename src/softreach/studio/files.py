@@ -98,6 +98,8 @@ def _shown(reach: Reach, look: Appearance) -> tuple[xr.Dataset, str | int | xr.D
 
 
 def _surface(reach: Reach) -> Surface:
+    if reach.refusal:
+        raise InvalidInput("surface", "unknown", "that of an exact set", reach.refusal)
     if not isinstance(reach.exact, ReachableSolid | ReachableSurface):
         raise InvalidInput("design", "too few free bundles", "one whose tip reaches a surface")
     return reach.exact.surface()

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import base64
-import html
 import io
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.studio import markup
 from softreach.studio.colors import key_html
-from softreach.studio.panels.status import reach_text
+from softreach.studio.panels.status import legend_text, reach_text
 from softreach.studio.reach import Reach
 from softreach.studio.scene import Scene
 from softreach.studio.server import start_server, stop_server
@@ -58,9 +58,10 @@ def _draw(scene: Scene, state: StudioState, reach: Reach) -> str:
 
 
 def _caption(state: StudioState, reach: Reach, key: str) -> str:
-    numbers = html.escape(reach_text(reach).replace("**", ""))
-    design = f"<details><summary>design</summary><pre>{html.escape(state.design.to_toml())}</pre>"
-    return f'<div style="{_BOX}">{numbers}{key}{design}</details></div>'
+    numbers, file = markup.inline(*reach_text(reach)), markup.inline(state.design.to_toml())
+    design = f"<details><summary>design</summary><pre>{file}</pre></details>"
+    marks = markup.paragraph(*legend_text(reach, free=False))
+    return f'<div style="{_BOX}">{numbers}{key}{marks}{design}</div>'
 
 
 def _image(picture: NDArray[np.uint8] | None) -> str:

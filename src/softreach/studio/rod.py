@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import threading
+from functools import lru_cache
+
 from softreach.arm.file import in_file_terms
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import InvalidDesign
+from softreach.errors import InvalidDesign, InvalidInput
 from softreach.rod.tip_map import TipMap, tip_map
 
-__all__ = ["TOL", "design_of_text", "rod_of"]
+__all__ = ["TOL", "design_of_text", "rod_of", "solvable_rod"]
 
 TOL = 1e-5
 """Largest tip error, in L: far below a pixel."""
@@ -33,3 +36,29 @@ def design_of_text(text: str, source: str) -> Manipulator:
         return rod_of(arm).arm
     except InvalidDesign as error:
         raise in_file_terms(error, source) from None
+
+
+def solvable_rod(arm: Manipulator) -> TipMap:
+    """The tip map of a design whose loads can be computed; slow the first time for a loaded arm.
+
+    Raises:
+        InvalidInput: The arm is loaded so heavily that no number of steps suffices.
+    """
+    if arm.loads is not None:
+        with _one_at_a_time:  # jobs that draw and measure the same arm would both try for long
+            solvable = _is_solvable(arm)
+        if not solvable:
+            allowed = f"such that tips can be computed to {TOL:g} L"
+            raise InvalidInput("loads", "too large", allowed, "lighten them or stiffen the arm")
+    return rod_of(arm)
+
+
+_one_at_a_time = threading.Lock()
+
+
+@lru_cache(maxsize=64)
+def _is_solvable(arm: Manipulator) -> bool:
+    try:
+        return rod_of(arm).steps > 0
+    except InvalidInput:  # which a tip map does not keep
+        return False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,9 @@ from softreach.arm_shape import arm_surface, bundle_skins
 from softreach.palette import BODY, bundle_color
 from softreach.rod.kinematics import configuration
 from softreach.studio.axes import axes_box
-from softreach.studio.colors import sample_colors
-from softreach.studio.reach import Reach, cloud_points
-from softreach.studio.rod import rod_of
+from softreach.studio.colors import FAINT, UNSTABLE, sample_colors
+from softreach.studio.reach import Reach, cloud_points, unstable_samples
+from softreach.studio.rod import solvable_rod
 from softreach.studio.slicing import in_slice, sliced_faces
 from softreach.studio.state import Appearance, Slice
 from softreach.workspace import ReachableSolid, ReachableSurface
@@ -36,6 +36,8 @@ _LIFT = 0.02  # of the fibers above the body, in R2
 _CLEAR = 0.45  # opacity of a body that has something inside
 _GHOST, _REFERENCE, _SURFACE, _HULL = 0.35, (150, 150, 158), (90, 140, 200), (220, 150, 60)
 _MARK: Color = (220, 30, 120)
+_FREE_LEVEL, _FREE_SIZE = 15, 0.6
+_UNSTABLE_SIZE = 2.0  # times that of other points: they are few, and not to be overlooked
 
 
 class Scene:
@@ -49,18 +51,40 @@ class Scene:
     def draw_cloud(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
         """Points, thinned by prefix and cut by the slice; returns the key to their colors."""
         if not look.cloud:
-            self.remove("/cloud", "/slice")
+            self.remove("/cloud", "/unstable", "/slice")
             return None
         points = cloud_points(reach, look.level)
         coloring = sample_colors(reach, look.level, look.color)
-        kept = in_slice(points, look.slice)
-        self._points("/cloud", points[kept], coloring.rgb[kept], look.point_size)
+        kept, unstable = in_slice(points, look.slice), unstable_samples(reach, look.level)
+        stable = kept & ~unstable
+        self._points("/cloud", points[stable], coloring.rgb[stable], look.point_size)
+        self._draw_unstable(points[kept & unstable], look.point_size)
         self._slab(look.slice, points)
         return coloring.key
 
+    def _draw_unstable(self, points: Array, size: float) -> None:
+        color = np.array(UNSTABLE, np.uint8)
+        self._points("/unstable", points, color, _UNSTABLE_SIZE * size, shape="diamond")
+
+    def draw_free(self, reach: Reach | None, look: Appearance) -> None:
+        """The cloud of the arm without its loads, faint; None takes it away."""
+        if reach is None or not look.free:
+            self.remove("/free")
+            return
+        points = cloud_points(reach, _FREE_LEVEL)
+        kept = in_slice(points, look.slice)
+        gray = np.array(FAINT, np.uint8)
+        self._points("/free", points[kept], gray, _FREE_SIZE * look.point_size)
+
     def draw_arm(self, arm: Manipulator, activation: Sequence[float], path: str = "/arm") -> Array:
-        """The body and its fibers; returns the tip [L]. Redrawn by moving what there is."""
-        shape = configuration(rod_of(arm), np.asarray(activation), _STATIONS)
+        """The body and its fibers; returns the tip [L]. Redrawn by moving what there is.
+
+        Nothing is drawn of an arm without equilibrium, and the tip is NaN.
+        """
+        shape = configuration(solvable_rod(arm), np.asarray(activation), _STATIONS)
+        if np.isnan(shape["position"].values).any():
+            self.remove(path)
+            return np.full(3, np.nan)
         meshes = _arm_meshes(arm, shape)
         known, handles = self._arms.get(path, (None, []))
         if known is arm:
@@ -94,12 +118,14 @@ class Scene:
         if look.alpha_shape and len(reach.alpha_shape.faces):
             self._surface("/alpha-shape", reach.alpha_shape, reach, look.slice, _HULL)
 
-    def draw_axes(self, reach: Reach, look: Appearance) -> None:
-        """The box with numbers around cloud and arm."""
+    def draw_axes(self, reach: Reach, look: Appearance, free: Reach | None = None) -> None:
+        """The box with numbers around cloud and arm, and the cloud without loads."""
         self.remove("/axes")
         if not look.axes:
             return
-        box = axes_box(cloud_points(reach, 14), np.array([[0, 0, 0], [0, 0, 1.0]]))
+        clouds = [reach] if free is None or not look.free else [reach, free]
+        around = (cloud_points(one, 14) for one in clouds)
+        box = axes_box(*around, np.array([[0, 0, 0], [0, 0, 1.0]]))
         self._api.add_line_segments(
             "/axes/lines", box.lines.astype(np.float32), (170, 170, 175), thickness=0.003
         )
@@ -151,7 +177,7 @@ class Scene:
         points, coloring = cloud_points(reach, level), sample_colors(reach, level, look.color)
         kept = in_slice(points, look.slice)
         self._points("/reference/cloud", points[kept] + shift, coloring.rgb[kept], look.point_size)
-        above = np.array([0, 0, points[:, 2].max() + 0.12])
+        above = np.array([0, 0, points[:, 2].max(initial=0.0) + 0.12])
         self._label("/reference/name", "reference", above + shift)
         self._label("/reference/other", "this design", above)
 
@@ -161,7 +187,7 @@ class Scene:
         """The arm of the design beside this one."""
         path = "/reference/arm"
         self.draw_arm(arm, activation, path)
-        for handle in self._arms[path][1]:
+        for handle in self._arms.get(path, (arm, []))[1]:
             handle.position = shift
 
     def remove(self, *paths: str) -> None:
@@ -173,7 +199,17 @@ class Scene:
             if self._api.get_handle_by_name(path) is not None:
                 self._api.remove_by_name(path)
 
-    def _points(self, path: str, points: Array, colors: NDArray[np.uint8], size: float) -> None:
+    def _points(
+        self,
+        path: str,
+        points: Array,
+        colors: NDArray[np.uint8],
+        size: float,
+        shape: Literal["circle", "diamond"] = "circle",
+    ) -> None:
+        if not len(points):
+            self.remove(path)
+            return
         # viser's default is float16: a quarter of a millimeter in a meter
         self._api.add_point_cloud(
             path,
@@ -181,7 +217,7 @@ class Scene:
             colors,
             point_size=size,
             precision="float32",
-            point_shape="circle",
+            point_shape=shape,
             point_shading="flat",
         )
 
@@ -214,7 +250,7 @@ class Scene:
     def _slab(self, cut: Slice, points: Array) -> None:
         """The middle plane of the slice, as wide as the cloud."""
         self.remove("/slice")
-        if cut.axis == "none":
+        if cut.axis == "none" or not len(points):
             return
         axis = "xyz".index(cut.axis)
         low, high = points.min(axis=0), points.max(axis=0)

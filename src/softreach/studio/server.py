@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 import socket
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from softreach.errors import InvalidInput, MissingExtra
-from softreach.studio.connections import refuse_unless
+from softreach.studio.connections import refuse_unless, sending_headers
 
 if TYPE_CHECKING:
     from viser import ViserServer
 
-__all__ = ["LOOPBACK", "page_url", "same_origin", "start_server", "stop_server"]
+__all__ = ["LOOPBACK", "page_headers", "page_url", "same_origin", "start_server", "stop_server"]
 
 LOOPBACK = "127.0.0.1"
 _FOV = 0.6  # [rad]; viser's 75 degrees draw a ball at the rim as an egg
@@ -39,7 +40,8 @@ def start_server(host: str = LOOPBACK, port: int | None = None) -> ViserServer:
         raise MissingExtra("viser", "studio") from error
 
     _check_free(host, port or 0)
-    with contextlib.redirect_stdout(io.StringIO()):  # its banner; we print our own line
+    # viser prints a banner; we print our own line.
+    with contextlib.redirect_stdout(io.StringIO()), sending_headers(page_headers):
         server = viser.ViserServer(host=host, port=port or 0, verbose=False, label="softreach")
     _disable_tunnel(server)
     refuse_unless(server, lambda headers: same_origin(headers, host))
@@ -77,6 +79,45 @@ def same_origin(headers: Mapping[str, str], host: str) -> bool:
         return False
     origin = headers.get("Origin")
     return origin is None or urlsplit(origin).netloc == asked.netloc
+
+
+def page_headers(host: str) -> dict[str, str]:
+    """What keeps a page to its own server, whatever its address asks for.
+
+    viser's page is one file of inline scripts and styles; it would open a socket to any server that
+    `?websocket=` names, and read a scene from any address.
+
+    Args:
+        host: Name and port, as the request has them.
+    """
+    plain = _HOST.fullmatch(host) is not None
+    sockets = f" ws://{host} wss://{host}" if plain else ""  # older browsers: not part of 'self'
+    rules = _POLICY | {"connect-src": f"'self' data: blob:{sockets}"}
+    policy = "; ".join(f"{name} {value}" for name, value in rules.items())
+    return {
+        "Content-Security-Policy": policy,
+        "X-Frame-Options": "DENY",
+        "X-Content-Type-Options": "nosniff",
+        "Referrer-Policy": "no-referrer",
+    }
+
+
+_HOST = re.compile(r"[A-Za-z0-9.\-]+(:\d+)?|\[[0-9A-Fa-f:.]+\](:\d+)?")
+_POLICY = {
+    "default-src": "'self'",
+    "script-src": "'self' 'unsafe-inline' 'unsafe-eval' blob:",
+    "script-src-attr": "'none'",
+    "style-src": "'self' 'unsafe-inline'",
+    "img-src": "'self' data: blob:",
+    "font-src": "'self' data:",
+    "media-src": "'none'",
+    "worker-src": "'self' blob: data:",
+    "frame-src": "'none'",
+    "object-src": "'none'",
+    "base-uri": "'none'",
+    "form-action": "'none'",
+    "frame-ancestors": "'none'",
+}
 
 
 def _check_free(host: str, port: int) -> None:

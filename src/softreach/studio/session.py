@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.errors import SoftreachError
+from softreach.rod.tip_map import TipStatus
 from softreach.studio.eye import Eye
 from softreach.studio.jobs import JOBS, Job, SolveInverse, what_follows
 from softreach.studio.map_board import MapBoard, board_of
@@ -54,11 +55,19 @@ class Session:
         """Number of changes that widgets have to follow."""
         self.reach: Reach | None = start.reach
         """What the design can reach, or the design before it until that is known."""
+        self.refusal = ""
+        """Why nothing can be computed of the design."""
+        self.compiling = False
+        """Whether kernels are being compiled, for whichever tab."""
+        self.free: Reach | None = None
+        """What a loaded design would reach without its loads."""
         self.reference: Reach | None = None
         self.key: BundleKey | ScalarKey | None = None
         """To the colors of the cloud."""
         self.tip: Array | None = None
-        """Where the tip is [L]."""
+        """Where the tip is [L]; None before it is known, and without equilibrium."""
+        self.posture: TipStatus | None = None
+        """Whether a loaded arm rests in its activation; None for an arm without loads."""
         self.trail: list[Array] = []
         """Where it has been."""
         self.answer: Solution | None = None
@@ -148,8 +157,10 @@ class Session:
 
     def _failed(self, error: Exception) -> None:
         """Show an error of a worker; one that is not ours is a bug and goes to the log too."""
-        self.say(f"**{type(error).__name__}**: {error}")
-        if not isinstance(error, SoftreachError):
+        if isinstance(error, SoftreachError):
+            self.say(str(error))
+        else:
+            self.say(f"{type(error).__name__}: {error}")
             threading.excepthook(
                 threading.ExceptHookArgs((type(error), error, error.__traceback__, None))
             )

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Self
 
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import InvalidInput
+from softreach.errors import InvalidInput, Range
 from softreach.rod.activation_box import ActivationBox
 from softreach.studio.rod import design_of_text, rod_of
 
@@ -31,6 +31,9 @@ LEVELS = range(14, 22)
 
 Vector = tuple[float, float, float]
 
+_AXES = ("none", "x", "y", "z")
+_FAR = 1e3  # [L], beyond which there is nothing to see
+
 
 @dataclass(frozen=True, kw_only=True)
 class Slice:
@@ -43,6 +46,12 @@ class Slice:
     thickness: float = 0.05
     """[L]."""
 
+    def __post_init__(self) -> None:
+        if self.axis not in _AXES:
+            raise InvalidInput("slice.axis", self.axis, f"one of {', '.join(_AXES)}")
+        _check_number("slice.center", self.center, -_FAR, _FAR)
+        _check_number("slice.thickness", self.thickness, 0.0, _FAR)
+
 
 @dataclass(frozen=True, kw_only=True)
 class MapView:
@@ -53,6 +62,9 @@ class MapView:
     """The parameter to the right."""
     up: str = ""
     shown: bool = True
+
+    def __post_init__(self) -> None:
+        _check_plain("map", self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,6 +85,8 @@ class Appearance:
     alpha_shape: bool = False
     trail: bool = False
     """Where the tip has been."""
+    free: bool = True
+    """The cloud without loads, faint, around that of a loaded arm."""
     ghosts: bool = True
     """The shapes of all solutions of the inverse problem at once."""
     map: MapView = field(default_factory=MapView)
@@ -80,6 +94,8 @@ class Appearance:
     def __post_init__(self) -> None:
         if self.level not in LEVELS:
             raise InvalidInput("level", self.level, f"{LEVELS[0]} to {LEVELS[-1]}")
+        _check_number("point_size", self.point_size, 0.0, 1.0)
+        _check_plain("appearance", self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,6 +104,10 @@ class Camera:
 
     position: Vector
     look_at: Vector
+
+    def __post_init__(self) -> None:
+        for value in (*self.position, *self.look_at):
+            _check_number("camera", value, -_FAR, _FAR)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,6 +204,20 @@ def vector(values: Iterable[float]) -> Vector:
     """Three plain numbers."""
     x, y, z = map(float, values)
     return x, y, z
+
+
+def _check_number(name: str, value: object, low: float, high: float) -> None:
+    if not Range(low, high).admits(value):
+        raise InvalidInput(name, value, f"{low:g} to {high:g}")
+
+
+def _check_plain(name: str, value: Appearance | MapView) -> None:
+    """Texts are texts and switches are switches, in a state that came from elsewhere too."""
+    for one in fields(value):
+        held = getattr(value, one.name)
+        kind = {"bool": bool, "str": str}.get(str(one.type))
+        if kind is not None and not isinstance(held, kind):
+            raise InvalidInput(f"{name}.{one.name}", held, f"a {kind.__name__}")
 
 
 def _within(box: ActivationBox, activation: Sequence[float]) -> tuple[float, ...]:

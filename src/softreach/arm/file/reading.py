@@ -26,7 +26,7 @@ from softreach.arm.file.toml_text import key_text
 from softreach.arm.file.version_1 import ROOT_KEYS, parts_of_version_1
 from softreach.arm.loads import Loads
 from softreach.arm.material import Material
-from softreach.arm.materials import material_names, named_material
+from softreach.arm.materials import LISTED, material_names, named_material
 from softreach.arm.profile import Profile
 from softreach.arm.section import Ring, Section
 from softreach.errors import Fault, InvalidDesign
@@ -240,7 +240,7 @@ def _materials_text(name: str, own: list[str]) -> str:
     close = difflib.get_close_matches(name, [*own, *material_names()], n=1, cutoff=0.5)
     hint = f'; did you mean "{close[0]}"?' if close else ""
     here = f"of this file ({', '.join(own)})" if own else "with a table [materials.NAME]"
-    return f"must be a material {here}, or of the library: {', '.join(material_names())}{hint}"
+    return f"must be a material {here}, or of the library{hint or f'; {LISTED}'}"
 
 
 def _kinds_text(kind: Any, own: list[str]) -> str:

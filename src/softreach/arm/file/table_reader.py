@@ -112,4 +112,6 @@ def _in_keys(fault: Fault, keys: Mapping[str, str], raw: Mapping[str, Any], path
     else:
         allowed = re.sub(r"\w+", lambda word: keys.get(word[0], word[0]), allowed)
     value = given[0] if len(given) == 1 else given
+    if isinstance(value, tuple) and all(one is None for one in value):
+        value = None
     return Fault(", ".join(f"{path}.{name}" for name in names), value, allowed)

@@ -7,13 +7,21 @@ from typing import Any
 
 from softreach.arm.file.actuator_tables import ACTUATORS
 from softreach.arm.file.body_tables import PROFILES, MaterialTable, RingTable, SectionTable
+from softreach.arm.file.load_table import LoadTable
 from softreach.errors import Fault, InvalidDesign, Range
 
 __all__ = ["dotted", "in_file_terms", "in_keys", "pydantic_fault"]
 
 _KEYS = {"inner_radius": "inner_radius_m"} | {
     field: key
-    for table in (*PROFILES.values(), MaterialTable, RingTable, SectionTable, *ACTUATORS.values())
+    for table in (
+        *PROFILES.values(),
+        MaterialTable,
+        RingTable,
+        SectionTable,
+        LoadTable,
+        *ACTUATORS.values(),
+    )
     for field, key in table.keys().items()
     if field != "activation_bounds"  # whose unit depends on the actuator
 }
@@ -59,6 +67,9 @@ def pydantic_fault(problem: Any) -> Fault:
         return Fault(dotted([*location, *below]), shown, context["allowed"])
     if context.get("min_length", 0) > 1 or "max_length" in context:
         return Fault(dotted(location), problem["input"], _length_allowed(context))
+    if problem["type"] == "string_type" and location[-1:] == ["<plain>"]:
+        allowed = "must be the name of a material, or a table of its values"
+        return Fault(dotted(location), problem["input"], allowed)
     message = str(problem["msg"]).replace("Input should be", "must be")
     allowed = _ALLOWED.get(problem["type"], message)
     return Fault(dotted(location), problem["input"], allowed)

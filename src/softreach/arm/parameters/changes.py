@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from softreach.arm.checks import plain_number
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.of_arm import by_ring_name, parameters
 from softreach.arm.parameters.parameter import Parameter
 from softreach.arm.parameters.unknown import unknown_parameter
-from softreach.errors import InvalidInput
+from softreach.errors import Fault, InvalidInput
 
 __all__ = ["changed", "find_parameter", "find_parameters", "parameters_by_every_name"]
 
@@ -50,7 +51,7 @@ def find_parameters(
     asked: dict[str, str] = {}
     for name in names:
         if name not in listed:
-            raise unknown_parameter(name, known)
+            raise unknown_parameter(str(name), known)
         if (first := asked.setdefault(listed[name], name)) != name:
             raise InvalidInput("parameter", name, "given once", f"{first} is the same")
     return {asked[one]: _renamed(known[one], asked[one]) for one in known if one in asked}
@@ -73,7 +74,11 @@ def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
     """
     draft = Draft(arm)
     for name, parameter in find_parameters(arm, tuple(values)).items():
-        parameter.change(draft, values[name])
+        value = plain_number(values[name])
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            parameter.change(draft, value)
+        else:
+            draft.refuse(Fault(name, value, parameter.variable.allowed))
     return draft.made() if values else arm
 
 

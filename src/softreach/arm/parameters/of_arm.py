@@ -18,7 +18,7 @@ from softreach.arm.parameters.parameter import (
 from softreach.arm.parameters.parts import parts, prefix_of, series_of
 from softreach.arm.parameters.whole import OuterRadius, Revolution, Taper
 from softreach.arm.variable import Variable
-from softreach.errors import InvalidInput, Range
+from softreach.errors import Range
 
 __all__ = ["by_ring_name", "parameters"]
 
@@ -48,19 +48,11 @@ def parameters(arm: Manipulator) -> dict[str, Parameter]:
     have them. Then come those of single parts, by their path: `profile.radii[1]`,
     `rings[0].inner_ratio`, `rings[0].material.young_modulus`, `core.density`, and of actuators by
     their name: `left.offset`, `left.helical_angle.values[2]`, `left.lower[1]`.
-
-    Raises:
-        InvalidInput: Actuators are named so that two parameters would share a name.
     """
     own = [one for key, part in parts(arm).items() for one in _of_part(key, part)]
     plain = [one for one in own if not one.owner]
     every = [*_of_arm(arm, plain, own), *(one for one in own if one.owner)]
-    found = {one.name: one for one in every}
-    if len(found) < len(every):
-        names = [one.name for one in every]
-        twice = next(name for name in names if names.count(name) > 1)
-        raise InvalidInput("parameter", twice, "a name for one of them", "rename the actuator")
-    return found
+    return {one.name: one for one in every}
 
 
 def by_ring_name(arm: Manipulator, known: dict[str, Parameter]) -> dict[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from softreach.studio.jobs.arm import DrawArm
+from softreach.studio.jobs.free import DrawFree
 from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.jobs.job import Job
 from softreach.studio.jobs.map import DrawMap
@@ -15,6 +16,7 @@ __all__ = [
     "ComputeReach",
     "DrawArm",
     "DrawCloud",
+    "DrawFree",
     "DrawMap",
     "DrawReference",
     "DrawSurfaces",
@@ -27,6 +29,7 @@ JOBS: tuple[type[Job], ...] = (
     ComputeReach,
     DrawArm,
     DrawCloud,
+    DrawFree,
     DrawSurfaces,
     SolveInverse,
     DrawReference,

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from softreach.errors import InvalidInput
+from softreach.rod.tip_map import TipStatus
 from softreach.studio.jobs.job import Job
 from softreach.studio.jobs.reference import draw_reference_arm
+from softreach.studio.rod import solvable_rod
 from softreach.studio.state import StudioState
 from softreach.studio.worker import StaleCheck
 
@@ -32,12 +35,29 @@ class DrawArm(Job):
         if not state.appearance.arm:
             session.scene.remove("/arm")
         else:
-            with session.client.atomic():
-                session.tip = session.scene.draw_arm(state.design, state.activation)
-            session.trail = [*session.trail[-_LONGEST_TRAIL:], session.tip]
+            self._draw(state)
         self._draw_trail()
         draw_reference_arm(session)
         session.show()
+
+    def _draw(self, state: StudioState) -> None:
+        session = self.session
+        session.posture = None
+        try:
+            rod = solvable_rod(state.design)
+        except InvalidInput:  # `ComputeReach` says so
+            session.tip, session.posture = None, TipStatus.NO_EQUILIBRIUM
+            session.scene.remove("/arm")
+            return
+        with session.client.atomic():
+            tip = session.scene.draw_arm(state.design, state.activation)
+        session.tip = tip if np.isfinite(tip).all() else None
+        if session.tip is not None:
+            session.trail = [*session.trail[-_LONGEST_TRAIL:], session.tip]
+        if rod.supports_unstable:
+            lost = session.tip is None
+            status = TipStatus.NO_EQUILIBRIUM if lost else rod.status([state.activation])[0]
+            session.posture = TipStatus(status)
 
     def _draw_trail(self) -> None:
         session, state = self.session, self.session.state

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softreach.studio.jobs.job import Job
+from softreach.studio.rod import solvable_rod
 from softreach.studio.state import StudioState, Vector
 from softreach.studio.worker import StaleCheck
 
@@ -66,5 +67,6 @@ class SolveInverse(Job):
 def _solution(state: StudioState, target: Vector) -> Solution:
     from softreach.inverse import solve_inverse
 
+    solvable_rod(state.design)
     near = state.activation if len(state.activation) > 3 else None
     return solve_inverse(state.design, [target], near=near, family=_FAMILY)[0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from softreach.errors import InvalidInput
 from softreach.studio.jobs.job import Job
 from softreach.studio.reach import Reach, stages
 from softreach.studio.state import StudioState
@@ -12,7 +13,7 @@ from softreach.studio.worker import StaleCheck
 if TYPE_CHECKING:
     from softreach.studio.session import Session
 
-__all__ = ["ComputeReach", "DrawCloud", "DrawSurfaces"]
+__all__ = ["ComputeReach", "DrawCloud", "DrawSurfaces", "draw_axes"]
 
 
 class ComputeReach(Job):
@@ -24,15 +25,19 @@ class ComputeReach(Job):
         return state.design
 
     def run(self, check: StaleCheck) -> None:
-        """Compute what is not known yet, and draw each stage."""
+        """Compute what is not known yet, and draw each stage; or say why it cannot be."""
         session, state = self.session, self.session.state
         if _is_complete(session.reach, state):
             _draw_cloud(session)
             return
-        for reach in stages(state.design, state.appearance.level, session.quality, check):
-            check()
-            session.reach = reach
-            _draw_cloud(session)
+        session.refusal = ""
+        try:
+            for reach in stages(state.design, state.appearance.level, session.quality, check):
+                check()
+                session.reach = reach
+                _draw_cloud(session)
+        except InvalidInput as error:
+            _withdraw(session, str(error))
 
 
 class DrawCloud(Job):
@@ -75,8 +80,16 @@ def _is_complete(known: Reach | None, state: StudioState) -> bool:
     """Whether what was computed, or read from a file, is all there is to know."""
     if known is None or not known.fine or known.arm != state.design:
         return False
-    enough = known.samples >= 1 << state.appearance.level
+    enough = max(known.samples, known.wanted) >= 1 << state.appearance.level
     return enough or known.cloud.attrs.get("sampler") != "sobol"
+
+
+def _withdraw(session: Session, refusal: str) -> None:
+    """Take away what belongs to the design before, and say what is wrong with this one."""
+    session.reach, session.key, session.refusal = None, None, refusal
+    with session.drawing:
+        session.scene.remove("/cloud", "/unstable", "/slice", "/surface", "/alpha-shape")
+    session.show()
 
 
 def _draw_cloud(session: Session) -> None:
@@ -92,4 +105,11 @@ def _draw_points(session: Session) -> None:
         return
     with session.drawing, session.client.atomic():
         session.key = session.scene.draw_cloud(reach, look)
-        session.scene.draw_axes(reach, look)
+        draw_axes(session)
+
+
+def draw_axes(session: Session) -> None:
+    """The box around what is drawn; to be called by whoever holds `Session.drawing`."""
+    if session.reach is not None:
+        free = session.free if session.state.design.loads is not None else None
+        session.scene.draw_axes(session.reach, session.state.appearance, free)

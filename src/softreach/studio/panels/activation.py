@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 from softreach.arm.manipulator import Manipulator
 from softreach.schema import activation_symbols
 from softreach.studio.panels.binding import bind, bind_button
+from softreach.studio.panels.line import Line
+from softreach.studio.panels.status import tip_text
 from softreach.studio.rod import rod_of
 from softreach.studio.state import StudioState
 
@@ -31,7 +33,7 @@ class ActivationPanel:
         self._made_for: Any = None
         self._revision = -1
         with tab:
-            self._tip = gui.add_markdown("")
+            self._tip = Line(gui)
             self._folder = gui.add_folder("activation")
             self._trail = gui.add_checkbox("show trail", False)
             rest = gui.add_button("Rest")
@@ -48,9 +50,7 @@ class ActivationPanel:
                     slider.value = value
                 self._trail.value = session.state.appearance.trail
             self._revision = session.revision
-        if session.tip is not None:
-            x, y, z = session.tip
-            self._tip.content = f"tip at ({x:.6f}, {y:.6f}, {z:.6f}) L"
+        self._tip.say(*tip_text(session))
 
     def _build(self, session: Session) -> None:
         self._made_for = _slider_ends(session.state.design)

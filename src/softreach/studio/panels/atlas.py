@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from softreach.studio.atlas_map import map_choices, metric_names
 from softreach.studio.map_board import MapBoard
 from softreach.studio.panels.binding import attempt, bind
+from softreach.studio.panels.line import Line
 from softreach.studio.state import MapView, StudioState
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ class AtlasPanel:
         self._revision = -1
         names = tuple(str(dim) for dim in self._atlas["status"].dims)
         with tab:
-            gui.add_markdown(_HINT)
+            Line(gui, _HINT)
             self._metric = gui.add_dropdown("metric", tuple(metric_names(self._atlas)))
             self._right = gui.add_dropdown("to the right", names)
             self._up = gui.add_dropdown("upward", names)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import threading
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -11,7 +10,9 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed
 from softreach.errors import InvalidDesign
 from softreach.studio.controls import Control, controls
+from softreach.studio.markup import Part
 from softreach.studio.panels.binding import bind, bind_button
+from softreach.studio.panels.line import Line
 from softreach.studio.panels.status import reach_text
 from softreach.studio.reach import beside
 from softreach.studio.rod import rod_of
@@ -27,7 +28,7 @@ __all__ = ["DesignPanel"]
 class _Row(NamedTuple):
     control: Control
     slider: Any
-    message: Any
+    message: Line
     first: float
     """What the slider showed before anyone moved it."""
 
@@ -46,7 +47,7 @@ class DesignPanel:
         with tab:
             self._folder = gui.add_folder("design")
             with gui.add_folder("compare"):
-                self._reference = gui.add_markdown("")
+                self._reference = Line(gui)
                 keep = gui.add_button("Keep this design as reference")
                 self._beside = gui.add_checkbox("side by side", False)
                 clear = gui.add_button("Forget the reference")
@@ -57,7 +58,7 @@ class DesignPanel:
 
     def show(self, session: Session) -> None:
         """Show the reference; rebuild the sliders for a design that they did not make."""
-        self._reference.content = _reference_text(session)
+        self._reference.say(*_reference_text(session))
         with self._lock:
             if session.revision == self._revision:
                 return
@@ -94,7 +95,7 @@ class DesignPanel:
     def _row(self, control: Control) -> _Row:
         low, high = control.limits
         slider = self._gui.add_slider(control.label, low, high, control.step, control.shown)
-        message = self._gui.add_html("", visible=False)
+        message = Line(self._gui)
         slider.on_update(lambda event: self._moved(control.name, event))
         return _Row(control, slider, message, slider.value)
 
@@ -123,17 +124,11 @@ class DesignPanel:
     def _complain(self, name: str, text: str) -> None:
         self._complaining = bool(text)
         for row in self._rows:
-            mine = text if row.control.name == name else ""
-            row.message.content, row.message.visible = _warning(mine), bool(mine)
+            row.message.warn(text if row.control.name == name else "")
 
 
-def _reference_text(session: Session) -> str:
+def _reference_text(session: Session) -> tuple[Part, ...]:
     if session.reference is None:
-        return "No reference is kept."
+        return ("No reference is kept.",)
     where = "reference" if session.state.side_by_side else "reference (gray)"
-    return f"{where}: {reach_text(session.reference)}"
-
-
-def _warning(text: str) -> str:
-    style = "color:#c92a2a;font-size:0.8em;padding:0 0.8em 0.5em;white-space:pre-line"
-    return f'<div role="alert" style="{style}">{html.escape(text)}</div>'
+    return (f"{where}: ", *reach_text(session.reference))

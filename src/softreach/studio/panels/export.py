@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import html
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from softreach.errors import InvalidInput
+from softreach.studio import markup
 from softreach.studio.files import (
     CLOUD_FORMATS,
     SURFACE_FORMATS,
@@ -18,6 +18,7 @@ from softreach.studio.files import (
 from softreach.studio.link import state_link
 from softreach.studio.page import static_page
 from softreach.studio.panels.binding import attempt, bind_button
+from softreach.studio.panels.line import Line
 
 if TYPE_CHECKING:
     from viser import GuiApi, UploadedFile
@@ -28,10 +29,9 @@ if TYPE_CHECKING:
 __all__ = ["ExportPanel"]
 
 
-_ADDRESS = (
-    '<div style="font-size:0.8em;padding:0 0.8em 0.5em"><a href="{link}" target="_blank">This '
-    "state in a new tab</a>; copy the link to keep it. It holds the state itself, and opens while "
-    "a studio serves at this address.</div>"
+_ABOUT_LINK = (
+    "; copy the link to keep it. It holds the state itself, and opens while a studio serves at "
+    "this address."
 )
 
 
@@ -44,7 +44,7 @@ class ExportPanel:
         with tab:
             self._button("Save state", self._save_state)
             self._button("Link to this state", self._link)
-            self._address = gui.add_html("")
+            self._address = Line(gui)
             self._button("Save design (TOML)", self._save_design)
             load = gui.add_upload_button("Load state or design")
             self._cloud = gui.add_dropdown("cloud format", CLOUD_FORMATS)
@@ -62,8 +62,8 @@ class ExportPanel:
         self._send("softreach-studio.json", self._session.state_now().to_json().encode())
 
     def _link(self) -> None:
-        link = html.escape(state_link(self._url, self._session.state_now()))
-        self._address.content = _ADDRESS.format(link=link)
+        address = state_link(self._url, self._session.state_now())
+        self._address.show(markup.link(address, "This state in a new tab", _ABOUT_LINK))
 
     def _save_design(self) -> None:
         self._send("design.toml", self._session.state.design.to_toml().encode())

@@ -10,6 +10,7 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.kinematics import tip_positions
 from softreach.studio.panels.binding import attempt, bind, bind_button
+from softreach.studio.panels.line import Line
 from softreach.studio.picking import picked_point
 from softreach.studio.reach import cloud_points, shown_samples
 from softreach.studio.slicing import in_slice
@@ -35,7 +36,7 @@ class InversePanel:
         self._shown: Solution | None = None
         self._buttons: list[tuple[Any, Any]] = []
         with tab:
-            self._text = gui.add_markdown(_HINT)
+            self._text = Line(gui, _HINT)
             self._target = gui.add_vector3("target / L", (0.0, 0.0, 1.0), step=0.001)
             solve = gui.add_button("Solve")
             self._ghosts = gui.add_checkbox("show all shapes", session.state.appearance.ghosts)
@@ -61,11 +62,11 @@ class InversePanel:
         for _, button in self._buttons:
             button.remove()
         self._buttons, self._folder.visible = [], answer is not None and len(answer) > 0
-        self._text.content = _HINT
+        self._text.say(_HINT)
         if answer is not None:
             arm = self._session.state.design
             self._target.value = answer.target / arm.length
-            self._text.content = _answer_text(answer, arm)
+            self._text.say(_answer_text(answer, arm))
             with self._folder:
                 self._buttons = [(row, self._button(row)) for row in answer.activations]
 

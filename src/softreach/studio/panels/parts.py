@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 import threading
 from collections.abc import Callable
@@ -15,6 +14,7 @@ from softreach.arm.materials import material_names
 from softreach.arm.parameters import changed
 from softreach.errors import InvalidDesign, SoftreachError
 from softreach.studio import edits
+from softreach.studio.panels.line import Line
 from softreach.studio.parts import Number, Part, numbers, parts
 from softreach.studio.rod import rod_of
 
@@ -50,7 +50,7 @@ class PartsPanel:
                 self._kind = gui.add_dropdown("kind", kinds)
                 self._button("Add", self._add)
             self._folder = gui.add_folder("part")
-            self._message = gui.add_html("", visible=False)
+            self._message = Line(gui)
 
     def show(self, session: Session) -> None:
         """Show the parts of the design, and what the chosen one has."""
@@ -215,20 +215,15 @@ class PartsPanel:
         try:
             made = rod_of(change(self._session.state.design)).arm
         except InvalidDesign as error:
-            self._say(str(in_file_terms(error, "")))
+            self._message.warn(str(in_file_terms(error, "")))
             return
         except SoftreachError as error:
-            self._say(str(error))
+            self._message.warn(str(error))
             return
-        self._say("")
+        self._message.warn("")
         if last is not None:
             self._label = last(made)
         self._session.update(lambda state: state.replace(design=made))
-
-    def _say(self, text: str) -> None:
-        style = "color:#c92a2a;font-size:0.8em;padding:0 0.8em 0.5em;white-space:pre-line"
-        self._message.content = f'<div role="alert" style="{style}">{html.escape(text)}</div>'
-        self._message.visible = bool(text)
 
 
 def _shown(one: Number) -> float:

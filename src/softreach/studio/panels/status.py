@@ -5,15 +5,25 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from softreach.studio.colors import key_html
+from softreach.rod.tip_map import TipStatus
+from softreach.studio.colors import FAINT, UNSTABLE, key_html
+from softreach.studio.markup import Part, Strong, Swatch
+from softreach.studio.panels.line import Line
 
 if TYPE_CHECKING:
     from viser import GuiApi
 
-    from softreach.studio.reach import Reach
+    from softreach.studio.reach import Reach, Size
     from softreach.studio.session import Session
 
-__all__ = ["StatusPanel", "reach_text"]
+__all__ = ["StatusPanel", "legend_text", "reach_text", "tip_text"]
+
+_GAP = "\N{EN SPACE} "
+_POSTURES = {
+    TipStatus.STABLE: "a stable equilibrium",
+    TipStatus.UNSTABLE: "an unstable equilibrium: a real arm leaves it",
+    TipStatus.NO_EQUILIBRIUM: "no equilibrium: the arm is not drawn",
+}
 
 
 class StatusPanel:
@@ -21,29 +31,109 @@ class StatusPanel:
 
     def __init__(self, gui: GuiApi) -> None:
         """Add the widgets."""
-        self._numbers = gui.add_markdown("computing ...")
-        self._key = gui.add_html("")
-        self._note = gui.add_markdown("", visible=False)
+        self._numbers = Line(gui, "computing ...")
+        self._comparison = Line(gui)
+        self._key = Line(gui)
+        self._legend = Line(gui)
+        self._refusal = Line(gui)
+        self._note = Line(gui)
 
     def show(self, session: Session) -> None:
         """Show what is known, and whether it is about to change."""
+        self._numbers.say(*_numbers_text(session))
+        self._comparison.say(*_comparison_text(session))
+        self._key.show(key_html(session.key))
+        self._explain_marks(session)
+        self._note.say(*((session.note,) if session.note else ()))
+
+    def _explain_marks(self, session: Session) -> None:
         reach = session.reach
-        self._numbers.content = "computing ..." if reach is None else _known_text(session, reach)
-        self._key.content = key_html(session.key)
-        self._note.content, self._note.visible = session.note, bool(session.note)
+        free = session.state.appearance.free and session.free is not None
+        self._legend.say(*(legend_text(reach, free=free) if reach is not None else ()))
+        refusal = reach.refusal if reach is not None else ""
+        self._refusal.say(*((f"No exact volume: {refusal}",) if refusal else ()))
 
 
-def _known_text(session: Session, reach: Reach) -> str:
+def _numbers_text(session: Session) -> list[Part]:
+    reach, work = session.reach, _work(session)
+    if reach is None:
+        return [session.refusal or work]
     stale = reach.arm != session.state.design
     hull = reach.alpha_volume if session.state.appearance.alpha_shape else None
-    hull_text = f" · α-shape {hull:.4f} L³" if hull is not None else ""
-    return reach_text(reach) + hull_text + (" · computing ..." if stale or not reach.fine else "")
+    hull_text = [f" · α-shape {hull:.4f} L³"] if hull is not None else []
+    return [*reach_text(reach), *hull_text, *([f" · {work}"] if stale or not reach.fine else [])]
 
 
-def reach_text(reach: Reach) -> str:
+def _work(session: Session) -> str:
+    return "compiling, once on this machine ..." if session.compiling else "computing ..."
+
+
+def reach_text(reach: Reach) -> list[Part]:
     """The numbers of a reach in one line."""
-    name, value, error, unit = reach.size
-    parts = [f"**{name} {value:.4f} ± {error:.1g} {unit}**"]
+    parts: list[Part] = []
+    if reach.size is not None:
+        name, value, error, unit = reach.size
+        parts += [Strong(f"{name} {value:.4f} ± {error:.1g} {unit}"), " · "]
     if not math.isnan(reach.unreachability):
-        parts.append(f"**UNR {100 * reach.unreachability:.2f} %**")
-    return " · ".join([*parts, f"{reach.samples:,} samples"])
+        parts += [Strong(f"UNR {100 * reach.unreachability:.2f} %"), " · "]
+    if reach.lost_share:
+        parts.append(f"{_percent(reach.lost_share)} of the activations left out · ")
+    parts.append(f"{reach.samples:,} samples")
+    if reach.fine and reach.samples < reach.wanted:
+        parts.append(f" of {reach.wanted:,}: those of a loaded arm take long")
+    return parts
+
+
+def _comparison_text(session: Session) -> list[Part]:
+    """How much of its reach the loads leave an arm; nothing for an arm without loads."""
+    if session.state.design.loads is None:
+        return []
+    loaded, free = _present_size(session), session.free
+    bare = free.size if free is not None else None
+    if bare is None:
+        return []
+    free_text = f"free {bare.value:.4f} {bare.unit}"
+    if loaded is None:
+        return [free_text]
+    share = f", {100 * loaded.value / bare.value:.0f} %" if bare.value > 0 else ""
+    return [Strong(f"loaded {loaded.value:.4f} {loaded.unit}"), f" · {free_text}{share}"]
+
+
+def _present_size(session: Session) -> Size | None:
+    """The size of what the design itself can reach, not the one before it."""
+    reach = session.reach
+    return reach.size if reach is not None and reach.arm == session.state.design else None
+
+
+def legend_text(reach: Reach, *, free: bool) -> list[Part]:
+    """What marks stand for, how many samples they are, and what is left out.
+
+    Args:
+        reach: What is shown; of an arm without loads there is nothing to say.
+        free: Whether the cloud without loads is shown too.
+    """
+    if reach.arm.loads is None:
+        return []
+    parts: list[Part] = []
+    if unstable := reach.share(TipStatus.UNSTABLE):
+        parts += [Swatch(UNSTABLE), f" unstable: {_percent(unstable)} of the samples {_GAP}"]
+    if lost := reach.share(TipStatus.NO_EQUILIBRIUM):
+        parts.append(f"no equilibrium, not shown: {_percent(lost)} {_GAP}")
+    if not unstable and not lost:
+        parts.append(f"every sample rests in a stable equilibrium {_GAP}")
+    return [*parts, Swatch(FAINT), " without loads"] if free else parts
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %"
+
+
+def tip_text(session: Session) -> list[Part]:
+    """Where the tip is, and whether a loaded arm rests there."""
+    parts: list[Part] = []
+    if session.tip is not None:
+        x, y, z = session.tip
+        parts.append(f"tip at ({x:.6f}, {y:.6f}, {z:.6f}) L")
+    if session.posture is not None:
+        parts.append(f"{' · ' if parts else ''}{_POSTURES[session.posture]}")
+    return parts

@@ -1,0 +1,81 @@
+"""What acts on an arm, and how it rests under it, as rows of a table."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from softreach.arm.loads import Loads
+    from softreach.arm.manipulator import Manipulator
+    from softreach.rest import Rest
+
+__all__ = ["load_rows", "rest_rows"]
+
+Rows = dict[str, tuple[Any, str]]
+
+_STATUS = {
+    "STABLE": "stable",
+    "UNSTABLE": "not stable",
+    "NO_EQUILIBRIUM": "no equilibrium follows from the unloaded arm",
+}
+
+
+def load_rows(loads: Loads | None) -> Rows:
+    """Gravity with the way in which it makes the arm point, and all other loads that are not 0."""
+    if loads is None:
+        return {}
+    rows: Rows = {}
+    if any(loads.gravity):
+        rows["gravity"] = (list(loads.gravity), "m/s²")
+        rows["base"] = (_base(loads.gravity), "")
+    for variable in (*loads.variables, *loads.series):
+        value = getattr(loads, variable.field)
+        given = any(value) if isinstance(value, tuple) else value
+        if given and variable.field != "gravity":
+            shown = list(value) if isinstance(value, tuple) else value
+            rows[variable.field.replace("_", " ")] = (shown, variable.allowed.unit)
+    if loads.point_loads:
+        rows["point loads"] = (len(loads.point_loads), "")
+    return rows
+
+
+def _base(gravity: tuple[float, float, float]) -> str:
+    """How the base stands: an arm at rest points along +z, gravity pulls downward."""
+    angle = math.degrees(math.acos(-gravity[2] / math.hypot(*gravity)))
+    for exactly, name in ((0, "upright"), (90, "sideways"), (180, "hanging")):
+        if abs(angle - exactly) < 1e-6:
+            return name
+    return f"tilted from upright by {angle:.4g}°"
+
+
+def rest_rows(arm: Manipulator) -> Rows:
+    """Sag and stability of the arm at rest.
+
+    Without loads: how far its own weight moves a tip that is held sideways, and whether the arm
+    would stand upright; nothing where moduli or densities are not known.
+    """
+    from softreach.arm.loads import Loads
+    from softreach.arm.weight import GRAVITY, load_number_faults
+    from softreach.rest import rest
+
+    if load_number_faults(arm):
+        return {}
+    if arm.loads is not None:
+        found = rest(arm)
+        return _sag("", found) | {"at rest": (_STATUS[found.status.name], "")}
+    sideways, upright = (
+        rest(arm.replace(loads=Loads(gravity=gravity)))
+        for gravity in ((GRAVITY, 0.0, 0.0), (0.0, 0.0, -GRAVITY))
+    )
+    stands = {"at rest upright": (_STATUS[upright.status.name], "")}
+    return _sag(" sideways", sideways) | stands
+
+
+def _sag(how: str, found: Rest) -> Rows:
+    """How far the tip is moved, as a share of the length and as a length."""
+    known = math.isfinite(found.sag)
+    return {
+        f"sag at rest{how}": (found.sag_over_length if known else None, "L"),
+        f"sag of the tip at rest{how}": (1e3 * found.sag if known else None, "mm"),
+    }

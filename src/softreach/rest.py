@@ -1,0 +1,65 @@
+"""The arm at rest under its loads: how far its tip sags, and whether it stays there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.manipulator import Manipulator
+from softreach.errors import InvalidInput
+from softreach.rod.equilibrium import Solver
+from softreach.rod.free import FreeRod
+from softreach.rod.loaded import LoadedRod
+from softreach.rod.tip_map import TipStatus
+
+__all__ = ["Rest", "rest"]
+
+# A straight arm needs few steps for its tip, but two losses of stability within one cancel.
+_FEWEST_STEPS = 64
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Where an arm rests that nothing drives."""
+
+    activation: NDArray[np.float64]
+    """The activation of least size within the bounds, zero where these hold it [unit]."""
+    tip: NDArray[np.float64]
+    """Of the loaded arm [m]; NaN without equilibrium."""
+    sag: float
+    """How far the loads move the tip [m]; NaN without equilibrium."""
+    sag_over_length: float
+    """The same over the length of the arm [-]."""
+    status: TipStatus
+    """Whether the equilibrium is stable."""
+
+
+def rest(arm: Manipulator, *, tol: float = 1e-6) -> Rest:
+    """The arm at rest under its loads.
+
+    Args:
+        arm: The design with its loads.
+        tol: Largest tip error, in L.
+
+    Raises:
+        InvalidInput: An arm without loads.
+        InvalidDesign: The activation at rest would shorten the arm to nothing.
+    """
+    if arm.loads is None:
+        raise InvalidInput("loads", None, "given", "arm.replace(loads=Loads(...)) gives some")
+    activation = np.clip(0.0, *arm.bounds.T)
+    # Nothing but rest is asked for, and the steps need suit no other activation.
+    held = arm.with_bounds(np.stack([activation, activation], axis=1)) if arm.bundles else arm
+    rod = LoadedRod(held, tol)
+    found = Solver(rod.tables, max(rod.steps, _FEWEST_STEPS), rod.tol).find(activation[None])
+    free = FreeRod(held.replace(loads=None), tol).tips(activation[None])[0]
+    sag = float(np.linalg.norm(found.tips[0] - free))
+    return Rest(
+        activation=activation,
+        tip=found.tips[0],
+        sag=sag,
+        sag_over_length=sag / arm.length,
+        status=TipStatus(int(found.status[0])),
+    )

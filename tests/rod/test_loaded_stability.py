@@ -1,0 +1,181 @@
+"""What is called stable is a minimum of energy, and what is called unstable is not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from softreach.arm import designs
+from softreach.arm.loads import Loads
+from softreach.rod.all_equilibria import all_equilibria
+from softreach.rod.equilibrium import Solver
+from softreach.rod.free import FreeRod
+from softreach.rod.load_tables import ArmBody, Body, LoadTables
+from softreach.rod.tip_map import TipStatus
+from tests.bodies import oracle_rod, rubber
+from tests.oracles import column
+from tests.oracles.chain import Chain
+
+UP, SIDE, ASLANT = (0.0, 0.0, -9.81), (9.81, 0.0, 0.0), (3.0, 4.0, -8.0)
+CYLINDER, TRUNK = designs.minimal_trunk(taper=0.0), designs.minimal_trunk()
+# Bent in the plane of symmetry, upright arms may fall out of it.
+SYMMETRIC = np.array([[-0.5, -0.5, -0.6], [-1.2, -1.2, -1.4], [-1.3, -1.3, -1.4]])
+ANY = np.array([[-1.2, -0.3, -0.8], [-1.6, -1.6, -1.6]])
+
+
+@dataclass(frozen=True)
+class Inextensible:
+    """A body that bends and twists alone."""
+
+    whole: Body
+
+    def compliance(self, z):
+        axial, bending, torsion = self.whole.compliance(z)
+        return np.zeros_like(axial), bending, torsion
+
+    def mass_per_length(self, z):
+        return self.whole.mass_per_length(z)
+
+
+def weighed(arm, load, gravity=UP, **loads):
+    """The arm with E such that its load number is `load`."""
+    young = 1000 * 9.81 * arm.length**3 / (load * arm.profile.outer_radius**2)
+    return rubber(arm, Loads(gravity=gravity, **loads), young)
+
+
+def solver_of(arm, body=None):
+    return Solver(LoadTables(arm, arm.loads, body or ArmBody(arm)), 32, 1e-9)
+
+
+def chain_of(arm, gamma, links=32):
+    return Chain(*oracle_rod(arm, ArmBody(arm), gamma, arm.loads), links)
+
+
+def index(chain, moment, tip):
+    """The number of ways to fall from the chain's equilibrium near a rod's."""
+    found = chain.solve(chain.bent_by(moment))
+    assert np.linalg.norm(chain.nodes(found)[-1] - tip) < 0.03 * chain.rod.length
+    return int((chain.softest(found) < 0).sum())
+
+
+@pytest.mark.parametrize("payload", [0.0, 0.5])
+@pytest.mark.parametrize("taper", [-0.02, 0.02, 0.05])
+def test_tapered_columns_buckle_where_ritz_has_them_buckle(taper, payload):
+    arm = rubber(designs.minimal_trunk(taper=taper), Loads(payload=payload))
+    body, rest = Inextensible(ArmBody(arm)), np.zeros(3)
+    of_column, _ = oracle_rod(arm, body, rest, arm.loads)
+    critical = column.buckling_gravity(1.0, of_column.bending, of_column.mass, payload=payload)
+    for share, status in ((0.9995, TipStatus.STABLE), (1.0005, TipStatus.UNSTABLE)):
+        fallen = arm.replace(loads=arm.loads.replace(gravity=(0, 0, -share * critical)))
+        found = solver_of(fallen, body).find(rest[None])
+        assert found.status[0] == status
+        np.testing.assert_allclose(found.tips[0], [0, 0, 1], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("load", "gravity", "more"),
+    [
+        (5.0, UP, {}),
+        (8.0, UP, {}),
+        (12.0, ASLANT, {}),
+        (5.0, UP, {"payload": 1.0, "payload_arm": (0.0, 0.02, 0.1)}),
+        (2.5, SIDE, {"tip_force": (0.0, 3.0, -20.0)}),
+        (5.0, UP, {"force_per_length": (0.0, 0.0, -20.0), "tip_force": (2.0, 0.0, 0.0)}),
+    ],
+)
+def test_of_the_reported_equilibria_the_stable_ones_are_minima_of_energy(load, gravity, more):
+    arm = weighed(CYLINDER, load, gravity, **more)
+    gamma, solver = np.concatenate([SYMMETRIC, ANY]), solver_of(arm)
+    found = solver.find(gamma)
+    assert (found.status != TipStatus.NO_EQUILIBRIUM).all()
+    stations = chain_of(arm, gamma[0]).joints
+    moments = solver.shapes(gamma, stations).moment
+    for one, moment, tip, status in zip(gamma, moments, found.tips, found.status, strict=True):
+        stable = index(chain_of(arm, one), moment, tip) == 0
+        assert stable == (status == TipStatus.STABLE)
+
+
+@pytest.mark.parametrize("gamma", SYMMETRIC)
+def test_stability_is_lost_where_a_minimum_of_energy_ends(gamma):
+    """The load number is bisected; at a hundredth less and more the energy is asked."""
+
+    def status(load):
+        return solver_of(weighed(CYLINDER, load)).find(gamma[None]).status[0]
+
+    low, high = 0.5, 5.0
+    assert (status(low), status(high)) == (TipStatus.STABLE, TipStatus.UNSTABLE)
+    while high - low > 1e-3 * low:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if status(middle) == TipStatus.STABLE else (low, middle)
+    for load, stable in ((0.99 * low, True), (1.01 * high, False)):
+        arm = weighed(CYLINDER, load)
+        chain, solver = chain_of(arm, gamma), solver_of(arm)
+        moment = solver.shapes(gamma[None], chain.joints).moment[0]
+        assert (index(chain, moment, solver.find(gamma[None]).tips[0]) == 0) == stable
+
+
+def moments(chain, direction):
+    """m at the joints of the rod whose tip sees gravity in this direction, in its directors."""
+    rod, g = chain.rod, float(np.linalg.norm(chain.loads.gravity))
+    weight = chain.loads.payload * g
+
+    def rates(z, state):
+        seen, m, w = state[:3], state[3:6], state[6]
+        stiff = np.array([rod.bending(z), rod.bending(z), rod.torsion(z)])
+        omega = rod.stretch(z) * (rod.curvature(z) + m / stiff)
+        along = rod.stretch(z) * (1.0 + w * seen[2] / rod.axial(z))
+        push = np.cross([0.0, 0.0, along], w * seen)
+        return [*-np.cross(omega, seen), *(-np.cross(omega, m) - push), -rod.mass(z) * g]
+
+    lever = weight * np.cross(chain.loads.lever, direction)
+    walk = solve_ivp(
+        rates,
+        (rod.length, 0.0),
+        [*direction, *lever, weight],
+        dense_output=True,
+        method="DOP853",
+        rtol=1e-9,
+        atol=1e-9,
+    )
+    return walk.sol(chain.joints)[3:6].T
+
+
+@pytest.mark.parametrize(
+    ("arm", "load", "gamma"),
+    [
+        (CYLINDER, 12.0, ANY[1]),
+        (TRUNK, 25.0, ANY[0]),
+    ],
+)
+@pytest.mark.slow
+def test_every_equilibrium_has_the_index_of_its_energy(arm, load, gamma):
+    """Stable ones have none, and the sign of the tangents at the base is that of the index."""
+    arm = weighed(arm, load)
+    solver, turn = solver_of(arm), FreeRod(arm, 1e-10).frames(gamma[None], [1.0]).directors[0, 0]
+    every = all_equilibria(solver, gamma[None])
+    _, sign = solver.polished(gamma[None], every.directions)
+    assert len(every.tips) > 1
+    chain = chain_of(arm, gamma, links=32)
+    for direction, tip, status, of_map in zip(
+        every.directions, every.tips, every.status, sign, strict=True
+    ):
+        ways = index(chain, moments(chain, turn @ direction), tip)
+        assert (ways == 0) == (status == TipStatus.STABLE)
+        assert of_map == (-1) ** ways
+
+
+def test_arms_that_lean_a_little_fall_to_the_side_they_lean_to():
+    """Beside a plane of symmetry in which they would be unstable; the branch stays stable."""
+    solver = solver_of(weighed(CYLINDER, 5.0))
+    leaning = SYMMETRIC + np.array([0.0, 1.0, 0.0]) * [[1e-3], [0.003], [0.01]]
+    gamma = np.concatenate([SYMMETRIC, leaning, leaning[:, [1, 0, 2]]])
+    found, slowly = solver.find(gamma), solver.slowly(gamma)
+    assert (found.status[:3] == TipStatus.UNSTABLE).all()
+    assert (found.status[3:] == TipStatus.STABLE).all()
+    np.testing.assert_allclose(found.tips, slowly.tips, atol=1e-7)
+    sides = found.tips[3:6, 0], found.tips[6:, 0]
+    np.testing.assert_allclose(sides[0], -sides[1], atol=1e-7)
+    assert np.abs(sides[0]).min() > 0.01

@@ -1,0 +1,140 @@
+"""Loads as they are typed, and what is computed of a loaded arm."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import softreach as sr
+from softreach.arm import designs
+from softreach.errors import InvalidDesign, InvalidInput
+from softreach.rod.tip_map import TipStatus
+from softreach.studio.effort import affordable_level
+from softreach.studio.loading import (
+    GRAVITIES,
+    TypedLoads,
+    gravity_name,
+    other_loads,
+    typed_loads,
+    with_loads,
+)
+from softreach.studio.reach import Quality, Reach, cloud_points, stages, unstable_samples
+from softreach.studio.rod import solvable_rod
+from softreach.studio.state import StudioState
+
+SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
+HANGING = GRAVITIES["hanging"]
+
+
+@pytest.fixture(scope="module")
+def lce():
+    return designs.lce_arm()
+
+
+def hanging(arm, grams: float):
+    return with_loads(arm, TypedLoads(gravity=HANGING, payload=grams))
+
+
+def test_what_is_typed_is_what_the_design_has(lce):
+    typed = TypedLoads((0.0, 1.0, -9.81), 2.5, (1.0, 0.0, -3.0), (0.0, 0.01, 0.0))
+    arm = with_loads(lce, typed)
+    assert arm.loads.payload == pytest.approx(0.0025)
+    np.testing.assert_allclose(arm.loads.payload_arm, (0.001, 0, -0.003))
+    assert typed_loads(arm) == typed
+    assert typed_loads(lce) == TypedLoads()
+
+
+def test_without_any_load_an_arm_is_an_arm_without_loads(lce):
+    assert with_loads(lce, TypedLoads()) == lce
+    assert with_loads(hanging(lce, 5.0), TypedLoads()) == lce
+
+
+def test_directions_are_known_by_name(lce):
+    for name, gravity in GRAVITIES.items():
+        assert gravity_name(gravity) == name
+        assert typed_loads(with_loads(lce, TypedLoads(gravity=gravity))).gravity == gravity
+    assert gravity_name((0.0, 0.0, -1.62)) == ""
+
+
+def test_loads_without_a_field_stay(lce):
+    twisted = lce.replace(loads=sr.Loads(gravity=HANGING, tip_moment=(0.0, 0.0, 1e-4)))
+    assert other_loads(twisted) == ["tip moment"]
+    changed = with_loads(twisted, TypedLoads(gravity=(0.0, 0.0, 0.0)))
+    assert changed.loads.tip_moment == (0.0, 0.0, 1e-4)
+    assert other_loads(lce) == []
+
+
+def test_matter_that_lacks_what_loads_need_is_named_in_one_line(trunk):
+    with pytest.raises(InvalidDesign) as caught:
+        with_loads(trunk, TypedLoads(gravity=HANGING))
+    line = str(caught.value)
+    assert "\n" not in line
+    assert "Young's modulus E and the density ρ of ring 0" in line
+    assert "tab Parts" in line
+
+
+@pytest.mark.parametrize("wrong", [-1.0, 1e9, math.nan, math.inf])
+def test_a_payload_that_cannot_be_is_refused_in_grams(lce, wrong):
+    with pytest.raises(InvalidInput, match=r"payload = .* g: must be 0 to 1,000,000 g"):
+        hanging(lce, wrong)
+
+
+@pytest.mark.parametrize("field", ["gravity", "payload_arm", "tip_force"])
+@pytest.mark.parametrize("wrong", [1e9, -1e9, math.nan])
+def test_a_vector_that_cannot_be_is_refused(lce, field, wrong):
+    typed = TypedLoads()._replace(**{field: (0.0, wrong, 0.0)})
+    with pytest.raises(InvalidInput, match=r"must be -1,000,000 to 1,000,000"):
+        with_loads(lce, typed)
+
+
+def test_a_state_keeps_its_loads(lce):
+    state = StudioState(design=hanging(lce, 5.0)).showing(free=False)
+    assert StudioState.from_json(state.to_json()) == state
+
+
+def test_a_loaded_cloud_comes_before_its_volume(lce):
+    first, second, fine = stages(hanging(lce, 5.0), 11, SMALL, lambda: None)
+    assert (first.exact, first.fine, first.size) == (None, False, None)
+    assert second.exact is not None
+    assert fine.fine
+    np.testing.assert_array_equal(first.cloud.tip, fine.cloud.tip[: first.samples])
+    np.testing.assert_allclose(fine.volume, second.volume, rtol=0.01)
+
+
+@pytest.fixture(scope="module")
+def torn(lce) -> Reach:
+    """With 30 g a few activations are unstable, and fewer have no equilibrium."""
+    *_, fine = stages(hanging(lce, 30.0), 13, SMALL, lambda: None)
+    return fine
+
+
+def test_samples_are_counted_by_status_and_those_without_a_tip_are_not_shown(torn):
+    shares = [torn.share(status) for status in TipStatus]
+    assert sum(shares) == pytest.approx(1.0)
+    assert shares[TipStatus.STABLE] > 0.98
+    assert shares[TipStatus.UNSTABLE] > 0
+    assert shares[TipStatus.NO_EQUILIBRIUM] > 0
+    points = cloud_points(torn, 13)
+    assert np.isfinite(points).all()
+    assert len(points) == torn.samples - round(torn.samples * shares[TipStatus.NO_EQUILIBRIUM])
+    assert unstable_samples(torn, 13).sum() == (torn.cloud.status == TipStatus.UNSTABLE).sum()
+
+
+def test_an_arm_loaded_beyond_what_can_be_computed_is_refused_and_remembered(lce):
+    heavy = hanging(lce, 100.0)
+    for _ in range(2):
+        with pytest.raises(InvalidInput, match="loads = too large"):
+            solvable_rod(heavy)
+    with pytest.raises(InvalidInput, match="loads = too large"):
+        next(stages(heavy, 12, SMALL, lambda: None))
+
+
+def test_a_cloud_has_no_more_samples_than_there_is_time_for(lce):
+    rod = solvable_rod(hanging(lce, 5.0))
+    assert affordable_level(rod, 1e6, 12) == 12
+    assert affordable_level(rod, 0.0, 17) == 10
+    hasty = Quality(coarse_level=12, fine_seconds=0.0, coarse_accuracy=0.1, fine_accuracy=0.1)
+    *_, fine = stages(rod.arm, 14, hasty, lambda: None)
+    assert (fine.samples, fine.wanted) == (1 << 10, 1 << 14)

@@ -1,0 +1,170 @@
+"""Loads are put on in the page: the cloud shrinks, unstable samples are marked, the arm hangs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import softreach as sr
+from softreach.arm import designs
+from softreach.rod.tip_map import TipStatus
+from softreach.studio import Start, Studio, StudioState
+from tests.studio.conftest import SMALL
+from tests.studio.tab import Tab
+
+
+@pytest.fixture(scope="module")
+def loads_tab(browser):
+    state = StudioState(design=designs.lce_arm()).showing(level=14)
+    with Studio(Start(state=state, quality=SMALL)) as studio:
+        tab = Tab(browser, studio)
+        tab.open("Loads")
+        yield tab
+        tab.close()
+
+
+def field(tab, label, number=1):
+    return tab.page.locator(
+        f"xpath=//label[normalize-space()='{label}']/following::input[{number}]"
+    )
+
+
+def typed(tab, label, text, number=1):
+    place = field(tab, label, number)
+    place.fill(text)
+    place.blur()
+
+
+def loads(tab):
+    return tab.session.state.design.loads
+
+
+def become(tab, condition, what):
+    tab.wait(lambda: loads(tab) is not None and condition(loads(tab)), what)
+    tab.settle()
+
+
+def test_gravity_is_chosen_and_the_free_reach_stays_beside_the_loaded_one(loads_tab):
+    tab, free = loads_tab, loads_tab.session.reach
+    tab.choose("gravity", "hanging")
+    become(tab, lambda one: one.gravity == (0.0, 0.0, 9.81), "gravity acts")
+    loaded = tab.session.reach
+    assert loaded.arm == tab.session.state.design
+    share = loaded.volume / free.volume
+    assert 0.7 < share < 0.85
+    tab.page.get_by_text(
+        f"loaded {loaded.volume:.4f} L³ · free {free.volume:.4f} L³, {100 * share:.0f} %"
+    ).wait_for()
+    assert tab.drawn("/free")
+    tab.page.get_by_text("every sample rests in a stable equilibrium").wait_for()
+    tab.page.get_by_label("show the cloud without loads").uncheck()
+    tab.wait(lambda: not tab.drawn("/free"), "the free cloud is gone")
+    tab.page.get_by_label("show the cloud without loads").check()
+    tab.wait(lambda: tab.drawn("/free"), "the free cloud is back")
+
+
+def test_a_payload_makes_samples_unstable_and_the_legend_says_how_many(loads_tab):
+    tab = loads_tab
+    typed(tab, "payload [g]", "30")
+    become(tab, lambda one: one.payload == pytest.approx(0.03), "the payload hangs")
+    reach = tab.session.reach
+    assert reach.arm == tab.session.state.design
+    share = f"{100 * reach.share(TipStatus.UNSTABLE):.2g}"
+    tab.page.get_by_text(f"unstable: {share} % of the samples").wait_for()
+    marked = tab.drawn("/unstable")
+    assert len(marked.points) == (reach.status == TipStatus.UNSTABLE).sum()
+
+
+def test_the_arm_takes_its_loaded_shape_and_says_whether_it_rests(loads_tab):
+    tab = loads_tab
+    tab.page.get_by_text("a stable equilibrium").last.wait_for()
+    arm, cloud = tab.session.state.design, tab.session.reach.cloud
+    pulled = cloud.activation.values[5]
+    tab.session.update(lambda s: s.replace(activation=tuple(pulled)))
+    tab.settle()
+    np.testing.assert_allclose(
+        tab.session.tip, sr.tip_positions(arm, [pulled])[0] / arm.length, atol=5e-5
+    )
+    for status, words in (
+        (TipStatus.UNSTABLE, "an unstable equilibrium"),
+        (TipStatus.NO_EQUILIBRIUM, "no equilibrium: the arm is not drawn"),
+    ):
+        rows = np.flatnonzero(tab.session.reach.status == status)
+        lost = cloud.activation.values[rows[0]]
+        tab.session.update(lambda s, lost=lost: s.replace(activation=tuple(lost)))
+        tab.settle()
+        assert tab.session.posture == status
+        tab.page.get_by_text(words).last.wait_for()
+    assert not tab.drawn("/arm/0")
+    tab.session.update(lambda s: s.replace(activation=()))
+    tab.settle()
+    assert tab.drawn("/arm/0")
+
+
+def test_values_that_cannot_be_are_refused_beside_the_fields(loads_tab):
+    tab = loads_tab
+    before = loads(tab)
+    for text in ("-5", "1000000000"):
+        typed(tab, "payload [g]", text)
+        alert = tab.page.get_by_role("alert").filter(has_text="payload = ")
+        alert.wait_for()
+        assert loads(tab) == before
+    typed(tab, "payload [g]", "2")
+    become(tab, lambda one: one.payload == pytest.approx(0.002), "a payload that can be")
+    alert.wait_for(state="hidden")
+
+
+def test_a_load_that_is_too_large_is_told_and_the_tab_goes_on(loads_tab):
+    tab = loads_tab
+    typed(tab, "payload [g]", "100")
+    become(tab, lambda one: one.payload == pytest.approx(0.1), "the payload is typed")
+    tab.page.get_by_text("loads = too large").first.wait_for()
+    assert not tab.drawn("/cloud")
+    typed(tab, "payload [g]", "0")
+    become(tab, lambda one: one.payload == 0.0, "the payload is off")
+    assert tab.drawn("/cloud")
+    assert tab.drawn("/arm/0")
+
+
+def test_a_force_acts_in_its_direction(loads_tab):
+    tab = loads_tab
+    rest = tab.session.tip.copy()
+    typed(tab, "tip force [N]", "0.01", number=2)
+    become(tab, lambda one: one.tip_force == (0.0, 0.01, 0.0), "the force acts")
+    assert tab.session.tip[1] - rest[1] > 0.01
+
+
+def test_a_direction_of_ones_own_is_typed(loads_tab):
+    tab = loads_tab
+    typed(tab, "g [m/s²]", "3.7", number=3)
+    become(tab, lambda one: one.gravity == (0.0, 0.0, 3.7), "Martian gravity acts")
+    assert field(tab, "gravity").input_value() == "as typed"
+
+
+def test_a_saved_design_has_its_loads(loads_tab, tmp_path):
+    tab = loads_tab
+    tab.open("Export")
+    design = sr.Manipulator.load(tab.save("Save design (TOML)", tmp_path))
+    assert design.loads == loads(tab)
+    tab.open("Loads")
+
+
+def test_all_loads_are_taken_off_at_once(loads_tab):
+    tab = loads_tab
+    tab.press("Take all loads off")
+    tab.wait(lambda: loads(tab) is None, "nothing acts")
+    tab.settle()
+    assert not tab.drawn("/free")
+    assert tab.session.reach.arm == designs.lce_arm()
+    tab.wait(lambda: field(tab, "gravity").input_value() == "none", "the fields are empty")
+    assert tab.page.get_by_text("equilibrium").count() == 0
+
+
+def test_matter_without_a_modulus_is_told_where_to_set_it(loads_tab):
+    tab = loads_tab
+    tab.session.update(lambda s: s.replace(design=designs.minimal_trunk()))
+    tab.settle()
+    tab.choose("gravity", "sideways")
+    tab.page.get_by_role("alert").filter(has_text="on the tab Parts").wait_for()
+    assert loads(tab) is None
+    assert tab.errors == []

@@ -1,0 +1,145 @@
+"""Nothing that came from elsewhere is rendered, and the page talks to its own server alone."""
+
+from __future__ import annotations
+
+import json
+import socket
+
+import pytest
+
+from softreach.arm import designs
+from softreach.studio import StudioState
+from softreach.studio.link import state_link
+from tests.studio.tab import Tab
+
+STRIKE = '<img src=x onerror="document.title=1"><b class=struck>struck</b><iframe srcdoc=struck>'
+QUOTED = STRIKE.replace('"', '\\"')
+
+
+def state_with(**changes) -> str:
+    """A state as text, of which some fields are not what the studio saved."""
+    values = json.loads(StudioState(design=designs.minimal_trunk()).showing(level=14).to_json())
+    look = values["appearance"]
+    for path, value in changes.items():
+        place, _, name = path.rpartition("__")
+        {"": values, "look": look, "slice": look["slice"], "map": look["map"]}[place][name] = value
+    return json.dumps(values)
+
+
+def design_with(old: str, new: str) -> str:
+    text = designs.minimal_trunk().to_toml()
+    assert old in text
+    return text.replace(old, new)
+
+
+NAMED = design_with('name = "left"', f'name = "{QUOTED}"')
+RING = design_with(
+    "inner_ratio", f'name = "{QUOTED}"\nmaterial = {{ name = "{QUOTED}" }}\ninner_ratio'
+)
+
+STATES = {
+    "level": state_with(look__level=STRIKE),
+    "color": state_with(look__color=STRIKE),
+    "size": state_with(look__point_size=STRIKE),
+    "switch": state_with(look__cloud=STRIKE),
+    "axis": state_with(slice__axis=STRIKE),
+    "metric": state_with(map__metric=STRIKE),
+    "parameter": state_with(map__right=STRIKE),
+    "unknown": state_with(**{"look__" + STRIKE: 1}),
+    "version": state_with(softreach_studio=STRIKE),
+    "target": state_with(target=[STRIKE] * 3),
+    "design": state_with(design=STRIKE),
+    "reference": state_with(design=RING, reference=NAMED, side_by_side=True),
+    "no state": STRIKE,
+}
+FILES = {f"{name}.json": text for name, text in STATES.items()} | {
+    "named.toml": NAMED,
+    "ring.toml": RING,
+    "key.toml": design_with("[profile]", f'"{QUOTED}" = 1\n[profile]'),
+    "kind.toml": design_with('kind = "fiber"', f'kind = "{QUOTED}"'),
+    "text.toml": STRIKE,
+    f"{STRIKE.replace('/', '')}.toml": "=",
+    f"{STRIKE.replace('/', '')}.json": "{",
+}
+
+
+def assert_nothing_struck(page):
+    assert page.locator(".struck").count() == 0
+    assert page.locator("iframe").count() == 0
+    assert page.locator("img[src=x]").count() == 0
+    assert page.title() != "1"
+
+
+def read(tab, name, text):
+    with tab.page.expect_file_chooser() as caught:
+        tab.press("Load state or design")
+    before = tab.session.revision, tab.session.note
+    tab.session.note = ""
+    file = {"name": name, "mimeType": "text/plain", "buffer": text.encode()}
+    caught.value.set_files(file)
+    tab.wait(
+        lambda: tab.session.note or tab.session.revision != before[0], f"{name} is taken or refused"
+    )
+    tab.settle()
+    tab.page.wait_for_timeout(100)
+
+
+@pytest.mark.parametrize("name", FILES, ids=lambda name: name.replace(STRIKE, "strike")[-12:])
+def test_no_text_of_a_file_or_its_name_is_markup(tab, name):
+    tab.open("Export")
+    read(tab, name, FILES[name])
+    for panel in ("Design", "Parts", "Loads", "Activation", "View", "Inverse", "Export"):
+        tab.open(panel)
+        assert_nothing_struck(tab.page)
+    tab.session.update(lambda s: StudioState(design=designs.minimal_trunk()).showing(level=14))
+    tab.settle()
+
+
+def test_a_message_shows_markup_as_the_text_that_it_is(tab):
+    tab.open("Export")
+    read(tab, "level.json", STATES["level"])
+    tab.page.get_by_text(STRIKE).first.wait_for()
+    assert_nothing_struck(tab.page)
+
+
+def test_no_text_of_a_link_is_markup(tab, studio, monkeypatch):
+    struck = StudioState(design=designs.minimal_trunk())
+    monkeypatch.setattr(StudioState, "to_json", lambda _: STATES["level"])
+    address = state_link(studio.url, struck)
+    monkeypatch.undo()
+    known, page = set(studio.sessions), tab.context.new_page()
+    page.goto(address)
+    tab.wait(lambda: set(studio.sessions) - known, "the other tab connects")
+    page.get_by_text("level = ").first.wait_for()
+    assert_nothing_struck(page)
+    studio.sessions[max(studio.sessions)].settle()
+    page.close()
+    tab.wait(lambda: set(studio.sessions) == known, "the session of the closed tab ends")
+
+
+@pytest.mark.parametrize("asked", ["websocket=ws", "playbackPath=http"])
+def test_the_page_talks_to_no_other_server_whatever_its_address_asks_for(browser, studio, asked):
+    with socket.create_server(("127.0.0.1", 0)) as elsewhere:
+        elsewhere.setblocking(False)
+        page = browser.new_page()
+        page.goto(f"{studio.url}/?{asked}://127.0.0.1:{elsewhere.getsockname()[1]}/x")
+        page.locator("canvas").first.wait_for()
+        page.wait_for_timeout(2000)  # it would have called by then
+        with pytest.raises(BlockingIOError):
+            elsewhere.accept()
+        page.close()
+
+
+def test_no_other_page_can_frame_the_studio(browser, studio):
+    page = browser.new_page()
+    page.set_content(f'<iframe src="{studio.url}"></iframe>')
+    page.wait_for_timeout(1500)
+    assert all("softreach" not in frame.content() for frame in page.frames[1:])
+    assert not any(frame.locator("#root").count() for frame in page.frames[1:])
+    page.close()
+
+
+def test_the_page_of_a_new_tab_breaks_none_of_its_rules(browser, studio):
+    opened = Tab(browser, studio)
+    assert opened.errors == []
+    opened.close()
