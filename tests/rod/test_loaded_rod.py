@@ -15,10 +15,11 @@ from softreach.errors import InvalidDesign, InvalidInput
 from softreach.kernels import loaded_reference
 from softreach.rod import equilibrium
 from softreach.rod import loaded as loaded_module
-from softreach.rod.equilibrium import Rung, Solver
+from softreach.rod.equilibrium import Solver
 from softreach.rod.free import FreeRod
 from softreach.rod.load_tables import LoadTables
 from softreach.rod.loaded import LoadedRod
+from softreach.rod.search import Rung
 from softreach.rod.tip_map import TipStatus
 from tests.bodies import oracle_rod, rubber, uniform
 from tests.oracles import column, elastica, loaded_rod

@@ -17,7 +17,7 @@ from numba.core import event
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
 
-__all__ = ["FAST", "inline", "kernel", "pasted", "strict"]
+__all__ = ["FAST", "inline", "inner", "kernel", "pasted", "strict"]
 
 _LOG = logging.getLogger(__name__)
 
@@ -38,6 +38,16 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 def inline(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a small function into its callers; a call left in a loop stops vectorization."""
     return njit(forceinline=True, nogil=True, fastmath=FAST, error_model="numpy")(function)
+
+
+def inner(function: Callable[..., Any]) -> Callable[..., Any]:
+    """As `inline`, for functions of tuples of tuples; a call from Python ends the process.
+
+    What would make them callable from there takes as long to compile as they do.
+    """
+    no_wrapper: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    options = {"nogil": True, "fastmath": FAST, "error_model": "numpy"} | no_wrapper
+    return njit(forceinline=True, **options)(function)
 
 
 def pasted(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -1,275 +1,126 @@
-"""Walk of whole frames from tip to base, with tangents: rods under any loads.
-
-A workspace is one array of rows of LANES numbers, so that the compiler can prove them disjoint.
-"""
+"""Walk of whole frames from tip to base, with tangents: rods under any loads."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from softreach.kernels.compiler import inline, pasted
-from softreach.kernels.explicit_rk8 import at_stages
-from softreach.kernels.lanes import (
-    along,
-    copy,
-    get,
-    get_five,
-    plus,
-    put,
-    put_five,
-    times,
-    turn_at,
-    turned,
+from softreach.kernels.compiler import inner, pasted
+from softreach.kernels.continuation import LOAD, MARGIN, TRIAL
+from softreach.kernels.frame_step import (
+    COLUMN_ROWS,
+    FOLLOWING,
+    PLANE,
+    REST,
+    STATE,
+    step_columns,
+    step_state,
 )
-from softreach.kernels.loaded_column import column_step, state_step
+from softreach.kernels.lanes import copy, get, get_four, put, put_four, turn_at
+from softreach.kernels.quaternion import turned
 from softreach.kernels.rest_frames import STEP_ROWS
 from softreach.kernels.rod import LANES
-from softreach.kernels.vector import cross, dot
+from softreach.kernels.vector import combination, cross, dot, plus, times
 
-__all__ = [
-    "COLUMN",
-    "DONE",
-    "DRIVE",
-    "HELD",
-    "HELD_LOAD",
-    "INCREMENT",
-    "LAST",
-    "LOAD",
-    "MARGIN",
-    "PAST",
-    "PAST_LOAD",
-    "PLANE",
-    "REST",
-    "SIZE",
-    "STAGES",
-    "STATE",
-    "STEP",
-    "TARGET",
-    "TRIAL",
-    "TURNS",
-    "adjugate_rows",
-    "rotation",
-    "walk",
-]
+__all__ = ["TRACE", "adjugate_rows", "rotation", "walk"]
 
-STATE = 0  # G, H, F, M, y
-DRIVE = 30 * LANES  # turn of the unloaded arm per unit of an activation at five nodes
-TARGET = 45 * LANES  # G, H that the base must see
-TRIAL = 51 * LANES  # G, H at the tip
-HELD = 57 * LANES
-PAST = 63 * LANES
-LOAD = 69 * LANES
-HELD_LOAD = 70 * LANES
-PAST_LOAD = 71 * LANES
-INCREMENT = 72 * LANES
-LAST = 73 * LANES
-TURNS = 74 * LANES
-DONE = 75 * LANES
-MARGIN = 76 * LANES
-PLANE = 77 * LANES  # rotations by the first three columns, in the directions of the world
-STEP = 86 * LANES
-COLUMN = 89 * LANES  # the tangent in hand
-STAGES = 104 * LANES  # states at the stages of a step
-REST = 269 * LANES  # the unloaded arm at the nodes of a step
-SIZE = REST + STEP_ROWS * LANES
+TRACE = 19
+"""Numbers kept of a section: G, H, M, y, the turn of the unloaded arm as a quaternion, and the
+force that follows the tip, along G, H, K."""
 
 
-@inline
-def _constants(scalars, n):
-    """1/K1, 1/K3 - 1/K1, 1/K0 and the force at one node; read before the loop over lanes."""
-    force = (scalars[n, 3], scalars[n, 4], scalars[n, 5])
-    return scalars[n, 0], scalars[n, 1], scalars[n, 2], force
+@inner
+def _span(jump, at, axes):
+    return combination((jump[at], jump[at + 1], jump[at + 2]), axes)
 
 
-@inline
-def _all_constants(scalars):
-    return (
-        _constants(scalars, 0),
-        _constants(scalars, 1),
-        _constants(scalars, 2),
-        _constants(scalars, 3),
-        _constants(scalars, 4),
-    )
+@inner
+def _turned_by(theta, g, h, k):
+    return cross(theta, g), cross(theta, h), cross(theta, k)
 
 
-@inline
-def _node(w, c, n, i):
-    at, share = REST + 4 * n * LANES, w[LOAD + i]
-    bending, twisting, axial, force = c[n]
-    return w[at + i], get(w, at + LANES, i), bending, twisting, axial, times(share, force)
+@inner
+def _dead_moment(jump, share, levers, axes):
+    l1, l2, l3 = levers
+    g, h, k = axes
+    m = plus(cross(l1, g), plus(cross(l2, h), cross(l3, k)))
+    return plus(m, times(share, _span(jump, 9, axes)))
 
 
-@inline
-def _nodes(w, c, i):
-    return at_stages(
-        (
-            _node(w, c, 0, i),
-            _node(w, c, 1, i),
-            _node(w, c, 2, i),
-            _node(w, c, 3, i),
-            _node(w, c, 4, i),
-        )
-    )
-
-
-@inline
-def _drives(w, change, unit, i):
-    a, b, c, d, e = change
-    return at_stages(
-        (
-            (a, get(w, DRIVE, i), unit),
-            (b, get(w, DRIVE + 3 * LANES, i), unit),
-            (c, get(w, DRIVE + 6 * LANES, i), unit),
-            (d, get(w, DRIVE + 9 * LANES, i), unit),
-            (e, get(w, DRIVE + 12 * LANES, i), unit),
-        )
-    )
-
-
-@pasted
-def _step_state(w, c):
-    for i in range(LANES):
-        s, at = state_step(_nodes(w, c, i), get_five(w, STATE, i))
-        put_five(w, STATE, i, s)
-        put_five(w, STAGES, i, at[0])
-        put_five(w, STAGES + 15 * LANES, i, at[1])
-        put_five(w, STAGES + 30 * LANES, i, at[2])
-        put_five(w, STAGES + 45 * LANES, i, at[3])
-        put_five(w, STAGES + 60 * LANES, i, at[4])
-        put_five(w, STAGES + 75 * LANES, i, at[5])
-        put_five(w, STAGES + 90 * LANES, i, at[6])
-        put_five(w, STAGES + 105 * LANES, i, at[7])
-        put_five(w, STAGES + 120 * LANES, i, at[8])
-        put_five(w, STAGES + 135 * LANES, i, at[9])
-        put_five(w, STAGES + 150 * LANES, i, at[10])
-
-
-@pasted
-def _step_column(w, c, change, unit):
-    for i in range(LANES):
-        n, v = _nodes(w, c, i), _drives(w, change, unit, i)
-        places = (
-            (n[0], get_five(w, STAGES, i), v[0]),
-            (n[1], get_five(w, STAGES + 15 * LANES, i), v[1]),
-            (n[2], get_five(w, STAGES + 30 * LANES, i), v[2]),
-            (n[3], get_five(w, STAGES + 45 * LANES, i), v[3]),
-            (n[4], get_five(w, STAGES + 60 * LANES, i), v[4]),
-            (n[5], get_five(w, STAGES + 75 * LANES, i), v[5]),
-            (n[6], get_five(w, STAGES + 90 * LANES, i), v[6]),
-            (n[7], get_five(w, STAGES + 105 * LANES, i), v[7]),
-            (n[8], get_five(w, STAGES + 120 * LANES, i), v[8]),
-            (n[9], get_five(w, STAGES + 135 * LANES, i), v[9]),
-            (n[10], get_five(w, STAGES + 150 * LANES, i), v[10]),
-        )
-        t, _ = column_step(places, get_five(w, COLUMN, i))
-        put_five(w, COLUMN, i, t)
-
-
-@inline
-def _drive(w, lanes, rest, bends, change, j):
-    """How an activation turns the unloaded arm over a step: P (dζ̂ û + ζ̂ U) at its five nodes.
-
-    Args:
-        w: Workspace.
-        lanes: Activations.
-        rest: Unloaded arm at the nodes.
-        bends: U at the nodes (node, 3, bundle).
-        change: dζ̂ dZ at the nodes (node,).
-        j: Bundle.
-    """
-    for n in range(5):
-        for i in range(LANES):
-            x, y, z = 0.0, 0.0, 0.0
-            for b in range(bends.shape[2]):
-                x += bends[n, 0, b] * lanes[b, i]
-                y += bends[n, 1, b] * lanes[b, i]
-                z += bends[n, 2, b] * lanes[b, i]
-            length, c = rest[4 * n * LANES + i], change[n]
-            bend = (
-                c * x + length * bends[n, 0, j],
-                c * y + length * bends[n, 1, j],
-                c * z + length * bends[n, 2, j],
-            )
-            q = turn_at(rest, (STEP_ROWS + 4 * n) * LANES, i)
-            put(w, DRIVE + 3 * n * LANES, i, turned(q, bend))
-
-
-@inline
-def _jump(w, columns, rest, jump):
+@inner
+def _jump(w, columns, count, rest, jump):
     """Loads at the tip end of a step: (lever x force (3, 3), moment, following force, moment)."""
     for i in range(LANES):
         q, share = turn_at(rest, STEP_ROWS * LANES, i), w[LOAD + i]
-        a = turned(q, (share, 0.0, 0.0))
-        b = turned(q, (0.0, share, 0.0))
-        c = turned(q, (0.0, 0.0, share))
-        l1 = along(jump[0], jump[3], jump[6], a, b, c)
-        l2 = along(jump[1], jump[4], jump[7], a, b, c)
-        l3 = along(jump[2], jump[5], jump[8], a, b, c)
-        g, h, f, m, y = get_five(w, STATE, i)
+        body = (
+            turned(q, (share, 0.0, 0.0)),
+            turned(q, (0.0, share, 0.0)),
+            turned(q, (0.0, 0.0, share)),
+        )
+        levers = (
+            combination((jump[0], jump[3], jump[6]), body),
+            combination((jump[1], jump[4], jump[7]), body),
+            combination((jump[2], jump[5], jump[8]), body),
+        )
+        g, h, m, _ = get_four(w, STATE, i)
         k = cross(g, h)
-        m = plus(m, _dead_moment(jump, share, l1, l2, l3, g, h, k))
-        m = plus(m, along(jump[15], jump[16], jump[17], a, b, c))
-        f = plus(f, along(jump[12], jump[13], jump[14], a, b, c))
-        put_five(w, STATE, i, (g, h, f, m, y))
-        for n in range(columns.shape[0]):
-            dg, dh, df, dm, dy = get_five(columns[n], 0, i)
-            dk = plus(cross(dg, h), cross(g, dh))
-            dm = plus(dm, _dead_moment(jump, share, l1, l2, l3, dg, dh, dk))
-            put_five(columns[n], 0, i, (dg, dh, df, dm, dy))
+        m = plus(m, _dead_moment(jump, share, levers, (g, h, k)))
+        put(w, STATE + 6 * LANES, i, plus(m, _span(jump, 15, body)))
+        f = _span(jump, 12, body)
+        along = dot(f, g), dot(f, h), dot(f, k)
+        put(w, FOLLOWING, i, plus(get(w, FOLLOWING, i), along))
+        for n in range(count):
+            theta, dm, dy, unit = get_four(columns[n], 0, i)
+            axes = _turned_by(theta, g, h, k)
+            dm = plus(dm, _dead_moment(jump, share, levers, axes))
+            unit = plus(unit, (dot(f, axes[0]), dot(f, axes[1]), dot(f, axes[2])))
+            put_four(columns[n], 0, i, (theta, dm, dy, unit))
 
 
-@inline
-def _dead_moment(jump, share, l1, l2, l3, g, h, k):
-    m = plus(cross(l1, g), plus(cross(l2, h), cross(l3, k)))
-    return plus(m, times(share, along(jump[9], jump[10], jump[11], g, h, k)))
-
-
-@inline
-def _begin(w, columns):
+@inner
+def _begin(w, columns, count, unit_at):
     for i in range(LANES):
-        g, h, zero = get(w, TRIAL, i), get(w, TRIAL + 3 * LANES, i), (0.0, 0.0, 0.0)
-        put_five(w, STATE, i, (g, h, zero, zero, zero))
-        for n in range(columns.shape[0]):
-            put_five(columns[n], 0, i, (zero, zero, zero, zero, zero))
-        e = (1.0, 0.0, 0.0)
-        put_five(columns[0], 0, i, (cross(e, g), cross(e, h), zero, zero, zero))
-        e = (0.0, 1.0, 0.0)
-        put_five(columns[1], 0, i, (cross(e, g), cross(e, h), zero, zero, zero))
-        e = (0.0, 0.0, 1.0)
-        put_five(columns[2], 0, i, (cross(e, g), cross(e, h), zero, zero, zero))
-        w[MARGIN + i] = 1.0
-        _put_rotations(w, columns, i)
+        zero = (0.0, 0.0, 0.0)
+        put(w, STATE, i, get(w, TRIAL, i))
+        put(w, STATE + 3 * LANES, i, get(w, TRIAL + 3 * LANES, i))
+        put(w, STATE + 6 * LANES, i, zero)
+        put(w, STATE + 9 * LANES, i, zero)
+        put(w, FOLLOWING, i, zero)
+    for n in range(count):
+        columns[n, : COLUMN_ROWS * LANES] = 0.0
+        row = n if n < 3 else 9 + n - unit_at
+        if n < 3 or n >= unit_at:
+            columns[n, row * LANES : (row + 1) * LANES] = 1.0
+    if count > 0:
+        for i in range(LANES):
+            w[MARGIN + i] = 1.0
+            _put_rotations(w, columns, i)
 
 
-@inline
-def rotation(s, t):
-    """The rotation that a tangent makes of the frame, in the directions of the world."""
-    g, h, dg, dh = s[0], s[1], t[0], t[1]
-    k = cross(g, h)
-    return dot(dh, k), -dot(dg, k), dot(dg, h)
+@inner
+def rotation(w, theta, i):
+    """The rotation θ of the section along the directions of the world."""
+    g, h = get(w, STATE, i), get(w, STATE + 3 * LANES, i)
+    return dot(theta, g), dot(theta, h), dot(theta, cross(g, h))
 
 
-@inline
+@inner
 def _put_rotations(w, columns, i):
-    s = get_five(w, STATE, i)
     for n in range(3):
-        put(w, PLANE + 3 * n * LANES, i, rotation(s, get_five(columns[n], 0, i)))
+        put(w, PLANE + 3 * n * LANES, i, rotation(w, get(columns[n], 0, i), i))
 
 
-@inline
+@inner
 def adjugate_rows(a, b, c):
     """Rows of det(A) A⁻¹ for a matrix of columns a, b, c."""
     return cross(b, c), cross(c, a), cross(a, b)
 
 
-@inline
+@inner
 def _length(a, b, c):
     return math.sqrt(dot(a, a) + dot(b, b) + dot(c, c))
 
 
-@inline
+@inner
 def _watch(w, columns, i):
     """Note whether the rotations lost their independence during the step.
 
@@ -277,17 +128,9 @@ def _watch(w, columns, i):
     conjugate point within gives it a negative eigenvalue, hence a negative trace, sum of principal
     minors or determinant.
     """
-    a, b, c = (
-        get(w, PLANE, i),
-        get(w, PLANE + 3 * LANES, i),
-        get(w, PLANE + 6 * LANES, i),
-    )
+    a, b, c = get(w, PLANE, i), get(w, PLANE + 3 * LANES, i), get(w, PLANE + 6 * LANES, i)
     _put_rotations(w, columns, i)
-    x, y, z = (
-        get(w, PLANE, i),
-        get(w, PLANE + 3 * LANES, i),
-        get(w, PLANE + 6 * LANES, i),
-    )
+    x, y, z = get(w, PLANE, i), get(w, PLANE + 3 * LANES, i), get(w, PLANE + 6 * LANES, i)
     p1, p2, p3 = adjugate_rows(a, b, c)
     q1, q2, q3 = adjugate_rows(x, y, z)
     before, after = _length(p1, p2, p3), _length(q1, q2, q3)
@@ -298,59 +141,44 @@ def _watch(w, columns, i):
 
 
 @pasted
-def _step_columns(w, columns, lanes, r, c, lengths, bends, bundles, unit_at, zero):
-    """All tangents across one step."""
-    for n in range(columns.shape[0]):
-        j = n - 3
-        driven = 0 <= j < bundles
-        change = lengths[:, j] if driven else zero
-        if driven:
-            _drive(w, lanes, r, bends, change, j)
-        elif j == bundles:
-            w[DRIVE : DRIVE + 15 * LANES] = 0.0
-        u = n - unit_at
-        unit = (1.0 if u == 0 else 0.0, 1.0 if u == 1 else 0.0, 1.0 if u == 2 else 0.0)
-        dz = (change[0], change[1], change[2], change[3], change[4])
-        copy(w, COLUMN, columns[n], 0, 15 * LANES)
-        _step_column(w, c, dz, unit)
-        copy(columns[n], 0, w, COLUMN, 15 * LANES)
+def walk(w, columns, count, lanes, rest, tables, bundles, trace):
+    """From tip to base, with the first `count` tangents.
 
-
-@pasted
-def walk(w, columns, lanes, rest, tables, jumps, bundles, unit_at, trace):
-    """From tip to base: three columns of rotations, some of activations, some of unit forces."""
-    _, lengths, scalars, bends = tables
-    zero = np.zeros(5)
-    _begin(w, columns)
-    for k in range(rest.shape[0]):
+    Args:
+        w: Workspace.
+        columns: Tangents: three of rotations, `bundles` of activations, three of unit forces.
+        count: How many.
+        lanes: Activations.
+        rest: The unloaded arm (step, rows).
+        tables: (pieces, lengths, scalars, bends, jumps).
+        bundles: Columns of activations.
+        trace: Filled with the sections between steps; or empty.
+    """
+    _, lengths, scalars, bends, jumps = tables
+    _begin(w, columns, count, 3 + bundles)
+    for k in range(lengths.shape[0]):
         if jumps[k].any():
-            _jump(w, columns, rest[k], jumps[k])
-            if k == 0:
-                for i in range(LANES):
-                    _put_rotations(w, columns, i)
-        r, c = rest[k], _all_constants(scalars[k])
-        copy(w, REST, r, 0, STEP_ROWS * LANES)
+            _jump(w, columns, count, rest[k], jumps[k])
+        copy(w, REST, rest[k], 0, STEP_ROWS * LANES)
         if k == 0 and trace.shape[0] > 0:
-            _keep(w, r, STEP_ROWS * LANES, trace[:, 0])
-        _step_state(w, c)
-        w[DRIVE : DRIVE + 15 * LANES] = 0.0
-        _step_columns(w, columns, lanes, r, c, lengths[k], bends[k], bundles, unit_at, zero)
-        for i in range(LANES):
-            _watch(w, columns, i)
+            _keep(w, rest[k], STEP_ROWS * LANES, trace[:, 0])
+        step_state(w, scalars[k])
+        step_columns(w, columns, count, lanes, rest[k], scalars[k], lengths[k], bends[k], bundles)
+        if count > 0:
+            for i in range(LANES):
+                _watch(w, columns, i)
         if trace.shape[0] > 0:
-            _keep(w, r, (STEP_ROWS + 16) * LANES, trace[:, k + 1])
+            _keep(w, rest[k], (STEP_ROWS + 16) * LANES, trace[:, k + 1])
 
 
-@inline
+@inner
 def _keep(w, rest, turn, trace):
     """Put the sections that the lanes are at into their places."""
     for i in range(min(LANES, trace.shape[0])):
-        s, q = get_five(w, STATE, i), turn_at(rest, turn, i)
-        for row in range(3):
-            trace[i, row] = s[0][row]
-            trace[i, 3 + row] = s[1][row]
-            trace[i, 6 + row] = s[3][row]
-            trace[i, 9 + row] = s[4][row]
-            trace[i, 16 + row] = s[2][row]
+        q, f = turn_at(rest, turn, i), get(w, FOLLOWING, i)
+        for row in range(12):
+            trace[i, row] = w[STATE + row * LANES + i]
         for row in range(4):
             trace[i, 12 + row] = q[row]
+        for row in range(3):
+            trace[i, 16 + row] = f[row]

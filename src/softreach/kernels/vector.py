@@ -16,6 +16,7 @@ __all__ = [
     "dot",
     "matrix",
     "minus",
+    "plus",
     "row",
     "times",
 ]
@@ -37,6 +38,12 @@ def difference(points, i, j):
 def minus(a, b):
     """a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@inline
+def plus(a, b):
+    """a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @inline

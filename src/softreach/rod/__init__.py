@@ -2,10 +2,11 @@
 
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.all_equilibria import AllEquilibria, equilibria
-from softreach.rod.equilibrium import Equilibria, Rung
+from softreach.rod.found_equilibria import Equilibria
 from softreach.rod.free_bundles import FreeBundles, free_bundles
 from softreach.rod.kinematics import configuration, tip_jacobian, tip_positions
 from softreach.rod.loaded import LoadedRod
+from softreach.rod.search import Rung
 from softreach.rod.tip_map import (
     Frames,
     StrainRange,

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from enum import IntEnum
 from functools import cached_property, partial
 from typing import NamedTuple
 
@@ -14,123 +12,27 @@ from numpy.typing import NDArray
 from softreach import parallel
 from softreach.kernels import loaded, loaded_general
 from softreach.rod.activation_box import ActivationBox
+from softreach.rod.found_equilibria import Equilibria, Response
 from softreach.rod.load_tables import LoadTables, StepTables
+from softreach.rod.loaded_shapes import Shapes, shapes_of
+from softreach.rod.search import CONTINUATION, DIRECT, HELD, NEAR, PATIENT, Rung, Search
 from softreach.rod.start_grid import StartGrid, grid_sizes
-from softreach.rod.tip_map import Frames, TipStatus
+from softreach.rod.tip_map import TipStatus
 
-__all__ = ["Equilibria", "Response", "Rung", "Shapes", "Solver"]
+__all__ = ["LATER_RUNGS", "Solver"]
 
 Array = NDArray[np.float64]
 
 
-class Rung(IntEnum):
-    """How an equilibrium was found."""
-
-    DIRECT = 0
-    """Newton's method, all load at once."""
-    CONTINUATION = 1
-    """The load grown in steps along the branch."""
-    PATIENT = 2
-    """The same in steps an order smaller."""
-    NONE = 3
-    """Not found: the branch ends before all of the load is on."""
-
-
-class _Search(NamedTuple):
-    """How boldly the kernels search."""
-
-    increment: float
-    """First share of the load to try."""
-    widest: float
-    """Longest first Newton step that is trusted [rad]."""
-    walks: int
-    """Walks allowed."""
-
-
-# An arm that jumps to another branch on its way lands on an unstable one (design/loaded_rod.md);
-# so whatever is not found stable is searched again, more patiently. Where an arm almost buckles to
-# either side, only the last search follows it to the side to which it leans.
-_DIRECT = _Search(1.0, 1.2, 7)
-_CONTINUATION = _Search(0.25, 0.1, 400)
-_PATIENT = _Search(1 / 64, 0.03, 2000)
 _COARSE_STEP = 0.05  # Newton step at which coarse steps have done their work
+_CAREFUL_STEP = 1e-3  # the same of a continuation, on fine steps
+_NEAR_STEP = 1e-7  # Newton step that may be taken linearly
 _DOUBTFUL = 0.02  # margin below which the tangents of coarse steps decide nothing
 _OF_TOL = 1e-2  # what the search may use up of the tolerance
 _FOUND = 1.0
+LATER_RUNGS = {Rung.CONTINUATION: CONTINUATION, Rung.PATIENT: PATIENT}
+"""How what the first rung leaves in doubt is searched again, in this order."""
 _TRACED = 1 << 20  # numbers kept of the sections of all arms in one task, 8 MB
-
-
-class Equilibria(NamedTuple):
-    """Where tips come to rest."""
-
-    tips: Array
-    """r [m], shape (n, 3); NaN where there is no equilibrium on the branch."""
-    status: NDArray[np.int8]
-    """`TipStatus`, shape (n,)."""
-    margin: Array
-    """How far from the loss of stability, from 1 to below 0 [-], shape (n,)."""
-    rung: NDArray[np.int8]
-    """`Rung`, shape (n,)."""
-    frame: Array
-    """First axis of the world at the tip, as the base of the unloaded arm sees it, (n, 3); with
-    loads of several directions also the second one, (n, 6)."""
-
-    @classmethod
-    def empty(cls, n: int, components: int) -> Equilibria:
-        """Room for n."""
-        return cls(
-            np.full((n, 3), np.nan),
-            np.full(n, TipStatus.NO_EQUILIBRIUM, np.int8),
-            np.full(n, np.nan),
-            np.full(n, Rung.NONE, np.int8),
-            np.zeros((n, components)),
-        )
-
-    def of(self, rows: slice | NDArray[np.bool_]) -> Equilibria:
-        """Some of them; a slice shares memory."""
-        tips, status, margin, rung, frame = self
-        return Equilibria(tips[rows], status[rows], margin[rows], rung[rows], frame[rows])
-
-
-class Response(NamedTuple):
-    """How tips answer to activations and forces."""
-
-    tips: Array
-    """r [m], shape (n, 3)."""
-    twists: Array
-    """(v, ω) per activation, shape (n, 6, bundles)."""
-    compliance: Array
-    """∂r/∂F [m/N], shape (n, 3, 3), or (0, 3, 3)."""
-    status: NDArray[np.int8]
-    """`TipStatus`, shape (n,)."""
-
-    @classmethod
-    def empty(cls, n: int, bundles: int, *, compliance: bool) -> Response:
-        """Room for n."""
-        forces = n if compliance else 0
-        status = np.empty(n, np.int8)
-        return cls(np.empty((n, 3)), np.empty((n, 6, bundles)), np.empty((forces, 3, 3)), status)
-
-
-class Shapes(NamedTuple):
-    """Arms at stations."""
-
-    frames: Frames
-    moment: Array
-    """m [N m] in the directors, shape (n, station, 3)."""
-    force: Array
-    """n [N] in the directors, shape (n, station, 3)."""
-
-    @classmethod
-    def empty(cls, n: int, stations: int) -> Shapes:
-        """Room for n."""
-        position, moment, force = np.empty((3, n, stations, 3))
-        return cls(Frames(position, np.empty((n, stations, 3, 3))), moment, force)
-
-    def put(self, rows: slice, some: Shapes) -> None:
-        """Put some into place."""
-        self.frames.position[rows], self.frames.directors[rows] = some.frames
-        self.moment[rows], self.force[rows] = some.moment, some.force
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,10 +71,6 @@ class Solver:
         """The same with twice the steps."""
         return Solver(self.tables, 2 * self.steps, self.tol)
 
-    def task(self, gamma: Array, found: Equilibria) -> Callable[[], None]:
-        """The work of filling `found`, to be run on any thread."""
-        return partial(self._fill, gamma, found)
-
     def empty(self, n: int) -> Equilibria:
         """Room for n equilibria."""
         return Equilibria.empty(n, 3 if self.tables.one_direction else 6)
@@ -180,36 +78,45 @@ class Solver:
     def find(self, gamma: Array) -> Equilibria:
         """The equilibria of activations (n, bundles), on the calling thread."""
         found = self.empty(len(gamma))
-        self._fill(gamma, found)
+        self.direct(gamma, found)
+        for rung in LATER_RUNGS:
+            rows = self.doubtful(found, rung)
+            if len(rows):
+                self.again(gamma, rows, rung, found)
         return found
+
+    def direct(self, gamma: Array, found: Equilibria) -> None:
+        """The first rung, for all of some activations (n, bundles), on the calling thread."""
+        guesses = None if self.starts is None else self.starts.at(gamma)
+        self._try(gamma, slice(None), DIRECT, Rung.DIRECT, found, guesses)
+
+    def doubtful(self, found: Equilibria, rung: Rung) -> NDArray[np.intp]:
+        """Rows that a later rung is to search again."""
+        lost = found.status == TipStatus.NO_EQUILIBRIUM
+        least = 0.0 if rung == Rung.PATIENT else _DOUBTFUL
+        return np.flatnonzero(lost | (found.margin < least))
+
+    def again(self, gamma: Array, rows: NDArray[np.intp], rung: Rung, found: Equilibria) -> None:
+        """A later rung, for some rows of all activations, on the calling thread."""
+        self._try(gamma, rows, LATER_RUNGS[rung], rung, found)
 
     def near(self, gamma: Array, known: Equilibria) -> Equilibria:
         """Equilibria near known ones of other steps."""
         found = self.empty(len(gamma))
-        self._try(gamma, slice(None), _DIRECT, Rung.DIRECT, found, known.frame)
+        self._try(gamma, slice(None), DIRECT, Rung.DIRECT, found, known.frame)
         return found
 
     def slowly(self, gamma: Array) -> Equilibria:
         """Equilibria found by the most patient continuation alone."""
         found = self.empty(len(gamma))
-        self._try(gamma, slice(None), _PATIENT, Rung.PATIENT, found)
+        self._try(gamma, slice(None), PATIENT, Rung.PATIENT, found)
         return found
-
-    def _fill(self, gamma: Array, found: Equilibria) -> None:
-        guesses = None if self.starts is None else self.starts.at(gamma)
-        self._try(gamma, slice(None), _DIRECT, Rung.DIRECT, found, guesses)
-        for search, rung in ((_CONTINUATION, Rung.CONTINUATION), (_PATIENT, Rung.PATIENT)):
-            lost = found.status == TipStatus.NO_EQUILIBRIUM
-            least = 0.0 if rung == Rung.PATIENT else _DOUBTFUL
-            rest = np.flatnonzero(lost | (found.margin < least))
-            if len(rest):
-                self._try(gamma, rest, search, rung, found)
 
     def _try(
         self,
         gamma: Array,
         rows: slice | NDArray[np.intp],
-        search: _Search,
+        search: Search,
         rung: Rung,
         found: Equilibria,
         guesses: Array | None = None,
@@ -236,24 +143,31 @@ class Solver:
         found.status[rows] = np.where(good, stable, TipStatus.NO_EQUILIBRIUM)
         found.rung[rows] = np.where(good, rung, Rung.NONE)
 
-    def _along_one(self, gamma: Array, search: _Search, guesses: Array | None):
+    def _first_phase(self, search: Search) -> tuple[StepTables, float]:
+        """Steps for Newton's method, and how near [rad] it is to come."""
+        if search is DIRECT:
+            return self._coarse, _COARSE_STEP
+        return self._fine, _CAREFUL_STEP
+
+    @property
+    def _tiny(self) -> float:
+        """What the search may leave [rad]."""
+        return max(_OF_TOL * self.tol, 1e-13)
+
+    def _along_one(self, gamma: Array, search: Search, guesses: Array | None):
         return self._one(gamma, search, guesses)[:4]
 
-    def _one(self, gamma: Array, search: _Search, guesses: Array | None):
-        fine = self._fine.for_one_direction
-        direct = search is _DIRECT
-        coarse = self._coarse.for_one_direction if direct else fine
-        tiny = max(_OF_TOL * self.tol, 1e-13)
-        small = _COARSE_STEP if direct else min(_COARSE_STEP, 1e-3)
+    def _one(self, gamma: Array, search: Search, guesses: Array | None):
+        coarse, small = self._first_phase(search)
         out = np.empty((len(gamma), 10))
         loaded.solve(
             gamma,
             self.tables.axes[0],
             self.tables.at_tip,
             np.zeros((0, 3)) if guesses is None else guesses,
-            coarse,
-            fine,
-            (search.increment, search.widest, small, tiny),
+            coarse.for_one_direction,
+            self._fine.for_one_direction,
+            (search.increment, search.widest, small, self._tiny),
             (search.walks, 10),
             out,
         )
@@ -278,83 +192,54 @@ class Solver:
         edges = self.tables.edges(stations, self.steps)
         table, z = self.tables.of_edges(edges), self.tables.arm.profile.station(edges)
         rows = np.abs(z[None] - np.append(stations, 0.0)[:, None]).argmin(axis=1)
-        frames, nowhere = self._whole(directions), np.full(len(rows), np.nan)
-        found, *_, trace = self._general(_columns(gamma), table, _HELD, frames, trace=True)
-        at, lost = np.zeros((len(gamma), 3)), np.zeros(len(gamma), bool)
-        force = self._force_at(table, rows)
-        shapes = _shapes(at, trace[:, rows], force, nowhere, lost, self.tables)
-        return _on_base(shapes), found[:, 9]
+        frames = np.concatenate([directions, _across(directions)], axis=1)
+        limits = (HELD.increment, HELD.widest, _NEAR_STEP, 0.0, 1.0)
+        walked = _general(
+            _columns(gamma),
+            self.tables.axes,
+            frames,
+            table,
+            table,
+            limits,
+            (HELD.walks, 0),
+            trace=True,
+        )
+        at, nowhere = np.zeros((len(gamma), 3)), np.full(len(rows), np.nan)
+        shapes = shapes_of(at, walked.trace, rows, self._force_at(table, rows), nowhere)
+        return shapes.on_base(), walked.found[:, 9]
 
-    def _whole(self, frame: Array) -> Array:
-        """Both axes; the second is turned as the first one is, by the shortest way."""
-        if frame.shape[1] == 6:
-            return frame
-        first = frame
-        g, h = self.tables.axes[0], self.tables.axes[1]
-        axis, cosine = np.cross(g, first), first @ g
-        along = axis @ h
-        safe = np.maximum(1.0 + cosine, 1e-6)
-        turned = cosine[:, None] * h + np.cross(axis, h) + (along / safe)[:, None] * axis
-        turned -= (turned * first).sum(axis=1, keepdims=True) * first
-        turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-12)
-        return np.concatenate([first, turned], axis=1)
-
-    def _in_general(self, gamma: Array, search: _Search, guesses: Array | None):
-        found = self._general(gamma, self._fine, search, guesses)[0]
+    def _in_general(self, gamma: Array, search: Search, guesses: Array | None):
+        coarse, small = self._first_phase(search)
+        limits = (search.increment, search.widest, small, self._tiny, 0.0)
+        found = _general(
+            gamma, self.tables.axes, guesses, coarse, self._fine, limits, (search.walks, 10)
+        ).found
         return found[:, :3], found[:, 3:9], found[:, 9], found[:, 10]
 
-    def _general(
-        self,
-        gamma: Array,
-        table: StepTables,
-        search: _Search,
-        guesses: Array | None,
-        *,
-        slopes: bool = False,
-        compliance: bool = False,
-        trace: bool = False,
-    ) -> tuple[Array, Array, Array, Array]:
-        n, steps = len(gamma), len(table.lengths)
-        found = np.empty((n, 12))
-        twists = np.zeros((n if slopes else 0, 6, gamma.shape[1]))
-        yields = np.zeros((n if compliance else 0, 3, 3))
-        traced = np.zeros((n if trace else 0, steps + 1, loaded_general.TRACE))
-        loaded_general.solve(
-            gamma,
-            self.tables.axes,
-            table.jumps,
-            np.zeros((0, 6)) if guesses is None else guesses,
-            (table.pieces, table.lengths, table.scalars, table.bends),
-            (search.increment, search.widest, 1e-5),
-            search.walks,
-            found,
-            twists,
-            yields,
-            traced,
+    def _near(self, gamma: Array, known: Equilibria, table: StepTables, **asked: bool) -> _Walked:
+        """The last walk again, from known equilibria, with whatever more is asked for."""
+        one = self.tables.one_direction
+        limits = (NEAR.increment, NEAR.widest, _NEAR_STEP, 0.0, float(one))
+        frame = np.concatenate([known.frame, _across(known.frame)], axis=1) if one else known.frame
+        walked = _general(
+            gamma, self.tables.axes, frame, table, table, limits, (NEAR.walks, 0), **asked
         )
-        return found, twists, yields, traced
+        lost = (known.status == TipStatus.NO_EQUILIBRIUM) | (walked.found[:, 10] != _FOUND)
+        for values in (walked.found[:, :3], walked.slopes, walked.compliance):
+            if len(values):
+                values[lost] = np.nan
+        return walked
 
     def respond(
         self, gamma: Array, *, compliance: bool = False, known: Equilibria | None = None
     ) -> Response:
         """Tips with their derivatives; NaN where there is no equilibrium."""
         known = self.find(gamma) if known is None else known
-        found, twists, yields, _ = self._general(
-            _columns(gamma),
-            self._fine,
-            _NEAR,
-            self._whole(known.frame),
-            slopes=True,
-            compliance=compliance,
-        )
-        lost = (known.status == TipStatus.NO_EQUILIBRIUM) | (found[:, 10] != _FOUND)
-        tips = found[:, :3].copy()
-        for values in (tips, twists, yields):
-            if len(values):
-                values[lost] = np.nan
-        in_base = yields @ self.tables.axes if compliance else yields
-        status = np.where(lost, np.int8(TipStatus.NO_EQUILIBRIUM), known.status)
-        return Response(tips, twists[:, :, : gamma.shape[1]], in_base, status)
+        walked = self._near(_columns(gamma), known, self._fine, slopes=True, compliance=compliance)
+        tips, twists = walked.found[:, :3].copy(), walked.slopes[:, :, : gamma.shape[1]]
+        lost = np.isnan(tips[:, 0])
+        status = np.where(lost, TipStatus.NO_EQUILIBRIUM, known.status).astype(np.int8)
+        return Response(tips, twists, walked.compliance, status)
 
     def shapes(self, gamma: Array, stations: Array) -> Shapes:
         """Arms at ascending stations Z [m]; NaN where there is no equilibrium."""
@@ -374,14 +259,9 @@ class Solver:
         self, gamma: Array, stations: Array, table: StepTables, rows: NDArray[np.intp]
     ) -> Shapes:
         """Arms at stations, which are these boundaries of the steps; on the calling thread."""
-        known = self.find(gamma)
-        found, _, _, trace = self._general(
-            _columns(gamma), table, _NEAR, self._whole(known.frame), trace=True
-        )
-        lost = (known.status == TipStatus.NO_EQUILIBRIUM) | (found[:, 10] != _FOUND)
-        return _shapes(
-            found[:, :3], trace[:, rows], self._force_at(table, rows), stations, lost, self.tables
-        )
+        walked = self._near(_columns(gamma), self.find(gamma), table, trace=True)
+        force = self._force_at(table, rows)
+        return shapes_of(walked.found[:, :3], walked.trace, rows, force, stations)
 
     def _force_at(self, table: StepTables, rows: NDArray[np.intp]) -> Array:
         """Dead force at boundaries along the world's axes, as the step beyond has it, (row, 3)."""
@@ -389,64 +269,48 @@ class Solver:
         return at_ends[rows]
 
 
-# From a known equilibrium: only the rotation about gravity may be far off.
-_NEAR = _Search(1.0, 4.0, 12)
-# One walk from where it is.
-_HELD = _Search(1.0, 4.0, 0)
+class _Walked(NamedTuple):
+    """What the kernel of general loads gives."""
+
+    found: Array
+    slopes: Array
+    compliance: Array
+    trace: Array
+
+
+def _general(
+    gamma: Array,
+    axes: Array,
+    guesses: Array | None,
+    coarse: StepTables,
+    fine: StepTables,
+    limits: tuple[float, ...],
+    most: tuple[int, int],
+    *,
+    slopes: bool = False,
+    compliance: bool = False,
+    trace: bool = False,
+) -> _Walked:
+    """See `loaded_general.solve`."""
+    n = len(gamma)
+    walked = _Walked(
+        np.empty((n, 13)),
+        np.zeros((n if slopes else 0, 6, gamma.shape[1])),
+        np.zeros((n if compliance else 0, 3, 3)),
+        np.zeros((n if trace else 0, len(coarse.lengths) + 1, loaded_general.TRACE)),
+    )
+    guessed = np.zeros((0, 6)) if guesses is None else guesses
+    loaded_general.solve(gamma, axes, guessed, tuple(coarse), tuple(fine), limits, most, *walked)
+    return walked
+
+
+def _across(directions: Array) -> Array:
+    """Some unit vector normal to each (n, 3)."""
+    other = np.eye(3)[np.abs(directions).argmin(axis=1)]
+    across = np.cross(directions, other)
+    return across / np.linalg.norm(across, axis=1, keepdims=True)
 
 
 def _columns(gamma: Array) -> Array:
     """Activations for kernels, which want one bundle at least."""
     return gamma if gamma.shape[1] else np.zeros((len(gamma), 1))
-
-
-def _shapes(
-    tips: Array,
-    trace: Array,
-    force: Array,
-    stations: Array,
-    lost: NDArray[np.bool_],
-    tables: LoadTables,
-) -> Shapes:
-    """Shapes from what the kernel keeps of sections: axes, moment and tip as each sees them."""
-    seen = _orthonormal(trace[..., 0:3], trace[..., 3:6])
-    turn = _matrix(trace[..., 12:16])
-    world = seen @ turn  # axes of the world in the directors
-    directors = np.swapaxes(world, -1, -2) @ tables.axes
-    back = np.einsum("nsac,nsc->nsa", seen, trace[..., 9:12]) @ tables.axes
-    position = tips[:, None] - back
-    position[:, stations == 0.0] = 0.0
-    directors[:, stations == 0.0] = np.eye(3)
-    moment = np.einsum("nsc,nscd->nsd", trace[..., 6:9], turn)
-    follower = np.einsum("nsc,nscd->nsd", trace[..., 16:19], turn)
-    thrust = np.einsum("sa,nsad->nsd", force, world) + follower
-    for values in (position, directors, moment, thrust):
-        values[lost] = np.nan
-    return Shapes(Frames(position, directors), moment, thrust)
-
-
-def _on_base(shapes: Shapes) -> Shapes:
-    """Shapes moved and turned so that their last station stands on the base, and without it."""
-    (position, directors), moment, force = shapes
-    turn = np.swapaxes(directors[:, -1], -1, -2)
-    position, directors = (position - position[:, -1:]) @ turn, directors @ turn[:, None]
-    return Shapes(Frames(position[:, :-1], directors[:, :-1]), moment[:, :-1], force[:, :-1])
-
-
-def _orthonormal(g: Array, h: Array) -> Array:
-    """Axes of the world in the frame of the walk, without the errors of the steps."""
-    g = g / np.linalg.norm(g, axis=-1, keepdims=True)
-    h = h - (g * h).sum(axis=-1, keepdims=True) * g
-    h /= np.linalg.norm(h, axis=-1, keepdims=True)
-    return np.stack([g, h, np.cross(g, h)], axis=-2)
-
-
-def _matrix(q: Array) -> Array:
-    """Rotation matrices of unit quaternions, shape (..., 3, 3)."""
-    w, x, y, z = np.moveaxis(q, -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

@@ -10,21 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
-from softreach.arm.manipulator import Manipulator
-from softreach.arm.tables import check_extension, tables
+from softreach.arm.tables import tables
 from softreach.kernels import frames, jacobian, rod
-from softreach.rod.activation_box import ActivationBox
+from softreach.rod.arm_rod import ArmRod
 from softreach.rod.linear_strains import linear_strains, strain_range
 from softreach.rod.linearization import Linearization
-from softreach.rod.steps import StepRule, check_tol
+from softreach.rod.steps import StepRule
 from softreach.rod.tip_map import (
     BLOCK,
     Frames,
     StrainRange,
     Strains,
-    TipMap,
     position_slopes,
-    tip_map,
 )
 
 __all__ = ["FreeRod"]
@@ -33,33 +30,8 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False)
-class FreeRod(TipMap):
-    """r' = ζ d3, dᵢ' = ζ u × dᵢ with ζ = 1 + z·γ, u = Uγ: theory (18), by sixth-order Magnus steps.
-
-    Raises:
-        InvalidInput: `tol` out of range.
-        InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
-    """
-
-    arm: Manipulator
-    tol: float = 1e-6
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "tol", check_tol(self.tol))
-        check_extension(self.arm)
-
-    @property
-    def box(self) -> ActivationBox:
-        """The activations within bounds."""
-        return self._box
-
-    @cached_property
-    def _box(self) -> ActivationBox:
-        return ActivationBox.between(self.arm.bounds, self.arm.bundle_names)
-
-    def refined(self, tol: float) -> TipMap:
-        """The map of the same arm to a smaller tolerance; itself if its own is no larger."""
-        return self if self.tol <= tol else tip_map(self.arm, tol)
+class FreeRod(ArmRod):
+    """r' = ζ d3, dᵢ' = ζ u × dᵢ with ζ = 1 + z·γ, u = Uγ, in Magnus steps of order 6: (18)."""
 
     @cached_property
     def rule(self) -> StepRule:
@@ -141,10 +113,6 @@ class FreeRod(TipMap):
         """What the strains at stations Z [m] can be within the activation box."""
         z = self.check_stations(stations, ascending=False)
         return strain_range(tables(self.arm, z), self.box)
-
-    def radius(self, stations: ArrayLike) -> Array:
-        """Outer radius R2 before activation at stations Z [m]."""
-        return self.arm.profile.radius(stations)
 
     def _station_table(self, z: Array) -> tuple[Array, NDArray[np.int64]]:
         """Packed tables with a step boundary at every station, and the steps up to each."""

@@ -14,6 +14,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import compliance, tables
 from softreach.kernels import magnus, rest_frames, rod
 from softreach.kernels.explicit_rk8 import NODES
+from softreach.rod.steps import edges_between
 
 __all__ = ["ArmBody", "Body", "LoadTables", "StepTables"]
 
@@ -134,14 +135,7 @@ class LoadTables:
         profile = self.arm.profile
         breaks = [*self.arm.breakpoints, *(one.station for one in self.loads.point_loads)]
         z = np.unique(np.concatenate([[0.0, self.arm.length], breaks, stations]))
-        s = profile.slender_coordinate(z)
-        gaps = np.diff(s)
-        counts = np.maximum(1, np.ceil(gaps / (profile.slender_length / steps) * (1 - 1e-12)))
-        inner = [
-            start + gap * np.arange(count) / count
-            for start, gap, count in zip(s[:-1], gaps, counts, strict=True)
-        ]
-        return np.concatenate([*inner, s[-1:]])[::-1]
+        return edges_between(profile, profile.slender_coordinate(z), steps)[::-1]
 
     def between(self, stations: Array, steps: int) -> StepTables:
         """Tables with a boundary at every station Z [m] too."""

@@ -11,25 +11,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
 from softreach.arm.loads import Loads
-from softreach.arm.manipulator import Manipulator
-from softreach.arm.tables import check_extension, tables
+from softreach.arm.tables import tables
 from softreach.errors import InvalidInput
-from softreach.rod.activation_box import ActivationBox
-from softreach.rod.equilibrium import Equilibria, Response, Solver
+from softreach.kernels.rod import LANES
+from softreach.rod.arm_rod import ArmRod
+from softreach.rod.equilibrium import LATER_RUNGS, Solver
+from softreach.rod.found_equilibria import Equilibria, Response
 from softreach.rod.free import FreeRod
 from softreach.rod.linear_strains import linear_strains
 from softreach.rod.load_tables import ArmBody, Body, LoadTables
 from softreach.rod.pilot import pilot_activations
-from softreach.rod.steps import check_tol
 from softreach.rod.tip_map import (
     BLOCK,
     Frames,
     StrainRange,
     Strains,
-    TipMap,
     TipStatus,
     position_slopes,
-    tip_map,
 )
 
 __all__ = ["LoadedRod"]
@@ -44,40 +42,16 @@ _BLOCK = BLOCK // 8  # samples per task
 
 
 @dataclass(frozen=True, repr=False)
-class LoadedRod(TipMap):
+class LoadedRod(ArmRod):
     """r' = ζ d3, dᵢ' = ζ̂ u × dᵢ with u = û + K⁻¹m, ζ = ζ̂ (1 + n3/K0), shot from the tip.
 
     The equilibrium is the one that an arm comes to which is activated first and loaded slowly then.
-
-    Raises:
-        InvalidInput: `tol` out of range.
-        InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
     """
-
-    arm: Manipulator
-    tol: float = 1e-6
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "tol", check_tol(self.tol))
-        check_extension(self.arm)
 
     @property
     def supports_unstable(self) -> bool:
         """Whether a tip can have another status than stable."""
         return True
-
-    @property
-    def box(self) -> ActivationBox:
-        """The activations within bounds."""
-        return self._box
-
-    @cached_property
-    def _box(self) -> ActivationBox:
-        return ActivationBox.between(self.arm.bounds, self.arm.bundle_names)
-
-    def refined(self, tol: float) -> TipMap:
-        """The map of the same arm to a smaller tolerance; itself if its own is no larger."""
-        return self if self.tol <= tol else tip_map(self.arm, tol)
 
     @property
     def loads(self) -> Loads:
@@ -145,12 +119,18 @@ class LoadedRod(TipMap):
         return self._solver_of(self.steps).with_starts(self.box)
 
     def equilibria(self, activations: ArrayLike) -> Equilibria:
-        """Tips with their status, the margin of stability, and how each was found."""
-        gamma = self.box.check(activations)
-        found = self._solver.empty(len(gamma))
-        parallel.run(
-            self._solver.task(gamma[b], found.of(b)) for b in parallel.blocks(len(gamma), _BLOCK)
-        )
+        """Tips with their status, the margin of stability, and how each was found.
+
+        What is to be searched again is gathered from all samples, so that kernels get whole blocks.
+        """
+        gamma, solver = self.box.check(activations), self._solver
+        found = solver.empty(len(gamma))
+        blocks = parallel.blocks(len(gamma), _BLOCK)
+        parallel.run(partial(solver.direct, gamma[b], found.of(b)) for b in blocks)
+        for rung in LATER_RUNGS:
+            rows = solver.doubtful(found, rung)
+            blocks = parallel.blocks(len(rows), LANES)
+            parallel.run(partial(solver.again, gamma, rows[b], rung, found) for b in blocks)
         return found
 
     def status(self, activations: ArrayLike) -> NDArray[np.int8]:
@@ -259,10 +239,6 @@ class LoadedRod(TipMap):
             _range(found.curvature[..., 2]),
             _range(found.extension),
         )
-
-    def radius(self, stations: ArrayLike) -> Array:
-        """Outer radius R2 before activation at stations Z [m]."""
-        return self.arm.profile.radius(stations)
 
 
 def _range(values: Array) -> Array:

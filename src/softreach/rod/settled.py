@@ -25,22 +25,22 @@ def check_settled(rod: TipMap) -> TipMap:
         InvalidInput: Some have none.
     """
     if rod.supports_unstable:
-        _check(rod)
+        lost, tried = _lost(rod)
+        if lost:
+            found = f"{lost} of {tried} activations tried have no stable equilibrium"
+            allowed = "such that every activation has one"
+            hint = "lighten the load or narrow the bounds; a cloud says which samples have one"
+            raise InvalidInput("loads", found, allowed, hint)
     return rod
 
 
 @lru_cache(maxsize=64)
-def _check(rod: TipMap) -> None:
+def _lost(rod: TipMap) -> tuple[int, int]:
+    """How many activations have no stable equilibrium, and of how many tried."""
     (cube,) = cube_blocks("sobol", _SAMPLES, rod.box.bundles, 0, _SAMPLES)
-    gamma = np.concatenate([rod.box.from_cube(cube), _corners(rod)])[
-        : None if rod.box.bundles else 1
-    ]
-    lost = int((rod.status(gamma) != TipStatus.STABLE).sum())
-    if lost:
-        found = f"{lost} of {len(gamma)} activations tried have no stable equilibrium"
-        allowed = "such that every activation has one"
-        hint = "lighten the load or narrow the bounds; a cloud says which samples have one"
-        raise InvalidInput("loads", found, allowed, hint)
+    gamma = np.concatenate([rod.box.from_cube(cube), _corners(rod)])
+    gamma = gamma if rod.box.bundles else gamma[:1]
+    return int((rod.status(gamma) != TipStatus.STABLE).sum()), len(gamma)
 
 
 def _corners(rod: TipMap) -> np.ndarray:

@@ -15,13 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.profile import Profile
 from softreach.arm.tables import both_sides, tables
 from softreach.errors import InvalidInput
 from softreach.kernels import frames, magnus, rod
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.pilot import pilot_activations, worsened
 
-__all__ = ["Nodes", "StepRule", "check_tol"]
+__all__ = ["Nodes", "StepRule", "check_tol", "edges_between", "step_counts"]
 
 Array = NDArray[np.float64]
 Differences = Callable[[Array], Array]
@@ -59,7 +60,7 @@ class StepRule:
 
     def edges(self, steps: int) -> Array:
         """Step boundaries S [-] from base to tip, with no step longer than `steps` uniform ones."""
-        return self._between(self._breaks, steps)
+        return edges_between(self.arm.profile, self._breaks, steps)
 
     @cached_property
     def _breaks(self) -> Array:
@@ -67,17 +68,6 @@ class StepRule:
         profile = self.arm.profile
         inside = profile.slender_coordinate(np.array(self.arm.breakpoints))
         return np.array([0.0, *inside, profile.slender_length])
-
-    def _between(self, marks: Array, steps: int) -> Array:
-        """Step boundaries that hold all marks, the first and the last of which are the ends."""
-        gaps = np.diff(marks)
-        pieces = zip(marks[:-1], gaps, self._counts(gaps, steps), strict=True)
-        edges = [start + gap * np.arange(n) / n for start, gap, n in pieces]
-        return np.concatenate([*edges, marks[-1:]])
-
-    def _counts(self, gaps: Array, steps: int) -> NDArray[np.int64]:
-        """Steps in each gap of S; a gap that only rounding makes longer takes no more for it."""
-        return np.ceil(gaps * (steps / self.arm.profile.slender_length) - 1e-9).astype(np.int64)
 
     def nodes(self, edges: ArrayLike) -> Nodes:
         """Tables at the Gauss nodes of the steps between `edges`, uniform in S within each step.
@@ -120,8 +110,9 @@ class StepRule:
         s = self.arm.profile.slender_coordinate(stations)
         inside = self._breaks[self._breaks < s[-1]]
         marks = np.unique(np.concatenate([inside, s]))
-        ends = np.cumsum(np.append(0, self._counts(np.diff(marks), steps)))
-        return self.nodes(self._between(marks, steps)), ends[np.searchsorted(marks, s)]
+        profile = self.arm.profile
+        ends = np.cumsum(np.append(0, step_counts(profile, np.diff(marks), steps)))
+        return self.nodes(edges_between(profile, marks, steps)), ends[np.searchsorted(marks, s)]
 
     def steps_for(self, tol: float) -> int:
         """The number of uniform steps in S for which no tip is off by more than `tol`.
@@ -218,6 +209,25 @@ class StepRule:
             return np.concatenate([of_block(gamma[block]) for block in rows])
 
         return difference
+
+
+def edges_between(profile: Profile, marks: Array, steps: int) -> Array:
+    """Step boundaries S [-] that hold all marks, with no step longer than `steps` uniform ones.
+
+    Args:
+        profile: Of the arm.
+        marks: Ascending S [-], the first and the last of which are the ends.
+        steps: Uniform steps along the whole arm.
+    """
+    gaps = np.diff(marks)
+    pieces = zip(marks[:-1], gaps, step_counts(profile, gaps, steps), strict=True)
+    edges = [start + gap * np.arange(n) / n for start, gap, n in pieces]
+    return np.concatenate([*edges, marks[-1:]])
+
+
+def step_counts(profile: Profile, gaps: Array, steps: int) -> NDArray[np.int64]:
+    """Steps in each gap of S; a gap that only rounding makes longer takes no more for it."""
+    return np.ceil(gaps * (steps / profile.slender_length) - 1e-9).astype(np.int64)
 
 
 def check_tol(tol: float) -> float:
