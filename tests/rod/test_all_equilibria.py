@@ -10,8 +10,7 @@ import pytest
 import softreach as sr
 from softreach.arm.loads import PointLoad
 from softreach.rod import TipStatus, all_equilibria, tip_map
-from tests.bodies import rubber
-from tests.bodies import oracle_rod
+from tests.bodies import oracle_rod, rubber
 from tests.oracles import column
 from tests.oracles.chain import Chain
 

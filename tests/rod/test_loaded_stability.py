@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from softreach.arm import designs
 from softreach.arm.loads import Loads
-from softreach.rod.all_equilibria import all_equilibria
+from softreach.rod.all_equilibria import equilibria
 from softreach.rod.equilibrium import Solver
 from softreach.rod.free import FreeRod
 from softreach.rod.load_tables import ArmBody, Body, LoadTables
@@ -154,13 +154,12 @@ def moments(chain, direction):
 def test_every_equilibrium_has_the_index_of_its_energy(arm, load, gamma):
     """Stable ones have none, and the sign of the tangents at the base is that of the index."""
     arm = weighed(arm, load)
-    solver, turn = solver_of(arm), FreeRod(arm, 1e-10).frames(gamma[None], [1.0]).directors[0, 0]
-    every = all_equilibria(solver, gamma[None])
-    _, sign = solver.polished(gamma[None], every.directions)
+    turn = FreeRod(arm, 1e-10).frames(gamma[None], [1.0]).directors[0, 0]
+    every = equilibria(arm, gamma)
     assert len(every.tips) > 1
     chain = chain_of(arm, gamma, links=32)
     for direction, tip, status, of_map in zip(
-        every.directions, every.tips, every.status, sign, strict=True
+        every.directions, every.tips, every.status, every.signs, strict=True
     ):
         ways = index(chain, moments(chain, turn @ direction), tip)
         assert (ways == 0) == (status == TipStatus.STABLE)

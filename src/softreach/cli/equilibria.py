@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import (
     Activation,
     AsJson,
     Design,
-    RevolutionDeg,
-    TaperDeg,
     activation_of,
     design_from,
 )
@@ -32,10 +31,9 @@ def equilibria(
     design: Design,
     *,
     activation: Activation = None,
-    revolution_deg: RevolutionDeg = None,
-    taper_deg: TaperDeg = None,
     figure: Annotated[Path | None, Parameter(help="Draw them: .png .pdf .svg")] = None,
     view: Annotated[str, Parameter(help="front, side, top or oblique.")] = "oblique",
+    changes: Changes = UNCHANGED,
     json: AsJson = False,
 ) -> None:
     """Every equilibrium of a loaded arm, stable ones first, and which one the arm comes to."""
@@ -43,7 +41,7 @@ def equilibria(
 
     if figure is not None:
         check_picture("figure", figure)
-    arm = design_from(design, revolution_deg, taper_deg)
+    arm = design_from(design, changes)
     found = all_of(arm, activation_of(activation, arm))
     if json:
         json_format.dump(_as_json(found), sys.stdout)

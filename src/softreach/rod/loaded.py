@@ -158,14 +158,6 @@ class LoadedRod(ArmRod):
         tips[:], status[:] = response.tips, response.status
         position_slopes(tips, response.twists, slopes)
 
-    def fill_slopes_and_status(
-        self, gamma: Array, tips: Array, slopes: Array, *, status: NDArray[np.int8]
-    ) -> None:
-        """Put tips, ∂r/∂γ (n, 3, bundles) [m] and `TipStatus` (n,) into place."""
-        response = self._solver.respond(gamma)
-        tips[:], status[:] = response.tips, response.status
-        position_slopes(tips, response.twists, slopes)
-
     def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:
         """Tips [m] and the spatial twist of the tip frame per unit of each activation."""
         response = self._responses(activations)
