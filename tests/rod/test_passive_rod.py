@@ -48,7 +48,7 @@ def test_a_tip_force_bends_an_elastica(load):
 @pytest.mark.parametrize("load", [1.0, 4.0, 10.0, 50.0])
 def test_a_heavy_cantilever_drops_as_published(load):
     gravity = load * BENDING / (WEIGHT * LENGTH**3)
-    tip = tip_map(rod(sr.Loads(gravity=(0, gravity, 0))), 1e-9).tips(AT_REST)[0]
+    tip = tip_map(rod(sr.Loads(gravity=(0, gravity, 0))), 1e-9, warn=False).tips(AT_REST)[0]
     np.testing.assert_allclose(tip[[1, 2]], elastica.heavy(load), atol=2e-7)
 
 
@@ -103,9 +103,9 @@ def test_the_inverse_reaches_its_tip_and_nothing_else(arm):
     assert elsewhere.gap == pytest.approx(0.1, abs=1e-6)
 
 
-def test_what_never_rests_is_refused_as_one_activation():
+def test_what_never_rests_is_refused():
     upright = THICK.replace(loads=sr.Loads(payload=2.0))
-    with pytest.raises(sr.InvalidInput, match="1 of 1 activations tried"):
+    with pytest.raises(sr.InvalidInput, match="none of 1 activations tried"):
         sr.reachable_set(upright)
 
 

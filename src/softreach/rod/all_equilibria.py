@@ -173,7 +173,7 @@ def equilibria(
     Warns:
         SoftreachWarning: Some may be missing, or tips miss `tol`.
     """
-    rod = tip_map(arm, tol)
+    rod = tip_map(arm, tol, warn=False)  # the degree tells whether any is missing
     gamma = _one(rod, activations)
     if not isinstance(rod, LoadedRod):
         return _without_loads(rod, gamma)

@@ -285,12 +285,13 @@ def position_slopes(tips: Array, twists: Array, slopes: Array) -> None:
         slopes[:, i] += w[:, j] * tips[:, k, None] - w[:, k] * tips[:, j, None]
 
 
-def tip_map(arm: Manipulator | TipMap, tol: float = 1e-6) -> TipMap:
+def tip_map(arm: Manipulator | TipMap, tol: float = 1e-6, *, warn: bool = True) -> TipMap:
     """The tip map of an arm, kept for the next call; a tip map is returned as it is.
 
     Args:
         arm: The design, or a tip map, whose own tolerance then counts.
         tol: Largest tip error, in L.
+        warn: Whether to warn of loads beyond what was verified.
 
     Raises:
         InvalidInput: No arm, or `tol` out of range.
@@ -300,7 +301,10 @@ def tip_map(arm: Manipulator | TipMap, tol: float = 1e-6) -> TipMap:
         return arm
     if not isinstance(arm, Manipulator):
         raise InvalidInput("arm", f"{arm!r:.80}", "a Manipulator or a TipMap")
-    return _of_arm(arm, check_tol(tol))
+    rod = _of_arm(arm, check_tol(tol))
+    if warn and arm.loads is not None:
+        _warn_of_large_loads(arm)
+    return rod
 
 
 @lru_cache(maxsize=64)
@@ -308,15 +312,15 @@ def _of_arm(arm: Manipulator, tol: float) -> TipMap:
     if arm.loads is not None:
         from softreach.rod.loaded import LoadedRod
 
-        _warn_of_large_loads(arm)
         return LoadedRod(arm, tol)
     from softreach.rod.free import FreeRod
 
     return FreeRod(arm, tol)
 
 
+@lru_cache(maxsize=64)
 def _warn_of_large_loads(arm: Manipulator) -> None:
-    """Say that an arm is loaded beyond what was verified; one text for all, so that it comes once.
+    """Say once that an arm is loaded beyond what was verified; one text for all.
 
     Raises:
         InvalidDesign: Moduli or densities are missing.
@@ -326,5 +330,5 @@ def _warn_of_large_loads(arm: Manipulator) -> None:
             f"the load number is above {VERIFIED_LOAD_NUMBER:g}, up to which shapes under loads "
             "were verified: look at the status of the samples, and compare with a smaller tol",
             SoftreachWarning,
-            stacklevel=2,
+            stacklevel=3,
         )
