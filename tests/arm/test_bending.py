@@ -33,7 +33,8 @@ def at_corners(arm, stations):
 def least(arm, stations):
     """Least bending by bounded least squares, for bundles that are free."""
     plane = tables(arm, stations).curvature[:, :2]
-    solved = [lsq_linear(u, [0.0, 0.0], tuple(arm.bounds.T), tol=1e-14) for u in plane]
+    bounds, active = tuple(arm.bounds.T), {"method": "bvls", "tol": 1e-15, "max_iter": 100}
+    solved = [lsq_linear(u, [0.0, 0.0], bounds, **active) for u in plane]
     return np.array([np.linalg.norm(one.fun) for one in solved])
 
 

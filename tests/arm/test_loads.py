@@ -95,24 +95,13 @@ def test_parameters_of_loads_are_written_as_the_keys_of_files(trunk):
 
 
 def test_a_cloud_of_a_loaded_arm_says_which_samples_are_stable(trunk):
-    upright = rubber(trunk, sr.Loads(payload=2.0), young=3e5)
+    upright = rubber(trunk, sr.Loads(payload=4.0), young=3e5)
     cloud = sr.compute_cloud(upright, n=300)
     assert set(np.unique(cloud.status)) > {0}
     np.testing.assert_array_equal(cloud.status == 2, np.isnan(cloud.tip).any("axis"))
     rod = sr.rod.tip_map(upright)
     np.testing.assert_array_equal(cloud.status, rod.status(cloud.activation.values))
     assert "status" not in sr.compute_cloud(trunk, n=10)
-
-
-def test_a_torn_image_is_not_measured(trunk):
-    upright = rubber(trunk, sr.Loads(payload=2.0), young=3e5)
-    for ask in (
-        lambda: sr.reachable_set(upright),
-        lambda: sr.solve_inverse(upright, [[0, 0, 0.5]]),
-        lambda: sr.track_path(upright, [[0, 0, 0.5]]),
-    ):
-        with pytest.raises(sr.InvalidInput, match="no stable equilibrium: must be such that"):
-            ask()
 
 
 @pytest.mark.slow
