@@ -224,7 +224,8 @@ def _logarithmic(values: Array, label: str) -> Coloring:
     """Colors in even steps of the logarithm of positive values."""
     rgb, key = _scalar(np.log(values), label)
     assert isinstance(key, ScalarKey)
-    return Coloring(rgb, ScalarKey(label, math.exp(key.low), math.exp(key.high), True))
+    low, high = math.exp(key.low), math.exp(key.high)
+    return Coloring(rgb, ScalarKey(label, low, high, logarithmic=True))
 
 
 def _scalar(values: NDArray[np.float64], label: str, low: float | None = None) -> Coloring:

@@ -330,7 +330,8 @@ def _judged(
     shapes, margin = solver.held(many, found.directions, np.array([rod.length]))
     margin = np.where(found.is_ring & (margin > -_NEUTRAL), 0.0, margin)
     stable = (found.signs > 0) & np.where(found.is_ring, margin == 0.0, margin > 0.0)
-    order = np.lexsort((-margin, ~stable))
+    places = np.round(shapes.frames.position[:, 0, ::-1] / rod.length, 6)  # part mirror images
+    order = np.lexsort((*places.T, -np.round(margin, 6), ~stable))
     followed = _nearest(found, known, axis)
     complete = found.complete and (followed is not None or not len(known))
     if not complete:
