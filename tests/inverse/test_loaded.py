@@ -13,8 +13,8 @@ from softreach.path import track_path
 from softreach.rod import tip_map
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.tip_map import TipStatus
+from tests.bodies import oracle_rod
 from tests.oracles import loaded_rod
-from tests.rod.test_loaded_rod import oracle
 
 TARGETS = 300
 
@@ -106,7 +106,7 @@ def test_a_shooting_from_the_base_puts_the_tip_of_a_root_at_its_target(heavy, st
     _, targets, solutions = stable
     several = np.flatnonzero(solutions.counts > 1)[0]
     for gamma in solutions[several].activations:
-        asked = oracle(heavy, loaded(heavy).body, gamma, heavy.loads)
+        asked = oracle_rod(heavy, loaded(heavy).body, gamma, heavy.loads)
         tip = loaded_rod.equilibrium(*asked, rtol=1e-10).tip
         assert np.linalg.norm(tip - targets[several]) <= 1e-6 * heavy.length
 
