@@ -14,7 +14,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.checks import series_faults
+from softreach.arm.value_checks import series_faults
 from softreach.errors import Fault, InvalidDesign
 
 __all__ = ["AlongArm", "Pieces", "Samples", "monotone_cubic"]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike, fspath
@@ -13,14 +12,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm import file
+from softreach.arm.actuator_checks import bounds_faults
 from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
-from softreach.arm.checks import bounds_faults, name_faults, tube_faults
+from softreach.arm.checks import tube_faults
 from softreach.arm.loads import Loads
 from softreach.arm.material import Material
+from softreach.arm.part_checks import fit_faults, kind_faults, named, part_faults, shared_names
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.section import Ring, Section
 from softreach.atomic import replacing
-from softreach.errors import Fault, InvalidDesign, InvalidInput
+from softreach.errors import InvalidDesign, InvalidInput
 
 __all__ = ["Manipulator"]
 
@@ -51,10 +52,10 @@ class Manipulator:
     """What acts on the arm beside them; None for nothing, not even its weight."""
 
     def __post_init__(self) -> None:
-        if faults := list(_part_faults(self)):
+        if faults := list(part_faults(self)):
             raise InvalidDesign(faults)
-        object.__setattr__(self, "actuators", tuple(_named(self.actuators)))
-        if faults := list(_name_faults(self)) or list(_fit_faults(self)):
+        object.__setattr__(self, "actuators", tuple(named(self.actuators)))
+        if faults := list(shared_names(self)) or list(fit_faults(self)):
             raise InvalidDesign(faults)
 
     @classmethod
@@ -91,7 +92,7 @@ class Manipulator:
             InvalidDesign: The arm cannot exist; the error names every fault.
         """
         values = {name: value for name, value in locals().items() if name != "cls"}
-        faults = list(_actuator_faults(actuators))
+        faults = list(kind_faults(actuators))
         bundles = None if faults else sum(actuator.bundles for actuator in actuators)
         if faults := tube_faults(values, bundles) + faults:
             raise InvalidDesign(faults)
@@ -249,7 +250,7 @@ class Manipulator:
         """Where all bundles lie in the sections at stations Z [m], shape (station,)."""
         stations = np.atleast_1d(np.asarray(z, float))
         each = [one.outline(self.profile, self.section, stations) for one in self.actuators]
-        each = each or [_no_bundles(len(stations))]
+        each = each or [Outline.empty(len(stations))]
         return Outline(
             center=np.concatenate([one.center for one in each], axis=1),
             extent=np.concatenate([one.extent for one in each]),
@@ -287,72 +288,3 @@ class Manipulator:
             return found[0]
         known = ", ".join(f"{k} ({name})" for k, name in names.items())
         raise InvalidInput("fiber", repr(fiber), f"the name or index of one architecture: {known}")
-
-
-def _no_bundles(stations: int) -> Outline:
-    """The outline of a passive rod."""
-    nowhere = np.empty((stations, 0))
-    return Outline(
-        center=nowhere,
-        extent=np.empty(0),
-        inner_ratio=nowhere,
-        outer_ratio=nowhere,
-        shape=(),
-        acts=np.empty((stations, 0), bool),
-    )
-
-
-def _part_faults(arm: Manipulator) -> Iterator[Fault]:
-    """Parts of the wrong type."""
-    if not isinstance(arm.profile, Profile):
-        yield Fault("profile", arm.profile, "must be a Profile, such as LinearTaper")
-    if not isinstance(arm.section, Section):
-        yield Fault("section", arm.section, "must be a Section")
-    if not isinstance(arm.loads, Loads | None):
-        yield Fault("loads", arm.loads, "must be Loads or None")
-    yield from _actuator_faults(arm.actuators)
-
-
-def _actuator_faults(actuators: Any) -> Iterator[Fault]:
-    if not isinstance(actuators, Sequence) or isinstance(actuators, str):
-        yield Fault("actuators", actuators, "must be a sequence of actuators")
-        return
-    for k, part in enumerate(actuators):
-        if not isinstance(part, Actuator):
-            yield Fault(f"actuators[{k}]", part, "must be an actuator, such as FiberArchitecture")
-
-
-def _fit_faults(arm: Manipulator) -> Iterator[Fault]:
-    """What keeps actuators and loads from acting on this profile and section."""
-    if arm.loads is not None:
-        yield from arm.loads.section_faults(arm.section, arm.length)
-    for actuator in arm.actuators:
-        faults = actuator.section_faults(arm.profile, arm.section)
-        yield from (
-            fault
-            if fault.path.startswith(("rings", "core"))
-            else fault._replace(path=f"{actuator.name}.{fault.path}")
-            for fault in faults
-        )
-
-
-def _named(actuators: Sequence[Actuator]) -> Iterator[Actuator]:
-    """The actuators, those without a name called "fiber 1", "fiber 2", ... by their places."""
-    taken = {actuator.name for actuator in actuators}
-    for place, actuator in enumerate(actuators, start=1):
-        if actuator.name:
-            yield actuator
-            continue
-        names = (f"{actuator.default_name} {number}" for number in itertools.count(place))
-        name = next(name for name in names if name not in taken)
-        taken.add(name)
-        yield actuator.replace(name=name)
-
-
-def _name_faults(arm: Manipulator) -> Iterator[Fault]:
-    """Names that two actuators or two bundles share."""
-    yield from (faults := list(name_faults([one.name for one in arm.actuators], "actuators")))
-    names = arm.bundle_names
-    if not faults and len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        yield Fault("actuators", twice, "names two bundles: rename an actuator")

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Self
 
-from softreach.arm.checks import MATERIAL_RANGES, material_faults, plain_number
+from softreach.arm.checks import MATERIAL_RANGES, material_faults
+from softreach.arm.value_checks import plain_number
 from softreach.arm.variable import Variable
 from softreach.errors import InvalidDesign
 

@@ -12,7 +12,8 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.checks import PROFILE_RANGES, plain_number, profile_faults
+from softreach.arm.checks import PROFILE_RANGES, profile_faults
+from softreach.arm.value_checks import plain_number
 from softreach.arm.variable import Variable
 from softreach.errors import InvalidDesign
 

@@ -11,14 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.along import monotone_cubic
-from softreach.arm.checks import (
-    INSIDE_RANGE,
-    PROFILE_RANGES,
-    plain_number,
-    range_faults,
-    series_faults,
-)
+from softreach.arm.checks import PROFILE_RANGES
 from softreach.arm.profile import Profile, relative_expm1, relative_log
+from softreach.arm.value_checks import INSIDE_RANGE, plain_number, range_faults, series_faults
 from softreach.arm.variable import Variable
 from softreach.errors import Fault, InvalidDesign
 

@@ -10,8 +10,9 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.checks import RING_RANGES, plain_number, ring_faults, section_faults
+from softreach.arm.checks import RING_RANGES, ring_faults, section_faults
 from softreach.arm.material import Material
+from softreach.arm.value_checks import plain_number
 from softreach.arm.variable import Variable
 from softreach.errors import Fault, InvalidDesign
 

@@ -9,9 +9,10 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.checks import actuator_faults, plain_number
+from softreach.arm.actuator_checks import actuator_faults
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
+from softreach.arm.value_checks import plain_number
 from softreach.arm.variable import Variable
 from softreach.errors import Fault, InvalidDesign, Range
 
@@ -54,6 +55,19 @@ class Outline:
     """"sector" of a ring, "line" along the arm, or round "lumen", for each bundle."""
     acts: NDArray[np.bool_]
     """Where along the arm each bundle acts, shape (station, bundle)."""
+
+    @classmethod
+    def empty(cls, stations: int) -> Outline:
+        """The outline of a passive rod at so many stations."""
+        nowhere = np.empty((stations, 0))
+        return cls(
+            center=nowhere,
+            extent=np.empty(0),
+            inner_ratio=nowhere,
+            outer_ratio=nowhere,
+            shape=(),
+            acts=np.empty((stations, 0), bool),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

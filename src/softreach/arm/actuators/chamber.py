@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.actuator_checks import FIBER_RANGES, chamber_faults
 from softreach.arm.actuators.actuator import STRETCH, Actuator, Outline, Resultants
-from softreach.arm.checks import FIBER_RANGES, chamber_faults
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.arm.variable import Variable

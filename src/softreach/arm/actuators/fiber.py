@@ -9,13 +9,13 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.actuator_checks import FIBER_RANGES, winding_faults
 from softreach.arm.actuators.actuator import STRETCH
 from softreach.arm.actuators.cone import cone_integrals
 from softreach.arm.actuators.ring_integrals import RingIntegrals
 from softreach.arm.actuators.sector import SectorActuator
 from softreach.arm.actuators.winding import helical_rotation
 from softreach.arm.along import AlongArm
-from softreach.arm.checks import FIBER_RANGES, winding_faults
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.arm.variable import Variable

@@ -11,11 +11,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.actuator_checks import FIBER_RANGES, constant_angle_faults
 from softreach.arm.actuators.actuator import STRETCH
 from softreach.arm.actuators.cone import cone_integrals
 from softreach.arm.actuators.ring_integrals import RingIntegrals
 from softreach.arm.actuators.sector import SectorActuator
-from softreach.arm.checks import FIBER_RANGES, constant_angle_faults
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.arm.variable import Variable

@@ -10,9 +10,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.actuator_checks import sector_faults
 from softreach.arm.actuators.actuator import Actuator, Bounds, Outline, Resultants
 from softreach.arm.actuators.ring_integrals import RingIntegrals
-from softreach.arm.checks import sector_faults
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.errors import Fault, InvalidDesign, InvalidInput

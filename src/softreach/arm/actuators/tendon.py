@@ -9,9 +9,9 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.actuator_checks import FIBER_RANGES, tendon_faults
 from softreach.arm.actuators.actuator import STRETCH, Actuator, Outline, Resultants
 from softreach.arm.along import AlongArm, Samples
-from softreach.arm.checks import FIBER_RANGES, tendon_faults
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.arm.variable import Variable

@@ -9,10 +9,10 @@ from pydantic import Discriminator, Field, model_validator
 
 from softreach.arm.actuators import FiberArchitecture, Tendon
 from softreach.arm.along import AlongArm, Pieces, Samples
-from softreach.arm.checks import series_faults
 from softreach.arm.file.quantities import Quantity, refused
 from softreach.arm.file.table import Table
 from softreach.arm.file.toml_text import inline_table, value_text
+from softreach.arm.value_checks import series_faults
 
 __all__ = ["AlongTable", "AngleAlong", "DistanceAlong", "RoutingAlong", "along_text", "either"]
 

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, PlainValidator, WithJsonSchema
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from softreach.arm.checks import bounds_faults, which_ring_faults
+from softreach.arm.actuator_checks import bounds_faults, which_ring_faults
 from softreach.arm.file.degrees import radians
 from softreach.arm.variable import Variable
 from softreach.errors import Fault, Range

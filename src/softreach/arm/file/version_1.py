@@ -8,9 +8,10 @@ from typing import Any, Literal
 
 from pydantic import ValidationError
 
+from softreach.arm.actuator_checks import fiber_faults
 from softreach.arm.actuators import Actuator, FiberArchitecture
 from softreach.arm.actuators.actuator import actuator_kinds
-from softreach.arm.checks import fiber_faults, name_faults, tube_faults
+from softreach.arm.checks import name_faults, tube_faults
 from softreach.arm.file.degrees import Written, radians
 from softreach.arm.file.document import Parts
 from softreach.arm.file.own_kind import made_own_kind

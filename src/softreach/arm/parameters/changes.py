@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from softreach.arm.checks import plain_number
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.of_arm import by_ring_name, parameters
 from softreach.arm.parameters.parameter import Parameter
 from softreach.arm.parameters.unknown import unknown_parameter
+from softreach.arm.value_checks import plain_number
 from softreach.errors import Fault, InvalidInput
 
 __all__ = ["changed", "find_parameter", "find_parameters", "parameters_by_every_name"]

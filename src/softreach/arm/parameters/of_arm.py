@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from softreach.arm.actuator_checks import FIBER_RANGES
 from softreach.arm.actuators import Actuator
-from softreach.arm.checks import FIBER_RANGES, MATERIAL_RANGES, PROFILE_RANGES, RING_RANGES
+from softreach.arm.checks import MATERIAL_RANGES, PROFILE_RANGES, RING_RANGES
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters.parameter import (
     BoundParameter,

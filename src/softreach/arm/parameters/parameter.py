@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from softreach.arm.actuators import Actuator
-from softreach.arm.checks import plain_number
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.parts import part_of
+from softreach.arm.value_checks import plain_number
 from softreach.arm.variable import Variable
 from softreach.errors import Fault
 

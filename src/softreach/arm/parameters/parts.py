@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 from softreach.arm.actuators import Actuator
 from softreach.arm.along import AlongArm
-from softreach.arm.checks import INSIDE_RANGE
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.value_checks import INSIDE_RANGE
 from softreach.arm.variable import Variable
 
 __all__ = ["WHOLE", "Series", "actuator_key", "part_of", "parts", "prefix_of", "series_of"]

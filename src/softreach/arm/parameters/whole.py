@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 from softreach.arm.actuators import Actuator
 from softreach.arm.along import AlongArm
-from softreach.arm.checks import plain_number
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.parameter import FieldParameter, Parameter
 from softreach.arm.parameters.parts import actuator_key
+from softreach.arm.value_checks import plain_number
 from softreach.errors import Fault
 
 __all__ = ["OuterRadius", "Revolution", "Taper"]
