@@ -25,6 +25,7 @@ from softreach.atlas import (
 from softreach.atlas.metrics import chosen_metrics
 from softreach.atlas.store import AtlasStore
 from softreach.errors import InvalidInput, SoftreachWarning
+from softreach.rod.tip_map import TipMap
 from tests.atlas.families import SMALL, assert_same, command, similar_designs, small_space
 
 
@@ -94,22 +95,23 @@ def test_every_need_can_be_met(tmp_path):
 def test_what_metrics_share_is_computed_once_for_each_design(tmp_path, monkeypatch):
     calls = Counter()
 
-    def counting(module, name):
-        real = getattr(import_module(module), name)
+    def counting(owner, name):
+        real = getattr(owner, name)
 
         def counted(*given, **options):
             calls[name] += 1
             return real(*given, **options)
 
-        monkeypatch.setattr(f"{module}.{name}", counted)
+        monkeypatch.setattr(owner, name, counted)
 
-    here = "softreach.atlas.intermediates"
-    shared = ("tip_positions", "delaunay", "stream_statistics")
-    for module, name in [*((here, n) for n in shared), ("softreach.workspace", "reachable_set")]:
-        counting(module, name)
+    shared = ("delaunay", "stream_statistics")
+    for name in shared:
+        counting(import_module("softreach.atlas.intermediates"), name)
+    counting(import_module("softreach.workspace"), "reachable_set")
+    counting(TipMap, "tips_and_status")
     options = SMALL | {"metrics": tuple(METRIC_GROUPS), "accuracy": 0.1}
     build_atlas(small_space(), tmp_path / "a.zarr", **options)
-    assert calls == dict.fromkeys([*shared, "reachable_set"], 4)
+    assert calls == dict.fromkeys([*shared, "reachable_set", "tips_and_status"], 4)
 
 
 # Metrics that cannot be had

@@ -27,7 +27,8 @@ Cells = tuple[int, int, int]
 def critical(vertices: np.ndarray, cells: Cells, stretches: np.ndarray) -> np.ndarray:
     star = contour.stars(cells)
     out = np.empty((len(vertices) * len(star.triangles), 5), np.int64)
-    arguments = (np.array(cells), 0, len(vertices), star, out)
+    whole = np.zeros(len(vertices), bool)
+    arguments = (np.array(cells), whole, 0, len(vertices), star, out)
     used = contour.critical_triangles(vertices, stretches, *arguments)
     return out[:used]
 

@@ -15,7 +15,7 @@ from softreach.atlas.metric import Metric
 from softreach.atlas.metrics import METRIC_GROUPS, chosen_metrics
 from softreach.atlas.reading import open_atlas, over_length
 from softreach.atlas.space import DesignSpace
-from softreach.atlas.store import DONE, GAP, AtlasStore
+from softreach.atlas.store import DONE, GAP, UNSTABLE, AtlasStore
 from softreach.errors import InvalidInput, SoftreachWarning, counted
 from softreach.progress import Progress, bar
 
@@ -49,6 +49,10 @@ def build_atlas(
     with the same numbers. A design that fails is recorded with its error, the rest goes on, and the
     next call tries it again. Combinations that no arm can have stay gaps.
 
+    Under loads, only samples with a stable equilibrium count, and `lost_share` tells the share of
+    the others. A design of which no sample is stable has no other metric: the rest is NaN, with a
+    message, and it is not tried again.
+
     Stored clouds are rounded to 1e-5 of the shortest length, an error of half of that at most in
     each coordinate, which halves their size; metrics are computed before.
 
@@ -58,8 +62,8 @@ def build_atlas(
         n: Samples of each design.
         seed: Seed of the sampler.
         sampler: As `compute_cloud` has it.
-        metrics: Groups of metrics (extent, convex, concave, exact, curvature), or a `Metric` of
-            your own.
+        metrics: Groups of metrics (extent, convex, concave, exact, curvature, stability), or a
+            `Metric` of your own.
         alpha_over_length: Radius of the alpha shapes over the length of each design.
         accuracy: Relative error asked of the exact volumes; see `reachable_set`.
         tol: Largest tip error, in L.
@@ -100,8 +104,11 @@ def build_atlas(
     indices = _checked_shard(shard, space.size)
     _warn_of_gaps(space)
     atlas = AtlasStore.begin(store, command)
-    _run(atlas, indices[~np.isin(atlas.status()[indices], (DONE, GAP))], executor, progress)
+    _run(
+        atlas, indices[~np.isin(atlas.status()[indices], (DONE, GAP, UNSTABLE))], executor, progress
+    )
     built = open_atlas(store)
+    _warn_of_unstable(built)
     _warn_of_sparse(built)
     return built
 
@@ -145,6 +152,18 @@ def _warn_of_gaps(space: DesignSpace) -> None:
         _warn(
             f"{len(space.gaps)} of {space.size} designs cannot exist and {stay}, first "
             f"{space.values(index)}: {reason}"
+        )
+
+
+def _warn_of_unstable(atlas: xr.Dataset) -> None:
+    """Warn of designs that have no metrics because nothing of them is stable."""
+    unstable = np.flatnonzero(atlas["status"].values == UNSTABLE)
+    if len(unstable):
+        first, number = unstable[0], atlas["number"].values.ravel()
+        message = atlas["message"].values.ravel()[first]
+        _warn(
+            f"{counted(len(unstable), 'design')} without metrics, first number {number[first]}: "
+            f"{message}"
         )
 
 

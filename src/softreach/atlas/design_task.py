@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from softreach.atlas.intermediates import Intermediates
 from softreach.atlas.metric import Metric, Need
-from softreach.atlas.store import AtlasStore, Result
+from softreach.atlas.store import UNSTABLE, AtlasStore, Result
 from softreach.atlas.store_root import StoreFailed
 from softreach.errors import SoftreachError, SoftreachWarning
 
@@ -34,7 +34,8 @@ def begin_design(store: AtlasStore, metrics: Sequence[Metric], index: int) -> Ca
     try:
         arm = store.command.design(index)
         found = Intermediates(arm, store.cube, store.command, metrics)
-        found[Need.TIPS]  # found now, by all threads
+        if not found.stable.any():  # found now, by all threads
+            return partial(_put_unstable, store, metrics, index, found)
         threaded = [metric for metric in metrics if Need.REACHABLE_SET in metric.needs]
         values = _values(threaded, found)
         found.forget(Need.REACHABLE_SET)
@@ -110,13 +111,28 @@ def _finish(
     return index, ""
 
 
+def _put_unstable(
+    store: AtlasStore, metrics: Sequence[Metric], index: int, found: Intermediates
+) -> Outcome:
+    """Store a design of which no sample is stable: it has no other metric than that."""
+    sizes = found.command.profile_sizes
+    values = {
+        metric.name: np.full([sizes[dim] for dim in metric.over], np.nan) for metric in metrics
+    }
+    known = [metric for metric in metrics if metric.needs == (Need.LOST_SHARE,)]
+    values |= {metric.name: metric.value(found, sizes) for metric in known}
+    message = f"none of {len(found.stable)} activations tried has a stable equilibrium"
+    store.write(index, Result(values, _kept_tips(store, found)), UNSTABLE, message)
+    return index, ""
+
+
 def _values(metrics: Sequence[Metric], found: Intermediates) -> Values:
     sizes = found.command.profile_sizes
     return {metric.name: metric.value(found, sizes) for metric in metrics}
 
 
 def _kept_tips(store: AtlasStore, found: Intermediates) -> NDArray[np.float64] | None:
-    return found[Need.TIPS] if store.command.keep_clouds else None
+    return found.tips if store.command.keep_clouds else None
 
 
 def _fail(store: AtlasStore, index: int, error: Exception) -> Outcome:

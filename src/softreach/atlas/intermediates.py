@@ -16,8 +16,7 @@ from softreach.curvature import stream_statistics
 from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.geometry.delaunay import delaunay
 from softreach.geometry.hull import convex_hull
-from softreach.rod.kinematics import tip_positions
-from softreach.rod.tip_map import TipMap, tip_map
+from softreach.rod.tip_map import TipMap, TipStatus, tip_map
 
 __all__ = ["Intermediates", "activations_of"]
 
@@ -48,6 +47,20 @@ class Intermediates(Mapping[Need, Any]):
         """The tip map of the design, to the tolerance of the command."""
         return tip_map(self.arm, self.command.tol)
 
+    @cached_property
+    def tips(self) -> Array:
+        """Tips of all samples [m], shape (n, 3); NaN where there is no equilibrium."""
+        return self._samples[0]
+
+    @cached_property
+    def stable(self) -> NDArray[np.bool_]:
+        """Which samples have a stable equilibrium, shape (n,)."""
+        return self._samples[1] == TipStatus.STABLE
+
+    @cached_property
+    def _samples(self) -> tuple[Array, NDArray[np.int8]]:
+        return self.rod.tips_and_status(activations_of(self.rod, self.cube))
+
     def __getitem__(self, need: Need) -> Any:
         if need not in self._found:
             self._found[need] = _COMPUTE[need](self)
@@ -70,8 +83,9 @@ def activations_of(rod: TipMap, cube: Array) -> Array:
     return rod.box.from_cube(cube[:, : rod.box.bundles])
 
 
-def _tips(of: Intermediates) -> Array:
-    return tip_positions(of.rod, activations_of(of.rod, of.cube))
+def _stable(of: Intermediates, values: Array) -> Array:
+    """Those of the samples that have a stable equilibrium; not copied if all have."""
+    return values if of.stable.all() else values[of.stable]
 
 
 def _alpha_complex(of: Intermediates) -> AlphaComplex:
@@ -93,6 +107,8 @@ def _reachable_set(of: Intermediates) -> Any:
 
 def _strain_statistics(of: Intermediates) -> Any:
     rod, cube = of.rod, of.cube
+    if rod.supports_unstable:
+        cube = cube[of.stable]
     blocks = (activations_of(rod, cube[k : k + _BLOCK]) for k in range(0, len(cube), _BLOCK))
     stations = np.array(of.command.stations) * rod.length
     return stream_statistics(rod, blocks, stations, quantiles=of.command.quantiles)
@@ -101,8 +117,9 @@ def _strain_statistics(of: Intermediates) -> Any:
 _COMPUTE: dict[Need, Callable[[Intermediates], Any]] = {
     Need.ARM: lambda of: of.arm,
     Need.LENGTH: lambda of: of.arm.length,
-    Need.ACTIVATIONS: lambda of: activations_of(of.rod, of.cube),
-    Need.TIPS: _tips,
+    Need.ACTIVATIONS: lambda of: _stable(of, activations_of(of.rod, of.cube)),
+    Need.TIPS: lambda of: _stable(of, of.tips),
+    Need.LOST_SHARE: lambda of: float((~of.stable).mean()),
     Need.ALPHA: lambda of: of.command.alpha_over_length * of.arm.length,
     Need.ALPHA_COMPLEX: _alpha_complex,
     Need.CONVEX_VOLUME: _convex_volume,

@@ -13,7 +13,7 @@ from softreach.atlas.command import Command
 from softreach.atlas.metric import Metric
 from softreach.schema import AXES
 
-__all__ = ["RESOLUTION", "SEAL", "Plan", "array_plans"]
+__all__ = ["MISSING", "RESOLUTION", "SEAL", "Plan", "array_plans"]
 
 RESOLUTION = 1e-5
 """Step of stored tips over the shortest length: no coordinate is off by more than half of it."""
@@ -21,7 +21,8 @@ RESOLUTION = 1e-5
 SEAL = "metrics"
 """The array that is created last: if it exists, so do all others."""
 
-_MISSING = int(np.iinfo(np.int32).min)
+MISSING = int(np.iinfo(np.int32).min)
+"""What stands for a tip that is NaN, or not stored."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,8 +71,8 @@ _CUBE = {
 }
 _STATUS = {
     "long_name": "status of the design",
-    "flag_values": [0, 1, 2, 3],
-    "flag_meanings": "to_do done failed gap",
+    "flag_values": [0, 1, 2, 3, 4],
+    "flag_meanings": "to_do done failed gap unstable",
 }
 
 
@@ -112,10 +113,10 @@ def _tips(command: Command) -> Plan:
         "units": "m",
         "long_name": "tip position",
         "scale_factor": RESOLUTION * command.space.length_range[0],
-        "_FillValue": _MISSING,
+        "_FillValue": MISSING,
     }
     sizes = {"axis": len(AXES), "sample": command.n}
-    return _per_design(command, "tip", np.int32, _MISSING, sizes, attrs)
+    return _per_design(command, "tip", np.int32, MISSING, sizes, attrs)
 
 
 def _described(command: Command) -> dict[str, Any]:

@@ -26,8 +26,9 @@ class Need(Enum):
 
     ARM = "the design, a Manipulator"
     LENGTH = "its length L [m]"
-    ACTIVATIONS = "activations of the samples [-], shape (n, bundles)"
-    TIPS = "tips of the samples [m], shape (n, 3)"
+    ACTIVATIONS = "activations of the samples with a stable equilibrium [-], shape (n, bundles)"
+    TIPS = "their tips [m], shape (n, 3)"
+    LOST_SHARE = "share of the samples without a stable equilibrium [-]"
     ALPHA = "radius of the alpha shape of this design [m]"
     ALPHA_COMPLEX = "alpha shapes of every radius, an AlphaComplex of the tips"
     CONVEX_VOLUME = "volume of the convex hull of the tips [m³]"

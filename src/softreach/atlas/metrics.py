@@ -181,6 +181,13 @@ _EXACT = (
         nan_if="the reachable set is flat",
     ),
     Metric(
+        name="exact_lost_share",
+        unit="1",
+        meaning="share of the activation box left out of the reachable set: not stable, or torn",
+        needs=(Need.REACHABLE_SET,),
+        compute=attrgetter("lost_share"),
+    ),
+    Metric(
         name="multiplicity",
         unit="1",
         meaning="mean number of activations that reach a place, if finite",
@@ -223,12 +230,23 @@ _CURVATURE = tuple(
     for quantity, (unit, meaning) in QUANTITIES.items()
 )
 
+_STABILITY = (
+    Metric(
+        name="lost_share",
+        unit="1",
+        meaning="share of the samples without a stable equilibrium, which count for nothing else",
+        needs=(Need.LOST_SHARE,),
+        compute=float,
+    ),
+)
+
 METRIC_GROUPS: dict[str, tuple[Metric, ...]] = {
     "extent": _EXTENT,
     "convex": _CONVEX,
     "concave": _CONCAVE,
     "exact": _EXACT,
     "curvature": _CURVATURE,
+    "stability": _STABILITY,
 }
 """Group -> its metrics. Those of `curvature` are quantiles at stations, the others numbers."""
 

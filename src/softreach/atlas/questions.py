@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.atlas.intermediates import activations_of
 from softreach.atlas.reading import command_of, opened_atlas
-from softreach.atlas.store import DONE, FAILED, GAP, TODO
+from softreach.atlas.store import DONE, FAILED, GAP, KNOWN, TODO, UNSTABLE
 from softreach.errors import InvalidInput
 from softreach.rod.tip_map import tip_map
-from softreach.schema import cloud_dataset
+from softreach.schema import cloud_dataset, with_status
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,9 +32,11 @@ class AtlasStatus:
     done: int
     failed: int
     gaps: int
+    unstable: int
+    """Designs of which no activation has a stable equilibrium."""
     todo: int
     messages: dict[int, str]
-    """Why designs failed or cannot exist: number -> message."""
+    """Why designs failed, cannot exist or are nowhere stable: number -> message."""
 
 
 def atlas_status(atlas: AtlasLike) -> AtlasStatus:
@@ -48,14 +50,15 @@ def atlas_status(atlas: AtlasLike) -> AtlasStatus:
     """
     opened = opened_atlas(atlas, metrics=False)
     status = opened["status"].values.ravel()
-    counts = np.bincount(status, minlength=4).tolist()
+    counts = np.bincount(status, minlength=5).tolist()
     return AtlasStatus(
         designs=status.size,
         done=counts[DONE],
         failed=counts[FAILED],
         gaps=counts[GAP],
+        unstable=counts[UNSTABLE],
         todo=counts[TODO],
-        messages=_messages(opened, np.isin(status, (FAILED, GAP))),
+        messages=_messages(opened, np.isin(status, (FAILED, GAP, UNSTABLE))),
     )
 
 
@@ -78,7 +81,7 @@ def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
     """The cloud of the design at, or nearest to, these parameters, like those of `compute_cloud`.
 
     Stored tips are rounded to 1e-5 of the shortest length; without them the cloud is computed
-    again, exactly as it was.
+    again, exactly as it was, and so are those of loaded designs, whose samples have a status.
 
     Args:
         atlas: A store, or a dataset from `open_atlas`.
@@ -91,18 +94,20 @@ def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
     command = command_of(opened)
     kept = [name for name in ("status", "number", "tip") if name in opened]
     row = _nearest(opened[kept], at)
-    if (status := int(row["status"])) != DONE:
+    if (status := int(row["status"])) not in KNOWN:
         raise InvalidInput("design", at, "done", f"its status is {status}")
     arm = command.design(int(row["number"]))
     rod = tip_map(arm, command.tol)
     activation = activations_of(rod, opened["unit_activation"].values)
+    drawn: Any = {"seed": command.seed, "sampler": command.sampler, "tol": command.tol}
+    if rod.supports_unstable:
+        tip, stability = rod.tips_and_status(activation)
+        return with_status(cloud_dataset(arm, activation, tip, **drawn), stability)
     if "tip" in opened:
         tip = np.ascontiguousarray(row["tip"].values.T, dtype=float)
     else:
         tip = rod.tips(activation)
-    return cloud_dataset(
-        arm, activation, tip, seed=command.seed, sampler=command.sampler, tol=command.tol
-    )
+    return cloud_dataset(arm, activation, tip, **drawn)
 
 
 def _messages(atlas: xr.Dataset, told: np.ndarray) -> dict[int, str]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from softreach.atlas.command import Command
 from softreach.atlas.metric import Metric, Need
-from softreach.atlas.store import DONE, AtlasStore
+from softreach.atlas.store import KNOWN, AtlasStore
 from softreach.atlas.store_root import absolute
 from softreach.errors import InvalidInput
 
@@ -26,7 +26,8 @@ _POWERS = {"m": 1, "m2": 2, "m3": 3, "1/m": -1}
 def open_atlas(store: StoreLike) -> xr.Dataset:
     """An atlas with a dimension for each parameter, so that ``atlas.volume.sel(taper=...)`` works.
 
-    Clouds are read when they are used. Designs that are not done are NaN.
+    Clouds are read when they are used. Designs that are not done are NaN, and
+    so are those of which no activation is stable, but for their `lost_share`.
 
     Args:
         store: Path, URL or Zarr store.
@@ -88,7 +89,7 @@ def _opened(store: StoreLike, *, metrics: bool) -> xr.Dataset:
     command = AtlasStore.open(store, "r").command
     raw = xr.open_zarr(absolute(store), consolidated=False, zarr_format=3, chunks=None)
     # Status first: what it calls done is complete by then.
-    done = (raw["status"].load() == DONE).values
+    done = raw["status"].load().isin(KNOWN).values
     atlas = raw.drop_vars(["metrics", "metric", "curvature", "quantity"], errors="ignore")
     if metrics:
         atlas = atlas.assign(_metrics(command, raw, done))

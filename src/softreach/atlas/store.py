@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.atlas.command import Command
-from softreach.atlas.layout import SEAL, Plan, array_plans
+from softreach.atlas.layout import MISSING, SEAL, Plan, array_plans
 from softreach.atlas.store_root import (
     StoreFailed,
     absolute,
@@ -40,9 +40,12 @@ if TYPE_CHECKING:
     import zarr
     from zarr.storage import StoreLike
 
-__all__ = ["DONE", "FAILED", "GAP", "TODO", "AtlasStore", "Result"]
+__all__ = ["DONE", "FAILED", "GAP", "KNOWN", "TODO", "UNSTABLE", "AtlasStore", "Result"]
 
-TODO, DONE, FAILED, GAP = range(4)
+TODO, DONE, FAILED, GAP, UNSTABLE = range(5)
+
+KNOWN = (DONE, UNSTABLE)
+"""The status of designs of which metrics are stored."""
 
 
 class Result(NamedTuple):
@@ -51,7 +54,7 @@ class Result(NamedTuple):
     metrics: Mapping[str, ArrayLike]
     """Every metric of the command by name."""
     tips: NDArray[np.float64] | None
-    """Tips [m], shape (n, 3); None if clouds are not kept."""
+    """Tips [m], shape (n, 3), NaN without equilibrium; None if clouds are not kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,13 +128,13 @@ class AtlasStore:
         _create_array(self.location, self.group, seal)
 
     def status(self) -> NDArray[np.uint8]:
-        """TODO, DONE, FAILED or GAP of every design, in C order, shape (designs,)."""
+        """TODO, DONE, FAILED, GAP or UNSTABLE of every design, in C order, shape (designs,)."""
         return np.asarray(self._array("status")[...]).ravel()
 
     def messages(self) -> dict[int, str]:
-        """Why designs failed or cannot exist: number -> message."""
+        """Why designs failed, cannot exist or are nowhere stable: number -> message."""
         texts = np.asarray(self._array("message")[...]).ravel()
-        told = np.flatnonzero(np.isin(self.status(), (FAILED, GAP))).tolist()
+        told = np.flatnonzero(np.isin(self.status(), (FAILED, GAP, UNSTABLE))).tolist()
         return {index: str(texts[index]) for index in told}
 
     @cached_property
@@ -150,7 +153,7 @@ class AtlasStore:
         if _digest(cube) != self.group.attrs["unit_activation_sha256"]:
             raise StoreFailed(f"{self.location}: {otherwise}")
 
-    def write(self, index: int, result: Result) -> None:
+    def write(self, index: int, result: Result, status: int = DONE, message: str = "") -> None:
         """Store a design; its status comes last.
 
         Raises:
@@ -166,7 +169,7 @@ class AtlasStore:
             if result.tips is not None:
                 tip = self._array("tip")
                 tip[place] = fixed_point(result.tips, float(str(tip.attrs["scale_factor"])))
-            self._array("status")[place] = DONE
+            _write_status(self.group, self.command, index, message, status)
 
     def write_failure(self, index: int, message: str, status: int = FAILED) -> None:
         """Store why a design has no numbers.
@@ -182,8 +185,9 @@ class AtlasStore:
 
 
 def fixed_point(tips: NDArray[np.float64], scale: float) -> NDArray[np.int32]:
-    """Tips as whole multiples of the scale, shape (3, n)."""
-    return np.rint(tips.T / scale).astype(np.int32)
+    """Tips as whole multiples of the scale, shape (3, n); NaN as what fills missing ones."""
+    whole = np.rint(tips.T / scale)
+    return np.where(np.isnan(whole), MISSING, whole).astype(np.int32)
 
 
 def _attributes(command: Command) -> dict[str, str]:

@@ -92,7 +92,7 @@ def status(store: Store, *, json: AsJson = False) -> None:
     from softreach.atlas import atlas_status
 
     found = atlas_status(store)
-    counts = ("designs", "done", "todo", "failed", "gaps")
+    counts = ("designs", "done", "todo", "failed", "gaps", "unstable")
     rows: dict[str, tuple[Any, str]] = {name: (getattr(found, name), "") for name in counts}
     if json:
         rows["messages"] = ({str(k): text for k, text in found.messages.items()}, "")

@@ -41,7 +41,8 @@ def reach(
     arm = design_from(design, changes)
     with progress.bar("mapping the activation box", None) as shown:
         found = reachable_set(arm, accuracy=accuracy, progress=shown)
-    print_rows(f"reachable set of {design}", load_rows(arm.loads) | _rows(found), json)
+    rows = load_rows(arm.loads) | _rows(found) | _lost(found)
+    print_rows(f"reachable set of {design}", rows, json)
     if surface is not None:
         from softreach.export import export_mesh
 
@@ -71,6 +72,13 @@ def _rows(found: ReachableSet) -> dict[str, tuple[Any, str]]:
             places = zip("xyz", found.tip, strict=True)
             return {axis: (float(place) / length, "L") for axis, place in places}
     raise AssertionError(found)
+
+
+def _lost(found: ReachableSet) -> dict[str, tuple[Any, str]]:
+    """What is left out, if anything is: no stable equilibrium, or torn."""
+    if not found.lost_share > 0.0:
+        return {}
+    return {"activation box left out": (100.0 * found.lost_share, "%")}
 
 
 def _size(

@@ -112,7 +112,7 @@ def slope(points, v, at, cells, step):
 
 
 @strict
-def critical_triangles(points, stretches, cells, first, last, star, out):
+def critical_triangles(points, stretches, cells, left_out, first, last, star, out):
     """Triangles with least vertex in first..last around which the mapped tetrahedra do not balance.
 
     Args:
@@ -120,6 +120,7 @@ def critical_triangles(points, stretches, cells, first, last, star, out):
         stretches: det J at the vertices in whole numbers, whose sum says which orientation a
             tetrahedron should have, shape (n,).
         cells: Number of cells along each axis, shape (3,).
+        left_out: Whether the cell with least vertex v has no image, shape (n,).
         first: First vertex of this task.
         last: One past its last.
         star: What `stars` says of one vertex.
@@ -145,6 +146,8 @@ def critical_triangles(points, stretches, cells, first, last, star, out):
                 if apexes[k, 0] & ~above or apexes[k, 1] & ~below:
                     continue
                 apex = v + apexes[k, 2]
+                if left_out[min(v, apex)]:  # the least vertex tells whose cell it is
+                    continue
                 # side times orientation, which is side · turn
                 turn = apexes[k, 3] * (dot(normal, difference(points, apex, v)) != 0)
                 balance += turn if stretch + stretches[apex] > 0 else -turn

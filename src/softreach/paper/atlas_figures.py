@@ -37,7 +37,8 @@ def atlas_figures(atlas: xr.Dataset, panels: int = 7) -> Iterator[tuple[str, Any
     edges = plot.sheet_axes(picked)
     yield "clouds", plot.plot_cloud_sheet(_clouds(picked), *edges, **box)
     yield "corners", plot.plot_opposite_sides(_corners(atlas), **box)
-    yield "curvature", _curvature(atlas)
+    if (statistics := _curvature(atlas)) is not None:
+        yield "curvature", statistics
     yield "hulls", plot.plot_hull_sheet(hulls_of(picked), *edges, length=1.0, **box)
 
 
@@ -69,6 +70,7 @@ def _clouds(atlas: xr.Dataset) -> Callable[[int, int], xr.Dataset | None]:
 
 def hulls_of(atlas: xr.Dataset) -> Callable[[int, int], Hull | None]:
     """(column, row) -> the hull of the design there in lengths of its own, if it is done."""
+    from softreach.rod.tip_map import TipStatus
     from softreach.volume import concave_hull
 
     cloud_at, alpha_over_length = _clouds(atlas), _alpha_over_length(atlas)
@@ -77,7 +79,10 @@ def hulls_of(atlas: xr.Dataset) -> Callable[[int, int], Hull | None]:
         cloud = cloud_at(column, row)
         if cloud is None:
             return None
-        return concave_hull(cloud.tip.values / cloud.tip.attrs["length"], alpha_over_length)
+        tips = cloud.tip.values / cloud.tip.attrs["length"]
+        if "status" in cloud:
+            tips = tips[cloud.status.values == TipStatus.STABLE]
+        return concave_hull(tips, alpha_over_length)
 
     return hull_at
 
@@ -107,7 +112,10 @@ def _at(axis: SheetAxis, k: int) -> str:
 
 
 def _curvature(atlas: xr.Dataset) -> Any:
-    """The first against the last value of the second parameter, at the last of the first."""
+    """The first against the last value of the second parameter, at the last of the first.
+
+    None if neither design is done.
+    """
     from softreach.curvature import curvature_statistics
     from softreach.plot import plot_curvature, sheet_axes
 
@@ -115,6 +123,8 @@ def _curvature(atlas: xr.Dataset) -> Any:
     across, up = sheet_axes(ends)
     clouds = {f"{_at(up, k)}": _clouds(ends)(len(across.values) - 1, k) for k in range(2)}
     found = {label: cloud for label, cloud in clouds.items() if cloud is not None}
+    if not found:
+        return None
     ax = plot_curvature({label: curvature_statistics(cloud) for label, cloud in found.items()})
     ax.set_title(_at(across, -1), fontsize=9)
     return ax

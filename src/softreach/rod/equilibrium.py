@@ -101,12 +101,15 @@ class Response(NamedTuple):
     """(v, ω) per activation, shape (n, 6, bundles)."""
     compliance: Array
     """∂r/∂F [m/N], shape (n, 3, 3), or (0, 3, 3)."""
+    status: NDArray[np.int8]
+    """`TipStatus`, shape (n,)."""
 
     @classmethod
     def empty(cls, n: int, bundles: int, *, compliance: bool) -> Response:
         """Room for n."""
         forces = n if compliance else 0
-        return cls(np.empty((n, 3)), np.empty((n, 6, bundles)), np.empty((forces, 3, 3)))
+        twists, yields = np.empty((n, 6, bundles)), np.empty((forces, 3, 3))
+        return cls(np.empty((n, 3)), twists, yields, np.empty(n, np.int8))
 
 
 class Shapes(NamedTuple):
@@ -340,7 +343,8 @@ class Solver:
             if len(values):
                 values[lost] = np.nan
         in_base = yields @ self.tables.axes if compliance else yields
-        return Response(tips, twists[:, :, : gamma.shape[1]], in_base)
+        status = np.where(lost, TipStatus.NO_EQUILIBRIUM, known.status).astype(np.int8)
+        return Response(tips, twists[:, :, : gamma.shape[1]], in_base, status)
 
     def shapes(self, gamma: Array, stations: Array) -> Shapes:
         """Arms at ascending stations Z [m]; NaN where there is no equilibrium."""

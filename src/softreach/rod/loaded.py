@@ -168,8 +168,14 @@ class LoadedRod(TipMap):
 
     def fill_slopes(self, gamma: Array, tips: Array, slopes: Array) -> None:
         """Put tips (n, 3) and ∂r/∂γ (n, 3, bundles) [m] into place."""
+        self.fill_slopes_and_status(gamma, tips, slopes, status=np.empty(len(gamma), np.int8))
+
+    def fill_slopes_and_status(
+        self, gamma: Array, tips: Array, slopes: Array, *, status: NDArray[np.int8]
+    ) -> None:
+        """`fill_slopes`, and the `TipStatus` (n,) of each, on the calling thread."""
         response = self._solver.respond(gamma)
-        tips[:] = response.tips
+        tips[:], status[:] = response.tips, response.status
         position_slopes(tips, response.twists, slopes)
 
     def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:

@@ -209,6 +209,23 @@ class TipMap(ABC):
         self.fill_tips(gamma, out)
         status[:] = TipStatus.STABLE
 
+    def fill_slopes_and_status(
+        self, gamma: Array, tips: Array, slopes: Array, *, status: NDArray[np.int8]
+    ) -> None:
+        """`fill_slopes`, and the `TipStatus` (n,) of each, on the calling thread."""
+        self.fill_slopes(gamma, tips, slopes)
+        self.fill_tips_and_status(gamma, np.empty_like(tips), status)
+
+    def tips_and_status(self, activations: ArrayLike) -> tuple[Array, NDArray[np.int8]]:
+        """Tips [m], shape (n, 3), NaN without an equilibrium, and their `TipStatus`, (n,)."""
+        gamma = self.box.check(activations)
+        tips, status = np.empty((len(gamma), 3)), np.empty(len(gamma), np.int8)
+        parallel.run(
+            partial(self.fill_tips_and_status, gamma[b], tips[b], status[b])
+            for b in parallel.blocks(len(gamma), BLOCK)
+        )
+        return tips, status
+
     def tips_and_slopes(self, activations: ArrayLike) -> tuple[Array, Array]:
         """Tips [m], shape (n, 3), and their derivatives ∂r/∂γ [m], shape (n, 3, bundles)."""
         gamma = self.box.check(activations)

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.errors import InvalidInput
+from softreach import parallel
 from softreach.kernels.contour import stretches
-from softreach.rod.tip_map import TipMap
+from softreach.rod.tip_map import BLOCK, TipMap
+from softreach.workspace.stable import fill_stable_slopes, none_stable, stable_tips
 
-__all__ = ["every_second", "grid_stretches", "grid_tips", "image_measure"]
+__all__ = ["corners_of", "every_second", "grid_stretches", "grid_tips", "image_measure"]
 
 Array = NDArray[np.float64]
 
 _TOL = 1e-9  # far fewer evaluations than on the grids: their steps may be short
+_NEARLY_ALL = 0.9
 _DIFFERENCES = 200.0  # over n², more than differences on n cells err by, of the largest det J
 
 
@@ -21,30 +25,59 @@ def grid_tips(rod: TipMap, cells: int) -> Array:
     """Tips [m] of the grid of cells^m boxes over the free bundles, in C order.
 
     Returns:
-        Shape ((cells + 1)^m, 3), the last free bundle varying fastest.
+        Shape ((cells + 1)^m, 3), the last free bundle varying fastest; NaN where there is no stable
+        equilibrium.
+
+    Raises:
+        InvalidInput: There is none anywhere.
     """
     ticks = [np.linspace(0.0, 1.0, cells + 1)] * rod.box.dimension
-    tips = rod.tips(rod.box.from_free_cube(_product(ticks)))
-    if rod.supports_unstable and not np.isfinite(tips).all():
-        lost = f"{int(np.isnan(tips[:, 0]).sum())} of {len(tips)} activations have no equilibrium"
-        raise InvalidInput("loads", lost, "such that every activation has one", "lighten the load")
+    tips = stable_tips(rod, rod.box.from_free_cube(_product(ticks)))
+    if rod.supports_unstable and np.isnan(tips[:, 0]).all():
+        raise none_stable(len(tips))
     return tips
 
 
-def grid_stretches(rod: TipMap, tips: Array, cells: int) -> Array:
-    """det J of three free bundles at the vertices of a grid, up to a positive factor.
+def grid_stretches(rod: TipMap, tips: Array, cells: int, left_out: NDArray[np.bool_]) -> Array:
+    """det J of three free bundles at the vertices of a grid, for tips in m per unit of activation.
 
-    From differences of the tips, and where these might have the wrong sign by J itself.
+    From differences of the tips, and by J itself where these might have the wrong sign, as well as
+    at the corners of cells that are left out.
+
+    Args:
+        rod: The tip map.
+        tips: From `grid_tips`.
+        cells: Number of cells along each axis.
+        left_out: Cells over which no differences can be taken, shape (cells, cells, cells).
 
     Returns:
-        Shape ((cells + 1)³,).
+        Shape ((cells + 1)³,); 0 where there is no stable equilibrium.
     """
     found = stretches(tips, np.array([cells] * 3))
     found *= cells**3 / (8.0 * rod.box.volume)
-    small = np.flatnonzero(np.abs(found) <= _DIFFERENCES / cells**2 * np.abs(found).max())
+    unsure = corners_of(left_out).ravel()
+    largest = _largest(rod, np.abs(found[~unsure]))
+    small = np.flatnonzero(unsure | (np.abs(found) <= _DIFFERENCES / cells**2 * largest))
+    small = small[np.isfinite(tips[small, 0])]
     places = np.stack(np.unravel_index(small, (cells + 1,) * 3), axis=1) / cells
     found[small] = _stretch(rod, rod.box.from_free_cube(places))
+    found[~np.isfinite(found)] = 0.0
     return found
+
+
+def _largest(rod: TipMap, stretch: Array) -> float:
+    """The largest |det J|; nearly so where it has no bound, as it grows toward instability."""
+    if rod.supports_unstable and len(stretch):
+        return float(np.quantile(stretch, _NEARLY_ALL))
+    return float(stretch.max(initial=0.0))
+
+
+def corners_of(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Vertices of a grid that are corners of some of its cells."""
+    for axis in range(cells.ndim):
+        none = np.zeros_like(np.take(cells, [0], axis))
+        cells = np.concatenate([cells, none], axis) | np.concatenate([none, cells], axis)
+    return cells
 
 
 def every_second(values: Array, cells: int, m: int) -> Array:
@@ -65,7 +98,8 @@ def image_measure(rod: TipMap, nodes: int) -> float:
         nodes: Nodes along each axis of the box.
 
     Returns:
-        Length [m], area [m²] or signed volume [m³] for one, two or three free bundles.
+        Length [m], area [m²] or signed volume [m³] for one, two or three free bundles; NaN if a
+        node has no stable equilibrium.
     """
     x, w = np.polynomial.legendre.leggauss(nodes)
     m = rod.box.dimension
@@ -77,10 +111,24 @@ def image_measure(rod: TipMap, nodes: int) -> float:
 
 def _stretch(rod: TipMap, gamma: Array) -> Array:
     """The change of measure of the map at each activation: det J where J is square."""
-    slopes = rod.tips_and_slopes(gamma)[1][:, :, rod.box.free]
-    if rod.box.dimension == 3:
-        return np.linalg.det(slopes)
-    return np.sqrt(np.linalg.det(np.swapaxes(slopes, 1, 2) @ slopes).clip(0.0))
+    slopes = _stable_slopes(rod, gamma)[:, :, rod.box.free]
+    with np.errstate(invalid="ignore"):  # NaN where there is no stable equilibrium
+        if rod.box.dimension == 3:
+            return np.linalg.det(slopes)
+        return np.sqrt(np.linalg.det(np.swapaxes(slopes, 1, 2) @ slopes).clip(0.0))
+
+
+def _stable_slopes(rod: TipMap, gamma: Array) -> Array:
+    """∂r/∂γ [m], shape (n, 3, bundles); NaN where there is no stable equilibrium."""
+    if not rod.supports_unstable:
+        return rod.tips_and_slopes(gamma)[1]
+    tips, slopes = np.empty((len(gamma), 3)), np.empty((len(gamma), 3, rod.box.bundles))
+    parallel.run(
+        partial(fill_stable_slopes, rod, gamma[block], tips[block], slopes[block])
+        for block in parallel.blocks(len(gamma), BLOCK // 16)
+    )
+    slopes[np.isnan(tips[:, 0])] = np.nan
+    return slopes
 
 
 def _product(ticks: list[Array]) -> Array:

@@ -188,6 +188,8 @@ def image_of(
     cells: tuple[int, int, int],
     lattice: Lattice,
     progress: Progress = silent,
+    *,
+    left_out: NDArray[np.bool_] | None = None,
 ) -> Image:
     """The image of a grid of boxes whose vertices go to `points`.
 
@@ -197,30 +199,47 @@ def image_of(
         cells: Number of boxes along each of the three axes.
         lattice: Cells to rasterize on.
         progress: Called with the number of vertices done since its last call.
+        left_out: Boxes that have no image, shape `cells`; points that are corners of no other box
+            may be NaN. None by default.
     """
     scaled = lattice.coordinates(points)
-    unit = _unit(scaled, cells)
+    gaps = np.zeros(cells, bool) if left_out is None else left_out
+    unit = _unit(scaled, gaps)
     vertices = np.rint(scaled * unit)
+    vertices[np.isnan(vertices)] = 0.0
     return Image(
         lattice=lattice,
         unit=unit,
         vertices=vertices,
-        triangles=_critical_triangles(vertices, stretches, cells, progress),
+        triangles=_critical_triangles(vertices, stretches, gaps, progress),
     )
 
 
-def _unit(scaled: Array, cells: tuple[int, int, int]) -> float:
+def _unit(scaled: Array, left_out: NDArray[np.bool_]) -> float:
     """The largest power of two for which the kernels' determinants are exact."""
-    grid = scaled.reshape(*(n + 1 for n in cells), 3)
-    steps = [np.abs(np.diff(grid, axis=j)).max() for j in range(3)]
+    grid = scaled.reshape(*(n + 1 for n in left_out.shape), 3)
+    steps = [_longest_edge(grid, left_out, axis) for axis in range(3)]
     longest = max(float(np.sum(steps)), 1.0)  # rounding adds at most 1 unit, hence the -1 below
     return 2.0 ** np.floor(contour.EXACT_BITS - 1 - np.log2(longest))
 
 
+def _longest_edge(grid: Array, left_out: NDArray[np.bool_], axis: int) -> float:
+    """The largest change of a coordinate along edges of the boxes that have an image."""
+    steps = np.abs(np.diff(grid, axis=axis))
+    if not left_out.any():
+        return float(steps.max())
+    used = np.pad(~left_out, [(int(other != axis),) * 2 for other in range(3)])
+    for other in {0, 1, 2} - {axis}:
+        rows = np.moveaxis(used, other, 0)
+        used = np.moveaxis(rows[:-1] | rows[1:], 0, other)
+    return float(steps[used].max(initial=0.0))
+
+
 def _critical_triangles(
-    vertices: Array, stretches: Array, cells: tuple[int, int, int], progress: Progress
+    vertices: Array, stretches: Array, left_out: NDArray[np.bool_], progress: Progress
 ) -> Ints:
-    star, axes = contour.stars(cells), np.array(cells)
+    star, axes = contour.stars(left_out.shape), np.array(left_out.shape)
+    gaps = np.pad(left_out, [(0, 1)] * 3).ravel()  # of the cells whose least vertex this is
     largest = np.abs(stretches).max() or 1.0
     stretches = np.rint(stretches / largest * 2.0**_STRETCH_BITS)
     blocks = list(parallel.blocks(len(vertices), max(1, _ROWS // len(star.triangles))))
@@ -229,7 +248,7 @@ def _critical_triangles(
     def task(number: int) -> None:
         first, last = blocks[number].start, blocks[number].stop
         out = np.empty(((last - first) * len(star.triangles), 5), np.int64)
-        used = contour.critical_triangles(vertices, stretches, axes, first, last, star, out)
+        used = contour.critical_triangles(vertices, stretches, axes, gaps, first, last, star, out)
         parts[number] = out[:used].copy()
         progress(last - first)
 

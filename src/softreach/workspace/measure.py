@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,10 +18,13 @@ __all__ = [
     "convex_volume",
     "fold_volume",
     "multiply_covered",
+    "partial_convex_volume",
+    "partial_volume",
     "solid_volume",
 ]
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 _LEFT = 0.35  # of what is removed; for four bundles 0.28 to 0.34 of it were found wrong
 _NODES = 24  # Gauss nodes along each axis; two thirds of them tell the error
@@ -43,6 +46,8 @@ def solid_volume(rod: TipMap, fine: Image, coarse: Image) -> Estimate:
     lives only where the image folds or overlaps and is taken from the rasterized images. What is
     rasterized errs by O(1/n²), which both grids together remove. All that they remove is the error
     stated: folds that a coarse grid makes up vanish faster than that.
+
+    NaN if a node of the integral has no stable equilibrium.
     """
     signed, rough = image_measure(rod, _NODES), image_measure(rod, 2 * _NODES // 3)
     sense = 1 if signed >= 0 else -1
@@ -52,26 +57,55 @@ def solid_volume(rod: TipMap, fine: Image, coarse: Image) -> Estimate:
     return Estimate(abs(signed) + rest.value, abs(signed - rough) + removed + at_fine.error)
 
 
+def partial_volume(fine: Image, common: Image, coarse: Image, remainder: float) -> Estimate:
+    """Volume of the image of a part of a box [m³], where no integral over all of it is known.
+
+    As `solid_volume`, with the signed volume of the mapped tetrahedra for the integral of det J.
+    What that errs by, O(1/n²), is removed as far as the cells tell that both grids hold. All that
+    is removed is part of the error, and so is half of what cells at the edge of the part are taken
+    to reach.
+
+    Args:
+        fine: What the cells of the grid reach that are not left out.
+        common: What those of them reach that the coarse grid holds too.
+        coarse: The same from a grid of half as many cells.
+        remainder: What cells at the edge reach beside [m³].
+    """
+    sense = 1 if _signed_volume(fine) >= 0 else -1
+    at_fine, at_common, at_coarse = (_covered(image, sense) for image in (fine, common, coarse))
+    removed = (at_common.value - at_coarse.value) / 3.0
+    unknown = 0.0 if at_coarse.value > 0.0 else at_fine.value  # nothing to compare with
+    error = abs(removed) + at_fine.error + 0.5 * remainder + unknown
+    return Estimate(at_fine.value + removed + remainder, error)
+
+
 def extrapolated(fine: Estimate, coarse: Estimate) -> Estimate:
     """The limit of values whose error falls by four when the grid is halved (Richardson)."""
     removed = (fine.value - coarse.value) / 3.0
     return Estimate(fine.value + removed, _LEFT * abs(removed) + fine.error)
 
 
-def multiply_covered(fine: Image, coarse: Image) -> tuple[dict[int, float], float]:
+def multiply_covered(
+    fine: Image, coarse: Image, common: Image | None = None
+) -> tuple[dict[int, float], float]:
     """Volume of the places that a given number of activations, 2 or more, reach [m³].
 
     A number whose volume is below the error, or changes by more than itself on half as fine a
     grid, is not a finding but the roughness of a fold: such places count with the next smaller.
 
+    Args:
+        fine: Of n cells along each axis.
+        coarse: Of half as many.
+        common: What the fine cells reach that the coarse grid holds too, if not all of them are.
+
     Returns:
         The volumes, and by how much their sum changes on half as fine a grid.
     """
-    volumes, rough = _by_cover(fine), _by_cover(coarse)
-    size = max(len(volumes), len(rough), 3)
-    volumes, rough = (np.pad(v, (0, size - len(v)))[2:] for v in (volumes, rough))
-    error = float(abs(volumes.sum() - rough.sum()))
-    sure = np.maximum(np.abs(volumes - rough), error) < volumes
+    covers = _of_each(_by_cover, fine, coarse, common)
+    size = max(*(len(cover) for cover in covers), 3)
+    volumes, same, rough = (np.pad(v, (0, size - len(v)))[2:] for v in covers)
+    error = float(abs(same.sum() - rough.sum()))
+    sure = np.maximum(np.abs(same - rough), error) < volumes
     sure[0] = True
     found, unsure = {}, 0.0
     for number in range(size - 1, 1, -1):
@@ -86,13 +120,23 @@ def _by_cover(image: Image) -> Array:
     return _mean(image, lambda spans: np.bincount(spans.cover, spans.length))
 
 
-def fold_volume(fine: Image, coarse: Image) -> Estimate:
+def fold_volume(fine: Image, coarse: Image, common: Image | None = None) -> Estimate:
     """Volume reached with both orientations [m³], and its change by half as fine a grid."""
-    value, rough = (
-        float(_mean(image, lambda spans: spans.length[spans.cover > np.abs(spans.degree)].sum()))
-        for image in (fine, coarse)
-    )
-    return Estimate(value, abs(value - rough))
+    value, same, rough = _of_each(_folded, fine, coarse, common)
+    return Estimate(value, abs(same - rough))
+
+
+def _folded(image: Image) -> float:
+    behind = _mean(image, lambda spans: spans.length[spans.cover > np.abs(spans.degree)].sum())
+    return float(behind)
+
+
+def _of_each(
+    measure: Callable[[Image], T], fine: Image, coarse: Image, common: Image | None
+) -> tuple[T, T, T]:
+    """A measure of the fine image, of what it has in common with the coarse one, and of this."""
+    value = measure(fine)
+    return value, value if common is None else measure(common), measure(coarse)
 
 
 def convex_volume(fine: Image, coarse: Image) -> Estimate:
@@ -100,11 +144,27 @@ def convex_volume(fine: Image, coarse: Image) -> Estimate:
 
     The hull of mapped vertices lies inside that of the image by O(1/n²), which is removed.
     """
-    value, rough = (
-        Estimate(convex_hull(_outer_vertices(image)).volume * image.lattice.cell**3, 0.0)
-        for image in (fine, coarse)
-    )
+    value, rough = (Estimate(_hull_volume(_corners(image)), 0.0) for image in (fine, coarse))
     return extrapolated(value, rough)
+
+
+def partial_convex_volume(fine: Image, common: Image, coarse: Image, tips: Array) -> Estimate:
+    """The same of a part of a box, and of some tips beside it [m], shape (n, 3)."""
+    corners = _corners(fine)
+    value = _hull_volume(np.concatenate([corners, tips]))
+    removed = (_hull_volume(_corners(common)) - _hull_volume(_corners(coarse))) / 3.0
+    error = abs(removed) + value - _hull_volume(corners)
+    return Estimate(value + removed, error)
+
+
+def _hull_volume(points: Array) -> float:
+    return convex_hull(points).volume
+
+
+def _corners(image: Image) -> Array:
+    """Points of the image that may be corners of its convex hull [m], shape (n, 3)."""
+    lattice = image.lattice
+    return lattice.origin + lattice.cell * _outer_vertices(image)
 
 
 def _outer_vertices(image: Image) -> Array:
@@ -133,6 +193,25 @@ def _correction(image: Image, sense: int) -> Estimate:
     values = [missing(spans) for spans in image.spans]
     scale = image.lattice.cell**3
     return Estimate(scale * float(np.mean(values)), scale * float(np.ptp(values)))
+
+
+def _covered(image: Image, sense: int) -> Estimate:
+    """∫ [x is reached] dx [m³], with the scatter of three directions of sight."""
+    again = _correction(image, sense)
+    return Estimate(sense * _signed_volume(image) + again.value, again.error)
+
+
+def _signed_volume(image: Image) -> float:
+    """Volume of the mapped tetrahedra that keep the orientation less that of the others [m³].
+
+    By the divergence theorem: the degree changes at critical triangles only.
+    """
+    if not len(image.triangles):
+        return 0.0
+    corners = image.vertices[image.triangles[:, :3]] / image.unit
+    a, b, c = np.moveaxis(corners - corners.mean(axis=(0, 1)), 1, 0)
+    flux = np.einsum("ti,ti->t", a, np.cross(b, c)) * image.triangles[:, 4]
+    return -float(flux.sum()) / 6.0 * image.lattice.cell**3
 
 
 def _mean(image: Image, quantity: Callable[[Spans], ArrayLike]) -> Array:

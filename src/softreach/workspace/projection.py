@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from softreach import parallel
 from softreach.rod.damped_step import damped_steps
 from softreach.rod.tip_map import BLOCK, TipMap
+from softreach.workspace.stable import fill_stable_slopes
 
 __all__ = ["Nearest", "nearest_tips"]
 
@@ -31,11 +32,14 @@ class Nearest(NamedTuple):
     tips: Array
     """Their tips [m], shape (n, 3)."""
     distance: Array
-    """From tip to target [m], shape (n,)."""
+    """From tip to target [m], shape (n,); infinite where a search began without a stable
+    equilibrium."""
 
 
 def nearest_tips(rod: TipMap, start: Array, targets: Array, enough: float) -> Nearest:
     """The activations whose tips come closest to targets, as far as a descent from `start` finds.
+
+    Only stable equilibria are taken.
 
     Args:
         rod: The tip map.
@@ -58,8 +62,9 @@ def _descend(rod: TipMap, targets: Array, enough: float, found: Nearest) -> None
     """Damped Gauss and Newton steps that stay within the bounds; on the calling thread."""
     active, damping = np.arange(len(targets)), np.full(len(targets), _FIRST_DAMPING)
     slopes = np.empty((len(targets), 3, rod.box.bundles))
-    rod.fill_slopes(found.gamma, found.tips, slopes)
-    found.distance[:] = np.linalg.norm(found.tips - targets, axis=1)
+    fill_stable_slopes(rod, found.gamma, found.tips, slopes)
+    found.distance[:] = _distance(found.tips, targets)
+    active = active[np.isfinite(found.distance)]  # others start where nothing is stable
     for _ in range(_MOST_STEPS):
         active = active[found.distance[active] > enough]
         if not len(active):
@@ -70,16 +75,24 @@ def _descend(rod: TipMap, targets: Array, enough: float, found: Nearest) -> None
         softness = damping[active] * square + 1e-300
         trial, left = damped_steps(rod.box, gamma, miss, slope, softness)
         tips, ahead = np.empty((len(active), 3)), np.empty((len(active), 3, rod.box.bundles))
-        rod.fill_slopes(trial, tips, ahead)
-        distance = np.linalg.norm(tips - targets[active], axis=1)
+        fill_stable_slopes(rod, trial, tips, ahead)
+        distance = _distance(tips, targets[active])
         better = distance < now
         taken = active[better]
         found.gamma[taken], found.tips[taken] = trial[better], tips[better]
         found.distance[taken], slopes[taken] = distance[better], ahead[better]
         good = now - distance > 0.25 * (now - left)
         believed = damping[active] <= _BELIEVED
-        factor = np.where(good, 0.1, np.where(better, 1.0, 10.0))
+        # Searches beyond the loss of stability take long: a step into it is shortened much.
+        worse = np.where(np.isinf(distance), 100.0, 10.0)
+        factor = np.where(good, 0.1, np.where(better, 1.0, worse))
         damping[active] = np.maximum(damping[active] * factor, _LEAST_DAMPING)
         # What the linear map promises bounds what is left to gain, once it is to be believed.
         small = (now - left <= _PROGRESS * np.minimum(enough, now)) & believed
         active = active[~small & (damping[active] < _LARGEST_DAMPING)]
+
+
+def _distance(tips: Array, targets: Array) -> Array:
+    """From tips to targets [m]; infinite for those that are not stable."""
+    distance = np.linalg.norm(tips - targets, axis=1)
+    return np.where(np.isnan(distance), np.inf, distance)

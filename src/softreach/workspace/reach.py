@@ -13,14 +13,15 @@ from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput, SoftreachWarning
 from softreach.memory import free_memory
 from softreach.progress import Progress, silent
-from softreach.rod.settled import check_settled
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.workspace import measure
-from softreach.workspace.box_grid import every_second, grid_stretches, grid_tips
+from softreach.workspace.box_grid import corners_of, every_second, grid_stretches, grid_tips
+from softreach.workspace.cut_cells import remainder
 from softreach.workspace.image import Image, Lattice, image_of
 from softreach.workspace.reachable import ReachableSet
-from softreach.workspace.redundant import searched_set, smallest_memory
+from softreach.workspace.redundant import lost_share, searched_set, smallest_memory
 from softreach.workspace.solid import ReachableSolid
+from softreach.workspace.tears import coarser, finer, left_out_cells
 from softreach.workspace.thin import thin_set
 
 __all__ = ["reachable_set"]
@@ -59,6 +60,10 @@ def reachable_set(
     within ε. Each place that counts has an activation that reaches it; parts thinner than h, or
     that no search meets, may be missing.
 
+    Under loads only stable equilibria count as reached. Where the activation box has none, or the
+    arm snaps from one to another, cells are left out and never bridged: `lost_share` tells their
+    share of the box. What they still reach at the edge is estimated, and is part of the error.
+
     Args:
         arm: The design, or its tip map. Bundles with equal bounds are held there and add no
             dimension.
@@ -76,14 +81,14 @@ def reachable_set(
         bundles or more, two, one or none.
 
     Raises:
-        InvalidInput: An argument out of range.
+        InvalidInput: An argument out of range, or loads under which no activation is stable.
 
     Warns:
         SoftreachWarning: The estimated error is larger than asked.
     """
     if not 1e-6 <= accuracy <= 0.2:
         raise InvalidInput("accuracy", accuracy, "1e-6 to 0.2")
-    rod = check_settled(tip_map(arm, tol))
+    rod = tip_map(arm, tol)
     m = rod.box.dimension
     if m < 3:
         return thin_set(rod)
@@ -103,7 +108,7 @@ def _of_three(
 ) -> ReachableSolid:
     cells = _checked_grid(grid) if grid is not None else _grid_for(accuracy)
     found = _solid(rod, cells, cell, accuracy, progress)
-    while grid is None and not _settled(found, accuracy) and _fits(2 * found.cells):
+    while grid is None and not _settled(found, accuracy) and _worthwhile(found, accuracy):
         found = _solid(rod, 2 * found.cells, cell, accuracy, progress)
     return found
 
@@ -129,6 +134,7 @@ def _of_many(
         volume_error=found.volume.error,
         convex_volume=found.convex_volume.value,
         convex_volume_error=found.convex_volume.error,
+        lost_share=lost_share(rod),
         image=found.cells,
         **_NO_OVERLAPS._asdict(),
     )
@@ -138,13 +144,13 @@ def _solid(
     rod: TipMap, cells: int, cell: float | None, accuracy: float, progress: Progress
 ) -> ReachableSolid:
     tips = grid_tips(rod, cells)
-    lattice, stretches = _lattice(tips, cell, accuracy), grid_stretches(rod, tips, cells)
-    fine = image_of(tips, stretches, (cells, cells, cells), lattice, progress)
-    half, fewer = cells // 2, every_second(stretches, cells, 3)
-    coarse = image_of(every_second(tips, cells, 3), fewer, (half, half, half), lattice)
-    volume = measure.solid_volume(rod, fine, coarse)
-    overlaps = _overlaps(volume, fine, coarse)
-    convex = measure.convex_volume(fine, coarse)
+    left_out = left_out_cells(rod, tips, cells)
+    lattice = _lattice(_reached(tips, left_out), cell, accuracy)
+    stretches = grid_stretches(rod, tips, cells, left_out)
+    grid = _Grid(tips, stretches, left_out)
+    fine, coarse = grid.image(lattice, progress), grid.every_second().image(lattice)
+    measures = None if left_out.any() else _whole(rod, fine, coarse)
+    volume, convex, overlaps = measures or _in_part(rod, grid, fine, coarse)
     return ReachableSolid(
         tip_map=rod,
         cells=cells,
@@ -152,9 +158,37 @@ def _solid(
         volume_error=overlaps.multiplicity_error,
         convex_volume=convex.value,
         convex_volume_error=convex.error,
+        lost_share=float(left_out.mean()),
         image=fine,
         **overlaps._asdict(),
     )
+
+
+class _Grid(NamedTuple):
+    """The mapped vertices of a grid of three bundles."""
+
+    tips: Array
+    """[m], shape ((n + 1)³, 3)."""
+    stretches: Array
+    """det J, shape ((n + 1)³,)."""
+    left_out: NDArray[np.bool_]
+    """Cells without an image, shape (n, n, n)."""
+
+    def image(self, lattice: Lattice, progress: Progress = silent) -> Image:
+        """What the cells cover that are not left out."""
+        n = len(self.left_out)
+        tips, stretches, left_out = self
+        return image_of(tips, stretches, (n, n, n), lattice, progress, left_out=left_out)
+
+    def every_second(self) -> _Grid:
+        """The grid of half as many cells, without those of which a part is left out."""
+        n = len(self.left_out)
+        tips, stretches = (every_second(values, n, 3) for values in (self.tips, self.stretches))
+        return _Grid(tips, stretches, coarser(self.left_out))
+
+    def in_common(self) -> _Grid:
+        """The grid without all cells that `every_second` leaves out."""
+        return self._replace(left_out=finer(coarser(self.left_out)))
 
 
 class _Overlaps(NamedTuple):
@@ -168,20 +202,68 @@ class _Overlaps(NamedTuple):
 
 _NO_OVERLAPS = _Overlaps({}, np.nan, np.nan, np.nan)
 
+_Measures = tuple[measure.Estimate, measure.Estimate, _Overlaps]
+"""Volume, volume of the convex hull, overlaps."""
 
-def _overlaps(volume: measure.Estimate, fine: Image, coarse: Image) -> _Overlaps:
+
+def _whole(rod: TipMap, fine: Image, coarse: Image) -> _Measures | None:
+    """Measures of the image of all of the box; None if not all of it is stable after all."""
+    volume = measure.solid_volume(rod, fine, coarse)
+    if np.isnan(volume.value):
+        return None
+    return volume, measure.convex_volume(fine, coarse), _overlaps(volume, fine, coarse)
+
+
+def _in_part(rod: TipMap, grid: _Grid, fine: Image, coarse: Image) -> _Measures:
+    """Measures of the image of the cells that are not left out, and of the rest of those."""
+    common = grid.in_common().image(fine.lattice)
+    rest = remainder(rod, fine, grid.stretches, grid.left_out)
+    volume = measure.partial_volume(fine, common, coarse, rest.volume)
+    convex = measure.partial_convex_volume(fine, common, coarse, rest.tips)
+    return volume, convex, _overlaps(volume, fine, coarse, common)
+
+
+def _overlaps(
+    volume: measure.Estimate, fine: Image, coarse: Image, common: Image | None = None
+) -> _Overlaps:
     """What is reached how often; a fold out of place errs by as much here as in the volume."""
-    several, change = measure.multiply_covered(fine, coarse)
+    several, change = measure.multiply_covered(fine, coarse, common)
     return _Overlaps(
         {1: volume.value - sum(several.values()), **several},
         volume.error + change,
-        *measure.fold_volume(fine, coarse),
+        *measure.fold_volume(fine, coarse, common),
     )
+
+
+def _reached(tips: Array, left_out: NDArray[np.bool_]) -> Array:
+    """Tips of the corners of cells that are not left out [m], shape (n, 3).
+
+    Raises:
+        InvalidInput: All are.
+    """
+    used = corners_of(~left_out).ravel()
+    if not used.any():
+        found = f"no cell of an activation grid of {len(left_out)}³ has a stable, untorn image"
+        raise InvalidInput("loads", found, "such that some have one", "lighten the load")
+    return tips[used]
 
 
 def _settled(found: ReachableSolid, accuracy: float) -> bool:
     """Whether a finer grid would hardly change the volume or how much of it is reached twice."""
     return found.volume_error <= accuracy * found.volume
+
+
+def _worthwhile(found: ReachableSolid, accuracy: float) -> bool:
+    """Whether grids that memory holds may be fine enough.
+
+    Where cells are left out the error falls as 1/n, as fast as n grows and no faster.
+    """
+    cells = 2 * found.cells
+    while found.lost_share > 0.0 and found.volume_error > accuracy * found.volume * (
+        cells / found.cells
+    ):
+        cells *= 2
+    return _fits(cells)
 
 
 def _fits(cells: int) -> bool:

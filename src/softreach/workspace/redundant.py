@@ -17,17 +17,20 @@ from softreach.errors import InvalidInput
 from softreach.geometry.hull import convex_hull
 from softreach.progress import Progress
 from softreach.rod.tip_map import TipMap
+from softreach.sampling import cube_blocks
 from softreach.workspace.crossings import Crossings
 from softreach.workspace.flood import ENOUGH, Flood
 from softreach.workspace.image import Lattice
 from softreach.workspace.lines import line_volume
 from softreach.workspace.measure import Estimate
 from softreach.workspace.reached_cells import ReachedCells
+from softreach.workspace.stable import none_stable, stable_tips
 
-__all__ = ["Searched", "searched_set", "smallest_memory"]
+__all__ = ["Searched", "lost_share", "searched_set", "smallest_memory"]
 
 Array = NDArray[np.float64]
 
+_SAMPLES = 1 << 14  # of the box, for the share that is lost
 _CLOUD = 1 << 16  # tips in a cloud that searches start from
 _CLOUDS = 8  # at most
 _RULE = 2.5  # cells along the mean side of the bounding box, times the root of the accuracy
@@ -59,6 +62,9 @@ def searched_set(
         cell: Edge of a cell [m], instead of the rule's.
         memory: What the search may use [bytes].
         progress: Called with the number of centers searched since its last call.
+
+    Raises:
+        InvalidInput: No activation has a stable equilibrium, or cells are too small for the memory.
     """
     gamma, tips = _cloud(rod, 0)
     sides = np.ptp(tips, axis=0)
@@ -85,6 +91,14 @@ def _lattice(tips: Array, cell: float) -> Lattice:
 def smallest_memory(rod: TipMap) -> float:
     """What a search cannot do without [bytes]."""
     return _fixed(rod) + 2e4 * _per_cell(rod)
+
+
+def lost_share(rod: TipMap) -> float:
+    """Share of the activation box without a stable equilibrium [-], from a sample."""
+    if not rod.supports_unstable:
+        return 0.0
+    (cube,) = cube_blocks("sobol", _SAMPLES, rod.box.dimension, 0, _SAMPLES)
+    return float(np.isnan(stable_tips(rod, rod.box.from_free_cube(cube))[:, 0]).mean())
 
 
 def _fixed(rod: TipMap) -> float:
@@ -210,4 +224,10 @@ def _cloud(rod: TipMap, seed: int) -> tuple[Array, Array]:
     bound = rng.random((_CLOUD, m)).argsort(axis=1) >= free[:, None]
     cube[bound] = rng.integers(0, 2, int(bound.sum()))
     gamma = np.ascontiguousarray(box.from_free_cube(cube))
-    return gamma, rod.tips(gamma)
+    tips = stable_tips(rod, gamma)
+    if not rod.supports_unstable:
+        return gamma, tips
+    stable = np.isfinite(tips[:, 0])
+    if not stable.any():
+        raise none_stable(len(tips))
+    return gamma[stable], tips[stable]

@@ -46,6 +46,7 @@ class ReachableSolid(ReachableSet):
     volume_error: float
     convex_volume: float
     convex_volume_error: float
+    lost_share: float = 0.0
     multiplicity: Mapping[int, float]
     """Volume of the places that exactly 1, 2, ... activations reach [m³]; empty for more than three
     free bundles."""

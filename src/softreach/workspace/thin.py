@@ -11,13 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.geometry.delaunay import finite_points
 from softreach.geometry.hull import convex_hull
-from softreach.geometry.surface import Surface
+from softreach.geometry.surface import Surface, compact_surface
 from softreach.kernels.simplices import chains, corner_steps
 from softreach.quantity import quantity
 from softreach.rod.tip_map import TipMap
 from softreach.workspace.box_grid import every_second, grid_tips, image_measure
 from softreach.workspace.measure import Estimate
 from softreach.workspace.reachable import Number, ReachableSet
+from softreach.workspace.tears import coarser, corner_values, finer, left_out_cells
 
 __all__ = ["ReachableCurve", "ReachablePoint", "ReachableSurface", "thin_set"]
 
@@ -42,8 +43,9 @@ class ReachableSurface(ReachableSet):
     """How far off `area` may be, estimated from two numbers of Gauss nodes [m²]."""
     convex_volume: float
     convex_volume_error: float
+    lost_share: float = 0.0
     mapped_grid: Surface = field(repr=False)
-    """The mapped activation grid."""
+    """The mapped activation grid, without cells that are left out."""
     volume: float = field(init=False, default=0.0)
     volume_error: float = field(init=False, default=0.0)
 
@@ -51,12 +53,15 @@ class ReachableSurface(ReachableSet):
     def of(cls, rod: TipMap) -> Self:
         """The surface of a tip map with two free bundles."""
         cells = _SURFACE_CELLS
-        tips, (area, error) = grid_tips(rod, cells), _measure(rod)
-        base = np.arange(cells**2)
+        tips = grid_tips(rod, cells)
+        left_out = left_out_cells(rod, tips, cells)
+        area, error = _measure(rod, tips, left_out)
+        base = np.flatnonzero(~left_out)
         base += base // cells  # each row of vertices has one more
         corners = corner_steps((cells, cells))[chains(2, 2)]
         faces = (base[:, None, None] + corners).reshape(-1, 3)
         convex = _convex_volume(tips, cells, 2)
+        vertices, faces = (tips, faces) if len(base) == cells**2 else compact_surface(tips, faces)
         return cls(
             tip_map=rod,
             cells=cells,
@@ -64,7 +69,8 @@ class ReachableSurface(ReachableSet):
             area_error=error,
             convex_volume=convex.value,
             convex_volume_error=convex.error,
-            mapped_grid=Surface(vertices=tips, faces=faces),
+            lost_share=float(left_out.mean()),
+            mapped_grid=Surface(vertices=vertices, faces=faces),
         )
 
     def surface(self) -> Surface:
@@ -106,15 +112,21 @@ class ReachableCurve(ReachableSet):
     """How far off `curve_length` may be, estimated from two numbers of Gauss nodes [m]."""
     convex_volume: float
     convex_volume_error: float
+    lost_share: float = 0.0
     path: Array = field(repr=False)
-    """Points along the curve [m], from the lower bound to the upper one, shape (cells + 1, 3)."""
+    """Points along the curve [m], from the lower bound to the upper one, shape (cells + 1, 3); NaN
+    where there is no stable equilibrium."""
+    left_out: NDArray[np.bool_] = field(repr=False)
+    """Which pieces between neighboring points are left out, shape (cells,)."""
     volume: float = field(init=False, default=0.0)
     volume_error: float = field(init=False, default=0.0)
 
     @classmethod
     def of(cls, rod: TipMap) -> Self:
         """The curve of a tip map with one free bundle."""
-        path, (length, error) = grid_tips(rod, _CURVE_CELLS), _measure(rod)
+        path = grid_tips(rod, _CURVE_CELLS)
+        left_out = left_out_cells(rod, path, _CURVE_CELLS)
+        length, error = _measure(rod, path, left_out)
         convex = _convex_volume(path, _CURVE_CELLS, 1)
         return cls(
             tip_map=rod,
@@ -123,7 +135,9 @@ class ReachableCurve(ReachableSet):
             curve_length_error=error,
             convex_volume=convex.value,
             convex_volume_error=convex.error,
+            lost_share=float(left_out.mean()),
             path=path,
+            left_out=left_out,
         )
 
     def distance(self, points: ArrayLike) -> Array:
@@ -133,14 +147,15 @@ class ReachableCurve(ReachableSet):
     @cached_property
     def _chords(self) -> Surface:
         """The chords as triangles that repeat a corner."""
-        start = np.arange(self.cells)
-        return Surface(vertices=self.path, faces=np.stack([start, start + 1, start + 1], axis=1))
+        start = np.flatnonzero(~self.left_out)
+        faces = np.stack([start, start + 1, start + 1], axis=1)
+        return Surface(vertices=np.nan_to_num(self.path), faces=faces)
 
     def _repr_html_(self) -> str:
         """What `repr` says below a small picture, for notebooks."""
         from softreach.picture import Dots, html_card
 
-        return html_card(repr(self), Dots(self.path))
+        return html_card(repr(self), Dots(_found(self.path)))
 
     def _lines(self) -> list[str]:
         length = quantity(self.curve_length, "m", self.curve_length_error)
@@ -163,6 +178,7 @@ class ReachablePoint(ReachableSet):
     tip_map: TipMap
     tip: Array
     """Position [m], shape (3,)."""
+    lost_share: float = field(init=False, default=0.0)
     cells: int = field(init=False, default=1)
     volume: float = field(init=False, default=0.0)
     volume_error: float = field(init=False, default=0.0)
@@ -197,10 +213,58 @@ def thin_set(rod: TipMap) -> ReachableSet:
     return _KINDS[rod.box.dimension].of(rod)
 
 
-def _measure(rod: TipMap) -> Estimate:
-    """Length or area of the image, and by how much fewer Gauss nodes change it."""
-    fine, rough = (image_measure(rod, nodes) for nodes in _NODES)
-    return Estimate(fine, abs(fine - rough))
+def _measure(rod: TipMap, tips: Array, left_out: NDArray[np.bool_]) -> Estimate:
+    """Length or area of the image, and by how much fewer Gauss nodes change it.
+
+    Where cells are left out, it is that of the others and an estimate of the rest.
+    """
+    if not left_out.any():
+        fine, rough = (image_measure(rod, nodes) for nodes in _NODES)
+        if np.isfinite([fine, rough]).all():
+            return Estimate(fine, abs(fine - rough))
+    return _of_cells(tips, left_out)
+
+
+def _of_cells(tips: Array, left_out: NDArray[np.bool_]) -> Estimate:
+    """Length or area of the cells of a grid that are not left out, as chords or triangles.
+
+    What they err by, O(1/n²), is removed as far as the cells tell that a grid of half as many holds
+    too. A cell that is left out may still reach as much as its largest neighbor, and half of it is
+    taken.
+    """
+    cells, m = len(left_out), left_out.ndim
+    sizes = np.where(left_out, 0.0, _sizes(tips, cells, m))
+    lost = coarser(left_out)
+    rough = np.where(lost, 0.0, _sizes(every_second(tips, cells, m), cells // 2, m))
+    removed = (float(sizes[~finer(lost)].sum()) - float(rough.sum())) / 3.0
+    rest = 0.5 * float(_largest_neighbor(sizes)[left_out].sum())
+    return Estimate(float(sizes.sum()) + removed + rest, abs(removed) + rest)
+
+
+def _sizes(tips: Array, cells: int, m: int) -> Array:
+    """Lengths of chords, or areas of two triangles each [m or m²], shape (cells,) * m."""
+    corners = np.moveaxis(tips.reshape(*(cells + 1,) * m, 3), -1, 0)
+    corners = np.stack([corner_values(axis) for axis in corners], axis=-1)
+    if m == 1:
+        return np.linalg.norm(corners[:, 1] - corners[:, 0], axis=-1)
+    first, second, third = (corners[..., k, :] - corners[..., 0, :] for k in (1, 3, 2))
+    pair = np.stack([np.cross(first, second), np.cross(second, third)])
+    return np.linalg.norm(pair, axis=-1).sum(axis=0) / 2.0
+
+
+def _largest_neighbor(sizes: Array) -> Array:
+    """The largest of a cell and those that touch it."""
+    for axis in range(sizes.ndim):
+        none = np.zeros_like(np.take(sizes, [0], axis))
+        rows = np.concatenate([none, sizes, none], axis)
+        sizes = np.moveaxis(corner_values(corner_values(rows, [axis]).max(axis=-1), [axis]), -1, 0)
+        sizes = sizes.max(axis=0)
+    return sizes
+
+
+def _found(tips: Array) -> Array:
+    """Tips of stable equilibria."""
+    return tips[np.isfinite(tips[:, 0])]
 
 
 def _convex_volume(tips: Array, cells: int, m: int) -> Estimate:
@@ -209,6 +273,7 @@ def _convex_volume(tips: Array, cells: int, m: int) -> Estimate:
     It is too small by O(1/n²): a grid with a quarter of the cells along each axis differs by 15
     times the error. A tenth of the difference is stated.
     """
-    quarter = every_second(every_second(tips, cells, m), cells // 2, m)
+    quarter = _found(every_second(every_second(tips, cells, m), cells // 2, m))
+    tips = _found(tips)
     fine, coarse = convex_hull(tips).volume, convex_hull(quarter).volume
     return Estimate(fine, abs(fine - coarse) / 10.0)
