@@ -42,3 +42,4 @@ from .rod import tip_positions as tip_positions
 from .volume import concave_hull as concave_hull
 from .volume import convex_hull as convex_hull
 from .workspace import reachable_set as reachable_set
+from .workspace import volume_gradient as volume_gradient

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 from softreach.rod.tip_map import TipMap
 from softreach.workspace.faces import FaceNodes, box_slopes, gauss_faces
 
-__all__ = ["FLUX_TOL", "Flux", "signed_volume"]
+__all__ = ["Flux", "flux_tol", "signed_volume"]
 
 Array = NDArray[np.float64]
 
-FLUX_TOL = 1e-11
-"""Largest tip error on the faces, in L: there are few nodes, so that steps may be short."""
-_ROUGH_TOL = 1e-9  # where a raster decides the error
+_TOL = 1e-11  # in L: there are few nodes, so that steps may be short
+_ROUGH_TOL = 1e-9  # where a raster decides the error, and under loads, where each tip costs much
 _NODES = (8, 12, 16, 24, 32)
 
 
@@ -33,6 +32,11 @@ class Flux(NamedTuple):
     """Area vectors of the nodes, theory (82), [m²], shape (n, 3)."""
 
 
+def flux_tol(rod: TipMap) -> float:
+    """Largest tip error on the faces, in L."""
+    return min(rod.tol, _ROUGH_TOL if rod.supports_unstable else _TOL)
+
+
 def signed_volume(rod: TipMap, nodes: int | None = None) -> Flux:
     """The signed volume of the image of three free bundles.
 
@@ -47,7 +51,7 @@ def signed_volume(rod: TipMap, nodes: int | None = None) -> Flux:
     Returns:
         Value and error are NaN if a node has no stable equilibrium.
     """
-    rod = rod.refined(FLUX_TOL if nodes is None else _ROUGH_TOL)
+    rod = rod.refined(flux_tol(rod) if nodes is None else _ROUGH_TOL)
     counts = _NODES if nodes is None else (2 * nodes // 3, nodes)
     found, change = _flux(rod, counts[0]), np.inf
     for count in counts[1:]:

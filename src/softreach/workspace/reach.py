@@ -27,7 +27,7 @@ from softreach.workspace.solid import ReachableSolid
 from softreach.workspace.tears import coarser, finer, left_out_cells
 from softreach.workspace.thin import thin_set
 
-__all__ = ["reachable_set"]
+__all__ = ["rasterized_set", "reachable_set"]
 
 Array = NDArray[np.float64]
 
@@ -116,9 +116,9 @@ def _of_three(
     cells = _checked_grid(grid) if grid is not None else _grid_for(accuracy)
     if is_one_to_one(rod):
         return solid_by_flux(rod, cells, partial(_lattice, cell=cell, accuracy=accuracy), progress)
-    found = _solid(rod, cells, cell, accuracy, progress)
+    found = rasterized_set(rod, cells, cell, accuracy, progress)
     while grid is None and not _settled(found, accuracy) and _worthwhile(found, accuracy):
-        found = _solid(rod, 2 * found.cells, cell, accuracy, progress)
+        found = rasterized_set(rod, 2 * found.cells, cell, accuracy, progress)
     return found
 
 
@@ -150,9 +150,22 @@ def _of_many(
     )
 
 
-def _solid(
-    rod: TipMap, cells: int, cell: float | None, accuracy: float, progress: Progress
+def rasterized_set(
+    rod: TipMap,
+    cells: int,
+    cell: float | None,
+    accuracy: float,
+    progress: Progress = silent,
 ) -> ReachableSolid:
+    """What three free bundles reach by one raster, whether the map is one to one or not.
+
+    Args:
+        rod: The tip map.
+        cells: Of the activation grid along each axis, even.
+        cell: Edge of a cell in space [m]; by the accuracy if None.
+        accuracy: Relative error of the volume that the cell is chosen for.
+        progress: Called with the number of grid vertices done since its last call.
+    """
     tips = grid_tips(rod, cells)
     left_out = left_out_cells(rod, tips, cells)
     lattice = _lattice(_reached(tips, left_out), cell=cell, accuracy=accuracy)
