@@ -18,7 +18,7 @@ from softreach.rod.tip_map import TipMap, tip_map
 from softreach.schema import provenance
 from softreach.workspace.flux import Flux, flux_tol, signed_volume
 from softreach.workspace.hull_corners import HullCorners, hull_corners
-from softreach.workspace.measure import Estimate, extrapolated
+from softreach.workspace.measure import Estimate
 from softreach.workspace.reach import rasterized_set, reachable_set
 from softreach.workspace.shifts import Shifts, shifts_along
 from softreach.workspace.solid import ReachableSolid
@@ -182,7 +182,7 @@ class _Base:
         shifts = shifts_along(arm, parameter, 3, _STEP)
         rods = [tip_map(each, flux_tol(self._solid.tip_map)) for each in shifts.arms]
         volume = _swept(self._flux, shifts, rods)
-        convex = extrapolated(*(_dragged(each, shifts, rods) for each in self._corners))
+        convex = _limit(*(_dragged(each, shifts, rods) for each in self._corners))
         if self._solid.route == "raster":
             rest, _ = self._by_raster(parameter)
             volume = Estimate(volume.value + rest.value, volume.error + rest.error)
@@ -228,6 +228,12 @@ def _dragged(corners: HullCorners, shifts: Shifts, rods: Sequence[TipMap]) -> Es
 
     noise = rods[0].tol * rods[0].length * float(np.linalg.norm(corners.area, axis=1).sum())
     return _derivative(shifts, rods, corners.cube, along, noise)
+
+
+def _limit(fine: Estimate, coarse: Estimate) -> Estimate:
+    """For infinitely fine grids; as hulls change corners, all that is removed is the error."""
+    removed = (fine.value - coarse.value) / 3.0
+    return Estimate(fine.value + removed, fine.error + abs(removed))
 
 
 def _derivative(
