@@ -54,6 +54,10 @@ _COMMANDS = {
         "The exact reachable set: volume, multiplicity, folds, boundary.",
         "softreach reach minimal_trunk --surface reach.stl --figure reach.png",
     ),
+    "gradient": (
+        "How the reachable volume changes with parameters of the design.",
+        "softreach gradient lce_arm taper upper --set lower=-3 --set upper=-1",
+    ),
     "solve": (
         "Every activation that puts the tip at a target.",
         "softreach solve minimal_trunk --target 0.2,0.1,0.6",

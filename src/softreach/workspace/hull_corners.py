@@ -17,7 +17,8 @@ __all__ = ["HullCorners", "hull_corners"]
 
 Array = NDArray[np.float64]
 
-_MOST_CELLS = 84  # of a grid of which all vertices are looked at
+_MOST_CELLS = 48  # of a grid of which all vertices are looked at
+_MOST_FACE_CELLS = 84  # of one of which those on the faces are
 
 
 class HullCorners(NamedTuple):
@@ -29,21 +30,19 @@ class HullCorners(NamedTuple):
     """∂V_convex/∂r of each corner [m²], shape (n, 3)."""
 
 
-def hull_corners(solid: ReachableSolid) -> tuple[HullCorners, HullCorners]:
-    """Corners of the hulls of the grid's image and of that of half as fine a grid.
+def hull_corners(solid: ReachableSolid) -> dict[int, HullCorners]:
+    """Corners of the hulls of images of some grids, by their number of cells along each axis.
 
     Where the image folds, vertices inside the box may be corners as well as those on its faces.
     """
-    cells = solid.cells
-    if solid.route == "flux":
-        vertices = np.rint(grid_faces(cells) * cells).astype(np.int64)
-    else:
-        cells = min(cells, _MOST_CELLS)
-        vertices = np.indices((cells + 1,) * 3).reshape(3, -1).T
-    second = (vertices % 2 == 0).all(axis=1)
-    places = vertices / cells
-    rod = solid.tip_map
-    return _corners(rod, places), _corners(rod, places[second])
+    folds = solid.route != "flux"
+    most = _MOST_CELLS if folds else _MOST_FACE_CELLS
+    grids = (most // 2, 3 * most // 4, most)
+    return {n: _corners(solid.tip_map, _grid(n) if folds else grid_faces(n)) for n in grids}
+
+
+def _grid(cells: int) -> Array:
+    return np.indices((cells + 1,) * 3).reshape(3, -1).T / cells
 
 
 def _corners(rod: TipMap, cube: Array) -> HullCorners:

@@ -18,7 +18,7 @@ Ints = NDArray[np.int64]
 
 _FIRST = 4  # patches along each side of a face to begin with
 _HALVINGS = 6
-_MOST_PAIRS = 60_000
+_MOST_PAIRS = 200_000
 _MARGIN = 1.25  # on differences of slopes, for those between the vertices
 
 
