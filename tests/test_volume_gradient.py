@@ -73,7 +73,9 @@ def test_a_longer_and_thicker_arm_reaches_as_the_cube_of_its_size():
     sizes = NARROW.length, NARROW.profile.outer_radius
     assert sizes @ found.volume == pytest.approx(3.0 * found.solid.volume, rel=1e-7)
     convex = sizes @ found.convex_volume
-    assert convex == pytest.approx(3.0 * found.solid.convex_volume, abs=found.convex_volume_error[0])
+    assert convex == pytest.approx(
+        3.0 * found.solid.convex_volume, abs=found.convex_volume_error[0]
+    )
 
 
 def test_the_bounds_of_all_bundles_move_the_sum_of_those_of_each():

@@ -29,7 +29,7 @@ class Flux(NamedTuple):
     faces: FaceNodes
     """Nodes on the faces of the unit cube of the free bundles."""
     area: Array
-    """Area vectors of the nodes, theory (82), [m²], shape (n, 3)."""
+    """Area vectors of the nodes, with their weights [m²], shape (n, 3)."""
 
 
 def flux_tol(rod: TipMap) -> float:

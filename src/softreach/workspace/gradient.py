@@ -1,4 +1,4 @@
-"""Derivatives of the reachable volume by parameters of the design."""
+"""Derivatives of the reachable volume by parameters of the design: theory (83) and (84)."""
 
 from __future__ import annotations
 
@@ -182,9 +182,7 @@ class _Base:
         shifts = shifts_along(arm, parameter, 3, _STEP)
         rods = [tip_map(each, flux_tol(self._solid.tip_map)) for each in shifts.arms]
         volume = _swept(self._flux, shifts, rods)
-        convex = _limit(
-            {n: _dragged(each, shifts, rods) for n, each in self._corners.items()}
-        )
+        convex = _limit({n: _dragged(each, shifts, rods) for n, each in self._corners.items()})
         if self._solid.route == "raster":
             rest, _ = self._by_raster(parameter)
             volume = Estimate(volume.value + rest.value, volume.error + rest.error)
@@ -235,8 +233,8 @@ def _dragged(corners: HullCorners, shifts: Shifts, rods: Sequence[TipMap]) -> Es
 def _limit(of_grids: Mapping[int, Estimate]) -> Estimate:
     """For infinitely fine grids, whose error falls as 1/n² or a little slower.
 
-    Corners jump from vertex to vertex: what is removed is part of the error, and so is how far the
-    grids are from the rule.
+    Corners jump from vertex to vertex: twice what is removed is part of the error, and so is how
+    far the grids are from the rule.
     """
     cells = np.array(list(of_grids), float)
     values = np.array([each.value for each in of_grids.values()])
@@ -245,7 +243,7 @@ def _limit(of_grids: Mapping[int, Estimate]) -> Estimate:
     off = float(np.abs(rule @ found - values).max())
     smooth = max(each.error for each in of_grids.values())
     limit = float(found[0])
-    return Estimate(limit, smooth + 2.0 * off + abs(limit - values[-1]))
+    return Estimate(limit, smooth + 2.0 * off + 2.0 * abs(limit - values[-1]))
 
 
 def _derivative(

@@ -18,11 +18,12 @@ _UNKNOWN, _NO, _YES = -1, 0, 1
 
 
 class RegularWindows:
-    """Cubes of 2 w cells around vertices of a grid in which the map is one to one, for w = 1, 2, 4.
+    """Cubes of 2 w cells around vertices of a grid in which the map is one to one; w = 1, 2, 4, ...
 
-    With J0 = U Σ Vᵀ in the middle, E the largest |Σ⁻¹Uᵀ (J - J0) V| in the window, entry by entry:
-    if the spectral radius of E is below 1 every matrix within these bounds is regular, the one of
-    the mean value theorem too, which takes the difference of two activations to that of their tips.
+    Theory (82): with J0 = U Σ Vᵀ in the middle, E is the largest |Σ⁻¹Uᵀ (J - J0) V| in the window,
+    entry by entry. If its spectral radius is below 1 every matrix within these bounds is regular,
+    that of the mean value theorem too, which takes the difference of two activations to that of
+    their tips [Neumaier1990].
 
     Args:
         slopes: ∂r/∂x at the grid of the unit cube, shape (n + 1, n + 1, n + 1, 3, 3).

@@ -17,7 +17,7 @@ __all__ = ["Shifts", "shifts_along"]
 
 Array = NDArray[np.float64]
 
-_SCALES = {"m": 0.1, "rad": 1.0}
+_SCALES = {"m": 0.1, "rad": 0.1}
 """Of parameters that are 0, by their unit; lengths in L."""
 
 
@@ -70,9 +70,7 @@ def shifts_along(arm: Manipulator, parameter: Parameter, reach: int, relative: f
     fault: InvalidDesign | None = None
     for offsets in ways:
         try:
-            arms = tuple(
-                _shifted(arm, parameter, value + step * k) if k else arm for k in offsets
-            )
+            arms = tuple(_shifted(arm, parameter, value + step * k) if k else arm for k in offsets)
         except InvalidDesign as error:
             fault = fault or error
         else:
