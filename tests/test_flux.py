@@ -47,12 +47,12 @@ class Mapped(TipMap):
         for k in range(3):
             moved = gamma.astype(complex)
             moved[:, k] += 1j * STEP
-            slopes[:, :, k] = self.of(moved).imag / STEP
+            slopes[:, :, k] = np.imag(self.of(moved)) / STEP
 
     def tip_twists(self, activations):
         raise NotImplementedError
 
-    frames = strains_at = strain_range = radius = tip_twists
+    frames = strains_at = strain_range = radius = tip_twists  # pyright: ignore[reportAssignmentType]
 
 
 def columns(*each: np.ndarray) -> np.ndarray:
@@ -214,7 +214,7 @@ def test_the_flux_is_the_integral_of_det_j_whether_the_map_folds_or_not():
 
 def test_volume_grows_with_the_cube_of_the_length():
     arm = ONE_TO_ONE["minimal trunk"]
-    larger = changed(arm, {"length": 3.0, "outer_radius": 3.0 * arm.profile.outer_radius})
+    larger = changed(arm, {"length": 3.0, "outer_radius": 3.0 * float(arm.profile.radius(0.0))})
     assert solid(larger).volume == pytest.approx(27.0 * solid(arm).volume, rel=1e-9)
 
 

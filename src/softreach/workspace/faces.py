@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +42,7 @@ class FaceNodes(NamedTuple):
         return (self.sense * self.weights)[:, None] * np.cross(first, second)
 
 
+@lru_cache(maxsize=8)
 def gauss_faces(nodes: int) -> FaceNodes:
     """Gauss and Legendre's nodes on all six faces, as many along each side."""
     x, w = np.polynomial.legendre.leggauss(nodes)

@@ -270,6 +270,6 @@ def _derivative(
 def _rough_derivative(shifts: Shifts, values: Sequence[float]) -> Estimate:
     """Derivative of values that a raster has made rough."""
     value, smooth = float(shifts.weights @ values), float(shifts.rough_weights @ values)
-    noise = abs(float(_ROUGHNESS @ values)) / np.linalg.norm(_ROUGHNESS)
+    noise = abs(float(_ROUGHNESS @ values)) / float(np.linalg.norm(_ROUGHNESS))
     error = abs(value - smooth) + 2.0 * noise * float(np.linalg.norm(shifts.weights))
     return Estimate(value, error)

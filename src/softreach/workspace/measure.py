@@ -43,9 +43,9 @@ def solid_volume(rod: TipMap, fine: Image, coarse: Image) -> Estimate:
     With the degree d(x), the sum of the orientations of the activations that reach x,
     V = ∫ [x is reached] dx = |∫ det J dγ| + ∫ ([x is reached] - |d|) dx for an image whose larger
     part keeps (or turns) the orientation. The first integral is exact to many digits by what flows
-    through the faces, the second lives only where the image folds or overlaps and is taken from the rasterized images. What is
-    rasterized errs by O(1/n²), which both grids together remove. All that they remove is the error
-    stated: folds that a coarse grid makes up vanish faster than that.
+    through the faces; the second lives only where the image folds or overlaps and is taken from
+    the rasterized images. What is rasterized errs by O(1/n²), which both grids together remove. All
+    that they remove is the error stated: folds that a coarse grid makes up vanish faster than that.
 
     NaN if a node of the integral has no stable equilibrium.
     """

@@ -68,4 +68,4 @@ def _rasterized(rod: TipMap, cells: int, lattice: Lattice) -> Image:
     """The image of the activation grid."""
     tips = grid_tips(rod, cells)
     stretches = grid_stretches(rod, tips, cells, np.zeros((cells,) * 3, bool))
-    return image_of(tips, stretches, (cells,) * 3, lattice)
+    return image_of(tips, stretches, (cells, cells, cells), lattice)

@@ -89,8 +89,8 @@ def _scale(arm: Manipulator, parameter: Parameter) -> float:
 def _shifted(arm: Manipulator, parameter: Parameter, value: float) -> Manipulator:
     made = changed(arm, {parameter.name: float(value)})
     check_extension(made)
-    free = [bounds[:, 1] > bounds[:, 0] for bounds in (made.bounds, arm.bounds)]
-    if not np.array_equal(*free):
+    free, before = (bounds[:, 1] > bounds[:, 0] for bounds in (made.bounds, arm.bounds))
+    if not np.array_equal(free, before):
         allowed = "one that neither holds a bundle nor frees one"
         raise InvalidInput("parameter", parameter.name, allowed)
     return made

@@ -75,8 +75,7 @@ class ReachableSolid(ReachableSet):
 
     @cached_property
     def image(self) -> Image | ReachedCells:
-        """The mapped activation grid, rasterized; for more than three free bundles what was found
-        by search.
+        """The mapped activation grid, rasterized; of more than three bundles what was found.
 
         For the route "flux" it is made when it is first asked for.
         """
