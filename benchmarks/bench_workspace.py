@@ -100,9 +100,7 @@ def main(n: int = 400_000, repeat: int = 5) -> None:
     for name, (wall, volume) in results.items():
         shown = f"{volume:.5f}" if volume is not None else ""
         print(f"| {name} | {shown} | {wall:.3f} | {wall / one:.1f} | 1/{whole / wall:.1f} |")
-    print(
-        "\n| design, bounds | route | V [L³] | error [L³] | CPU [ms] | by raster | four derivatives |"
-    )
+    print("\n| design, bounds | route | V [L³] | error | CPU [ms] | raster | 4 derivatives |")
     print("|---|---|--:|--:|--:|--:|--:|")
     for name, bounds in NARROW:
         print(route_row(name, bounds, repeat))

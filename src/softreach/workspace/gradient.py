@@ -272,4 +272,4 @@ def _rough_derivative(shifts: Shifts, values: Sequence[float]) -> Estimate:
     value, smooth = float(shifts.weights @ values), float(shifts.rough_weights @ values)
     noise = abs(float(_ROUGHNESS @ values)) / float(np.linalg.norm(_ROUGHNESS))
     error = abs(value - smooth) + 2.0 * noise * float(np.linalg.norm(shifts.weights))
-    return Estimate(value, error)
+    return Estimate(value, float(error))

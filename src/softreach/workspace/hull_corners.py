@@ -59,6 +59,6 @@ def _corners(rod: TipMap, cube: Array) -> HullCorners:
 
 def _rows_of(some: Array, every: Array) -> NDArray[np.int64]:
     """Where in a list of points some of them are; one place for those that come twice."""
-    from scipy.spatial import cKDTree  # lazily
+    from scipy.spatial import KDTree  # lazily
 
-    return cKDTree(every).query(some)[1].astype(np.int64)
+    return np.asarray(KDTree(every).query(some)[1], np.int64)
