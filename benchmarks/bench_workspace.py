@@ -17,9 +17,14 @@ import pytest
 
 import softreach as sr
 from benchmarks.memory import peak_bytes, reset_peak
+from softreach.rod.tip_map import tip_map
 from softreach.workspace import reachable_set
 
 ALPHA = 0.03
+NARROW = (
+    *(("trunk", (-0.9, -0.3)), ("trunk", (-1.6, -0.3)), ("trunk", (-5 / 3, 0.0))),
+    *(("laboratory arm", (-3.0, -1.0)), ("laboratory arm", (-2.0, 0.0))),
+)
 MANY = (
     *(("trunk", 1e-2), ("trunk", 3e-3), ("five", 1e-2), ("five", 3e-3)),
     *(("six", 1e-2), ("six", 3e-3), ("twelve", 5e-2), ("twelve", 1e-2)),
@@ -95,10 +100,45 @@ def main(n: int = 400_000, repeat: int = 5) -> None:
     for name, (wall, volume) in results.items():
         shown = f"{volume:.5f}" if volume is not None else ""
         print(f"| {name} | {shown} | {wall:.3f} | {wall / one:.1f} | 1/{whole / wall:.1f} |")
+    print("\n| design, bounds | route | V [L³] | error | CPU [ms] | raster | 4 derivatives |")
+    print("|---|---|--:|--:|--:|--:|--:|")
+    for name, bounds in NARROW:
+        print(route_row(name, bounds, repeat))
     print("\n| bundles | accuracy | V [L³] | wall [s] | peak memory beyond the library's [MB] |")
     print("|--:|--:|--:|--:|--:|")
     for name, accuracy in MANY:
         print(many_row(name, accuracy))
+
+
+def route_row(name: str, bounds: tuple[float, float], repeat: int) -> str:
+    """How long the route takes that is found, the raster alone, and the derivatives."""
+    from softreach.workspace.reach import rasterized_set
+
+    arm = {"trunk": sr.designs.minimal_trunk, "laboratory arm": sr.designs.lce_arm}[name]()
+    rod = tip_map(arm.with_bounds(bounds))
+    found = reachable_set(rod)
+    work: tuple[Callable[[], object], ...] = (
+        lambda: reachable_set(rod),
+        lambda: rasterized_set(rod, found.cells, None, 3e-3),
+        lambda: sr.volume_gradient(rod.arm, ["taper", "revolution", "lower", "upper"]),
+    )
+    whole, raster, slopes = (1e3 * cpu_seconds(each, repeat) for each in work)
+    cube = arm.length**3
+    return (
+        f"| {name}, {bounds[0]:g} to {bounds[1]:g} | {getattr(found, 'route', '')} "
+        f"| {found.volume / cube:.9f} | {found.volume_error / cube:.1e} "
+        f"| {whole:.0f} | {raster:.0f} | {slopes:.0f} |"
+    )
+
+
+def cpu_seconds(work: Callable[[], object], repeat: int) -> float:
+    """CPU time of the fastest of some runs [s]."""
+    fastest = math.inf
+    for _ in range(repeat):
+        start = time.process_time()
+        work()
+        fastest = min(fastest, time.process_time() - start)
+    return fastest
 
 
 def many_row(name: str, accuracy: float) -> str:

@@ -48,3 +48,4 @@ from .stiffness import tip_compliance as tip_compliance
 from .volume import concave_hull as concave_hull
 from .volume import convex_hull as convex_hull
 from .workspace import reachable_set as reachable_set
+from .workspace import volume_gradient as volume_gradient

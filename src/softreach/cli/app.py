@@ -62,6 +62,10 @@ _COMMANDS = {
         "How much of its reach a payload costs, and the largest that keeps a share of it.",
         "softreach payload lce_arm --gravity up --share 0.8",
     ),
+    "gradient": (
+        "How the reachable volume changes with parameters of the design.",
+        "softreach gradient lce_arm taper upper --set lower=-3 --set upper=-1",
+    ),
     "solve": (
         "Every activation that puts the tip at a target.",
         "softreach solve minimal_trunk --target 0.2,0.1,0.6",

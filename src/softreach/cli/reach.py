@@ -90,7 +90,10 @@ def _size(
 
 def _solid_rows(found: ReachableSolid) -> dict[str, tuple[Any, str]]:
     cube = found.arm.length**3
-    rows: dict[str, tuple[Any, str]] = {"unreachability": (found.unreachability, "")}
+    rows: dict[str, tuple[Any, str]] = {
+        "unreachability": (found.unreachability, ""),
+        "route": (found.route, ""),
+    }
     for times, volume in found.multiplicity.items():
         if volume > 1e-7 * found.volume:
             rows[f"reached by {times} activation{'s' * (times > 1)}"] = (volume / cube, "L³")

@@ -108,6 +108,8 @@ def _line(content: str) -> str:
 
 def _multiplicity(reach: Reach, rows: NDArray[np.int64]) -> Array:
     assert isinstance(reach.exact, ReachableSolid)
+    if reach.exact.route == "flux":  # each place is reached once
+        return np.ones(len(rows))
     # A sample is reached by its own activation at least, whatever the grid says at the rim.
     return np.maximum(reach.exact.image.counts_at(reach.cloud.tip.values[rows]), 1).astype(float)
 

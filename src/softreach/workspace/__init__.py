@@ -2,6 +2,7 @@
 
 from softreach.geometry.surface import Surface
 from softreach.workspace.directions import direction_spread
+from softreach.workspace.gradient import VolumeGradient, volume_gradient
 from softreach.workspace.image import Image, Lattice
 from softreach.workspace.reach import reachable_set
 from softreach.workspace.reachable import ReachableSet
@@ -17,6 +18,8 @@ __all__ = [
     "ReachableSolid",
     "ReachableSurface",
     "Surface",
+    "VolumeGradient",
     "direction_spread",
     "reachable_set",
+    "volume_gradient",
 ]

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach import parallel
 from softreach.kernels.contour import stretches
-from softreach.rod.tip_map import BLOCK, TipMap
-from softreach.workspace.stable import fill_stable_slopes, none_stable, stable_tips
+from softreach.rod.tip_map import TipMap
+from softreach.workspace.stable import none_stable, stable_slopes, stable_tips
 
 __all__ = ["corners_of", "every_second", "grid_stretches", "grid_tips", "image_measure"]
 
@@ -88,18 +85,17 @@ def every_second(values: Array, cells: int, m: int) -> Array:
 
 
 def image_measure(rod: TipMap, nodes: int) -> float:
-    """Length, area or signed volume of the image, ∫ √det(JᵀJ) dγ or ∫ det J dγ; for m <= 3.
+    """Length or area of the image of one or two free bundles, ∫ √det(JᵀJ) dγ.
 
     By Gauss and Legendre's rule, as the map is smooth: its error falls faster than any power of the
     number of nodes. Places reached more than once count as often.
 
     Args:
-        rod: The tip map, with m <= 3 free bundles.
+        rod: The tip map, with one or two free bundles.
         nodes: Nodes along each axis of the box.
 
     Returns:
-        Length [m], area [m²] or signed volume [m³] for one, two or three free bundles; NaN if a
-        node has no stable equilibrium.
+        Length [m] or area [m²]; NaN if a node has no stable equilibrium.
     """
     x, w = np.polynomial.legendre.leggauss(nodes)
     m = rod.box.dimension
@@ -111,24 +107,11 @@ def image_measure(rod: TipMap, nodes: int) -> float:
 
 def _stretch(rod: TipMap, gamma: Array) -> Array:
     """The change of measure of the map at each activation: det J where J is square."""
-    slopes = _stable_slopes(rod, gamma)[:, :, rod.box.free]
+    slopes = stable_slopes(rod, gamma)[1][:, :, rod.box.free]
     with np.errstate(invalid="ignore"):  # NaN where there is no stable equilibrium
         if rod.box.dimension == 3:
             return np.linalg.det(slopes)
         return np.sqrt(np.linalg.det(np.swapaxes(slopes, 1, 2) @ slopes).clip(0.0))
-
-
-def _stable_slopes(rod: TipMap, gamma: Array) -> Array:
-    """∂r/∂γ [m], shape (n, 3, bundles); NaN where there is no stable equilibrium."""
-    if not rod.supports_unstable:
-        return rod.tips_and_slopes(gamma)[1]
-    tips, slopes = np.empty((len(gamma), 3)), np.empty((len(gamma), 3, rod.box.bundles))
-    parallel.run(
-        partial(fill_stable_slopes, rod, gamma[block], tips[block], slopes[block])
-        for block in parallel.blocks(len(gamma), BLOCK // 16)
-    )
-    slopes[np.isnan(tips[:, 0])] = np.nan
-    return slopes
 
 
 def _product(ticks: list[Array]) -> Array:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.geometry.hull import convex_hull
 from softreach.rod.tip_map import TipMap
-from softreach.workspace.box_grid import image_measure
+from softreach.workspace.flux import signed_volume
 from softreach.workspace.image import Image, Spans
 
 __all__ = [
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 T = TypeVar("T")
 
 _LEFT = 0.35  # of what is removed; for four bundles 0.28 to 0.34 of it were found wrong
-_NODES = 24  # Gauss nodes along each axis; two thirds of them tell the error
+_NODES = 24  # Gauss nodes along each side of a face; two thirds of them tell the error
 
 
 class Estimate(NamedTuple):
@@ -42,19 +42,19 @@ def solid_volume(rod: TipMap, fine: Image, coarse: Image) -> Estimate:
 
     With the degree d(x), the sum of the orientations of the activations that reach x,
     V = ∫ [x is reached] dx = |∫ det J dγ| + ∫ ([x is reached] - |d|) dx for an image whose larger
-    part keeps (or turns) the orientation. The first integral is exact to many digits, the second
-    lives only where the image folds or overlaps and is taken from the rasterized images. What is
-    rasterized errs by O(1/n²), which both grids together remove. All that they remove is the error
-    stated: folds that a coarse grid makes up vanish faster than that.
+    part keeps (or turns) the orientation. The first integral is exact to many digits by what flows
+    through the faces; the second lives only where the image folds or overlaps and is taken from
+    the rasterized images. What is rasterized errs by O(1/n²), which both grids together remove. All
+    that they remove is the error stated: folds that a coarse grid makes up vanish faster than that.
 
     NaN if a node of the integral has no stable equilibrium.
     """
-    signed, rough = image_measure(rod, _NODES), image_measure(rod, 2 * _NODES // 3)
-    sense = 1 if signed >= 0 else -1
+    signed = signed_volume(rod, _NODES)
+    sense = 1 if signed.value >= 0 else -1
     at_fine, at_coarse = _correction(fine, sense), _correction(coarse, sense)
     rest = extrapolated(at_fine, at_coarse)
     removed = abs(rest.value - at_fine.value)
-    return Estimate(abs(signed) + rest.value, abs(signed - rough) + removed + at_fine.error)
+    return Estimate(abs(signed.value) + rest.value, signed.error + removed + at_fine.error)
 
 
 def partial_volume(fine: Image, common: Image, coarse: Image, remainder: float) -> Estimate:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from typing import NamedTuple
+from functools import partial
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +19,19 @@ from softreach.workspace import measure
 from softreach.workspace.box_grid import corners_of, every_second, grid_stretches, grid_tips
 from softreach.workspace.cut_cells import remainder
 from softreach.workspace.image import Image, Lattice, image_of
+from softreach.workspace.one_to_one import is_one_to_one
+from softreach.workspace.one_to_one_solid import solid_by_flux
 from softreach.workspace.reachable import ReachableSet
 from softreach.workspace.redundant import lost_share, searched_set, smallest_memory
 from softreach.workspace.solid import ReachableSolid
 from softreach.workspace.tears import coarser, finer, left_out_cells
 from softreach.workspace.thin import thin_set
 
-__all__ = ["reachable_set"]
+__all__ = ["rasterized_set", "reachable_set"]
 
 Array = NDArray[np.float64]
+
+T = TypeVar("T")
 
 _MOST_VERTICES = 3.3e6  # of the activation grid
 _MOST_CELLS = 2.0**26
@@ -50,7 +55,9 @@ def reachable_set(
     cube root of the volume of the bounding box. The volume itself is then far more accurate than
     asked. Where the map folds, what lies behind the fold is reached more than once: n is doubled
     until the volume of that changes by less than ε as well. A fold thinner than a cell of the grid
-    may be missed.
+    may be missed. Where the map is found to be one to one (`route` is "flux"), what flows through
+    the six faces of the box gives the volume to nine digits or so, the hull of their images the
+    convex volume, and nothing is rasterized until a question needs it.
 
     More free bundles: simplices would be too many, so the image is searched for in space. Centers
     of cells are reached if a search within the bounds ends on them, from tips of a cloud and from
@@ -107,9 +114,11 @@ def _of_three(
     rod: TipMap, accuracy: float, cell: float | None, grid: int | None, progress: Progress
 ) -> ReachableSolid:
     cells = _checked_grid(grid) if grid is not None else _grid_for(accuracy)
-    found = _solid(rod, cells, cell, accuracy, progress)
+    if is_one_to_one(rod):
+        return solid_by_flux(rod, cells, partial(_lattice, cell=cell, accuracy=accuracy), progress)
+    found = rasterized_set(rod, cells, cell, accuracy, progress)
     while grid is None and not _settled(found, accuracy) and _worthwhile(found, accuracy):
-        found = _solid(rod, 2 * found.cells, cell, accuracy, progress)
+        found = rasterized_set(rod, 2 * found.cells, cell, accuracy, progress)
     return found
 
 
@@ -135,17 +144,31 @@ def _of_many(
         convex_volume=found.convex_volume.value,
         convex_volume_error=found.convex_volume.error,
         lost_share=lost_share(rod),
-        image=found.cells,
+        route="search",
+        rasterize=partial(_known, found.cells),
         **_NO_OVERLAPS._asdict(),
     )
 
 
-def _solid(
-    rod: TipMap, cells: int, cell: float | None, accuracy: float, progress: Progress
+def rasterized_set(
+    rod: TipMap,
+    cells: int,
+    cell: float | None,
+    accuracy: float,
+    progress: Progress = silent,
 ) -> ReachableSolid:
+    """What three free bundles reach by one raster, whether the map is one to one or not.
+
+    Args:
+        rod: The tip map.
+        cells: Of the activation grid along each axis, even.
+        cell: Edge of a cell in space [m]; by the accuracy if None.
+        accuracy: Relative error of the volume that the cell is chosen for.
+        progress: Called with the number of grid vertices done since its last call.
+    """
     tips = grid_tips(rod, cells)
     left_out = left_out_cells(rod, tips, cells)
-    lattice = _lattice(_reached(tips, left_out), cell, accuracy)
+    lattice = _lattice(_reached(tips, left_out), cell=cell, accuracy=accuracy)
     stretches = grid_stretches(rod, tips, cells, left_out)
     grid = _Grid(tips, stretches, left_out)
     fine, coarse = grid.image(lattice, progress), grid.every_second().image(lattice)
@@ -159,9 +182,15 @@ def _solid(
         convex_volume=convex.value,
         convex_volume_error=convex.error,
         lost_share=float(left_out.mean()),
-        image=fine,
+        route="raster",
+        rasterize=partial(_known, fine),
         **overlaps._asdict(),
     )
+
+
+def _known(image: T) -> T:
+    """What there is already where it might be made when asked for."""
+    return image
 
 
 class _Grid(NamedTuple):
@@ -282,7 +311,7 @@ def _checked_grid(grid: int) -> int:
     return int(grid)
 
 
-def _lattice(tips: Array, cell: float | None, accuracy: float) -> Lattice:
+def _lattice(tips: Array, *, cell: float | None, accuracy: float) -> Lattice:
     sides = np.ptp(tips, axis=0)
     if cell is not None:
         smallest = float(np.cbrt(np.prod(sides) / _MOST_CELLS))

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,9 +24,16 @@ from softreach.workspace.reached_cells import ReachedCells
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["ReachableSolid"]
+__all__ = ["ReachableSolid", "Route"]
 
 Array = NDArray[np.float64]
+Route = Literal["flux", "raster", "search"]
+
+_ROUTES = {
+    "flux": "one to one: by flux through the faces of the activation box",
+    "raster": "rasterized, as the image folds or overlaps or may do so",
+    "search": "searched for in space",
+}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -58,9 +65,21 @@ class ReachableSolid(ReachableSet):
     NaN for more than three free bundles."""
     fold_volume_error: float
     """By how much `fold_volume` changed from half as fine a grid [m³]."""
-    image: Image | ReachedCells = field(repr=False)
-    """The mapped activation grid, rasterized; for more than three free bundles what was found by
-    search."""
+    route: Route
+    """What the volume comes from. "flux": the map is found to be one to one, and the volume is what
+    flows through the images of the six faces of the activation box. "raster": the image folds or
+    overlaps, or this is not clear; it is rasterized, and a signed volume by flux makes it exact
+    elsewhere. "search": more than three free bundles."""
+    rasterize: Callable[[], Image | ReachedCells] = field(repr=False)
+    """Makes `image`."""
+
+    @cached_property
+    def image(self) -> Image | ReachedCells:
+        """The mapped activation grid, rasterized; of more than three bundles what was found.
+
+        For the route "flux" it is made when it is first asked for.
+        """
+        return self.rasterize()
 
     @cached_property
     def grid(self) -> xr.Dataset:
@@ -146,7 +165,9 @@ class ReachableSolid(ReachableSet):
         """All numbers with their errors and units; `multiplicity` over `activations`."""
         import xarray as xr
 
-        found = super().to_dataset().assign_attrs(cell=self.image.lattice.cell)
+        found = super().to_dataset().assign_attrs(route=self.route)
+        if self.route != "flux":  # else there may be no raster yet
+            found = found.assign_attrs(cell=self.image.lattice.cell)
         if not self.multiplicity:
             return found
         name = {"units": "m3", "long_name": "volume that so many activations reach"}
@@ -177,7 +198,8 @@ class ReachableSolid(ReachableSet):
             again = quantity(several, "m³", self.multiplicity_error)
             behind = quantity(self.fold_volume, "m³", self.fold_volume_error)
             lines.append(f"reached more than once {again}, behind folds {behind}")
-        return [*lines, f"raster of {self.image.lattice.cell:.3g} m"]
+        raster = "" if self.route == "flux" else f", cells of {self.image.lattice.cell:.3g} m"
+        return [*lines, _ROUTES[self.route] + raster]
 
     def _numbers(self) -> dict[str, Number]:
         numbers = {

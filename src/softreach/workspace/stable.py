@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach import parallel
 from softreach.errors import InvalidInput
-from softreach.rod.tip_map import TipMap, TipStatus
+from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
 
-__all__ = ["fill_stable_slopes", "none_stable", "stable_tips"]
+__all__ = ["fill_stable_slopes", "none_stable", "stable_slopes", "stable_tips"]
 
 Array = NDArray[np.float64]
 
@@ -33,6 +36,19 @@ def fill_stable_slopes(rod: TipMap, gamma: Array, tips: Array, slopes: Array) ->
     rod.fill_slopes_and_status(gamma, tips, slopes, status=status)
     tips[status != TipStatus.STABLE] = np.nan
     return None
+
+
+def stable_slopes(rod: TipMap, gamma: Array) -> tuple[Array, Array]:
+    """Tips [m] (n, 3) and ∂r/∂γ [m] (n, 3, bundles); NaN where there is no stable equilibrium."""
+    if not rod.supports_unstable:
+        return rod.tips_and_slopes(gamma)
+    tips, slopes = np.empty((len(gamma), 3)), np.empty((len(gamma), 3, rod.box.bundles))
+    parallel.run(
+        partial(fill_stable_slopes, rod, gamma[block], tips[block], slopes[block])
+        for block in parallel.blocks(len(gamma), BLOCK // 16)
+    )
+    slopes[np.isnan(tips[:, 0])] = np.nan
+    return tips, slopes
 
 
 def none_stable(tried: int) -> InvalidInput:

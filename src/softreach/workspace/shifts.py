@@ -1,0 +1,102 @@
+"""A design and its neighbors along one parameter, and derivatives from what is asked of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.parameters import Parameter, changed
+from softreach.arm.tables import check_extension
+from softreach.errors import InvalidDesign, InvalidInput
+
+__all__ = ["Shifts", "shifts_along"]
+
+Array = NDArray[np.float64]
+
+_SCALES = {"m": 0.1, "rad": 0.1}
+"""Of parameters that are 0, by their unit; lengths in L."""
+
+
+@dataclass(frozen=True)
+class Shifts:
+    """Designs at offsets of a parameter, and the rules for its derivative."""
+
+    offsets: Array
+    """Change of the parameter in steps, whole numbers, shape (n,)."""
+    step: float
+    """Size of a step, in the unit of the parameter."""
+    arms: tuple[Manipulator, ...]
+    """The designs, in the same order; the design itself at 0."""
+
+    @cached_property
+    def weights(self) -> Array:
+        """The derivative is the sum of these times the values, to the highest order."""
+        return _weights(self.offsets) / self.step
+
+    @cached_property
+    def rough_weights(self) -> Array:
+        """The same without the two offsets that are farthest, two orders lower."""
+        kept = np.sort(np.argsort(np.abs(self.offsets), kind="stable")[:-2])
+        found = np.zeros(len(self.offsets))
+        found[kept] = _weights(self.offsets[kept]) / self.step
+        return found
+
+
+def shifts_along(arm: Manipulator, parameter: Parameter, reach: int, relative: float) -> Shifts:
+    """Neighbors of a design along a parameter: on both sides, or on one at the end of its range.
+
+    Args:
+        arm: The design.
+        parameter: What changes.
+        reach: Steps to either side; twice as many to one side.
+        relative: Size of a step as a part of the parameter.
+
+    Raises:
+        InvalidInput: The parameter counts something, or has no value.
+        InvalidDesign: The design has no neighbors on either side.
+    """
+    value = parameter.value(arm)
+    if parameter.whole:
+        raise InvalidInput("parameter", parameter.name, "a number that can change continuously")
+    if not np.isfinite(value):
+        allowed = "a parameter that the design gives as one number"
+        raise InvalidInput("parameter", parameter.name, allowed)
+    step = relative * (abs(value) or _scale(arm, parameter))
+    ways = np.arange(-reach, reach + 1), np.arange(2 * reach + 1), -np.arange(2 * reach + 1)
+    fault: InvalidDesign | None = None
+    for offsets in ways:
+        try:
+            arms = tuple(_shifted(arm, parameter, value + step * k) if k else arm for k in offsets)
+        except InvalidDesign as error:
+            fault = fault or error
+        else:
+            return Shifts(offsets.astype(float), step, arms)
+    assert fault is not None
+    raise fault
+
+
+def _scale(arm: Manipulator, parameter: Parameter) -> float:
+    """What a parameter that is 0 is measured by: an offset or a bound of another one."""
+    if parameter.field.startswith(("lower", "upper")):
+        return float(np.ptp(arm.bounds, axis=1).max()) or 1.0
+    return _SCALES.get(parameter.unit, 1.0) * (arm.length if parameter.unit == "m" else 1.0)
+
+
+def _shifted(arm: Manipulator, parameter: Parameter, value: float) -> Manipulator:
+    made = changed(arm, {parameter.name: float(value)})
+    check_extension(made)
+    free, before = (bounds[:, 1] > bounds[:, 0] for bounds in (made.bounds, arm.bounds))
+    if not np.array_equal(free, before):
+        allowed = "one that neither holds a bundle nor frees one"
+        raise InvalidInput("parameter", parameter.name, allowed)
+    return made
+
+
+def _weights(offsets: Array) -> Array:
+    """Of the derivative at 0 by polynomials through all offsets."""
+    powers = np.vander(offsets, increasing=True).T
+    return np.linalg.solve(powers, np.eye(len(offsets))[1])

@@ -1,0 +1,243 @@
+"""Volumes by what flows through the faces: maps of known volume, and when they are believed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from softreach.arm import Loads, Manipulator, designs
+from softreach.arm.parameters import changed
+from softreach.rod.activation_box import ActivationBox
+from softreach.rod.tip_map import TipMap, tip_map
+from softreach.workspace import ReachableSolid, reachable_set
+from softreach.workspace.flux import signed_volume
+from softreach.workspace.one_to_one import is_one_to_one
+from softreach.workspace.reach import rasterized_set
+from tests.bodies import rubber
+
+Map = Callable[[np.ndarray], np.ndarray]
+
+ARM = designs.minimal_trunk()
+STEP = 1e-20
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Mapped(TipMap):
+    """Any analytic map of the unit cube, with slopes by complex steps: exact to rounding."""
+
+    of: Map
+    arm: Manipulator = ARM
+    tol: float = 1e-12
+
+    @property
+    def box(self):
+        return ActivationBox.between(((0.0, 1.0),) * 3, tuple("abc"))
+
+    def refined(self, tol):
+        return self
+
+    def fill_tips(self, gamma, out):
+        out[:] = self.of(gamma)
+
+    def fill_slopes(self, gamma, tips, slopes):
+        self.fill_tips(gamma, tips)
+        for k in range(3):
+            moved = gamma.astype(complex)
+            moved[:, k] += 1j * STEP
+            slopes[:, :, k] = np.imag(self.of(moved)) / STEP
+
+    def tip_twists(self, activations):
+        raise NotImplementedError
+
+    frames = strains_at = strain_range = radius = tip_twists  # pyright: ignore[reportAssignmentType]
+
+
+def columns(*each: np.ndarray) -> np.ndarray:
+    return np.stack(each, axis=1)
+
+
+MATRIX = np.array([[1.0, 0.4, -0.2], [0.1, 0.5, 0.3], [0.0, -0.6, 0.8]])
+
+
+def affine(x: np.ndarray) -> np.ndarray:
+    return 3.0 + x @ MATRIX.T
+
+
+def mirrored(x: np.ndarray) -> np.ndarray:
+    return affine(x) * [-1.0, 1.0, 1.0]
+
+
+def twisted(x: np.ndarray) -> np.ndarray:
+    """A square bar twisted by 2.5 rad along its axis: volume 1."""
+    angle, a, b = 2.5 * x[:, 2], x[:, 0] - 0.5, x[:, 1] - 0.5
+    cos, sin = np.cos(angle), np.sin(angle)
+    return columns(cos * a - sin * b, sin * a + cos * b, x[:, 2])
+
+
+def around(turns: float, rise: float) -> Map:
+    """A bar of radii 1 to 2 and height 1 bent around the z axis, rising by so much a turn."""
+
+    def bent(x):
+        angle, radius = 2 * np.pi * turns * x[:, 0], 1.0 + x[:, 1]
+        height = x[:, 2] + rise * turns * x[:, 0]
+        return columns(radius * np.cos(angle), radius * np.sin(angle), height)
+
+    return bent
+
+
+def ring_volume(turns: float) -> float:
+    return np.pi * 3.0 * turns
+
+
+def pressed(x: np.ndarray) -> np.ndarray:
+    """det J = 1 + 3 (x - y - 0.2): zero on a plane through the box."""
+    return columns(x[:, 0] + 1.5 * (x[:, 0] - x[:, 1] - 0.2) ** 2, x[:, 1], x[:, 2])
+
+
+pytestmark = pytest.mark.filterwarnings("ignore:volume .* may be off")
+
+
+def solid(arm: Manipulator | TipMap, **options) -> ReachableSolid:
+    found = reachable_set(arm, **options)
+    assert isinstance(found, ReachableSolid)
+    return found
+
+
+KNOWN = {
+    "affine": (affine, np.linalg.det(MATRIX)),
+    "mirrored": (mirrored, np.linalg.det(MATRIX)),
+    "twisted": (twisted, 1.0),
+    "three quarters of a ring": (around(0.75, 0.0), ring_volume(0.75)),
+    "a spiral ramp that clears itself": (around(1.15, 1.3), ring_volume(1.15)),
+}
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_where_a_map_is_one_to_one_the_flux_is_the_volume(name):
+    of, volume = KNOWN[name]
+    found = solid(Mapped(of), accuracy=0.02)
+    assert found.route == "flux"
+    assert found.volume == pytest.approx(volume, rel=1e-10)
+    assert found.volume_error < 1e-9
+    assert found.multiplicity == {1: found.volume}
+    assert found.fold_volume == found.fold_volume_error == 0.0
+    assert found.surface().volume == pytest.approx(volume, rel=3e-3)
+
+
+@pytest.mark.parametrize("rise", [0.0, 0.8])
+def test_a_ramp_that_lies_on_itself_is_not_one_to_one_though_it_has_no_fold(rise):
+    turns = 1.15
+    rod = Mapped(around(turns, rise))
+    assert not is_one_to_one(rod)
+    found = solid(rod, accuracy=0.02)
+    assert found.route == "raster"
+    twice = np.pi * 3.0 * (turns - 1.0) * (1.0 - rise)
+    assert abs(signed_volume(rod).value) == pytest.approx(ring_volume(turns), rel=1e-10)
+    assert found.volume == pytest.approx(ring_volume(turns) - twice, abs=found.volume_error)
+    assert sum(v for k, v in found.multiplicity.items() if k == 2) == pytest.approx(twice, rel=0.05)
+
+
+def test_faces_that_overlap_a_little_are_told_from_those_that_do_not_touch():
+    assert is_one_to_one(Mapped(around(0.95, 0.0)))
+    assert not is_one_to_one(Mapped(around(1.01, 0.0)))
+
+
+def test_a_fold_is_found_before_anything_is_believed():
+    found = solid(Mapped(pressed), accuracy=0.02)
+    assert found.route == "raster"
+    assert found.fold_volume > 0.0
+    assert abs(signed_volume(Mapped(pressed)).value) < found.volume
+
+
+def test_a_fold_at_one_corner_is_found():
+    # det J = 1 - s - (1 - x)(1 - y)(1 - z) is below 0 next to one corner only, or nowhere.
+    def dented(sign):
+        def of(x):
+            rest = (1 - x[:, 1]) * (1 - x[:, 2])
+            return columns((1 - sign) * x[:, 0] + 0.5 * rest * (1 - x[:, 0]) ** 2, x[:, 1], x[:, 2])
+
+        return Mapped(of)
+
+    assert not is_one_to_one(dented(0.001))
+    assert is_one_to_one(dented(-0.6))
+
+
+def narrowed(arm: Manipulator, low: float, high: float) -> Manipulator:
+    return arm.with_bounds((low, high))
+
+
+ONE_TO_ONE = {
+    "minimal trunk": narrowed(ARM, -0.9, -0.3),
+    "laboratory arm": narrowed(designs.lce_arm(), -3.0, -1.0),
+    "little twist": narrowed(designs.minimal_trunk(np.radians(36), np.radians(1)), -0.9, -0.3),
+}
+
+
+@pytest.mark.parametrize("name", ONE_TO_ONE)
+def test_flux_and_raster_agree_within_the_error_of_the_raster(name):
+    arm = ONE_TO_ONE[name]
+    found = solid(arm)
+    raster = rasterized_set(tip_map(arm), 72, None, 1e-3)
+    assert found.route == "flux"
+    assert abs(found.volume - raster.volume) < raster.volume_error + found.volume_error
+    assert found.volume_error < 1e-3 * raster.volume_error + 1e-8 * found.volume
+    between = raster.convex_volume_error + found.convex_volume_error
+    assert abs(found.convex_volume - raster.convex_volume) < between
+    assert sum(v for k, v in raster.multiplicity.items() if k > 1) <= raster.multiplicity_error
+
+
+@pytest.mark.parametrize("name", ONE_TO_ONE)
+def test_the_flux_agrees_with_points_counted_in_the_set(name):
+    found = solid(ONE_TO_ONE[name])
+    tips = found.surface().vertices
+    low, high = tips.min(axis=0), tips.max(axis=0)
+    points = np.random.default_rng(0).uniform(low, high, (30_000, 3))
+    share = found.contains(points).mean()
+    box = np.prod(high - low)
+    scatter = box * np.sqrt(share * (1 - share) / len(points))
+    assert share * box == pytest.approx(found.volume, abs=4 * scatter)
+
+
+def test_the_flux_is_the_integral_of_det_j_whether_the_map_folds_or_not():
+    for arm in (ARM, designs.minimal_trunk(np.radians(75), np.radians(3))):
+        rod = tip_map(arm, 1e-9)
+        x, w = np.polynomial.legendre.leggauss(20)
+        cube = np.stack(np.meshgrid(*[(1 + x) / 2] * 3, indexing="ij"), -1).reshape(-1, 3)
+        weights = np.einsum("i,j,k->ijk", w, w, w).ravel() / 8
+        stretch = np.linalg.det(rod.tips_and_slopes(rod.box.from_free_cube(cube))[1])
+        whole = float(weights @ stretch) * rod.box.volume
+        assert signed_volume(rod).value == pytest.approx(whole, rel=1e-8)
+
+
+def test_volume_grows_with_the_cube_of_the_length():
+    arm = ONE_TO_ONE["minimal trunk"]
+    larger = changed(arm, {"length": 3.0, "outer_radius": 3.0 * float(arm.profile.radius(0.0))})
+    assert solid(larger).volume == pytest.approx(27.0 * solid(arm).volume, rel=1e-9)
+
+
+def test_the_paper_s_design_folds_in_a_corner_and_is_rasterized():
+    assert solid(ARM, accuracy=0.02).route == "raster"
+
+
+def test_loaded_arms_are_always_rasterized():
+    rod = tip_map(rubber(ONE_TO_ONE["minimal trunk"], Loads(payload=1e-6)))
+    assert not is_one_to_one(rod)
+
+
+def test_nothing_is_rasterized_until_it_is_asked_for():
+    found = solid(ONE_TO_ONE["minimal trunk"])
+    stored = found.to_dataset()
+    assert stored.attrs["route"] == "flux"
+    assert "one to one" in repr(found)
+    assert "image" not in vars(found)
+    assert found.grid.occupied.any()
+    assert "image" in vars(found)
+
+
+def test_the_route_is_told_in_the_dataset():
+    assert solid(ARM, accuracy=0.02).to_dataset().attrs["route"] == "raster"
+    many = solid(designs.redundant_trunk(), accuracy=0.1, cell=0.1)
+    assert many.to_dataset().attrs["route"] == "search"

@@ -1,0 +1,182 @@
+"""Derivatives of the reachable volume: against differences, laws of scale, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from softreach.arm import Loads, Manipulator, designs
+from softreach.arm.parameters import changed, find_parameter
+from softreach.errors import InvalidDesign, InvalidInput
+from softreach.rod.tip_map import tip_map
+from softreach.workspace import VolumeGradient, reachable_set, volume_gradient
+from softreach.workspace.flux import signed_volume
+from softreach.workspace.reach import rasterized_set
+from tests.bodies import rubber
+
+NARROW = designs.minimal_trunk().with_bounds((-0.9, -0.3))
+NAMES = ("taper", "revolution", "left.offset", "rings[0].inner_ratio", "lower", "right.upper")
+
+
+@pytest.fixture(scope="module")
+def narrow() -> VolumeGradient:
+    """Derivatives where the map is one to one."""
+    return volume_gradient(NARROW, NAMES)
+
+
+def difference(arm: Manipulator, name: str, step: float, volume) -> float:
+    """Derivative by differences of fourth order over steps relative to the parameter."""
+    value = find_parameter(arm, name).value(arm)
+    h = step * abs(value)
+    at = [volume(changed(arm, {name: value + k * h})) for k in (-2, -1, 1, 2)]
+    return (at[0] - 8 * at[1] + 8 * at[2] - at[3]) / (12 * h)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_where_the_flux_holds_it_is_exact_to_a_millionth(narrow, name):
+    def raster(arm):
+        return rasterized_set(tip_map(arm, 1e-9), 42, None, 3e-3).volume
+
+    row = narrow.parameters.index(name)
+    assert narrow.route == "flux"
+    assert narrow.volume_error[row] < 1e-6 * abs(narrow.volume[row])
+    expected = difference(NARROW, name, 5e-3, raster)
+    assert narrow.volume[row] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["taper", "lower", "left.offset"])
+def test_the_convex_volume_s_derivative_is_within_its_error(narrow, name):
+    def convex(arm):
+        return reachable_set(arm, accuracy=5e-4).convex_volume
+
+    row = narrow.parameters.index(name)
+    expected = difference(NARROW, name, 2e-2, convex)
+    error = narrow.convex_volume_error[row]
+    assert abs(narrow.convex_volume[row] - expected) < error
+    assert error < 0.02 * np.abs(narrow.convex_volume).max()
+
+
+def test_unreachability_follows_from_both_volumes(narrow):
+    solid = narrow.solid
+    step = 1e-6 / np.abs(narrow.volume)
+    share = (solid.volume + step * narrow.volume) / (
+        solid.convex_volume + step * narrow.convex_volume
+    )
+    change = (1.0 - share) - solid.unreachability
+    assert change / step == pytest.approx(narrow.unreachability, rel=1e-4)
+    assert (narrow.unreachability_error > 0).all()
+
+
+def test_a_longer_and_thicker_arm_reaches_as_the_cube_of_its_size():
+    # V = L³ f(R2/L): L ∂V/∂L + R2 ∂V/∂R2 = 3 V
+    found = volume_gradient(NARROW, ("length", "outer_radius"))
+    sizes = np.array([NARROW.length, float(NARROW.profile.radius(0.0))])
+    assert sizes @ found.volume == pytest.approx(3.0 * found.solid.volume, rel=1e-7)
+    convex = sizes @ found.convex_volume
+    assert convex == pytest.approx(
+        3.0 * found.solid.convex_volume, abs=found.convex_volume_error[0]
+    )
+
+
+def test_the_bounds_of_all_bundles_move_the_sum_of_those_of_each():
+    each = [f"{name}.{side}" for side in ("lower", "upper") for name in ("left", "right")]
+    each += [f"longitudinal.{side}" for side in ("lower", "upper")]
+    found = volume_gradient(NARROW, ("lower", "upper", *each)).volume
+    assert found[0] == pytest.approx(found[[2, 3, 6]].sum(), rel=1e-8)
+    assert found[1] == pytest.approx(found[[4, 5, 7]].sum(), rel=1e-8)
+
+
+def test_the_signed_volume_grows_at_a_bound_by_what_the_face_sweeps():
+    # ∂/∂upper ∫ det J dγ = ∫ det J over the face
+    rod = tip_map(NARROW, 1e-11)
+    x, w = np.polynomial.legendre.leggauss(16)
+    face = np.stack(np.meshgrid((1 + x) / 2, (1 + x) / 2, indexing="ij"), -1).reshape(-1, 2)
+    cube = np.column_stack([np.ones(len(face)), face])
+    stretch = np.linalg.det(rod.tips_and_slopes(rod.box.from_free_cube(cube))[1])
+    swept = (np.outer(w, w).ravel() / 4) @ stretch * np.prod(rod.box.widths[1:])
+    name = f"{NARROW.actuators[0].name}.upper"
+    found = volume_gradient(NARROW, name).volume[0]
+    assert found == pytest.approx(abs(swept), rel=1e-8)
+    assert signed_volume(rod).value * swept > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["revolution", "lower"])
+def test_where_the_image_folds_finer_rasters_agree_within_the_error(name):
+    arm = designs.minimal_trunk(np.radians(75), np.radians(3))
+    found = volume_gradient(arm, name)
+    assert found.route == "raster"
+
+    def raster(arm):
+        return rasterized_set(tip_map(arm), 84, 0.008, 1e-3).volume
+
+    expected = difference(arm, name, 2e-2, raster)
+    assert abs(found.volume[0] - expected) < 2.0 * found.volume_error[0]
+    assert found.volume_error[0] < 0.02 * abs(found.volume[0])
+
+
+def test_at_the_end_of_a_range_the_derivative_is_that_of_the_side_that_exists():
+    straight = designs.minimal_trunk(np.radians(108), 0.0).with_bounds((-0.9, -0.3))
+    found = volume_gradient(straight, "taper")
+    ahead = [reachable_set(changed(straight, {"taper": h})).volume for h in (0.0, 1e-3, 2e-3)]
+    expected = (4 * ahead[1] - 3 * ahead[0] - ahead[2]) / 2e-3
+    assert found.volume[0] == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_parameter_without_effect_has_derivative_zero():
+    arm = rubber(NARROW, Loads()).replace(loads=None)
+    found = volume_gradient(arm, "rings[0].material.density")
+    assert found.volume[0] == pytest.approx(0.0, abs=1e-12)
+    assert found.volume_error[0] < 1e-9
+
+
+def test_units_and_route_are_told(narrow):
+    stored = narrow.to_dataset()
+    assert stored.attrs["route"] == "flux"
+    assert dict(zip(narrow.parameters, narrow.units, strict=True))["taper"] == "rad"
+    assert list(stored.parameter.values) == list(NAMES)
+    assert "∂V/∂(taper)" in repr(narrow)
+
+
+@pytest.mark.parametrize(
+    ("arm", "names", "said"),
+    [
+        (NARROW, (), "parameters = none"),
+        (NARROW, "tapper", 'did you mean "taper"'),
+        (NARROW, "left.bundles", "continuously"),
+        (NARROW, "rings[0].material.young_modulus", "one number"),
+        (designs.redundant_trunk(), "taper", "4 free bundles"),
+        (NARROW.with_bounds([(-0.5, -0.5), (-1, 0), (-1, 0)]), "taper", "2 free bundles"),
+    ],
+)
+def test_what_has_no_derivative_is_refused_in_one_line(arm, names, said):
+    with pytest.raises(InvalidInput) as caught:
+        volume_gradient(arm, names)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_bound_that_would_free_a_held_bundle_is_refused():
+    four = designs.redundant_trunk()
+    bounds = four.bounds.copy()
+    bounds[0] = -0.5
+    held = four.with_bounds(bounds)
+    first = f"{held.actuators[0].name}.lower"
+    with pytest.raises((InvalidInput, InvalidDesign)):
+        volume_gradient(held, first)
+
+
+@pytest.mark.slow
+def test_loaded_arms_have_derivatives_too():
+    arm = designs.lce_arm().replace(loads=Loads(gravity=(0, 0, 9.81)))
+    found = volume_gradient(arm, "upper", accuracy=0.02)
+    assert found.route == "raster"
+
+    def volume(arm):
+        return rasterized_set(tip_map(arm), 32, None, 0.02).volume
+
+    value = find_parameter(arm, "upper").value(arm)
+    steps = 0.1
+    at = [volume(changed(arm, {"upper": value + k * steps})) for k in (-1, 1)]
+    expected = (at[1] - at[0]) / (2 * steps)
+    assert found.volume[0] == pytest.approx(expected, rel=0.05)
