@@ -44,7 +44,6 @@ from .rod import configuration as configuration
 from .rod import equilibria as equilibria
 from .rod import tip_jacobian as tip_jacobian
 from .rod import tip_positions as tip_positions
-from .stiffness import tip_compliance as tip_compliance
 from .volume import concave_hull as concave_hull
 from .volume import convex_hull as convex_hull
 from .workspace import reachable_set as reachable_set
