@@ -14,6 +14,7 @@ import numpy as np
 from softreach.kernels.chord import by_inverse, chord_with, keep_inverse
 from softreach.kernels.compiler import inner, kernel
 from softreach.kernels.continuation import (
+    BEFORE,
     DONE,
     FOUND,
     HELD,
@@ -77,7 +78,9 @@ def _newton(w, i):
         combination((t1[2], t2[2], 0.0), c),
     )
     keep_inverse(w, i, rows)
-    put(w, STEP, i, by_inverse(w, i, _missing(w, i)))
+    missing = _missing(w, i)
+    put(w, BEFORE, i, missing)
+    put(w, STEP, i, by_inverse(w, i, missing))
 
 
 @inner

@@ -15,6 +15,7 @@ import numpy as np
 from softreach.kernels.chord import by_inverse, chord_with, keep_inverse
 from softreach.kernels.compiler import inner, kernel
 from softreach.kernels.continuation import (
+    BEFORE,
     DONE,
     FOUND,
     HELD,
@@ -75,7 +76,9 @@ def _newton(w, i):
     determinant = dot(p1, a)
     scale = 1.0 / math.copysign(max(abs(determinant), 1e-12), determinant)
     keep_inverse(w, i, (times(scale, p1), times(scale, p2), times(scale, p3)))
-    put(w, STEP, i, by_inverse(w, i, _missing(w, i)))
+    missing = _missing(w, i)
+    put(w, BEFORE, i, missing)
+    put(w, STEP, i, by_inverse(w, i, missing))
 
 
 @inner

@@ -41,7 +41,7 @@ class Solver:
 
     Args:
         tables: Of the arm and its loads.
-        steps: Least number of steps.
+        steps: Least number of steps, coarse ones apart; no fewer than the phase of the loads needs.
         tol: Largest tip error, in L, of which the search uses up a hundredth.
     """
 
@@ -50,6 +50,9 @@ class Solver:
     tol: float
     starts: StartGrid | None = None
     """Where to begin."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "steps", max(self.steps, self.tables.phase.fewest_steps))
 
     def with_starts(self, box: ActivationBox) -> Solver:
         """The same, beginning from equilibria on a grid over the box where that is worth it."""
@@ -65,7 +68,8 @@ class Solver:
 
     @cached_property
     def _coarse(self) -> StepTables:
-        return self.tables.uniform(max(2, (self.steps + 1) // 2))
+        fewest = self.tables.phase.fewest_steps
+        return self.tables.uniform(max(fewest, (self.steps + 1) // 2))
 
     def halved(self) -> Solver:
         """The same with twice the steps."""

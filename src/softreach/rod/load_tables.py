@@ -14,6 +14,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import compliance, tables
 from softreach.kernels import magnus, rest_frames, rod
 from softreach.kernels.explicit_rk8 import NODES
+from softreach.rod.load_phase import LoadPhase, load_phase, phase_stations
 from softreach.rod.steps import edges_between
 
 __all__ = ["ArmBody", "Body", "LoadTables", "StepTables"]
@@ -122,6 +123,13 @@ class LoadTables:
     @property
     def _at_tip(self) -> Array:
         return self._weight + np.array(self.loads.tip_force)
+
+    @cached_property
+    def phase(self) -> LoadPhase:
+        """How far the loads let tangents swing."""
+        z = phase_stations(self.arm)
+        mass = self.body.mass_per_length(z)
+        return load_phase(self.arm, self.loads, self.body.compliance(z), mass)
 
     def uniform(self, steps: int) -> StepTables:
         """At least `steps` steps, with boundaries where the arm or its loads are not smooth."""

@@ -82,7 +82,7 @@ class LoadedRod(ArmRod):
         for which the arm is about to lose its stability are left out. Where none is left, the
         steps are no fewer than those of the free rod.
         """
-        return self._fewest(_FEWEST_STEPS, _tip_differences)
+        return self._fewest(max(_FEWEST_STEPS, self.tables.phase.fewest_steps), _tip_differences)
 
     @cached_property
     def _shape_steps(self) -> int:
