@@ -57,8 +57,9 @@ def advance_with(newton, move, extrapolate):
     """A function that takes a Newton step in every lane at work, and counts those at work still.
 
     A step is as long as its turn of the tip or, where the arm hangs and that is small, as the turn
-    that the base lacks. Once it is short, the lane goes on to the next load; if all load is on, it is done, and the
-    step is left to be taken. A step too long to be trusted leads back to a smaller load.
+    that the base lacks. Once it is short, the lane goes on to the next load; if all load is on, it
+    is done, and the step is left to be taken. A step too long to be trusted leads back to a smaller
+    load.
 
     Args:
         newton: Puts the Newton step of a lane into STEP, and what the base lacks into BEFORE.

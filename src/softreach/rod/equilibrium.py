@@ -79,11 +79,16 @@ class Solver:
         """Room for n equilibria."""
         return Equilibria.empty(n, 3 if self.tables.one_direction else 6)
 
-    def find(self, gamma: Array) -> Equilibria:
-        """The equilibria of activations (n, bundles), on the calling thread."""
+    def find(self, gamma: Array, *, patient: bool = True) -> Equilibria:
+        """The equilibria of activations (n, bundles), on the calling thread.
+
+        Args:
+            gamma: Activations.
+            patient: Whether to climb the last rung too.
+        """
         found = self.empty(len(gamma))
         self.direct(gamma, found)
-        for rung in LATER_RUNGS:
+        for rung in LATER_RUNGS if patient else [Rung.CONTINUATION]:
             rows = self.doubtful(found, rung)
             if len(rows):
                 self.again(gamma, rows, rung, found)
@@ -128,6 +133,22 @@ class Solver:
         """Search at some rows, and put down what is found."""
         of_kind = self._along_one if self.tables.one_direction else self._in_general
         self._put(found, rows, rung, *of_kind(_columns(gamma[rows]), search, guesses))
+        if self.tables.phase.squeeze >= 1.0:
+            self._give_up_squeezed(gamma, rows, found)
+
+    def _give_up_squeezed(
+        self, gamma: Array, rows: slice | NDArray[np.intp], found: Equilibria
+    ) -> None:
+        """No arm is where ζ = ζ̂ (1 + n3/K0) is not positive: it would be turned inside out."""
+        squeezed = np.arange(len(gamma))[rows]
+        edges = self.tables.edges(np.array([]), self.steps)[::-1]
+        z = self.tables.arm.profile.station(edges)
+        force = self.shapes(gamma[squeezed], z, found.of(squeezed)).force[..., 2]
+        stretch = 1.0 + force * self.tables.body.compliance(z)[0]
+        squeezed = squeezed[(stretch <= 0.0).any(axis=1)]
+        found.tips[squeezed] = np.nan
+        found.status[squeezed] = TipStatus.NO_EQUILIBRIUM
+        found.rung[squeezed] = Rung.NONE
 
     def _put(
         self,
@@ -140,7 +161,7 @@ class Solver:
         state: Array,
     ) -> None:
         """Put down what a search found at some rows."""
-        good = state == _FOUND
+        good = (state == _FOUND) & np.isfinite(tips).all(axis=1) & ~np.isnan(margin)
         stable = np.where(margin > 0, TipStatus.STABLE, TipStatus.UNSTABLE)
         found.tips[rows] = np.where(good[:, None], tips, np.nan)
         found.frame[rows], found.margin[rows] = frame, margin
@@ -245,25 +266,38 @@ class Solver:
         status = np.where(lost, TipStatus.NO_EQUILIBRIUM, known.status).astype(np.int8)
         return Response(tips, twists, walked.compliance, status)
 
-    def shapes(self, gamma: Array, stations: Array) -> Shapes:
-        """Arms at ascending stations Z [m]; NaN where there is no equilibrium."""
+    def shapes(self, gamma: Array, stations: Array, known: Equilibria | None = None) -> Shapes:
+        """Arms at ascending stations Z [m]; NaN where there is no equilibrium.
+
+        Args:
+            gamma: Activations (n, bundles).
+            stations: Ascending Z [m].
+            known: Their equilibria, with these steps or others.
+        """
         edges = self.tables.edges(stations, self.steps)
         table, z = self.tables.of_edges(edges), self.tables.arm.profile.station(edges)
         rows = np.abs(z[None] - stations[:, None]).argmin(axis=1)
         shapes = Shapes.empty(len(gamma), len(stations))
 
         def fill(block: slice) -> None:
-            shapes.put(block, self._shapes_of(gamma[block], stations, table, rows))
+            at = gamma[block]
+            equilibria = self.find(at) if known is None else known.of(block)
+            shapes.put(block, self._shapes_of(at, equilibria, stations, table, rows))
 
         size = max(1, _TRACED // (len(edges) * loaded_general.TRACE))
         parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), size))
         return shapes
 
     def _shapes_of(
-        self, gamma: Array, stations: Array, table: StepTables, rows: NDArray[np.intp]
+        self,
+        gamma: Array,
+        known: Equilibria,
+        stations: Array,
+        table: StepTables,
+        rows: NDArray[np.intp],
     ) -> Shapes:
         """Arms at stations, which are these boundaries of the steps; on the calling thread."""
-        walked = self._near(_columns(gamma), self.find(gamma), table, trace=True)
+        walked = self._near(_columns(gamma), known, table, trace=True)
         force = self._force_at(table, rows)
         return shapes_of(walked.found[:, :3], walked.trace, rows, force, stations)
 

@@ -41,7 +41,7 @@ class Equilibria(NamedTuple):
             np.zeros((n, components)),
         )
 
-    def of(self, rows: slice | NDArray[np.bool_]) -> Equilibria:
+    def of(self, rows: slice | NDArray[np.bool_ | np.intp]) -> Equilibria:
         """Some of them; a slice shares memory."""
         tips, status, margin, rung, frame = self
         return Equilibria(tips[rows], status[rows], margin[rows], rung[rows], frame[rows])

@@ -16,13 +16,16 @@ from numpy.typing import NDArray
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import both_sides, tables
+from softreach.arm.weight import load_number
+from softreach.errors import InvalidInput
 
-__all__ = ["LoadPhase", "load_phase", "phase_stations"]
+__all__ = ["LoadPhase", "check_phase", "load_phase", "phase_stations"]
 
 Array = NDArray[np.float64]
 
 _MOST_PHASE = math.pi / 2.0
 _MOST_STEPS = 1 << 16
+_MOST_GROWTH = 25.0  # e^25 roundings are 1e-5 rad
 _STATIONS = 65
 
 
@@ -33,6 +36,8 @@ class LoadPhase(NamedTuple):
     """Over the whole arm [rad]."""
     steepest: float
     """Over the whole arm, were it everywhere as steep in S as where it is steepest [rad]."""
+    squeeze: float
+    """The largest force over K0 [-]: from 1 on it could squeeze the arm to nothing."""
 
     @property
     def fewest_steps(self) -> int:
@@ -63,9 +68,25 @@ def load_phase(
     with np.errstate(over="ignore"):
         force, softest = _force(loads, z, mass), np.maximum(bending, torsion)
         swing = force * (1.0 + force * axial) * softest + (0.5 * _moment(loads) * softest) ** 2
+        squeeze = float((force * axial).max())
         rate = _longest(arm, z) * np.sqrt(swing)
     steepest = rate * arm.profile.radius(z) * arm.profile.slender_length  # dZ = R2 dS
-    return LoadPhase(float(np.trapezoid(rate, z)), float(steepest.max()))
+    return LoadPhase(float(np.trapezoid(rate, z)), float(steepest.max()), squeeze)
+
+
+def check_phase(arm: Manipulator, phase: LoadPhase) -> None:
+    """Refuse what shooting from the tip cannot follow.
+
+    A turn at the tip of a hanging arm grows to the base with the exponential of the phase, until
+    the last digit of the one is all of the other.
+
+    Raises:
+        InvalidInput: Too heavy loads.
+    """
+    if not phase.whole <= _MOST_GROWTH:
+        found = f"of load number {load_number(arm):.3g}"
+        allowed = f"lighter: their phase is {phase.whole:.3g} rad, at most {_MOST_GROWTH:g} allowed"
+        raise InvalidInput("loads", found, allowed, "lighten the load or stiffen the arm")
 
 
 def phase_stations(arm: Manipulator) -> Array:
