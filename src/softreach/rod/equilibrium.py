@@ -256,15 +256,29 @@ class Solver:
         return walked
 
     def respond(
-        self, gamma: Array, *, compliance: bool = False, known: Equilibria | None = None
+        self,
+        gamma: Array,
+        *,
+        compliance: bool = False,
+        directions: bool = False,
+        known: Equilibria | None = None,
     ) -> Response:
-        """Tips with their derivatives; NaN where there is no equilibrium."""
-        known = self.find(gamma) if known is None else known
-        walked = self._near(_columns(gamma), known, self._fine, slopes=True, compliance=compliance)
+        """Tips with their derivatives, theory (74); NaN where there is no equilibrium."""
+        known, fine = self.find(gamma) if known is None else known, self._fine
+        walked = self._near(
+            _columns(gamma), known, fine, slopes=True, compliance=compliance, trace=directions
+        )
         tips, twists = walked.found[:, :3].copy(), walked.slopes[:, :, : gamma.shape[1]]
         lost = np.isnan(tips[:, 0])
         status = np.where(lost, TipStatus.NO_EQUILIBRIUM, known.status).astype(np.int8)
-        return Response(tips, twists, walked.compliance, status)
+        d3 = self._tip_directions(tips, walked.trace, fine) if directions else np.empty((0, 3))
+        return Response(tips, twists, walked.compliance, d3, status)
+
+    def _tip_directions(self, tips: Array, trace: Array, table: StepTables) -> Array:
+        """d3 of tips whose sections were kept, (n, 3)."""
+        rows, at_tip = np.zeros(1, np.intp), np.array([self.tables.arm.length])
+        shapes = shapes_of(tips, trace, rows, self._force_at(table, rows), at_tip)
+        return shapes.frames.directors[:, 0, 2]
 
     def shapes(self, gamma: Array, stations: Array, known: Equilibria | None = None) -> Shapes:
         """Arms at ascending stations Z [m]; NaN where there is no equilibrium.

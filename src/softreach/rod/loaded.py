@@ -34,6 +34,7 @@ from softreach.rod.tip_map import (
     Frames,
     StrainRange,
     Strains,
+    TipMotions,
     position_slopes,
 )
 
@@ -166,12 +167,20 @@ class LoadedRod(ArmRod):
         """∂r/∂F [m/N]: how a tip yields to a small dead force on it, shape (n, 3, 3)."""
         return self._responses(activations, compliance=True).compliance
 
-    def _responses(self, activations: ArrayLike, *, compliance: bool = False) -> Response:
+    def tip_motions(self, activations: ArrayLike) -> TipMotions:
+        """Positions and directions of the tips with their derivatives, in one pass over rods."""
+        found = self._responses(activations, directions=True)
+        slopes = np.empty_like(found.twists[:, :3])
+        position_slopes(found.tips, found.twists, slopes)
+        return TipMotions(found.tips, slopes, found.directions, found.twists[:, 3:])
+
+    def _responses(self, activations: ArrayLike, **asked: bool) -> Response:
         gamma, solver = self.box.check(activations), self._solver
-        found = Response.empty(len(gamma), self.box.bundles, compliance=compliance)
+        asked = {"compliance": False, "directions": False, **asked}
+        found = Response.empty(len(gamma), self.box.bundles, **asked)
 
         def fill(block: slice) -> None:
-            response = solver.respond(gamma[block], compliance=compliance)
+            response = solver.respond(gamma[block], **asked)
             for all_values, values in zip(found, response, strict=True):
                 all_values[block] = values
 
