@@ -70,7 +70,7 @@ def _determinant(w, i):
 
 @inner
 def _newton(w, i):
-    """The Newton step of the frame at the tip, and the inverse that gives it."""
+    """The Newton step of the frame at the tip, theory (69), and the inverse that gives it."""
     a, b, c = get(w, PLANE, i), get(w, PLANE + 3 * LANES, i), get(w, PLANE + 6 * LANES, i)
     p1, p2, p3 = adjugate_rows(a, b, c)
     determinant = dot(p1, a)
@@ -111,6 +111,7 @@ def _move(w, i):
 
 @inner
 def _extrapolate(w, i, ratio):
+    """The secant of theory (71)."""
     g, p = get(w, HELD, i), get(w, PAST, i)
     h, q = get(w, HELD + 3 * LANES, i), get(w, PAST + 3 * LANES, i)
     _put_frame(w, i, plus(g, times(ratio, minus(g, p))), plus(h, times(ratio, minus(h, q))))
@@ -122,7 +123,7 @@ _chord_all = chord_with(_missing, _move)
 
 @inner
 def _aim(w, work, axes):
-    """What the base must see, in the frame of the walk."""
+    """What the base must see, in the frame of the walk, theory (65)."""
     for i in range(LANES):
         q = turn_at(work, TURN, i)
         put(w, TARGET, i, turned(q, (axes[0, 0], axes[0, 1], axes[0, 2])))

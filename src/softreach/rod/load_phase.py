@@ -30,7 +30,7 @@ _STATIONS = 65
 
 
 class LoadPhase(NamedTuple):
-    """Bounds of the phase of the tangents, theory (81)."""
+    """Bounds of the phase of the tangents, theory (85)."""
 
     whole: float
     """Over the whole arm [rad]."""
@@ -44,7 +44,7 @@ class LoadPhase(NamedTuple):
         """Uniform ones in S, of which none makes more than a quarter of a swing.
 
         Half of what is between conjugate points in a straight arm leaves room for the moment of a
-        bent one, which makes the phase no more than √2 as large.
+        bent one, which makes the phase at most about √2 as large.
         """
         return max(2, math.ceil(min(self.steepest / _MOST_PHASE, _MOST_STEPS)))
 

@@ -187,7 +187,7 @@ class LoadTables:
         )
 
     def _forces(self, z: Array) -> Array:
-        """Dead force n [N] at the nodes of steps, (step, 5, 3)."""
+        """Dead force n [N] at the nodes of steps, theory (60), (step, 5, 3)."""
         loads, length = self.loads, self.arm.length
         order = z.ravel()
         ahead = np.concatenate([[length], order[:-1]])
@@ -202,7 +202,7 @@ class LoadTables:
         return force
 
     def _jumps(self, z: Array) -> Array:
-        """Moments, and forces that follow, at the tip end of every step."""
+        """Moments, and forces that follow, at the tip end of every step, for theory (67)."""
         loads, jumps = self.loads, np.zeros((len(z), 18))
         jumps[0, :9] = np.outer(loads.payload_arm, self.axes @ self._weight).ravel()
         jumps[0, 9:12] = self.axes @ np.array(loads.tip_moment)

@@ -47,8 +47,9 @@ _BLOCK = BLOCK // 8  # samples per task
 
 @dataclass(frozen=True, repr=False)
 class LoadedRod(ArmRod):
-    """r' = ζ d3, dᵢ' = ζ̂ u × dᵢ with u = û + K⁻¹m, ζ = ζ̂ (1 + n3/K0), shot from the tip.
+    """r' = ζ d3, dᵢ' = ζ̂ u × dᵢ with u = û + K⁻¹m, ζ = ζ̂ (1 + n3/K0), theory (57), (58).
 
+    It is shot from the tip.
     The equilibrium is the one that an arm comes to which is activated first and loaded slowly then.
     """
 
@@ -174,13 +175,16 @@ class LoadedRod(ArmRod):
         position_slopes(found.tips, found.twists, slopes)
         return TipMotions(found.tips, slopes, found.directions, found.twists[:, 3:])
 
-    def _responses(self, activations: ArrayLike, **asked: bool) -> Response:
+    def _responses(
+        self, activations: ArrayLike, *, compliance: bool = False, directions: bool = False
+    ) -> Response:
         gamma, solver = self.box.check(activations), self._solver
-        asked = {"compliance": False, "directions": False, **asked}
-        found = Response.empty(len(gamma), self.box.bundles, **asked)
+        found = Response.empty(
+            len(gamma), self.box.bundles, compliance=compliance, directions=directions
+        )
 
         def fill(block: slice) -> None:
-            response = solver.respond(gamma[block], **asked)
+            response = solver.respond(gamma[block], compliance=compliance, directions=directions)
             for all_values, values in zip(found, response, strict=True):
                 all_values[block] = values
 

@@ -48,13 +48,11 @@ def fewest_steps(
     Returns:
         Steps; what to raise where even the most are too few; None where nothing can be judged.
     """
-    steps, few = max(steps, _FEWEST_STEPS), _few(pilot)
-    for gamma in (few, pilot) if len(few) < len(pilot) else (pilot,):
-        found = _enough(solver_of, gamma, steps, differences)
-        if isinstance(found, InvalidInput):
-            return found
-        steps = found or steps
-    return found
+    steps = max(steps, _FEWEST_STEPS)
+    found = _enough(solver_of, _few(pilot), steps, differences)
+    if isinstance(found, InvalidInput):
+        return found
+    return _enough(solver_of, pilot, found or steps, differences)
 
 
 def _few(pilot: Array) -> Array:
