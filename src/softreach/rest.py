@@ -40,7 +40,7 @@ def rest(arm: Manipulator, *, tol: float = 1e-6) -> Rest:
         tol: Largest tip error, in L.
 
     Raises:
-        InvalidInput: An arm without loads.
+        InvalidInput: An arm without loads, or with loads too heavy to be followed along it.
         InvalidDesign: The activation at rest would shorten the arm to nothing.
     """
     if arm.loads is None:
