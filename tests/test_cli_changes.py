@@ -133,6 +133,11 @@ class TestRestInTheSummary:
     def test_an_arm_that_cannot_stand_is_said_not_to_be_stable(self, capsys):
         assert self.facts(capsys, "lce_arm", "--payload", "50g")["at_rest"] == "not stable"
 
+    def test_an_arm_too_heavy_to_be_followed_is_still_described(self, capsys):
+        facts = self.facts(capsys, "lce_arm", "--gravity", "sideways", "--payload", "100kg")
+        assert facts["at_rest"] == "too heavy to be told"
+        assert facts["sag_at_rest_L"] is None
+
     def test_an_arm_without_loads_is_judged_by_its_own_weight(self, capsys):
         facts = self.facts(capsys, "lce_arm")
         held = sr.designs.lce_arm().replace(loads=sr.Loads(gravity=(9.81, 0, 0)))

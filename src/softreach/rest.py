@@ -9,15 +9,11 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
-from softreach.rod.equilibrium import Solver
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.tip_map import TipStatus
 
 __all__ = ["Rest", "rest"]
-
-# A straight arm needs few steps for its tip, but two losses of stability within one cancel.
-_FEWEST_STEPS = 64
 
 
 @dataclass(frozen=True)
@@ -44,7 +40,7 @@ def rest(arm: Manipulator, *, tol: float = 1e-6) -> Rest:
         tol: Largest tip error, in L.
 
     Raises:
-        InvalidInput: An arm without loads.
+        InvalidInput: An arm without loads, or with loads too heavy to be followed along it.
         InvalidDesign: The activation at rest would shorten the arm to nothing.
     """
     if arm.loads is None:
@@ -53,7 +49,7 @@ def rest(arm: Manipulator, *, tol: float = 1e-6) -> Rest:
     # Nothing but rest is asked for, and the steps need suit no other activation.
     held = arm.with_bounds(np.stack([activation, activation], axis=1)) if arm.bundles else arm
     rod = LoadedRod(held, tol)
-    found = Solver(rod.tables, max(rod.steps, _FEWEST_STEPS), rod.tol).find(activation[None])
+    found = rod.equilibria(activation[None])
     free = FreeRod(held.replace(loads=None), tol).tips(activation[None])[0]
     sag = float(np.linalg.norm(found.tips[0] - free))
     return Rest(

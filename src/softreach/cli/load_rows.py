@@ -57,25 +57,39 @@ def rest_rows(arm: Manipulator) -> Rows:
     """
     from softreach.arm.loads import Loads
     from softreach.arm.weight import GRAVITY, load_number_faults
-    from softreach.rest import rest
 
     if load_number_faults(arm):
         return {}
     if arm.loads is not None:
-        found = rest(arm)
-        return _sag("", found) | {"at rest": (_STATUS[found.status.name], "")}
+        found = _rest(arm)
+        return _sag("", found) | {"at rest": (_status(found), "")}
     sideways, upright = (
-        rest(arm.replace(loads=Loads(gravity=gravity)))
+        _rest(arm.replace(loads=Loads(gravity=gravity)))
         for gravity in ((GRAVITY, 0.0, 0.0), (0.0, 0.0, -GRAVITY))
     )
-    stands = {"at rest upright": (_STATUS[upright.status.name], "")}
-    return _sag(" sideways", sideways) | stands
+    return _sag(" sideways", sideways) | {"at rest upright": (_status(upright), "")}
 
 
-def _sag(how: str, found: Rest) -> Rows:
+def _rest(arm: Manipulator) -> Rest | None:
+    """The arm at rest; None under loads that cannot be followed along it."""
+    from softreach.errors import InvalidInput
+    from softreach.rest import rest
+
+    try:
+        return rest(arm)
+    except InvalidInput as error:
+        if error.name != "loads":
+            raise
+        return None
+
+
+def _status(found: Rest | None) -> str:
+    return "too heavy to be told" if found is None else _STATUS[found.status.name]
+
+
+def _sag(how: str, found: Rest | None) -> Rows:
     """How far the tip is moved, as a share of the length and as a length."""
-    known = math.isfinite(found.sag)
-    return {
-        f"sag at rest{how}": (found.sag_over_length if known else None, "L"),
-        f"sag of the tip at rest{how}": (1e3 * found.sag if known else None, "mm"),
-    }
+    sag = (None, None)
+    if found is not None and math.isfinite(found.sag):
+        sag = found.sag_over_length, 1e3 * found.sag
+    return {f"sag at rest{how}": (sag[0], "L"), f"sag of the tip at rest{how}": (sag[1], "mm")}

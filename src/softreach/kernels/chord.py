@@ -31,7 +31,7 @@ def keep_inverse(w, i, rows):
 
 @inner
 def _correct(w, i, y):
-    """Broyden's correction, after the last step changed what is missing by -y."""
+    """Broyden's correction, theory (70), after the last step changed what is missing by -y."""
     s, cy = get(w, STEP, i), by_inverse(w, i, y)
     c0, c1 = get(w, INVERSE, i), get(w, INVERSE + 3 * LANES, i)
     c2 = get(w, INVERSE + 6 * LANES, i)

@@ -56,11 +56,13 @@ _SMALLEST_INCREMENT = 1 / 4096
 def advance_with(newton, move, extrapolate):
     """A function that takes a Newton step in every lane at work, and counts those at work still.
 
-    Once a step is short, the lane goes on to the next load; if all load is on, it is done, and the
-    step is left to be taken. A step too long to be trusted leads back to a smaller load.
+    A step is as long as its turn of the tip or, where the arm hangs and that is small, as the turn
+    that the base lacks. Once it is short, the lane goes on to the next load; if all load is on, it
+    is done, and the step is left to be taken. A step too long to be trusted leads back to a smaller
+    load.
 
     Args:
-        newton: Puts the Newton step of a lane into STEP.
+        newton: Puts the Newton step of a lane into STEP, and what the base lacks into BEFORE.
         move: Takes it.
         extrapolate: Puts the secant through HELD and PAST into TRIAL, for a ratio of increments.
     """
@@ -83,8 +85,8 @@ def _advance_with(newton, move, go_back, go_on):
     @inner
     def advance(w, i, small, widest):
         newton(w, i)
-        step = get(w, STEP, i)
-        size = math.sqrt(dot(step, step))
+        step, missing = get(w, STEP, i), get(w, BEFORE, i)
+        size = math.sqrt(max(dot(step, step), dot(missing, missing)))
         if size >= small and (size >= w[LEFT + i] or w[TURNS + i] >= _MOST_TURNS):
             go_back(w, i, widest)
         elif size < small and w[LOAD + i] >= 1.0:

@@ -72,7 +72,7 @@ def tangents(g):
 
 @inner
 def _begin_tip(w, tip, i):
-    """State at the tip; `tip` holds the lever times the payload's weight, and a moment."""
+    """State at the tip, theory (62); `tip` holds the payload's lever times weight, and a moment."""
     g, share = get(w, TRIAL, i), w[LOAD + i]
     put(w, X, i, g)
     m = cross((tip[0], tip[1], tip[2]), g)
@@ -97,7 +97,7 @@ def walk_tip(w, rest, scalars, tip):
 
 @pasted
 def walk_tangents(w, rest, scalars, tip):
-    """The direction that the base would have to see, and its two tangents."""
+    """The direction that the base would have to see, and its two tangents, theory (68)."""
     for i in range(LANES):
         g, share = _begin_tip(w, tip, i), w[LOAD + i]
         t1, t2 = tangents(g)
@@ -124,7 +124,7 @@ def walk_tangents(w, rest, scalars, tip):
 
 @inner
 def _watch(w, i):
-    """Note whether the tangents of G lost their independence during the step.
+    """Note whether the tangents of G lost their independence during the step, theory (77), (78).
 
     With P and Q the 2 x 2 matrices before and after, Q P⁻¹ is near a positive multiple of the
     identity for a short step. One conjugate point within makes its determinant negative, two its

@@ -38,7 +38,7 @@ def _world(w, at, i):
 
 @inner
 def respond(w, work, columns, first, count, bundles, slopes, compliance):
-    """Fill slopes (v, ω) and compliances, whatever is asked for."""
+    """Fill slopes (v, ω), theory (74), and compliances, theory (75), whatever is asked for."""
     for i in range(count):
         q = back(turn_at(work, TURN, i))
         at_tip, at_base = _world(w, TRIAL, i), _world(w, STATE, i)

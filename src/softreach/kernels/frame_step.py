@@ -141,7 +141,7 @@ def _step_column(w, c, change):
 
 @inner
 def _drive(w, lanes, rest, bends, change, j):
-    """How an activation turns the unloaded arm over a step: P (dζ̂ û + ζ̂ U) at its five nodes.
+    """How an activation turns the unloaded arm over a step: δω̂ of theory (73) at its five nodes.
 
     Args:
         w: Workspace.

@@ -40,6 +40,7 @@ def _turned_by(theta, g, h, k):
 
 @inner
 def _dead_moment(jump, share, levers, axes):
+    """Of a lever and of what does not turn with the arm, theory (67)."""
     l1, l2, l3 = levers
     g, h, k = axes
     m = plus(cross(l1, g), plus(cross(l2, h), cross(l3, k)))
@@ -48,7 +49,7 @@ def _dead_moment(jump, share, levers, axes):
 
 @inner
 def _jump(w, columns, count, rest, jump):
-    """Loads at the tip end of a step: (lever x force (3, 3), moment, following force, moment)."""
+    """Loads at the tip end of a step, theory (67): lever x force (3, 3), moment, following two."""
     for i in range(LANES):
         q, share = turn_at(rest, STEP_ROWS * LANES, i), w[LOAD + i]
         body = (
@@ -78,6 +79,7 @@ def _jump(w, columns, count, rest, jump):
 
 @inner
 def _begin(w, columns, count, unit_at):
+    """The state at the tip, and its tangents, theory (68)."""
     for i in range(LANES):
         zero = (0.0, 0.0, 0.0)
         put(w, STATE, i, get(w, TRIAL, i))
@@ -98,7 +100,7 @@ def _begin(w, columns, count, unit_at):
 
 @inner
 def rotation(w, theta, i):
-    """The rotation θ of the section along the directions of the world."""
+    """The rotation θ of the section along the directions of the world: φ of theory (68)."""
     g, h = get(w, STATE, i), get(w, STATE + 3 * LANES, i)
     return dot(theta, g), dot(theta, h), dot(theta, cross(g, h))
 
@@ -122,7 +124,7 @@ def _length(a, b, c):
 
 @inner
 def _watch(w, columns, i):
-    """Note whether the rotations lost their independence during the step.
+    """Note whether the rotations lost their independence during the step, theory (77), (78).
 
     With P and Q the matrices before and after, Q P⁻¹ is near the identity for a short step. A
     conjugate point within gives it a negative eigenvalue, hence a negative trace, sum of principal

@@ -14,6 +14,7 @@ import numpy as np
 from softreach.kernels.chord import by_inverse, chord_with, keep_inverse
 from softreach.kernels.compiler import inner, kernel
 from softreach.kernels.continuation import (
+    BEFORE,
     DONE,
     FOUND,
     HELD,
@@ -64,7 +65,7 @@ def _missing(w, i):
 
 @inner
 def _newton(w, i):
-    """The Newton step of G(L), and the linear map that gives it, kept for the chord steps."""
+    """The Newton step of G(L), theory (69), and its linear map, kept for the chord steps."""
     g, a, b = get(w, X, i), get(w, A, i), get(w, B, i)
     t1, t2 = tangents(get(w, TRIAL, i))
     c1, c2 = cross(b, g), cross(g, a)
@@ -77,7 +78,9 @@ def _newton(w, i):
         combination((t1[2], t2[2], 0.0), c),
     )
     keep_inverse(w, i, rows)
-    put(w, STEP, i, by_inverse(w, i, _missing(w, i)))
+    missing = _missing(w, i)
+    put(w, BEFORE, i, missing)
+    put(w, STEP, i, by_inverse(w, i, missing))
 
 
 @inner
@@ -93,6 +96,7 @@ def _move_all(w):
 
 @inner
 def _extrapolate(w, i, ratio):
+    """The secant of theory (71)."""
     g, p = get(w, HELD, i), get(w, PAST, i)
     put(w, TRIAL, i, _unit(plus(g, times(ratio, minus(g, p)))))
 
@@ -103,7 +107,7 @@ _chord_all = chord_with(_missing, _move)
 
 @inner
 def _aim(w, work, gravity):
-    """What the base must see, in the frame of the walk."""
+    """What the base must see, in the frame of the walk, theory (65)."""
     for i in range(LANES):
         q = turn_at(work, TURN, i)
         put(w, TARGET, i, turned(q, (gravity[0], gravity[1], gravity[2])))

@@ -5,8 +5,9 @@ K = G × H), the moment M, and the tip y, four tuples of three. With
 
     n = n1 G + n2 H + n3 K
 
-the equations are those of `loaded_step`, with n for w G, and dH = ω × H. A force that follows the
-tip is fixed in that world too, as any frame on the rod is during one walk: it adds to n1, n2, n3.
+the equations are those of `loaded_step`, with n for w G, and dH = ω × H, theory (66). A force that
+follows the tip is fixed in that world too, as any frame on the rod is during one walk: it adds to
+n1, n2, n3.
 
 A tangent turns the whole frame of a section by θ, so that δG = θ × G. It is (θ, δM, δy) with
 
@@ -53,7 +54,7 @@ def _rates(node, s):
 
 @inner
 def _tangent_rates(place, t):
-    """Product rule on `_rates`; place = (node, state, (δℓ, turn, u))."""
+    """Product rule on `_rates`, theory (73); place = (node, state, (δℓ, turn, u))."""
     node, s, (d_length, d_turn, unit) = place
     length, d, bending, twisting, axial, _ = node
     (g, h, m, y), (theta, dm, dy) = s, t

@@ -15,6 +15,7 @@ import numpy as np
 from softreach.kernels.chord import by_inverse, chord_with, keep_inverse
 from softreach.kernels.compiler import inner, kernel
 from softreach.kernels.continuation import (
+    BEFORE,
     DONE,
     FOUND,
     HELD,
@@ -69,13 +70,15 @@ def _determinant(w, i):
 
 @inner
 def _newton(w, i):
-    """The Newton step of the frame at the tip, and the inverse that gives it."""
+    """The Newton step of the frame at the tip, theory (69), and the inverse that gives it."""
     a, b, c = get(w, PLANE, i), get(w, PLANE + 3 * LANES, i), get(w, PLANE + 6 * LANES, i)
     p1, p2, p3 = adjugate_rows(a, b, c)
     determinant = dot(p1, a)
     scale = 1.0 / math.copysign(max(abs(determinant), 1e-12), determinant)
     keep_inverse(w, i, (times(scale, p1), times(scale, p2), times(scale, p3)))
-    put(w, STEP, i, by_inverse(w, i, _missing(w, i)))
+    missing = _missing(w, i)
+    put(w, BEFORE, i, missing)
+    put(w, STEP, i, by_inverse(w, i, missing))
 
 
 @inner
@@ -108,6 +111,7 @@ def _move(w, i):
 
 @inner
 def _extrapolate(w, i, ratio):
+    """The secant of theory (71)."""
     g, p = get(w, HELD, i), get(w, PAST, i)
     h, q = get(w, HELD + 3 * LANES, i), get(w, PAST + 3 * LANES, i)
     _put_frame(w, i, plus(g, times(ratio, minus(g, p))), plus(h, times(ratio, minus(h, q))))
@@ -119,7 +123,7 @@ _chord_all = chord_with(_missing, _move)
 
 @inner
 def _aim(w, work, axes):
-    """What the base must see, in the frame of the walk."""
+    """What the base must see, in the frame of the walk, theory (65)."""
     for i in range(LANES):
         q = turn_at(work, TURN, i)
         put(w, TARGET, i, turned(q, (axes[0, 0], axes[0, 1], axes[0, 2])))

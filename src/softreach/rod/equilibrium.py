@@ -41,7 +41,7 @@ class Solver:
 
     Args:
         tables: Of the arm and its loads.
-        steps: Least number of steps.
+        steps: Least number of steps, coarse ones apart; no fewer than the phase of the loads needs.
         tol: Largest tip error, in L, of which the search uses up a hundredth.
     """
 
@@ -50,6 +50,9 @@ class Solver:
     tol: float
     starts: StartGrid | None = None
     """Where to begin."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "steps", max(self.steps, self.tables.phase.fewest_steps))
 
     def with_starts(self, box: ActivationBox) -> Solver:
         """The same, beginning from equilibria on a grid over the box where that is worth it."""
@@ -65,7 +68,8 @@ class Solver:
 
     @cached_property
     def _coarse(self) -> StepTables:
-        return self.tables.uniform(max(2, (self.steps + 1) // 2))
+        fewest = self.tables.phase.fewest_steps
+        return self.tables.uniform(max(fewest, (self.steps + 1) // 2))
 
     def halved(self) -> Solver:
         """The same with twice the steps."""
@@ -75,11 +79,16 @@ class Solver:
         """Room for n equilibria."""
         return Equilibria.empty(n, 3 if self.tables.one_direction else 6)
 
-    def find(self, gamma: Array) -> Equilibria:
-        """The equilibria of activations (n, bundles), on the calling thread."""
+    def find(self, gamma: Array, *, patient: bool = True) -> Equilibria:
+        """The equilibria of activations (n, bundles), on the calling thread.
+
+        Args:
+            gamma: Activations.
+            patient: Whether to climb the last rung too.
+        """
         found = self.empty(len(gamma))
         self.direct(gamma, found)
-        for rung in LATER_RUNGS:
+        for rung in LATER_RUNGS if patient else [Rung.CONTINUATION]:
             rows = self.doubtful(found, rung)
             if len(rows):
                 self.again(gamma, rows, rung, found)
@@ -124,6 +133,22 @@ class Solver:
         """Search at some rows, and put down what is found."""
         of_kind = self._along_one if self.tables.one_direction else self._in_general
         self._put(found, rows, rung, *of_kind(_columns(gamma[rows]), search, guesses))
+        if self.tables.phase.squeeze >= 1.0:
+            self._give_up_squeezed(gamma, rows, found)
+
+    def _give_up_squeezed(
+        self, gamma: Array, rows: slice | NDArray[np.intp], found: Equilibria
+    ) -> None:
+        """No arm is where ζ = ζ̂ (1 + n3/K0) is not positive: it would be turned inside out."""
+        squeezed = np.arange(len(gamma))[rows]
+        edges = self.tables.edges(np.array([]), self.steps)[::-1]
+        z = self.tables.arm.profile.station(edges)
+        force = self.shapes(gamma[squeezed], z, found.of(squeezed)).force[..., 2]
+        stretch = 1.0 + force * self.tables.body.compliance(z)[0]
+        squeezed = squeezed[(stretch <= 0.0).any(axis=1)]
+        found.tips[squeezed] = np.nan
+        found.status[squeezed] = TipStatus.NO_EQUILIBRIUM
+        found.rung[squeezed] = Rung.NONE
 
     def _put(
         self,
@@ -136,7 +161,7 @@ class Solver:
         state: Array,
     ) -> None:
         """Put down what a search found at some rows."""
-        good = state == _FOUND
+        good = (state == _FOUND) & np.isfinite(tips).all(axis=1) & ~np.isnan(margin)
         stable = np.where(margin > 0, TipStatus.STABLE, TipStatus.UNSTABLE)
         found.tips[rows] = np.where(good[:, None], tips, np.nan)
         found.frame[rows], found.margin[rows] = frame, margin
@@ -231,35 +256,62 @@ class Solver:
         return walked
 
     def respond(
-        self, gamma: Array, *, compliance: bool = False, known: Equilibria | None = None
+        self,
+        gamma: Array,
+        *,
+        compliance: bool = False,
+        directions: bool = False,
+        known: Equilibria | None = None,
     ) -> Response:
-        """Tips with their derivatives; NaN where there is no equilibrium."""
-        known = self.find(gamma) if known is None else known
-        walked = self._near(_columns(gamma), known, self._fine, slopes=True, compliance=compliance)
+        """Tips with their derivatives, theory (74); NaN where there is no equilibrium."""
+        known, fine = self.find(gamma) if known is None else known, self._fine
+        walked = self._near(
+            _columns(gamma), known, fine, slopes=True, compliance=compliance, trace=directions
+        )
         tips, twists = walked.found[:, :3].copy(), walked.slopes[:, :, : gamma.shape[1]]
         lost = np.isnan(tips[:, 0])
         status = np.where(lost, TipStatus.NO_EQUILIBRIUM, known.status).astype(np.int8)
-        return Response(tips, twists, walked.compliance, status)
+        d3 = self._tip_directions(tips, walked.trace, fine) if directions else np.empty((0, 3))
+        return Response(tips, twists, walked.compliance, d3, status)
 
-    def shapes(self, gamma: Array, stations: Array) -> Shapes:
-        """Arms at ascending stations Z [m]; NaN where there is no equilibrium."""
+    def _tip_directions(self, tips: Array, trace: Array, table: StepTables) -> Array:
+        """d3 of tips whose sections were kept, (n, 3)."""
+        rows, at_tip = np.zeros(1, np.intp), np.array([self.tables.arm.length])
+        shapes = shapes_of(tips, trace, rows, self._force_at(table, rows), at_tip)
+        return shapes.frames.directors[:, 0, 2]
+
+    def shapes(self, gamma: Array, stations: Array, known: Equilibria | None = None) -> Shapes:
+        """Arms at ascending stations Z [m]; NaN where there is no equilibrium.
+
+        Args:
+            gamma: Activations (n, bundles).
+            stations: Ascending Z [m].
+            known: Their equilibria, with these steps or others.
+        """
         edges = self.tables.edges(stations, self.steps)
         table, z = self.tables.of_edges(edges), self.tables.arm.profile.station(edges)
         rows = np.abs(z[None] - stations[:, None]).argmin(axis=1)
         shapes = Shapes.empty(len(gamma), len(stations))
 
         def fill(block: slice) -> None:
-            shapes.put(block, self._shapes_of(gamma[block], stations, table, rows))
+            at = gamma[block]
+            equilibria = self.find(at) if known is None else known.of(block)
+            shapes.put(block, self._shapes_of(at, equilibria, stations, table, rows))
 
         size = max(1, _TRACED // (len(edges) * loaded_general.TRACE))
         parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), size))
         return shapes
 
     def _shapes_of(
-        self, gamma: Array, stations: Array, table: StepTables, rows: NDArray[np.intp]
+        self,
+        gamma: Array,
+        known: Equilibria,
+        stations: Array,
+        table: StepTables,
+        rows: NDArray[np.intp],
     ) -> Shapes:
         """Arms at stations, which are these boundaries of the steps; on the calling thread."""
-        walked = self._near(_columns(gamma), self.find(gamma), table, trace=True)
+        walked = self._near(_columns(gamma), known, table, trace=True)
         force = self._force_at(table, rows)
         return shapes_of(walked.found[:, :3], walked.trace, rows, force, stations)
 

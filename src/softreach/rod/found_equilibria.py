@@ -41,7 +41,7 @@ class Equilibria(NamedTuple):
             np.zeros((n, components)),
         )
 
-    def of(self, rows: slice | NDArray[np.bool_]) -> Equilibria:
+    def of(self, rows: slice | NDArray[np.bool_ | np.intp]) -> Equilibria:
         """Some of them; a slice shares memory."""
         tips, status, margin, rung, frame = self
         return Equilibria(tips[rows], status[rows], margin[rows], rung[rows], frame[rows])
@@ -56,12 +56,18 @@ class Response(NamedTuple):
     """(v, ω) per activation, shape (n, 6, bundles)."""
     compliance: Array
     """∂r/∂F [m/N], shape (n, 3, 3), or (0, 3, 3)."""
+    directions: Array
+    """Tangents d3 of the tips [-], shape (n, 3), or (0, 3)."""
     status: NDArray[np.int8]
     """`TipStatus`, shape (n,)."""
 
     @classmethod
-    def empty(cls, n: int, bundles: int, *, compliance: bool) -> Response:
+    def empty(cls, n: int, bundles: int, *, compliance: bool, directions: bool) -> Response:
         """Room for n."""
-        forces = n if compliance else 0
-        status = np.empty(n, np.int8)
-        return cls(np.empty((n, 3)), np.empty((n, 6, bundles)), np.empty((forces, 3, 3)), status)
+        return cls(
+            np.empty((n, 3)),
+            np.empty((n, 6, bundles)),
+            np.empty((n if compliance else 0, 3, 3)),
+            np.empty((n if directions else 0, 3)),
+            np.empty(n, np.int8),
+        )

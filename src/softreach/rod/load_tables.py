@@ -14,6 +14,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import compliance, tables
 from softreach.kernels import magnus, rest_frames, rod
 from softreach.kernels.explicit_rk8 import NODES
+from softreach.rod.load_phase import LoadPhase, load_phase, phase_stations
 from softreach.rod.steps import edges_between
 
 __all__ = ["ArmBody", "Body", "LoadTables", "StepTables"]
@@ -123,6 +124,13 @@ class LoadTables:
     def _at_tip(self) -> Array:
         return self._weight + np.array(self.loads.tip_force)
 
+    @cached_property
+    def phase(self) -> LoadPhase:
+        """How far the loads let tangents swing."""
+        z = phase_stations(self.arm)
+        mass = self.body.mass_per_length(z)
+        return load_phase(self.arm, self.loads, self.body.compliance(z), mass)
+
     def uniform(self, steps: int) -> StepTables:
         """At least `steps` steps, with boundaries where the arm or its loads are not smooth."""
         return self.between(np.array([]), steps)
@@ -179,7 +187,7 @@ class LoadTables:
         )
 
     def _forces(self, z: Array) -> Array:
-        """Dead force n [N] at the nodes of steps, (step, 5, 3)."""
+        """Dead force n [N] at the nodes of steps, theory (60), (step, 5, 3)."""
         loads, length = self.loads, self.arm.length
         order = z.ravel()
         ahead = np.concatenate([[length], order[:-1]])
@@ -194,7 +202,7 @@ class LoadTables:
         return force
 
     def _jumps(self, z: Array) -> Array:
-        """Moments, and forces that follow, at the tip end of every step."""
+        """Moments, and forces that follow, at the tip end of every step, for theory (67)."""
         loads, jumps = self.loads, np.zeros((len(z), 18))
         jumps[0, :9] = np.outer(loads.payload_arm, self.axes @ self._weight).ravel()
         jumps[0, 9:12] = self.axes @ np.array(loads.tip_moment)

@@ -19,14 +19,22 @@ from softreach.rod.equilibrium import LATER_RUNGS, Solver
 from softreach.rod.found_equilibria import Equilibria, Response
 from softreach.rod.free import FreeRod
 from softreach.rod.linear_strains import linear_strains
+from softreach.rod.load_phase import check_phase
 from softreach.rod.load_tables import ArmBody, Body, LoadTables
+from softreach.rod.loaded_steps import (
+    Differences,
+    checked,
+    fewest_steps,
+    shape_differences,
+    tip_differences,
+)
 from softreach.rod.pilot import pilot_activations
 from softreach.rod.tip_map import (
     BLOCK,
     Frames,
     StrainRange,
     Strains,
-    TipStatus,
+    TipMotions,
     position_slopes,
 )
 
@@ -34,17 +42,14 @@ __all__ = ["LoadedRod"]
 
 Array = NDArray[np.float64]
 
-_SAFETY = 2.0
-_FEWEST_STEPS, _MOST_STEPS = 4, 256
-# A sample this near to the loss of stability magnifies every error, and does not choose the steps.
-_CRITICAL = 0.02
 _BLOCK = BLOCK // 8  # samples per task
 
 
 @dataclass(frozen=True, repr=False)
 class LoadedRod(ArmRod):
-    """r' = ζ d3, dᵢ' = ζ̂ u × dᵢ with u = û + K⁻¹m, ζ = ζ̂ (1 + n3/K0), shot from the tip.
+    """r' = ζ d3, dᵢ' = ζ̂ u × dᵢ with u = û + K⁻¹m, ζ = ζ̂ (1 + n3/K0), theory (57), (58).
 
+    It is shot from the tip.
     The equilibrium is the one that an arm comes to which is activated first and loaded slowly then.
     """
 
@@ -65,46 +70,42 @@ class LoadedRod(ArmRod):
 
     @cached_property
     def tables(self) -> LoadTables:
-        """What the kernels read."""
-        return LoadTables(self.arm, self.loads, self.body)
+        """What the kernels read.
+
+        Raises:
+            InvalidInput: Loads so heavy that no walk from tip to base keeps its digits.
+        """
+        tables = LoadTables(self.arm, self.loads, self.body)
+        check_phase(self.arm, tables.phase)
+        return tables
 
     @property
     def steps(self) -> int:
-        """The number of steps that `tol` needs; see `_fewest_steps` for the rule."""
-        return self._fewest_steps
+        """The number of steps that `tol` needs; see `loaded_steps` for the rule."""
+        return checked(self._fewest_steps)
 
     @cached_property
-    def _fewest_steps(self) -> int:
-        """The number of steps that `tol` needs.
-
-        The rule: the pilot of the free rod is solved with n and with 2n steps; n is the smallest
-        number whose largest difference of a tip, doubled for safety, is within `tol`. Activations
-        for which the arm is about to lose its stability are left out. Where none is left, the
-        steps are no fewer than those of the free rod.
-        """
-        return self._fewest(_FEWEST_STEPS, _tip_differences)
+    def _fewest_steps(self) -> int | InvalidInput:
+        """Steps with which `tol` holds for tips, or why there are none, theory (72)."""
+        return self._fewest(self.tables.phase.fewest_steps, tip_differences)
 
     @cached_property
-    def _shape_steps(self) -> int:
+    def _fewest_shape_steps(self) -> int | InvalidInput:
         """Steps with which `tol` holds all along the arm."""
-        return self._fewest(self.steps, _shape_differences)
+        return self._fewest(self.steps, shape_differences)
+
+    @property
+    def _shape_steps(self) -> int:
+        return checked(self._fewest_shape_steps)
 
     @cached_property
     def _shape_solver(self) -> Solver:
         return self._solver_of(self._shape_steps)
 
-    def _fewest(self, steps: int, differences: Callable[[Solver, Array], Array]) -> int:
-        allowed = self.tol * self.length / _SAFETY
+    def _fewest(self, steps: int, differences: Differences) -> int | InvalidInput:
         gamma = pilot_activations(self.arm, self.box)
-        while steps <= _MOST_STEPS:
-            found = differences(self._solver_of(steps), gamma)
-            if not len(found):
-                return max(steps, FreeRod(self.arm, self.tol).steps)
-            error = float(found.max())
-            if error <= allowed:
-                return steps
-            steps = max(steps + 1, int(0.97 * steps * (error / allowed) ** (1 / 8)))
-        raise InvalidInput("tol", self.tol, f"reachable within {_MOST_STEPS} steps", "enlarge it")
+        found = fewest_steps(self._solver_of, gamma, steps, differences)
+        return found or max(steps, FreeRod(self.arm, self.tol).steps)
 
     def _solver_of(self, steps: int) -> Solver:
         return Solver(self.tables, steps, self.tol)
@@ -167,12 +168,23 @@ class LoadedRod(ArmRod):
         """∂r/∂F [m/N]: how a tip yields to a small dead force on it, shape (n, 3, 3)."""
         return self._responses(activations, compliance=True).compliance
 
-    def _responses(self, activations: ArrayLike, *, compliance: bool = False) -> Response:
+    def tip_motions(self, activations: ArrayLike) -> TipMotions:
+        """Positions and directions of the tips with their derivatives, in one pass over rods."""
+        found = self._responses(activations, directions=True)
+        slopes = np.empty_like(found.twists[:, :3])
+        position_slopes(found.tips, found.twists, slopes)
+        return TipMotions(found.tips, slopes, found.directions, found.twists[:, 3:])
+
+    def _responses(
+        self, activations: ArrayLike, *, compliance: bool = False, directions: bool = False
+    ) -> Response:
         gamma, solver = self.box.check(activations), self._solver
-        found = Response.empty(len(gamma), self.box.bundles, compliance=compliance)
+        found = Response.empty(
+            len(gamma), self.box.bundles, compliance=compliance, directions=directions
+        )
 
         def fill(block: slice) -> None:
-            response = solver.respond(gamma[block], compliance=compliance)
+            response = solver.respond(gamma[block], compliance=compliance, directions=directions)
             for all_values, values in zip(found, response, strict=True):
                 all_values[block] = values
 
@@ -235,27 +247,3 @@ class LoadedRod(ArmRod):
 
 def _range(values: Array) -> Array:
     return np.stack([np.nanmin(values, axis=0), np.nanmax(values, axis=0)], axis=1)
-
-
-def _settled(solver: Solver, gamma: Array) -> tuple[Array, Equilibria]:
-    """The activations that judge the steps, and their equilibria."""
-    found = solver.find(gamma)
-    settled = (found.status != TipStatus.NO_EQUILIBRIUM) & (np.abs(found.margin) > _CRITICAL)
-    return gamma[settled], found.of(settled)
-
-
-def _tip_differences(solver: Solver, gamma: Array) -> Array:
-    gamma, coarse = _settled(solver, gamma)
-    return _distances(coarse.tips, solver.halved().near(gamma, coarse).tips)
-
-
-def _shape_differences(solver: Solver, gamma: Array) -> Array:
-    gamma, _ = _settled(solver, gamma)
-    stations = np.linspace(0.0, solver.tables.arm.length, 9)
-    apart = solver.shapes(gamma, stations), solver.halved().shapes(gamma, stations)
-    return _distances(apart[0].frames.position, apart[1].frames.position)
-
-
-def _distances(a: Array, b: Array) -> Array:
-    apart = np.linalg.norm(a - b, axis=-1)
-    return apart[np.isfinite(apart)]

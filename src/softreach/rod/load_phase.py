@@ -1,0 +1,118 @@
+"""How fast loads let tangents swing or grow along an arm, which bounds the length of steps.
+
+The tangents of theory (68) obey Jacobi's equation: where a force w pushes, they swing like
+cos ∫ √(w/K) ds, so that conjugate points are about π of this phase apart; where it pulls, they grow
+like cosh of the same.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.loads import Loads
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.tables import both_sides, tables
+from softreach.arm.weight import load_number
+from softreach.errors import InvalidInput
+
+__all__ = ["LoadPhase", "check_phase", "load_phase", "phase_stations"]
+
+Array = NDArray[np.float64]
+
+_MOST_PHASE = math.pi / 2.0
+_MOST_STEPS = 1 << 16
+_MOST_GROWTH = 25.0  # e^25 roundings are 1e-5 rad
+_STATIONS = 65
+
+
+class LoadPhase(NamedTuple):
+    """Bounds of the phase of the tangents, theory (85)."""
+
+    whole: float
+    """Over the whole arm [rad]."""
+    steepest: float
+    """Over the whole arm, were it everywhere as steep in S as where it is steepest [rad]."""
+    squeeze: float
+    """The largest force over K0 [-]: from 1 on it could squeeze the arm to nothing."""
+
+    @property
+    def fewest_steps(self) -> int:
+        """Uniform ones in S, of which none makes more than a quarter of a swing.
+
+        Half of what is between conjugate points in a straight arm leaves room for the moment of a
+        bent one, which makes the phase at most about √2 as large.
+        """
+        return max(2, math.ceil(min(self.steepest / _MOST_PHASE, _MOST_STEPS)))
+
+
+def load_phase(
+    arm: Manipulator, loads: Loads, compliance: tuple[Array, Array, Array], mass: Array
+) -> LoadPhase:
+    """The phase that loads give the tangents at most.
+
+    Its rate is √(w (1 + w/K0)/K + (M/2K)²) ζ̂, with K the smaller of K1 and K3, w and M the sizes of
+    all forces and moments beyond, added whatever their directions, and ζ̂ the largest within bounds.
+
+    Args:
+        arm: The design.
+        loads: What acts on it.
+        compliance: 1/K0 [1/N], 1/K1 and 1/K3 [1/(N m²)] at `phase_stations`.
+        mass: Per length there [kg/m].
+    """
+    z = phase_stations(arm)
+    axial, bending, torsion = compliance
+    with np.errstate(over="ignore"):
+        force, softest = _force(loads, z, mass), np.maximum(bending, torsion)
+        swing = force * (1.0 + force * axial) * softest + (0.5 * _moment(loads) * softest) ** 2
+        squeeze = float((force * axial).max())
+        rate = _longest(arm, z) * np.sqrt(swing)
+    steepest = rate * arm.profile.radius(z) * arm.profile.slender_length  # dZ = R2 dS
+    return LoadPhase(float(np.trapezoid(rate, z)), float(steepest.max()), squeeze)
+
+
+def check_phase(arm: Manipulator, phase: LoadPhase) -> None:
+    """Refuse what shooting from the tip cannot follow.
+
+    A turn at the tip of a hanging arm grows to the base with the exponential of the phase, until
+    the last digit of the one is all of the other.
+
+    Raises:
+        InvalidInput: Too heavy loads.
+    """
+    if not phase.whole <= _MOST_GROWTH:
+        found = f"of load number {load_number(arm):.3g}"
+        allowed = f"lighter: their phase is {phase.whole:.3g} rad, at most {_MOST_GROWTH:g} allowed"
+        raise InvalidInput("loads", found, allowed, "lighten the load or stiffen the arm")
+
+
+def phase_stations(arm: Manipulator) -> Array:
+    """Z [m], even in S, and both sides of every breakpoint."""
+    profile = arm.profile
+    return both_sides(arm, profile.station(np.linspace(0.0, profile.slender_length, _STATIONS)))
+
+
+def _longest(arm: Manipulator, z: Array) -> Array:
+    """The largest ζ̂ within the bounds."""
+    return 1.0 + (tables(arm, z).extension[:, None] * arm.bounds.T).max(axis=1).sum(axis=-1)
+
+
+def _force(loads: Loads, z: Array, mass: Array) -> Array:
+    """The sizes of all forces beyond each station, added [N]."""
+    gravity, at_tip = math.hypot(*loads.gravity), math.hypot(*loads.tip_force)
+    per_length = math.hypot(*loads.force_per_length) + mass * gravity
+    each = 0.5 * (per_length[1:] + per_length[:-1]) * np.diff(z)
+    along = np.append(np.cumsum(each[::-1])[::-1], 0.0)
+    points = sum((math.hypot(*one.force) * (one.station >= z) for one in loads.point_loads), 0.0)
+    at_tip += math.hypot(*loads.follower_force) + loads.payload * gravity
+    return at_tip + along + points
+
+
+def _moment(loads: Loads) -> float:
+    """The sizes of all moments, added, that of the payload on its lever among them [N m]."""
+    weight = loads.payload * math.hypot(*loads.gravity)
+    moments = [loads.tip_moment, loads.follower_moment, *(one.moment for one in loads.point_loads)]
+    return weight * math.hypot(*loads.payload_arm) + sum(math.hypot(*one) for one in moments)

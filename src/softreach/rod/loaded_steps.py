@@ -1,0 +1,121 @@
+"""How many steps a loaded rod needs, theory (72).
+
+The pilot of the free rod is solved with n and with 2n steps; n is the smallest number, no smaller
+than the phase of the loads needs, whose largest difference, doubled for safety, is within `tol`.
+Few of the pilot are asked first, all of them once these agree.
+
+Near the loss of stability every error is magnified. Activations there are left out: those of small
+margin, and the few that differ more than tenfold what 99 % of all do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.errors import InvalidInput
+from softreach.rod.equilibrium import Solver
+from softreach.rod.found_equilibria import Equilibria
+from softreach.rod.tip_map import TipStatus
+
+__all__ = ["Differences", "checked", "fewest_steps", "shape_differences", "tip_differences"]
+
+Array = NDArray[np.float64]
+Differences = Callable[[Solver, Array, Equilibria], Array]
+"""Distances [m] between what a solver and one of twice its steps find, near known equilibria."""
+
+_SAFETY = 2.0
+_FEWEST_STEPS, _MOST_STEPS = 4, 256
+_CRITICAL = 0.02
+_BULK, _OUTLYING = 0.99, 10.0
+_FEW = 64
+_STATIONS = 9
+
+
+def fewest_steps(
+    solver_of: Callable[[int], Solver], pilot: Array, steps: int, differences: Differences
+) -> int | InvalidInput | None:
+    """The fewest steps for the tolerance of the solvers.
+
+    Args:
+        solver_of: A solver of so many steps.
+        pilot: Activations to judge by, shape (n, bundles).
+        steps: The fewest to try.
+        differences: What must be within the tolerance.
+
+    Returns:
+        Steps; what to raise where even the most are too few; None where nothing can be judged.
+    """
+    steps = max(steps, _FEWEST_STEPS)
+    found = _enough(solver_of, _few(pilot), steps, differences)
+    if isinstance(found, InvalidInput):
+        return found
+    return _enough(solver_of, pilot, found or steps, differences)
+
+
+def _few(pilot: Array) -> Array:
+    """The first of the pilot, which are corners, and as many of the others."""
+    others = pilot[_FEW:]
+    return np.concatenate([pilot[:_FEW], others[:: max(1, len(others) // _FEW)]])
+
+
+def _enough(
+    solver_of: Callable[[int], Solver], gamma: Array, steps: int, differences: Differences
+) -> int | InvalidInput | None:
+    """As `fewest_steps`, by these activations."""
+    tol = solver_of(steps).tol
+    while steps <= _MOST_STEPS:
+        solver = solver_of(steps)
+        allowed = tol * solver.tables.arm.length / _SAFETY
+        found = _bulk(differences(solver, *_settled(solver, gamma)))
+        if not len(found):
+            return None
+        error = float(found.max())
+        if error <= allowed:
+            return steps
+        steps = max(steps + 1, int(0.97 * steps * (error / allowed) ** (1 / 8)))
+    return InvalidInput("tol", tol, f"reachable within {_MOST_STEPS} steps", "enlarge it")
+
+
+def _settled(solver: Solver, gamma: Array) -> tuple[Array, Equilibria]:
+    """The activations that judge the steps, and their equilibria."""
+    found = solver.find(gamma, patient=False)
+    settled = (found.status != TipStatus.NO_EQUILIBRIUM) & (np.abs(found.margin) > _CRITICAL)
+    return gamma[settled], found.of(settled)
+
+
+def _bulk(distances: Array) -> Array:
+    """Without those that are far larger than nearly all."""
+    known = distances[np.isfinite(distances)]
+    if not len(known):
+        return known
+    return known[known <= _OUTLYING * np.quantile(known, _BULK, method="lower")]
+
+
+def tip_differences(solver: Solver, gamma: Array, known: Equilibria) -> Array:
+    """Between tips."""
+    return _distances(known.tips, solver.halved().near(gamma, known).tips)
+
+
+def shape_differences(solver: Solver, gamma: Array, known: Equilibria) -> Array:
+    """Between centerlines, along the arm."""
+    stations = np.linspace(0.0, solver.tables.arm.length, _STATIONS)
+    shapes = [one.shapes(gamma, stations, known) for one in (solver, solver.halved())]
+    return _distances(*(one.frames.position for one in shapes)).max(axis=1, initial=0.0)
+
+
+def _distances(a: Array, b: Array) -> Array:
+    return np.linalg.norm(a - b, axis=-1)
+
+
+def checked(steps: int | InvalidInput) -> int:
+    """The steps.
+
+    Raises:
+        InvalidInput: There are none; found once, raised whenever asked for.
+    """
+    if isinstance(steps, InvalidInput):
+        raise steps.with_traceback(None)
+    return steps
