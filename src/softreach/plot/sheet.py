@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.errors import InvalidInput
 from softreach.geometry.surface import SurfaceMesh
 from softreach.palette import STEEL, activation_colors
-from softreach.picture.projection import View, project, view_axes
+from softreach.picture.projection import View, view_axes
 from softreach.picture.shading import draw_mesh
 from softreach.picture.zbuffer import Extent, ZBuffer
 from softreach.plot.atlas_axes import SheetAxis
@@ -186,7 +186,7 @@ def _draw_cloud(ax: Axes, cloud: xr.Dataset, box: Array, view: View) -> None:
     pixels = point_size(len(tips), box) * columns / (extent.right - extent.left)
     buffer = ZBuffer(extent, columns, oversample=2, color_step=8)
     colors = activation_colors(bundle_activations(cloud).values)
-    buffer.draw_points(project(tips, view), colors, max(1.0, pixels))
+    buffer.draw_points(tips, colors, max(1.0, pixels), view=view)
     _show(ax, buffer)
 
 
