@@ -9,9 +9,14 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
+from functools import cache
 from itertools import chain, islice
+from typing import TypeVar
 
-__all__ = ["blocks", "run", "thread_count"]
+__all__ = ["blocks", "meanwhile", "run", "thread_count"]
+
+Result = TypeVar("Result")
 
 
 def thread_count() -> int:
@@ -52,6 +57,19 @@ def run(tasks: Iterable[Callable[[], object]]) -> None:
                 pending = _drain(pending)
         while pending:
             pending = _drain(pending)
+
+
+@contextmanager
+def meanwhile(task: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
+    """Call a task on another thread during the block, which gets a function that waits for it.
+
+    Where only one thread is to be used, the task begins when its result is asked for.
+    """
+    if thread_count() == 1:
+        yield cache(task)
+        return
+    with ThreadPoolExecutor(1) as pool:
+        yield pool.submit(task).result
 
 
 def _drain(pending: set[Future[object]]) -> set[Future[object]]:
