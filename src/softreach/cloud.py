@@ -87,7 +87,7 @@ def save_cloud(cloud: xr.Dataset, path: str | PathLike[str]) -> None:
     schema.check_cloud(cloud)
     chunk = min(cloud.sizes["sample"], 1 << 20)
     encoding = {name: {"chunks": (chunk, cloud[name].shape[1])} for name in ("tip", "activation")}
-    with replacing(path) as partial_path:
+    with replacing(path) as partial_path, _few_chunks_at_a_time():
         schema.storable(cloud).to_zarr(
             partial_path, mode="w", zarr_format=3, consolidated=False, encoding=encoding
         )
@@ -103,8 +103,18 @@ def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
 
     if not (Path(path) / "zarr.json").is_file():
         raise InvalidInput("cloud", fspath(path), "a Zarr store written by softreach")
-    with xr.open_zarr(path, consolidated=False, zarr_format=3, chunks=None) as stored:
+    with (
+        _few_chunks_at_a_time(),
+        xr.open_zarr(path, consolidated=False, zarr_format=3, chunks=None) as stored,
+    ):
         return schema.check_cloud(stored.load())
+
+
+def _few_chunks_at_a_time() -> AbstractContextManager[object]:
+    """Zarr holds two copies of each chunk in flight, by default of ten: half a gigabyte."""
+    import zarr
+
+    return zarr.config.set({"async.concurrency": min(4, parallel.thread_count())})
 
 
 def design_of(cloud: xr.Dataset) -> Manipulator:
