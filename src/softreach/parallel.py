@@ -7,6 +7,7 @@ people's thread and process pools, and let Ctrl-C through between blocks.
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
@@ -14,7 +15,7 @@ from functools import cache
 from itertools import chain, islice
 from typing import TypeVar
 
-__all__ = ["blocks", "meanwhile", "run", "thread_count"]
+__all__ = ["blocks", "in_order", "meanwhile", "run", "thread_count"]
 
 Result = TypeVar("Result")
 
@@ -57,6 +58,25 @@ def run(tasks: Iterable[Callable[[], object]]) -> None:
                 pending = _drain(pending)
         while pending:
             pending = _drain(pending)
+
+
+def in_order(tasks: Iterable[Callable[[], Result]]) -> Iterator[Result]:
+    """The results of tasks in their order; as many run at a time as there are threads."""
+    threads = thread_count()
+    if threads == 1:
+        yield from (task() for task in tasks)
+        return
+    ahead: deque[Future[Result]] = deque()
+    pool = ThreadPoolExecutor(threads)
+    try:
+        for task in tasks:
+            ahead.append(pool.submit(task))
+            if len(ahead) > threads:
+                yield ahead.popleft().result()
+        while ahead:
+            yield ahead.popleft().result()
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 @contextmanager
