@@ -172,8 +172,8 @@ def _rounded(rgba: NDArray[np.uint8], step: int) -> NDArray[np.uint8]:
 
 def _extent_of_content(keys: Keys, by: int) -> tuple[slice, slice]:
     """Rows and columns, in blocks of pixels, outside of which nothing is drawn."""
-    rows = _range_of(keys.any(axis=1), by)
-    return rows, _range_of(keys[by * rows.start : by * rows.stop].any(axis=0), by)
+    rows = _range_of(keys.max(axis=1, initial=0) > 0, by)
+    return rows, _range_of(keys[by * rows.start : by * rows.stop].max(axis=0, initial=0) > 0, by)
 
 
 def _range_of(some: NDArray[np.bool_], by: int) -> slice:

@@ -133,7 +133,7 @@ def _filled_sheet(
             return None if content is None else image(content, columns).rgba()
 
         tasks = (partial(pixels, *place) for place in np.ndindex(panels.shape))
-        for ax, found in zip(panels.flat, parallel.in_order(tasks), strict=True):
+        for ax, found in zip(panels.ravel().tolist(), parallel.in_order(tasks), strict=True):
             if found is not None:
                 # the frame of the axes and their limits stay
                 ax.imshow(found, extent=extent, interpolation="none", aspect="auto")
