@@ -24,6 +24,7 @@ PARTS = (
     "redundancy",
     "atlas",
     "studio",
+    "pictures",
 )
 
 HEADER = """# Benchmarks

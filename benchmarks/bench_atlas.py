@@ -86,7 +86,7 @@ def one_design(store: AtlasStore, index: int, times: Times) -> None:
         tips = found[Need.TIPS]
     shared[Need.TIPS]
     measure("exact", found, "exact")
-    measure("convex", found, "extent", "convex")
+    measure("convex", found, "extent", "convex", "stability")
     measure("concave", shared, "extent", "convex", "concave")
     measure("curvature", found, "curvature")
     with clock(times["writing"]):

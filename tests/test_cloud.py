@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import tracemalloc
+from contextlib import contextmanager
+
 import numpy as np
 import pytest
 
@@ -109,3 +112,29 @@ def test_any_number_of_bundles_makes_a_cloud(bundles):
     cloud = sr.compute_cloud(arm.replace(actuators=(fiber,)), n=500)
     assert cloud.activation.shape == (500, bundles)
     assert np.isfinite(cloud.tip).all()
+
+
+def test_making_and_keeping_a_large_cloud_takes_little_more_memory_than_the_cloud(
+    trunk, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("SOFTREACH_NUM_THREADS", "1")
+    sr.save_cloud(sr.compute_cloud(trunk, 100), tmp_path / "cloud.zarr")  # what is loaded once
+    with _traced() as peak:
+        cloud = sr.compute_cloud(trunk, 5_000_000)
+        assert peak() <= 1.3 * cloud.nbytes
+        sr.save_cloud(cloud, tmp_path / "cloud.zarr")
+        assert peak() <= 1.3 * cloud.nbytes
+        size = cloud.nbytes
+        del cloud
+        sr.open_cloud(tmp_path / "cloud.zarr")
+        assert peak() <= 1.3 * size
+
+
+@contextmanager
+def _traced():
+    """Count what Python and NumPy allocate; lent is the peak so far [bytes]."""
+    tracemalloc.start()
+    try:
+        yield lambda: tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()

@@ -78,6 +78,29 @@ class TestPoints:
         monkeypatch.setattr("softreach.picture.zbuffer._BLOCK", 7)
         np.testing.assert_array_equal(image(points, colors, 3), whole)
 
+    @pytest.mark.parametrize("view", ["top", "oblique", (0.3, -1.0)])
+    def test_points_in_space_are_seen_from_the_view(self, rng, view):
+        points, colors = rng.uniform(-0.5, 0.5, (500, 3)), rng.integers(0, 256, (500, 3))
+        buffer, frame = ZBuffer(Extent(-1.0, 1.0, -1.0, 1.0), 30), Extent(-1.0, 1.0, -1.0, 1.0)
+        buffer.draw_points(points, colors, 1.5, view=view)
+        seen = image(project(points, view), colors, 1.5, 30, 2, frame)
+        np.testing.assert_array_equal(buffer.rgba(), seen)
+
+    @pytest.mark.parametrize("oversample", [1, 2, 3])
+    def test_pixels_are_means_of_what_is_drawn_in_them(self, rng, oversample):
+        """Also where most of the image is empty."""
+        extent = Extent(-1.0, 2.0, -0.5, 3.0)
+        points, colors = rng.uniform(0, 1, (300, 3)), rng.integers(0, 256, (300, 3))
+        fine = image(points, colors, oversample * 1.0, 12 * oversample, 1, extent)
+        blocks = fine.reshape(-1, oversample, 12, oversample, 4).swapaxes(1, 2)
+        blocks = blocks.reshape(-1, 12, oversample**2, 4).astype(float)
+        full = (blocks[..., 3] > 0).sum(axis=-1)
+        expected = np.zeros((*full.shape, 4))
+        expected[..., :3] = blocks[..., :3].sum(axis=2) // np.maximum(full, 1)[..., None]
+        expected[..., 3] = 255 * full // oversample**2
+        got = image(points, colors, 1.0, 12, oversample, extent)
+        np.testing.assert_array_equal(got, expected)
+
     def test_points_outside_or_not_finite_leave_no_trace(self):
         points = [[2, 0.5, 0], [0.5, -1, 0], [np.nan, 0.5, 0], [0.5, 0.5, np.nan], [0.5, np.inf, 0]]
         assert not image(points, RED, size=1).any()

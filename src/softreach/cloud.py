@@ -85,9 +85,9 @@ def save_cloud(cloud: xr.Dataset, path: str | PathLike[str]) -> None:
         InvalidInput: The dataset is no cloud.
     """
     schema.check_cloud(cloud)
-    chunk = min(cloud.sizes["sample"], 1 << 20)
+    chunk = min(cloud.sizes["sample"], _CHUNK)
     encoding = {name: {"chunks": (chunk, cloud[name].shape[1])} for name in ("tip", "activation")}
-    with replacing(path) as partial_path:
+    with replacing(path) as partial_path, _few_chunks_at_a_time():
         schema.storable(cloud).to_zarr(
             partial_path, mode="w", zarr_format=3, consolidated=False, encoding=encoding
         )
@@ -103,8 +103,18 @@ def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
 
     if not (Path(path) / "zarr.json").is_file():
         raise InvalidInput("cloud", fspath(path), "a Zarr store written by softreach")
-    with xr.open_zarr(path, consolidated=False, zarr_format=3, chunks=None) as stored:
+    with (
+        _few_chunks_at_a_time(),
+        xr.open_zarr(path, consolidated=False, zarr_format=3, chunks=None) as stored,
+    ):
         return schema.check_cloud(stored.load())
+
+
+def _few_chunks_at_a_time() -> AbstractContextManager[object]:
+    """Zarr holds three copies of each chunk in flight, and has ten in flight by default."""
+    import zarr
+
+    return zarr.config.set({"async.concurrency": min(4, parallel.thread_count())})
 
 
 def design_of(cloud: xr.Dataset) -> Manipulator:
@@ -124,6 +134,7 @@ def _of_all_bundles(rod: TipMap) -> TipMap:
     return rod
 
 
+_CHUNK = 1 << 19  # samples of a stored array that are held at once
 _LONG = 5_000_000  # samples from which a bar is worth showing
 
 

@@ -45,6 +45,9 @@ _MATERIALS: tuple[tuple[Color, str], ...] = (
 )
 
 
+_BLOCK = 1 << 15  # samples at a time: temporary arrays stay in the cache
+
+
 def material_fill(index: int) -> tuple[Color, str]:
     """Color and hatch of a material in sections; they repeat after six."""
     return _MATERIALS[index % len(_MATERIALS)]
@@ -66,8 +69,17 @@ def activation_colors(activation: ArrayLike) -> NDArray[np.uint8]:
     Returns:
         Colors from 0 to 255, shape (sample, 3).
     """
-    gamma = np.nan_to_num(np.asarray(activation, float))
-    largest = max(gamma.max(initial=0.0), -gamma.min(initial=0.0)) or 1.0
+    gamma = np.asarray(activation, float)
+    blocks = [slice(k, k + _BLOCK) for k in range(0, len(gamma), _BLOCK)]
+    largest = max((_magnitudes(gamma[block]).max(initial=0.0) for block in blocks), default=0.0)
+    largest = largest or 1.0
     lights = _LIGHTS[np.arange(gamma.shape[1]) % len(_LIGHTS)]
     mix = lights * (255.0 / largest) / np.maximum(lights.sum(axis=0), 1.0)
-    return np.rint(np.abs(gamma) @ mix).astype(np.uint8)
+    colors = np.empty((len(gamma), 3), np.uint8)
+    for block in blocks:
+        colors[block] = np.rint(_magnitudes(gamma[block]) @ mix)
+    return colors
+
+
+def _magnitudes(gamma: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.abs(gamma if np.isfinite(gamma).all() else np.nan_to_num(gamma))

@@ -7,11 +7,17 @@ people's thread and process pools, and let Ctrl-C through between blocks.
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
+from functools import cache
 from itertools import chain, islice
+from typing import TypeVar
 
-__all__ = ["blocks", "run", "thread_count"]
+__all__ = ["blocks", "in_order", "meanwhile", "run", "thread_count"]
+
+Result = TypeVar("Result")
 
 
 def thread_count() -> int:
@@ -52,6 +58,38 @@ def run(tasks: Iterable[Callable[[], object]]) -> None:
                 pending = _drain(pending)
         while pending:
             pending = _drain(pending)
+
+
+def in_order(tasks: Iterable[Callable[[], Result]]) -> Iterator[Result]:
+    """The results of tasks in their order; as many run at a time as there are threads."""
+    threads = thread_count()
+    if threads == 1:
+        yield from (task() for task in tasks)
+        return
+    ahead: deque[Future[Result]] = deque()
+    pool = ThreadPoolExecutor(threads)
+    try:
+        for task in tasks:
+            ahead.append(pool.submit(task))
+            if len(ahead) > threads:
+                yield ahead.popleft().result()
+        while ahead:
+            yield ahead.popleft().result()
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def meanwhile(task: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
+    """Call a task on another thread during the block, which gets a function that waits for it.
+
+    Where only one thread is to be used, the task begins when its result is asked for.
+    """
+    if thread_count() == 1:
+        yield cache(task)
+        return
+    with ThreadPoolExecutor(1) as pool:
+        yield pool.submit(task).result
 
 
 def _drain(pending: set[Future[object]]) -> set[Future[object]]:

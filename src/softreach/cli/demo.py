@@ -26,23 +26,28 @@ def demo(
     """
     from time import perf_counter
 
-    from softreach import export, plot
+    from softreach import export, parallel, plot
     from softreach.arm import designs
     from softreach.cloud import compute_cloud, save_cloud
     from softreach.rod.kinematics import configuration
-    from softreach.volume import concave_hull, convex_hull
+    from softreach.volume import Hull, concave_hull, convex_hull
 
     start = perf_counter()
     arm = designs.minimal_trunk()
     arm.save(out / "design.toml")
     cloud = compute_cloud(arm, n)
     computed = perf_counter() - start
-    concave, convex = concave_hull(cloud.tip, bias=True), convex_hull(cloud.tip)
-    save_cloud(cloud, out / "cloud.zarr")
-    export.export_cloud(cloud, out / "cloud.ply")
+
+    def hulls() -> tuple[Hull, Hull]:
+        return concave_hull(cloud.tip, bias=True), convex_hull(cloud.tip)
+
+    with parallel.meanwhile(hulls) as found:
+        save_cloud(cloud, out / "cloud.zarr")
+        export.export_cloud(cloud, out / "cloud.ply")
+        shape = configuration(arm, [-1.0, 0.0, -0.4])
+        plot.save_figure(plot.plot_views(cloud, arm, shape), out / "cloud.png")
+        concave, convex = found()
     export.export_mesh(concave, out / "hull.ply")
-    shape = configuration(arm, [-1.0, 0.0, -0.4])
-    plot.save_figure(plot.plot_views(cloud, arm, shape), out / "cloud.png")
 
     rows = volume_rows(concave, convex, arm.length)
     rows["time to compute the cloud"] = (round(computed, 3), "s")

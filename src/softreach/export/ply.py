@@ -1,4 +1,4 @@
-"""Binary PLY of points with any number of columns (Turk's Stanford polygon format, version 1.0)."""
+"""Binary PLY of points with any columns, and of meshes (Turk's polygon format, version 1.0)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["write_points"]
+__all__ = ["write_mesh", "write_points"]
 
 _TYPES = {"f8": "double", "f4": "float", "u1": "uchar"}
 
@@ -35,6 +35,26 @@ def write_points(
             rows.tofile(file)
 
 
+def write_mesh(
+    path: Path, vertices: Mapping[str, NDArray[np.generic]], faces: NDArray[np.integer]
+) -> None:
+    """Write triangles.
+
+    Args:
+        path: Where to.
+        vertices: Columns of float64, float32 or uint8, by name.
+        faces: Corners, shape (f, 3).
+    """
+    rows = _records(vertices)
+    triangles = np.empty(len(faces), [("count", "u1"), ("corners", "<i4", 3)])
+    triangles["count"], triangles["corners"] = 3, faces
+    element = f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
+    with path.open("wb") as file:
+        file.write(_header(len(rows), rows.dtype, {}, element))
+        rows.tofile(file)
+        triangles.tofile(file)
+
+
 def _records(columns: Mapping[str, NDArray[np.generic]]) -> NDArray[np.void]:
     fields = [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()]
     rows = np.zeros(len(next(iter(columns.values()))), fields)
@@ -43,14 +63,17 @@ def _records(columns: Mapping[str, NDArray[np.generic]]) -> NDArray[np.void]:
     return rows
 
 
-def _header(count: int, fields: np.dtype[np.void], description: Mapping[str, object]) -> bytes:
+def _header(
+    count: int, fields: np.dtype[np.void], description: Mapping[str, object], further: str = ""
+) -> bytes:
+    """What stands before the rows; further elements follow the vertices."""
     lines = ["ply", "format binary_little_endian 1.0"]
     for key, value in description.items():
         lines += [f"comment {key}: {_ascii(line)}" for line in str(value).splitlines()]
     lines.append(f"element vertex {count}")
     for name in fields.names or ():
         lines.append(f"property {_TYPES[fields[name].str[1:]]} {name}")
-    return "\n".join([*lines, "end_header", ""]).encode("ascii")
+    return "\n".join([*lines, f"{further}end_header", ""]).encode("ascii")
 
 
 def _ascii(text: str) -> str:

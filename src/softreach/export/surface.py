@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arrays import Faces
 from softreach.errors import InvalidInput
+from softreach.export import ply
 from softreach.export.formats import load_library, write_by_suffix
 from softreach.geometry.surface import SurfaceMesh
 from softreach.palette import BODY, Color
@@ -71,10 +72,17 @@ def write_parts(parts: Sequence[Part], path: str | PathLike[str]) -> None:
     write_by_suffix(path, _WRITERS, parts)
 
 
-def _write_joined(parts: Sequence[Part], path: Path) -> None:
+def _write_ply(parts: Sequence[Part], path: Path) -> None:
+    vertices, faces = _joined(parts)
+    colors = np.concatenate([np.tile(_rgba(part), (len(part.vertices), 1)) for part in parts])
+    columns = dict(zip("xyz", vertices.T, strict=True))
+    columns |= dict(zip(("red", "green", "blue", "alpha"), colors.T, strict=True))
+    ply.write_mesh(path, columns, faces)
+
+
+def _write_stl(parts: Sequence[Part], path: Path) -> None:
     trimesh = load_library("trimesh")
-    joined = trimesh.util.concatenate([_colored(part) for part in parts])
-    joined.export(path)
+    trimesh.util.concatenate([_colored(part) for part in parts]).export(path)
 
 
 def _write_obj(parts: Sequence[Part], path: Path) -> None:
@@ -98,21 +106,22 @@ def _write_glb(parts: Sequence[Part], path: Path) -> None:
 
 def _write_vtk(parts: Sequence[Part], path: Path) -> None:
     meshio = load_library("meshio")
+    vertices, faces = _joined(parts)
+    number = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])
+    mesh = meshio.Mesh(vertices, [("triangle", faces)], cell_data={"part": [number]})
+    meshio.write(path, mesh)
+
+
+def _joined(parts: Sequence[Part]) -> tuple[NDArray[np.float64], Faces]:
+    """Vertices and faces of all parts as one mesh."""
     starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
     faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
-    number = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])
-    mesh = meshio.Mesh(
-        np.concatenate([part.vertices for part in parts]),
-        [("triangle", np.concatenate(faces))],
-        cell_data={"part": [number]},
-    )
-    meshio.write(path, mesh)
+    return np.concatenate([part.vertices for part in parts]), np.concatenate(faces)
 
 
 def _colored(part: Part) -> Any:
     trimesh = load_library("trimesh")
-    rgba = np.rint(255 * np.array([*part.color, part.opacity])).astype(np.uint8)
-    colors = np.tile(rgba, (len(part.vertices), 1))
+    colors = np.tile(_rgba(part), (len(part.vertices), 1))
     return trimesh.Trimesh(
         part.vertices,
         part.faces,
@@ -120,6 +129,10 @@ def _colored(part: Part) -> Any:
         metadata={"name": part.name},
         process=False,
     )
+
+
+def _rgba(part: Part) -> NDArray[np.uint8]:
+    return np.rint(255 * np.array([*part.color, part.opacity])).astype(np.uint8)
 
 
 def _shiny(part: Part) -> Any:
@@ -139,8 +152,8 @@ def _shiny(part: Part) -> Any:
 
 
 _WRITERS = {
-    ".ply": _write_joined,
-    ".stl": _write_joined,
+    ".ply": _write_ply,
+    ".stl": _write_stl,
     ".obj": _write_obj,
     ".glb": _write_glb,
     ".vtu": _write_vtk,

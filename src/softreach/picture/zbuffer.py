@@ -7,11 +7,13 @@ maximum of the finished image, whatever the number of points.
 
 from __future__ import annotations
 
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.picture.projection import View, project
 from softreach.picture.scanline import filled_pixels
 
 __all__ = ["Extent", "ZBuffer"]
@@ -19,7 +21,7 @@ __all__ = ["Extent", "ZBuffer"]
 Array = NDArray[np.float64]
 Keys = NDArray[np.uint64]
 
-_BLOCK = 1 << 19  # points at a time: temporary arrays stay in the tens of MB
+_BLOCK = 1 << 15  # points at a time: temporary arrays stay in the cache, and in memory once touched
 
 
 class Extent(NamedTuple):
@@ -54,20 +56,30 @@ class ZBuffer:
         """Rows and columns of the image."""
         return self._keys.shape[0] // self.oversample, self._keys.shape[1] // self.oversample
 
-    def draw_points(self, points: ArrayLike, colors: ArrayLike, size: float = 1.0) -> None:
+    def draw_points(
+        self,
+        points: ArrayLike,
+        colors: ArrayLike,
+        size: float = 1.0,
+        *,
+        view: View | None = None,
+    ) -> None:
         """Draw discs that face the eye; points that are not finite or outside are left out.
 
         Args:
             points: Shape (n, 3).
             colors: RGB from 0 to 255, shape (n, 3) or (3,).
             size: Diameter in pixels of the image.
+            view: The direction of the eye, for points in space; None for points that are already
+                seen from it.
         """
         points = np.asarray(points, float)
         colors = np.broadcast_to(np.asarray(colors, np.uint8), points.shape)
         layer = np.zeros_like(self._keys)
         for start in range(0, len(points), _BLOCK):
             block = slice(start, start + _BLOCK)
-            self._splat(layer, points[block], colors[block])
+            seen = points[block] if view is None else project(points[block], view)
+            self._splat(layer, seen, colors[block])
         self._keep_larger(_grown(layer, size * self.oversample))
 
     def draw_triangles(self, corners: ArrayLike, colors: ArrayLike) -> None:
@@ -87,9 +99,12 @@ class ZBuffer:
 
     def rgba(self) -> NDArray[np.uint8]:
         """The image from top to bottom, shape (rows, columns, 4); transparent where nothing is."""
-        packed = (self._keys & np.uint64(0xFFFFFFFF)).astype(np.uint32)
-        rgba = packed.astype(">u4")[..., None].view(np.uint8)
-        return _rounded(_averaged(rgba, self.oversample), self.color_step)
+        image = np.zeros((*self.shape, 4), np.uint8)
+        rows, columns = _extent_of_content(self._keys, self.oversample)
+        by = self.oversample
+        keys = self._keys[by * rows.start : by * rows.stop, by * columns.start : by * columns.stop]
+        image[rows, columns] = _rounded(_averaged(keys, by), self.color_step)
+        return image
 
     def _to_pixels(self, points: Array) -> Array:
         """Column and row from the top, where whole numbers are the edges of pixels."""
@@ -155,10 +170,26 @@ def _rounded(rgba: NDArray[np.uint8], step: int) -> NDArray[np.uint8]:
     return np.concatenate([levels[rgba[..., :3]], rgba[..., 3:]], axis=-1)
 
 
-def _averaged(rgba: NDArray[np.uint8], by: int) -> NDArray[np.uint8]:
-    """Means of blocks of pixels; colors are weighted by opacity so that edges keep their color."""
-    rows, columns = rgba.shape[0] // by, rgba.shape[1] // by
+def _extent_of_content(keys: Keys, by: int) -> tuple[slice, slice]:
+    """Rows and columns, in blocks of pixels, outside of which nothing is drawn."""
+    rows = _range_of(keys.max(axis=1, initial=0) > 0, by)
+    return rows, _range_of(keys[by * rows.start : by * rows.stop].max(axis=0, initial=0) > 0, by)
+
+
+def _range_of(some: NDArray[np.bool_], by: int) -> slice:
+    """The blocks from the first to the last that are true somewhere."""
+    found = np.flatnonzero(some)
+    return slice(found[0] // by, found[-1] // by + 1) if len(found) else slice(0, 0)
+
+
+def _averaged(keys: Keys, by: int) -> NDArray[np.uint8]:
+    """RGBA means of blocks of pixels; colors are weighted by opacity so that edges keep theirs."""
+    # four sums in one number: opacity, green, blue and red from 0 to 255, each in 16 bits of 64
+    pairs = np.uint64(0x00FF00FF)
+    lanes = (keys & pairs) | (keys >> np.uint64(8) & pairs) << np.uint64(32)
+    total = sum(lanes[i::by, j::by] for i, j in product(range(by), repeat=2))
+    opacity, green, blue, red = (total >> np.uint64(s) & np.uint64(0xFFFF) for s in (0, 16, 32, 48))
     # opacity is 0 or 255 here, and the color of an empty pixel is 0
-    total = rgba.reshape(rows, by, columns, by, 4).sum(axis=(1, 3), dtype=np.uint32)
-    full = np.maximum(total[..., 3:] // 255, 1)
-    return np.concatenate([total[..., :3] // full, total[..., 3:] // by**2], -1).astype(np.uint8)
+    full = np.maximum(opacity.astype(np.uint16) // 255, 1)
+    channels = [color.astype(np.uint16) // full for color in (red, green, blue)]
+    return np.stack([*channels, opacity // np.uint64(by**2)], axis=-1).astype(np.uint8)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from softreach.arm.manipulator import Manipulator
 
-__all__ = ["arm_points", "draw_arms", "plot_arm", "shapes_of"]
+__all__ = ["arm_images", "arm_points", "draw_arms", "plot_arm", "shapes_of"]
 
 Array = NDArray[np.float64]
 
@@ -102,8 +102,18 @@ def draw_arms(
     fade: float = 0.0,
 ) -> None:
     """One image of all shapes, over what the axes hold."""
-    if not shapes:
-        return
+    if shapes:
+        panel.show(*arm_images(panel, arm, shapes, bundles, fade))
+
+
+def arm_images(
+    panel: Panel,
+    arm: Manipulator,
+    shapes: list[xr.Dataset],
+    bundles: Collection[int],
+    fade: float = 0.0,
+) -> tuple[ZBuffer, ZBuffer | None]:
+    """All shapes in a panel, and what shows through them; None for nothing."""
     buffer, within = panel.buffer(oversample=3), panel.buffer(oversample=3)
     hidden = inside(arm)
     clear = any(hidden[index] for index in bundles)
@@ -116,7 +126,7 @@ def draw_arms(
             if clear:
                 faces = faces_to_eye(points, faces, panel.view)
                 draw_mesh(within, points / arm.length, faces, color, panel.view, fade)
-    panel.show(buffer, within if clear else None)
+    return buffer, within if clear else None
 
 
 def _draw_body(

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.picture.projection import View, project
+from softreach.picture.projection import View
+from softreach.picture.zbuffer import ZBuffer
 from softreach.plot.coloring import color_samples, draw_key
 from softreach.plot.frame import Panel
 from softreach.plot.lengths import unit_of
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["drawn_tips", "plot_cloud", "point_size"]
+__all__ = ["cloud_image", "drawn_tips", "plot_cloud", "point_size"]
 
 _LARGEST = 8.0  # pixels
 
@@ -56,15 +57,29 @@ def plot_cloud(
         tips = drawn_tips(cloud)
         panel = Panel.opened(tips, unit_of(cloud["tip"]), ax, view, box)
         coloring = color_samples(cloud, color)
-        spread = point_size(len(tips), panel.box) * panel.pixels_per_unit
-        pixels = size or min(_LARGEST, spread)
-        # small points gain nothing from smoothing; fine steps of color drown in their noise
-        buffer = panel.buffer(oversample=1 if pixels < 3.5 else 2, color_step=8)
-        buffer.draw_points(project(tips, view), coloring.rgb, pixels)
-        panel.show(buffer)
+        panel.show(cloud_image(panel, tips, coloring.rgb, size))
         if key:
             draw_key(panel.ax, coloring.key)
     return panel.ax
+
+
+def cloud_image(
+    panel: Panel, tips: NDArray[np.float64], rgb: NDArray[np.uint8], size: float | None
+) -> ZBuffer:
+    """The image of points in a panel.
+
+    Args:
+        panel: Where it will be shown.
+        tips: In the units of the axes, shape (n, 3).
+        rgb: From 0 to 255, shape (n, 3).
+        size: As in `plot_cloud`.
+    """
+    spread = point_size(len(tips), panel.box) * panel.pixels_per_unit
+    pixels = size or min(_LARGEST, spread)
+    # small points gain nothing from smoothing; fine steps of color drown in their noise
+    buffer = panel.buffer(oversample=1 if pixels < 3.5 else 2, color_step=8)
+    buffer.draw_points(tips, rgb, pixels, view=panel.view)
+    return buffer
 
 
 def drawn_tips(cloud: xr.Dataset) -> NDArray[np.float64]:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach import parallel
 from softreach.errors import InvalidInput
 from softreach.geometry.surface import SurfaceMesh
 from softreach.palette import STEEL, activation_colors
-from softreach.picture.projection import View, project, view_axes
+from softreach.picture.projection import View, view_axes
 from softreach.picture.shading import draw_mesh
 from softreach.picture.zbuffer import Extent, ZBuffer
 from softreach.plot.atlas_axes import SheetAxis
@@ -48,7 +50,7 @@ def plot_cloud_sheet(
 
     Args:
         cloud_at: (column, row) -> cloud, row 0 at the bottom; None leaves a gap. Called once for
-            each, so that one cloud at a time is held.
+            each, on all threads, so that one cloud is held on each.
         across: Parameter along the horizontal edge.
         up: Parameter along the vertical edge.
         box_over_length: What each panel shows, lower and upper corner in L [-], shape (2, 3).
@@ -61,10 +63,10 @@ def plot_cloud_sheet(
     """
     box = np.asarray(box_over_length, float)
 
-    def draw(ax: Axes, cloud: xr.Dataset) -> None:
-        _draw_cloud(ax, cloud, box, view)
+    def image(cloud: xr.Dataset, columns: int) -> ZBuffer:
+        return _cloud_image(cloud, columns, box, view)
 
-    return _filled_sheet(cloud_at, draw, across, up, box, view, width)
+    return _filled_sheet(cloud_at, image, across, up, box, view, width)
 
 
 def plot_hull_sheet(
@@ -80,7 +82,8 @@ def plot_hull_sheet(
     """A sheet of lit hulls at one scale (figure 3a).
 
     Args:
-        hull_at: (column, row) -> surface [m], row 0 at the bottom; None leaves a gap.
+        hull_at: (column, row) -> surface [m], row 0 at the bottom; None leaves a gap. Called as
+            `cloud_at` of `plot_cloud_sheet` is.
         across: As for `plot_cloud_sheet`.
         up: As for `plot_cloud_sheet`.
         length: L [m], one for all or one for each panel, shape (columns, rows).
@@ -100,29 +103,40 @@ def plot_hull_sheet(
             return None
         return np.asarray(hull.vertices) / lengths[column, row], hull.faces
 
-    def draw(ax: Axes, surface: tuple[Array, ArrayLike]) -> None:
-        buffer = ZBuffer(panel_extent(box, view), _columns(ax), oversample=3, color_step=4)
+    def image(surface: tuple[Array, ArrayLike], columns: int) -> ZBuffer:
+        buffer = ZBuffer(panel_extent(box, view), columns, oversample=3, color_step=4)
         draw_mesh(buffer, *surface, STEEL, view)
-        _show(ax, buffer)
+        return buffer
 
-    return _filled_sheet(relative, draw, across, up, box, view, width)
+    return _filled_sheet(relative, image, across, up, box, view, width)
 
 
 def _filled_sheet(
     content_at: Callable[[int, int], Content | None],
-    draw: Callable[[Axes, Content], None],
+    image: Callable[[Content, int], ZBuffer],
     across: SheetAxis,
     up: SheetAxis,
     box: Array,
     view: View,
     width: float,
 ) -> Figure:
-    """A sheet with what belongs to each panel drawn in it, one after the other."""
+    """A sheet with an image of what belongs to each panel, as many columns wide as it has pixels.
+
+    The threads find and draw the contents, the caller places them.
+    """
     with figure_style():
         figure, panels = _sheet(across, up, box, view, width)
-        for (row, column), ax in np.ndenumerate(panels):
-            if (content := content_at(column, row)) is not None:
-                draw(ax, content)
+        columns, extent = _columns(panels[0, 0]), panel_extent(box, view)
+
+        def pixels(row: int, column: int) -> NDArray[np.uint8] | None:
+            content = content_at(column, row)
+            return None if content is None else image(content, columns).rgba()
+
+        tasks = (partial(pixels, *place) for place in np.ndindex(panels.shape))
+        for ax, found in zip(panels.ravel().tolist(), parallel.in_order(tasks), strict=True):
+            if found is not None:
+                # the frame of the axes and their limits stay
+                ax.imshow(found, extent=extent, interpolation="none", aspect="auto")
         _draw_scale(figure, panels[0, 0], view)
     return figure
 
@@ -178,21 +192,16 @@ def _columns(ax: Axes) -> int:
     return max(16, round(ax.get_position().width * figure.get_size_inches()[0] * DPI))
 
 
-def _draw_cloud(ax: Axes, cloud: xr.Dataset, box: Array, view: View) -> None:
-    extent, columns = panel_extent(box, view), _columns(ax)
+def _cloud_image(cloud: xr.Dataset, columns: int, box: Array, view: View) -> ZBuffer:
+    extent = panel_extent(box, view)
     if not unit_of(cloud["tip"]).relative:
         raise InvalidInput("cloud.tip.attrs['length']", None, "L [m], the unit of the sheet")
     tips = drawn_tips(cloud)
     pixels = point_size(len(tips), box) * columns / (extent.right - extent.left)
     buffer = ZBuffer(extent, columns, oversample=2, color_step=8)
     colors = activation_colors(bundle_activations(cloud).values)
-    buffer.draw_points(project(tips, view), colors, max(1.0, pixels))
-    _show(ax, buffer)
-
-
-def _show(ax: Axes, buffer: ZBuffer) -> None:
-    """The image in its axes, whose frame and limits stay."""
-    ax.imshow(buffer.rgba(), extent=buffer.extent, interpolation="none", aspect="auto")
+    buffer.draw_points(tips, colors, max(1.0, pixels), view=view)
+    return buffer
 
 
 def _draw_scale(figure: Figure, panel: Axes, view: View) -> None:

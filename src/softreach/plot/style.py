@@ -75,7 +75,12 @@ def save_figure(figure: Figure | Axes, path: str | PathLike[str]) -> None:
     with pyplot().rc_context(_SAVING), replacing(path) as lent:
         whole = figure.get_figure(root=True)
         if whole is not None:
-            whole.savefig(lent, dpi=DPI)
+            whole.savefig(lent, dpi=DPI, **_encoding(lent.suffix))
+
+
+def _encoding(suffix: str) -> dict[str, Any]:
+    """PNG at a level that takes less than half the time of the default for 5 % more bytes."""
+    return {"pil_kwargs": {"compress_level": 4}} if suffix.lower() == ".png" else {}
 
 
 def write_note(ax: Axes, text: str, right: float, up: float) -> None:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach import parallel
 from softreach.arm_shape import rest_configuration
 from softreach.picture.projection import View
-from softreach.plot.arm import arm_points, plot_arm, shapes_of
-from softreach.plot.cloud import drawn_tips, plot_cloud
+from softreach.picture.zbuffer import ZBuffer
+from softreach.plot.arm import arm_images, arm_points, shapes_of
+from softreach.plot.cloud import cloud_image, drawn_tips
 from softreach.plot.coloring import color_samples, draw_figure_key
-from softreach.plot.frame import bounding_box
+from softreach.plot.frame import Panel, bounding_box
 from softreach.plot.lengths import common_unit, in_lengths, unit_of
 from softreach.plot.style import figure_style, pyplot
 
@@ -24,6 +27,9 @@ if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
 
 __all__ = ["plot_views"]
+
+Images = tuple[ZBuffer, ZBuffer | None]
+"""An image, and what shows through it."""
 
 _LEFT, _GAP, _RIGHT, _BOTTOM, _TOP = 0.55, 0.60, 0.12, 0.42, 0.42  # inches
 
@@ -57,21 +63,28 @@ def plot_views(
         InvalidInput: As `plot_cloud`; an arm beside a cloud that does not know L.
         MissingExtra: matplotlib is not installed.
     """
-    unit, shown = unit_of(cloud["tip"]), [drawn_tips(cloud)]
+    unit, tips = unit_of(cloud["tip"]), drawn_tips(cloud)
+    shown, shapes = [tips], []
     if arm is not None:
         common_unit([unit, in_lengths(arm.length)])
         shapes = shapes_of(configuration) or [rest_configuration(arm)]
         shown += [arm_points(arm, shape) for shape in shapes]
     box = bounding_box(*shown)
     coloring = color_samples(cloud, color)
-    points = {"color": coloring.rgb / 255, "size": size, "key": False, "box": box * unit.size}
     with figure_style():
-        figure, panels, top = _layout(np.ptp(box, axis=0), width, view)
-        for seen, ax in panels:
-            plot_cloud(cloud, ax=ax, view=seen, **points)
+        figure, axes, top = _layout(np.ptp(box, axis=0), width, view)
+        panels = [Panel(ax, box, seen, unit) for seen, ax in axes]
+        images: list[list[Images]] = [[] for _ in panels]
+
+        def draw(panel: Panel, drawn: list[Images]) -> None:
+            drawn.append((cloud_image(panel, tips, coloring.rgb, size), None))
             if arm is not None:
-                inside = box * arm.length
-                plot_arm(arm, configuration, ax=ax, view=seen, rest=False, box=inside)
+                drawn.append(arm_images(panel, arm, shapes, range(arm.bundles)))
+
+        parallel.run(partial(draw, *each) for each in zip(panels, images, strict=True))
+        for panel, drawn in zip(panels, images, strict=True):
+            for image, within in drawn:
+                panel.show(image, within)
         draw_figure_key(figure, coloring.key, top)
     return figure
 

@@ -1,0 +1,63 @@
+"""Tasks on threads: their order, how many there are, and what they raise."""
+
+from __future__ import annotations
+
+import threading
+import time
+from functools import partial
+
+import pytest
+
+from softreach import parallel
+
+
+@pytest.fixture(params=["1", "3"], autouse=True)
+def threads(request, monkeypatch):
+    monkeypatch.setenv("SOFTREACH_NUM_THREADS", request.param)
+    return int(request.param)
+
+
+def test_results_come_in_the_order_of_their_tasks():
+    def late(number):
+        time.sleep(0.002 * (number % 3 == 0))
+        return number
+
+    assert list(parallel.in_order(partial(late, k) for k in range(20))) == list(range(20))
+
+
+def test_no_more_tasks_run_at_a_time_than_there_are_threads(threads):
+    running, most, lock = 0, 0, threading.Lock()
+
+    def task():
+        nonlocal running, most
+        with lock:
+            running += 1
+            most = max(most, running)
+        time.sleep(0.001)
+        with lock:
+            running -= 1
+
+    list(parallel.in_order(task for _ in range(20)))
+    assert 1 <= most <= threads
+
+
+def test_what_a_task_raises_arrives_in_its_place():
+    def broken():
+        raise ValueError("broken")
+
+    results = parallel.in_order([lambda: 1, broken, lambda: 3])
+    assert next(results) == 1
+    with pytest.raises(ValueError, match="broken"):
+        next(results)
+
+
+def test_what_is_done_meanwhile_is_done_once_and_asked_for_later():
+    calls = []
+    with parallel.meanwhile(lambda: calls.append(1) or "found") as found:
+        assert found() == found() == "found"
+    assert calls == [1]
+
+
+def test_what_is_done_meanwhile_raises_where_it_is_asked_for():
+    with parallel.meanwhile(lambda: 1 / 0) as found, pytest.raises(ZeroDivisionError):
+        found()
