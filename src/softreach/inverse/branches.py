@@ -34,6 +34,7 @@ from softreach.inverse.request import Request
 from softreach.inverse.roots import Roots, no_roots, placed, roots_at, smallest_singular_values
 from softreach.kernels import candidates, folds, newton
 from softreach.kernels.newton import CONVERGED, RUNNING, STAGNATED, Search
+from softreach.rod.tip_map import TipMap
 
 __all__ = ["distinct", "every_branch"]
 
@@ -42,7 +43,11 @@ Index = NDArray[np.int64]
 
 _ROUNDING = 1e-13  # of a tip, in L, with room to spare
 _BLOCK = 1024
+_PLACES = 32  # along each axis, when targets are put in order
 _MOST_ITERATIONS = 40
+_CHORD_STEPS = 2  # with the inverse that a start knows, before Newton's method
+_LONGEST_CHORD = 0.01  # in ranges of the bounds
+_MUCH_NEARER = 0.1  # part of the distance to the target that a step may leave
 _PARTNER_RANGE = 1.5  # widths of a cell within which a fold's other root is looked for
 
 
@@ -55,6 +60,18 @@ class _Starts(NamedTuple):
     """Cell of the mesh, shape (n,)."""
     gamma: Array
     """Activation [-], shape (n, 3)."""
+    inverse: Array
+    """Inverse of the Jacobian there [1/m], roughly; 0 if not known, shape (n, 3, 3)."""
+
+    @staticmethod
+    def empty(room: int) -> _Starts:
+        """Space for so many."""
+        target, cell = np.empty(room, np.int64), np.empty(room, np.int64)
+        return _Starts(target, cell, np.empty((room, 3)), np.empty((room, 3, 3)))
+
+    def where(self, chosen: slice | Index) -> _Starts:
+        """Some of them, copied."""
+        return _Starts(*(column[chosen].copy() for column in self))
 
 
 def every_branch(prepared: PreparedMap, request: Request) -> Roots:
@@ -89,21 +106,21 @@ def _starts(
         rows: Numbers of the targets.
         with_root: Whether to leave out tetrahedra whose quadratic does not reach the target.
     """
+    rows = rows[_spatial_order(request.targets[rows])]
     box, targets = prepared.rod.box, request.targets[rows]
     if not len(prepared.mesh.corner):
-        return _Starts(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 3)))
+        return _Starts.empty(0)
     blocks = list(parallel.blocks(len(targets), _BLOCK))
     parts: list[list[_Starts]] = [[] for _ in blocks]
 
     def fill(part: list[_Starts], first: int, last: int) -> None:
-        room = candidates.MOST_STARTS + 4 * _BLOCK
-        out = _Starts(np.empty(room, np.int64), np.empty(room, np.int64), np.empty((room, 3)))
+        out = _Starts.empty(candidates.MOST_STARTS + 4 * _BLOCK)
         while first < last:
             done, n = candidates.find_starts(
                 prepared.mesh, prepared.tree, targets[first:last], low, high, with_root, *out
             )
-            target = rows[out.target[:n] + first]
-            part.append(_Starts(target, out.cell[:n].copy(), out.gamma[:n].copy()))
+            found = out.where(slice(n))
+            part.append(found._replace(target=rows[found.target + first]))
             first += done
 
     low, high = box.low.copy(), box.high.copy()
@@ -111,9 +128,19 @@ def _starts(
         partial(fill, part, block.start, block.stop)
         for part, block in zip(parts, blocks, strict=True)
     )
-    none = _Starts(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 3)))
-    pieces = [none, *(piece for part in parts for piece in part)]
-    return _Starts(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))
+    pieces = [_Starts.empty(0), *(piece for part in parts for piece in part)]
+    starts = _Starts(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))
+    return starts.where(np.argsort(starts.target, kind="stable"))
+
+
+def _spatial_order(points: Array) -> Index:
+    """An order in which points (n, 3) that follow each other share most of their candidates."""
+    if len(points) < 2:
+        return np.arange(len(points))
+    low, high = points.min(axis=0), points.max(axis=0)
+    place = ((points - low) * (_PLACES / np.maximum(high - low, 1e-300))).astype(np.int64)
+    place = np.minimum(place, _PLACES - 1)
+    return np.argsort(place @ np.array([_PLACES**2, _PLACES, 1]), kind="stable")
 
 
 def _with_torn(prepared: PreparedMap, request: Request, starts: _Starts) -> _Starts:
@@ -122,15 +149,16 @@ def _with_torn(prepared: PreparedMap, request: Request, starts: _Starts) -> _Sta
     target = np.concatenate([starts.target, target])
     cell = np.concatenate([starts.cell, np.full(len(target) - len(starts.cell), -1)])
     gamma = np.concatenate([starts.gamma, gamma])
+    inverse = np.concatenate([starts.inverse, np.zeros((len(target) - len(starts.cell), 3, 3))])
     order = np.argsort(target, kind="stable")
-    return _Starts(target[order], cell[order], gamma[order])
+    return _Starts(target, cell, gamma, inverse).where(order)
 
 
 def _newton(prepared: PreparedMap, request: Request, starts: _Starts) -> Roots:
     """Step 5: damped Newton from every start; the roots that are within the bounds."""
     rod, goal = prepared.branch_map, request.targets[starts.target]
     low, high = rod.box.low.copy(), rod.box.high.copy()
-    search = _search(goal, starts.gamma)
+    search = _search(goal, _improved(rod, goal, starts))
     for _ in range(_MOST_ITERATIONS):
         active = np.flatnonzero(search.state == RUNNING)
         if not len(active):
@@ -153,6 +181,31 @@ def _newton(prepared: PreparedMap, request: Request, starts: _Starts) -> Roots:
         stable,
     )
     return roots.where(residual <= request.residual)
+
+
+def _improved(rod: TipMap, goal: Array, starts: _Starts) -> Array:
+    """The starts after steps with the inverse known there: tips cost a fraction of Jacobians.
+
+    A step that does not bring the tip much nearer to its target is not taken.
+    """
+    gamma = starts.gamma.copy()
+    if rod.supports_unstable:
+        return gamma
+    row = np.flatnonzero(starts.inverse.any(axis=(1, 2)))
+    miss = goal[row] - rod.tips(gamma[row])
+    for steps_left in reversed(range(_CHORD_STEPS)):
+        step = np.einsum("nij,nj->ni", starts.inverse[row], miss)
+        short = (np.abs(step) <= _LONGEST_CHORD * rod.box.widths).all(axis=1)
+        row, step, miss = row[short], step[short], miss[short]
+        trial = gamma[row] + step
+        if not steps_left:  # Newton's method looks at the last one
+            gamma[row] = trial
+            break
+        next_miss = goal[row] - rod.tips(trial)
+        nearer = (next_miss**2).sum(axis=1) <= _MUCH_NEARER**2 * (miss**2).sum(axis=1)
+        row, miss = row[nearer], next_miss[nearer]
+        gamma[row] = trial[nearer]
+    return gamma
 
 
 def _give_up(search: Search, active: Index) -> None:
@@ -205,7 +258,8 @@ def _partner_starts(prepared: PreparedMap, roots: Roots) -> _Starts:
         start,
         near,
     )
-    return _Starts(roots.target[near], roots.cell[near], start[near])
+    unknown = np.zeros((int(near.sum()), 3, 3))
+    return _Starts(roots.target[near], roots.cell[near], start[near], unknown)
 
 
 def distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:

@@ -1,7 +1,9 @@
 """Starting points of Newton's method: tetrahedra of the activation box that map onto a target.
 
 A target's solutions lie in tetrahedra whose linear image, inflated by its interpolation error,
-contains it. In each of them the quadratic through tips and Jacobians says whether and where.
+contains it. In each of them the quadratic through tips and Jacobians says whether and where, up to
+its remainder. Where the map does not fold, a root of the quadratic that lies outside its tetrahedron
+is left to the neighbor's.
 """
 
 from __future__ import annotations
@@ -21,11 +23,13 @@ MOST_STARTS = 1024
 _DISTINCT = 0.1  # starts nearer than this, in widths of their cells, lead to one solution
 _ITERATIONS = 6
 _OUTSIDE = 0.5  # how far outside a tetrahedron its quadratic is followed, in barycentric units
-_CONVERGED, _ACCEPTED = 0.01, 0.4  # residuals at which to end and to keep, in interpolation errors
+_CONVERGED, _ACCEPTED = 0.25, 2.0  # residuals at which to end and to keep, in remainders
+_MARGIN = 2.0  # remainders by which a target may lie outside the image of a tetrahedron
+_ROUNDING = 1e-6  # the same in barycentric units
 
 
 @kernel
-def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start):
+def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start, inverse):
     """Activations near each solution of the targets, until the arrays are full.
 
     Args:
@@ -38,11 +42,13 @@ def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start):
         target: Filled with the number of each start's target.
         cell: Filled with its cell.
         start: Filled with the activation, shape (room, 3).
+        inverse: Filled with the inverse of the quadratic's Jacobian near it [1/m], zero where it is
+            singular, shape (room, 3, 3).
 
     Returns:
         How many targets are done, and how many starts were found.
     """
-    guess = np.empty(3)
+    guess, adjugate = np.empty(3), np.empty((3, 3))
     gamma, tip, slope, corner = mesh.gamma, mesh.tip, mesh.slope, mesh.corner
     planes, item = tree.planes, tree.item
     found = 0
@@ -58,14 +64,20 @@ def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start):
                 c = k // 6
                 v = tetrahedron(corner, c, k % 6)
                 weights = _linear_weights(tip, v, p)
-                reached = _refine(
-                    gamma, tip, slope, v, weights, p, mesh.interpolation_error[c], guess
+                remainder = mesh.remainder[c]
+                reached, weights, det = _refine(
+                    gamma, tip, slope, v, weights, p, remainder, guess, adjugate
                 )
+                if reached and with_root and mesh.even[c]:
+                    reached = _is_inside(gamma, v, weights, adjugate, det, _MARGIN * remainder)
                 if (reached or not with_root) and _is_new(
                     gamma, corner, c, guess, start, first, found
                 ):
+                    scale = 1.0 / det if det != 0.0 else 0.0
                     for axis in range(3):
                         start[found, axis] = min(max(guess[axis], low[axis]), high[axis])
+                        for j in range(3):
+                            inverse[found, axis, j] = scale * adjugate[j, axis]
                     target[found], cell[found] = t, c
                     found += 1
     return targets.shape[0], found
@@ -85,11 +97,14 @@ def _linear_weights(tip, v, p):
 
 
 @inline
-def _refine(gamma, tip, slope, v, weights, p, error, guess):
+def _refine(gamma, tip, slope, v, weights, p, remainder, guess, adjugate):
     """Solve the quadratic through a tetrahedron's tips and slopes, near the tetrahedron.
 
     At x the average of the corners' expansions, Σ λi (fi + ½ Ji (x - xi)), is exact for quadratics.
-    Return whether the target is reached but for the cubic rest.
+
+    Returns:
+        Whether the target is reached but for the cubic rest, the barycentric coordinates, and the
+        determinant of the slope of the last step, whose cofactors are in `adjugate`.
     """
     for k in range(3):
         guess[k] = (
@@ -98,18 +113,17 @@ def _refine(gamma, tip, slope, v, weights, p, error, guess):
             + weights[2] * gamma[v[2], k]
             + weights[3] * gamma[v[3], k]
         )
-    last = False
+    det, size = 0.0, 0.0
     for _ in range(_ITERATIONS):
         r, a = _model(gamma, tip, slope, v, weights, p, guess)
-        if dot(r, r) <= (_CONVERGED * error) ** 2:
-            if last:
-                return True
-            last = True  # close enough, and once more to be closer
-        weights, moved = _step(gamma, v, weights, r, a, guess)
+        size = dot(r, r)
+        weights, det, moved = _step(gamma, v, weights, r, a, guess, adjugate)
+        if size <= (_CONVERGED * remainder) ** 2:
+            return True, weights, det
         if not moved:
-            break
+            return size <= (_ACCEPTED * remainder) ** 2, weights, det
     r, a = _model(gamma, tip, slope, v, weights, p, guess)
-    return dot(r, r) <= (_ACCEPTED * error) ** 2
+    return dot(r, r) <= (_ACCEPTED * remainder) ** 2, weights, det
 
 
 @inline
@@ -132,12 +146,14 @@ def _model(gamma, tip, slope, v, weights, p, guess):
 
 
 @inline
-def _step(gamma, v, weights, r, a, guess):
+def _step(gamma, v, weights, r, a, guess, adjugate):
     """A Newton step, cut short where it leaves the neighborhood of the tetrahedron."""
     c = cofactors(a)
     det = dot(a[0], c[0])
+    for i in range(3):
+        adjugate[i, 0], adjugate[i, 1], adjugate[i, 2] = c[i]
     if det == 0.0:
-        return weights, False
+        return weights, det, False
     y = combination(r, c)
     y = (y[0] / det, y[1] / det, y[2] / det)
     ahead = _weights(gamma, v, (guess[0] + y[0], guess[1] + y[1], guess[2] + y[2]))
@@ -146,10 +162,37 @@ def _step(gamma, v, weights, r, a, guess):
         if ahead[i] < -_OUTSIDE:
             part = min(part, (weights[i] + _OUTSIDE) / (weights[i] - ahead[i]))
     if part < 1e-3:
-        return weights, False
+        return weights, det, False
     for k in range(3):
         guess[k] += part * y[k]
-    return _weights(gamma, v, guess), True
+    return _weights(gamma, v, guess), det, True
+
+
+@inline
+def _is_inside(gamma, v, weights, adjugate, det, margin):
+    """Whether a target can lie in the image of a tetrahedron, if it is off by so much at most.
+
+    Each barycentric coordinate then changes by no more than its gradient in space times that.
+    """
+    zero = (0.0, 0.0, 0.0)
+    g = (zero, _gradient(gamma, v, 0, adjugate), _gradient(gamma, v, 1, adjugate))
+    g = (g[0], g[1], g[2], _gradient(gamma, v, 2, adjugate), zero)
+    for i in range(4):
+        outside = -weights[i] - _ROUNDING
+        if outside > 0.0:
+            change = minus(g[i], g[i + 1])
+            if (outside * det) ** 2 > margin * margin * dot(change, change):
+                return False
+    return True
+
+
+@inline
+def _gradient(gamma, v, i, adjugate):
+    """det J times the gradient in space of the coordinate along edge i of the path of vertices."""
+    a, b = v[i], v[i + 1]
+    k = 0 if gamma[a, 0] != gamma[b, 0] else (1 if gamma[a, 1] != gamma[b, 1] else 2)
+    width = gamma[b, k] - gamma[a, k]
+    return adjugate[0, k] / width, adjugate[1, k] / width, adjugate[2, k] / width
 
 
 @inline
