@@ -69,10 +69,8 @@ def mesh_of(f: Quadratic, cells: int) -> ActivationMesh:
     tip, error, remainder = f.values(gamma), np.empty(len(corner)), np.empty(len(corner))
     interpolation_errors(gamma, tip, slope, corner, error, remainder)
     change = np.abs(slope[corner] - slope[corner[:, :1]]).sum(axis=(1, 2, 3))
-    det = np.linalg.det(slope)[corner]
-    even = (det.min(axis=1) * det.max(axis=1) > 0) & (abs(det).min(axis=1) > 0.3 * abs(det).max(1))
     error += ROUNDING
-    return ActivationMesh(gamma, tip, slope, corner, error, remainder, change, even)
+    return ActivationMesh(gamma, tip, slope, corner, error, remainder, change)
 
 
 def sampled(

@@ -46,7 +46,7 @@ _BLOCK = 1024
 _PLACES = 32  # along each axis, when targets are put in order
 _MOST_ITERATIONS = 40
 _CHORD_STEPS = 2  # with the inverse that a start knows, before Newton's method
-_LONGEST_CHORD = 0.01  # in ranges of the bounds
+_LONGEST_CHORD = 0.003  # in ranges of the bounds
 _MUCH_NEARER = 0.1  # part of the distance to the target that a step may leave
 _PARTNER_RANGE = 1.5  # widths of a cell within which a fold's other root is looked for
 

@@ -111,6 +111,5 @@ def _mesh(lattice: _Lattice, corner: Index) -> ActivationMesh:
     for bit in (1, 2, 4):
         step = lattice.slope[corner[:, bit]] - lattice.slope[corner[:, 0]]
         change += np.sqrt((step**2).sum((1, 2)))
-    even = ~_uneven(lattice.det[corner])
     vertices = lattice.gamma, lattice.tip, lattice.slope
-    return ActivationMesh(*vertices, corner, error, remainder, change, even)
+    return ActivationMesh(*vertices, corner, error, remainder, change)

@@ -51,8 +51,6 @@ class ActivationMesh(NamedTuple):
     """How far it may lie from the quadratic through tips and Jacobians [m], shape (cell,)."""
     slope_change: np.ndarray
     """How much the Jacobian changes across the cell at most [m], shape (cell,)."""
-    even: np.ndarray
-    """Whether det J is so even at the corners that the cell does not fold, shape (cell,)."""
 
 
 @kernel

@@ -13,7 +13,7 @@ import numpy as np
 from softreach.kernels.activation_mesh import image_faces, tetrahedron
 from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.space_tree import leaf_at, may_meet
-from softreach.kernels.vector import cofactors, combination, dot, minus, row
+from softreach.kernels.vector import cofactors, combination, cross, dot, matrix, minus, row
 
 __all__ = ["MOST_STARTS", "find_starts"]
 
@@ -25,6 +25,8 @@ _ITERATIONS = 6
 _OUTSIDE = 0.5  # how far outside a tetrahedron its quadratic is followed, in barycentric units
 _CONVERGED, _ACCEPTED = 0.25, 2.0  # residuals at which to end and to keep, in remainders
 _MARGIN = 2.0  # remainders by which a target may lie outside the image of a tetrahedron
+_EVEN = 0.3  # ratio of det J at its vertices above which a tetrahedron does not fold
+_ASIDE = 0.1  # how far from each other vertex a search near one begins
 _ROUNDING = 1e-6  # the same in barycentric units
 
 
@@ -48,7 +50,7 @@ def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start, 
     Returns:
         How many targets are done, and how many starts were found.
     """
-    guess, adjugate = np.empty(3), np.empty((3, 3))
+    guess, adjugate, side = np.empty(3), np.empty((3, 3)), np.empty(MOST_STARTS)
     gamma, tip, slope, corner = mesh.gamma, mesh.tip, mesh.slope, mesh.corner
     planes, item = tree.planes, tree.item
     found = 0
@@ -63,24 +65,63 @@ def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start, 
             if found - first < MOST_STARTS and may_meet(planes, k, p, (0.0, 0.0, 0.0)):
                 c = k // 6
                 v = tetrahedron(corner, c, k % 6)
-                weights = _linear_weights(tip, v, p)
                 remainder = mesh.remainder[c]
-                reached, weights, det = _refine(
-                    gamma, tip, slope, v, weights, p, remainder, guess, adjugate
-                )
-                if reached and with_root and mesh.even[c]:
-                    reached = _is_inside(gamma, v, weights, adjugate, det, _MARGIN * remainder)
-                if (reached or not with_root) and _is_new(
-                    gamma, corner, c, guess, start, first, found
-                ):
-                    scale = 1.0 / det if det != 0.0 else 0.0
-                    for axis in range(3):
-                        start[found, axis] = min(max(guess[axis], low[axis]), high[axis])
-                        for j in range(3):
-                            inverse[found, axis, j] = scale * adjugate[j, axis]
-                    target[found], cell[found] = t, c
-                    found += 1
+                most, least, even = _determinants(slope, v)
+                for attempt in range(1 if even else 3):
+                    if attempt == 0:
+                        weights = _linear_weights(tip, v, p)
+                    else:
+                        weights = _near_vertex(most if attempt == 1 else least)
+                    reached, weights, det = _refine(
+                        gamma, tip, slope, v, weights, p, remainder, guess, adjugate
+                    )
+                    if reached and with_root and even:
+                        reached = _is_inside(gamma, v, weights, adjugate, det, _MARGIN * remainder)
+                    if (
+                        (reached or not with_root)
+                        and found - first < MOST_STARTS
+                        and _is_new(gamma, corner, c, guess, det, start, side, first, found)
+                    ):
+                        scale = 1.0 / det if det != 0.0 else 0.0
+                        for axis in range(3):
+                            start[found, axis] = min(max(guess[axis], low[axis]), high[axis])
+                            for j in range(3):
+                                inverse[found, axis, j] = scale * adjugate[j, axis]
+                        target[found], cell[found], side[found - first] = t, c, det
+                        found += 1
     return targets.shape[0], found
+
+
+@inline
+def _determinants(slope, v):
+    """The vertices of the largest and least det J, and whether the tetrahedron does not fold."""
+    most, least = 0, 0
+    high = low = _determinant(slope, v[0])
+    for i in range(1, 4):
+        det = _determinant(slope, v[i])
+        if det > high:
+            most, high = i, det
+        if det < low:
+            least, low = i, det
+    return most, least, low > _EVEN * high or high < _EVEN * low
+
+
+@inline
+def _determinant(slope, i):
+    a = matrix(slope, i)
+    return dot(a[0], cross(a[1], a[2]))
+
+
+@inline
+def _near_vertex(i):
+    """Barycentric coordinates of a place near a vertex."""
+    near, far = 1.0 - 3.0 * _ASIDE, _ASIDE
+    return (
+        near if i == 0 else far,
+        near if i == 1 else far,
+        near if i == 2 else far,
+        near if i == 3 else far,
+    )
 
 
 @inline
@@ -218,14 +259,14 @@ def _along_edge(gamma, a, b, u):
 
 
 @inline
-def _is_new(gamma, corner, c, guess, start, begin, end):
-    """Whether no start of the target is so near that it leads to the same solution."""
+def _is_new(gamma, corner, c, guess, det, start, side, begin, end):
+    """Whether no start of the target is so near, on one side of a fold, that both lead to one."""
     first, last = corner[c, 0], corner[c, 7]
     for i in range(begin, end):
         apart = 0.0
         for k in range(3):
             width = gamma[last, k] - gamma[first, k]
             apart = max(apart, abs(start[i, k] - guess[k]) / width)
-        if apart < _DISTINCT:
+        if apart < _DISTINCT and det * side[i - begin] > 0.0:
             return False
     return True
