@@ -46,8 +46,11 @@ _BLOCK = 1024
 _PLACES = 32  # along each axis, when targets are put in order
 _MOST_ITERATIONS = 40
 _CHORD_STEPS = 2  # with the inverse that a start knows, before Newton's method
+_STEEP = 1000.0  # change of activation per change of place in L beyond which they are not taken
 _LONGEST_CHORD = 0.003  # in ranges of the bounds
 _MUCH_NEARER = 0.1  # part of the distance to the target that a step may leave
+_OVERSHOOTS = 2.8, 5.0, 16.0  # the larger ones where the curvature is far from what the cell says
+_OUTSIDE = 0.02  # how far outside the bounds that search may begin, in ranges
 _PARTNER_RANGE = 1.5  # widths of a cell within which a fold's other root is looked for
 
 
@@ -128,8 +131,12 @@ def _starts(
         partial(fill, part, block.start, block.stop)
         for part, block in zip(parts, blocks, strict=True)
     )
-    pieces = [_Starts.empty(0), *(piece for part in parts for piece in part)]
-    starts = _Starts(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))
+    return _joined([_Starts.empty(0), *(piece for part in parts for piece in part)])
+
+
+def _joined(parts: list[_Starts]) -> _Starts:
+    """All of them, sorted by target."""
+    starts = _Starts(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     return starts.where(np.argsort(starts.target, kind="stable"))
 
 
@@ -191,7 +198,8 @@ def _improved(rod: TipMap, goal: Array, starts: _Starts) -> Array:
     gamma = starts.gamma.copy()
     if rod.supports_unstable:
         return gamma
-    row = np.flatnonzero(starts.inverse.any(axis=(1, 2)))
+    steepest = np.abs(starts.inverse).max(axis=(1, 2)) * rod.length
+    row = np.flatnonzero((steepest > 0) & (steepest < _STEEP))
     miss = goal[row] - rod.tips(gamma[row])
     for steps_left in reversed(range(_CHORD_STEPS)):
         step = np.einsum("nij,nj->ni", starts.inverse[row], miss)
@@ -242,24 +250,28 @@ def _with_partners(prepared: PreparedMap, request: Request, roots: Roots) -> Roo
 
 
 def _partner_starts(prepared: PreparedMap, roots: Roots) -> _Starts:
-    """Near the second preimage of every root that has a fold near."""
+    """Near the second preimage of every root that has a fold near, once for each overshoot."""
     roots = roots.where(roots.cell >= 0)
-    box, smallest = prepared.rod.box, smallest_singular_values(roots.slope)
-    start, near = np.empty_like(roots.gamma), np.zeros(len(roots.target), bool)
-    folds.second_preimages(
-        prepared.mesh,
-        roots.cell,
-        roots.gamma,
-        roots.slope,
-        smallest,
-        _PARTNER_RANGE,
-        box.low.copy(),
-        box.high.copy(),
-        start,
-        near,
-    )
-    unknown = np.zeros((int(near.sum()), 3, 3))
-    return _Starts(roots.target[near], roots.cell[near], start[near], unknown)
+    box, parts = prepared.rod.box, [_Starts.empty(0)]
+    margin = _OUTSIDE * box.widths  # a start moved to the bounds may be short of the other root
+    for overshoot in _OVERSHOOTS:
+        start, near = np.empty_like(roots.gamma), np.zeros(len(roots.target), bool)
+        folds.second_preimages(
+            prepared.mesh,
+            roots.cell,
+            roots.gamma,
+            roots.slope,
+            smallest_singular_values(roots.slope),
+            _PARTNER_RANGE,
+            overshoot,
+            box.low - margin,
+            box.high + margin,
+            start,
+            near,
+        )
+        roots, unknown = roots.where(near), np.zeros((int(near.sum()), 3, 3))
+        parts.append(_Starts(roots.target, roots.cell, start[near], unknown))
+    return _joined(parts)
 
 
 def distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:

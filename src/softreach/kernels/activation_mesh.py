@@ -81,7 +81,10 @@ def interpolation_errors(gamma, tip, slope, corner, error, remainder):
 
 @kernel
 def face_planes(mesh, rounding, planes):
-    """Planes round the inflated images: n·p >= d for unit normals n, shape (6 cells, 4, 4)."""
+    """Planes round the inflated images: n·p >= d for unit normals n, shape (6 cells, 4, 4).
+
+    Those of the largest faces come first: an image is thinnest across them, so they miss most.
+    """
     for c in range(mesh.corner.shape[0]):
         for which in range(6):
             v = tetrahedron(mesh.corner, c, which)
@@ -92,11 +95,22 @@ def face_planes(mesh, rounding, planes):
                 size = math.sqrt(dot(n, n))
                 scale = 1.0 / size if size > 0 else 0.0
                 offset = -det if i == 0 else 0.0
+                place = _larger_faces(normals, i)
                 for k in range(3):
-                    planes[6 * c + which, i, k] = scale * n[k]
+                    planes[6 * c + which, place, k] = scale * n[k]
                 unit = times(scale, n)
                 error = _bulge(bends, unit, i, scale * det) + mesh.remainder[c] + rounding
-                planes[6 * c + which, i, 3] = dot(base, unit) + scale * offset - error
+                planes[6 * c + which, place, 3] = dot(base, unit) + scale * offset - error
+
+
+@inline
+def _larger_faces(normals, i):
+    """How many faces are larger than face i, or as large and before it."""
+    size, larger = dot(normals[i], normals[i]), 0
+    for j in range(4):
+        other = dot(normals[j], normals[j])
+        larger += int(other > size or (other == size and j < i))
+    return larger
 
 
 @inline

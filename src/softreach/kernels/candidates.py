@@ -25,6 +25,7 @@ _ITERATIONS = 6
 _OUTSIDE = 0.5  # how far outside a tetrahedron its quadratic is followed, in barycentric units
 _CONVERGED, _ACCEPTED = 0.25, 2.0  # residuals at which to end and to keep, in remainders
 _MARGIN = 2.0  # remainders by which a target may lie outside the image of a tetrahedron
+_MANY = 32  # starts after which a tetrahedron is searched once only
 _EVEN = 0.3  # ratio of det J at its vertices above which a tetrahedron does not fold
 _ASIDE = 0.1  # how far from each other vertex a search near one begins
 _ROUNDING = 1e-6  # the same in barycentric units
@@ -67,7 +68,7 @@ def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start, 
                 v = tetrahedron(corner, c, k % 6)
                 remainder = mesh.remainder[c]
                 most, least, even = _determinants(slope, v)
-                for attempt in range(1 if even else 3):
+                for attempt in range(1 if even or found - first >= _MANY else 3):
                     if attempt == 0:
                         weights = _linear_weights(tip, v, p)
                     else:
