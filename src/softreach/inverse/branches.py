@@ -2,13 +2,13 @@
 
 1. The activation box is cut into cells of six tetrahedra each; tips and Jacobians are computed at
    their corners, once for an arm (`cells`).
-2. A tetrahedron is mapped linearly by its corners. Its true image lies within an interpolation
-   error of the linear one, estimated from how the Jacobian changes along the edges: theory (38),
-   `kernels.activation_mesh`. So every root lies in a tetrahedron whose linear image, inflated by
-   its error, contains the target.
+2. A tetrahedron is mapped by the quadratic through tips and Jacobians of its corners, whose image
+   lies within planes; the true image lies within a remainder of it, estimated from the tips and
+   Jacobians along the edges: `kernels.activation_mesh`. So every root lies in a tetrahedron whose
+   planes, moved out by the remainder, contain the target.
 3. An octree over space lists the inflated images that may cover a place (`image_tree`).
 4. In each tetrahedron listed at the target, the quadratic through tips and Jacobians says whether
-   and where it is reached: a start (`kernels.candidates`).
+   and where it is reached: a start (`kernels.candidates`). Tips alone improve it.
 5. Damped Newton with the exact Jacobian leads from each start to a root (`kernels.newton`).
 6. A tetrahedron that folds within itself holds two roots and gave one start: the other root lies
    opposite, along the null direction of the Jacobian (`kernels.folds`), and is searched as well.
@@ -74,7 +74,23 @@ class _Starts(NamedTuple):
 
     def where(self, chosen: slice | Index) -> _Starts:
         """Some of them, copied."""
-        return _Starts(*(column[chosen].copy() for column in self))
+        return _Starts(
+            self.target[chosen].copy(),
+            self.cell[chosen].copy(),
+            self.gamma[chosen].copy(),
+            self.inverse[chosen].copy(),
+        )
+
+    @staticmethod
+    def joined(parts: list[_Starts]) -> _Starts:
+        """All of them, sorted by target."""
+        starts = _Starts(
+            np.concatenate([part.target for part in parts]),
+            np.concatenate([part.cell for part in parts]),
+            np.concatenate([part.gamma for part in parts]),
+            np.concatenate([part.inverse for part in parts]),
+        )
+        return starts.where(np.argsort(starts.target, kind="stable"))
 
 
 def every_branch(prepared: PreparedMap, request: Request) -> Roots:
@@ -131,13 +147,7 @@ def _starts(
         partial(fill, part, block.start, block.stop)
         for part, block in zip(parts, blocks, strict=True)
     )
-    return _joined([_Starts.empty(0), *(piece for part in parts for piece in part)])
-
-
-def _joined(parts: list[_Starts]) -> _Starts:
-    """All of them, sorted by target."""
-    starts = _Starts(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
-    return starts.where(np.argsort(starts.target, kind="stable"))
+    return _Starts.joined([_Starts.empty(0), *(piece for part in parts for piece in part)])
 
 
 def _spatial_order(points: Array) -> Index:
@@ -256,22 +266,14 @@ def _partner_starts(prepared: PreparedMap, roots: Roots) -> _Starts:
     margin = _OUTSIDE * box.widths  # a start moved to the bounds may be short of the other root
     for overshoot in _OVERSHOOTS:
         start, near = np.empty_like(roots.gamma), np.zeros(len(roots.target), bool)
+        known = roots.cell, roots.gamma, roots.slope, smallest_singular_values(roots.slope)
+        bounds = box.low - margin, box.high + margin
         folds.second_preimages(
-            prepared.mesh,
-            roots.cell,
-            roots.gamma,
-            roots.slope,
-            smallest_singular_values(roots.slope),
-            _PARTNER_RANGE,
-            overshoot,
-            box.low - margin,
-            box.high + margin,
-            start,
-            near,
+            prepared.mesh, *known, _PARTNER_RANGE, overshoot, *bounds, start, near
         )
         roots, unknown = roots.where(near), np.zeros((int(near.sum()), 3, 3))
         parts.append(_Starts(roots.target, roots.cell, start[near], unknown))
-    return _joined(parts)
+    return _Starts.joined(parts)
 
 
 def distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:

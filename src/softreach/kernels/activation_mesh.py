@@ -64,8 +64,9 @@ def interpolation_errors(gamma, tip, slope, corner, error, remainder):
     f'' changes across one cell by more than its own size, as at an inflection of x³, where ΔJ = 0.
     `design/inverse.md` has what was measured on arms.
 
-    The quadratic Σ λi (fi + ½ Ji (x - xi)) is off by Σ λi f'''[di, di, di]/12, di = xi - x, for cubics.
-    Along an edge, what the trapezoidal rule leaves, |Δf - ½ (Ja + Jb) e|, is |f'''[e, e, e]|/12.
+    Of cubics the quadratic Σ λi (fi + ½ Ji (x - xi)) is off by Σ λi f'''[di, di, di]/12 with
+    di = xi - x; what the trapezoidal rule leaves of an edge, |Δf - ½ (Ja + Jb) e|, is
+    |f'''[e, e, e]|/12.
     """
     for c in range(corner.shape[0]):
         worst, rest = 0.0, 0.0
@@ -164,7 +165,12 @@ def _second_difference(gamma, slope, i, j):
 @inline
 def _cubic_difference(gamma, tip, slope, i, j):
     """-f'''[e, e, e]/12 ≈ Δf - ½ (Ji + Jj) e along the edge e from vertex i to vertex j."""
-    e, d, at_i, at_j = difference(gamma, j, i), difference(tip, j, i), matrix(slope, i), matrix(slope, j)
+    e, d, at_i, at_j = (
+        difference(gamma, j, i),
+        difference(tip, j, i),
+        matrix(slope, i),
+        matrix(slope, j),
+    )
     return (
         d[0] - 0.5 * (dot(at_i[0], e) + dot(at_j[0], e)),
         d[1] - 0.5 * (dot(at_i[1], e) + dot(at_j[1], e)),

@@ -2,8 +2,8 @@
 
 A target's solutions lie in tetrahedra whose linear image, inflated by its interpolation error,
 contains it. In each of them the quadratic through tips and Jacobians says whether and where, up to
-its remainder. Where the map does not fold, a root of the quadratic that lies outside its tetrahedron
-is left to the neighbor's.
+its remainder. Where the map does not fold, a root of the quadratic that lies outside its
+tetrahedron is left to the neighbor's; where it may, one is searched on either side of the fold.
 """
 
 from __future__ import annotations
@@ -52,8 +52,7 @@ def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start, 
         How many targets are done, and how many starts were found.
     """
     guess, adjugate, side = np.empty(3), np.empty((3, 3)), np.empty(MOST_STARTS)
-    gamma, tip, slope, corner = mesh.gamma, mesh.tip, mesh.slope, mesh.corner
-    planes, item = tree.planes, tree.item
+    gamma, corner, planes, item = mesh.gamma, mesh.corner, tree.planes, tree.item
     found = 0
     for t in range(targets.shape[0]):
         if found + MOST_STARTS > start.shape[0]:
@@ -63,34 +62,51 @@ def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start, 
         begin, end = leaf_at(tree.low, tree.size, tree.child, tree.first, tree.length, p)
         for entry in range(begin, end):
             k = item[entry]
-            if found - first < MOST_STARTS and may_meet(planes, k, p, (0.0, 0.0, 0.0)):
-                c = k // 6
-                v = tetrahedron(corner, c, k % 6)
-                remainder = mesh.remainder[c]
-                most, least, even = _determinants(slope, v)
-                for attempt in range(1 if even or found - first >= _MANY else 3):
-                    if attempt == 0:
-                        weights = _linear_weights(tip, v, p)
-                    else:
-                        weights = _near_vertex(most if attempt == 1 else least)
-                    reached, weights, det = _refine(
-                        gamma, tip, slope, v, weights, p, remainder, guess, adjugate
-                    )
-                    if reached and with_root and even:
-                        reached = _is_inside(gamma, v, weights, adjugate, det, _MARGIN * remainder)
-                    if (
-                        (reached or not with_root)
-                        and found - first < MOST_STARTS
-                        and _is_new(gamma, corner, c, guess, det, start, side, first, found)
-                    ):
-                        scale = 1.0 / det if det != 0.0 else 0.0
-                        for axis in range(3):
-                            start[found, axis] = min(max(guess[axis], low[axis]), high[axis])
-                            for j in range(3):
-                                inverse[found, axis, j] = scale * adjugate[j, axis]
-                        target[found], cell[found], side[found - first] = t, c, det
-                        found += 1
+            if not may_meet(planes, k, p, (0.0, 0.0, 0.0)):
+                continue
+            c, v = k // 6, tetrahedron(corner, k // 6, k % 6)
+            most, least, even = _determinants(mesh.slope, v)
+            for attempt in range(_attempts(even, found - first)):
+                near = (-1, most, least)[attempt]
+                reached, det = _search(mesh, c, v, near, p, even, guess, adjugate)
+                if (reached or not with_root) and _is_new(
+                    gamma, corner, c, guess, det, start, side, first, found
+                ):
+                    _put(guess, adjugate, det, low, high, found, start, inverse)
+                    target[found], cell[found], side[found - first] = t, c, det
+                    found += 1
     return targets.shape[0], found
+
+
+@inline
+def _attempts(even, found):
+    """How many searches to begin in a tetrahedron: one, or also on either side of a fold."""
+    if found >= MOST_STARTS:
+        return 0
+    return 1 if even or found >= _MANY else 3
+
+
+@inline
+def _search(mesh, c, v, near, p, even, guess, adjugate):
+    """Whether a search from near a vertex, or from the linear root, reaches p, and its det J."""
+    remainder = mesh.remainder[c]
+    weights = _linear_weights(mesh.tip, v, p) if near < 0 else _near_vertex(near)
+    reached, weights, det = _refine(
+        mesh.gamma, mesh.tip, mesh.slope, v, weights, p, remainder, guess, adjugate
+    )
+    if reached and even:
+        reached = _is_inside(mesh.gamma, v, weights, adjugate, det, _MARGIN * remainder)
+    return reached, det
+
+
+@inline
+def _put(guess, adjugate, det, low, high, n, start, inverse):
+    """Write start n."""
+    scale = 1.0 / det if det != 0.0 else 0.0
+    for i in range(3):
+        start[n, i] = min(max(guess[i], low[i]), high[i])
+        for j in range(3):
+            inverse[n, i, j] = scale * adjugate[j, i]
 
 
 @inline
