@@ -66,10 +66,11 @@ def mesh_of(f: Quadratic, cells: int) -> ActivationMesh:
     least = np.stack(np.meshgrid(*[np.arange(cells)] * 3, indexing="ij"), -1).reshape(-1, 1, 3)
     corner = (least + corner_bits(3)) @ np.array([(cells + 1) ** 2, cells + 1, 1])
     slope = f.slopes(gamma)
-    error = np.empty(len(corner))
-    interpolation_errors(gamma, slope, corner, error)
+    tip, error, remainder = f.values(gamma), np.empty(len(corner)), np.empty(len(corner))
+    interpolation_errors(gamma, tip, slope, corner, error, remainder)
     change = np.abs(slope[corner] - slope[corner[:, :1]]).sum(axis=(1, 2, 3))
-    return ActivationMesh(gamma, f.values(gamma), slope, corner, error + ROUNDING, change)
+    error += ROUNDING
+    return ActivationMesh(gamma, tip, slope, corner, error, remainder, change)
 
 
 def sampled(

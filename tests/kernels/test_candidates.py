@@ -22,7 +22,10 @@ def starts_of(f: Quadratic, targets: np.ndarray, cells: int, with_root: bool = T
     tree = image_tree(mesh)
     room = MOST_STARTS * (1 + len(targets))
     target, cell, start = np.empty(room, int), np.empty(room, int), np.empty((room, 3))
-    done, found = find_starts(mesh, tree, targets, LOW, HIGH, with_root, target, cell, start)
+    inverse = np.empty((room, 3, 3))
+    done, found = find_starts(
+        mesh, tree, targets, LOW, HIGH, with_root, target, cell, start, inverse
+    )
     assert done == len(targets)
     return target[:found], start[:found]
 

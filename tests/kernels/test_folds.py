@@ -11,6 +11,7 @@ from softreach.kernels import folds
 from tests.kernels.maps import mesh_of, random_fold
 
 FAR = np.full(3, 100.0)
+OVERSHOOT = 2.8
 
 
 def second_preimages(mesh, f, gamma, reach, low=-FAR, high=FAR):
@@ -18,7 +19,10 @@ def second_preimages(mesh, f, gamma, reach, low=-FAR, high=FAR):
     smallest = np.linalg.svd(slope, compute_uv=False)[:, 2]
     start, near = np.full_like(gamma, np.nan), np.zeros(len(gamma), bool)
     cell = np.zeros(len(gamma), np.int64)
-    folds.second_preimages(mesh, cell, gamma, slope, smallest, reach, low, high, start, near)
+    bounds = low, high
+    folds.second_preimages(
+        mesh, cell, gamma, slope, smallest, reach, OVERSHOOT, *bounds, start, near
+    )
     return start, near
 
 
@@ -31,7 +35,7 @@ def test_on_a_fold_the_start_lies_beyond_the_mirror_image_by_the_overshoot(seed,
     gamma = y @ fold.r
     start, near = second_preimages(mesh_of(f, 1), f, gamma, reach=10.0)
     assert near.all()
-    share = 0.5 * folds._OVERSHOOT
+    share = 0.5 * OVERSHOOT
     assert start == pytest.approx(gamma + share * (fold.mirrored(gamma) - gamma), abs=1e-9)
 
 

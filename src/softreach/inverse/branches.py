@@ -2,13 +2,13 @@
 
 1. The activation box is cut into cells of six tetrahedra each; tips and Jacobians are computed at
    their corners, once for an arm (`cells`).
-2. A tetrahedron is mapped linearly by its corners. Its true image lies within an interpolation
-   error of the linear one, estimated from how the Jacobian changes along the edges: theory (38),
-   `kernels.activation_mesh`. So every root lies in a tetrahedron whose linear image, inflated by
-   its error, contains the target.
+2. A tetrahedron is mapped by the quadratic through tips and Jacobians of its corners, whose image
+   lies within planes; the true image lies within a remainder of it, estimated from the tips and
+   Jacobians along the edges: `kernels.activation_mesh`. So every root lies in a tetrahedron whose
+   planes, moved out by the remainder, contain the target.
 3. An octree over space lists the inflated images that may cover a place (`image_tree`).
 4. In each tetrahedron listed at the target, the quadratic through tips and Jacobians says whether
-   and where it is reached: a start (`kernels.candidates`).
+   and where it is reached: a start (`kernels.candidates`). Tips alone improve it.
 5. Damped Newton with the exact Jacobian leads from each start to a root (`kernels.newton`).
 6. A tetrahedron that folds within itself holds two roots and gave one start: the other root lies
    opposite, along the null direction of the Jacobian (`kernels.folds`), and is searched as well.
@@ -34,6 +34,7 @@ from softreach.inverse.request import Request
 from softreach.inverse.roots import Roots, no_roots, placed, roots_at, smallest_singular_values
 from softreach.kernels import candidates, folds, newton
 from softreach.kernels.newton import CONVERGED, RUNNING, STAGNATED, Search
+from softreach.rod.tip_map import TipMap
 
 __all__ = ["distinct", "every_branch"]
 
@@ -42,7 +43,14 @@ Index = NDArray[np.int64]
 
 _ROUNDING = 1e-13  # of a tip, in L, with room to spare
 _BLOCK = 1024
+_PLACES = 32  # along each axis, when targets are put in order
 _MOST_ITERATIONS = 40
+_CHORD_STEPS = 2  # with the inverse that a start knows, before Newton's method
+_STEEP = 1000.0  # change of activation per change of place in L beyond which they are not taken
+_LONGEST_CHORD = 0.003  # in ranges of the bounds
+_MUCH_NEARER = 0.1  # part of the distance to the target that a step may leave
+_OVERSHOOTS = 2.8, 5.0, 16.0  # the larger ones where the curvature is far from what the cell says
+_OUTSIDE = 0.02  # how far outside the bounds that search may begin, in ranges
 _PARTNER_RANGE = 1.5  # widths of a cell within which a fold's other root is looked for
 
 
@@ -55,6 +63,34 @@ class _Starts(NamedTuple):
     """Cell of the mesh, shape (n,)."""
     gamma: Array
     """Activation [-], shape (n, 3)."""
+    inverse: Array
+    """Inverse of the Jacobian there [1/m], roughly; 0 if not known, shape (n, 3, 3)."""
+
+    @staticmethod
+    def empty(room: int) -> _Starts:
+        """Space for so many."""
+        target, cell = np.empty(room, np.int64), np.empty(room, np.int64)
+        return _Starts(target, cell, np.empty((room, 3)), np.empty((room, 3, 3)))
+
+    def where(self, chosen: slice | Index) -> _Starts:
+        """Some of them, copied."""
+        return _Starts(
+            self.target[chosen].copy(),
+            self.cell[chosen].copy(),
+            self.gamma[chosen].copy(),
+            self.inverse[chosen].copy(),
+        )
+
+    @staticmethod
+    def joined(parts: list[_Starts]) -> _Starts:
+        """All of them, sorted by target."""
+        starts = _Starts(
+            np.concatenate([part.target for part in parts]),
+            np.concatenate([part.cell for part in parts]),
+            np.concatenate([part.gamma for part in parts]),
+            np.concatenate([part.inverse for part in parts]),
+        )
+        return starts.where(np.argsort(starts.target, kind="stable"))
 
 
 def every_branch(prepared: PreparedMap, request: Request) -> Roots:
@@ -89,21 +125,21 @@ def _starts(
         rows: Numbers of the targets.
         with_root: Whether to leave out tetrahedra whose quadratic does not reach the target.
     """
+    rows = rows[_spatial_order(request.targets[rows])]
     box, targets = prepared.rod.box, request.targets[rows]
     if not len(prepared.mesh.corner):
-        return _Starts(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 3)))
+        return _Starts.empty(0)
     blocks = list(parallel.blocks(len(targets), _BLOCK))
     parts: list[list[_Starts]] = [[] for _ in blocks]
 
     def fill(part: list[_Starts], first: int, last: int) -> None:
-        room = candidates.MOST_STARTS + 4 * _BLOCK
-        out = _Starts(np.empty(room, np.int64), np.empty(room, np.int64), np.empty((room, 3)))
+        out = _Starts.empty(candidates.MOST_STARTS + 4 * _BLOCK)
         while first < last:
             done, n = candidates.find_starts(
                 prepared.mesh, prepared.tree, targets[first:last], low, high, with_root, *out
             )
-            target = rows[out.target[:n] + first]
-            part.append(_Starts(target, out.cell[:n].copy(), out.gamma[:n].copy()))
+            found = out.where(slice(n))
+            part.append(found._replace(target=rows[found.target + first]))
             first += done
 
     low, high = box.low.copy(), box.high.copy()
@@ -111,9 +147,17 @@ def _starts(
         partial(fill, part, block.start, block.stop)
         for part, block in zip(parts, blocks, strict=True)
     )
-    none = _Starts(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 3)))
-    pieces = [none, *(piece for part in parts for piece in part)]
-    return _Starts(*(np.concatenate(columns) for columns in zip(*pieces, strict=True)))
+    return _Starts.joined([_Starts.empty(0), *(piece for part in parts for piece in part)])
+
+
+def _spatial_order(points: Array) -> Index:
+    """An order in which points (n, 3) that follow each other share most of their candidates."""
+    if len(points) < 2:
+        return np.arange(len(points))
+    low, high = points.min(axis=0), points.max(axis=0)
+    place = ((points - low) * (_PLACES / np.maximum(high - low, 1e-300))).astype(np.int64)
+    place = np.minimum(place, _PLACES - 1)
+    return np.argsort(place @ np.array([_PLACES**2, _PLACES, 1]), kind="stable")
 
 
 def _with_torn(prepared: PreparedMap, request: Request, starts: _Starts) -> _Starts:
@@ -122,15 +166,16 @@ def _with_torn(prepared: PreparedMap, request: Request, starts: _Starts) -> _Sta
     target = np.concatenate([starts.target, target])
     cell = np.concatenate([starts.cell, np.full(len(target) - len(starts.cell), -1)])
     gamma = np.concatenate([starts.gamma, gamma])
+    inverse = np.concatenate([starts.inverse, np.zeros((len(target) - len(starts.cell), 3, 3))])
     order = np.argsort(target, kind="stable")
-    return _Starts(target[order], cell[order], gamma[order])
+    return _Starts(target, cell, gamma, inverse).where(order)
 
 
 def _newton(prepared: PreparedMap, request: Request, starts: _Starts) -> Roots:
     """Step 5: damped Newton from every start; the roots that are within the bounds."""
     rod, goal = prepared.branch_map, request.targets[starts.target]
     low, high = rod.box.low.copy(), rod.box.high.copy()
-    search = _search(goal, starts.gamma)
+    search = _search(goal, _improved(rod, goal, starts))
     for _ in range(_MOST_ITERATIONS):
         active = np.flatnonzero(search.state == RUNNING)
         if not len(active):
@@ -153,6 +198,32 @@ def _newton(prepared: PreparedMap, request: Request, starts: _Starts) -> Roots:
         stable,
     )
     return roots.where(residual <= request.residual)
+
+
+def _improved(rod: TipMap, goal: Array, starts: _Starts) -> Array:
+    """The starts after steps with the inverse known there: tips cost a fraction of Jacobians.
+
+    A step that does not bring the tip much nearer to its target is not taken.
+    """
+    gamma = starts.gamma.copy()
+    if rod.supports_unstable:
+        return gamma
+    steepest = np.abs(starts.inverse).max(axis=(1, 2)) * rod.length
+    row = np.flatnonzero((steepest > 0) & (steepest < _STEEP))
+    miss = goal[row] - rod.tips(gamma[row])
+    for steps_left in reversed(range(_CHORD_STEPS)):
+        step = np.einsum("nij,nj->ni", starts.inverse[row], miss)
+        short = (np.abs(step) <= _LONGEST_CHORD * rod.box.widths).all(axis=1)
+        row, step, miss = row[short], step[short], miss[short]
+        trial = gamma[row] + step
+        if not steps_left:  # Newton's method looks at the last one
+            gamma[row] = trial
+            break
+        next_miss = goal[row] - rod.tips(trial)
+        nearer = (next_miss**2).sum(axis=1) <= _MUCH_NEARER**2 * (miss**2).sum(axis=1)
+        row, miss = row[nearer], next_miss[nearer]
+        gamma[row] = trial[nearer]
+    return gamma
 
 
 def _give_up(search: Search, active: Index) -> None:
@@ -189,23 +260,20 @@ def _with_partners(prepared: PreparedMap, request: Request, roots: Roots) -> Roo
 
 
 def _partner_starts(prepared: PreparedMap, roots: Roots) -> _Starts:
-    """Near the second preimage of every root that has a fold near."""
+    """Near the second preimage of every root that has a fold near, once for each overshoot."""
     roots = roots.where(roots.cell >= 0)
-    box, smallest = prepared.rod.box, smallest_singular_values(roots.slope)
-    start, near = np.empty_like(roots.gamma), np.zeros(len(roots.target), bool)
-    folds.second_preimages(
-        prepared.mesh,
-        roots.cell,
-        roots.gamma,
-        roots.slope,
-        smallest,
-        _PARTNER_RANGE,
-        box.low.copy(),
-        box.high.copy(),
-        start,
-        near,
-    )
-    return _Starts(roots.target[near], roots.cell[near], start[near])
+    box, parts = prepared.rod.box, [_Starts.empty(0)]
+    margin = _OUTSIDE * box.widths  # a start moved to the bounds may be short of the other root
+    for overshoot in _OVERSHOOTS:
+        start, near = np.empty_like(roots.gamma), np.zeros(len(roots.target), bool)
+        known = roots.cell, roots.gamma, roots.slope, smallest_singular_values(roots.slope)
+        bounds = box.low - margin, box.high + margin
+        folds.second_preimages(
+            prepared.mesh, *known, _PARTNER_RANGE, overshoot, *bounds, start, near
+        )
+        roots, unknown = roots.where(near), np.zeros((int(near.sum()), 3, 3))
+        parts.append(_Starts(roots.target, roots.cell, start[near], unknown))
+    return _Starts.joined(parts)
 
 
 def distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:

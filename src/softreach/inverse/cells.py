@@ -104,11 +104,12 @@ def _torn(lattice: _Lattice, corner: Index, cells: int) -> TornCells:
 
 
 def _mesh(lattice: _Lattice, corner: Index) -> ActivationMesh:
-    error = np.empty(len(corner))
-    interpolation_errors(lattice.gamma, lattice.slope, corner, error)
+    error, remainder = np.empty(len(corner)), np.empty(len(corner))
+    interpolation_errors(lattice.gamma, lattice.tip, lattice.slope, corner, error, remainder)
     error += 1e-9 * lattice.rod.length  # rounding must not put a target between two tetrahedra
     change = np.sqrt(((lattice.slope[corner[:, 7]] - lattice.slope[corner[:, 0]]) ** 2).sum((1, 2)))
     for bit in (1, 2, 4):
         step = lattice.slope[corner[:, bit]] - lattice.slope[corner[:, 0]]
         change += np.sqrt((step**2).sum((1, 2)))
-    return ActivationMesh(lattice.gamma, lattice.tip, lattice.slope, corner, error, change)
+    vertices = lattice.gamma, lattice.tip, lattice.slope
+    return ActivationMesh(*vertices, corner, error, remainder, change)

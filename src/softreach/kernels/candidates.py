@@ -1,7 +1,9 @@
 """Starting points of Newton's method: tetrahedra of the activation box that map onto a target.
 
 A target's solutions lie in tetrahedra whose linear image, inflated by its interpolation error,
-contains it. In each of them the quadratic through tips and Jacobians says whether and where.
+contains it. In each of them the quadratic through tips and Jacobians says whether and where, up to
+its remainder. Where the map does not fold, a root of the quadratic that lies outside its
+tetrahedron is left to the neighbor's; where it may, one is searched on either side of the fold.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ import numpy as np
 from softreach.kernels.activation_mesh import image_faces, tetrahedron
 from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.space_tree import leaf_at, may_meet
-from softreach.kernels.vector import cofactors, combination, dot, minus, row
+from softreach.kernels.vector import cofactors, combination, cross, dot, matrix, minus, row
 
 __all__ = ["MOST_STARTS", "find_starts"]
 
@@ -21,11 +23,16 @@ MOST_STARTS = 1024
 _DISTINCT = 0.1  # starts nearer than this, in widths of their cells, lead to one solution
 _ITERATIONS = 6
 _OUTSIDE = 0.5  # how far outside a tetrahedron its quadratic is followed, in barycentric units
-_CONVERGED, _ACCEPTED = 0.01, 0.4  # residuals at which to end and to keep, in interpolation errors
+_CONVERGED, _ACCEPTED = 0.25, 2.0  # residuals at which to end and to keep, in remainders
+_MARGIN = 2.0  # remainders by which a target may lie outside the image of a tetrahedron
+_MANY = 32  # starts after which a tetrahedron is searched once only
+_EVEN = 0.3  # ratio of det J at its vertices above which a tetrahedron does not fold
+_ASIDE = 0.1  # how far from each other vertex a search near one begins
+_ROUNDING = 1e-6  # the same in barycentric units
 
 
 @kernel
-def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start):
+def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start, inverse):
     """Activations near each solution of the targets, until the arrays are full.
 
     Args:
@@ -38,13 +45,14 @@ def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start):
         target: Filled with the number of each start's target.
         cell: Filled with its cell.
         start: Filled with the activation, shape (room, 3).
+        inverse: Filled with the inverse of the quadratic's Jacobian near it [1/m], zero where it is
+            singular, shape (room, 3, 3).
 
     Returns:
         How many targets are done, and how many starts were found.
     """
-    guess = np.empty(3)
-    gamma, tip, slope, corner = mesh.gamma, mesh.tip, mesh.slope, mesh.corner
-    planes, item = tree.planes, tree.item
+    guess, adjugate, side = np.empty(3), np.empty((3, 3)), np.empty(MOST_STARTS)
+    gamma, corner, planes, item = mesh.gamma, mesh.corner, tree.planes, tree.item
     found = 0
     for t in range(targets.shape[0]):
         if found + MOST_STARTS > start.shape[0]:
@@ -54,21 +62,83 @@ def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start):
         begin, end = leaf_at(tree.low, tree.size, tree.child, tree.first, tree.length, p)
         for entry in range(begin, end):
             k = item[entry]
-            if found - first < MOST_STARTS and may_meet(planes, k, p, (0.0, 0.0, 0.0)):
-                c = k // 6
-                v = tetrahedron(corner, c, k % 6)
-                weights = _linear_weights(tip, v, p)
-                reached = _refine(
-                    gamma, tip, slope, v, weights, p, mesh.interpolation_error[c], guess
-                )
+            if not may_meet(planes, k, p, (0.0, 0.0, 0.0)):
+                continue
+            c, v = k // 6, tetrahedron(corner, k // 6, k % 6)
+            most, least, even = _determinants(mesh.slope, v)
+            for attempt in range(_attempts(even, found - first)):
+                near = (-1, most, least)[attempt]
+                reached, det = _search(mesh, c, v, near, p, even, guess, adjugate)
                 if (reached or not with_root) and _is_new(
-                    gamma, corner, c, guess, start, first, found
+                    gamma, corner, c, guess, det, start, side, first, found
                 ):
-                    for axis in range(3):
-                        start[found, axis] = min(max(guess[axis], low[axis]), high[axis])
-                    target[found], cell[found] = t, c
+                    _put(guess, adjugate, det, low, high, found, start, inverse)
+                    target[found], cell[found], side[found - first] = t, c, det
                     found += 1
     return targets.shape[0], found
+
+
+@inline
+def _attempts(even, found):
+    """How many searches to begin in a tetrahedron: one, or also on either side of a fold."""
+    if found >= MOST_STARTS:
+        return 0
+    return 1 if even or found >= _MANY else 3
+
+
+@inline
+def _search(mesh, c, v, near, p, even, guess, adjugate):
+    """Whether a search from near a vertex, or from the linear root, reaches p, and its det J."""
+    remainder = mesh.remainder[c]
+    weights = _linear_weights(mesh.tip, v, p) if near < 0 else _near_vertex(near)
+    reached, weights, det = _refine(
+        mesh.gamma, mesh.tip, mesh.slope, v, weights, p, remainder, guess, adjugate
+    )
+    if reached and even:
+        reached = _is_inside(mesh.gamma, v, weights, adjugate, det, _MARGIN * remainder)
+    return reached, det
+
+
+@inline
+def _put(guess, adjugate, det, low, high, n, start, inverse):
+    """Write start n."""
+    scale = 1.0 / det if det != 0.0 else 0.0
+    for i in range(3):
+        start[n, i] = min(max(guess[i], low[i]), high[i])
+        for j in range(3):
+            inverse[n, i, j] = scale * adjugate[j, i]
+
+
+@inline
+def _determinants(slope, v):
+    """The vertices of the largest and least det J, and whether the tetrahedron does not fold."""
+    most, least = 0, 0
+    high = low = _determinant(slope, v[0])
+    for i in range(1, 4):
+        det = _determinant(slope, v[i])
+        if det > high:
+            most, high = i, det
+        if det < low:
+            least, low = i, det
+    return most, least, low > _EVEN * high or high < _EVEN * low
+
+
+@inline
+def _determinant(slope, i):
+    a = matrix(slope, i)
+    return dot(a[0], cross(a[1], a[2]))
+
+
+@inline
+def _near_vertex(i):
+    """Barycentric coordinates of a place near a vertex."""
+    near, far = 1.0 - 3.0 * _ASIDE, _ASIDE
+    return (
+        near if i == 0 else far,
+        near if i == 1 else far,
+        near if i == 2 else far,
+        near if i == 3 else far,
+    )
 
 
 @inline
@@ -85,11 +155,14 @@ def _linear_weights(tip, v, p):
 
 
 @inline
-def _refine(gamma, tip, slope, v, weights, p, error, guess):
+def _refine(gamma, tip, slope, v, weights, p, remainder, guess, adjugate):
     """Solve the quadratic through a tetrahedron's tips and slopes, near the tetrahedron.
 
     At x the average of the corners' expansions, Σ λi (fi + ½ Ji (x - xi)), is exact for quadratics.
-    Return whether the target is reached but for the cubic rest.
+
+    Returns:
+        Whether the target is reached but for the cubic rest, the barycentric coordinates, and the
+        determinant of the slope of the last step, whose cofactors are in `adjugate`.
     """
     for k in range(3):
         guess[k] = (
@@ -98,18 +171,17 @@ def _refine(gamma, tip, slope, v, weights, p, error, guess):
             + weights[2] * gamma[v[2], k]
             + weights[3] * gamma[v[3], k]
         )
-    last = False
+    det, size = 0.0, 0.0
     for _ in range(_ITERATIONS):
         r, a = _model(gamma, tip, slope, v, weights, p, guess)
-        if dot(r, r) <= (_CONVERGED * error) ** 2:
-            if last:
-                return True
-            last = True  # close enough, and once more to be closer
-        weights, moved = _step(gamma, v, weights, r, a, guess)
+        size = dot(r, r)
+        weights, det, moved = _step(gamma, v, weights, r, a, guess, adjugate)
+        if size <= (_CONVERGED * remainder) ** 2:
+            return True, weights, det
         if not moved:
-            break
+            return size <= (_ACCEPTED * remainder) ** 2, weights, det
     r, a = _model(gamma, tip, slope, v, weights, p, guess)
-    return dot(r, r) <= (_ACCEPTED * error) ** 2
+    return dot(r, r) <= (_ACCEPTED * remainder) ** 2, weights, det
 
 
 @inline
@@ -132,12 +204,14 @@ def _model(gamma, tip, slope, v, weights, p, guess):
 
 
 @inline
-def _step(gamma, v, weights, r, a, guess):
+def _step(gamma, v, weights, r, a, guess, adjugate):
     """A Newton step, cut short where it leaves the neighborhood of the tetrahedron."""
     c = cofactors(a)
     det = dot(a[0], c[0])
+    for i in range(3):
+        adjugate[i, 0], adjugate[i, 1], adjugate[i, 2] = c[i]
     if det == 0.0:
-        return weights, False
+        return weights, det, False
     y = combination(r, c)
     y = (y[0] / det, y[1] / det, y[2] / det)
     ahead = _weights(gamma, v, (guess[0] + y[0], guess[1] + y[1], guess[2] + y[2]))
@@ -146,10 +220,37 @@ def _step(gamma, v, weights, r, a, guess):
         if ahead[i] < -_OUTSIDE:
             part = min(part, (weights[i] + _OUTSIDE) / (weights[i] - ahead[i]))
     if part < 1e-3:
-        return weights, False
+        return weights, det, False
     for k in range(3):
         guess[k] += part * y[k]
-    return _weights(gamma, v, guess), True
+    return _weights(gamma, v, guess), det, True
+
+
+@inline
+def _is_inside(gamma, v, weights, adjugate, det, margin):
+    """Whether a target can lie in the image of a tetrahedron, if it is off by so much at most.
+
+    Each barycentric coordinate then changes by no more than its gradient in space times that.
+    """
+    zero = (0.0, 0.0, 0.0)
+    g = (zero, _gradient(gamma, v, 0, adjugate), _gradient(gamma, v, 1, adjugate))
+    g = (g[0], g[1], g[2], _gradient(gamma, v, 2, adjugate), zero)
+    for i in range(4):
+        outside = -weights[i] - _ROUNDING
+        if outside > 0.0:
+            change = minus(g[i], g[i + 1])
+            if (outside * det) ** 2 > margin * margin * dot(change, change):
+                return False
+    return True
+
+
+@inline
+def _gradient(gamma, v, i, adjugate):
+    """det J times the gradient in space of the coordinate along edge i of the path of vertices."""
+    a, b = v[i], v[i + 1]
+    k = 0 if gamma[a, 0] != gamma[b, 0] else (1 if gamma[a, 1] != gamma[b, 1] else 2)
+    width = gamma[b, k] - gamma[a, k]
+    return adjugate[0, k] / width, adjugate[1, k] / width, adjugate[2, k] / width
 
 
 @inline
@@ -175,14 +276,14 @@ def _along_edge(gamma, a, b, u):
 
 
 @inline
-def _is_new(gamma, corner, c, guess, start, begin, end):
-    """Whether no start of the target is so near that it leads to the same solution."""
+def _is_new(gamma, corner, c, guess, det, start, side, begin, end):
+    """Whether no start of the target is so near, on one side of a fold, that both lead to one."""
     first, last = corner[c, 0], corner[c, 7]
     for i in range(begin, end):
         apart = 0.0
         for k in range(3):
             width = gamma[last, k] - gamma[first, k]
             apart = max(apart, abs(start[i, k] - guess[k]) / width)
-        if apart < _DISTINCT:
+        if apart < _DISTINCT and det * side[i - begin] > 0.0:
             return False
     return True

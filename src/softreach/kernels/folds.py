@@ -13,15 +13,27 @@ from softreach.kernels.vector import cofactors, combination, dot, matrix, times
 
 __all__ = ["second_preimages"]
 
-# Instead of 2: from beyond the other root Newton's method converges to it, from short of it perhaps
-# back to the one that is known.
-_OVERSHOOT = 2.8
 _ITERATIONS = 3  # of inverse iteration, which near a fold gains many digits each
 
 
 @kernel
-def second_preimages(mesh, cell, gamma, slope, smallest, reach, low, high, start, near):
-    """The second preimage of each solution, and whether it is within `reach` widths of its cell."""
+def second_preimages(mesh, cell, gamma, slope, smallest, reach, overshoot, low, high, start, near):
+    """Near the second preimage of each solution, and whether that is within reach.
+
+    Args:
+        mesh: Cells of the activation box.
+        cell: Cell of each solution, shape (n,).
+        gamma: Solutions, shape (n, 3).
+        slope: Jacobians there [m], shape (n, 3, 3).
+        smallest: Their smallest singular values [m], shape (n,).
+        reach: How many widths of its cell a solution may move.
+        overshoot: What to put for 2 in -2σ/κ. From beyond the other root Newton's method converges
+            to it, from short of it perhaps back to the one that is known.
+        low: Lower bounds, shape (3,).
+        high: Upper bounds, shape (3,).
+        start: Filled with activations, shape (n, 3).
+        near: Filled with whether they are within reach, shape (n,).
+    """
     for n in range(gamma.shape[0]):
         c = cell[n]
         first, last = mesh.corner[c, 0], mesh.corner[c, 7]
@@ -42,7 +54,7 @@ def second_preimages(mesh, cell, gamma, slope, smallest, reach, low, high, start
             continue
         for k in range(3):
             width = mesh.gamma[last, k] - mesh.gamma[first, k]
-            s = -_OVERSHOOT * sigma / kappa * v[k]
+            s = -overshoot * sigma / kappa * v[k]
             root = gamma[n, k] + s
             start[n, k] = min(max(root, low[k]), high[k])
             near[n] = near[n] and abs(s) <= reach * width and abs(start[n, k] - root) <= width

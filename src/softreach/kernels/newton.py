@@ -29,6 +29,7 @@ _LONGEST_STEP = 0.25  # in ranges of the bounds
 _OUTSIDE = 0.05  # how far a search may leave the bounds, in ranges
 _SUFFICIENT = 0.2  # least part of the predicted decrease that is accepted
 _STEP_TOL = 1e-7  # a last step that is small enough, in ranges
+_TINY_STEP = 1e-8  # one after which the tip is at its target but for rounding
 _LEAST_DAMPING = 1 / 32  # part of a step below which a search stagnates
 
 
@@ -80,8 +81,10 @@ def newton_step(search, active, tips, slopes, low, high, tol):
         if search.damping[n] < _LEAST_DAMPING:
             search.state[n] = CONVERGED if search.residual[n] <= tol else STAGNATED
             search.trial[n] = search.gamma[n]
-        elif search.residual[n] <= tol and _length(search.step, n, low, high) <= _STEP_TOL:
-            search.state[n] = CONVERGED
+        else:
+            enough = _STEP_TOL if search.residual[n] <= tol else _TINY_STEP
+            if _length(search.step, n, low, high) <= enough:
+                search.state[n] = CONVERGED
 
 
 @inline
