@@ -84,7 +84,7 @@ def judge(running, n, tips, ahead, targets, found, enough, low, high, scales):
         if not begins:
             gain = now - running.left[i]
             # What the linear map promises bounds what is left to gain, once it is to be believed.
-            ended = damping <= _BELIEVED and gain <= _PROGRESS * min(enough, now)
+            ended = damping <= _BELIEVED and gain <= max(_PROGRESS * min(enough, now), 1e-3 * now)
             if now - trial > 0.25 * gain:
                 damping = max(0.1 * damping, _LEAST_DAMPING)
             elif not better:
