@@ -8,11 +8,13 @@ activation that proves it; what searches miss is missing from the volume.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach import parallel
 from softreach.errors import InvalidInput
 from softreach.geometry.hull import convex_hull
 from softreach.progress import Progress
@@ -224,7 +226,13 @@ def _not_among(flood: Flood, tips: Array) -> NDArray[np.bool_]:
 
 def _convex_volume(points: Array, fewer: Array) -> Estimate:
     """What hulls of ever more boundary points tend to, as far as two of them tell."""
-    value, rough = convex_hull(points).volume, convex_hull(fewer).volume
+    found = np.empty(2)
+
+    def measure(place: int, some: Array) -> None:
+        found[place] = convex_hull(some).volume
+
+    parallel.run([partial(measure, 0, points), partial(measure, 1, fewer)])
+    value, rough = found.tolist()
     rest = max(value - rough, 0.0) / 3.0
     return Estimate(value + 0.5 * rest, rest)
 
