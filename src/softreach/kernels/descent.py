@@ -50,7 +50,7 @@ class Running(NamedTuple):
 
 
 @kernel
-def judge(running, n, tips, ahead, targets, found, enough, low, high, scales):
+def judge(running, n, tips, ahead, targets, found, enough, low, high, scales):  # noqa: C901
     """Take in the trials of the first n, and set up the next steps of those that go on.
 
     Args:

@@ -57,7 +57,7 @@ def sort_keys(points, low, scale, keys):
 
 
 @strict
-def stable_order(keys, order):
+def stable_order(keys, order):  # noqa: C901
     """Increasing keys, equal ones in the order in which they come, digit by digit from the last.
 
     Digits in which no two keys differ are left out: most of the 63 bits, as columns are few.
@@ -74,7 +74,7 @@ def stable_order(keys, order):
     numbers, turned = order, np.empty_like(order)
     place = np.empty(_DIGIT + 1, np.int64)
     passes = shift = 0
-    while differ >> shift:
+    while shift < 63 and differ >> shift:
         if not (differ >> shift) & 1:
             shift += 1
             continue
