@@ -11,6 +11,7 @@ from softreach import parallel
 from softreach.errors import InvalidInput
 from softreach.geometry import neighbors
 from softreach.geometry.neighbors import mean_value_distance
+from softreach.kernels.neighbors import stable_order
 
 
 def by_all_pairs(points, values, radius, queries=None):
@@ -115,6 +116,24 @@ def test_neighbors_come_from_all_points_whatever_the_queries():
     found = mean_value_distance(points, values, 0.1, queries)
     np.testing.assert_array_equal(found[0], everywhere[0][queries])
     np.testing.assert_array_equal(found[1], everywhere[1][queries])
+
+
+@pytest.mark.parametrize("radius", [0.0, 1e-9, 0.02, 0.2, 1.0, 200.0, np.inf])
+@pytest.mark.parametrize("flat", [False, True])
+def test_a_few_queries_of_many_points_equal_a_loop_over_all_pairs(radius, flat):
+    points, values = uneven(4000, 3)
+    points[:, 1] *= not flat
+    queries = np.array([3999, 3, 700, 700, 0, 2100])
+    found = mean_value_distance(points, values, radius, queries)
+    assert_same(found, by_all_pairs(points, values, radius, queries))
+
+
+@given(st.lists(st.integers(0, 2**62) | st.integers(0, 3), min_size=1, max_size=60))
+def test_keys_are_put_in_order_and_equal_ones_stay_in_theirs(numbers):
+    keys = np.array(numbers)
+    order = np.empty(len(keys), np.int64)
+    stable_order(keys, order)
+    np.testing.assert_array_equal(order, np.argsort(keys, kind="stable"))
 
 
 def test_no_queries_and_no_points_give_nothing():

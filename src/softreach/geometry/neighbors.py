@@ -18,6 +18,7 @@ from softreach.kernels.neighbors import (
     find_windows,
     neighbor_sums,
     sort_keys,
+    stable_order,
     window_keys,
 )
 
@@ -28,6 +29,8 @@ Index = NDArray[np.intp]
 
 BLOCK = 1 << 14  # queries that one thread takes at a time
 _CELLS = 2.0 ** (PLACE_BITS - 1)  # along an axis; the other half of the keys is room for windows
+_CUBES = 128  # along an axis, at most, to find what is near a few queries
+_FEW = 1.0 / 500  # queries to a point, below which that pays
 _SLACK = 2.0**-20  # of a cell or a radius, far above the rounding of a key
 _SMALLEST = 1e-290  # width of a cell
 
@@ -62,7 +65,11 @@ def mean_value_distance(
     if len(points) == 0:
         return np.empty(0), np.empty(0, np.intp)
     columns = _Columns.around(points, float(radius))
-    order, cloud = columns.sorted_sample(points, values)
+    if queries is not None and len(queries) < _FEW * len(points):
+        near = columns.near(points, points[queries])
+        order, cloud = columns.sorted_sample(points[near], values[near])
+    else:
+        order, cloud = columns.sorted_sample(points, values)
     if queries is None:
         return _means(cloud, columns, cloud, order)
     order, chosen = columns.sorted_sample(points[queries], values[queries])
@@ -113,8 +120,24 @@ class _Columns:
         points = np.ascontiguousarray(points.T[self.axes])
         keys = np.empty(points.shape[1], np.int64)
         sort_keys(points, self.low, 1.0 / self.widths, keys)
-        order = np.argsort(keys, kind="stable")
+        order = np.empty(len(keys), np.int64)
+        stable_order(keys, order)
         return order, _Sample(keys[order], _taken(points, order), _taken(values.T, order))
+
+    def near(self, points: Array, queries: Array) -> Index:
+        """Which points lie in the cubes around those of queries; all others are too far away."""
+        corner, extent = self.low, points.max(axis=0)[self.axes] - self.low
+        width = np.maximum(extent / _CUBES, max(self.margin, _SMALLEST))
+        shape = tuple((extent / width).astype(np.int64) + 3)
+        wanted = np.zeros(shape, bool)
+        x, y, z = ((queries[:, self.axes] - corner) / width + 1.0).astype(np.int64).T
+        for i, j, k in np.ndindex(3, 3, 3):
+            wanted[x + i - 1, y + j - 1, z + k - 1] = True
+        cubes = np.zeros(len(points), np.int64)
+        for axis, size, low, one in zip(self.axes, shape, corner, width, strict=True):
+            cubes *= size
+            cubes += ((points[:, axis] - low) / one + 1.0).astype(np.int64)
+        return np.flatnonzero(wanted.ravel()[cubes])
 
     def windows(self, keys: NDArray[np.int64], along: Array) -> NDArray[np.int64]:
         """First and last key of what each query can reach in its own column, shape (2, q)."""

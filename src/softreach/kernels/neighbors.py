@@ -15,11 +15,21 @@ import numpy as np
 
 from softreach.kernels.compiler import kernel, strict
 
-__all__ = ["PLACE_BITS", "SHIFTS", "find_windows", "neighbor_sums", "sort_keys", "window_keys"]
+__all__ = [
+    "PLACE_BITS",
+    "SHIFTS",
+    "find_windows",
+    "neighbor_sums",
+    "sort_keys",
+    "stable_order",
+    "window_keys",
+]
 
 PLACE_BITS = 21  # of each of the three parts of a key
 _ROW = 1 << 2 * PLACE_BITS
 _COLUMN = 1 << PLACE_BITS
+_DIGIT_BITS = 11
+_DIGIT = 1 << _DIGIT_BITS
 SHIFTS = tuple(row * _ROW + column * _COLUMN for row in (-1, 0, 1) for column in (-1, 0, 1))
 """What takes a key to the same place in each of the nine columns around."""
 
@@ -44,6 +54,47 @@ def sort_keys(points, low, scale, keys):
         y = _place(points[0, i], low[0], scale[0])
         z = _place(points[1, i], low[1], scale[1])
         keys[i] = y * _ROW + z * _COLUMN + _place(points[2, i], low[2], scale[2])
+
+
+@strict
+def stable_order(keys, order):  # noqa: C901
+    """Increasing keys, equal ones in the order in which they come, digit by digit from the last.
+
+    Digits in which no two keys differ are left out: most of the 63 bits, as columns are few.
+
+    Args:
+        keys: Not below zero, shape (n,), int64.
+        order: Filled with indices, shape (n,), int64.
+    """
+    n, differ = len(keys), np.int64(0)
+    for i in range(n):
+        order[i] = i
+        differ |= keys[i] ^ keys[0]
+    now, after = keys.copy(), np.empty_like(keys)
+    numbers, turned = order, np.empty_like(order)
+    place = np.empty(_DIGIT + 1, np.int64)
+    passes = shift = 0
+    while shift < 63 and differ >> shift:
+        if not (differ >> shift) & 1:
+            shift += 1
+            continue
+        place[:] = 0
+        for i in range(n):
+            place[((now[i] >> shift) & (_DIGIT - 1)) + 1] += 1
+        for digit in range(_DIGIT):
+            place[digit + 1] += place[digit]
+        for i in range(n):
+            digit = (now[i] >> shift) & (_DIGIT - 1)
+            to = place[digit]
+            place[digit] = to + 1
+            after[to], turned[to] = now[i], numbers[i]
+        now, after = after, now
+        numbers, turned = turned, numbers
+        shift += _DIGIT_BITS
+        passes += 1
+    if passes % 2:  # the last pass went to the other array
+        for i in range(n):
+            order[i] = numbers[i]
 
 
 @strict

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.kernels.space_claims import claim_corners
 from softreach.progress import Progress, silent
 from softreach.rod.tip_map import TipMap
 from softreach.workspace.image import Lattice
@@ -20,7 +21,7 @@ Ints = NDArray[np.int64]
 ENOUGH = 1e-3
 """Distance at which a place counts as reached, in cells."""
 _CHUNK = 1 << 16  # places searched for at a time
-_CORNERS = np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+_CLEARLY = 0.02  # cells by which a tip must be closer to start another search
 
 
 class Flood:
@@ -71,20 +72,8 @@ class Flood:
         """Centers around tips that one of them is clearly closer to than `gap`, and which."""
         at = self.lattice.coordinates(tips)
         within = ((at >= 0) & (at < np.array(self.lattice.shape) - 1)).all(axis=1)
-        at, gamma = at[within], gamma[within]
-        base = np.floor(at).astype(np.int64)
-        found: list[tuple[Ints, Array, Ints]] = []
-        for corner in _CORNERS:
-            cells = (base + corner) @ self.steps
-            away = np.linalg.norm(at - base - corner, axis=1)
-            near = np.flatnonzero(away < self.gap[cells] - 0.02)
-            found.append((cells[near], away[near], near))
-        cells, away, row = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        closest = np.full(len(self.gap), np.inf)
-        np.minimum.at(closest, cells, away)
-        best = np.flatnonzero(away == closest[cells])[::-1]  # the first of equals is written last
-        owner = np.full(len(self.gap), -1)
-        owner[cells[best]] = row[best]
+        owner, closest = np.full(len(self.gap), -1), self.gap - _CLEARLY
+        claim_corners(at[within], np.flatnonzero(within), self.steps, closest, owner)
         cells = np.flatnonzero(owner >= 0)
         return cells, gamma[owner[cells]]
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach import parallel
-from softreach.rod.damped_step import damped_steps
+from softreach.kernels.box_projection import project
+from softreach.kernels.descent import FIRST_DAMPING, NOWHERE, Running, judge, next_trials
 from softreach.rod.tip_map import BLOCK, TipMap
 from softreach.workspace.stable import fill_stable_slopes
 
@@ -17,11 +18,7 @@ __all__ = ["Nearest", "nearest_tips"]
 
 Array = NDArray[np.float64]
 
-_TASK = BLOCK // 16
-_MOST_STEPS = 30
-_FIRST_DAMPING, _LEAST_DAMPING, _LARGEST_DAMPING = 1e-2, 1e-4, 1e4
-_BELIEVED = 0.1  # damping above which the linear map says little of what is left to gain
-_PROGRESS = 0.005  # of the tolerance or the distance: a smaller gain ends a search
+_TOGETHER = BLOCK // 16  # searches that one thread runs side by side
 
 
 class Nearest(NamedTuple):
@@ -54,45 +51,40 @@ def nearest_tips(rod: TipMap, start: Array, targets: Array, enough: float) -> Ne
         parts = (found.gamma[block], found.tips[block], found.distance[block])
         _descend(rod, targets[block], enough, Nearest(*parts))
 
-    parallel.run(partial(task, block) for block in parallel.blocks(len(targets), _TASK))
+    # Searches that end make room for others; only the last of a task run by a few.
+    share = max(_TOGETHER, -(-len(targets) // parallel.thread_count()))
+    parallel.run(partial(task, block) for block in parallel.blocks(len(targets), share))
     return found
 
 
 def _descend(rod: TipMap, targets: Array, enough: float, found: Nearest) -> None:
     """Damped Gauss and Newton steps that stay within the bounds; on the calling thread."""
-    active, damping = np.arange(len(targets)), np.full(len(targets), _FIRST_DAMPING)
-    slopes = np.empty((len(targets), 3, rod.box.bundles))
-    fill_stable_slopes(rod, found.gamma, found.tips, slopes)
-    found.distance[:] = _distance(found.tips, targets)
-    active = active[np.isfinite(found.distance)]  # others start where nothing is stable
-    for _ in range(_MOST_STEPS):
-        active = active[found.distance[active] > enough]
-        if not len(active):
-            return
-        gamma, now = found.gamma[active], found.distance[active]
-        miss, slope = found.tips[active] - targets[active], slopes[active]
-        square = ((slope * rod.box.scales) ** 2).sum(axis=(1, 2)) / 3.0
-        softness = damping[active] * square + 1e-300
-        trial, left = damped_steps(rod.box, gamma, miss, slope, softness)
-        tips, ahead = np.empty((len(active), 3)), np.empty((len(active), 3, rod.box.bundles))
-        fill_stable_slopes(rod, trial, tips, ahead)
-        distance = _distance(tips, targets[active])
-        better = distance < now
-        taken = active[better]
-        found.gamma[taken], found.tips[taken] = trial[better], tips[better]
-        found.distance[taken], slopes[taken] = distance[better], ahead[better]
-        good = now - distance > 0.25 * (now - left)
-        believed = damping[active] <= _BELIEVED
-        # Searches beyond the loss of stability take long: a step into it is shortened much.
-        worse = np.where(np.isinf(distance), 100.0, 10.0)
-        factor = np.where(good, 0.1, np.where(better, 1.0, worse))
-        damping[active] = np.maximum(damping[active] * factor, _LEAST_DAMPING)
-        # What the linear map promises bounds what is left to gain, once it is to be believed.
-        small = (now - left <= _PROGRESS * np.minimum(enough, now)) & believed
-        active = active[~small & (damping[active] < _LARGEST_DAMPING)]
+    total, box = len(targets), rod.box
+    bounds = box.low, box.high, box.scales
+    running, center = _room(min(total, _TOGETHER), box.bundles)
+    tips, ahead = np.empty_like(running.wanted), np.empty_like(running.slope)
+    step, multiplier = np.empty_like(running.trial), np.empty_like(running.wanted)
+    begun = n = 0
+    while begun < total or n:
+        more = min(total - begun, len(tips) - n)
+        new, rows = slice(n, n + more), slice(begun, begun + more)
+        running.row[new], running.count[new] = np.arange(begun, begun + more), 0
+        running.trial[new], running.damping[new] = found.gamma[rows], FIRST_DAMPING
+        n, begun = n + more, begun + more
+        fill_stable_slopes(rod, running.trial[:n], tips[:n], ahead[:n])
+        if rod.supports_unstable:
+            tips[np.isnan(tips[:n, 0]).nonzero()[0]] = NOWHERE
+        n = judge(running, n, tips, ahead, targets, found, enough, *bounds)
+        problem = running.slope, running.wanted, running.softness, running.low, running.high
+        project(center[:n], *(part[:n] for part in problem), step[:n], multiplier[:n])
+        next_trials(running, n, step, multiplier, found.gamma, *bounds)
+    nowhere = found.distance >= NOWHERE
+    found.distance[nowhere], found.tips[nowhere] = np.inf, np.nan
 
 
-def _distance(tips: Array, targets: Array) -> Array:
-    """From tips to targets [m]; infinite for those that are not stable."""
-    distance = np.linalg.norm(tips - targets, axis=1)
-    return np.where(np.isnan(distance), np.inf, distance)
+def _room(count: int, m: int) -> tuple[Running, Array]:
+    """Place for as many searches side by side, and where their steps are centered."""
+    integers = np.zeros(count, np.int64), np.zeros(count, np.int64)
+    numbers = [np.zeros(shape) for shape in ((count,), (count,), (count, 3, m), (count, 3))]
+    rest = [np.zeros(shape) for shape in ((count,), (count, m), (count, m), (count, m))]
+    return Running(*integers, *numbers, *rest), np.zeros((count, m))

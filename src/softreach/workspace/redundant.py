@@ -8,11 +8,13 @@ activation that proves it; what searches miss is missing from the volume.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach import parallel
 from softreach.errors import InvalidInput
 from softreach.geometry.hull import convex_hull
 from softreach.progress import Progress
@@ -39,6 +41,7 @@ _FINER = 1.5
 _SHIFT = (0.31, 0.17, 0.43)  # of a cell: lines on a plane of symmetry would all err alike
 _SWEEPS = 3
 _BEYOND = 0.05  # cells by which a sweep looks beyond a crossing
+_APART = 0.05  # ranges: activations nearer to each other lead to the same end
 _MOST_CELLS = 2.0**26
 
 
@@ -132,7 +135,7 @@ def _search(
     edge = flood.lattice.cell
     area = len(crossings.edges.cell) * edge**2 / 1.5  # a plane cuts 1.5 edges to a square of a cell
     slack = area * (ENOUGH * edge + rod.tol * rod.length)
-    convex = _hull(crossings, tips)
+    convex = _hull(crossings, tips[_not_among(flood, tips)])
     noise = volume.noise if np.isfinite(volume.noise) else convex.value + convex.error
     error = noise + missed + slack
     return Searched(cells, Estimate(volume.value, error), convex)
@@ -177,10 +180,11 @@ def _swept(flood: Flood) -> tuple[Crossings, float]:
         count = len(crossings.edges.cell)
         if count <= sweep:
             return crossings, 0.0
-        every = np.arange(count)
-        places = crossings.points(every, crossings.place)
+        places = crossings.points(np.arange(count), crossings.place)
         others = np.asarray(KDTree(places).query(places, k=sweep + 1)[1])[:, sweep]
-        moved = crossings.advance(every, crossings.gamma[others], _BEYOND)
+        apart = np.abs(crossings.gamma[others] - crossings.gamma) / flood.rod.box.scales
+        which = np.flatnonzero((apart > _APART).any(axis=1))
+        moved = crossings.advance(which, crossings.gamma[others[which]], _BEYOND)
         gain = float(moved.clip(0.0).sum()) * volume
         beyond = np.flatnonzero(crossings.low >= 1.0)
         if len(beyond):
@@ -208,9 +212,27 @@ def _hull(crossings: Crossings, tips: Array) -> Estimate:
     )
 
 
+def _not_among(flood: Flood, tips: Array) -> NDArray[np.bool_]:
+    """Which tips are not between eight centers that are reached, where no hull has a corner."""
+    cubes = flood.reached
+    for axis in range(3):
+        cubes = np.moveaxis(cubes, axis, 0)
+        cubes = np.moveaxis(cubes[:-1] & cubes[1:], 0, axis)
+    index = np.floor(flood.lattice.coordinates(tips)).astype(np.int64)
+    inside = ((index >= 0) & (index < cubes.shape)).all(axis=1)
+    x, y, z = np.where(inside[:, None], index, 0).T
+    return ~(inside & cubes[x, y, z])
+
+
 def _convex_volume(points: Array, fewer: Array) -> Estimate:
     """What hulls of ever more boundary points tend to, as far as two of them tell."""
-    value, rough = convex_hull(points).volume, convex_hull(fewer).volume
+    found = np.empty(2)
+
+    def measure(place: int, some: Array) -> None:
+        found[place] = convex_hull(some).volume
+
+    parallel.run([partial(measure, 0, points), partial(measure, 1, fewer)])
+    value, rough = found.tolist()
     rest = max(value - rough, 0.0) / 3.0
     return Estimate(value + 0.5 * rest, rest)
 

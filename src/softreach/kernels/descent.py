@@ -1,0 +1,140 @@
+"""Descents to the tips nearest to targets, many at a time: what happens between two evaluations.
+
+The rod is evaluated in between for all that still run. Those that end make room for the next, so
+that the evaluation is never asked for a few.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from softreach.kernels.compiler import kernel
+
+__all__ = ["FIRST_DAMPING", "NOWHERE", "Running", "judge", "next_trials"]
+
+NOWHERE = 1e150
+"""Coordinate of tips that do not count; no distance may be infinite here."""
+FIRST_DAMPING = 1e-2
+_LEAST_DAMPING, _LARGEST_DAMPING = 1e-4, 1e4
+_MOST_STEPS = 30
+_BELIEVED = 0.1  # damping above which the linear map says little of what is left to gain
+_PROGRESS = 0.005  # of the tolerance or the distance: a smaller gain ends a search
+
+
+class Running(NamedTuple):
+    """Searches side by side, and the step each takes next."""
+
+    row: np.ndarray
+    """Which search it is, shape (n,), int64."""
+    count: np.ndarray
+    """Steps it has taken, shape (n,), int64."""
+    damping: np.ndarray
+    """Of the next step, part of the mean square of the slopes [-], shape (n,)."""
+    left: np.ndarray
+    """Distance that the linear map leaves behind the step under trial [m], shape (n,)."""
+    slope: np.ndarray
+    """∂r/∂γ in ranges of the bounds [m] where it is now, shape (n, 3, m)."""
+    wanted: np.ndarray
+    """Target minus tip [m], shape (n, 3)."""
+    softness: np.ndarray
+    """Damping times that mean square [m²], shape (n,)."""
+    low: np.ndarray
+    """How far the lower bounds are, in ranges, shape (n, m)."""
+    high: np.ndarray
+    """How far the upper bounds are, shape (n, m)."""
+    trial: np.ndarray
+    """Activations to evaluate next [-], shape (n, m)."""
+
+
+@kernel
+def judge(running, n, tips, ahead, targets, found, enough, low, high, scales):  # noqa: C901
+    """Take in the trials of the first n, and set up the next steps of those that go on.
+
+    Args:
+        running: The searches; those that go on become the first.
+        n: How many run.
+        tips: Of their trials [m], `NOWHERE` if they do not count, shape (n, 3).
+        ahead: ∂r/∂γ of their trials [m], shape (n, 3, m).
+        targets: Of all searches [m], shape (all, 3).
+        found: Best activations, their tips and distances of all searches.
+        enough: Distance at which a search ends [m].
+        low: Lower bounds, shape (m,).
+        high: Upper bounds, shape (m,).
+        scales: Ranges of the bounds, shape (m,).
+
+    Returns:
+        How many go on.
+    """
+    gamma, best, distance = found
+    kept = 0
+    for i in range(n):
+        row, damping = running.row[i], running.damping[i]
+        x, y, z = (
+            targets[row, 0] - tips[i, 0],
+            targets[row, 1] - tips[i, 1],
+            targets[row, 2] - tips[i, 2],
+        )
+        trial, now = math.sqrt(x * x + y * y + z * z), distance[row]
+        begins = running.count[i] == 0
+        better = begins or trial < now
+        ended = begins and trial >= NOWHERE  # nothing is stable there
+        if not begins:
+            gain = now - running.left[i]
+            # What the linear map promises bounds what is left to gain, once it is to be believed.
+            ended = damping <= _BELIEVED and gain <= max(_PROGRESS * min(enough, now), 1e-3 * now)
+            if now - trial > 0.25 * gain:
+                damping = max(0.1 * damping, _LEAST_DAMPING)
+            elif not better:
+                # Searches beyond the loss of stability take long: a step into it is cut down.
+                damping *= 100.0 if trial >= NOWHERE else 10.0
+            ended = ended or damping >= _LARGEST_DAMPING or running.count[i] >= _MOST_STEPS
+        if better:
+            distance[row] = trial
+            for j in range(gamma.shape[1]):
+                gamma[row, j] = running.trial[i, j]
+            for a in range(3):
+                best[row, a] = tips[i, a]
+        if ended or distance[row] <= enough:
+            continue
+        square = 0.0
+        for a in range(3):
+            running.wanted[kept, a] = targets[row, a] - best[row, a]
+            for j in range(gamma.shape[1]):
+                if better:
+                    running.slope[kept, a, j] = ahead[i, a, j] * scales[j]
+                else:
+                    running.slope[kept, a, j] = running.slope[i, a, j]
+                square += running.slope[kept, a, j] ** 2
+        for j in range(gamma.shape[1]):
+            running.low[kept, j] = (low[j] - gamma[row, j]) / scales[j]
+            running.high[kept, j] = (high[j] - gamma[row, j]) / scales[j]
+        running.row[kept], running.count[kept] = row, running.count[i] + 1
+        running.damping[kept] = damping
+        running.softness[kept] = damping * square / 3.0 + 1e-300
+        kept += 1
+    return kept
+
+
+@kernel
+def next_trials(running, n, step, multiplier, gamma, low, high, scales):
+    """Where the steps of the first n lead, and what the linear map leaves there.
+
+    Args:
+        running: The searches.
+        n: How many run.
+        step: In ranges of the bounds, shape (n, m).
+        multiplier: Of the steps, shape (n, 3): what is left by the softness.
+        gamma: Best activations of all searches, shape (all, m).
+        low: Lower bounds, shape (m,).
+        high: Upper bounds, shape (m,).
+        scales: Ranges of the bounds, shape (m,).
+    """
+    for i in range(n):
+        for j in range(len(low)):
+            end = gamma[running.row[i], j] + step[i, j] * scales[j]
+            running.trial[i, j] = min(max(end, low[j]), high[j])
+        x, y, z = multiplier[i, 0], multiplier[i, 1], multiplier[i, 2]
+        running.left[i] = running.softness[i] * math.sqrt(x * x + y * y + z * z)
