@@ -29,7 +29,7 @@ class Running(NamedTuple):
 
     row: np.ndarray
     """Which search it is, shape (n,), int64."""
-    count: np.ndarray
+    steps: np.ndarray
     """Steps it has taken, shape (n,), int64."""
     damping: np.ndarray
     """Of the next step, part of the mean square of the slopes [-], shape (n,)."""
@@ -78,7 +78,7 @@ def judge(running, n, tips, ahead, targets, found, enough, low, high, scales):  
             targets[row, 2] - tips[i, 2],
         )
         trial, now = math.sqrt(x * x + y * y + z * z), distance[row]
-        begins = running.count[i] == 0
+        begins = running.steps[i] == 0
         better = begins or trial < now
         ended = begins and trial >= NOWHERE  # nothing is stable there
         if not begins:
@@ -90,7 +90,7 @@ def judge(running, n, tips, ahead, targets, found, enough, low, high, scales):  
             elif not better:
                 # Searches beyond the loss of stability take long: a step into it is cut down.
                 damping *= 100.0 if trial >= NOWHERE else 10.0
-            ended = ended or damping >= _LARGEST_DAMPING or running.count[i] >= _MOST_STEPS
+            ended = ended or damping >= _LARGEST_DAMPING or running.steps[i] >= _MOST_STEPS
         if better:
             distance[row] = trial
             for j in range(gamma.shape[1]):
@@ -111,7 +111,7 @@ def judge(running, n, tips, ahead, targets, found, enough, low, high, scales):  
         for j in range(gamma.shape[1]):
             running.low[kept, j] = (low[j] - gamma[row, j]) / scales[j]
             running.high[kept, j] = (high[j] - gamma[row, j]) / scales[j]
-        running.row[kept], running.count[kept] = row, running.count[i] + 1
+        running.row[kept], running.steps[kept] = row, running.steps[i] + 1
         running.damping[kept] = damping
         running.softness[kept] = damping * square / 3.0 + 1e-300
         kept += 1

@@ -68,7 +68,7 @@ def _descend(rod: TipMap, targets: Array, enough: float, found: Nearest) -> None
     while begun < total or n:
         more = min(total - begun, len(tips) - n)
         new, rows = slice(n, n + more), slice(begun, begun + more)
-        running.row[new], running.count[new] = np.arange(begun, begun + more), 0
+        running.row[new], running.steps[new] = np.arange(begun, begun + more), 0
         running.trial[new], running.damping[new] = found.gamma[rows], FIRST_DAMPING
         n, begun = n + more, begun + more
         fill_stable_slopes(rod, running.trial[:n], tips[:n], ahead[:n])

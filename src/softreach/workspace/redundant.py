@@ -217,11 +217,11 @@ def _not_among(flood: Flood, tips: Array) -> NDArray[np.bool_]:
     cubes = flood.reached
     for axis in range(3):
         cubes = np.moveaxis(cubes, axis, 0)
-        cubes = np.moveaxis(cubes[:-1] & cubes[1:], 0, axis)
+        cubes = np.moveaxis(np.logical_and(cubes[:-1], cubes[1:]), 0, axis)
     index = np.floor(flood.lattice.coordinates(tips)).astype(np.int64)
     inside = ((index >= 0) & (index < cubes.shape)).all(axis=1)
     x, y, z = np.where(inside[:, None], index, 0).T
-    return ~(inside & cubes[x, y, z])
+    return ~(inside & np.asarray(cubes)[x, y, z])
 
 
 def _convex_volume(points: Array, fewer: Array) -> Estimate:
