@@ -216,12 +216,12 @@ def _not_among(flood: Flood, tips: Array) -> NDArray[np.bool_]:
     """Which tips are not between eight centers that are reached, where no hull has a corner."""
     cubes = flood.reached
     for axis in range(3):
-        cubes = np.moveaxis(cubes, axis, 0)
-        cubes = np.moveaxis(np.logical_and(cubes[:-1], cubes[1:]), 0, axis)
+        rolled = np.moveaxis(cubes, axis, 0)
+        cubes = np.moveaxis(rolled[:-1] & rolled[1:], 0, axis)
     index = np.floor(flood.lattice.coordinates(tips)).astype(np.int64)
     inside = ((index >= 0) & (index < cubes.shape)).all(axis=1)
     x, y, z = np.where(inside[:, None], index, 0).T
-    return ~(inside & np.asarray(cubes)[x, y, z])
+    return ~(inside & cubes[x, y, z])
 
 
 def _convex_volume(points: Array, fewer: Array) -> Estimate:
