@@ -219,8 +219,8 @@ def _not_among(flood: Flood, tips: Array) -> NDArray[np.bool_]:
         rolled = np.moveaxis(cubes, axis, 0)
         cubes = np.moveaxis(rolled[:-1] & rolled[1:], 0, axis)
     index = np.floor(flood.lattice.coordinates(tips)).astype(np.int64)
-    inside = ((index >= 0) & (index < cubes.shape)).all(axis=1)
-    x, y, z = np.where(inside[:, None], index, 0).T
+    inside = np.all((index >= 0) & (index < cubes.shape), axis=1)
+    x, y, z = (index * inside[:, None]).T
     return ~(inside & cubes[x, y, z])
 
 
