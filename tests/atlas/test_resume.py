@@ -11,7 +11,8 @@ import softreach as sr
 from softreach.atlas import DesignSpace, StoreFailed, atlas_status, build_atlas
 from softreach.atlas.design_task import Intermediates
 from softreach.atlas.store import AtlasStore
-from softreach.errors import InvalidInput, SoftreachWarning
+from softreach.errors import InvalidInput
+from softreach.rod import SoftreachWarning, TipMap
 from tests.atlas.families import SMALL, assert_same, command, small_space
 from tests.atlas.scripts import build16, ended, run_script
 from tests.laws import of_length
@@ -47,7 +48,7 @@ def test_three_kills_leave_the_same_numbers_as_no_kill(whole, tmp_path):
 
 def test_a_second_call_computes_nothing(tmp_path, monkeypatch):
     first = build_atlas(small_space(), tmp_path / "a.zarr", **SMALL).load()
-    monkeypatch.setattr("softreach.atlas.intermediates.tip_positions", lambda *_: 1 / 0)
+    monkeypatch.setattr(TipMap, "tips_and_status", lambda *_: 1 / 0)
     assert build_atlas(small_space(), tmp_path / "a.zarr", **SMALL).identical(first)
 
 

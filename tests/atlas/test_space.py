@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.parameters import changed
 from softreach.atlas import DesignSpace
 from softreach.atlas.space_file import parse_space
@@ -104,13 +103,6 @@ def test_parameters_of_one_fiber_are_written_with_its_name_and_a_dot(table):
     space = parse_space(f"design = 'redundant_trunk'\n{table}", builtin)
     wanted = {"left.offset": np.radians(60), "longitudinal 1.bundles": 2}
     assert space.values(0) == pytest.approx(wanted)
-
-
-def test_the_dot_of_a_name_is_matched_exactly():
-    fibers = (FiberArchitecture(name=name, revolution=0, extent=0.1) for name in ("a.b", "a_b"))
-    base = sr.designs.minimal_trunk().replace(actuators=tuple(fibers))
-    space = parse_space("[parameters]\na.b.offset_deg = [90]", lambda _: base)
-    assert [fiber.offset for fiber in space.design(0).fibers] == pytest.approx([np.pi / 2, 0])
 
 
 @pytest.mark.parametrize(
