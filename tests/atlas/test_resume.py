@@ -11,8 +11,8 @@ import softreach as sr
 from softreach.atlas import DesignSpace, StoreFailed, atlas_status, build_atlas
 from softreach.atlas.design_task import Intermediates
 from softreach.atlas.store import AtlasStore
-from softreach.errors import InvalidInput
-from softreach.rod import SoftreachWarning, TipMap
+from softreach.errors import InvalidInput, SoftreachWarning
+from softreach.rod import TipMap
 from tests.atlas.families import SMALL, assert_same, command, small_space
 from tests.atlas.scripts import build16, ended, run_script
 from tests.laws import of_length
