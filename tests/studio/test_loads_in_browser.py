@@ -116,8 +116,8 @@ def test_values_that_cannot_be_are_refused_beside_the_fields(loads_tab):
 
 def test_a_load_that_is_too_large_is_told_and_the_tab_goes_on(loads_tab):
     tab = loads_tab
-    typed(tab, "payload [g]", "100")
-    become(tab, lambda one: one.payload == pytest.approx(0.1), "the payload is typed")
+    typed(tab, "payload [g]", "1000")
+    become(tab, lambda one: one.payload == pytest.approx(1.0), "the payload is typed")
     tab.page.get_by_text("loads = too large").first.wait_for()
     assert not tab.drawn("/cloud")
     typed(tab, "payload [g]", "0")
