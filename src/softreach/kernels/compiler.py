@@ -12,10 +12,12 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
-from numba import njit
+from numba import config, njit
 from numba.core import event
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
+
+from softreach.kernels.parts import PartedDispatcher
 
 __all__ = ["FAST", "inline", "kernel", "pasted", "strict"]
 
@@ -37,7 +39,7 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def inline(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a small function into its callers; a call left in a loop stops vectorization."""
-    return njit(forceinline=True, nogil=True, fastmath=FAST, error_model="numpy")(function)
+    return _with_part(function, forceinline=True, fastmath=FAST)
 
 
 def pasted(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -57,7 +59,13 @@ def strict(function: Callable[..., Any]) -> Callable[..., Any]:
     what is compiled on behalf of a caller inherits its flags.
     """
     source = getattr(function, "py_func", function)
-    return _cached(njit(nogil=True, fastmath=False, error_model="numpy")(source))
+    return _cached(_with_part(source, fastmath=False))
+
+
+def _with_part(function: Callable[..., Any], **options: Any) -> Any:
+    """A function for callers in Python, and for kernels a part of them."""
+    options |= {"nopython": True, "nogil": True, "error_model": "numpy"}
+    return function if config.DISABLE_JIT else PartedDispatcher(function, options)
 
 
 def _cached(function: Any) -> Any:
