@@ -12,12 +12,12 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
-from numba import config, njit
+from numba import config
 from numba.core import event
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
 
-from softreach.kernels.parts import PartedDispatcher
+from softreach.kernels.parts import KernelDispatcher, PartedDispatcher
 
 __all__ = ["FAST", "inline", "kernel", "pasted", "strict"]
 
@@ -34,17 +34,17 @@ check.
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a loop over samples."""
-    return _cached(njit(nogil=True, fastmath=FAST, error_model="numpy")(function))
+    return _cached(_dispatcher(KernelDispatcher, function, fastmath=FAST))
 
 
 def inline(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a small function into its callers; a call left in a loop stops vectorization."""
-    return _with_part(function, forceinline=True, fastmath=FAST)
+    return _dispatcher(PartedDispatcher, function, forceinline=True, fastmath=FAST)
 
 
 def pasted(function: Callable[..., Any]) -> Callable[..., Any]:
     """As `inline`, but before compilation: a large function is then not compiled by itself too."""
-    return njit(inline="always", nogil=True, fastmath=FAST, error_model="numpy")(function)
+    return _dispatcher(KernelDispatcher, function, inline="always", fastmath=FAST)
 
 
 def strict(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -59,13 +59,15 @@ def strict(function: Callable[..., Any]) -> Callable[..., Any]:
     what is compiled on behalf of a caller inherits its flags.
     """
     source = getattr(function, "py_func", function)
-    return _cached(_with_part(source, fastmath=False))
+    return _cached(_dispatcher(PartedDispatcher, source, fastmath=False))
 
 
-def _with_part(function: Callable[..., Any], **options: Any) -> Any:
-    """A function for callers in Python, and for kernels a part of them."""
+def _dispatcher(made_by: Any, function: Callable[..., Any], **options: Any) -> Any:
+    """A function that is compiled when it is called, unless Numba is told not to compile."""
+    if config.DISABLE_JIT:
+        return function
     options |= {"nopython": True, "nogil": True, "error_model": "numpy"}
-    return function if config.DISABLE_JIT else PartedDispatcher(function, options)
+    return made_by(function, targetoptions=options)
 
 
 def _cached(function: Any) -> Any:

@@ -8,6 +8,8 @@ first run went into the rest.
 
 from __future__ import annotations
 
+import gc
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -17,11 +19,15 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
 
-__all__ = ["PartedDispatcher"]
+__all__ = ["KernelDispatcher", "PartedDispatcher"]
 
 
 class _PartLibrary(JITCodeLibrary):
     """Code to be linked, which is optimized and compiled with its callers only."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Nothing yet."""
+        ll_module.data_layout = self._codegen._data_layout
 
     def finalize(self) -> None:
         """Link what the part calls itself."""
@@ -67,6 +73,39 @@ class _PartCompiler(CompilerBase):
         return [passes]
 
 
+class _Pause:
+    """Stops the collection of cyclic garbage, of which a compiler makes none worth the search."""
+
+    def __init__(self) -> None:
+        """Running."""
+        self._lock, self._depth, self._resume = threading.Lock(), 0, False
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._depth == 0:
+                self._resume = gc.isenabled()
+                gc.disable()
+            self._depth += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._depth -= 1
+            if self._depth == 0 and self._resume:
+                gc.enable()
+
+
+_PAUSE = _Pause()
+
+
+class KernelDispatcher(CPUDispatcher):
+    """A function that is called from Python."""
+
+    def compile(self, sig: Any) -> Any:
+        """Compile for one set of types, or load what is cached."""
+        with _PAUSE:
+            return super().compile(sig)
+
+
 class _Part(CPUDispatcher):
     """A function as part of those that call it; Python cannot."""
 
@@ -75,14 +114,14 @@ class _Part(CPUDispatcher):
         self.overloads[tuple(cres.signature.args)] = cres
 
 
-class PartedDispatcher(CPUDispatcher):
+class PartedDispatcher(KernelDispatcher):
     """A function that is compiled whole for callers in Python and is a part of other kernels."""
 
-    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+    def __init__(self, function: Callable[..., Any], *, targetoptions: dict[str, Any]) -> None:
         """Nothing is compiled before the first call."""
-        super().__init__(function, targetoptions=options)
+        super().__init__(function, targetoptions=targetoptions)
         alone = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        self._part = _Part(function, targetoptions=options | alone, pipeline_class=_PartCompiler)
+        self._part = _Part(function, targetoptions=targetoptions | alone, pipeline_class=_PartCompiler)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """The types of a call in a kernel."""
