@@ -45,7 +45,7 @@ def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start):
     guess = np.empty(3)
     gamma, tip, slope, corner = mesh.gamma, mesh.tip, mesh.slope, mesh.corner
     planes, item = tree.planes, tree.item
-    found = 0
+    found = np.intp(0)  # typed: compiled once
     for t in range(targets.shape[0]):
         if found + MOST_STARTS > start.shape[0]:
             return t, found
@@ -149,7 +149,7 @@ def _step(gamma, v, weights, r, a, guess):
         return weights, False
     for k in range(3):
         guess[k] += part * y[k]
-    return _weights(gamma, v, guess), True
+    return _weights(gamma, v, (guess[0], guess[1], guess[2])), True
 
 
 @inline

@@ -121,7 +121,9 @@ class PartedDispatcher(KernelDispatcher):
         """Nothing is compiled before the first call."""
         super().__init__(function, targetoptions=targetoptions)
         alone = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        self._part = _Part(function, targetoptions=targetoptions | alone, pipeline_class=_PartCompiler)
+        self._part = _Part(
+            function, targetoptions=targetoptions | alone, pipeline_class=_PartCompiler
+        )
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """The types of a call in a kernel."""

@@ -101,9 +101,7 @@ class StepRule:
         return self._packed(self.edges(steps))
 
     def _packed(self, edges: Array) -> Array:
-        table = rod.pack(*self.nodes(edges))
-        table.setflags(write=False)
-        return table
+        return _read_only(rod.pack(*self.nodes(edges)))
 
     def _halves(self, steps: int) -> tuple[Array, Array]:
         """Packed tables of the steps, and of both halves of each."""
@@ -122,6 +120,11 @@ class StepRule:
         marks = np.unique(np.concatenate([inside, s]))
         ends = np.cumsum(np.append(0, self._counts(np.diff(marks), steps)))
         return self.nodes(self._between(marks, steps)), ends[np.searchsorted(marks, s)]
+
+    def packed_stations(self, stations: Array, steps: int) -> tuple[Array, NDArray[np.int64]]:
+        """`station_nodes` as a packed table, read-only."""
+        nodes, ends = self.station_nodes(stations, steps)
+        return _read_only(rod.pack(*nodes)), ends
 
     def steps_for(self, tol: float) -> int:
         """The number of uniform steps in S for which no tip is off by more than `tol`.
@@ -218,6 +221,12 @@ class StepRule:
             return np.concatenate([of_block(gamma[block]) for block in rows])
 
         return difference
+
+
+def _read_only(table: Array) -> Array:
+    """The same for all tables: kernels are compiled once more for those that can be written."""
+    table.setflags(write=False)
+    return table
 
 
 def check_tol(tol: float) -> float:
