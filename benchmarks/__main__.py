@@ -14,7 +14,17 @@ from pathlib import Path
 from softreach import parallel
 
 PAGE = Path(__file__).parent.parent / "docs" / "benchmarks.md"
-PARTS = ("kernels", "arms", "geometry", "workspace", "inverse", "redundancy", "atlas", "studio")
+PARTS = (
+    "cold",
+    "kernels",
+    "arms",
+    "geometry",
+    "workspace",
+    "inverse",
+    "redundancy",
+    "atlas",
+    "studio",
+)
 
 HEADER = """# Benchmarks
 
