@@ -1,9 +1,9 @@
 """How every kernel is compiled: without the interpreter lock, with loops cached on disk.
 
-A `kernel` calls nothing but what is inlined: the process that compiles links a callee compiled by
-itself, later ones load the copy optimized with its caller, and the two round apart. What is
-`strict` rounds as written in every process and may call its like; it calls nothing else, and
-nothing else calls it.
+A `kernel` calls nothing but what is inlined, so that all of its arithmetic is fused and rounded in
+one place. What is `strict` rounds as written in every process and may call its like; it calls
+nothing else, and nothing else calls it. Callees of both kinds are `parts` of the kernels that call
+them, and compiled alone only when Python calls them.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """What kernels call: handed over as it is written, and compiled where it is called.
 
 Numba compiles a callee as if it were called from Python as well: it wraps it, optimizes it, turns
-it into machine code, and then optimizes it again with each caller. Of all that a kernel needs the
-last alone. A part stops after lowering, in a library that its callers link; most of the time of a
-first run went into the rest.
+it into machine code, and then optimizes it again with each caller. A part stops after lowering, in
+a library that its callers link. What they inline is optimized with them alone; the rest once by
+itself too, as it runs slower otherwise (`design/cold_start.md`).
 """
 
 from __future__ import annotations
@@ -23,17 +23,18 @@ __all__ = ["KernelDispatcher", "PartedDispatcher"]
 
 
 class _PartLibrary(JITCodeLibrary):
-    """Code to be linked, which is optimized and compiled with its callers only."""
+    """Code to be linked, of which its callers make machine code."""
 
-    def _optimize_functions(self, ll_module: Any) -> None:
-        """Nothing yet."""
-        ll_module.data_layout = self._codegen._data_layout
+    inlined = False
+    """Whether callers must inline it: then it is optimized with them, else once, by itself."""
 
     def finalize(self) -> None:
         """Link what the part calls itself."""
         for library in dict.fromkeys(self._linking_libraries):
             self._reload_init.update(library._reload_init)
             self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        if not self.inlined:
+            self._optimize_final_module()
         self._finalize_dynamic_globals()
         self._finalized = True
 
@@ -52,6 +53,7 @@ class _PartLowering(NativeLowering):
         """Lower the function into a library of its own."""
         state.flags.no_compile = True
         state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.inlined = state.flags.forceinline
         super().run_pass(state)
         key, lowered = _Key(), state["cr"]
         state.targetctx.insert_user_function(key, lowered.fndesc, [state.library])
