@@ -82,8 +82,11 @@ def _loaded() -> list[Callable[[], object]]:
     from softreach.rod.kinematics import configuration, tip_jacobian, tip_positions
 
     free = designs.lce_arm()
-    all_kinds = ({"gravity": (0, 0, 9.81), "payload": 0.001}, {"follower_force": (0, 0.001, 0)})
-    arms = [free.replace(loads=Loads(**kind)) for kind in all_kinds]
+    kinds = (
+        Loads(gravity=(0, 0, 9.81), payload=0.001),
+        Loads(follower_force=(0, 0.001, 0)),
+    )
+    arms = [free.replace(loads=loads) for loads in kinds]
     rest = [0.0] * free.bundles
     functions = (partial(f, arm) for arm in arms for f in (tip_positions, tip_jacobian))
     return [

@@ -64,7 +64,7 @@ def strict(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def _dispatcher(made_by: Any, function: Callable[..., Any], **options: Any) -> Any:
     """A function that is compiled when it is called, unless Numba is told not to compile."""
-    if config.DISABLE_JIT:
+    if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
         return function
     options |= {"nopython": True, "nogil": True, "error_model": "numpy"}
     return made_by(function, targetoptions=options)
