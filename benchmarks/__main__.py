@@ -15,6 +15,7 @@ from softreach import parallel
 
 PAGE = Path(__file__).parent.parent / "docs" / "benchmarks.md"
 PARTS = (
+    "cold",
     "kernels",
     "arms",
     "geometry",

@@ -98,6 +98,10 @@ _COMMANDS = {
         "Read a design or a cloud of ActiveFilaments.jl.",
         "softreach import filament.jl filament.toml",
     ),
+    "warmup": (
+        "Compile all kernels now, so that no later command has to.",
+        "softreach warmup",
+    ),
 }
 _KEYWORDS = {"import": "import_file"}  # commands that no Python function can be called
 for _place, (_name, (_summary, _example)) in enumerate(_COMMANDS.items()):

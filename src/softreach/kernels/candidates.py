@@ -53,7 +53,7 @@ def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start, 
     """
     guess, adjugate, side = np.empty(3), np.empty((3, 3)), np.empty(MOST_STARTS)
     gamma, corner, planes, item = mesh.gamma, mesh.corner, tree.planes, tree.item
-    found = 0
+    found = np.intp(0)  # typed: compiled once
     for t in range(targets.shape[0]):
         if found + MOST_STARTS > start.shape[0]:
             return t, found
@@ -223,7 +223,7 @@ def _step(gamma, v, weights, r, a, guess, adjugate):
         return weights, det, False
     for k in range(3):
         guess[k] += part * y[k]
-    return _weights(gamma, v, guess), det, True
+    return _weights(gamma, v, (guess[0], guess[1], guess[2])), det, True
 
 
 @inline

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from softreach.kernels.compiler import inner
+from softreach.kernels.compiler import inline
 from softreach.kernels.continuation import BEFORE, DONE, FOUND, INVERSE, LEFT, STEP
 from softreach.kernels.lanes import get, put
 from softreach.kernels.rod import LANES
@@ -11,7 +11,7 @@ from softreach.kernels.vector import dot, minus, times
 __all__ = ["by_inverse", "chord_with", "keep_inverse"]
 
 
-@inner
+@inline
 def by_inverse(w, i, r):
     """The step at the tip that makes up for what is missing at the base."""
     return (
@@ -21,7 +21,7 @@ def by_inverse(w, i, r):
     )
 
 
-@inner
+@inline
 def keep_inverse(w, i, rows):
     """Put an inverse into place."""
     put(w, INVERSE, i, rows[0])
@@ -29,7 +29,7 @@ def keep_inverse(w, i, rows):
     put(w, INVERSE + 6 * LANES, i, rows[2])
 
 
-@inner
+@inline
 def _correct(w, i, y):
     """Broyden's correction, theory (70), after the last step changed what is missing by -y."""
     s, cy = get(w, STEP, i), by_inverse(w, i, y)
@@ -62,7 +62,7 @@ def chord_with(missing, move):
         move: Takes the step in STEP.
     """
 
-    @inner
+    @inline
     def step(w, i, turn, least):
         r = missing(w, i)
         if turn > 0:
@@ -74,7 +74,7 @@ def chord_with(missing, move):
         if w[LEFT + i] > least:
             move(w, i)
 
-    @inner
+    @inline
     def chord_all(w, turn, least):
         waiting = 0
         for i in range(LANES):

@@ -1,9 +1,9 @@
 """How every kernel is compiled: without the interpreter lock, with loops cached on disk.
 
-A `kernel` calls nothing but what is inlined: the process that compiles links a callee compiled by
-itself, later ones load the copy optimized with its caller, and the two round apart. What is
-`strict` rounds as written in every process and may call its like; it calls nothing else, and
-nothing else calls it.
+A `kernel` calls nothing but what is inlined, so that all of its arithmetic is fused and rounded in
+one place. What is `strict` rounds as written in every process and may call its like; it calls
+nothing else, and nothing else calls it. Callees of both kinds are `parts` of the kernels that call
+them, and compiled alone only when Python calls them.
 """
 
 from __future__ import annotations
@@ -12,12 +12,14 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
-from numba import njit
+from numba import config
 from numba.core import event
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
 
-__all__ = ["FAST", "inline", "inner", "kernel", "pasted", "strict"]
+from softreach.kernels.parts import KernelDispatcher, PartedDispatcher
+
+__all__ = ["FAST", "inline", "kernel", "pasted", "strict"]
 
 _LOG = logging.getLogger(__name__)
 
@@ -32,27 +34,17 @@ check.
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a loop over samples."""
-    return _cached(njit(nogil=True, fastmath=FAST, error_model="numpy")(function))
+    return _cached(_dispatcher(KernelDispatcher, function, fastmath=FAST))
 
 
 def inline(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a small function into its callers; a call left in a loop stops vectorization."""
-    return njit(forceinline=True, nogil=True, fastmath=FAST, error_model="numpy")(function)
-
-
-def inner(function: Callable[..., Any]) -> Callable[..., Any]:
-    """As `inline`, for functions of tuples of tuples; a call from Python ends the process.
-
-    What would make them callable from there takes as long to compile as they do.
-    """
-    no_wrapper: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    options = {"nogil": True, "fastmath": FAST, "error_model": "numpy"} | no_wrapper
-    return njit(forceinline=True, **options)(function)
+    return _dispatcher(PartedDispatcher, function, forceinline=True, fastmath=FAST)
 
 
 def pasted(function: Callable[..., Any]) -> Callable[..., Any]:
     """As `inline`, but before compilation: a large function is then not compiled by itself too."""
-    return njit(inline="always", nogil=True, fastmath=FAST, error_model="numpy")(function)
+    return _dispatcher(KernelDispatcher, function, inline="always", fastmath=FAST)
 
 
 def strict(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -67,7 +59,15 @@ def strict(function: Callable[..., Any]) -> Callable[..., Any]:
     what is compiled on behalf of a caller inherits its flags.
     """
     source = getattr(function, "py_func", function)
-    return _cached(njit(nogil=True, fastmath=False, error_model="numpy")(source))
+    return _cached(_dispatcher(PartedDispatcher, source, fastmath=False))
+
+
+def _dispatcher(made_by: Any, function: Callable[..., Any], **options: Any) -> Any:
+    """A function that is compiled when it is called, unless Numba is told not to compile."""
+    if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
+        return function
+    options |= {"nopython": True, "nogil": True, "error_model": "numpy"}
+    return made_by(function, targetoptions=options)
 
 
 def _cached(function: Any) -> Any:

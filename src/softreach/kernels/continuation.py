@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from softreach.kernels.compiler import inner
+from softreach.kernels.compiler import inline
 from softreach.kernels.lanes import copy, get
 from softreach.kernels.rod import LANES
 from softreach.kernels.vector import dot
@@ -69,7 +69,7 @@ def advance_with(newton, move, extrapolate):
     predict = _predict_with(extrapolate)
     advance = _advance_with(newton, move, _go_back_with(predict), _go_on_with(predict))
 
-    @inner
+    @inline
     def advance_all(w, small, widest):
         waiting = 0
         for i in range(LANES):
@@ -82,7 +82,7 @@ def advance_with(newton, move, extrapolate):
 
 
 def _advance_with(newton, move, go_back, go_on):
-    @inner
+    @inline
     def advance(w, i, small, widest):
         newton(w, i)
         step, missing = get(w, STEP, i), get(w, BEFORE, i)
@@ -102,7 +102,7 @@ def _advance_with(newton, move, go_back, go_on):
 
 
 def _predict_with(extrapolate):
-    @inner
+    @inline
     def predict(w, i, widest):
         w[LOAD + i] = min(1.0, w[HELD_LOAD + i] + w[INCREMENT + i])
         ratio = 0.0
@@ -116,7 +116,7 @@ def _predict_with(extrapolate):
 
 
 def _go_back_with(predict):
-    @inner
+    @inline
     def go_back(w, i, widest):
         w[INCREMENT + i] *= 0.5
         if w[INCREMENT + i] < _SMALLEST_INCREMENT:
@@ -128,7 +128,7 @@ def _go_back_with(predict):
 
 
 def _go_on_with(predict):
-    @inner
+    @inline
     def go_on(w, i, widest):
         w[PAST_LOAD + i] = w[HELD_LOAD + i]
         w[HELD_LOAD + i] = w[LOAD + i]
@@ -142,7 +142,7 @@ def _go_on_with(predict):
     return go_on
 
 
-@inner
+@inline
 def start(w, increment, widest):
     """Begin at TRIAL, with a first share of the load; HELD and PAST are of no load."""
     copy(w, HELD, w, TRIAL, 6 * LANES)

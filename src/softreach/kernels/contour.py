@@ -93,7 +93,7 @@ def stretches(points, cells):
     for v in range(len(points)):
         first = slope(points, v, v // layer, cells[0], layer)
         second = slope(points, v, v % layer // rows, cells[1], rows)
-        third = slope(points, v, v % rows, cells[2], 1)
+        third = slope(points, v, v % rows, cells[2], np.intp(1))  # typed: compiled once
         out[v] = dot(cross(first, second), third)
     return out
 

@@ -23,7 +23,7 @@ from __future__ import annotations
 import numpy as np
 
 from softreach.kernels.compiler import strict
-from softreach.kernels.expansions import scratch
+from softreach.kernels.expansions import SCRATCH
 from softreach.kernels.predicates import (
     collinear,
     insphere,
@@ -49,7 +49,6 @@ __all__ = ["triangulate"]
 INSIDE, UNSURE = np.intp(-1), np.intp(-2)
 
 
-@strict
 def triangulate(points):
     """Insert points in the given order.
 
@@ -60,17 +59,34 @@ def triangulate(points):
         Cells (m, 4), neighbors (m, 4) with -1 outside the hull, and for every point itself or the
         equal point inserted before it, shape (n,). No cells if the points lie in one plane.
     """
-    w = scratch()
-    same = np.arange(len(points))
-    start = first_cell(points, w)
-    if start[3] < 0:
-        return np.empty((0, 4), np.int32), np.empty((0, 4), np.int32), same
+    w, start, same = np.empty(SCRATCH), np.zeros(4, np.int64), np.arange(len(points))
     mesh = empty_triangulation(8 * len(points) + 64)
-    used = set_first_cell(mesh, start)
-    free, last = DEAD, np.intp(0)
     table = np.empty((2, 2048), np.int64)
-    for p in range(len(points)):
-        if p in start:
+    at, walls, used, free, last = _insert(points, mesh, start, same, table, w, 0, 0, DEAD, 0)
+    while at < len(points):
+        mesh, table = enlarged(mesh, used, walls), np.empty((2, max(2048, 32 * walls)), np.int64)
+        at, walls, used, free, last = _insert(
+            points, mesh, start, same, table, w, at, used, free, last
+        )
+    return mesh.cells[:used], mesh.neighbors[:used], same
+
+
+@strict
+def _insert(points, mesh, start, same, table, w, at, used, free, last):
+    """Insert points from number `at` on while there is room; no cells yet if that is 0.
+
+    Memory is left to the caller: a kernel that asks for it takes longer to compile.
+
+    Returns:
+        The first point that was not inserted, and the walls of its cavity; slots used, the head of
+        the freed slots and the last cell, to go on with. Once all are: slots used by finite cells.
+    """
+    if at == 0:
+        used = first_cell(points, mesh, start, w)
+        if used == 0:
+            return len(points), 0, used, free, last
+    for p in range(at, len(points)):
+        if p == start[0] or p == start[1] or p == start[2] or p == start[3]:
             continue
         found = locate(points, mesh, p, last, w)
         twin = twin_in(points, mesh, p, found)
@@ -78,18 +94,15 @@ def triangulate(points):
             same[p] = twin
             continue
         dug, walls = dig(points, mesh, p, found, w)
-        if used + walls > len(mesh.mark):
-            mesh = enlarged(mesh, walls)
-        if 8 * walls > table.shape[1]:
-            table = np.empty((2, 32 * walls), np.int64)
+        if used + walls > len(mesh.mark) or 8 * walls > table.shape[1]:
+            return p, walls, used, free, last
         used, free, last = fill(mesh, p, dug, walls, used, free, table)
-    count = compact(mesh, used)
-    return mesh.cells[:count], mesh.neighbors[:count], same
+    return len(points), 0, compact(mesh, used), free, last
 
 
 @strict
-def first_cell(points, w):
-    """Four points that span space, positively oriented; (0, 0, 0, -1) if there are none."""
+def first_cell(points, mesh, start, w):
+    """Start from four points that span space; return the slots used, 0 if there are none."""
     n = len(points)
     a, b = np.intp(0), np.intp(1)
     while b < n and equal(points, a, b):
@@ -97,14 +110,18 @@ def first_cell(points, w):
     c = b + 1
     while c < n and collinear(points, a, b, c, w):
         c += 1
-    d = c + 1
-    while d < n and orient(points, a, b, c, d, w) == 0.0:
+    d, side = c + 1, 0.0
+    while d < n:
+        side = orient(points, a, b, c, d, w)
+        if side != 0.0:
+            break
         d += 1
     if d >= n:
-        return a, a, a, GHOST
-    if orient(points, a, b, c, d, w) > 0.0:
-        return a, b, c, d
-    return a, c, b, d
+        return 0
+    if side < 0.0:
+        b, c = c, b
+    start[0], start[1], start[2], start[3] = a, b, c, d
+    return set_first_cell(mesh, start)
 
 
 @strict

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from softreach.kernels.compiler import inner, pasted
+from softreach.kernels.compiler import inline, pasted
 from softreach.kernels.continuation import HEAD, LOAD, MARGIN, TRIAL
 from softreach.kernels.explicit_rk8 import at_stages
 from softreach.kernels.lanes import get, put
@@ -24,25 +24,25 @@ PLANE = HEAD + 24 * LANES  # the tangents of G in that plane, a 2 x 2 matrix
 SIZE = HEAD + 28 * LANES
 
 
-@inner
+@inline
 def _six(w, at, i):
     return get(w, at, i) + get(w, at + 3 * LANES, i)
 
 
-@inner
+@inline
 def _put_six(w, at, i, v):
     put(w, at, i, v[:3])
     put(w, at + 3 * LANES, i, v[3:])
 
 
-@inner
+@inline
 def _node(rest, scalars, n, i, share):
     at = 4 * n * LANES + i
     d = (rest[at + LANES], rest[at + 2 * LANES], rest[at + 3 * LANES])
     return rest[at], d, scalars[n, 0], scalars[n, 1], scalars[n, 2], scalars[n, 3] * share
 
 
-@inner
+@inline
 def _nodes(w, rest, scalars, i):
     share = w[LOAD + i]
     return at_stages(
@@ -56,12 +56,12 @@ def _nodes(w, rest, scalars, i):
     )
 
 
-@inner
+@inline
 def _unit(v):
     return times(1.0 / math.sqrt(dot(v, v)), v)
 
 
-@inner
+@inline
 def tangents(g):
     """Two orthonormal directions t1, t2 with t1 × t2 = g."""
     s = math.copysign(1.0, g[2])
@@ -70,7 +70,7 @@ def tangents(g):
     return (1.0 + s * g[0] * g[0] * a, s * b, -s * g[0]), (b, s + g[1] * g[1] * a, -g[1])
 
 
-@inner
+@inline
 def _begin_tip(w, tip, i):
     """State at the tip, theory (62); `tip` holds the payload's lever times weight, and a moment."""
     g, share = get(w, TRIAL, i), w[LOAD + i]
@@ -122,7 +122,7 @@ def walk_tangents(w, rest, scalars, tip):
             _watch(w, i)
 
 
-@inner
+@inline
 def _watch(w, i):
     """Note whether the tangents of G lost their independence during the step, theory (77), (78).
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from softreach.kernels.compiler import inner
+from softreach.kernels.compiler import inline
 
 __all__ = ["NODES", "at_stages", "step_function", "sum3", "sum6"]
 
@@ -17,19 +17,19 @@ NODES = (0.0, (7 - _S) / 14, 0.5, (7 + _S) / 14, 1.0)
 """Lobatto nodes of the unit step."""
 
 
-@inner
+@inline
 def at_stages(nodes):
     """The nodes of the eleven stages from the five of a step."""
     n0, n1, n2, n3, n4 = nodes
     return n0, n2, n2, n3, n3, n2, n1, n1, n2, n3, n4
 
 
-@inner
+@inline
 def _value(x, c, a, b, e, f, g, h):
     return x + c[0] * a + c[1] * b + c[2] * e + c[3] * f + c[4] * g + c[5] * h
 
 
-@inner
+@inline
 def sum3(x, c, a, b, e, f, g, h):
     """x + Σ ci ki of tuples of three; a coefficient that is the literal 0 costs nothing."""
     return (
@@ -39,7 +39,7 @@ def sum3(x, c, a, b, e, f, g, h):
     )
 
 
-@inner
+@inline
 def sum6(x, c, a, b, e, f, g, h):
     """`sum3` of tuples of six."""
     return (
@@ -63,7 +63,7 @@ def step_function(rates, plus):
         plus: A state plus Σ ci ki, of six coefficients and six slopes.
     """
 
-    @inner
+    @inline
     def step(nodes, s):
         k1 = rates(nodes[0], s)
         s2 = plus(s, (1 / 2, 0.0, 0.0, 0.0, 0.0, 0.0), k1, k1, k1, k1, k1, k1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from softreach.kernels.chord import by_inverse
-from softreach.kernels.compiler import inner
+from softreach.kernels.compiler import inline
 from softreach.kernels.continuation import STEP, TRIAL
 from softreach.kernels.frame_step import STATE
 from softreach.kernels.frame_walk import rotation
@@ -16,7 +16,7 @@ from softreach.kernels.vector import combination, cross, dot, plus, times
 __all__ = ["corrected_tip", "respond"]
 
 
-@inner
+@inline
 def _turned_too(columns, i, x, y):
     """y, and what a rotation x at the tip adds to it."""
     for n in range(3):
@@ -24,19 +24,19 @@ def _turned_too(columns, i, x, y):
     return y
 
 
-@inner
+@inline
 def corrected_tip(w, columns, i):
     """The tip as the base sees it, with the step that is left taken linearly."""
     return _turned_too(columns, i, get(w, STEP, i), get(w, STATE + 9 * LANES, i))
 
 
-@inner
+@inline
 def _world(w, at, i):
     g, h = get(w, at, i), get(w, at + 3 * LANES, i)
     return g, h, cross(g, h)
 
 
-@inner
+@inline
 def respond(w, work, columns, first, count, bundles, slopes, compliance):
     """Fill slopes (v, ω), theory (74), and compliances, theory (75), whatever is asked for."""
     for i in range(count):

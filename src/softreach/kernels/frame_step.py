@@ -5,7 +5,7 @@ A workspace is one array of rows of LANES numbers, so that the compiler can prov
 
 from __future__ import annotations
 
-from softreach.kernels.compiler import inner, pasted
+from softreach.kernels.compiler import inline, pasted
 from softreach.kernels.continuation import HEAD, LOAD
 from softreach.kernels.explicit_rk8 import at_stages
 from softreach.kernels.lanes import copy, get, get_four, put, put_four, turn_at
@@ -41,14 +41,14 @@ COLUMN_ROWS = 12
 """Rows of a tangent: θ, δM, δy, and the change of force u."""
 
 
-@inner
+@inline
 def _constants(scalars, n):
     """1/K1, 1/K3 - 1/K1, 1/K0 and the force at one node; read before the loop over lanes."""
     force = (scalars[n, 3], scalars[n, 4], scalars[n, 5])
     return scalars[n, 0], scalars[n, 1], scalars[n, 2], force
 
 
-@inner
+@inline
 def _all_constants(scalars):
     return (
         _constants(scalars, 0),
@@ -59,7 +59,7 @@ def _all_constants(scalars):
     )
 
 
-@inner
+@inline
 def _node(w, c, n, i):
     at, share = REST + 4 * n * LANES, w[LOAD + i]
     bending, twisting, axial, force = c[n]
@@ -67,7 +67,7 @@ def _node(w, c, n, i):
     return w[at + i], get(w, at + LANES, i), bending, twisting, axial, load
 
 
-@inner
+@inline
 def _nodes(w, c, i):
     return at_stages(
         (
@@ -80,7 +80,7 @@ def _nodes(w, c, i):
     )
 
 
-@inner
+@inline
 def _drives(w, change, i):
     a, b, c, d, e = change
     unit = get(w, COLUMN + 9 * LANES, i)
@@ -139,7 +139,7 @@ def _step_column(w, c, change):
         put(w, COLUMN + 6 * LANES, i, dy)
 
 
-@inner
+@inline
 def _drive(w, lanes, rest, bends, change, j):
     """How an activation turns the unloaded arm over a step: δω̂ of theory (73) at its five nodes.
 

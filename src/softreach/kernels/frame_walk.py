@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from softreach.kernels.compiler import inner, pasted
+from softreach.kernels.compiler import inline, pasted
 from softreach.kernels.continuation import LOAD, MARGIN, TRIAL
 from softreach.kernels.frame_step import (
     COLUMN_ROWS,
@@ -28,17 +28,17 @@ TRACE = 19
 force that follows the tip, along G, H, K."""
 
 
-@inner
+@inline
 def _span(jump, at, axes):
     return combination((jump[at], jump[at + 1], jump[at + 2]), axes)
 
 
-@inner
+@inline
 def _turned_by(theta, g, h, k):
     return cross(theta, g), cross(theta, h), cross(theta, k)
 
 
-@inner
+@inline
 def _dead_moment(jump, share, levers, axes):
     """Of a lever and of what does not turn with the arm, theory (67)."""
     l1, l2, l3 = levers
@@ -47,7 +47,7 @@ def _dead_moment(jump, share, levers, axes):
     return plus(m, times(share, _span(jump, 9, axes)))
 
 
-@inner
+@inline
 def _jump(w, columns, count, rest, jump):
     """Loads at the tip end of a step, theory (67): lever x force (3, 3), moment, following two."""
     for i in range(LANES):
@@ -77,7 +77,7 @@ def _jump(w, columns, count, rest, jump):
             put_four(columns[n], 0, i, (theta, dm, dy, unit))
 
 
-@inner
+@inline
 def _begin(w, columns, count, unit_at):
     """The state at the tip, and its tangents, theory (68)."""
     for i in range(LANES):
@@ -98,31 +98,31 @@ def _begin(w, columns, count, unit_at):
             _put_rotations(w, columns, i)
 
 
-@inner
+@inline
 def rotation(w, theta, i):
     """The rotation θ of the section along the directions of the world: φ of theory (68)."""
     g, h = get(w, STATE, i), get(w, STATE + 3 * LANES, i)
     return dot(theta, g), dot(theta, h), dot(theta, cross(g, h))
 
 
-@inner
+@inline
 def _put_rotations(w, columns, i):
     for n in range(3):
         put(w, PLANE + 3 * n * LANES, i, rotation(w, get(columns[n], 0, i), i))
 
 
-@inner
+@inline
 def adjugate_rows(a, b, c):
     """Rows of det(A) A⁻¹ for a matrix of columns a, b, c."""
     return cross(b, c), cross(c, a), cross(a, b)
 
 
-@inner
+@inline
 def _length(a, b, c):
     return math.sqrt(dot(a, a) + dot(b, b) + dot(c, c))
 
 
-@inner
+@inline
 def _watch(w, columns, i):
     """Note whether the rotations lost their independence during the step, theory (77), (78).
 
@@ -173,7 +173,7 @@ def walk(w, columns, count, lanes, rest, tables, bundles, trace):
             _keep(w, rest[k], (STEP_ROWS + 16) * LANES, trace[:, k + 1])
 
 
-@inner
+@inline
 def _keep(w, rest, turn, trace):
     """Put the sections that the lanes are at into their places."""
     for i in range(min(LANES, trace.shape[0])):

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.magnus import exponent
 from softreach.kernels.twist import act, exp_coefficients
 from softreach.kernels.vector import combination, cross
 
 __all__ = ["frames"]
+
+
+_BASE, _MIDDLE, _TIP = np.intp(0), np.intp(1), np.intp(2)
+# typed: a literal would compile the function of a node once more
 
 
 @inline
@@ -49,15 +55,14 @@ def frames(table, ends, gamma, position, directors):
     for sample in range(gamma.shape[0]):
         r = (0.0, 0.0, 0.0)
         d1, d2, d3 = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-        k = 0
+        k, activation = _BASE, gamma[sample]
         for station in range(ends.shape[0]):
             while k < ends[station]:
-                nodes = (
-                    _node(table, k, 0, gamma[sample]),
-                    _node(table, k, 1, gamma[sample]),
-                    _node(table, k, 2, gamma[sample]),
+                base, middle = (
+                    _node(table, k, _BASE, activation),
+                    _node(table, k, _MIDDLE, activation),
                 )
-                omega = exponent(nodes[0], nodes[1], nodes[2])
+                omega = exponent(base, middle, _node(table, k, _TIP, activation))
                 step = act(omega, (0.0, 0.0, 0.0))
                 r = _moved(r, d1, d2, d3, step)
                 d1, d2, d3 = _rotated(d1, d2, d3, omega)

@@ -10,7 +10,7 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.magnus import exponent, exponent_derivative
-from softreach.kernels.rod import LANES, TIP, WORK, load, node_values, nodes_at, walk
+from softreach.kernels.rod import LANES, TIP, clear_tips, load, node_values, nodes_at, room, walk
 from softreach.kernels.twist import add, bracket, dexp
 
 __all__ = ["jacobians"]
@@ -66,18 +66,22 @@ def _walk_column(work, column, table, k, j):
             column[row * LANES + i] = xi[row]
 
 
-@kernel
 def jacobians(table, gamma, tips, out):
     """Tips (n, 3) and spatial Jacobians (n, 6, bundle), linear rows first, of n activations."""
+    columns = np.empty((gamma.shape[1], 6 * LANES))
+    _jacobians(table, gamma, *room(table), columns, tips, out)
+
+
+@kernel
+def _jacobians(table, gamma, work, lanes, columns, tips, out):
     bundles = gamma.shape[1]
-    work = np.zeros(WORK)
-    lanes = np.zeros((table.shape[2] - 1, LANES))
-    columns = np.zeros((bundles, 6 * LANES))
     for first in range(0, gamma.shape[0], LANES):
         count = min(LANES, gamma.shape[0] - first)
         load(lanes, gamma, first, count)
-        work[TIP:] = 0.0
-        columns[:] = 0.0
+        clear_tips(work)
+        for j in range(bundles):
+            for i in range(6 * LANES):
+                columns[j, i] = 0.0
         for k in range(table.shape[0] - 1, -1, -1):
             node_values(work, lanes, table, k)
             for j in range(bundles):

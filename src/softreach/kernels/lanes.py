@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from softreach.kernels.compiler import inner
+from softreach.kernels.compiler import inline
 from softreach.kernels.rod import LANES, load
 
 __all__ = ["copy", "get", "get_four", "load_all", "put", "put_four", "turn_at"]
 
 
-@inner
+@inline
 def get(w, at, i):
     """Three rows of one lane."""
     return w[at + i], w[at + LANES + i], w[at + 2 * LANES + i]
 
 
-@inner
+@inline
 def put(w, at, i, v):
     """Write three rows of one lane."""
     w[at + i] = v[0]
@@ -22,7 +22,7 @@ def put(w, at, i, v):
     w[at + 2 * LANES + i] = v[2]
 
 
-@inner
+@inline
 def get_four(w, at, i):
     """Four vectors of one lane."""
     return (
@@ -33,7 +33,7 @@ def get_four(w, at, i):
     )
 
 
-@inner
+@inline
 def put_four(w, at, i, s):
     """Write four vectors of one lane."""
     put(w, at, i, s[0])
@@ -42,20 +42,20 @@ def put_four(w, at, i, s):
     put(w, at + 9 * LANES, i, s[3])
 
 
-@inner
+@inline
 def turn_at(w, at, i):
     """A quaternion in four rows of one lane."""
     return w[at + i], w[at + LANES + i], w[at + 2 * LANES + i], w[at + 3 * LANES + i]
 
 
-@inner
+@inline
 def copy(into, at, values, start, count):
     """A loop: an assignment of slices would compile messages for shapes that do not fit."""
     for i in range(count):
         into[at + i] = values[start + i]
 
 
-@inner
+@inline
 def load_all(lanes, gamma, first, count):
     """Lay activations side by side; lanes to spare repeat the last one."""
     load(lanes, gamma, first, count)

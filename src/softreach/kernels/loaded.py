@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from softreach.kernels.chord import by_inverse, chord_with, keep_inverse
-from softreach.kernels.compiler import inner, kernel
+from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.continuation import (
     BEFORE,
     DONE,
@@ -51,19 +51,19 @@ TARGET = SIZE  # gravity as seen by the base, in the frame of the walk
 WHOLE = SIZE + 3 * LANES
 
 
-@inner
+@inline
 def _unit(v):
     return times(1.0 / math.sqrt(dot(v, v)), v)
 
 
-@inner
+@inline
 def _missing(w, i):
     """What is missing at the base, in the plane normal to G(0), which steps do not keep at 1."""
     g, t = get(w, X, i), get(w, TARGET, i)
     return minus(t, times(dot(g, t) / dot(g, g), g))
 
 
-@inner
+@inline
 def _newton(w, i):
     """The Newton step of G(L), theory (69), and its linear map, kept for the chord steps."""
     g, a, b = get(w, X, i), get(w, A, i), get(w, B, i)
@@ -83,18 +83,18 @@ def _newton(w, i):
     put(w, STEP, i, by_inverse(w, i, missing))
 
 
-@inner
+@inline
 def _move(w, i):
     put(w, TRIAL, i, _unit(plus(get(w, TRIAL, i), get(w, STEP, i))))
 
 
-@inner
+@inline
 def _move_all(w):
     for i in range(LANES):
         _move(w, i)
 
 
-@inner
+@inline
 def _extrapolate(w, i, ratio):
     """The secant of theory (71)."""
     g, p = get(w, HELD, i), get(w, PAST, i)
@@ -105,7 +105,7 @@ _advance_all = advance_with(_newton, _move, _extrapolate)
 _chord_all = chord_with(_missing, _move)
 
 
-@inner
+@inline
 def _aim(w, work, gravity):
     """What the base must see, in the frame of the walk, theory (65)."""
     for i in range(LANES):
@@ -113,7 +113,7 @@ def _aim(w, work, gravity):
         put(w, TARGET, i, turned(q, (gravity[0], gravity[1], gravity[2])))
 
 
-@inner
+@inline
 def _set_out(w, work, guesses, first, count, increment, widest):
     """Begin from the unloaded arm, or where a guess is given, there."""
     for i in range(LANES):
@@ -171,7 +171,7 @@ def solve(gamma, gravity, tip, guesses, coarse, fine, limits, most, out):
         _store(w, work, first, count, tiny, walks, out)
 
 
-@inner
+@inline
 def _store(w, work, first, count, tiny, walks, out):
     for i in range(count):
         q, n = back(turn_at(work, TURN, i)), first + i

@@ -19,19 +19,19 @@ driven by its values at the tip, by a change of force u, or by a change of activ
 
 from __future__ import annotations
 
-from softreach.kernels.compiler import inner
+from softreach.kernels.compiler import inline
 from softreach.kernels.explicit_rk8 import step_function, sum3
 from softreach.kernels.vector import combination, cross, dot, plus, times
 
 __all__ = ["column_step", "state_step"]
 
 
-@inner
+@inline
 def _mix(a, x, b, y):
     return a * x[0] + b * y[0], a * x[1] + b * y[1], a * x[2] + b * y[2]
 
 
-@inner
+@inline
 def _internal(node, s):
     """Force, twist and stretch of a section, and how the step turns the frame."""
     length, d, bending, twisting, axial, load = node
@@ -41,7 +41,7 @@ def _internal(node, s):
     return n, twist, stretch, _mix(length * bending, m, length * twist, d)
 
 
-@inner
+@inline
 def _rates(node, s):
     """Changes over the step; node = (ℓ, d, 1/K1, 1/K3 - 1/K1, 1/K0, (n1, n2, n3))."""
     length, d = node[0], node[1]
@@ -52,7 +52,7 @@ def _rates(node, s):
     return cross(turn, g), cross(turn, h), cross(d, push), plus(cross(turn, y), along)
 
 
-@inner
+@inline
 def _tangent_rates(place, t):
     """Product rule on `_rates`, theory (73); place = (node, state, (δℓ, turn, u))."""
     node, s, (d_length, d_turn, unit) = place
@@ -71,7 +71,7 @@ def _tangent_rates(place, t):
     )
 
 
-@inner
+@inline
 def _plus(s, c, a, b, e, f, g, h):
     return (
         sum3(s[0], c, a[0], b[0], e[0], f[0], g[0], h[0]),
@@ -81,7 +81,7 @@ def _plus(s, c, a, b, e, f, g, h):
     )
 
 
-@inner
+@inline
 def _plus_tangent(s, c, a, b, e, f, g, h):
     return (
         sum3(s[0], c, a[0], b[0], e[0], f[0], g[0], h[0]),

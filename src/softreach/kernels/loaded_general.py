@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from softreach.kernels.chord import by_inverse, chord_with, keep_inverse
-from softreach.kernels.compiler import inner, kernel
+from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.continuation import (
     BEFORE,
     DONE,
@@ -44,7 +44,7 @@ AXIAL = SIZE  # whether no load turns with the world about its first axis
 WHOLE = SIZE + 1
 
 
-@inner
+@inline
 def _missing(w, i):
     """The rotation that the base lacks, along the directions of the world.
 
@@ -62,13 +62,13 @@ def _missing(w, i):
     return times(scale, (dot(twice, g), dot(twice, h), dot(twice, k)))
 
 
-@inner
+@inline
 def _determinant(w, i):
     a, b, c = get(w, PLANE, i), get(w, PLANE + 3 * LANES, i), get(w, PLANE + 6 * LANES, i)
     return dot(a, cross(b, c))
 
 
-@inner
+@inline
 def _newton(w, i):
     """The Newton step of the frame at the tip, theory (69), and the inverse that gives it."""
     a, b, c = get(w, PLANE, i), get(w, PLANE + 3 * LANES, i), get(w, PLANE + 6 * LANES, i)
@@ -81,21 +81,21 @@ def _newton(w, i):
     put(w, STEP, i, by_inverse(w, i, missing))
 
 
-@inner
+@inline
 def _orthonormal(g, h):
     g = times(1.0 / math.sqrt(dot(g, g)), g)
     h = minus(h, times(dot(g, h), g))
     return g, times(1.0 / math.sqrt(dot(h, h)), h)
 
 
-@inner
+@inline
 def _put_frame(w, i, g, h):
     g, h = _orthonormal(g, h)
     put(w, TRIAL, i, g)
     put(w, TRIAL + 3 * LANES, i, h)
 
 
-@inner
+@inline
 def _move(w, i):
     """Turn the frame of the tip by the step."""
     x = get(w, STEP, i)
@@ -109,7 +109,7 @@ def _move(w, i):
     _put_frame(w, i, g, h)
 
 
-@inner
+@inline
 def _extrapolate(w, i, ratio):
     """The secant of theory (71)."""
     g, p = get(w, HELD, i), get(w, PAST, i)
@@ -121,7 +121,7 @@ _advance_all = advance_with(_newton, _move, _extrapolate)
 _chord_all = chord_with(_missing, _move)
 
 
-@inner
+@inline
 def _aim(w, work, axes):
     """What the base must see, in the frame of the walk, theory (65)."""
     for i in range(LANES):
@@ -130,7 +130,7 @@ def _aim(w, work, axes):
         put(w, TARGET + 3 * LANES, i, turned(q, (axes[1, 0], axes[1, 1], axes[1, 2])))
 
 
-@inner
+@inline
 def _set_out(w, work, guesses, first, count, increment, widest):
     """Begin from the unloaded arm, or where a guess is given, there."""
     copy(w, TRIAL, w, TARGET, 6 * LANES)
@@ -143,7 +143,7 @@ def _set_out(w, work, guesses, first, count, increment, widest):
             _put_frame(w, i, g, h)
 
 
-@inner
+@inline
 def _improve(w, turn, limits):
     """A Newton step before the first turn of chord steps; how many lanes are at work still."""
     if turn < 0:
@@ -151,7 +151,7 @@ def _improve(w, turn, limits):
     return _chord_all(w, turn, limits[3] * limits[3])
 
 
-@inner
+@inline
 def _move_all(w):
     for i in range(LANES):
         _move(w, i)
@@ -214,7 +214,7 @@ def solve(gamma, axes, guesses, coarse, fine, limits, most, found, slopes, compl
         _store(w, work, columns, first, count, turn, walks, tiny, found)
 
 
-@inner
+@inline
 def _store(w, work, columns, first, count, turn, walks, tiny, found):
     for i in range(count):
         q, n = back(turn_at(work, TURN, i)), first + i

@@ -12,14 +12,14 @@ is each of its tangents.
 
 from __future__ import annotations
 
-from softreach.kernels.compiler import inner
+from softreach.kernels.compiler import inline
 from softreach.kernels.explicit_rk8 import step_function, sum3, sum6
 from softreach.kernels.vector import cross, dot
 
 __all__ = ["tangent_step", "tip_step"]
 
 
-@inner
+@inline
 def _rate(node, x):
     """Change of (G, M) over the step at one node; node = (ℓ, d, 1/K1, 1/K3 - 1/K1, 1/K0, w)."""
     length, d, bending, twisting, axial, w = node
@@ -32,7 +32,7 @@ def _rate(node, x):
     return turn + cross(d, push)
 
 
-@inner
+@inline
 def _tip_rate(node, x, y):
     """Change of the tip y as the section sees it."""
     length, d, bending, twisting, axial, w = node
@@ -43,7 +43,7 @@ def _tip_rate(node, x, y):
     return turn[0] + zeta * d[0], turn[1] + zeta * d[1], turn[2] + zeta * d[2]
 
 
-@inner
+@inline
 def _tangent_rate(node, x, t):
     """Product rule on `_rate`, for the tangents of theory (68)."""
     length, d, bending, twisting, axial, w = node
@@ -63,12 +63,12 @@ def _tangent_rate(node, x, t):
     return (turn[0] + more[0], turn[1] + more[1], turn[2] + more[2]) + cross(d, push)
 
 
-@inner
+@inline
 def _tip_rates(node, s):
     return _rate(node, s[0]), _tip_rate(node, s[0], s[1])
 
 
-@inner
+@inline
 def _tip_plus(s, c, a, b, e, f, g, h):
     return (
         sum6(s[0], c, a[0], b[0], e[0], f[0], g[0], h[0]),
@@ -76,12 +76,12 @@ def _tip_plus(s, c, a, b, e, f, g, h):
     )
 
 
-@inner
+@inline
 def _tangent_rates(node, s):
     return _rate(node, s[0]), _tangent_rate(node, s[0], s[1]), _tangent_rate(node, s[0], s[2])
 
 
-@inner
+@inline
 def _tangent_plus(s, c, a, b, e, f, g, h):
     return (
         sum6(s[0], c, a[0], b[0], e[0], f[0], g[0], h[0]),

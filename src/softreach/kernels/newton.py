@@ -65,8 +65,10 @@ def newton_step(search, active, tips, slopes, low, high, tol):
         # each full step quarters its residual.
         if residual < (1.0 - _SUFFICIENT * search.damping[n]) * search.residual[n]:
             search.residual[n] = residual
-            search.gamma[n] = search.trial[n]
-            search.slope[n] = slopes[k]
+            _copy(search.trial, n, search.gamma)
+            for i in range(3):
+                for j in range(3):
+                    search.slope[n, i, j] = slopes[k, i, j]
             x, y, z = _solution(matrix(slopes, k), miss)
             search.step[n, 0], search.step[n, 1], search.step[n, 2] = x, y, z
             _shorten(search.step, n, low, high)
@@ -80,11 +82,18 @@ def newton_step(search, active, tips, slopes, low, high, tol):
         # Near a fold a small residual says little about γ: there the search goes on while it can.
         if search.damping[n] < _LEAST_DAMPING:
             search.state[n] = CONVERGED if search.residual[n] <= tol else STAGNATED
-            search.trial[n] = search.gamma[n]
+            _copy(search.gamma, n, search.trial)
         else:
             enough = _STEP_TOL if search.residual[n] <= tol else _TINY_STEP
             if _length(search.step, n, low, high) <= enough:
                 search.state[n] = CONVERGED
+
+
+@inline
+def _copy(points, n, to):
+    """Row n; numba compiles the assignment of a row with all that could go wrong, for seconds."""
+    for j in range(3):
+        to[n, j] = points[n, j]
 
 
 @inline

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from softreach.kernels.compiler import inner
+from softreach.kernels.compiler import inline
 from softreach.kernels.vector import cross, plus, times
 
 __all__ = ["back", "turned"]
 
 
-@inner
+@inline
 def turned(q, p):
     """q p q*."""
     v = q[1], q[2], q[3]
@@ -16,7 +16,7 @@ def turned(q, p):
     return plus(p, plus(times(q[0], t), cross(v, t)))
 
 
-@inner
+@inline
 def back(q):
     """The quaternion that turns back."""
     return -q[0], q[1], q[2], q[3]

@@ -12,7 +12,19 @@ from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.magnus import exponent
 from softreach.kernels.twist import act
 
-__all__ = ["LANES", "TIP", "WORK", "load", "node_values", "nodes_at", "pack", "tips", "walk"]
+__all__ = [
+    "LANES",
+    "TIP",
+    "WORK",
+    "clear_tips",
+    "load",
+    "node_values",
+    "nodes_at",
+    "pack",
+    "room",
+    "tips",
+    "walk",
+]
 
 LANES = 128
 """Samples side by side: whole blocks only, so a sample's result never depends on its neighbors."""
@@ -94,6 +106,13 @@ def _twist(length, u1, u2, u3):
 
 
 @inline
+def clear_tips(work):
+    """Put the point of every lane at the origin."""
+    for i in range(TIP, WORK):
+        work[i] = 0.0
+
+
+@inline
 def walk(work):
     """Carry the point of every lane across one step, toward the base."""
     for i in range(LANES):
@@ -105,15 +124,25 @@ def walk(work):
         work[TIP + 2 * LANES + i] = z
 
 
-@kernel
+def room(table):
+    """Scratch of one call: a workspace and the lanes of activations.
+
+    Made here, as a kernel that makes its own takes longer to compile.
+    """
+    return np.zeros(WORK), np.zeros((table.shape[2] - 1, LANES))
+
+
 def tips(table, gamma, out):
     """Tip positions: (n, bundle) activations into (n, 3) `out`, in the units of `table`."""
-    work = np.zeros(WORK)
-    lanes = np.zeros((table.shape[2] - 1, LANES))
+    _tips(table, gamma, *room(table), out)
+
+
+@kernel
+def _tips(table, gamma, work, lanes, out):
     for first in range(0, gamma.shape[0], LANES):
         count = min(LANES, gamma.shape[0] - first)
         load(lanes, gamma, first, count)
-        work[TIP:] = 0.0
+        clear_tips(work)
         for k in range(table.shape[0] - 1, -1, -1):
             node_values(work, lanes, table, k)
             walk(work)

@@ -46,7 +46,6 @@ class Triangulation(NamedTuple):
     walls: np.ndarray
 
 
-@strict
 def empty_triangulation(size):
     """One with room for ``size`` cells; memory is touched only as cells come."""
     return Triangulation(
@@ -58,18 +57,11 @@ def empty_triangulation(size):
     )
 
 
-@strict
-def enlarged(mesh, more):
-    """A copy with at least ``more`` further slots."""
-    size = len(mesh.mark)
-    larger = empty_triangulation(size + size // 2 + more)
-    for t in range(size):  # loops, as slices of arrays take seconds to compile
-        for i in range(4):
-            larger.cells[t, i] = mesh.cells[t, i]
-            larger.neighbors[t, i] = mesh.neighbors[t, i]
-        larger.mark[t] = mesh.mark[t]
-        larger.dug[t] = mesh.dug[t]
-        larger.walls[2 * t], larger.walls[2 * t + 1] = mesh.walls[2 * t], mesh.walls[2 * t + 1]
+def enlarged(mesh, used, more):
+    """A copy with at least ``more`` further slots, and no cavity noted."""
+    larger = empty_triangulation(len(mesh.mark) + len(mesh.mark) // 2 + more)
+    larger.cells[:used], larger.neighbors[:used] = mesh.cells[:used], mesh.neighbors[:used]
+    larger.mark[:used] = -1
     return larger
 
 

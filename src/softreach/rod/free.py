@@ -118,11 +118,9 @@ class FreeRod(ArmRod):
         """Packed tables with a step boundary at every station, and the steps up to each."""
         if len(z) == 1 and z[0] == self.length:
             return self._tip_table
-        nodes, ends = self.rule.station_nodes(z, self._shape_steps)
-        return rod.pack(*nodes), ends
+        return self.rule.packed_stations(z, self._shape_steps)
 
     @cached_property
     def _tip_table(self) -> tuple[Array, NDArray[np.int64]]:
         steps = max(self._fineness, self.rule.fewest_for_frames)
-        nodes, ends = self.rule.station_nodes(np.array([self.length]), steps)
-        return rod.pack(*nodes), ends
+        return self.rule.packed_stations(np.array([self.length]), steps)

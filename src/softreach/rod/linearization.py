@@ -91,7 +91,7 @@ class Linearization:
         n = len(centers)
         longest, bending = np.empty(n), np.empty(n)
         offset = (1.0 + self.stretch @ half_widths) / self.longest
-        relative_strains(centers, offset, *self._relative, longest, bending)
+        relative_strains(np.ascontiguousarray(centers), offset, *self._relative, longest, bending)
         bending = np.sqrt(bending) + (self.size @ half_widths * self._bending_inverse).max()
         square, terms = self._terms(half_widths)
         return square * np.asarray(terms.sum(np.minimum(longest, 1.0), np.minimum(bending, 1.0)))

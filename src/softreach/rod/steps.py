@@ -91,9 +91,7 @@ class StepRule:
         return self._packed(self.edges(steps))
 
     def _packed(self, edges: Array) -> Array:
-        table = rod.pack(*self.nodes(edges))
-        table.setflags(write=False)
-        return table
+        return _read_only(rod.pack(*self.nodes(edges)))
 
     def _halves(self, steps: int) -> tuple[Array, Array]:
         """Packed tables of the steps, and of both halves of each."""
@@ -113,6 +111,11 @@ class StepRule:
         profile = self.arm.profile
         ends = np.cumsum(np.append(0, step_counts(profile, np.diff(marks), steps)))
         return self.nodes(edges_between(profile, marks, steps)), ends[np.searchsorted(marks, s)]
+
+    def packed_stations(self, stations: Array, steps: int) -> tuple[Array, NDArray[np.int64]]:
+        """`station_nodes` as a packed table, read-only."""
+        nodes, ends = self.station_nodes(stations, steps)
+        return _read_only(rod.pack(*nodes)), ends
 
     def steps_for(self, tol: float) -> int:
         """The number of uniform steps in S for which no tip is off by more than `tol`.
@@ -228,6 +231,12 @@ def edges_between(profile: Profile, marks: Array, steps: int) -> Array:
 def step_counts(profile: Profile, gaps: Array, steps: int) -> NDArray[np.int64]:
     """Steps in each gap of S; a gap that only rounding makes longer takes no more for it."""
     return np.ceil(gaps * (steps / profile.slender_length) - 1e-9).astype(np.int64)
+
+
+def _read_only(table: Array) -> Array:
+    """The same for all tables: kernels are compiled once more for those that can be written."""
+    table.setflags(write=False)
+    return table
 
 
 def check_tol(tol: float) -> float:

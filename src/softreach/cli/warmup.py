@@ -1,0 +1,95 @@
+"""`softreach warmup`: compile all kernels now, so that no later command has to."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Callable
+from functools import partial
+from typing import Annotated
+
+from cyclopts import Parameter
+
+__all__ = ["warmup"]
+
+
+def warmup(
+    *,
+    loads: Annotated[
+        bool, Parameter(help="Also what arms under loads need: half a minute more.")
+    ] = False,
+) -> None:
+    """Compile every kernel into the cache on disk; with a full cache that is done in seconds.
+
+    Example: softreach warmup
+    """
+    from softreach.progress import bar
+
+    jobs = [*_free(), *(_loaded() if loads else ())]
+    with bar("compiling", len(jobs)) as done, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of clouds and grids that are too coarse
+        for job in jobs:
+            job()
+            done(1)
+    sys.stdout.write("all kernels are compiled\n")
+
+
+def _free() -> list[Callable[[], object]]:
+    """Small jobs that together call every kernel but those of loads."""
+    from softreach import workspace
+    from softreach.arm import designs
+    from softreach.inverse import solve_inverse
+    from softreach.path import track_path
+    from softreach.rod.kinematics import configuration, tip_jacobian
+
+    arm, redundant = designs.minimal_trunk(), designs.redundant_trunk()
+    target = (0.2, 0.1, 0.6)
+    path = (target, (0.2, 0.1, 0.61))
+    return [
+        _hulls,
+        partial(tip_jacobian, arm, [[-1.0, 0.0, -0.4]]),
+        partial(configuration, arm, [-1.0, 0.0, -0.4]),
+        partial(workspace.reachable_set, arm, accuracy=0.1),
+        partial(solve_inverse, arm, [target]),
+        partial(track_path, arm, path),
+        partial(workspace.direction_spread, arm, n=1024),
+        partial(workspace.reachable_set, redundant, accuracy=0.1),
+        partial(solve_inverse, redundant, [target], near=[-0.5] * 4),
+        partial(solve_inverse, redundant, [target], prove_least=True),
+        partial(track_path, redundant, path),
+    ]
+
+
+def _hulls() -> None:
+    """What is computed from a cloud."""
+    from softreach.arm import designs
+    from softreach.cloud import compute_cloud
+    from softreach.geometry.surface import Surface
+    from softreach.redundancy import activation_distance
+    from softreach.volume import concave_hull
+
+    cloud = compute_cloud(designs.minimal_trunk(), 2000)
+    concave_hull(cloud.tip, alpha=0.2)
+    hull = concave_hull(cloud.tip, alpha="critical")
+    Surface(vertices=hull.vertices, faces=hull.faces).distance(hull.vertices[:2])
+    activation_distance(cloud, 0.1)
+
+
+def _loaded() -> list[Callable[[], object]]:
+    """Small jobs that together call the kernels of loads."""
+    from softreach.arm import designs
+    from softreach.arm.loads import Loads
+    from softreach.rod.kinematics import configuration, tip_jacobian, tip_positions
+
+    free = designs.lce_arm()
+    kinds = (
+        Loads(gravity=(0, 0, 9.81), payload=0.001),
+        Loads(follower_force=(0, 0.001, 0)),
+    )
+    arms = [free.replace(loads=loads) for loads in kinds]
+    rest = [0.0] * free.bundles
+    functions = (partial(f, arm) for arm in arms for f in (tip_positions, tip_jacobian))
+    return [
+        *(partial(f, [rest]) for f in functions),
+        *(partial(configuration, arm, rest) for arm in arms),
+    ]

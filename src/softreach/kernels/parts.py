@@ -1,0 +1,136 @@
+"""What kernels call: handed over as it is written, and compiled where it is called.
+
+Numba compiles a callee as if it were called from Python as well: it wraps it, optimizes it, turns
+it into machine code, and then optimizes it again with each caller. A part stops after lowering, in
+a library that its callers link. What they inline is optimized with them alone; the rest once by
+itself too, as it runs slower otherwise (`design/cold_start.md`).
+"""
+
+from __future__ import annotations
+
+import gc
+import threading
+from collections.abc import Callable
+from typing import Any, Literal
+
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import register_pass
+from numba.core.registry import CPUDispatcher
+from numba.core.typed_passes import NativeLowering
+
+__all__ = ["KernelDispatcher", "PartedDispatcher"]
+
+
+class _PartLibrary(JITCodeLibrary):
+    """Code to be linked, of which its callers make machine code."""
+
+    inlined = False
+    """Whether callers must inline it: then it is optimized with them, else once, by itself."""
+
+    def finalize(self) -> None:
+        """Link what the part calls itself."""
+        for library in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(library._reload_init)
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        if not self.inlined:
+            self._optimize_final_module()
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+class _Key:
+    """Stands for a part where Numba keeps the entry point of what is compiled."""
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _PartLowering(NativeLowering):
+    """Lowering without compilation."""
+
+    _name = "softreach_part_lowering"
+
+    def run_pass(self, state: Any) -> Literal[True]:
+        """Lower the function into a library of its own."""
+        state.flags.no_compile = True
+        state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.inlined = state.flags.forceinline
+        super().run_pass(state)
+        key, lowered = _Key(), state["cr"]
+        state.targetctx.insert_user_function(key, lowered.fndesc, [state.library])
+        state["cr"] = lowered._replace(cfunc=key)
+        return True
+
+
+class _PartCompiler(CompilerBase):
+    """Numba's passes, the last of which does not compile."""
+
+    def define_pipelines(self) -> list[Any]:
+        """The one pipeline."""
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.passes = [
+            (_PartLowering, text) if step is NativeLowering else (step, text)
+            for step, text in passes.passes
+        ]
+        passes.finalize()
+        return [passes]
+
+
+class _Pause:
+    """Stops the collection of cyclic garbage, of which a compiler makes none worth the search."""
+
+    def __init__(self) -> None:
+        """Running."""
+        self._lock, self._depth, self._resume = threading.Lock(), 0, False
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._depth == 0:
+                self._resume = gc.isenabled()
+                gc.disable()
+            self._depth += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._depth -= 1
+            if self._depth == 0 and self._resume:
+                gc.enable()
+
+
+_PAUSE = _Pause()
+
+
+class KernelDispatcher(CPUDispatcher):
+    """A function that is called from Python."""
+
+    def compile(self, sig: Any) -> Any:
+        """Compile for one set of types, or load what is cached."""
+        with _PAUSE:
+            return super().compile(sig)
+
+
+class _Part(CPUDispatcher):
+    """A function as part of those that call it; Python cannot."""
+
+    def add_overload(self, cres: Any) -> None:
+        """Keep what was lowered, but not for callers in Python."""
+        self.overloads[tuple(cres.signature.args)] = cres
+
+
+class PartedDispatcher(KernelDispatcher):
+    """A function that is compiled whole for callers in Python and is a part of other kernels."""
+
+    def __init__(self, function: Callable[..., Any], *, targetoptions: dict[str, Any]) -> None:
+        """Nothing is compiled before the first call."""
+        super().__init__(function, targetoptions=targetoptions)
+        alone = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        self._part = _Part(
+            function, targetoptions=targetoptions | alone, pipeline_class=_PartCompiler
+        )
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """The types of a call in a kernel."""
+        return self._part.get_call_template(args, kws)
+
+    def get_overload(self, sig: Any) -> Any:
+        """What a kernel calls."""
+        return self._part.get_overload(sig)
