@@ -1,0 +1,64 @@
+"""What every refusal has in common: one clear line, at once, and nothing lost."""
+
+from __future__ import annotations
+
+import resource
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from softreach.cli.app import run
+from softreach.errors import SoftreachError
+
+__all__ = ["files_in", "raised_by", "refusal_of", "within_budget"]
+
+SECONDS = 2.0  # of processor time: compilation is done before, by `warm`
+BYTES = 1e9
+
+
+def files_in(folder: Path) -> dict[str, bytes | None]:
+    """Every file below the folder with what it holds, and the folders."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None
+        for path in folder.rglob("*")
+    }
+
+
+@contextmanager
+def within_budget() -> Iterator[None]:
+    """At most two seconds of processor time and a gigabyte more than before."""
+    seconds, peak = time.process_time(), _peak()
+    yield
+    assert time.process_time() - seconds < SECONDS
+    assert _peak() - peak < BYTES
+
+
+def _peak() -> float:
+    return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+def refusal_of(arguments: list[str], capsys: pytest.CaptureFixture[str], folder: Path) -> str:
+    """The one line that a command answers, which must leave `folder` as it was."""
+    before = files_in(folder)
+    capsys.readouterr()
+    with within_budget():
+        code = run(arguments)
+    printed = capsys.readouterr()
+    assert code == 2, f"exit code {code}: {printed.out} {printed.err}"
+    assert printed.out == ""
+    assert "Traceback" not in printed.err
+    assert printed.err.count("\n") == 1, printed.err
+    assert len(printed.err) < 1_000
+    assert files_in(folder) == before
+    return printed.err
+
+
+def raised_by(call: Callable[[], object]) -> SoftreachError:
+    """The error of a call in Python, which must be one that softreach raises on purpose."""
+    with within_budget(), pytest.raises(SoftreachError) as caught:
+        call()
+    assert len(str(caught.value)) < 1_000
+    return caught.value
