@@ -30,8 +30,9 @@ $(READY): requirements.lock pyproject.toml
 demo: setup
 	$(BIN)/softreach demo --out out
 
+# Files of tests side by side, up to four on as many cores.
 test: check browser
-	$(BIN)/python -m pytest -q
+	$(BIN)/python -m pytest -q --numprocesses auto --maxprocesses 4 --dist loadfile
 
 # The studio is tested in a real browser. Only root installs one; whoever has none is told at the end
 # of the tests what to type.
