@@ -28,6 +28,7 @@ from softreach.rod.loaded_steps import (
     shape_differences,
     tip_differences,
 )
+from softreach.rod.never_at_rest import none_of, too_heavy
 from softreach.rod.pilot import pilot_activations
 from softreach.rod.tip_map import (
     BLOCK,
@@ -235,8 +236,7 @@ class LoadedRod(ArmRod):
         gamma = pilot_activations(self.arm, self.box)
         found = self.strains_at(stations)(gamma)
         if np.isnan(found.extension).all():
-            tried = f"{len(gamma)} activations tried have no equilibrium"
-            raise InvalidInput("loads", tried, "such that some have one", "lighten the load")
+            raise too_heavy(none_of(len(gamma), "an equilibrium"))
         bend = np.hypot(found.curvature[..., 0], found.curvature[..., 1])
         return StrainRange(
             np.stack([np.zeros(bend.shape[1]), np.nanmax(bend, axis=0)], axis=1),

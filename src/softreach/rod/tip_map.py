@@ -233,9 +233,10 @@ class TipMap(ABC):
         """Tips [m], shape (n, 3), and their derivatives ∂r/∂γ [m], shape (n, 3, bundles)."""
         gamma = self.box.check(activations)
         tips, slopes = np.empty((len(gamma), 3)), np.empty((len(gamma), 3, self.box.bundles))
+        size = BLOCK // (16 if self.supports_unstable else 8)  # an equilibrium takes a search
         parallel.run(
             partial(self.fill_slopes, gamma[b], tips[b], slopes[b])
-            for b in parallel.blocks(len(gamma), BLOCK // 8)
+            for b in parallel.blocks(len(gamma), size)
         )
         return tips, slopes
 

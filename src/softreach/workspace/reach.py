@@ -14,6 +14,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput, SoftreachWarning
 from softreach.memory import free_memory
 from softreach.progress import Progress, silent
+from softreach.rod.never_at_rest import too_heavy
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.workspace import measure
 from softreach.workspace.box_grid import corners_of, every_second, grid_stretches, grid_tips
@@ -273,7 +274,7 @@ def _reached(tips: Array, left_out: NDArray[np.bool_]) -> Array:
     used = corners_of(~left_out).ravel()
     if not used.any():
         found = f"no cell of an activation grid of {len(left_out)}³ has a stable, untorn image"
-        raise InvalidInput("loads", found, "such that some have one", "lighten the load")
+        raise too_heavy(found)
     return tips[used]
 
 
