@@ -1,7 +1,8 @@
 """The rod: activation box, tip map, and the kinematics that a user asks."""
 
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.all_equilibria import AllEquilibria, equilibria
+from softreach.rod.all_equilibria import AllEquilibria
+from softreach.rod.equilibria_by_degree import equilibria
 from softreach.rod.found_equilibria import Equilibria
 from softreach.rod.free_bundles import FreeBundles, free_bundles
 from softreach.rod.kinematics import configuration, tip_jacobian, tip_positions
