@@ -14,7 +14,8 @@ from softreach import schema
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
 from softreach.rod.activation_box import as_floats
-from softreach.rod.tip_map import Frames, Strains, TipMap, tip_map
+from softreach.rod.frames import Frames, Strains
+from softreach.rod.tip_map import TipMap, tip_map
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -17,6 +17,7 @@ from softreach.kernels.rod import LANES
 from softreach.rod.arm_rod import ArmRod
 from softreach.rod.equilibrium import LATER_RUNGS, Solver
 from softreach.rod.found_equilibria import Equilibria, Response
+from softreach.rod.frames import Frames, StrainRange, Strains, TipMotions, position_slopes
 from softreach.rod.free import FreeRod
 from softreach.rod.linear_strains import linear_strains
 from softreach.rod.load_phase import check_phase
@@ -30,14 +31,7 @@ from softreach.rod.loaded_steps import (
 )
 from softreach.rod.never_at_rest import none_of, too_heavy
 from softreach.rod.pilot import pilot_activations
-from softreach.rod.tip_map import (
-    BLOCK,
-    Frames,
-    StrainRange,
-    Strains,
-    TipMotions,
-    position_slopes,
-)
+from softreach.rod.tip_map import BLOCK
 
 __all__ = ["LoadedRod"]
 
