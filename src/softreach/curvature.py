@@ -18,8 +18,9 @@ from softreach.arm.manipulator import Manipulator
 from softreach.cloud import tip_map_of
 from softreach.errors import InvalidInput
 from softreach.rod.activation_box import as_floats
+from softreach.rod.frames import Strains
 from softreach.rod.stable_tips import stable_tips
-from softreach.rod.tip_map import Strains, TipMap, tip_map
+from softreach.rod.tip_map import TipMap, tip_map
 from softreach.schema import provenance
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import pytest
 
 import softreach as sr
 from softreach.arm.loads import PointLoad
-from softreach.rod import TipStatus, all_equilibria, tip_map
+from softreach.rod import TipStatus, equilibria_by_degree, tip_map
 from tests.bodies import oracle_rod, rubber
 from tests.oracles import column
 from tests.oracles.chain import Chain
@@ -214,7 +214,7 @@ def test_one_activation_is_asked_at_a_time():
 
 
 def test_what_may_be_missing_is_said(monkeypatch):
-    monkeypatch.setattr(all_equilibria, "sphere_roots", _without_the_last)
+    monkeypatch.setattr(equilibria_by_degree, "sphere_roots", _without_the_last)
     with pytest.warns(sr.errors.SoftreachWarning, match="degree of those found is 2"):
         every = sr.equilibria(trunk(25.0), BENT)
     assert not every.complete

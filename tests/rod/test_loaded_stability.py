@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from softreach.arm import designs
 from softreach.arm.loads import Loads
-from softreach.rod.all_equilibria import equilibria
+from softreach.rod.equilibria_by_degree import equilibria
 from softreach.rod.equilibrium import Solver
 from softreach.rod.free import FreeRod
 from softreach.rod.load_tables import ArmBody, Body, LoadTables

@@ -17,6 +17,7 @@ from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import UNSTABLE, AtlasStore, Result
 from softreach.atlas.store_root import StoreFailed
 from softreach.errors import SoftreachError, SoftreachWarning
+from softreach.rod.never_at_rest import none_of
 
 __all__ = ["Outcome", "Remote", "begin_design", "run_remotely"]
 
@@ -121,8 +122,8 @@ def _put_unstable(
     }
     known = [metric for metric in metrics if metric.needs == (Need.LOST_SHARE,)]
     values |= {metric.name: metric.value(found, sizes) for metric in known}
-    message = f"none of {len(found.stable)} activations tried has a stable equilibrium"
-    store.write(index, Result(values, _kept_tips(store, found)), UNSTABLE, message)
+    result = Result(values, _kept_tips(store, found))
+    store.write(index, result, UNSTABLE, none_of(len(found.stable)))
     return index, ""
 
 

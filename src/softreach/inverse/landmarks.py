@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.errors import InvalidInput
 from softreach.kernels.spread import choose_apart
+from softreach.rod.never_at_rest import none_stable
 from softreach.rod.tip_map import TipMap
 from softreach.sampling import sample_cube
 
@@ -77,8 +77,7 @@ def landmarks(rod: TipMap) -> Landmarks:
         gamma = box.from_cube(np.array(sample_cube("sobol", _SOBOL, m)))
     found = _with_tips(rod, gamma)
     if not len(found.gamma):
-        tried = f"{len(gamma)} activations tried have no stable equilibrium"
-        raise InvalidInput("loads", tried, "such that some have one", "lighten the load")
+        raise none_stable(len(gamma))
     return found
 
 

@@ -28,7 +28,6 @@ from softreach.kernels.continuation import (
     start,
 )
 from softreach.kernels.direction_walk import (
-    PLANE,
     SIZE,
     A,
     B,
@@ -140,8 +139,8 @@ def solve(gamma, gravity, tip, guesses, coarse, fine, limits, most, out):
         limits: First share of the load to try; longest first Newton step [rad] that is trusted;
             step at which the coarse tables have done their work; what the fine ones may leave.
         most: Walks (coarse, fine) allowed.
-        out: Filled with the tip, G(L), the margin, the state (0 not found, 1 found, 2 given up),
-            walks, and the determinant of the tangents at the base, (n, 10).
+        out: Filled with the tip, G(L), the margin, and the state (0 not found, 1 found, 2 given
+            up), (n, 8).
     """
     increment, widest, small, tiny = limits
     lanes = np.zeros((coarse[0].shape[2] - 1, LANES))
@@ -165,14 +164,13 @@ def solve(gamma, gravity, tip, guesses, coarse, fine, limits, most, out):
         _move_all(w)
         for turn in range(most[1]):
             walk_tip(w, fine_rest, fine[2], tip)
-            walks += 1
             if _chord_all(w, turn, tiny * tiny) == 0:
                 break
-        _store(w, work, first, count, tiny, walks, out)
+        _store(w, work, first, count, tiny, out)
 
 
 @inline
-def _store(w, work, first, count, tiny, walks, out):
+def _store(w, work, first, count, tiny, out):
     for i in range(count):
         q, n = back(turn_at(work, TURN, i)), first + i
         r, g = turned(q, get(w, Y, i)), turned(q, get(w, TRIAL, i))
@@ -183,9 +181,6 @@ def _store(w, work, first, count, tiny, walks, out):
         out[n, 7] = w[DONE + i]
         if w[DONE + i] == FOUND and w[LEFT + i] > tiny * tiny:
             out[n, 7] = 0.0
-        out[n, 8] = walks
-        out[n, 9] = w[PLANE + i] * w[PLANE + 3 * LANES + i]
-        out[n, 9] -= w[PLANE + LANES + i] * w[PLANE + 2 * LANES + i]
 
 
 @kernel

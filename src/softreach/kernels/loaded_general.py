@@ -63,12 +63,6 @@ def _missing(w, i):
 
 
 @inline
-def _determinant(w, i):
-    a, b, c = get(w, PLANE, i), get(w, PLANE + 3 * LANES, i), get(w, PLANE + 6 * LANES, i)
-    return dot(a, cross(b, c))
-
-
-@inline
 def _newton(w, i):
     """The Newton step of the frame at the tip, theory (69), and the inverse that gives it."""
     a, b, c = get(w, PLANE, i), get(w, PLANE + 3 * LANES, i), get(w, PLANE + 6 * LANES, i)
@@ -172,9 +166,8 @@ def solve(gamma, axes, guesses, coarse, fine, limits, most, found, slopes, compl
             1 if all loads are along the first axis, so that no turn about it is looked for, else 0.
         most: Walks (coarse, fine) allowed; with none on fine tables, the last Newton step is taken
             linearly.
-        found: Filled with the tip, G, H as in `guesses`, the margin of stability, the state (0 not
-            found, 1 found, 2 given up), walks, and the determinant of the rotations at the base,
-            (n, 13).
+        found: Filled with the tip, G, H as in `guesses`, the margin of stability, and the state (0
+            not found, 1 found, 2 given up), (n, 11).
         slopes: Filled with (v, ω) of the tip per activation, (n, 6, bundle); or (0, 6, bundle).
         compliance: Zeros, to which the change of the tip per force there is added, (n, 3, 3); or
             (0, 3, 3).
@@ -211,11 +204,11 @@ def solve(gamma, axes, guesses, coarse, fine, limits, most, found, slopes, compl
             turn, tables, tangents = 0, fine, 0
             _move_all(w)
         respond(w, work, columns, first, count, bundles, slopes, compliance)
-        _store(w, work, columns, first, count, turn, walks, tiny, found)
+        _store(w, work, columns, first, count, turn, tiny, found)
 
 
 @inline
-def _store(w, work, columns, first, count, turn, walks, tiny, found):
+def _store(w, work, columns, first, count, turn, tiny, found):
     for i in range(count):
         q, n = back(turn_at(work, TURN, i)), first + i
         r = corrected_tip(w, columns, i) if turn < 0 else get(w, STATE + 9 * LANES, i)
@@ -229,5 +222,3 @@ def _store(w, work, columns, first, count, turn, walks, tiny, found):
         found[n, 10] = w[DONE + i]
         if turn >= 0 and w[DONE + i] == FOUND and w[LEFT + i] > tiny * tiny:
             found[n, 10] = 0.0
-        found[n, 11] = walks
-        found[n, 12] = _determinant(w, i)

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.tip_map import Frames, StrainRange, Strains, TipMap
+from softreach.rod.frames import Frames, StrainRange, Strains
+from softreach.rod.tip_map import TipMap
 
 __all__ = ["AffineCoordinates"]
 

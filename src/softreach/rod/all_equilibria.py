@@ -1,51 +1,27 @@
-"""Every equilibrium of a loaded arm at given activations, stable or not.
-
-The direction of gravity that the tip sees decides which one the base would have to see: a map of
-the sphere to itself. Unloaded it is the identity, so that its degree is 1, theory (80): every
-direction at the base is covered once more forward than backward, and the number of equilibria is
-odd.
-"""
+"""All equilibria of a loaded arm at one activation, as a value to be asked."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import schema
-from softreach.arm.loads import Loads
-from softreach.arm.manipulator import Manipulator
-from softreach.errors import InvalidInput, SoftreachWarning
-from softreach.geometry.sphere_mesh import icosphere
-from softreach.geometry.sphere_rings import is_axisymmetric, pole_rings
-from softreach.geometry.sphere_roots import Map, Roots, polished_roots, sphere_roots
-from softreach.rod.activation_box import as_floats
 from softreach.rod.equilibrium import Solver
-from softreach.rod.free import FreeRod
-from softreach.rod.kinematics import configuration, even_stations
-from softreach.rod.load_tables import LoadTables
+from softreach.rod.kinematics import configuration, shape_dataset, stations_along
 from softreach.rod.loaded import LoadedRod
-from softreach.rod.tip_map import TipMap, TipStatus, tip_map
+from softreach.rod.tip_map import TipMap, TipStatus
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["AllEquilibria", "equilibria"]
+__all__ = ["AllEquilibria"]
 
 Array = NDArray[np.float64]
 
-_SEARCHES = ((4, 1.0), (5, 3.0), (6, 10.0))
-"""Levels of the first mesh, and caution: the later ones where the degree is not 1."""
-_MOST_STEPS = 512
-_ROUGHLY = 0.01  # [rad]
-_SYMMETRIC = 1e-6  # [rad], of the directions that the base would have to see
-_NEUTRAL = 1e-5  # what tolerances leave of the margin of a ring, which is 0
 _SMALL = 1e-9  # of a length, below which it is shown as 0, in L
-_SAME = 1e-3  # [rad], of equilibria that were found in two ways
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -92,20 +68,10 @@ class AllEquilibria:
         gamma, rod = np.repeat(self.activation[None], len(self), axis=0), self.rod
         if self.solver is None or not isinstance(rod, LoadedRod):
             return configuration(rod, gamma, stations)
-        z = even_stations(rod, stations) if np.ndim(stations) == 0 else rod.check_stations(stations)
+        z = stations_along(rod, stations)
         shapes = self.solver.held(gamma, self.directions, z)[0]
-        position, directors = shapes.frames
-        curvature, extension = rod.strains_of_shapes(z)(gamma, shapes.moment, shapes.force)
-        return schema.configuration_dataset(
-            rod.arm,
-            gamma,
-            z,
-            position=position,
-            directors=directors,
-            curvature=curvature,
-            extension=extension,
-            radius=rod.radius(z),
-        )
+        strains = rod.strains_of_shapes(z)(gamma, shapes.moment, shapes.force)
+        return shape_dataset(rod, gamma, z, shapes.frames, strains)
 
     def to_dataset(self) -> xr.Dataset:
         """All numbers over `equilibrium` and `axis`."""
@@ -141,227 +107,3 @@ class AllEquilibria:
         kind = TipStatus(self.status[k]).name.lower() + (" ring" if self.is_ring[k] else "")
         which = ", follows from the unloaded arm" if k == self.followed else ""
         return f"{kind}: tip ({tip}) m, margin {self.margin[k]:.3g}{which}"
-
-
-class _Found(NamedTuple):
-    """Equilibria as directions of gravity at the tip."""
-
-    directions: Array
-    signs: NDArray[np.int8]
-    """As in `AllEquilibria`, but of a ring that of the move outward."""
-    is_ring: NDArray[np.bool_]
-    complete: bool
-
-
-def equilibria(
-    arm: Manipulator | TipMap, activations: ArrayLike, *, tol: float = 1e-6
-) -> AllEquilibria:
-    """Every equilibrium of a loaded arm at one activation, stable or not.
-
-    An arm that turning about the direction of gravity does not change, straight and upright say,
-    has rings of equilibria where it leans: of each ring one is returned.
-
-    Args:
-        arm: The design, or its tip map.
-        activations: Of each bundle [unit of each], shape (bundles,) or (1, bundles).
-        tol: Largest tip error, in L.
-
-    Raises:
-        InvalidInput: Activations of another shape, or other loads than dead forces along one
-            direction.
-
-    Warns:
-        SoftreachWarning: Some may be missing, or tips miss `tol`.
-    """
-    rod = tip_map(arm, tol, warn=False)  # the degree tells whether any is missing
-    gamma = _one(rod, activations)
-    if not isinstance(rod, LoadedRod):
-        return _without_loads(rod, gamma)
-    _check_loads(rod.tables)
-    solver = _resolving(Solver(rod.tables, FreeRod(rod.arm, rod.tol).steps, rod.tol), gamma)
-    branch = solver.find(gamma)
-    known = branch.frame[branch.status != TipStatus.NO_EQUILIBRIUM]
-    solver, found = _accurate(solver, gamma, _search(solver, gamma, known))
-    return _judged(rod, solver, gamma, found, known)
-
-
-def _one(rod: TipMap, activations: ArrayLike) -> Array:
-    """Activations (1, bundles)."""
-    gamma = as_floats("activations", activations)
-    gamma = rod.box.check(gamma[None] if gamma.ndim == 1 else gamma)
-    if len(gamma) != 1:
-        allowed = f"({rod.box.bundles},) or (1, {rod.box.bundles}): one activation at a time"
-        raise InvalidInput("activations.shape", gamma.shape, allowed)
-    return gamma
-
-
-def _check_loads(tables: LoadTables) -> None:
-    """Refuse loads for which more than a direction is unknown."""
-    if tables.one_direction:
-        return
-    crossing = ", ".join(_crossing(tables.loads, tables.axes[0]))
-    allowed = "dead forces along one direction; follower_moment and payload_arm may be anything"
-    raise InvalidInput("loads", crossing, allowed, "ask the tip map for the branch alone")
-
-
-def _crossing(loads: Loads, direction: Array) -> list[str]:
-    """Names of the loads that are not dead forces along a direction."""
-
-    def across(force: ArrayLike) -> bool:
-        size = np.linalg.norm(np.cross(np.asarray(force, float), direction))
-        return bool(size > 1e-14 * np.linalg.norm(force))
-
-    forces = ("gravity", "tip_force", "force_per_length")
-    names = [name for name in forces if across(getattr(loads, name))]
-    names += [name for name in ("tip_moment", "follower_force") if any(getattr(loads, name))]
-    return names + [
-        f"point_loads[{k}]"
-        for k, one in enumerate(loads.point_loads)
-        if across(one.force) or any(one.moment)
-    ]
-
-
-def _without_loads(rod: TipMap, gamma: Array) -> AllEquilibria:
-    return AllEquilibria(
-        rod=rod,
-        solver=None,
-        activation=gamma[0],
-        tips=rod.tips(gamma),
-        status=rod.status(gamma),
-        margin=np.ones(1),
-        directions=np.full((1, 3), np.nan),
-        signs=np.ones(1, np.int8),
-        is_ring=np.zeros(1, bool),
-        followed=0,
-        complete=True,
-    )
-
-
-def _search(solver: Solver, gamma: Array, known: Array) -> _Found:
-    """All of them; the known ones are tried first."""
-    image, axis = _image(solver, gamma), solver.tables.axes[0]
-    if is_axisymmetric(image, axis, _SYMMETRIC):
-        rings = pole_rings(image, axis, known[0] if len(known) else axis)
-        directions = np.concatenate([axis[None], rings.points])
-        is_ring = np.arange(len(directions)) > 0
-        return _Found(directions, np.append(1, rings.signs), is_ring, rings.complete)
-    return _isolated(image, axis, known)
-
-
-def _isolated(
-    image: Map, axis: Array, known: Array, searches: Sequence[tuple[int, float]] = _SEARCHES
-) -> _Found:
-    """Those of an arm that is not axisymmetric, searched more finely if the degree is not 1."""
-    (levels, caution), *finer = searches
-    roots, cut = sphere_roots(image, axis, levels=levels, caution=caution, starts=known)
-    complete = cut and int(np.sign(roots.determinants).sum()) == 1
-    if complete or not finer:
-        return _of_roots(roots, complete=complete)
-    return _isolated(image, axis, known, finer)
-
-
-def _of_roots(roots: Roots, *, complete: bool) -> _Found:
-    signs = np.sign(roots.determinants).astype(np.int8)
-    return _Found(roots.points, signs, np.zeros(len(signs), bool), complete)
-
-
-def _image(solver: Solver, gamma: Array) -> Map:
-    """What the base would have to see, of what the tip sees; steps do not keep its length."""
-
-    def image(points: Array) -> Array:
-        images = solver.base_directions(gamma, np.ascontiguousarray(points))
-        return images / np.linalg.norm(images, axis=1, keepdims=True)
-
-    return image
-
-
-def _resolving(solver: Solver, gamma: Array) -> Solver:
-    """With steps halved until the whole map of directions is roughly right."""
-    points = icosphere(2)[0]
-    while 2 * solver.steps <= _MOST_STEPS:
-        finer = solver.halved()
-        apart = _image(solver, gamma)(points) - _image(finer, gamma)(points)
-        if np.linalg.norm(apart, axis=1).max() <= _ROUGHLY:
-            break
-        solver = finer
-    return solver
-
-
-def _accurate(solver: Solver, gamma: Array, found: _Found) -> tuple[Solver, _Found]:
-    """With steps halved until no tip moves by more than half of the tolerance.
-
-    Those to begin with are enough without loads. The steps of the tip map are those of the branch
-    that it follows anywhere in the box: others may bend more.
-    """
-    allowed = 0.5 * solver.tol * solver.tables.arm.length
-    while 2 * solver.steps <= _MOST_STEPS:
-        finer = solver.halved()
-        again = _again(finer, gamma, found)
-        if len(again.directions) == len(found.directions):
-            apart = _tips(finer, gamma, again) - _tips(solver, gamma, found)
-            if np.linalg.norm(apart, axis=1).max(initial=0.0) <= allowed:
-                return solver, found
-            solver, found = finer, again
-        else:
-            solver, found = finer, _search(finer, gamma, found.directions)
-    _warn(f"tips of some equilibria miss tol = {solver.tol:g}")
-    return solver, found
-
-
-def _again(solver: Solver, gamma: Array, found: _Found) -> _Found:
-    """The same with other steps."""
-    if found.is_ring.any():
-        return _search(solver, gamma, found.directions[1:])
-    image, axis = _image(solver, gamma), solver.tables.axes[0]
-    return _of_roots(polished_roots(image, axis, found.directions), complete=found.complete)
-
-
-def _tips(solver: Solver, gamma: Array, found: _Found) -> Array:
-    many = np.repeat(gamma, len(found.directions), axis=0)
-    stations = np.array([solver.tables.arm.length])
-    return solver.held(many, found.directions, stations)[0].frames.position[:, 0]
-
-
-def _judged(
-    rod: LoadedRod, solver: Solver, gamma: Array, found: _Found, known: Array
-) -> AllEquilibria:
-    """In order, with tips and status."""
-    axis, many = solver.tables.axes[0], np.repeat(gamma, len(found.directions), axis=0)
-    shapes, margin = solver.held(many, found.directions, np.array([rod.length]))
-    margin = np.where(found.is_ring & (margin > -_NEUTRAL), 0.0, margin)
-    stable = (found.signs > 0) & np.where(found.is_ring, margin == 0.0, margin > 0.0)
-    places = np.round(shapes.frames.position[:, 0, ::-1] / rod.length, 6)  # part mirror images
-    order = np.lexsort((*places.T, -np.round(margin, 6), ~stable))
-    followed = _nearest(found, known, axis)
-    complete = found.complete and (followed is not None or not len(known))
-    if not complete:
-        total = int(found.signs[~found.is_ring].sum())
-        _warn(f"equilibria may be missing: the degree of those found is {total}")
-    return AllEquilibria(
-        rod=rod,
-        solver=solver,
-        activation=gamma[0],
-        tips=shapes.frames.position[order, 0],
-        status=np.where(stable, TipStatus.STABLE, TipStatus.UNSTABLE).astype(np.int8)[order],
-        margin=margin[order],
-        directions=found.directions[order],
-        signs=np.where(found.is_ring, 0, found.signs).astype(np.int8)[order],
-        is_ring=found.is_ring[order],
-        followed=None if followed is None else int(np.flatnonzero(order == followed)[0]),
-        complete=complete,
-    )
-
-
-def _nearest(found: _Found, known: Array, axis: Array) -> int | None:
-    """Which one the branch of the unloaded arm ends at, if it does."""
-    if not len(known) or not len(found.directions):
-        return None
-    apart = np.linalg.norm(found.directions - known[0], axis=1)
-    latitudes = np.abs(found.directions @ axis - known[0] @ axis)
-    apart = np.where(found.is_ring, latitudes, apart)
-    nearest = int(apart.argmin())
-    return nearest if apart[nearest] < _SAME else None
-
-
-def _warn(text: str) -> None:
-    warnings.warn(text, SoftreachWarning, stacklevel=4)

@@ -4,18 +4,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach import parallel
-from softreach.kernels import loaded, loaded_general
+from softreach.kernels.loaded_general import TRACE
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.found_equilibria import Equilibria, Response
 from softreach.rod.load_tables import LoadTables, StepTables
 from softreach.rod.loaded_shapes import Shapes, shapes_of
 from softreach.rod.search import CONTINUATION, DIRECT, HELD, NEAR, PATIENT, Rung, Search
+from softreach.rod.shooting import (
+    Shots,
+    Walked,
+    base_directions,
+    shoot,
+    shoot_along_one,
+    with_across,
+)
 from softreach.rod.start_grid import StartGrid, grid_sizes
 from softreach.rod.tip_map import TipStatus
 
@@ -131,8 +138,7 @@ class Solver:
         guesses: Array | None = None,
     ) -> None:
         """Search at some rows, and put down what is found."""
-        of_kind = self._along_one if self.tables.one_direction else self._in_general
-        self._put(found, rows, rung, *of_kind(_columns(gamma[rows]), search, guesses))
+        self._put(found, rows, rung, self._shoot(gamma[rows], search, guesses))
         if self.tables.phase.squeeze >= 1.0:
             self._give_up_squeezed(gamma, rows, found)
 
@@ -155,12 +161,10 @@ class Solver:
         found: Equilibria,
         rows: slice | NDArray[np.intp],
         rung: Rung,
-        tips: Array,
-        frame: Array,
-        margin: Array,
-        state: Array,
+        shots: Shots,
     ) -> None:
         """Put down what a search found at some rows."""
+        tips, frame, margin, state = shots
         good = (state == _FOUND) & np.isfinite(tips).all(axis=1) & ~np.isnan(margin)
         stable = np.where(margin > 0, TipStatus.STABLE, TipStatus.UNSTABLE)
         found.tips[rows] = np.where(good[:, None], tips, np.nan)
@@ -179,34 +183,21 @@ class Solver:
         """What the search may leave [rad]."""
         return max(_OF_TOL * self.tol, 1e-13)
 
-    def _along_one(self, gamma: Array, search: Search, guesses: Array | None):
-        return self._one(gamma, search, guesses)[:4]
-
-    def _one(self, gamma: Array, search: Search, guesses: Array | None):
-        coarse, small = self._first_phase(search)
-        out = np.empty((len(gamma), 10))
-        loaded.solve(
-            gamma,
-            self.tables.axes[0],
-            self.tables.at_tip,
-            np.zeros((0, 3)) if guesses is None else guesses,
-            coarse.for_one_direction,
-            self._fine.for_one_direction,
-            (search.increment, search.widest, small, self._tiny),
-            (search.walks, 10),
-            out,
-        )
-        return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7], out[:, 9]
+    def _shoot(self, gamma: Array, search: Search, guesses: Array | None) -> Shots:
+        """One search for each activation (n, bundles)."""
+        (coarse, small), fine = self._first_phase(search), self._fine
+        limits = (search.increment, search.widest, small, self._tiny)
+        most = (search.walks, 10)
+        if self.tables.one_direction:
+            return shoot_along_one(gamma, self.tables, guesses, coarse, fine, limits, most)
+        return shoot(gamma, self.tables.axes, guesses, coarse, fine, (*limits, 0.0), most).shots
 
     def base_directions(self, gamma: Array, directions: Array) -> Array:
         """What the base of one arm (1, bundles) must see of gravity, for what its tip sees, (n, 3).
 
         Both as the base of the unloaded arm sees them; loads along one direction only.
         """
-        out = np.empty_like(directions)
-        fine = self._fine.for_one_direction
-        loaded.base_directions(_columns(gamma), self.tables.at_tip, directions, fine, out)
-        return out
+        return base_directions(gamma, self.tables, directions, self._fine)
 
     def held(self, gamma: Array, directions: Array, stations: Array) -> tuple[Shapes, Array]:
         """Shapes of arms whose tips see gravity along given directions, and their margins.
@@ -217,40 +208,27 @@ class Solver:
         edges = self.tables.edges(stations, self.steps)
         table, z = self.tables.of_edges(edges), self.tables.arm.profile.station(edges)
         rows = np.abs(z[None] - np.append(stations, 0.0)[:, None]).argmin(axis=1)
-        frames = np.concatenate([directions, _across(directions)], axis=1)
-        limits = (HELD.increment, HELD.widest, _NEAR_STEP, 0.0, 1.0)
-        walked = _general(
-            _columns(gamma),
-            self.tables.axes,
-            frames,
-            table,
-            table,
-            limits,
-            (HELD.walks, 0),
-            trace=True,
-        )
+        walked = self._walk(gamma, with_across(directions), table, HELD, trace=True)
         at, nowhere = np.zeros((len(gamma), 3)), np.full(len(rows), np.nan)
         shapes = shapes_of(at, walked.trace, rows, self._force_at(table, rows), nowhere)
-        return shapes.on_base(), walked.found[:, 9]
+        return shapes.on_base(), walked.shots.margin
 
-    def _in_general(self, gamma: Array, search: Search, guesses: Array | None):
-        coarse, small = self._first_phase(search)
-        limits = (search.increment, search.widest, small, self._tiny, 0.0)
-        found = _general(
-            gamma, self.tables.axes, guesses, coarse, self._fine, limits, (search.walks, 10)
-        ).found
-        return found[:, :3], found[:, 3:9], found[:, 9], found[:, 10]
-
-    def _near(self, gamma: Array, known: Equilibria, table: StepTables, **asked: bool) -> _Walked:
-        """The last walk again, from known equilibria, with whatever more is asked for."""
-        one = self.tables.one_direction
-        limits = (NEAR.increment, NEAR.widest, _NEAR_STEP, 0.0, float(one))
-        frame = np.concatenate([known.frame, _across(known.frame)], axis=1) if one else known.frame
-        walked = _general(
-            gamma, self.tables.axes, frame, table, table, limits, (NEAR.walks, 0), **asked
+    def _walk(
+        self, gamma: Array, frames: Array, table: StepTables, search: Search, **asked: bool
+    ) -> Walked:
+        """Newton steps from frames of tips (n, 6), with whatever more is asked for."""
+        axial = float(self.tables.one_direction)
+        limits = (search.increment, search.widest, _NEAR_STEP, 0.0, axial)
+        return shoot(
+            gamma, self.tables.axes, frames, table, table, limits, (search.walks, 0), **asked
         )
-        lost = (known.status == TipStatus.NO_EQUILIBRIUM) | (walked.found[:, 10] != _FOUND)
-        for values in (walked.found[:, :3], walked.slopes, walked.compliance):
+
+    def _near(self, gamma: Array, known: Equilibria, table: StepTables, **asked: bool) -> Walked:
+        """The last walk again, from known equilibria, with whatever more is asked for."""
+        frames = with_across(known.frame) if self.tables.one_direction else known.frame
+        walked = self._walk(gamma, frames, table, NEAR, **asked)
+        lost = (known.status == TipStatus.NO_EQUILIBRIUM) | (walked.shots.state != _FOUND)
+        for values in (walked.shots.tips, walked.slopes, walked.compliance):
             if len(values):
                 values[lost] = np.nan
         return walked
@@ -266,9 +244,9 @@ class Solver:
         """Tips with their derivatives, theory (74); NaN where there is no equilibrium."""
         known, fine = self.find(gamma) if known is None else known, self._fine
         walked = self._near(
-            _columns(gamma), known, fine, slopes=True, compliance=compliance, trace=directions
+            gamma, known, fine, slopes=True, compliance=compliance, trace=directions
         )
-        tips, twists = walked.found[:, :3].copy(), walked.slopes[:, :, : gamma.shape[1]]
+        tips, twists = walked.shots.tips.copy(), walked.slopes
         lost = np.isnan(tips[:, 0])
         status = np.where(lost, TipStatus.NO_EQUILIBRIUM, known.status).astype(np.int8)
         d3 = self._tip_directions(tips, walked.trace, fine) if directions else np.empty((0, 3))
@@ -298,7 +276,7 @@ class Solver:
             equilibria = self.find(at) if known is None else known.of(block)
             shapes.put(block, self._shapes_of(at, equilibria, stations, table, rows))
 
-        size = max(1, _TRACED // (len(edges) * loaded_general.TRACE))
+        size = max(1, _TRACED // (len(edges) * TRACE))
         parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), size))
         return shapes
 
@@ -311,58 +289,11 @@ class Solver:
         rows: NDArray[np.intp],
     ) -> Shapes:
         """Arms at stations, which are these boundaries of the steps; on the calling thread."""
-        walked = self._near(_columns(gamma), known, table, trace=True)
+        walked = self._near(gamma, known, table, trace=True)
         force = self._force_at(table, rows)
-        return shapes_of(walked.found[:, :3], walked.trace, rows, force, stations)
+        return shapes_of(walked.shots.tips, walked.trace, rows, force, stations)
 
     def _force_at(self, table: StepTables, rows: NDArray[np.intp]) -> Array:
         """Dead force at boundaries along the world's axes, as the step beyond has it, (row, 3)."""
         at_ends = np.concatenate([table.scalars[:1, 0, 3:], table.scalars[:, -1, 3:]])
         return at_ends[rows]
-
-
-class _Walked(NamedTuple):
-    """What the kernel of general loads gives."""
-
-    found: Array
-    slopes: Array
-    compliance: Array
-    trace: Array
-
-
-def _general(
-    gamma: Array,
-    axes: Array,
-    guesses: Array | None,
-    coarse: StepTables,
-    fine: StepTables,
-    limits: tuple[float, ...],
-    most: tuple[int, int],
-    *,
-    slopes: bool = False,
-    compliance: bool = False,
-    trace: bool = False,
-) -> _Walked:
-    """See `loaded_general.solve`."""
-    n = len(gamma)
-    walked = _Walked(
-        np.empty((n, 13)),
-        np.zeros((n if slopes else 0, 6, gamma.shape[1])),
-        np.zeros((n if compliance else 0, 3, 3)),
-        np.zeros((n if trace else 0, len(coarse.lengths) + 1, loaded_general.TRACE)),
-    )
-    guessed = np.zeros((0, 6)) if guesses is None else guesses
-    loaded_general.solve(gamma, axes, guessed, tuple(coarse), tuple(fine), limits, most, *walked)
-    return walked
-
-
-def _across(directions: Array) -> Array:
-    """Some unit vector normal to each (n, 3)."""
-    other = np.eye(3)[np.abs(directions).argmin(axis=1)]
-    across = np.cross(directions, other)
-    return across / np.linalg.norm(across, axis=1, keepdims=True)
-
-
-def _columns(gamma: Array) -> Array:
-    """Activations for kernels, which want one bundle at least."""
-    return gamma if gamma.shape[1] else np.zeros((len(gamma), 1))

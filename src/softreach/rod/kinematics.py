@@ -14,12 +14,13 @@ from softreach import schema
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
 from softreach.rod.activation_box import as_floats
+from softreach.rod.frames import Frames, Strains
 from softreach.rod.tip_map import TipMap, tip_map
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["configuration", "even_stations", "tip_jacobian", "tip_positions"]
+__all__ = ["configuration", "shape_dataset", "stations_along", "tip_jacobian", "tip_positions"]
 
 Array = NDArray[np.float64]
 
@@ -86,26 +87,31 @@ def configuration(
     """
     rod = tip_map(arm, tol)
     gamma = rod.box.check(np.atleast_2d(as_floats("activation", activation)))
-    z = even_stations(rod, stations) if np.ndim(stations) == 0 else rod.check_stations(stations)
-    position, directors = rod.frames(gamma, z)
-    curvature, extension = rod.strains(gamma, z)
-    dataset = schema.configuration_dataset(
-        rod.arm,
-        gamma,
-        z,
-        position=position,
-        directors=directors,
-        curvature=curvature,
-        extension=extension,
-        radius=rod.radius(z),
-    )
+    z = stations_along(rod, stations)
+    dataset = shape_dataset(rod, gamma, z, rod.frames(gamma, z), rod.strains(gamma, z))
     if rod.supports_unstable:
         dataset = schema.with_status(dataset, rod.status(gamma))
     return dataset.isel(sample=0) if np.ndim(activation) == 1 else dataset
 
 
-def even_stations(rod: TipMap, stations: object) -> Array:
-    """Z [m] of a number of stations, evenly spaced from base to tip."""
+def shape_dataset(
+    rod: TipMap, gamma: Array, z: Array, frames: Frames, strains: Strains
+) -> xr.Dataset:
+    """Shapes at stations Z [m] as `configuration` has them, one for each row of activations."""
+    return schema.configuration_dataset(
+        rod.arm, gamma, z, **frames._asdict(), **strains._asdict(), radius=rod.radius(z)
+    )
+
+
+def stations_along(rod: TipMap, stations: int | ArrayLike) -> Array:
+    """Z [m] of stations given by their number or by themselves, ascending.
+
+    Args:
+        rod: The tip map.
+        stations: Number of stations, evenly spaced from base to tip, or their Z [m].
+    """
+    if np.ndim(stations):
+        return rod.check_stations(stations)
     if isinstance(stations, bool) or not isinstance(stations, int | np.integer) or stations < 2:
         raise InvalidInput("stations", stations, "2 or more, or the stations' Z in m")
     return np.linspace(0.0, rod.length, int(stations))

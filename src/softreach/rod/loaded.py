@@ -17,6 +17,7 @@ from softreach.kernels.rod import LANES
 from softreach.rod.arm_rod import ArmRod
 from softreach.rod.equilibrium import LATER_RUNGS, Solver
 from softreach.rod.found_equilibria import Equilibria, Response
+from softreach.rod.frames import Frames, StrainRange, Strains, TipMotions, position_slopes
 from softreach.rod.free import FreeRod
 from softreach.rod.linear_strains import linear_strains
 from softreach.rod.load_phase import check_phase
@@ -28,15 +29,9 @@ from softreach.rod.loaded_steps import (
     shape_differences,
     tip_differences,
 )
+from softreach.rod.never_at_rest import none_of, too_heavy
 from softreach.rod.pilot import pilot_activations
-from softreach.rod.tip_map import (
-    BLOCK,
-    Frames,
-    StrainRange,
-    Strains,
-    TipMotions,
-    position_slopes,
-)
+from softreach.rod.tip_map import BLOCK
 
 __all__ = ["LoadedRod"]
 
@@ -235,8 +230,7 @@ class LoadedRod(ArmRod):
         gamma = pilot_activations(self.arm, self.box)
         found = self.strains_at(stations)(gamma)
         if np.isnan(found.extension).all():
-            tried = f"{len(gamma)} activations tried have no equilibrium"
-            raise InvalidInput("loads", tried, "such that some have one", "lighten the load")
+            raise too_heavy(none_of(len(gamma), "an equilibrium"))
         bend = np.hypot(found.curvature[..., 0], found.curvature[..., 1])
         return StrainRange(
             np.stack([np.zeros(bend.shape[1]), np.nanmax(bend, axis=0)], axis=1),

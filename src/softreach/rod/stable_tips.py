@@ -10,14 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.tip_map import (
-    Frames,
-    StrainRange,
-    Strains,
-    TipMap,
-    TipMotions,
-    TipStatus,
-)
+from softreach.rod.frames import Frames, StrainRange, Strains, TipMotions
+from softreach.rod.tip_map import TipMap, TipStatus
 
 __all__ = ["StableTips", "stable_tips"]
 

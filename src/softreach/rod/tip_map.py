@@ -11,7 +11,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from enum import IntEnum
 from functools import lru_cache, partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,17 +20,13 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.weight import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.errors import InvalidInput, SoftreachWarning, counted
 from softreach.rod.activation_box import ActivationBox, as_floats
+from softreach.rod.frames import Frames, StrainRange, Strains, TipMotions, position_slopes
 from softreach.rod.steps import check_tol
 
 __all__ = [
     "BLOCK",
-    "Frames",
-    "StrainRange",
-    "Strains",
     "TipMap",
-    "TipMotions",
     "TipStatus",
-    "position_slopes",
     "tip_map",
 ]
 
@@ -50,48 +45,6 @@ class TipStatus(IntEnum):
     """An unstable equilibrium."""
     NO_EQUILIBRIUM = 2
     """The branch that starts at the unloaded arm ends before; the tip is NaN."""
-
-
-class Frames(NamedTuple):
-    """Rods in space, at stations."""
-
-    position: Array
-    """Centerline r [m], shape (n, station, 3)."""
-    directors: Array
-    """d1, d2, d3 as rows, shape (n, station, 3, 3)."""
-
-
-class Strains(NamedTuple):
-    """How rods are deformed, at stations."""
-
-    curvature: Array
-    """u in the directors, per unit of activated arclength [1/m], shape (n, station, 3)."""
-    extension: Array
-    """ζ [-], shape (n, station)."""
-
-
-class TipMotions(NamedTuple):
-    """Where tips are and point, and how both change with each activation."""
-
-    tips: Array
-    """r [m], shape (n, 3)."""
-    slopes: Array
-    """∂r/∂γ [m], shape (n, 3, bundles)."""
-    directions: Array
-    """Tangents d3 [-], shape (n, 3)."""
-    rotations: Array
-    """ω [rad], shape (n, 3, bundles): ∂d3/∂γ = ω × d3."""
-
-
-class StrainRange(NamedTuple):
-    """Ranges of the strains within the activation box, shape (station, 2) each."""
-
-    bending: Array
-    """√(u1² + u2²) [1/m], from 0 to an upper bound at most 1e-5 too large."""
-    torsion: Array
-    """u3 [1/m]."""
-    extension: Array
-    """ζ [-]."""
 
 
 class TipMap(ABC):
@@ -233,9 +186,10 @@ class TipMap(ABC):
         """Tips [m], shape (n, 3), and their derivatives ∂r/∂γ [m], shape (n, 3, bundles)."""
         gamma = self.box.check(activations)
         tips, slopes = np.empty((len(gamma), 3)), np.empty((len(gamma), 3, self.box.bundles))
+        size = BLOCK // (16 if self.supports_unstable else 8)  # an equilibrium takes a search
         parallel.run(
             partial(self.fill_slopes, gamma[b], tips[b], slopes[b])
-            for b in parallel.blocks(len(gamma), BLOCK // 8)
+            for b in parallel.blocks(len(gamma), size)
         )
         return tips, slopes
 
@@ -275,14 +229,6 @@ class TipMap(ABC):
         bundles = counted(self.box.bundles, "bundle")
         size = f"L = {self.length:g} m, {bundles}"
         return f"<{type(self).__name__}: {size}, tip error up to {self.tol:g} L>"
-
-
-def position_slopes(tips: Array, twists: Array, slopes: Array) -> None:
-    """Put ∂r/∂γ = v + ω × r (n, 3, bundles) into place, from tips and spatial twists (v, ω)."""
-    v, w = twists[:, :3], twists[:, 3:]
-    slopes[:] = v
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        slopes[:, i] += w[:, j] * tips[:, k, None] - w[:, k] * tips[:, j, None]
 
 
 def tip_map(arm: Manipulator | TipMap, tol: float = 1e-6, *, warn: bool = True) -> TipMap:

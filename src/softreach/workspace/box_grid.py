@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.kernels.contour import stretches
+from softreach.rod.never_at_rest import none_stable
+from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap
-from softreach.workspace.stable import none_stable, stable_slopes, stable_tips
 
 __all__ = ["corners_of", "every_second", "grid_stretches", "grid_tips", "image_measure"]
 
@@ -29,7 +30,7 @@ def grid_tips(rod: TipMap, cells: int) -> Array:
         InvalidInput: There is none anywhere.
     """
     ticks = [np.linspace(0.0, 1.0, cells + 1)] * rod.box.dimension
-    tips = stable_tips(rod, rod.box.from_free_cube(_product(ticks)))
+    tips = stable_tips(rod).tips(rod.box.from_free_cube(_product(ticks)))
     if rod.supports_unstable and np.isnan(tips[:, 0]).all():
         raise none_stable(len(tips))
     return tips
@@ -107,7 +108,7 @@ def image_measure(rod: TipMap, nodes: int) -> float:
 
 def _stretch(rod: TipMap, gamma: Array) -> Array:
     """The change of measure of the map at each activation: det J where J is square."""
-    slopes = stable_slopes(rod, gamma)[1][:, :, rod.box.free]
+    slopes = stable_tips(rod).tips_and_slopes(gamma)[1][:, :, rod.box.free]
     with np.errstate(invalid="ignore"):  # NaN where there is no stable equilibrium
         if rod.box.dimension == 3:
             return np.linalg.det(slopes)

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap
 from softreach.workspace.image import Image
-from softreach.workspace.stable import stable_tips
 from softreach.workspace.tears import corner_values
 
 __all__ = ["Remainder", "remainder"]
@@ -53,7 +53,7 @@ def remainder(
     if len(cut) > _MOST:
         looked = np.sort(np.random.default_rng(0).choice(cut, _MOST, replace=False))
     places = np.stack(np.unravel_index(looked, left_out.shape), axis=1)[:, None] + _INSIDE
-    tips = stable_tips(rod, rod.box.from_free_cube(places.reshape(-1, 3) / cells))
+    tips = stable_tips(rod).tips(rod.box.from_free_cube(places.reshape(-1, 3) / cells))
     stable = np.isfinite(tips[:, 0])
     counted = stable.copy()
     counted[stable] = image.counts_at(tips[stable]) == 0

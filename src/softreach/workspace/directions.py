@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,9 +11,8 @@ from numpy.typing import NDArray
 from softreach import parallel
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
-from softreach.rod.settled import check_settled
-from softreach.rod.tip_map import TipMap, tip_map
-from softreach.sampling import sample_cube
+from softreach.rod.tip_map import TipMap, TipStatus, tip_map
+from softreach.sampling import cube_blocks, sample_cube
 from softreach.schema import provenance
 from softreach.workspace.image import Lattice
 
@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 _BLOCK = 1 << 15
 _PER_CELL = 64  # samples in a cell of the bounding box, on average
 _STEPS = 32  # the cone is then too wide by some percent at most
+_TRIED = 4096  # activations of a loaded arm that must all come to rest
 
 
 def direction_spread(
@@ -65,7 +66,7 @@ def direction_spread(
     """
     if cell is not None and not 0 < cell < np.inf:
         raise InvalidInput("cell", cell, "a length > 0 [m]")
-    rod = check_settled(tip_map(arm, tol))
+    rod = _all_stable(tip_map(arm, tol))
     tips, directions = _tips_and_directions(rod, sample_cube("sobol", n, rod.box.bundles, seed))
     if cell is None:
         cell = float(np.cbrt(np.prod(np.ptp(tips, axis=0).clip(1e-3 * rod.length)) * _PER_CELL / n))
@@ -79,6 +80,32 @@ def direction_spread(
     samples.flat[cells] = np.diff(starts, append=n)
     drawn = {"n": n, "sampler": "sobol", "seed": seed, "tol": rod.tol}
     return _dataset(lattice, angle, samples).assign_attrs({**provenance(rod.arm), **drawn})
+
+
+def _all_stable(rod: TipMap) -> TipMap:
+    """The map itself, if all of a sample of its activations have a stable equilibrium.
+
+    Raises:
+        InvalidInput: Some have none.
+    """
+    if rod.supports_unstable:
+        lost, tried = _lost(rod)
+        if lost:
+            found = f"{lost} of {tried} activations tried have no stable equilibrium"
+            allowed = "such that every activation has one"
+            hint = "lighten the load or narrow the bounds; a cloud says which samples have one"
+            raise InvalidInput("loads", found, allowed, hint)
+    return rod
+
+
+@lru_cache(maxsize=64)
+def _lost(rod: TipMap) -> tuple[int, int]:
+    """How many activations have no stable equilibrium, and of how many tried."""
+    (cube,) = cube_blocks("sobol", _TRIED, rod.box.bundles, 0, _TRIED)
+    corners = rod.box.corners() if rod.box.bundles <= 10 else np.empty((0, rod.box.bundles))
+    gamma = np.concatenate([rod.box.from_cube(cube), corners])
+    gamma = gamma if rod.box.bundles else gamma[:1]
+    return int((rod.status(gamma) != TipStatus.STABLE).sum()), len(gamma)
 
 
 def _tips_and_directions(rod: TipMap, cube: Array) -> tuple[Array, Array]:

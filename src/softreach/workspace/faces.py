@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap
-from softreach.workspace.stable import stable_slopes
 
 __all__ = ["FaceNodes", "box_slopes", "gauss_faces", "grid_faces"]
 
@@ -66,7 +66,7 @@ def box_slopes(rod: TipMap, cube: Array) -> tuple[Array, Array]:
     Returns:
         Shapes (n, 3) and (n, 3, dimension); NaN where there is no stable equilibrium.
     """
-    tips, slopes = stable_slopes(rod, rod.box.from_free_cube(cube))
+    tips, slopes = stable_tips(rod).tips_and_slopes(rod.box.from_free_cube(cube))
     free = rod.box.free
     return tips, slopes[:, :, free] * rod.box.widths[free]
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.geometry.hull import convex_hull
+from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap
 from softreach.workspace.faces import grid_faces
 from softreach.workspace.solid import ReachableSolid
-from softreach.workspace.stable import stable_tips
 
 __all__ = ["HullCorners", "hull_corners"]
 
@@ -46,7 +46,7 @@ def _grid(cells: int) -> Array:
 
 
 def _corners(rod: TipMap, cube: Array) -> HullCorners:
-    tips = stable_tips(rod, rod.box.from_free_cube(cube))
+    tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
     hull = convex_hull(tips)
     area = np.zeros_like(hull.vertices)
     corners = (hull.vertices - hull.vertices.mean(axis=0))[hull.faces]

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from softreach import parallel
 from softreach.kernels.box_projection import project
 from softreach.kernels.descent import FIRST_DAMPING, NOWHERE, Running, judge, next_trials
+from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import BLOCK, TipMap
-from softreach.workspace.stable import fill_stable_slopes
 
 __all__ = ["Nearest", "nearest_tips"]
 
@@ -44,7 +44,7 @@ def nearest_tips(rod: TipMap, start: Array, targets: Array, enough: float) -> Ne
         targets: Places [m], shape (n, 3).
         enough: Distance at which a target counts as reached [m].
     """
-    gamma = np.ascontiguousarray(start)
+    rod, gamma = stable_tips(rod), np.ascontiguousarray(start)
     found = Nearest(gamma.copy(), np.empty_like(targets), np.empty(len(targets)))
 
     def task(block: slice) -> None:
@@ -71,7 +71,7 @@ def _descend(rod: TipMap, targets: Array, enough: float, found: Nearest) -> None
         running.row[new], running.steps[new] = np.arange(begun, begun + more), 0
         running.trial[new], running.damping[new] = found.gamma[rows], FIRST_DAMPING
         n, begun = n + more, begun + more
-        fill_stable_slopes(rod, running.trial[:n], tips[:n], ahead[:n])
+        rod.fill_slopes(running.trial[:n], tips[:n], ahead[:n])
         if rod.supports_unstable:
             tips[np.isnan(tips[:n, 0]).nonzero()[0]] = NOWHERE
         n = judge(running, n, tips, ahead, targets, found, enough, *bounds)

@@ -1,4 +1,4 @@
-"""From a design to its reachable set: resolutions, images, volumes."""
+"""From a design to its reachable set: images and volumes."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput, SoftreachWarning
 from softreach.memory import free_memory
 from softreach.progress import Progress, silent
+from softreach.rod.never_at_rest import too_heavy
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.workspace import measure
 from softreach.workspace.box_grid import corners_of, every_second, grid_stretches, grid_tips
@@ -23,6 +24,13 @@ from softreach.workspace.one_to_one import is_one_to_one
 from softreach.workspace.one_to_one_solid import solid_by_flux
 from softreach.workspace.reachable import ReachableSet
 from softreach.workspace.redundant import lost_share, searched_set, smallest_memory
+from softreach.workspace.resolution import (
+    checked_grid,
+    grid_for,
+    is_settled,
+    is_worthwhile,
+    lattice_for,
+)
 from softreach.workspace.solid import ReachableSolid
 from softreach.workspace.tears import coarser, finer, left_out_cells
 from softreach.workspace.thin import thin_set
@@ -32,9 +40,6 @@ __all__ = ["rasterized_set", "reachable_set"]
 Array = NDArray[np.float64]
 
 T = TypeVar("T")
-
-_MOST_VERTICES = 3.3e6  # of the activation grid
-_MOST_CELLS = 2.0**26
 
 
 def reachable_set(
@@ -113,11 +118,13 @@ def reachable_set(
 def _of_three(
     rod: TipMap, accuracy: float, cell: float | None, grid: int | None, progress: Progress
 ) -> ReachableSolid:
-    cells = _checked_grid(grid) if grid is not None else _grid_for(accuracy)
+    cells = checked_grid(grid) if grid is not None else grid_for(accuracy)
     if is_one_to_one(rod):
-        return solid_by_flux(rod, cells, partial(_lattice, cell=cell, accuracy=accuracy), progress)
+        return solid_by_flux(
+            rod, cells, partial(lattice_for, cell=cell, accuracy=accuracy), progress
+        )
     found = rasterized_set(rod, cells, cell, accuracy, progress)
-    while grid is None and not _settled(found, accuracy) and _worthwhile(found, accuracy):
+    while grid is None and not is_settled(found, accuracy) and is_worthwhile(found, accuracy):
         found = rasterized_set(rod, 2 * found.cells, cell, accuracy, progress)
     return found
 
@@ -168,7 +175,7 @@ def rasterized_set(
     """
     tips = grid_tips(rod, cells)
     left_out = left_out_cells(rod, tips, cells)
-    lattice = _lattice(_reached(tips, left_out), cell=cell, accuracy=accuracy)
+    lattice = lattice_for(_reached(tips, left_out), cell=cell, accuracy=accuracy)
     stretches = grid_stretches(rod, tips, cells, left_out)
     grid = _Grid(tips, stretches, left_out)
     fine, coarse = grid.image(lattice, progress), grid.every_second().image(lattice)
@@ -273,56 +280,8 @@ def _reached(tips: Array, left_out: NDArray[np.bool_]) -> Array:
     used = corners_of(~left_out).ravel()
     if not used.any():
         found = f"no cell of an activation grid of {len(left_out)}³ has a stable, untorn image"
-        raise InvalidInput("loads", found, "such that some have one", "lighten the load")
+        raise too_heavy(found)
     return tips[used]
-
-
-def _settled(found: ReachableSolid, accuracy: float) -> bool:
-    """Whether a finer grid would hardly change the volume or how much of it is reached twice."""
-    return found.volume_error <= accuracy * found.volume
-
-
-def _worthwhile(found: ReachableSolid, accuracy: float) -> bool:
-    """Whether grids that memory holds may be fine enough.
-
-    Where cells are left out the error falls as 1/n, as fast as n grows and no faster.
-    """
-    cells = 2 * found.cells
-    while found.lost_share > 0.0 and found.volume_error > accuracy * found.volume * (
-        cells / found.cells
-    ):
-        cells *= 2
-    return _fits(cells)
-
-
-def _fits(cells: int) -> bool:
-    return (cells + 1) ** 3 <= _MOST_VERTICES
-
-
-def _grid_for(accuracy: float) -> int:
-    """The rule for n: even, within what memory and patience hold."""
-    most = np.cbrt(_MOST_VERTICES) - 1.0
-    return max(2, 2 * int(np.ceil(min(np.sqrt(5.0 / accuracy), most) / 2)))
-
-
-def _checked_grid(grid: int) -> int:
-    if isinstance(grid, bool) or int(grid) != grid or grid < 2 or grid % 2:
-        raise InvalidInput("grid", grid, "an even number of cells, 2 or more")
-    return int(grid)
-
-
-def _lattice(tips: Array, *, cell: float | None, accuracy: float) -> Lattice:
-    sides = np.ptp(tips, axis=0)
-    if cell is not None:
-        smallest = float(np.cbrt(np.prod(sides) / _MOST_CELLS))
-        if not smallest <= cell < np.inf:  # NaN too
-            raise InvalidInput(
-                "cell", cell, f"at least {smallest:.3g} m for {_MOST_CELLS:.0g} cells"
-            )
-        return Lattice.around(tips, float(cell))
-    wanted = np.sqrt(accuracy / 30.0) * np.cbrt(np.prod(sides))
-    # An image that is almost flat would need countless cells along it.
-    return Lattice.around(tips, float(max(wanted, sides.max() / 1024.0)))
 
 
 def _inaccurate(found: ReachableSolid, accuracy: float, finer: str) -> str:

@@ -18,6 +18,8 @@ from softreach import parallel
 from softreach.errors import InvalidInput
 from softreach.geometry.hull import convex_hull
 from softreach.progress import Progress
+from softreach.rod.never_at_rest import none_stable
+from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap
 from softreach.sampling import cube_blocks
 from softreach.workspace.crossings import Crossings
@@ -26,7 +28,6 @@ from softreach.workspace.image import Lattice
 from softreach.workspace.lines import line_volume
 from softreach.workspace.measure import Estimate
 from softreach.workspace.reached_cells import ReachedCells
-from softreach.workspace.stable import none_stable, stable_tips
 
 __all__ = ["Searched", "lost_share", "searched_set", "smallest_memory"]
 
@@ -101,7 +102,8 @@ def lost_share(rod: TipMap) -> float:
     if not rod.supports_unstable:
         return 0.0
     (cube,) = cube_blocks("sobol", _SAMPLES, rod.box.dimension, 0, _SAMPLES)
-    return float(np.isnan(stable_tips(rod, rod.box.from_free_cube(cube))[:, 0]).mean())
+    tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
+    return float(np.isnan(tips[:, 0]).mean())
 
 
 def _fixed(rod: TipMap) -> float:
@@ -246,7 +248,7 @@ def _cloud(rod: TipMap, seed: int) -> tuple[Array, Array]:
     bound = rng.random((_CLOUD, m)).argsort(axis=1) >= free[:, None]
     cube[bound] = rng.integers(0, 2, int(bound.sum()))
     gamma = np.ascontiguousarray(box.from_free_cube(cube))
-    tips = stable_tips(rod, gamma)
+    tips = stable_tips(rod).tips(gamma)
     if not rod.supports_unstable:
         return gamma, tips
     stable = np.isfinite(tips[:, 0])

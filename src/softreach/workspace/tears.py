@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap
-from softreach.workspace.stable import stable_tips
 
 __all__ = ["coarser", "corner_values", "finer", "left_out_cells"]
 
@@ -113,7 +113,7 @@ def _stay_apart(rod: TipMap, edges: Ints, axis: int, field: Array) -> Bools:
     torn, open_ = np.zeros(len(edges), bool), np.arange(len(edges))
     for _ in range(_HALVINGS):
         middle = 0.5 * (low[open_] + high[open_])
-        tips = stable_tips(rod, rod.box.from_free_cube(middle))
+        tips = stable_tips(rod).tips(rod.box.from_free_cube(middle))
         down = np.linalg.norm(tips - at_low[open_], axis=1)
         up = np.linalg.norm(at_high[open_] - tips, axis=1)
         torn[open_[np.isnan(down)]] = True

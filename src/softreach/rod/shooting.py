@@ -1,0 +1,113 @@
+"""Rods shot from the tip: what the kernels of loaded rods give for many activations, by name."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.kernels import loaded, loaded_general
+from softreach.rod.load_tables import LoadTables, StepTables
+
+__all__ = ["Shots", "Walked", "base_directions", "shoot", "shoot_along_one", "with_across"]
+
+Array = NDArray[np.float64]
+
+
+class Shots(NamedTuple):
+    """Where searches ended."""
+
+    tips: Array
+    """r [m], shape (n, 3)."""
+    frame: Array
+    """As in `Equilibria`, (n, 3) or (n, 6)."""
+    margin: Array
+    """Of stability [-], shape (n,)."""
+    state: Array
+    """0 not found, 1 found, 2 given up; shape (n,)."""
+
+
+class Walked(NamedTuple):
+    """Where searches ended under any loads, and what was asked for with it."""
+
+    shots: Shots
+    slopes: Array
+    """(v, ω) of the tips per activation, shape (n, 6, bundles) or (0, 6, bundles)."""
+    compliance: Array
+    """∂r/∂F [m/N], shape (n, 3, 3) or (0, 3, 3)."""
+    trace: Array
+    """Sections between steps, tip first, shape (n, step + 1, `TRACE`) or (0, step + 1, `TRACE`)."""
+
+
+def shoot_along_one(
+    gamma: Array,
+    tables: LoadTables,
+    guesses: Array | None,
+    coarse: StepTables,
+    fine: StepTables,
+    limits: tuple[float, ...],
+    most: tuple[int, int],
+) -> Shots:
+    """Searches under loads along one direction; see `loaded.solve`."""
+    out = np.empty((len(gamma), 8))
+    loaded.solve(
+        _columns(gamma),
+        tables.axes[0],
+        tables.at_tip,
+        np.zeros((0, 3)) if guesses is None else guesses,
+        coarse.for_one_direction,
+        fine.for_one_direction,
+        limits,
+        most,
+        out,
+    )
+    return Shots(out[:, :3], out[:, 3:6], out[:, 6], out[:, 7])
+
+
+def shoot(
+    gamma: Array,
+    axes: Array,
+    guesses: Array | None,
+    coarse: StepTables,
+    fine: StepTables,
+    limits: tuple[float, ...],
+    most: tuple[int, int],
+    *,
+    slopes: bool = False,
+    compliance: bool = False,
+    trace: bool = False,
+) -> Walked:
+    """Searches under any loads; see `loaded_general.solve`."""
+    n, columns = len(gamma), _columns(gamma)
+    found = np.empty((n, 11))
+    answers = (
+        np.zeros((n if slopes else 0, 6, columns.shape[1])),
+        np.zeros((n if compliance else 0, 3, 3)),
+        np.zeros((n if trace else 0, len(coarse.lengths) + 1, loaded_general.TRACE)),
+    )
+    guessed = np.zeros((0, 6)) if guesses is None else guesses
+    steps = tuple(coarse), tuple(fine)
+    loaded_general.solve(columns, axes, guessed, *steps, limits, most, found, *answers)
+    shots = Shots(found[:, :3], found[:, 3:9], found[:, 9], found[:, 10])
+    return Walked(shots, answers[0][:, :, : gamma.shape[1]], *answers[1:])
+
+
+def base_directions(gamma: Array, tables: LoadTables, directions: Array, fine: StepTables) -> Array:
+    """What the base of one arm (1, bundles) must see of gravity, for what its tip sees, (n, 3)."""
+    out = np.empty_like(directions)
+    loaded.base_directions(_columns(gamma), tables.at_tip, directions, fine.for_one_direction, out)
+    return out
+
+
+def with_across(directions: Array) -> Array:
+    """Directions (n, 3) with some unit vector normal to each: frames for `shoot`, (n, 6)."""
+    other = np.eye(3)[np.abs(directions).argmin(axis=1)]
+    across = np.cross(directions, other)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    return np.concatenate([directions, across], axis=1)
+
+
+def _columns(gamma: Array) -> Array:
+    """Activations for kernels, which want one bundle at least."""
+    return gamma if gamma.shape[1] else np.zeros((len(gamma), 1))
