@@ -1,0 +1,84 @@
+"""Worker processes on this machine, which end with the process that started them."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from softreach.interruption import PATIENCE, as_a_whole, end_process
+
+__all__ = ["LocalProcesses", "Workers", "worker_processes"]
+
+Workers = Callable[[], Executor]
+"""Starts a pool; called again when a dead worker has broken the one before."""
+
+
+def worker_processes(count: int) -> Workers:
+    """Worker processes on this machine, restarted if one dies.
+
+    They end with this process, whatever ends it.
+
+    Args:
+        count: Number of processes; each uses one thread.
+    """
+    return lambda: LocalProcesses(count)
+
+
+class LocalProcesses(ProcessPoolExecutor):
+    """A pool whose workers live as long as a pipe of which only their parent has the other end."""
+
+    def __init__(self, count: int) -> None:
+        """Start none before the first task.
+
+        Args:
+            count: Number of processes.
+        """
+        context = multiprocessing.get_context("spawn")  # threads and forks do not mix
+        other_end, self._lifeline = context.Pipe(duplex=False)
+        first: Any = {"initializer": _live_with_parent, "initargs": (other_end,)}
+        super().__init__(count, mp_context=context, **first)
+
+    def submit(self, *call: Any, **options: Any) -> Future[Any]:
+        """Hand a call to a worker."""
+        with as_a_whole(), _no_interrupts():  # a worker may start now
+            return super().submit(*call, **options)
+
+    def abandon(self) -> None:
+        """End all workers without waiting for what they compute."""
+        processes = list((self._processes or {}).values())
+        self._lifeline.close()
+        for process in processes:
+            wait([process.sentinel], PATIENCE)
+
+
+def _live_with_parent(lifeline: Connection) -> None:
+    """Leave Ctrl-C to the parent and end when it has ended; a worker calls this first."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    threading.Thread(target=_outlive, args=(lifeline,), daemon=True, name="lifeline").start()
+
+
+def _outlive(lifeline: Connection) -> None:
+    with contextlib.suppress(EOFError, OSError):
+        lifeline.recv_bytes()  # nothing is ever sent
+    end_process(1)
+
+
+@contextlib.contextmanager
+def _no_interrupts() -> Iterator[None]:
+    """Keep Ctrl-C from this thread and from processes that it starts meanwhile."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
