@@ -28,8 +28,8 @@ COMMANDS = {
     "equilibria": "equilibria lce_arm --payload 30g --gravity up --figure equilibria.png",
     "payload": "payload lce_arm --gravity up --figure payload.png",
     "gradient": "gradient lce_arm taper upper --accuracy 3e-4",
-    "atlas": "atlas build a.zarr --vary taper_deg=0:3:9 --n 100000",
-    "atlas, 2 workers": "atlas build a.zarr --vary taper_deg=0:3:9 --n 100000 --workers 2",
+    "atlas": "atlas build a.zarr --vary taper_deg=0:3:9 --n 20000",
+    "atlas, 2 workers": "atlas build a.zarr --vary taper_deg=0:3:9 --n 20000 --workers 2",
     "paper": "paper --out paper --quick",
     "demo": "demo --out demo",
     "warmup": "warmup --loads",
@@ -92,6 +92,8 @@ def started(name: str, folder: Path) -> subprocess.Popen[bytes]:
     if name.endswith("empty cache"):
         environment["NUMBA_CACHE_DIR"] = str(folder / ".cache")
     run = [sys.executable, "-m", "softreach", *COMMANDS[name].split()]
+    for number in SAID:  # a command started in the background would go on ignoring some
+        signal.signal(number, signal.default_int_handler)
     with (folder / ".said").open("wb") as said:
         process = subprocess.Popen(
             run,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
@@ -30,6 +31,9 @@ def worker_processes(count: int) -> Workers:
     return lambda: LocalProcesses(count)
 
 
+_QUIET = "ignore::UserWarning:multiprocessing.resource_tracker"
+
+
 class LocalProcesses(ProcessPoolExecutor):
     """A pool whose workers live as long as a pipe of which only their parent has the other end."""
 
@@ -40,6 +44,7 @@ class LocalProcesses(ProcessPoolExecutor):
             count: Number of processes.
         """
         context = multiprocessing.get_context("spawn")  # threads and forks do not mix
+        _start_quiet_tracker()
         other_end, self._lifeline = context.Pipe(duplex=False)
         first: Any = {"initializer": _live_with_parent, "initargs": (other_end,)}
         super().__init__(count, mp_context=context, **first)
@@ -54,7 +59,21 @@ class LocalProcesses(ProcessPoolExecutor):
         processes = list((self._processes or {}).values())
         self._lifeline.close()
         for process in processes:
-            wait([process.sentinel], PATIENCE)
+            if not wait([process.sentinel], PATIENCE):
+                process.kill()
+
+
+def _start_quiet_tracker() -> None:
+    """Let Python clean up after processes that were killed without a warning that it does."""
+    if sys.platform == "win32":  # where there is nothing to clean up
+        return
+    from multiprocessing import resource_tracker
+
+    sys.warnoptions.append(_QUIET)
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        sys.warnoptions.remove(_QUIET)
 
 
 def _live_with_parent(lifeline: Connection) -> None:
