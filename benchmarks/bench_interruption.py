@@ -44,7 +44,7 @@ SAID = {
 LIMIT = 2.0
 """How long a command may go on after a signal [s]."""
 
-_PATIENCE = 60.0  # seconds after which a command counts as deaf
+_PATIENCE = 30.0  # seconds after which a command counts as deaf
 _ORPHANED = 5.0  # seconds in which workers must have noticed that their parent is gone
 
 
@@ -131,7 +131,7 @@ def ended_by(
         process.kill()
         code = process.wait()
     seconds = time.perf_counter() - sent
-    survivors = _survivors(process.pid)
+    survivors = survivors_of(process.pid)
     said = (folder / ".said").read_text()
     return Ending(code, said, seconds, survivors, sorted(broken_files(folder, number)))
 
@@ -170,12 +170,6 @@ def _read_image(path: Path) -> None:
         image.load()
 
 
-def _read_mesh(path: Path) -> None:
-    import meshio
-
-    meshio.read(path)
-
-
 def _read_json(path: Path) -> None:
     json.loads(path.read_text())
 
@@ -196,7 +190,7 @@ def _catches(pid: int, number: signal.Signals) -> bool:
     return bool(caught >> (number - 1) & 1)
 
 
-def _survivors(session: int) -> int:
+def survivors_of(session: int) -> int:
     """How many processes of a session do not end soon."""
     deadline = time.monotonic() + _ORPHANED
     while (left := _processes_of(session)) and time.monotonic() < deadline:

@@ -6,13 +6,13 @@ import contextlib
 import multiprocessing
 import signal
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import wait
 from typing import Any
 
-from softreach.interruption import PATIENCE, as_a_whole, end_process
+from softreach.interruption import PATIENCE, as_a_whole
+from softreach.lifeline import live_with_parent
 
 __all__ = ["LocalProcesses", "Workers", "worker_processes"]
 
@@ -46,7 +46,7 @@ class LocalProcesses(ProcessPoolExecutor):
         context = multiprocessing.get_context("spawn")  # threads and forks do not mix
         _start_quiet_tracker()
         other_end, self._lifeline = context.Pipe(duplex=False)
-        first: Any = {"initializer": _live_with_parent, "initargs": (other_end,)}
+        first: Any = {"initializer": live_with_parent, "initargs": (other_end,)}
         super().__init__(count, mp_context=context, **first)
 
     def submit(self, *call: Any, **options: Any) -> Future[Any]:
@@ -74,20 +74,6 @@ def _start_quiet_tracker() -> None:
         resource_tracker.ensure_running()
     finally:
         sys.warnoptions.remove(_QUIET)
-
-
-def _live_with_parent(lifeline: Connection) -> None:
-    """Leave Ctrl-C to the parent and end when it has ended; a worker calls this first."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-    threading.Thread(target=_outlive, args=(lifeline,), daemon=True, name="lifeline").start()
-
-
-def _outlive(lifeline: Connection) -> None:
-    with contextlib.suppress(EOFError, OSError):
-        lifeline.recv_bytes()  # nothing is ever sent
-    end_process(1)
 
 
 @contextlib.contextmanager
