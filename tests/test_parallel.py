@@ -61,3 +61,43 @@ def test_what_is_done_meanwhile_is_done_once_and_asked_for_later():
 def test_what_is_done_meanwhile_raises_where_it_is_asked_for():
     with parallel.meanwhile(lambda: 1 / 0) as found, pytest.raises(ZeroDivisionError):
         found()
+
+
+def test_what_is_interrupted_is_given_up_on_every_level(threads):
+    begun = []
+
+    def inner(number):
+        begun.append(number)
+        time.sleep(0.02)
+
+    def outer(first):
+        parallel.run(partial(inner, number) for number in range(first, first + 100))
+
+    def interrupted():
+        time.sleep(0.05)
+        raise KeyboardInterrupt
+
+    tasks = [interrupted, *(partial(outer, 100 * k) for k in range(4))]
+    start = time.perf_counter()
+    with pytest.raises(KeyboardInterrupt):
+        parallel.run(tasks)
+    assert time.perf_counter() - start < 1.0
+    assert len(begun) < 40
+
+
+def test_a_task_that_is_given_up_is_no_failure_of_its_own():
+    seen = []
+
+    def task():
+        try:
+            parallel.run(partial(time.sleep, 0.01) for _ in range(100))
+        except Exception as error:
+            seen.append(error)
+
+    def broken():
+        time.sleep(0.03)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        parallel.run([task, broken])
+    assert seen == []

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from softreach.interruption import as_a_whole
+from softreach.scratch import REPLACED, scratch_folder
 
 __all__ = ["replacing"]
 
@@ -20,13 +21,22 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
-    scratch = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
-    try:
+    with scratch_folder(target.parent) as scratch:
         # The suffix stays, because writers choose their format by it.
         partial = scratch / target.name
         yield partial
-        if target.is_dir():
-            target.rename(scratch / "replaced")
+        with as_a_whole():
+            _take_place(partial, target, scratch / REPLACED)
+
+
+def _take_place(partial: Path, target: Path, replaced: Path) -> None:
+    """Put the new file or folder where the older one is, or keep that one."""
+    if not target.is_dir():
         partial.replace(target)
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
+        return
+    target.rename(replaced)
+    try:
+        partial.rename(target)
+    except BaseException:
+        replaced.rename(target)
+        raise

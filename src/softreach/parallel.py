@@ -1,19 +1,20 @@
 """Threads over blocks of work.
 
 The kernels release the interpreter lock, so plain threads use every core, nest safely in other
-people's thread and process pools, and let Ctrl-C through between blocks.
+people's thread and process pools, and let Ctrl-C through between blocks, however deep they are.
 """
 
 from __future__ import annotations
 
 import os
+import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from itertools import chain, islice
-from typing import TypeVar
+from typing import Any, TypeVar
 
 __all__ = ["blocks", "in_order", "meanwhile", "run", "thread_count"]
 
@@ -39,21 +40,23 @@ def blocks(total: int, size: int) -> Iterator[slice]:
 def run(tasks: Iterable[Callable[[], object]]) -> None:
     """Call every task on the threads; at most twice as many are drawn ahead as are running.
 
-    The first exception (Ctrl-C too) stops the drawing of further tasks and is raised once the
-    tasks already begun have ended. A task that is alone is called on the calling thread, because
-    starting threads takes longer than a small block of samples.
+    The first exception (Ctrl-C too) stops the drawing of further tasks, here and in what the tasks
+    themselves run on threads, and is raised once the calls already begun have ended. A task that is
+    alone is called on the calling thread, because starting threads takes longer than a small block
+    of samples.
     """
     drawn = iter(tasks)
     first = list(islice(drawn, 2))
     if len(first) < 2:
         for task in first:
+            _check_wanted()
             task()
         return
     threads = thread_count()
     pending: set[Future[object]] = set()
-    with ThreadPoolExecutor(threads) as pool:
+    with _pool(threads) as submit:
         for task in chain(first, drawn):
-            pending.add(pool.submit(task))
+            pending.add(submit(task))
             if len(pending) >= 2 * threads:
                 pending = _drain(pending)
         while pending:
@@ -67,16 +70,13 @@ def in_order(tasks: Iterable[Callable[[], Result]]) -> Iterator[Result]:
         yield from (task() for task in tasks)
         return
     ahead: deque[Future[Result]] = deque()
-    pool = ThreadPoolExecutor(threads)
-    try:
+    with _pool(threads) as submit:
         for task in tasks:
-            ahead.append(pool.submit(task))
+            ahead.append(submit(task))
             if len(ahead) > threads:
                 yield ahead.popleft().result()
         while ahead:
             yield ahead.popleft().result()
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 @contextmanager
@@ -88,8 +88,63 @@ def meanwhile(task: Callable[[], Result]) -> Iterator[Callable[[], Result]]:
     if thread_count() == 1:
         yield cache(task)
         return
-    with ThreadPoolExecutor(1) as pool:
-        yield pool.submit(task).result
+    with _pool(1) as submit:
+        yield submit(task).result
+
+
+class _Unwanted(BaseException):
+    """Nobody waits for what this task computes; no task may take it for a failure of its own."""
+
+
+class _Wanted:
+    """Whether somebody still waits for the tasks of a pool."""
+
+    def __init__(self, outer: _Wanted | None) -> None:
+        self.given_up, self._outer = False, outer
+
+    def check(self) -> None:
+        """Raise if nobody does, here or where the pool itself was started."""
+        if self.given_up:
+            raise _Unwanted
+        if self._outer is not None:
+            self._outer.check()
+
+
+class _Here(threading.local):
+    """What the task of this thread was started for."""
+
+    wanted: _Wanted | None = None
+
+
+_HERE = _Here()
+
+
+def _check_wanted() -> None:
+    if _HERE.wanted is not None:
+        _HERE.wanted.check()
+
+
+Submit = Callable[[Callable[[], Result]], "Future[Result]"]
+
+
+@contextmanager
+def _pool(threads: int) -> Iterator[Submit[Any]]:
+    """Threads for a block; if it raises, what has not begun never does."""
+    wanted = _Wanted(_HERE.wanted)
+
+    def called(task: Callable[[], Any]) -> Any:
+        wanted.check()
+        _HERE.wanted = wanted
+        return task()
+
+    pool = ThreadPoolExecutor(threads)
+    try:
+        yield partial(pool.submit, called)
+    except BaseException:
+        wanted.given_up = True
+        raise
+    finally:
+        pool.shutdown(cancel_futures=wanted.given_up)
 
 
 def _drain(pending: set[Future[object]]) -> set[Future[object]]:

@@ -160,7 +160,7 @@ def test_what_is_no_executor_is_refused(tmp_path):
 def test_worker_processes_start_when_called_and_not_before(monkeypatch):
     started = []
     monkeypatch.setattr(
-        "softreach.atlas.executor.ProcessPoolExecutor", lambda count, **_: started.append(count)
+        "softreach.atlas.processes.LocalProcesses", lambda count: started.append(count)
     )
     start = worker_processes(3)
     assert started == []

@@ -2,9 +2,9 @@
 
 from softreach.atlas.best import best_designs
 from softreach.atlas.build import build_atlas
-from softreach.atlas.executor import worker_processes
 from softreach.atlas.metric import Metric, MetricFailed, Need
 from softreach.atlas.metrics import METRIC_GROUPS
+from softreach.atlas.processes import worker_processes
 from softreach.atlas.questions import AtlasStatus, atlas_cloud, atlas_design, atlas_status
 from softreach.atlas.reading import open_atlas, over_length
 from softreach.atlas.space import DesignSpace

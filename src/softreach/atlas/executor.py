@@ -23,10 +23,12 @@ from typing import Any, Protocol, Self
 from softreach import parallel
 from softreach.atlas.design_task import Outcome, Remote, begin_design, run_remotely
 from softreach.atlas.metric import Metric, check_travels
+from softreach.atlas.processes import LocalProcesses, Workers
 from softreach.atlas.store import AtlasStore
 from softreach.errors import InvalidInput, SoftreachError
+from softreach.interruption import undoing
 
-__all__ = ["ExecutorLike", "Workers", "run_designs", "worker_processes"]
+__all__ = ["ExecutorLike", "run_designs"]
 
 ATTEMPTS = 3
 """How often a design may take its worker with it before it counts as failed."""
@@ -42,26 +44,7 @@ class DaskClient(Protocol):
 
 OnOutcome = Callable[[Outcome], None]
 
-Workers = Callable[[], Executor]
-"""Starts a pool; called again when a dead worker has broken the one before."""
-
 ExecutorLike = Executor | DaskClient | Workers | None
-
-
-def worker_processes(count: int) -> Workers:
-    """Worker processes on this machine, restarted if one dies.
-
-    Args:
-        count: Number of processes; each uses one thread.
-    """
-
-    def start() -> Executor:
-        import multiprocessing
-
-        context = multiprocessing.get_context("spawn")  # threads and forks do not mix
-        return ProcessPoolExecutor(count, mp_context=context)
-
-    return start
 
 
 def run_designs(
@@ -90,7 +73,8 @@ def run_designs(
             _reporting(begin_design(store, metrics, index), on_outcome) for index in indices
         )
         return
-    with _Pool(executor) as pool:
+    pool = _Pool(executor)
+    with undoing(pool.abandon), pool:
         pool.check_metrics(store.command.metrics)
         for index in _run_in_pool(pool, Remote(store), deque(indices), on_outcome):
             on_outcome(_given_up(store, index))
@@ -120,9 +104,16 @@ class _Pool:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is not None:
+            self.abandon()
         if self._start is not None:
             self._now.shutdown(wait=True, cancel_futures=True)
+
+    def abandon(self) -> None:
+        """Wait for nothing that is being computed, if the workers are ours."""
+        if isinstance(self._now, LocalProcesses):
+            self._now.abandon()
 
     def check_metrics(self, metrics: Sequence[Metric]) -> None:
         """Refuse metrics whose functions a worker process cannot get."""

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from softreach.errors import InvalidInput, SoftreachError
+from softreach.interruption import as_a_whole
 
 if TYPE_CHECKING:
     import zarr
@@ -32,12 +33,16 @@ def absolute(location: StoreLike) -> StoreLike:
     return location
 
 
-def writing(location: StoreLike) -> AbstractContextManager[None]:
-    """Turn errors of the disk or the network into one line that says what to do."""
-    return storage_errors(
-        f"{location} cannot be written",
-        "; what is done is safe, and the same command continues once that is fixed",
-    )
+@contextmanager
+def writing(location: StoreLike) -> Iterator[None]:
+    """Turn errors of the disk or the network into one line that says what to do.
+
+    A process that a signal ends waits for what is being written.
+    """
+    failed = f"{location} cannot be written"
+    then = "; what is done is safe, and the same command continues once that is fixed"
+    with as_a_whole(), storage_errors(failed, then):
+        yield
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""The `softreach` command and what its exit codes mean: 0 done, 2 wrong input, 130 interrupted."""
+"""The `softreach` command and its exit codes: 0 done, 2 wrong input, 128 + signal."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from importlib.metadata import version
 from cyclopts import App, CycloptsError
 
 from softreach.cli.first_run import compilation_announced
+from softreach.cli.signals import INTERRUPTED
 from softreach.errors import SoftreachError, SoftreachWarning
 
-__all__ = ["app", "main"]
+__all__ = ["app", "run"]
 
 app = App(
     name="softreach",
@@ -114,11 +115,6 @@ for _place, (_name, (_summary, _example)) in enumerate(_COMMANDS.items()):
     )
 
 
-def main(arguments: list[str] | None = None) -> None:
-    """Run the command line and exit."""
-    sys.exit(run(sys.argv[1:] if arguments is None else arguments))
-
-
 def run(arguments: list[str]) -> int:
     """Run the command line and return its exit code; wrong input costs one line, no traceback."""
     with warnings.catch_warnings(), compilation_announced():
@@ -128,7 +124,7 @@ def run(arguments: list[str]) -> int:
         except (CycloptsError, SoftreachError, OSError) as error:
             return _failed(str(error) or type(error).__name__)
         except KeyboardInterrupt:
-            sys.stderr.write("interrupted: nothing half-written was left behind\n")
+            sys.stderr.write(f"{INTERRUPTED}\n")
             return 130
     return 0
 

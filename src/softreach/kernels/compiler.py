@@ -17,6 +17,7 @@ from numba.core import event
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
 
+from softreach.interruption import as_a_whole
 from softreach.kernels.parts import KernelDispatcher, PartedDispatcher
 
 __all__ = ["FAST", "inline", "kernel", "pasted", "strict"]
@@ -103,7 +104,8 @@ class _Cache(FunctionCache):
 
     def _attempt(self, write: Callable[..., None], *arguments: Any) -> None:
         try:
-            write(*arguments)
+            with as_a_whole():
+                write(*arguments)
         except Exception as error:
             _LOG.info("%r cannot be written: %s: %s", self, type(error).__name__, error)
 
