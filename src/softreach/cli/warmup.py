@@ -43,14 +43,14 @@ def _free() -> list[Callable[[], object]]:
     from softreach.rod.kinematics import configuration, tip_jacobian
 
     arm, redundant = designs.minimal_trunk(), designs.redundant_trunk()
-    target = (0.2, 0.1, 0.6)
+    target, beyond = (0.2, 0.1, 0.6), (2.0, 0.0, 0.0)
     path = (target, (0.2, 0.1, 0.61))
     return [
         _hulls,
         partial(tip_jacobian, arm, [[-1.0, 0.0, -0.4]]),
         partial(configuration, arm, [-1.0, 0.0, -0.4]),
         partial(workspace.reachable_set, arm, accuracy=0.1),
-        partial(solve_inverse, arm, [target]),
+        partial(solve_inverse, arm, [target, beyond]),
         partial(track_path, arm, path),
         partial(workspace.direction_spread, arm, n=1024),
         partial(workspace.reachable_set, redundant, accuracy=0.1),
