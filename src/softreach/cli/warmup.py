@@ -79,6 +79,7 @@ def _loaded() -> list[Callable[[], object]]:
     """Small jobs that together call the kernels of loads."""
     from softreach.arm import designs
     from softreach.arm.loads import Loads
+    from softreach.rod.all_equilibria import equilibria
     from softreach.rod.kinematics import configuration, tip_jacobian, tip_positions
 
     free = designs.lce_arm()
@@ -92,4 +93,5 @@ def _loaded() -> list[Callable[[], object]]:
     return [
         *(partial(f, [rest]) for f in functions),
         *(partial(configuration, arm, rest) for arm in arms),
+        partial(equilibria, arms[0], rest),
     ]
