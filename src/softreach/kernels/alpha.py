@@ -156,7 +156,7 @@ def join_regions(neighbors, kept, parent):
 
 @strict
 def least_radii(cells, radii, least):
-    """The least radius of the cells at each vertex; ``least`` is -1 at the start and without any."""
+    """Write the least radius of the cells at each vertex into ``least``, which is -1 before."""
     for t in range(len(cells)):
         for i in range(4):
             v = cells[t, i]
