@@ -13,7 +13,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -92,7 +92,7 @@ def _record(arguments: list[str]) -> Cold:
         """Times compilations; those that others cause count for these."""
 
         def __init__(self) -> None:
-            self.seconds: Counter[str] = Counter()
+            self.seconds: defaultdict[str, float] = defaultdict(float)
             self.compiled: Counter[str] = Counter()
             self.thread = threading.local()
 

@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numba
 import pytest
@@ -169,7 +170,7 @@ def test_code_for_other_types_is_never_run(cache):
     swapped = other.read_bytes(), one.read_bytes()
     one.write_bytes(swapped[0])
     other.write_bytes(swapped[1])
-    again = kernel(doubled)
+    again: Any = kernel(doubled)
     assert (again(2.5), again(3)) == (5.0, 6)
     assert not again.stats.cache_hits
 
