@@ -13,19 +13,21 @@ import sys
 import tempfile
 import threading
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
 COMMANDS = {
-    "cloud": "cloud minimal_trunk --out {folder}/trunk.zarr",
+    "cloud": "cloud minimal_trunk --out trunk.zarr",
     "volume": "volume minimal_trunk --alpha 0.05L",
     "reach": "reach minimal_trunk",
     "solve": "solve minimal_trunk --target 0.2,0.1,0.6",
-    "demo": "demo --out {folder}/demo",
+    "demo": "demo --out demo",
 }
 BUDGETS = {"cloud": 4, "volume": 8, "reach": 6, "solve": 8, "demo": 15}
 """CPU seconds of compilation."""
+
+ROOT = Path(__file__).parent.parent
 
 
 class Cold(NamedTuple):
@@ -49,13 +51,19 @@ def measured(name: str, folder: Path, *options: str) -> Cold:
         folder: Place for the kernel cache and the results.
         options: More of the command's options.
     """
-    arguments = [*COMMANDS[name].format(folder=folder).split(), *options]
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(folder / "cache")}
-    run = [sys.executable, "-m", __name__, str(folder / "cold.json"), *arguments]
-    done = subprocess.run(run, env=environment, capture_output=True, text=True)
+    return recorded([*COMMANDS[name].split(), *options], folder)
+
+
+def recorded(arguments: list[str], folder: Path) -> Cold:
+    """Run the command line in a new process, in a folder that also has the kernel cache."""
+    found = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(folder / "cache"), "PYTHONPATH": found}
+    record = folder / "cold.json"
+    run = [sys.executable, "-m", "benchmarks.bench_cold", str(record), *arguments]
+    done = subprocess.run(run, env=environment, cwd=folder, capture_output=True, text=True)
     if done.returncode:
         raise RuntimeError(f"softreach {' '.join(arguments)}: {done.stderr}")
-    return Cold(**json.loads((folder / "cold.json").read_text(encoding="utf-8")))
+    return Cold(**json.loads(record.read_text(encoding="utf-8")))
 
 
 def main() -> None:
@@ -84,7 +92,7 @@ def _record(arguments: list[str]) -> Cold:
         """Times compilations; those that others cause count for these."""
 
         def __init__(self) -> None:
-            self.seconds: Counter[str] = Counter()
+            self.seconds: defaultdict[str, float] = defaultdict(float)
             self.compiled: Counter[str] = Counter()
             self.thread = threading.local()
 

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 from pathlib import Path
 
 import pytest
-from benchmarks.bench_cold import COMMANDS, Cold, measured
+from benchmarks.bench_cold import COMMANDS, ROOT, Cold, measured, recorded
+
+from softreach import kernels
+from softreach.kernels.parts import KernelDispatcher
 
 ROD = {"rod._tips"}
 SLOPES = ROD | {"jacobian._jacobians"}
@@ -29,7 +34,7 @@ MESH = {
     "space_tree.sort_into_children",
 }
 NEWTON = {
-    "candidates.find_starts",
+    "candidates._find_starts",
     "newton.newton_step",
     "newton.conditions",
     "newton.merge_equal",
@@ -90,3 +95,45 @@ def test_a_function_is_compiled_for_one_set_of_types_with_few_exceptions(runs, n
 def test_kernels_ask_numba_for_little_of_its_own(runs, name):
     of_numba = [times for n, times in runs[name].compiled.items() if n.startswith("numba.")]
     assert sum(of_numba) <= OF_NUMBA
+
+
+@pytest.fixture(scope="module")
+def warm(tmp_path_factory) -> tuple[Path, Cold]:
+    """A folder with a warm kernel cache, and what the warm-up did."""
+    folder: Path = tmp_path_factory.mktemp("warm")
+    return folder, recorded(["warmup", "--loads"], folder)
+
+
+@pytest.mark.slow
+def test_the_warm_up_compiles_every_kernel(warm):
+    assert _kernels() <= warm[1].used.keys()
+
+
+@pytest.mark.slow
+def test_after_the_warm_up_no_command_of_the_readme_compiles_anything(warm):
+    compiled = {" ".join(line): recorded(line, warm[0]).compiled for line in _of_readme()}
+    assert len(compiled) >= 7
+    assert {line: names for line, names in compiled.items() if names} == {}
+
+
+def _kernels() -> set[str]:
+    """Every function that is made to be called from Python, by the name of the benchmark."""
+    modules = [
+        importlib.import_module(f"{kernels.__name__}.{module.name}")
+        for module in pkgutil.iter_modules(kernels.__path__)
+    ]
+    return {
+        f"{module.__name__.rsplit('.', 1)[1]}.{name}"
+        for module in modules
+        for name, function in vars(module).items()
+        if type(function) is KernelDispatcher  # not of a class that makes parts of it
+        and function.py_func.__module__ == module.__name__
+        and function.targetoptions.get("inline") != "always"
+    }
+
+
+def _of_readme() -> list[list[str]]:
+    """The arguments of the commands in the README that end by themselves, with small clouds."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8").replace("400000", "2000")
+    lines = [line.split("#")[0] for line in text.splitlines() if line.startswith("softreach ")]
+    return [line.split()[1:] for line in [*lines, "softreach demo --out out --n 2000"]]

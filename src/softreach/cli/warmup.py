@@ -43,14 +43,14 @@ def _free() -> list[Callable[[], object]]:
     from softreach.rod.kinematics import configuration, tip_jacobian
 
     arm, redundant = designs.minimal_trunk(), designs.redundant_trunk()
-    target = (0.2, 0.1, 0.6)
+    target, beyond = (0.2, 0.1, 0.6), (2.0, 0.0, 0.0)
     path = (target, (0.2, 0.1, 0.61))
     return [
         _hulls,
         partial(tip_jacobian, arm, [[-1.0, 0.0, -0.4]]),
         partial(configuration, arm, [-1.0, 0.0, -0.4]),
         partial(workspace.reachable_set, arm, accuracy=0.1),
-        partial(solve_inverse, arm, [target]),
+        partial(solve_inverse, arm, [target, beyond]),
         partial(track_path, arm, path),
         partial(workspace.direction_spread, arm, n=1024),
         partial(workspace.reachable_set, redundant, accuracy=0.1),
@@ -79,6 +79,7 @@ def _loaded() -> list[Callable[[], object]]:
     """Small jobs that together call the kernels of loads."""
     from softreach.arm import designs
     from softreach.arm.loads import Loads
+    from softreach.rod.all_equilibria import equilibria
     from softreach.rod.kinematics import configuration, tip_jacobian, tip_positions
 
     free = designs.lce_arm()
@@ -92,4 +93,5 @@ def _loaded() -> list[Callable[[], object]]:
     return [
         *(partial(f, [rest]) for f in functions),
         *(partial(configuration, arm, rest) for arm in arms),
+        partial(equilibria, arms[0], rest),
     ]

@@ -13,6 +13,7 @@ from softreach.geometry.delaunay import Delaunay, unit_scale
 from softreach.geometry.hull import Hull
 from softreach.geometry.surface import compact_surface, surface_area
 from softreach.kernels import alpha as kernels
+from softreach.kernels.expansions import scratch
 
 __all__ = ["AlphaComplex"]
 
@@ -61,7 +62,7 @@ class AlphaComplex:
 
     def regions(self, alpha: float) -> int:
         """Number of parts of the shape that are connected through faces."""
-        return int(kernels.join_regions(self.triangulation.neighbors, self.radii <= alpha)[1])
+        return self._joined(alpha)[1]
 
     def critical_alpha(self) -> float:
         """The smallest radius [m] at which one region covers all points; inf for a flat cloud.
@@ -74,8 +75,10 @@ class AlphaComplex:
         mesh = self.triangulation
         if len(mesh.tetrahedra) == 0:
             return np.inf
-        covering = kernels.covering_radius(mesh.tetrahedra, self.radii, len(mesh.points))
-        parent, regions = kernels.join_regions(mesh.neighbors, self.radii <= covering)
+        least = np.full(len(mesh.points), -1.0)
+        kernels.least_radii(mesh.tetrahedra, self.radii, least)
+        covering = least.max()
+        parent, regions = self._joined(covering)
         if regions == 1:
             return float(covering)
         later = np.flatnonzero(self.radii > covering)
@@ -84,11 +87,25 @@ class AlphaComplex:
             kernels.radius_of_one_region(mesh.neighbors, self.radii, parent, regions, order)
         )
 
+    def _joined(self, alpha: float) -> tuple[np.ndarray, int]:
+        """What `kernels.join_regions` needs to join further tetrahedra, and the number of parts."""
+        parent = np.full(len(self.radii), -1, np.int32)
+        neighbors = self.triangulation.neighbors
+        return parent, int(kernels.join_regions(neighbors, self.radii <= alpha, parent))
+
+    def _boundary(self, kept: np.ndarray) -> np.ndarray:
+        """The faces between kept tetrahedra and the rest, normals outwards, shape (f, 3)."""
+        cells, neighbors = self.triangulation.tetrahedra, self.triangulation.neighbors
+        faces = np.empty((0, 3), cells.dtype)
+        count = kernels.boundary_faces(cells, neighbors, kept, faces)
+        faces = np.empty((count, 3), cells.dtype)
+        kernels.boundary_faces(cells, neighbors, kept, faces)
+        return faces
+
     def hull(self, alpha: float) -> Hull:
         """The shape of one radius [m]: surface, volume, area and regions."""
         mesh, kept = self.triangulation, self.radii <= alpha
-        faces = kernels.boundary_faces(mesh.tetrahedra, mesh.neighbors, kept)
-        vertices, faces = compact_surface(mesh.points, faces)
+        vertices, faces = compact_surface(mesh.points, self._boundary(kept))
         return Hull(
             vertices=vertices,
             faces=faces,
@@ -107,7 +124,12 @@ def _measure(mesh: Delaunay) -> tuple[np.ndarray, np.ndarray]:
 
     def task(part: slice) -> Callable[[], object]:
         return partial(
-            kernels.measure_cells, points, mesh.tetrahedra[part], radii[part], volumes[part]
+            kernels.measure_cells,
+            points,
+            mesh.tetrahedra[part],
+            scratch(),
+            radii[part],
+            volumes[part],
         )
 
     parallel.run(task(part) for part in parallel.blocks(len(radii), BLOCK))

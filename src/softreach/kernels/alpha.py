@@ -12,15 +12,15 @@ from __future__ import annotations
 import numpy as np
 
 from softreach.kernels.compiler import strict
-from softreach.kernels.expansions import BOTTOM, scratch, value
+from softreach.kernels.expansions import BOTTOM, value
 from softreach.kernels.predicates import EPS, ORIENT_BOUND, dot3, edge, end, minor
 from softreach.kernels.strict_vector import cross, difference, dot
 from softreach.kernels.triangulation import FACES, corners
 
 __all__ = [
     "boundary_faces",
-    "covering_radius",
     "join_regions",
+    "least_radii",
     "measure_cells",
     "radius_of_one_region",
 ]
@@ -30,7 +30,7 @@ LENGTH_BOUND = 48 * EPS  # three products of a square and a minor of two product
 
 
 @strict
-def measure_cells(points, cells, radii, volumes):
+def measure_cells(points, cells, w, radii, volumes):
     """Write the radius of the circumscribed sphere and the volume of every cell.
 
     With edges a, b, c from the fourth vertex, 6V = a · (b × c) and
@@ -39,10 +39,10 @@ def measure_cells(points, cells, radii, volumes):
     Args:
         points: Coordinates in [-1, 1], shape (n, 3).
         cells: Vertices, shape (m, 4).
+        w: Work array of the predicates.
         radii: Result, shape (m,); inf where a cell has no volume.
         volumes: Result, shape (m,).
     """
-    w = scratch()
     for t in range(len(cells)):
         i, j, k, m = corners(cells, t)
         length, det, sure = sphere(points, i, j, k, m)
@@ -95,27 +95,24 @@ def sphere_exact(points, i, j, k, m, w):
 
 
 @strict
-def boundary_faces(cells, neighbors, kept):
-    """The faces between kept cells and the rest, normals outwards, shape (f, 3).
+def boundary_faces(cells, neighbors, kept, faces):
+    """Write the faces between kept cells and the rest, normals outwards; return how many.
 
     Args:
         cells: Vertices, shape (m, 4).
         neighbors: Neighbors, -1 for none, shape (m, 4).
         kept: Which cells belong to the shape, shape (m,).
+        faces: Result, shape (f, 3); empty to count only.
     """
     count = 0
     for t in range(len(cells)):
         for i in range(4):
-            count += is_boundary(neighbors, kept, t, i)
-    faces = np.empty((count, 3), cells.dtype)
-    at = 0
-    for t in range(len(cells)):
-        for i in range(4):
             if is_boundary(neighbors, kept, t, i):
-                for k in range(3):
-                    faces[at, k] = cells[t, FACES[i, k]]
-                at += 1
-    return faces
+                if len(faces):
+                    for k in range(3):
+                        faces[count, k] = cells[t, FACES[i, k]]
+                count += 1
+    return count
 
 
 @strict
@@ -147,27 +144,24 @@ def merges(neighbors, parent, t):
 
 
 @strict
-def join_regions(neighbors, kept):
-    """The regions of the kept cells: `merges`' parent of every cell (-1 if not kept), how many."""
-    parent = np.full(len(neighbors), -1, np.int32)
+def join_regions(neighbors, kept, parent):
+    """The number of regions of the kept cells; `merges`' parent of every cell, -1 at the start."""
     regions = 0
     for t in range(len(neighbors)):
         if kept[t]:
             parent[t] = t
             regions += 1 - merges(neighbors, parent, t)
-    return parent, regions
+    return regions
 
 
 @strict
-def covering_radius(cells, radii, n_points):
-    """The smallest radius at which every vertex belongs to a kept cell."""
-    smallest = np.full(n_points, -1.0)
+def least_radii(cells, radii, least):
+    """Write the least radius of the cells at each vertex into ``least``, which is -1 before."""
     for t in range(len(cells)):
         for i in range(4):
             v = cells[t, i]
-            if smallest[v] < 0.0 or radii[t] < smallest[v]:
-                smallest[v] = radii[t]
-    return smallest.max()
+            if least[v] < 0.0 or radii[t] < least[v]:
+                least[v] = radii[t]
 
 
 @strict

@@ -31,7 +31,6 @@ _ASIDE = 0.1  # how far from each other vertex a search near one begins
 _ROUNDING = 1e-6  # the same in barycentric units
 
 
-@kernel
 def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start, inverse):
     """Activations near each solution of the targets, until the arrays are full.
 
@@ -51,7 +50,29 @@ def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start, 
     Returns:
         How many targets are done, and how many starts were found.
     """
-    guess, adjugate, side = np.empty(3), np.empty((3, 3)), np.empty(MOST_STARTS)
+    # Memory that a kernel makes takes longer to compile.
+    room = np.empty(3), np.empty((3, 3)), np.empty(MOST_STARTS)
+    return _find_starts(
+        mesh, tree, targets, low, high, with_root, *room, target, cell, start, inverse
+    )
+
+
+@kernel
+def _find_starts(
+    mesh,
+    tree,
+    targets,
+    low,
+    high,
+    with_root,
+    guess,
+    adjugate,
+    side,
+    target,
+    cell,
+    start,
+    inverse,
+):
     gamma, corner, planes, item = mesh.gamma, mesh.corner, tree.planes, tree.item
     found = np.intp(0)  # typed: compiled once
     for t in range(targets.shape[0]):
@@ -233,8 +254,8 @@ def _is_inside(gamma, v, weights, adjugate, det, margin):
     Each barycentric coordinate then changes by no more than its gradient in space times that.
     """
     zero = (0.0, 0.0, 0.0)
-    g = (zero, _gradient(gamma, v, 0, adjugate), _gradient(gamma, v, 1, adjugate))
-    g = (g[0], g[1], g[2], _gradient(gamma, v, 2, adjugate), zero)
+    first, second = _gradient(gamma, v[0], v[1], adjugate), _gradient(gamma, v[1], v[2], adjugate)
+    g = (zero, first, second, _gradient(gamma, v[2], v[3], adjugate), zero)
     for i in range(4):
         outside = -weights[i] - _ROUNDING
         if outside > 0.0:
@@ -245,9 +266,8 @@ def _is_inside(gamma, v, weights, adjugate, det, margin):
 
 
 @inline
-def _gradient(gamma, v, i, adjugate):
-    """det J times the gradient in space of the coordinate along edge i of the path of vertices."""
-    a, b = v[i], v[i + 1]
+def _gradient(gamma, a, b, adjugate):
+    """det J times the gradient in space of the coordinate along the edge from a to b."""
     k = 0 if gamma[a, 0] != gamma[b, 0] else (1 if gamma[a, 1] != gamma[b, 1] else 2)
     width = gamma[b, k] - gamma[a, k]
     return adjugate[0, k] / width, adjugate[1, k] / width, adjugate[2, k] / width

@@ -86,13 +86,18 @@ class _Cache(FunctionCache):
 
     Numba reads an index whole before it asks whether the index is fresh. One that an older version
     of the package wrote may name classes that have moved since, and a process that is killed or
-    runs out of space may leave anything: what cannot be read is discarded.
+    runs out of space may leave anything: what cannot be read is discarded. Two processes that
+    compile a function for different types at once may both call their code number one, so that the
+    index of one names the code of the other: what was compiled for other types is discarded too.
     """
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled code, or None if there is none that can be read."""
         try:
-            return super().load_overload(sig, target_context)
+            found = super().load_overload(sig, target_context)
+            if found is not None and found.signature.args != getattr(sig, "args", sig):
+                raise TypeError(f"compiled for {found.signature.args}")
+            return found
         except Exception as error:  # unpickling raises whatever it likes
             _LOG.info("cache of %r discarded: %s: %s", self, type(error).__name__, error)
             self._attempt(self.flush)

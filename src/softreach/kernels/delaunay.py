@@ -23,7 +23,7 @@ from __future__ import annotations
 import numpy as np
 
 from softreach.kernels.compiler import strict
-from softreach.kernels.expansions import SCRATCH
+from softreach.kernels.expansions import scratch
 from softreach.kernels.predicates import (
     collinear,
     insphere,
@@ -59,7 +59,7 @@ def triangulate(points):
         Cells (m, 4), neighbors (m, 4) with -1 outside the hull, and for every point itself or the
         equal point inserted before it, shape (n,). No cells if the points lie in one plane.
     """
-    w, start, same = np.empty(SCRATCH), np.zeros(4, np.int64), np.arange(len(points))
+    w, start, same = scratch(), np.zeros(4, np.int64), np.arange(len(points))
     mesh = empty_triangulation(8 * len(points) + 64)
     table = np.empty((2, 2048), np.int64)
     at, walls, used, free, last = _insert(points, mesh, start, same, table, w, 0, 0, DEAD, 0)

@@ -35,9 +35,8 @@ BOTTOM = np.intp(0)  # typed: a literal 0 would compile every function once more
 SPLITTER = 134_217_729.0  # 2^27 + 1, cuts 53 bits in two halves
 
 
-@strict
 def scratch():
-    """A work array large enough for every predicate."""
+    """A work array large enough for every predicate; made by those who call a kernel."""
     return np.empty(SCRATCH)
 
 

@@ -33,8 +33,9 @@ class _PartLibrary(JITCodeLibrary):
         for library in dict.fromkeys(self._linking_libraries):
             self._reload_init.update(library._reload_init)
             self._final_module.link_in(library._get_module_for_linking(), preserve=True)
-        if not self.inlined:
-            self._optimize_final_module()
+        if not self.inlined:  # once; Numba does it twice, the first time for counted references
+            passes, builder = self._codegen._module_pass_manager()
+            passes.run(self._final_module, builder)
         self._finalize_dynamic_globals()
         self._finalized = True
 

@@ -27,7 +27,9 @@ def insertion_order(points):
     places = np.empty((len(points), 3), np.uint16)
     for axis in range(3):
         places[:, axis] = _crowding_scale(points[:, axis])
-    return np.argsort(_sort_keys(places), kind="stable")
+    keys = np.empty(len(points), np.uint64)
+    _sort_keys(places, keys)
+    return np.argsort(keys, kind="stable")
 
 
 def _crowding_scale(x):
@@ -45,14 +47,12 @@ def _crowding_scale(x):
 
 
 @strict
-def _sort_keys(places):
-    """One integer per point: its round, then its place on the Hilbert curve."""
-    keys = np.empty(len(places), np.uint64)
+def _sort_keys(places, keys):
+    """Write one integer per point: its round, then its place on the Hilbert curve."""
     for i in range(len(places)):
         x, y, z = np.uint32(places[i, 0]), np.uint32(places[i, 1]), np.uint32(places[i, 2])
         late = np.uint64(ROUNDS - _round_from_end(i))
         keys[i] = (late << np.uint64(3 * BITS)) | _hilbert(x, y, z)
-    return keys
 
 
 @strict
