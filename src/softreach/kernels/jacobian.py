@@ -71,7 +71,10 @@ def _walk_column(work, column, table, k, j, groups):
 
 
 def jacobians(table, gamma, tips, out):
-    """Tips (n, 3) and spatial Jacobians (n, 6, bundle), linear rows first, of n activations."""
+    """Tips (n, 3) and spatial Jacobians (n, 6, bundle), linear rows first, of n activations.
+
+    With room for three rows, (n, 3, bundle), the derivatives of the tip positions instead.
+    """
     columns = np.empty((gamma.shape[1], 6 * LANES))
     _jacobians(table, gamma, *room(table), columns, tips, out)
 
@@ -92,15 +95,30 @@ def _jacobians(table, gamma, work, lanes, columns, tips, out):
             for j in range(bundles):
                 _walk_column(work, columns[j], table, k, j, groups)
             walk(work)
-        _store(work, columns, first, count, tips, out)
+        for i in range(count):
+            tip = work[TIP + i], work[TIP + LANES + i], work[TIP + 2 * LANES + i]
+            for axis in range(3):
+                tips[first + i, axis] = tip[axis]
+            if out.shape[1] == 3:
+                _store_slopes(columns, i, tip, out[first + i])
+            else:
+                _store_twists(columns, i, out[first + i])
 
 
 @inline
-def _store(work, columns, first, count, tips, out):
+def _store_twists(columns, i, out):
     """Columns hold (ω, v); the Jacobian has its linear rows first."""
-    for i in range(count):
-        for axis in range(3):
-            tips[first + i, axis] = work[TIP + axis * LANES + i]
-        for j in range(out.shape[2]):
-            for row in range(6):
-                out[first + i, row, j] = columns[j, (row + 3) % 6 * LANES + i]
+    for j in range(out.shape[1]):
+        for row in range(6):
+            out[row, j] = columns[j, (row + 3) % 6 * LANES + i]
+
+
+@inline
+def _store_slopes(columns, i, tip, out):
+    """How the tip moves: v + ω × r."""
+    for j in range(out.shape[1]):
+        a, b, c = columns[j, i], columns[j, LANES + i], columns[j, 2 * LANES + i]
+        x, y, z = tip
+        out[0, j] = columns[j, 3 * LANES + i] + (b * z - c * y)
+        out[1, j] = columns[j, 4 * LANES + i] + (c * x - a * z)
+        out[2, j] = columns[j, 5 * LANES + i] + (a * y - b * x)
