@@ -95,14 +95,19 @@ def _jacobians(table, gamma, work, lanes, columns, tips, out):
             for j in range(bundles):
                 _walk_column(work, columns[j], table, k, j, groups)
             walk(work)
-        for i in range(count):
-            tip = work[TIP + i], work[TIP + LANES + i], work[TIP + 2 * LANES + i]
-            for axis in range(3):
-                tips[first + i, axis] = tip[axis]
-            if out.shape[1] == 3:
-                _store_slopes(columns, i, tip, out[first + i])
-            else:
-                _store_twists(columns, i, out[first + i])
+        _store(work, columns, first, count, tips, out)
+
+
+@inline
+def _store(work, columns, first, count, tips, out):
+    for i in range(count):
+        tip = work[TIP + i], work[TIP + LANES + i], work[TIP + 2 * LANES + i]
+        for axis in range(3):
+            tips[first + i, axis] = tip[axis]
+        if out.shape[1] == 3:
+            _store_slopes(columns, i, tip, out[first + i])
+        else:
+            _store_twists(columns, i, out[first + i])
 
 
 @inline
