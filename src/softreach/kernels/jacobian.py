@@ -105,25 +105,25 @@ def _store(work, columns, first, count, tips, out):
         for axis in range(3):
             tips[first + i, axis] = tip[axis]
         if out.shape[1] == 3:
-            _store_slopes(columns, i, tip, out[first + i])
+            _store_slopes(columns, i, tip, out, first + i)
         else:
-            _store_twists(columns, i, out[first + i])
+            _store_twists(columns, i, out, first + i)
 
 
 @inline
-def _store_twists(columns, i, out):
+def _store_twists(columns, i, out, n):
     """Columns hold (ω, v); the Jacobian has its linear rows first."""
-    for j in range(out.shape[1]):
+    for j in range(out.shape[2]):
         for row in range(6):
-            out[row, j] = columns[j, (row + 3) % 6 * LANES + i]
+            out[n, row, j] = columns[j, (row + 3) % 6 * LANES + i]
 
 
 @inline
-def _store_slopes(columns, i, tip, out):
+def _store_slopes(columns, i, tip, out, n):
     """How the tip moves: v + ω × r."""
-    for j in range(out.shape[1]):
+    for j in range(out.shape[2]):
         a, b, c = columns[j, i], columns[j, LANES + i], columns[j, 2 * LANES + i]
         x, y, z = tip
-        out[0, j] = columns[j, 3 * LANES + i] + (b * z - c * y)
-        out[1, j] = columns[j, 4 * LANES + i] + (c * x - a * z)
-        out[2, j] = columns[j, 5 * LANES + i] + (a * y - b * x)
+        out[n, 0, j] = columns[j, 3 * LANES + i] + (b * z - c * y)
+        out[n, 1, j] = columns[j, 4 * LANES + i] + (c * x - a * z)
+        out[n, 2, j] = columns[j, 5 * LANES + i] + (a * y - b * x)
