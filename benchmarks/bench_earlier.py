@@ -1,12 +1,13 @@
 """Old and new figures side by side: the same work by an earlier commit and by this one, in turns.
 
-`python -m benchmarks.bench_earlier [COMMIT [TURNS]]` prints the tables. Both versions run in one
+`python -m benchmarks.bench_earlier [COMMIT]` prints the tables. Both versions run in one
 go, each in a process of its own; kernels are compiled before anything is timed, but for the cold
 starts, of which compilation is all.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import subprocess
@@ -81,4 +82,8 @@ def compilation(name: str, source: Path) -> float:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:2], *map(int, sys.argv[2:3]))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("commit", nargs="?", default=EARLIER)
+    parser.add_argument("--turns", type=int, default=3)
+    asked = parser.parse_args()
+    main(asked.commit, asked.turns)

@@ -376,7 +376,10 @@ def compared(ours: Version, theirs: Version, part: str, turns: int) -> Iterator[
                 took[version].append((answer["cpu"], answer["wall"]))
         mine, other = np.array(took[ours]), np.array(took[theirs])
         ratio = float(np.median(mine[:, 0] / other[:, 0]))
-        yield Comparison(name, *np.median(mine, 0), *np.median(other, 0), ratio, apart)
+        (cpu, wall), (other_cpu, other_wall) = (
+            np.median(each, 0).tolist() for each in (mine, other)
+        )
+        yield Comparison(name, cpu, wall, other_cpu, other_wall, ratio, apart)
 
 
 @contextmanager
