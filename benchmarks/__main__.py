@@ -26,6 +26,7 @@ PARTS = (
     "atlas",
     "studio",
     "pictures",
+    "earlier",
 )
 
 HEADER = """# Benchmarks

@@ -160,7 +160,8 @@ def print_atlas(alone: Times, side: int, n: int) -> None:
         "| α-shapes | Threads | Wall [s] | Sum of parts [s] | Ratio | CPU ratio | Designs/min |",
         end="",
     )
-    print(" Store [MB/design] | Peak [MB] |\n|---|---|---|---|---|---|---|---|---|")
+    print(" 256 designs [s] | Wanted | Store [MB/design] | Peak [MB] |")
+    print("|---|---|---|---|---|---|---|---|---|---|---|")
     for kind, left_out in (("concave", "convex"), ("convex", "concave")):
         used = [alone[name] for name in PARTS if name != left_out]
         wall, cpu = (sum(times) for times in zip(*used, strict=True))
@@ -172,6 +173,8 @@ def print_atlas(alone: Times, side: int, n: int) -> None:
             )
             print(f" {wall / threads:.1f} | {found['wall'] * threads / wall:.2f} |", end="")
             print(f" {found['cpu'] / cpu:.2f} | {60 * side**2 / found['wall']:.1f} |", end="")
+            wanted = "120" if (kind, threads) == ("convex", 2) else ""
+            print(f" {256 * found['wall'] / side**2:.0f} | {wanted} |", end="")
             print(f" {found['size']:.2f} | {found['peak']:.0f} |")
 
 

@@ -91,7 +91,7 @@ def _scipy(
     tree = KDTree(tip, balanced_tree=False, compact_nodes=False)
     built, queries = clock(), _some(len(tip))[::every]
     means = []
-    for piece in np.array_split(queries, 20):
+    for piece in np.array_split(queries, min(20, len(queries))):
         lists = tree.query_ball_point(tip[piece], RADIUS, workers=-1, return_sorted=False)
         means.append(mean_of(lists, activation, piece))
     return Cost(
@@ -101,7 +101,7 @@ def _scipy(
 
 def _mean_of_piece(lists, activation: Points, piece: Points) -> Points:
     lengths = np.array([len(found) for found in lists])
-    flat = np.concatenate([np.asarray(found) for found in lists])
+    flat = np.concatenate([np.asarray(found, np.intp) for found in lists])
     apart = activation[flat] - np.repeat(activation[piece], lengths, axis=0)
     total = np.add.reduceat(np.sqrt(np.einsum("ij,ij->i", apart, apart)), _starts(lengths))
     others = lengths - 1  # the point itself is in its own list

@@ -11,12 +11,16 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import resource
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -73,12 +77,13 @@ def kernel_tasks() -> dict[str, Task]:
 
 def workspace_tasks() -> dict[str, Task]:
     """The exact reachable set."""
+    from benchmarks.bench_workspace import family_arm
     from softreach.workspace import reachable_set
 
     def numbers(arm: Any, accuracy: float) -> Task:
         def task() -> Results:
             found = reachable_set(arm, accuracy=accuracy)
-            asked = ("volume", "volume_error", "convex_volume")
+            asked = ("volume", "convex_volume")
             return {name: np.array(getattr(found, name)) for name in asked}
 
         return task
@@ -88,6 +93,11 @@ def workspace_tasks() -> dict[str, Task]:
     import softreach as sr
 
     found["reachable set, 4 bundles"] = numbers(sr.designs.redundant_trunk(), 0.02)
+    found["reachable set, 4 bundles, 0.3 %"] = numbers(sr.designs.redundant_trunk(), 3e-3)
+    found["reachable set, 6 bundles, 0.3 %"] = numbers(family_arm("six"), 3e-3)
+    found["reachable set, 12 bundles, 1 %"] = numbers(family_arm("twelve"), 1e-2)
+    narrow = sr.designs.minimal_trunk().with_bounds((-0.9, -0.3))
+    found["reachable set, one to one"] = numbers(narrow, 3e-3)
     found["reachable surface"] = lambda: {
         "vertices": reachable_set(_trunk(75, 3)).surface().vertices
     }
@@ -137,15 +147,19 @@ def redundancy_tasks() -> dict[str, Task]:
     from softreach.dexterity import dexterity
 
     cloud = sr.compute_cloud(sr.designs.redundant_trunk(), 200_000)
+    large = sr.compute_cloud(sr.designs.minimal_trunk(), 2_000_000)
 
     def statistics() -> Results:
         found = curvature_statistics(cloud)
         return {name: found[name].values for name in found if not name.endswith("_count")}
 
+    def distance(of: Any, queries: int) -> Task:
+        return lambda: {"distance": sr.activation_distance(of, 1 / 60, queries=queries).values}
+
     return {
-        "activation distance": lambda: {
-            "distance": sr.activation_distance(cloud, 1 / 60, queries=10_000).values
-        },
+        "activation distance": distance(cloud, 10_000),
+        "activation distance, 10,000 of 2,000,000": distance(large, 10_000),
+        "activation distance, 100 of 2,000,000": distance(large, 100),
         "dexterity": lambda: {"manipulability": dexterity(cloud).manipulability.values},
         "curvature statistics": statistics,
     }
@@ -158,15 +172,71 @@ def atlas_tasks() -> dict[str, Task]:
     space = sr.DesignSpace.grid(
         sr.designs.minimal_trunk(), revolution=[0.9, 1.8], taper=np.radians([0.0, 2.0]).tolist()
     )
-    metrics = ("extent", "convex", "concave", "exact", "curvature")
+    exact = ("extent", "convex", "exact", "curvature")
 
-    def task() -> Results:
+    def build(n: int, *metrics: str) -> Task:
+        def task() -> Results:
+            with tempfile.TemporaryDirectory() as folder:
+                atlas = sr.build_atlas(space, f"{folder}/a.zarr", n, metrics=metrics)
+                names = ("volume", "convex_volume", "exact_volume", "unreachability", "x_min")
+                return {name: atlas[name].values for name in names if name in atlas}
+
+        return task
+
+    return {
+        "atlas, 2 x 2 of 100,000": build(100_000, *exact, "concave"),
+        "atlas, 2 x 2 of 400,000": build(400_000, *exact, "concave"),
+        "atlas, 2 x 2 of 400,000, without α-shapes": build(400_000, *exact),
+    }
+
+
+def picture_tasks() -> dict[str, Task]:
+    """Pictures of clouds and hulls, and the demo from the start of its process to its end."""
+    import softreach as sr
+    from softreach import plot
+    from softreach.plot.style import pyplot
+
+    arm = sr.designs.minimal_trunk()
+    clouds = {n: sr.compute_cloud(arm, n) for n in (400_000, 2_000_000)}
+    hull = sr.concave_hull(clouds[400_000].tip, 0.05 * arm.length)
+
+    def drawn(draw: Callable[[], object]) -> Task:
+        def task() -> Results:
+            draw()
+            pyplot().close("all")
+            return {}
+
+        return task
+
+    def demo() -> Results:
         with tempfile.TemporaryDirectory() as folder:
-            atlas = sr.build_atlas(space, f"{folder}/a.zarr", 100_000, metrics=metrics)
-            names = ("volume", "convex_volume", "exact_volume", "unreachability", "x_min")
-            return {name: atlas[name].values for name in names}
+            command = [sys.executable, "-m", "softreach", "demo", "--json", "--out", folder]
+            subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        return {}
 
-    return {"atlas, 2 x 2 of 100,000": task}
+    views = {
+        f"four views of {n:,} points and the arm": drawn(partial(plot.plot_views, cloud, arm))
+        for n, cloud in clouds.items()
+    }
+    return {**views, "picture of a hull": drawn(lambda: plot.plot_hull(hull)), "demo": demo}
+
+
+def studio_tasks() -> dict[str, Task]:
+    """From a moved slider to the fine result."""
+    import softreach as sr
+    from softreach.studio.reach import Quality, stages
+
+    def fine(arm: Any) -> Task:
+        def task() -> Results:
+            *_, last = stages(arm, 17, Quality(), lambda: None)
+            return {"volume": np.array(last.volume)}
+
+        return task
+
+    return {
+        "studio's fine result": fine(_trunk(108, 2)),
+        "studio's fine result, 4 bundles": fine(sr.designs.redundant_trunk()),
+    }
 
 
 PARTS: dict[str, Callable[[], dict[str, Task]]] = {
@@ -176,6 +246,8 @@ PARTS: dict[str, Callable[[], dict[str, Task]]] = {
     "inverse": inverse_tasks,
     "redundancy": redundancy_tasks,
     "atlas": atlas_tasks,
+    "pictures": picture_tasks,
+    "studio": studio_tasks,
 }
 
 
@@ -197,7 +269,6 @@ def _tip_directions(arm: Any, gamma: np.ndarray) -> np.ndarray:
 
 def serve() -> None:
     """Run the tasks that arrive as lines; this is what the processes of both versions do."""
-    import time
     import warnings
 
     warnings.simplefilter("ignore")
@@ -208,12 +279,18 @@ def serve() -> None:
             tasks = PARTS[asked["part"]]()
             answer: dict[str, Any] = {"tasks": list(tasks)}
         else:
-            wall, cpu = time.perf_counter(), time.process_time()
+            wall, cpu = time.perf_counter(), _cpu_seconds()
             results = tasks[asked["task"]]()
-            answer = {"wall": time.perf_counter() - wall, "cpu": time.process_time() - cpu}
+            answer = {"wall": time.perf_counter() - wall, "cpu": _cpu_seconds() - cpu}
             np.savez(asked["out"], **results)  # type: ignore[arg-type]
         sys.stdout.write(json.dumps(answer) + "\n")
         sys.stdout.flush()
+
+
+def _cpu_seconds() -> float:
+    """Of this process and of those that it has waited for."""
+    waited_for = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + waited_for.ru_utime + waited_for.ru_stime
 
 
 class Version:
@@ -266,21 +343,58 @@ def difference(ours: Results, theirs: Results) -> float:
     return worst
 
 
-def compared(ours: Version, theirs: Version, part: str, turns: int) -> Iterator[tuple[Any, ...]]:
-    """Task, ratio of CPU times, CPU time of the other version [s], difference of results."""
+class Comparison(NamedTuple):
+    """One task by both versions: medians of the turns."""
+
+    task: str
+    cpu: float
+    """CPU time of this version [s]."""
+    wall: float
+    """Its wall time [s]."""
+    other_cpu: float
+    """CPU time of the other version [s]."""
+    other_wall: float
+    """Its wall time [s]."""
+    ratio: float
+    """Of the CPU times of a turn, this version over the other."""
+    apart: float
+    """Largest relative difference of the results."""
+
+
+def compared(ours: Version, theirs: Version, part: str, turns: int) -> Iterator[Comparison]:
+    """Every task of a part by both versions in turns."""
     names = ours.ask(part=part)["tasks"]
     theirs.ask(part=part)
     for name in names:
         for version in (ours, theirs):  # compiled, loaded
             version.ask(task=name)
         apart = difference(ours.results(), theirs.results())
-        pairs = []
+        took: dict[Version, list[tuple[float, float]]] = {ours: [], theirs: []}
         for turn in range(turns):
-            order = (ours, theirs) if turn % 2 else (theirs, ours)
-            took = {version: version.ask(task=name)["cpu"] for version in order}
-            pairs.append((took[ours], took[theirs]))
-        mine, other = np.array(pairs).T
-        yield name, float(np.median(mine / other)), float(np.median(other)), apart
+            for version in (ours, theirs) if turn % 2 else (theirs, ours):
+                answer = version.ask(task=name)
+                took[version].append((answer["cpu"], answer["wall"]))
+        mine, other = np.array(took[ours]), np.array(took[theirs])
+        ratio = float(np.median(mine[:, 0] / other[:, 0]))
+        (cpu, wall), (other_cpu, other_wall) = (
+            np.median(each, 0).tolist() for each in (mine, other)
+        )
+        yield Comparison(name, cpu, wall, other_cpu, other_wall, ratio, apart)
+
+
+@contextmanager
+def both(source: Path) -> Iterator[tuple[Version, Version]]:
+    """This version and that of another folder src, each in a process of its own."""
+    with tempfile.TemporaryDirectory() as folder:
+        versions = [
+            Version(ROOT / "src", Path(folder) / "ours.npz"),
+            Version(source.resolve(), Path(folder) / "theirs.npz"),
+        ]
+        try:
+            yield versions[0], versions[1]
+        finally:
+            for version in versions:
+                version.end()
 
 
 def main() -> None:
@@ -296,17 +410,12 @@ def main() -> None:
     worst = 0.0
     print("| task | CPU of the other [s] | ratio of CPU times | largest relative difference |")
     print("|---|--:|--:|--:|")
-    with tempfile.TemporaryDirectory() as folder:
-        ours = Version(ROOT / "src", Path(folder) / "ours.npz")
-        theirs = Version(asked.source.resolve(), Path(folder) / "theirs.npz")
-        try:
-            for part in asked.parts:
-                for name, ratio, cpu, apart in compared(ours, theirs, part, asked.turns):
-                    worst = max(worst, ratio)
-                    print(f"| {name} | {cpu:.3f} | {ratio:.3f} | {apart:.1e} |", flush=True)
-        finally:
-            ours.end()
-            theirs.end()
+    with both(asked.source) as (ours, theirs):
+        for part in asked.parts:
+            for found in compared(ours, theirs, part, asked.turns):
+                worst = max(worst, found.ratio)
+                numbers = f"{found.other_cpu:.3f} | {found.ratio:.3f} | {found.apart:.1e}"
+                print(f"| {found.task} | {numbers} |", flush=True)
     sys.exit(worst > asked.most)
 
 

@@ -18,6 +18,7 @@ from concurrent.futures import (
     ThreadPoolExecutor,
     wait,
 )
+from itertools import chain
 from typing import Any, Protocol, Self
 
 from softreach import parallel
@@ -69,9 +70,9 @@ def run_designs(
     if executor is None:
         # Drawing a task computes the tips, so at most a few clouds per thread are held at once.
         metrics = store.command.metrics
-        parallel.run(
-            _reporting(begin_design(store, metrics, index), on_outcome) for index in indices
-        )
+        tasks = (_reporting(begin_design(store, metrics, index), on_outcome) for index in indices)
+        # Threads start with the second task: with one before all they get the first design at once.
+        parallel.run(chain([lambda: None], tasks))
         return
     pool = _Pool(executor)
     with undoing(pool.abandon), pool:

@@ -31,6 +31,7 @@ BLOCK = 1 << 14  # queries that one thread takes at a time
 _CELLS = 2.0 ** (PLACE_BITS - 1)  # along an axis; the other half of the keys is room for windows
 _CUBES = 128  # along an axis, at most, to find what is near a few queries
 _FEW = 1.0 / 500  # queries to a point, below which that pays
+_MANY = 100_000  # points, from which on it does
 _SLACK = 2.0**-20  # of a cell or a radius, far above the rounding of a key
 _SMALLEST = 1e-290  # width of a cell
 
@@ -65,7 +66,7 @@ def mean_value_distance(
     if len(points) == 0:
         return np.empty(0), np.empty(0, np.intp)
     columns = _Columns.around(points, float(radius))
-    if queries is not None and len(queries) < _FEW * len(points):
+    if queries is not None and len(points) >= _MANY and len(queries) < _FEW * len(points):
         near = columns.near(points, points[queries])
         order, cloud = columns.sorted_sample(points[near], values[near])
     else:

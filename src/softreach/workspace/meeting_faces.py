@@ -54,9 +54,8 @@ def faces_meet(rod: TipMap, slopes: Array) -> bool | None:
     side = _FIRST
     first, second = np.triu_indices(6 * side * side)
     for _ in range(_HALVINGS):
-        which, place = np.unique(np.concatenate([first, second]), return_inverse=True)
+        which, a, b = _each_once(first, second, 6 * side * side)
         patches = _patches(rod, which, side)
-        a, b = place[: len(first)], place[len(first) :]
         left = ~_parted(patches, a, b, bend)
         first, second, a, b = first[left], second[left], a[left], b[left]
         regular, hopeless = windows.hold(*_hull(patches, a, b))
@@ -69,6 +68,14 @@ def faces_meet(rod: TipMap, slopes: Array) -> bool | None:
         if len(first) > _MOST_PAIRS:
             return True
     return True
+
+
+def _each_once(first: Ints, second: Ints, size: int) -> tuple[Ints, Ints, Ints]:
+    """Numbers below `size` that occur in pairs, and where among them the pairs are found."""
+    used = np.zeros(size, bool)
+    used[first] = used[second] = True
+    place = np.cumsum(used) - 1
+    return np.flatnonzero(used), place[first], place[second]
 
 
 def _largest_bend(slopes: Array) -> Array:
@@ -100,12 +107,13 @@ def _parted(patches: _Patches, a: Ints, b: Ints, bend: Array) -> NDArray[np.bool
     between = patches.tips[b] - patches.tips[a]
     found = np.linalg.norm(between, axis=1) > radius[a] + radius[b]
     normal = _normals(patches)
-    for direction in (between, normal[a], normal[b]):
+    # Along its own plane a patch reaches no farther than by its bend.
+    for direction, tilted in ((between, (a, b)), (normal[a], (b,)), (normal[b], (a,))):
         left = np.flatnonzero(~found)
         unit = direction[left] / np.linalg.norm(direction[left], axis=1).clip(1e-300)[:, None]
         reach = rest[a[left]] + rest[b[left]]
-        for each in (a[left], b[left]):
-            reach += np.abs(unit[:, None, :] @ sides[each]).sum(axis=(1, 2))
+        for each in tilted:
+            reach += np.abs(unit[:, None, :] @ sides[each[left]]).sum(axis=(1, 2))
         found[left] = np.abs((unit * between[left]).sum(axis=1)) > reach
     return found
 

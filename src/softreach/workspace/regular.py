@@ -70,9 +70,9 @@ class RegularWindows:
         return found, held & ~found & (size == 0)
 
     def _are_regular(self, size: Ints, vertex: Ints) -> Bools:
-        asked = np.unique(size * len(self._slopes) + vertex)
-        new = asked[self._known.ravel()[asked] == _UNKNOWN]
-        number, at = np.divmod(new, len(self._slopes))
+        asked = np.zeros(self._known.shape, bool)
+        asked[size, vertex] = True
+        number, at = np.nonzero(asked & (self._known == _UNKNOWN))
         self._known[number, at] = np.where(self._judge(self._sizes[number], at), _YES, _NO)
         return self._known[size, vertex] == _YES
 
