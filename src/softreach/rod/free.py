@@ -13,7 +13,7 @@ from softreach import parallel
 from softreach.arm.tables import tables
 from softreach.kernels import frames, jacobian, rod
 from softreach.rod.arm_rod import ArmRod
-from softreach.rod.frames import Frames, StrainRange, Strains, position_slopes
+from softreach.rod.frames import Frames, StrainRange, Strains
 from softreach.rod.linear_strains import linear_strains, strain_range
 from softreach.rod.linearization import Linearization
 from softreach.rod.steps import StepRule
