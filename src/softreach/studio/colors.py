@@ -13,10 +13,10 @@ from softreach.redundancy import activation_distance
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import activation_symbols
 from softreach.studio import markup
+from softreach.studio.multiplicity import count_activations
 from softreach.studio.reach import Reach, shown_rows, shown_samples
 from softreach.studio.rod import rod_of
 from softreach.studio.worker import all_cores
-from softreach.workspace import ReachableSolid
 
 __all__ = [
     "FAINT",
@@ -27,6 +27,7 @@ __all__ = [
     "manipulability",
     "sample_colors",
     "sample_values",
+    "shown_color",
 ]
 
 Array = NDArray[np.float64]
@@ -56,21 +57,28 @@ def sample_colors(reach: Reach, level: int, color: str) -> Coloring:
     """Colors of the samples that are shown; an unknown name colors by all activations."""
     cloud = reach.cloud[["tip", "activation"]].isel(sample=shown_samples(reach, level))
     coloring = color_samples(cloud, sample_values(reach, level, color))
-    if isinstance(coloring.key, ScalarKey) and color in _VALUES:
+    if isinstance(coloring.key, ScalarKey) and color in _LABELS:
         return coloring._replace(key=coloring.key._replace(label=color_label(color)))
     return coloring
 
 
 def sample_values(reach: Reach, level: int, color: str) -> Literal["rgb"] | int | Array:
     """What the samples that are shown are colored by, as the library's own figures take it."""
-    if color.startswith("bundle ") and int(color[7:]) < reach.arm.bundles:
-        return int(color[7:])
-    if color not in _VALUES or color not in color_names(reach.arm):
+    color = shown_color(reach.arm, color)
+    if color == "rgb":
         return "rgb"
-    if color == "multiplicity" and not isinstance(reach.exact, ReachableSolid):
-        return "rgb"  # what counts it is not there yet, or never
+    if color.startswith("bundle "):
+        return int(color[7:])
+    if color == "multiplicity":
+        # Coarse clouds last for a moment only, in which nothing is counted.
+        return count_activations(reach, shown_rows(reach, level)) if reach.fine else "rgb"
     with all_cores:
         return _VALUES[color](reach, shown_rows(reach, level))
+
+
+def shown_color(arm: Manipulator, color: str) -> str:
+    """What points are colored by where that color is asked for; it may be one of another arm."""
+    return color if color in color_names(arm) else "rgb"
 
 
 def color_label(color: str) -> str:
@@ -106,14 +114,6 @@ def _line(content: str) -> str:
     return f'<div style="font-size:0.8em;padding:0 0.8em 0.4em">{content}</div>'
 
 
-def _multiplicity(reach: Reach, rows: NDArray[np.int64]) -> Array:
-    assert isinstance(reach.exact, ReachableSolid)
-    if reach.exact.route == "flux":  # each place is reached once
-        return np.ones(len(rows))
-    # A sample is reached by its own activation at least, whatever the grid says at the rim.
-    return np.maximum(reach.exact.image.counts_at(reach.cloud.tip.values[rows]), 1).astype(float)
-
-
 def _manipulability(reach: Reach, rows: NDArray[np.int64]) -> Array:
     return manipulability(reach.arm, reach.cloud.activation.values[rows])
 
@@ -128,7 +128,6 @@ def _activation_distance(reach: Reach, rows: NDArray[np.int64]) -> Array:
 
 
 _VALUES = {
-    "multiplicity": _multiplicity,
     "manipulability": _manipulability,
     "activation distance": _activation_distance,
 }

@@ -133,6 +133,14 @@ class Reach:
         lost = np.isnan(self.cloud.tip.values).any(axis=1)
         return np.where(lost, TipStatus.NO_EQUILIBRIUM, self.cloud.status.values).astype(np.int8)
 
+    @cached_property
+    def counts(self) -> NDArray[np.float64]:
+        """How many activations reach the place of each sample, as far as that is known, else NaN.
+
+        Filled by `studio.multiplicity`.
+        """
+        return np.full(self.samples, np.nan)
+
     @property
     def lost_share(self) -> float:
         """Share of the activation box that the exact set leaves out [-]."""

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from softreach.errors import InvalidInput
+from softreach.studio.colors import shown_color
 from softreach.studio.jobs.job import Job
-from softreach.studio.reach import Reach, stages
+from softreach.studio.multiplicity import count_activations, uncounted
+from softreach.studio.reach import Reach, shown_rows, stages
 from softreach.studio.state import StudioState
 from softreach.studio.worker import StaleCheck
 
@@ -35,6 +37,7 @@ class ComputeReach(Job):
             for reach in stages(state.design, state.appearance.level, session.quality, check):
                 check()
                 session.reach = reach
+                _count_shown(session, check)
                 _draw_cloud(session)
         except InvalidInput as error:
             _withdraw(session, str(error))
@@ -53,6 +56,7 @@ class DrawCloud(Job):
         """Draw what is known; ask for more where it is not enough."""
         check()
         if _is_complete(self.session.reach, self.session.state):
+            _count_shown(self.session, check)
             _draw_points(self.session)
             self.session.show()
         else:
@@ -96,6 +100,23 @@ def _draw_cloud(session: Session) -> None:
     _draw_points(session)
     session.follow(DrawSurfaces)
     session.show()
+
+
+def _count_shown(session: Session, check: StaleCheck) -> None:
+    """Count the activations of the points that are shown, where their colors tell it."""
+    reach, look = session.reach, session.state.appearance
+    if reach is None or not reach.fine or shown_color(reach.arm, look.color) != "multiplicity":
+        return
+    missing, done = uncounted(reach, shown_rows(reach, look.level)), 0
+
+    def progress(more: int) -> None:
+        nonlocal done
+        done += more
+        session.say(f"activations counted at {done:,} of {len(missing):,} points")
+
+    count_activations(reach, missing, check, progress)
+    if len(missing):
+        session.say("")
 
 
 def _draw_points(session: Session) -> None:
