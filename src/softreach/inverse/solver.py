@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _NEARLY = 1e-2  # gap in L at which a target may have a root where ∂r/∂γ is nearly singular
-_BLOCK = 32_768  # targets at once: bounds the memory of a call
+_BLOCK = 131_072  # targets at once: bounds the memory of a call
 
 
 def solve_inverse(
