@@ -8,7 +8,7 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 
-__all__ = ["SpaceTree", "leaf_at", "may_meet", "sort_into_children"]
+__all__ = ["SpaceTree", "leaf_at", "listed", "may_meet", "sort_into_children"]
 
 
 class SpaceTree(NamedTuple):
@@ -54,6 +54,31 @@ def leaf_at(low, size, child, first, length, p):
         node = child[node] + 4 * i + 2 * j + k
         x, y, z = x - i, y - j, z - k
     return first[node], first[node] + length[node]
+
+
+@inline
+def listed(tree, p, begin, end, held):
+    """Put those of some items whose face planes hold p into `held`, in order; return how many.
+
+    Two faces at a time, without a branch: which of them misses p cannot be predicted.
+    """
+    item, some, all_four = tree.item, 0, 0
+    for entry in range(begin, end):
+        k = item[entry]
+        held[some] = k
+        some += _is_beyond(tree.planes, k, 0, p) & _is_beyond(tree.planes, k, 1, p)
+    for entry in range(some):
+        k = held[entry]
+        held[all_four] = k
+        all_four += _is_beyond(tree.planes, k, 2, p) & _is_beyond(tree.planes, k, 3, p)
+    return all_four
+
+
+@inline
+def _is_beyond(planes, k, i, p):
+    """Whether p lies on the inner side of face i of tetrahedron k."""
+    inward = planes[k, i, 0] * p[0] + planes[k, i, 1] * p[1] + planes[k, i, 2] * p[2]
+    return inward >= planes[k, i, 3]
 
 
 @kernel
