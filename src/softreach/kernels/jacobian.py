@@ -12,6 +12,7 @@ from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.magnus import exponent, exponent_derivative
 from softreach.kernels.rod import LANES, TIP, clear_tips, load, node_values, nodes_at, room, walk
 from softreach.kernels.twist import add, bracket, dexp
+from softreach.kernels.vector import cross
 
 __all__ = ["jacobians"]
 
@@ -67,7 +68,10 @@ def _walk_column(work, column, table, k, j):
 
 
 def jacobians(table, gamma, tips, out):
-    """Tips (n, 3) and spatial Jacobians (n, 6, bundle), linear rows first, of n activations."""
+    """Tips (n, 3) and spatial Jacobians (n, 6, bundle), linear rows first, of n activations.
+
+    Where `out` has three rows, (n, 3, bundle), it receives ∂r/∂γ instead.
+    """
     columns = np.empty((gamma.shape[1], 6 * LANES))
     _jacobians(table, gamma, *room(table), columns, tips, out)
 
@@ -92,10 +96,22 @@ def _jacobians(table, gamma, work, lanes, columns, tips, out):
 
 @inline
 def _store(work, columns, first, count, tips, out):
-    """Columns hold (ω, v); the Jacobian has its linear rows first."""
+    """Columns hold (ω, v); the Jacobian has its linear rows first, or is v + ω × r alone."""
     for i in range(count):
+        r = (work[TIP + i], work[TIP + LANES + i], work[TIP + 2 * LANES + i])
         for axis in range(3):
-            tips[first + i, axis] = work[TIP + axis * LANES + i]
+            tips[first + i, axis] = r[axis]
         for j in range(out.shape[2]):
-            for row in range(6):
-                out[first + i, row, j] = columns[j, (row + 3) % 6 * LANES + i]
+            if out.shape[1] == 6:
+                for row in range(6):
+                    out[first + i, row, j] = columns[j, (row + 3) % 6 * LANES + i]
+            else:
+                moved = cross(_column(columns, j, i), r)
+                for row in range(3):
+                    out[first + i, row, j] = columns[j, (row + 3) * LANES + i] + moved[row]
+
+
+@inline
+def _column(columns, j, i):
+    """ω of lane i per unit of activation j."""
+    return columns[j, i], columns[j, LANES + i], columns[j, 2 * LANES + i]

@@ -21,7 +21,6 @@ from softreach.rod.tip_map import (
     Frames,
     StrainRange,
     Strains,
-    position_slopes,
 )
 
 __all__ = ["FreeRod"]
@@ -63,9 +62,7 @@ class FreeRod(ArmRod):
 
     def fill_slopes(self, gamma: Array, tips: Array, slopes: Array) -> None:
         """Put tips (n, 3) and ∂r/∂γ (n, 3, bundles) [m] into place: theory (31)."""
-        twists = np.empty((len(gamma), 6, self.box.bundles))
-        jacobian.jacobians(self._table, gamma, tips, twists)
-        position_slopes(tips, twists, slopes)
+        jacobian.jacobians(self._table, gamma, tips, slopes)
 
     def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:
         """Tips [m] and the spatial twist of the tip frame per unit of each activation."""
