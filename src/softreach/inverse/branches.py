@@ -210,10 +210,15 @@ def _partner_starts(prepared: PreparedMap, roots: Roots) -> Starts:
 
 def distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
     """Step 7: every root once."""
-    offsets = np.searchsorted(roots.target, np.arange(len(request.targets) + 1))
-    smallest = smallest_singular_values(roots.slope)
-    kept, rounding = np.ones(len(roots.target), bool), _ROUNDING * prepared.rod.length
-    newton.merge_equal(offsets, roots.gamma, roots.residual, smallest, rounding, kept)
+    counts = np.bincount(roots.target, minlength=len(request.targets))
+    several = np.flatnonzero(counts[roots.target] > 1)
+    offsets = np.concatenate([[0], np.cumsum(counts[counts > 1])])
+    compared = roots.gamma[several], roots.residual[several]
+    smallest = smallest_singular_values(roots.slope[several])
+    single, rounding = np.ones(len(several), bool), _ROUNDING * prepared.rod.length
+    newton.merge_equal(offsets, *compared, smallest, rounding, single)
+    kept = np.ones(len(roots.target), bool)
+    kept[several] = single
     return roots.where(kept)
 
 

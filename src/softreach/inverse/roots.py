@@ -35,7 +35,9 @@ class Roots(NamedTuple):
     """Whether the arm can be there, shape (n,)."""
 
     def where(self, chosen: NDArray[np.bool_] | Index) -> Roots:
-        """Those chosen by a mask or an index."""
+        """Those chosen by a mask or an index; themselves where a mask leaves none out."""
+        if chosen.dtype == bool and chosen.all():
+            return self
         return Roots(
             self.target[chosen],
             self.gamma[chosen],
