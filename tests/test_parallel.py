@@ -61,3 +61,21 @@ def test_what_is_done_meanwhile_is_done_once_and_asked_for_later():
 def test_what_is_done_meanwhile_raises_where_it_is_asked_for():
     with parallel.meanwhile(lambda: 1 / 0) as found, pytest.raises(ZeroDivisionError):
         found()
+
+
+def test_work_that_is_undivided_stays_on_its_thread():
+    where = []
+    with parallel.undivided():
+        parallel.run([lambda: where.append(threading.get_ident())] * 5)
+    assert where == [threading.get_ident()] * 5
+
+
+def test_other_threads_divide_their_work_meanwhile(threads):
+    tasks = [lambda: where.append(threading.get_ident())] * 5
+    where: list[int] = []
+    with parallel.undivided():
+        other = threading.Thread(target=parallel.run, args=(tasks,))
+        other.start()
+        other.join()
+    assert threading.get_ident() not in where
+    assert len(where) == 5

@@ -42,7 +42,8 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _ROUNDING = 1e-13  # of a tip, in L, with room to spare
-_LARGEST, _SMALLEST = 8192, 1024  # targets solved together
+_LARGEST, _SMALLEST = 8192, 1024  # targets solved together on a thread
+_LARGEST_LOADED = 32_768  # with loads, on all threads
 _SHARES = 6  # of the targets for each thread, because some are harder than others
 _MOST_ITERATIONS = 40
 _CHORD_STEPS = 2  # with the inverse that a start knows, before Newton's method
@@ -66,18 +67,23 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
     count = len(request.targets)
     if not count:
         return no_roots(prepared.rod)
-    order = spatial_order(request.targets)
     prepared.prepare_branches()
-    pieces = [order[block] for block in parallel.blocks(count, _piece(count))]
-    if len(pieces) == 1:
-        parts = [_branches_of(prepared, request, order)]
+    order = spatial_order(request.targets)
+    sets = [order[block] for block in parallel.blocks(count, _set_size(prepared, count))]
+    if prepared.branch_map.supports_unstable or len(sets) == 1:
+        parts = [_branches_of(prepared, request, rows) for rows in sets]
     else:
-        parts = parallel.in_order(partial(_alone, prepared, request, rows) for rows in pieces)
-    return Roots.sorted_by_target(list(parts))
+        parts = list(parallel.in_order(partial(_alone, prepared, request, rows) for rows in sets))
+    return Roots.sorted_by_target(parts)
 
 
-def _piece(count: int) -> int:
-    """How many targets to solve together: enough of them for kernels, and sets for threads."""
+def _set_size(prepared: PreparedMap, count: int) -> int:
+    """How many targets to solve together: enough of them for kernels, enough sets for threads.
+
+    Rods under loads are work enough to be shared out among threads by themselves.
+    """
+    if prepared.branch_map.supports_unstable:
+        return _LARGEST_LOADED
     return min(_LARGEST, max(_SMALLEST, -(-count // (_SHARES * parallel.thread_count()))))
 
 
@@ -90,8 +96,7 @@ def _alone(prepared: PreparedMap, request: Request, rows: Index) -> Roots:
 def _branches_of(prepared: PreparedMap, request: Request, rows: Index) -> Roots:
     """The roots of some of the targets, sorted by their places in `rows`."""
     some = request.of(rows)
-    everything = np.arange(len(rows))
-    starts = starts_from_cells(prepared, some, everything)
+    starts = starts_from_cells(prepared, some, np.arange(len(rows)))
     if len(prepared.torn_cells.tip):
         starts = with_torn_cells(prepared, some, starts)
     roots = _newton(prepared, some, starts)

@@ -60,9 +60,7 @@ class Starts(NamedTuple):
     def by_target(self) -> Starts:
         """All of them, sorted by target."""
         order = np.argsort(self.target, kind="stable")
-        return Starts(
-            self.target[order], self.cell[order], self.gamma[order], self.inverse[order]
-        )
+        return Starts(self.target[order], self.cell[order], self.gamma[order], self.inverse[order])
 
 
 def starts_from_cells(

@@ -73,7 +73,17 @@ def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start, 
                     if (reached or not with_root) and _is_new(
                         mesh, c, guess, det, start, side, first, found
                     ):
-                        _put(guess, q, axes, orientation(which) * det, low, high, found, start, inverse)
+                        _put(
+                            guess,
+                            q,
+                            axes,
+                            orientation(which) * det,
+                            low,
+                            high,
+                            found,
+                            start,
+                            inverse,
+                        )
                         target[found], cell[found], side[found - first] = t, c, det
                         found += 1
     return targets.shape[0], found
