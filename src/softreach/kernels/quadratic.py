@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from softreach.kernels.compiler import inline
-from softreach.kernels.vector import cross, dot, minus, row
+from softreach.kernels.vector import combination, cross, dot, matrix, minus, plus, row, times
 
 __all__ = ["Quadratic", "barycentric", "expand", "is_inside", "quadratic", "refine"]
 
@@ -92,29 +92,15 @@ def barycentric(s):
 @inline
 def _at(q, s):
     """p - f at s, and ∂f/∂s0, ∂f/∂s1, ∂f/∂s2."""
-    w = barycentric(s)
-    a, b, c = _change(q, w, 0), _change(q, w, 1), _change(q, w, 2)
-    return (
-        -_combined(q.value, w, 0) - 0.5 * (s[0] * a[0] + s[1] * b[0] + s[2] * c[0]),
-        -_combined(q.value, w, 1) - 0.5 * (s[0] * a[1] + s[1] * b[1] + s[2] * c[1]),
-        -_combined(q.value, w, 2) - 0.5 * (s[0] * a[2] + s[1] * b[2] + s[2] * c[2]),
-    ), (a, b, c)
-
-
-@inline
-def _combined(value, w, k):
-    return w[0] * value[0, k] + w[1] * value[1, k] + w[2] * value[2, k] + w[3] * value[3, k]
-
-
-@inline
-def _change(q, w, j):
-    """Σ λi Dij."""
-    d = q.change
-    return (
-        w[0] * d[0, j, 0] + w[1] * d[1, j, 0] + w[2] * d[2, j, 0] + w[3] * d[3, j, 0],
-        w[0] * d[0, j, 1] + w[1] * d[1, j, 1] + w[2] * d[2, j, 1] + w[3] * d[3, j, 1],
-        w[0] * d[0, j, 2] + w[1] * d[1, j, 2] + w[2] * d[2, j, 2] + w[3] * d[3, j, 2],
-    )
+    w, none = barycentric(s), (0.0, 0.0, 0.0)
+    miss, a0, a1, a2 = none, none, none, none
+    for i in range(4):
+        change = matrix(q.change, i)
+        a0, a1 = plus(a0, times(w[i], change[0])), plus(a1, times(w[i], change[1]))
+        a2 = plus(a2, times(w[i], change[2]))
+        miss = minus(miss, times(w[i], row(q.value, i)))
+    a = (a0, a1, a2)
+    return minus(miss, times(0.5, combination(s, a))), a
 
 
 @inline
@@ -144,12 +130,14 @@ def is_inside(q, weights, det, margin):
 
     Each barycentric coordinate then changes by no more than its gradient in space times that.
     """
-    g = (row(q.gradient, 0), row(q.gradient, 1), row(q.gradient, 2))
-    gradients = (g[0], minus(g[0], g[1]), minus(g[1], g[2]), g[2])
     for i in range(4):
         outside = -weights[i] - _ROUNDING
-        if outside > 0.0 and (outside * det) ** 2 > margin * margin * dot(
-            gradients[i], gradients[i]
-        ):
-            return False
+        if outside > 0.0:
+            size = 0.0
+            for c in range(3):
+                before = q.gradient[i - 1, c] if i > 0 else 0.0
+                behind = q.gradient[i, c] if i < 3 else 0.0
+                size += (before - behind) ** 2
+            if (outside * det) ** 2 > margin * margin * size:
+                return False
     return True

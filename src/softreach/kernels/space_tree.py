@@ -62,16 +62,17 @@ def listed(tree, p, begin, end, held):
 
     Two faces at a time, without a branch: which of them misses p cannot be predicted.
     """
-    item, some, all_four = tree.item, 0, 0
-    for entry in range(begin, end):
-        k = item[entry]
-        held[some] = k
-        some += _is_beyond(tree.planes, k, 0, p) & _is_beyond(tree.planes, k, 1, p)
-    for entry in range(some):
-        k = held[entry]
-        held[all_four] = k
-        all_four += _is_beyond(tree.planes, k, 2, p) & _is_beyond(tree.planes, k, 3, p)
-    return all_four
+    count = end - begin
+    for entry in range(count):
+        held[entry] = tree.item[begin + entry]
+    for i in (0, 2):
+        kept = 0
+        for entry in range(count):
+            k = held[entry]
+            held[kept] = k
+            kept += _is_beyond(tree.planes, k, i, p) & _is_beyond(tree.planes, k, i + 1, p)
+        count = kept
+    return count
 
 
 @inline
