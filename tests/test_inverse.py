@@ -9,7 +9,7 @@ from scipy.optimize import least_squares, minimize
 from softreach.arm import designs
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
-from softreach.inverse import Solutions, Status, prepared_map, solve_inverse
+from softreach.inverse import Solutions, Status, branches, prepared_map, solve_inverse
 from softreach.rod import tip_map
 from softreach.rod.kinematics import configuration, tip_positions
 
@@ -193,6 +193,16 @@ def test_a_target_is_solved_alike_alone_and_among_others(folded):
     for i in (0, 7, 299):
         alone = solve_inverse(folded, targets[i : i + 1])[0]
         assert np.array_equal(alone.activations, together[i].activations)
+
+
+def test_solutions_do_not_depend_on_which_targets_share_a_thread(folded, monkeypatch):
+    targets = tip_positions(folded, random_activations(folded, 300, seed=4))
+    together = solve_inverse(folded, targets)
+    monkeypatch.setenv("SOFTREACH_NUM_THREADS", "3")
+    monkeypatch.setattr(branches, "_SMALLEST", 20)
+    apart = solve_inverse(folded, targets)
+    assert np.array_equal(apart.offsets, together.offsets)
+    assert np.array_equal(apart.activations, together.activations)
 
 
 def test_the_condition_number_is_that_of_the_position_jacobian(folded):

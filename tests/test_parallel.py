@@ -101,3 +101,21 @@ def test_a_task_that_is_given_up_is_no_failure_of_its_own():
     with pytest.raises(KeyboardInterrupt):
         parallel.run([task, broken])
     assert seen == []
+
+
+def test_work_that_is_undivided_stays_on_its_thread():
+    where = []
+    with parallel.undivided():
+        parallel.run([lambda: where.append(threading.get_ident())] * 5)
+    assert where == [threading.get_ident()] * 5
+
+
+def test_other_threads_divide_their_work_meanwhile(threads):
+    tasks = [lambda: where.append(threading.get_ident())] * 5
+    where: list[int] = []
+    with parallel.undivided():
+        other = threading.Thread(target=parallel.run, args=(tasks,))
+        other.start()
+        other.join()
+    assert threading.get_ident() not in where
+    assert len(where) == 5

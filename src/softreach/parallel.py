@@ -16,9 +16,11 @@ from functools import cache, partial
 from itertools import chain, islice
 from typing import Any, TypeVar
 
-__all__ = ["blocks", "in_order", "meanwhile", "run", "thread_count"]
+__all__ = ["blocks", "in_order", "meanwhile", "run", "thread_count", "undivided"]
 
 Result = TypeVar("Result")
+
+_here = threading.local()
 
 
 def thread_count() -> int:
@@ -47,8 +49,8 @@ def run(tasks: Iterable[Callable[[], object]]) -> None:
     """
     drawn = iter(tasks)
     first = list(islice(drawn, 2))
-    if len(first) < 2:
-        for task in first:
+    if len(first) < 2 or getattr(_here, "undivided", False):
+        for task in chain(first, drawn):
             _check_wanted()
             task()
         return
@@ -61,6 +63,16 @@ def run(tasks: Iterable[Callable[[], object]]) -> None:
                 pending = _drain(pending)
         while pending:
             pending = _drain(pending)
+
+
+@contextmanager
+def undivided() -> Iterator[None]:
+    """Let `run` call its tasks on this thread, which is one of several with work of their own."""
+    before, _here.undivided = getattr(_here, "undivided", False), True
+    try:
+        yield
+    finally:
+        _here.undivided = before
 
 
 def in_order(tasks: Iterable[Callable[[], Result]]) -> Iterator[Result]:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from softreach.inverse.image_tree import image_tree
 from softreach.kernels import candidates
 from softreach.kernels.candidates import MOST_STARTS, find_starts
-from tests.kernels.maps import Quadratic, mesh_of, random_fold
+from tests.kernels.maps import Quadratic, mesh_of, random_fold, random_quadratic
 
 SEEDS = st.integers(0, 2**32 - 1)
 LOW, HIGH = np.full(3, -1.0), np.full(3, 1.0)
@@ -18,6 +18,11 @@ LOW, HIGH = np.full(3, -1.0), np.full(3, 1.0)
 
 def starts_of(f: Quadratic, targets: np.ndarray, cells: int, with_root: bool = True):
     """Number of the target and activation of every start."""
+    return starts_and_inverses(f, targets, cells, with_root)[:2]
+
+
+def starts_and_inverses(f: Quadratic, targets: np.ndarray, cells: int, with_root: bool = True):
+    """The same, and the inverse of the Jacobian at each."""
     mesh = mesh_of(f, cells)
     tree = image_tree(mesh)
     room = MOST_STARTS * (1 + len(targets))
@@ -27,7 +32,7 @@ def starts_of(f: Quadratic, targets: np.ndarray, cells: int, with_root: bool = T
         mesh, tree, targets, LOW, HIGH, with_root, target, cell, start, inverse
     )
     assert done == len(targets)
-    return target[:found], start[:found]
+    return target[:found], start[:found], inverse[:found]
 
 
 @given(seed=SEEDS, with_root=st.booleans())
@@ -40,6 +45,16 @@ def test_the_root_of_an_affine_map_is_found_exactly(seed, with_root):
     target, start = starts_of(f, f.values(gamma), 4, with_root)
     assert set(target) == set(range(60))
     assert start == pytest.approx(gamma[target], abs=1e-10)
+
+
+@given(seed=SEEDS)
+@settings(max_examples=5)
+def test_a_start_knows_the_inverse_of_the_jacobian_there(seed):
+    f = random_quadratic(np.random.default_rng(seed), bend=0.02)
+    gamma = np.random.default_rng(seed).uniform(-1, 1, (60, 3))
+    _, start, inverse = starts_and_inverses(f, f.values(gamma), 4)
+    product = np.einsum("nij,njk->nik", inverse, f.slopes(start))
+    assert np.median(np.abs(product - np.eye(3)).max(axis=(1, 2))) < 1e-3
 
 
 @given(seed=SEEDS)

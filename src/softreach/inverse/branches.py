@@ -22,7 +22,6 @@ they tear have no image; their other corners begin searches instead (`torn_cells
 from __future__ import annotations
 
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +31,8 @@ from softreach.inverse.nearest import local_minima
 from softreach.inverse.prepared_map import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.roots import Roots, no_roots, placed, roots_at, smallest_singular_values
-from softreach.kernels import candidates, folds, newton
+from softreach.inverse.starts import Starts, spatial_order, starts_from_cells, with_torn_cells
+from softreach.kernels import folds, newton
 from softreach.kernels.newton import CONVERGED, RUNNING, STAGNATED, Search
 from softreach.rod.tip_map import TipMap
 
@@ -42,8 +42,9 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _ROUNDING = 1e-13  # of a tip, in L, with room to spare
-_BLOCK = 1024
-_PLACES = 32  # along each axis, when targets are put in order
+_LARGEST, _SMALLEST = 8192, 1024  # targets solved together on a thread
+_LARGEST_LOADED = 32_768  # with loads, on all threads
+_SHARES = 6  # of the targets for each thread, because some are harder than others
 _MOST_ITERATIONS = 40
 _CHORD_STEPS = 2  # with the inverse that a start knows, before Newton's method
 _STEEP = 1000.0  # change of activation per change of place in L beyond which they are not taken
@@ -54,47 +55,10 @@ _OUTSIDE = 0.02  # how far outside the bounds that search may begin, in ranges
 _PARTNER_RANGE = 1.5  # widths of a cell within which a fold's other root is looked for
 
 
-class _Starts(NamedTuple):
-    """Where searches begin."""
-
-    target: Index
-    """Number of the target, shape (n,)."""
-    cell: Index
-    """Cell of the mesh, shape (n,)."""
-    gamma: Array
-    """Activation [-], shape (n, 3)."""
-    inverse: Array
-    """Inverse of the Jacobian there [1/m], roughly; 0 if not known, shape (n, 3, 3)."""
-
-    @staticmethod
-    def empty(room: int) -> _Starts:
-        """Space for so many."""
-        target, cell = np.empty(room, np.int64), np.empty(room, np.int64)
-        return _Starts(target, cell, np.empty((room, 3)), np.empty((room, 3, 3)))
-
-    def where(self, chosen: slice | Index) -> _Starts:
-        """Some of them, copied."""
-        return _Starts(
-            self.target[chosen].copy(),
-            self.cell[chosen].copy(),
-            self.gamma[chosen].copy(),
-            self.inverse[chosen].copy(),
-        )
-
-    @staticmethod
-    def joined(parts: list[_Starts]) -> _Starts:
-        """All of them, sorted by target."""
-        starts = _Starts(
-            np.concatenate([part.target for part in parts]),
-            np.concatenate([part.cell for part in parts]),
-            np.concatenate([part.gamma for part in parts]),
-            np.concatenate([part.inverse for part in parts]),
-        )
-        return starts.where(np.argsort(starts.target, kind="stable"))
-
-
 def every_branch(prepared: PreparedMap, request: Request) -> Roots:
     """All roots inside the bounds, sorted by target; those of loaded arms stable or not.
+
+    Targets that are near to each other are solved together, each set on a thread of its own.
 
     Args:
         prepared: A tip map of three free bundles.
@@ -103,75 +67,48 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
     count = len(request.targets)
     if not count:
         return no_roots(prepared.rod)
-    starts = _starts(prepared, request, np.arange(count))
-    if len(prepared.torn_cells.tip):
-        starts = _with_torn(prepared, request, starts)
-    roots = _newton(prepared, request, starts)
-    # Where the quadratics say that nothing leads there, look once more without believing them.
-    again = _starts(prepared, request, roots.missing(count), with_root=False)
-    roots = distinct(prepared, request, roots.joined(_newton(prepared, request, again)))
-    roots = _with_partners(prepared, request, roots)
-    return roots.joined(_singular_roots(prepared, request, roots.missing(count)))
+    prepared.prepare_branches()
+    order = spatial_order(request.targets)
+    sets = [order[block] for block in parallel.blocks(count, _set_size(prepared, count))]
+    if prepared.branch_map.supports_unstable or len(sets) == 1:
+        parts = [_branches_of(prepared, request, rows) for rows in sets]
+    else:
+        parts = list(parallel.in_order(partial(_alone, prepared, request, rows) for rows in sets))
+    return Roots.sorted_by_target(parts)
 
 
-def _starts(
-    prepared: PreparedMap, request: Request, rows: Index, with_root: bool = True
-) -> _Starts:
-    """Steps 3 and 4: starts for some of the targets, sorted by target.
+def _set_size(prepared: PreparedMap, count: int) -> int:
+    """How many targets to solve together: enough of them for kernels, enough sets for threads.
 
-    Args:
-        prepared: The tip map, with its cells and their tree.
-        request: What is asked.
-        rows: Numbers of the targets.
-        with_root: Whether to leave out tetrahedra whose quadratic does not reach the target.
+    Rods under loads are work enough to be shared out among threads by themselves.
     """
-    rows = rows[_spatial_order(request.targets[rows])]
-    box, targets = prepared.rod.box, request.targets[rows]
-    if not len(prepared.mesh.corner):
-        return _Starts.empty(0)
-    blocks = list(parallel.blocks(len(targets), _BLOCK))
-    parts: list[list[_Starts]] = [[] for _ in blocks]
-
-    def fill(part: list[_Starts], first: int, last: int) -> None:
-        out = _Starts.empty(candidates.MOST_STARTS + 4 * _BLOCK)
-        while first < last:
-            done, n = candidates.find_starts(
-                prepared.mesh, prepared.tree, targets[first:last], low, high, with_root, *out
-            )
-            found = out.where(slice(n))
-            part.append(found._replace(target=rows[found.target + first]))
-            first += done
-
-    low, high = box.low.copy(), box.high.copy()
-    parallel.run(
-        partial(fill, part, block.start, block.stop)
-        for part, block in zip(parts, blocks, strict=True)
-    )
-    return _Starts.joined([_Starts.empty(0), *(piece for part in parts for piece in part)])
+    if prepared.branch_map.supports_unstable:
+        return _LARGEST_LOADED
+    return min(_LARGEST, max(_SMALLEST, -(-count // (_SHARES * parallel.thread_count()))))
 
 
-def _spatial_order(points: Array) -> Index:
-    """An order in which points (n, 3) that follow each other share most of their candidates."""
-    if len(points) < 2:
-        return np.arange(len(points))
-    low, high = points.min(axis=0), points.max(axis=0)
-    place = ((points - low) * (_PLACES / np.maximum(high - low, 1e-300))).astype(np.int64)
-    place = np.minimum(place, _PLACES - 1)
-    return np.argsort(place @ np.array([_PLACES**2, _PLACES, 1]), kind="stable")
+def _alone(prepared: PreparedMap, request: Request, rows: Index) -> Roots:
+    """The roots of some of the targets, on this thread only."""
+    with parallel.undivided():
+        return _branches_of(prepared, request, rows)
 
 
-def _with_torn(prepared: PreparedMap, request: Request, starts: _Starts) -> _Starts:
-    """The starts, and more from corners of cells that have no image."""
-    target, gamma = prepared.torn_cells.starts(request.targets)
-    target = np.concatenate([starts.target, target])
-    cell = np.concatenate([starts.cell, np.full(len(target) - len(starts.cell), -1)])
-    gamma = np.concatenate([starts.gamma, gamma])
-    inverse = np.concatenate([starts.inverse, np.zeros((len(target) - len(starts.cell), 3, 3))])
-    order = np.argsort(target, kind="stable")
-    return _Starts(target, cell, gamma, inverse).where(order)
+def _branches_of(prepared: PreparedMap, request: Request, rows: Index) -> Roots:
+    """The roots of some of the targets, sorted by their places in `rows`."""
+    some = request.of(rows)
+    starts = starts_from_cells(prepared, some, np.arange(len(rows)))
+    if len(prepared.torn_cells.tip):
+        starts = with_torn_cells(prepared, some, starts)
+    roots = _newton(prepared, some, starts)
+    # Where the quadratics say that nothing leads there, look once more without believing them.
+    again = starts_from_cells(prepared, some, roots.missing(len(rows)), with_root=False)
+    roots = distinct(prepared, some, roots.joined(_newton(prepared, some, again)))
+    roots = _with_partners(prepared, some, roots)
+    roots = roots.joined(_singular_roots(prepared, some, roots.missing(len(rows))))
+    return roots._replace(target=rows[roots.target])
 
 
-def _newton(prepared: PreparedMap, request: Request, starts: _Starts) -> Roots:
+def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
     """Step 5: damped Newton from every start; the roots that are within the bounds."""
     rod, goal = prepared.branch_map, request.targets[starts.target]
     low, high = rod.box.low.copy(), rod.box.high.copy()
@@ -200,7 +137,7 @@ def _newton(prepared: PreparedMap, request: Request, starts: _Starts) -> Roots:
     return roots.where(residual <= request.residual)
 
 
-def _improved(rod: TipMap, goal: Array, starts: _Starts) -> Array:
+def _improved(rod: TipMap, goal: Array, starts: Starts) -> Array:
     """The starts after steps with the inverse known there: tips cost a fraction of Jacobians.
 
     A step that does not bring the tip much nearer to its target is not taken.
@@ -259,10 +196,10 @@ def _with_partners(prepared: PreparedMap, request: Request, roots: Roots) -> Roo
     return roots
 
 
-def _partner_starts(prepared: PreparedMap, roots: Roots) -> _Starts:
+def _partner_starts(prepared: PreparedMap, roots: Roots) -> Starts:
     """Near the second preimage of every root that has a fold near, once for each overshoot."""
     roots = roots.where(roots.cell >= 0)
-    box, parts = prepared.rod.box, [_Starts.empty(0)]
+    box, parts = prepared.rod.box, [Starts.empty(0)]
     margin = _OUTSIDE * box.widths  # a start moved to the bounds may be short of the other root
     for overshoot in _OVERSHOOTS:
         start, near = np.empty_like(roots.gamma), np.zeros(len(roots.target), bool)
@@ -272,22 +209,27 @@ def _partner_starts(prepared: PreparedMap, roots: Roots) -> _Starts:
             prepared.mesh, *known, _PARTNER_RANGE, overshoot, *bounds, start, near
         )
         roots, unknown = roots.where(near), np.zeros((int(near.sum()), 3, 3))
-        parts.append(_Starts(roots.target, roots.cell, start[near], unknown))
-    return _Starts.joined(parts)
+        parts.append(Starts(roots.target, roots.cell, start[near], unknown))
+    return Starts.joined(parts).by_target()
 
 
 def distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
     """Step 7: every root once."""
-    offsets = np.searchsorted(roots.target, np.arange(len(request.targets) + 1))
-    smallest = smallest_singular_values(roots.slope)
-    kept, rounding = np.ones(len(roots.target), bool), _ROUNDING * prepared.rod.length
-    newton.merge_equal(offsets, roots.gamma, roots.residual, smallest, rounding, kept)
+    counts = np.bincount(roots.target, minlength=len(request.targets))
+    several = np.flatnonzero(counts[roots.target] > 1)
+    offsets = np.concatenate([[0], np.cumsum(counts[counts > 1])])
+    compared = roots.gamma[several], roots.residual[several]
+    smallest = smallest_singular_values(roots.slope[several])
+    single, rounding = np.ones(len(several), bool), _ROUNDING * prepared.rod.length
+    newton.merge_equal(offsets, *compared, smallest, rounding, single)
+    kept = np.ones(len(roots.target), bool)
+    kept[several] = single
     return roots.where(kept)
 
 
 def _singular_roots(prepared: PreparedMap, request: Request, rows: Index) -> Roots:
     """Step 8: what descent finds for targets where Newton's method found nothing."""
-    starts = _starts(prepared, request, rows)
+    starts = starts_from_cells(prepared, request, rows)
     by_position = Request(
         targets=request.targets[starts.target], residual=request.residual, near=starts.gamma
     )

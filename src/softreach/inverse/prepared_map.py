@@ -74,6 +74,11 @@ class PreparedMap:
     def _cut(self) -> tuple[ActivationMesh, TornCells]:
         return activation_cells(self.branch_map, self.cells, self.depth)
 
+    def prepare_branches(self) -> None:
+        """Compute what every search from the cells needs, once for all threads."""
+        for name in ("rod", "branch_map", "_cut", "tree")[: 4 if len(self.mesh.corner) else 3]:
+            getattr(self, name)
+
     @property
     def mesh(self) -> ActivationMesh:
         """The cells of the activation box of three free bundles."""

@@ -35,7 +35,9 @@ class Roots(NamedTuple):
     """Whether the arm can be there, shape (n,)."""
 
     def where(self, chosen: NDArray[np.bool_] | Index) -> Roots:
-        """Those chosen by a mask or an index."""
+        """Those chosen by a mask or an index; themselves where a mask leaves none out."""
+        if chosen.dtype == bool and chosen.all():
+            return self
         return Roots(
             self.target[chosen],
             self.gamma[chosen],
@@ -46,16 +48,14 @@ class Roots(NamedTuple):
         )
 
     def joined(self, other: Roots) -> Roots:
-        """Both, sorted by target."""
-        both = Roots(
-            np.concatenate([self.target, other.target]),
-            np.concatenate([self.gamma, other.gamma]),
-            np.concatenate([self.slope, other.slope]),
-            np.concatenate([self.residual, other.residual]),
-            np.concatenate([self.cell, other.cell]),
-            np.concatenate([self.stable, other.stable]),
-        )
-        return both.where(np.argsort(both.target, kind="stable"))
+        """Both, sorted by target as each of them is."""
+        return Roots.sorted_by_target([self, other]) if len(other.target) else self
+
+    @staticmethod
+    def sorted_by_target(parts: list[Roots]) -> Roots:
+        """All of them, sorted by target."""
+        everything = Roots(*map(np.concatenate, zip(*parts, strict=True)))
+        return everything.where(np.argsort(everything.target, kind="stable"))
 
     def missing(self, targets: int) -> Index:
         """Which of so many targets have no stable root."""

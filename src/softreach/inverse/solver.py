@@ -37,6 +37,7 @@ Index = NDArray[np.int64]
 
 _NEARLY = 1e-2  # gap in L at which a target may have a root where ∂r/∂γ is nearly singular
 _BLOCK = 32_768  # targets at once: bounds the memory of a call
+_BRANCH_BLOCK = 131_072  # where all roots are searched, which is done in smaller sets
 
 
 def solve_inverse(
@@ -109,18 +110,14 @@ def solve_inverse(
         seed=checked_whole_number("seed", seed, 0, 2**63),
         prove_least=bool(prove_least),
     )
-    blocks = list(parallel.blocks(len(points), _BLOCK)) or [slice(0)]
-    solutions = Solutions.joined([_solved(prepared, request.of(rows)) for rows in blocks])
-    return solutions.in_units_of(prepared.measures)
-
-
-def _solved(prepared: PreparedMap, request: Request) -> Solutions:
-    """Solve for one block of targets."""
+    solve, size = _by_distance, _BLOCK
     if prepared.dimension > 3:
-        return _by_least_change(prepared, request)
-    if prepared.dimension == 3 and request.direction is None:
-        return _by_branches(prepared, request)
-    return _by_distance(prepared, request)
+        solve = _by_least_change
+    elif prepared.dimension == 3 and request.direction is None:
+        solve, size = _by_branches, _BRANCH_BLOCK
+    blocks = list(parallel.blocks(len(points), size)) or [slice(0)]
+    solutions = Solutions.joined([solve(prepared, request.of(rows)) for rows in blocks])
+    return solutions.in_units_of(prepared.measures)
 
 
 def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
@@ -130,7 +127,8 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     unstable = np.bincount(found.target[~found.stable], minlength=count)
     roots = found.where(found.stable)
     missing = roots.missing(count)
-    closest = nearest(prepared, request.of(missing))
+    blocks = list(parallel.blocks(len(missing), _BLOCK)) or [slice(0)]
+    closest = Nearest.joined([nearest(prepared, request.of(missing[rows])) for rows in blocks])
     solutions = _solutions(prepared, request, roots, missing, closest)
     left = np.flatnonzero(_perhaps_singular(prepared, solutions))
     if len(left):

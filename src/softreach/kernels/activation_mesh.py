@@ -17,14 +17,20 @@ from softreach.kernels.vector import cross, difference, dot, matrix, minus, row,
 
 __all__ = [
     "ActivationMesh",
+    "axes_of",
     "face_planes",
     "image_faces",
     "interpolation_errors",
+    "orientation",
     "tetrahedron",
 ]
 
 # Each tetrahedron of a cell walks from corner 0 to corner 7 by these two, along axes in some order.
 _PATHS = tuple((int(second), int(third)) for _, second, third, _ in kuhn_simplices(3))
+_AXES = tuple(
+    (second >> 1, (third ^ second) >> 1, (7 ^ third) >> 1) for second, third in _PATHS
+)  # bits 1, 2 and 4 are axes 0, 1 and 2
+_EVEN_ORDERS = tuple((b - a) % 3 == 1 for a, b, _ in _AXES)
 
 _EDGES = tuple((a, b) for a in range(8) for b in range(a + 1, 8) if a & b == a)
 _SAFETY = 1.25  # for derivatives of higher order
@@ -183,6 +189,18 @@ def tetrahedron(corner, c, which):
     """The four vertices of one of the tetrahedra of cell c."""
     second, third = _PATHS[which]
     return corner[c, 0], corner[c, second], corner[c, third], corner[c, 7]
+
+
+@inline
+def axes_of(which):
+    """The axes of the walk of a tetrahedron from its first vertex to its last."""
+    return _AXES[which]
+
+
+@inline
+def orientation(which):
+    """The sign of the order of these axes."""
+    return 1.0 if _EVEN_ORDERS[which] else -1.0
 
 
 @inline

@@ -8,7 +8,7 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 
-__all__ = ["SpaceTree", "leaf_at", "may_meet", "sort_into_children"]
+__all__ = ["SpaceTree", "leaf_at", "listed", "may_meet", "sort_into_children"]
 
 
 class SpaceTree(NamedTuple):
@@ -54,6 +54,32 @@ def leaf_at(low, size, child, first, length, p):
         node = child[node] + 4 * i + 2 * j + k
         x, y, z = x - i, y - j, z - k
     return first[node], first[node] + length[node]
+
+
+@inline
+def listed(tree, p, begin, end, held):
+    """Put those of some items whose face planes hold p into `held`, in order; return how many.
+
+    Two faces at a time, without a branch: which of them misses p cannot be predicted.
+    """
+    count = end - begin
+    for entry in range(count):
+        held[entry] = tree.item[begin + entry]
+    for i in (0, 2):
+        kept = 0
+        for entry in range(count):
+            k = held[entry]
+            held[kept] = k
+            kept += _is_beyond(tree.planes, k, i, p) & _is_beyond(tree.planes, k, i + 1, p)
+        count = kept
+    return count
+
+
+@inline
+def _is_beyond(planes, k, i, p):
+    """Whether p lies on the inner side of face i of tetrahedron k."""
+    inward = planes[k, i, 0] * p[0] + planes[k, i, 1] * p[1] + planes[k, i, 2] * p[2]
+    return inward >= planes[k, i, 3]
 
 
 @kernel

@@ -1,0 +1,107 @@
+"""Where searches for the activations with a given tip begin, with three free bundles."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.inverse.prepared_map import PreparedMap
+from softreach.inverse.request import Request
+from softreach.kernels import candidates
+
+__all__ = ["Starts", "spatial_order", "starts_from_cells", "with_torn_cells"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_ROOM = candidates.MOST_STARTS + 4096  # starts that are gathered before they are copied
+_PLACES = 32  # along each axis, when targets are put in order
+
+
+class Starts(NamedTuple):
+    """Where searches begin."""
+
+    target: Index
+    """Number of the target, shape (n,)."""
+    cell: Index
+    """Cell of the mesh, shape (n,)."""
+    gamma: Array
+    """Activation [-], shape (n, 3)."""
+    inverse: Array
+    """Inverse of the Jacobian there [1/m], roughly; 0 if not known, shape (n, 3, 3)."""
+
+    @staticmethod
+    def empty(room: int) -> Starts:
+        """Space for so many."""
+        target, cell = np.empty(room, np.int64), np.empty(room, np.int64)
+        return Starts(target, cell, np.empty((room, 3)), np.empty((room, 3, 3)))
+
+    @staticmethod
+    def joined(parts: list[Starts]) -> Starts:
+        """All of them, one part after the other."""
+        return Starts(
+            np.concatenate([part.target for part in parts]),
+            np.concatenate([part.cell for part in parts]),
+            np.concatenate([part.gamma for part in parts]),
+            np.concatenate([part.inverse for part in parts]),
+        )
+
+    def first(self, count: int) -> Starts:
+        """A copy of so many."""
+        return Starts(
+            self.target[:count].copy(),
+            self.cell[:count].copy(),
+            self.gamma[:count].copy(),
+            self.inverse[:count].copy(),
+        )
+
+    def by_target(self) -> Starts:
+        """All of them, sorted by target."""
+        order = np.argsort(self.target, kind="stable")
+        return Starts(self.target[order], self.cell[order], self.gamma[order], self.inverse[order])
+
+
+def starts_from_cells(
+    prepared: PreparedMap, request: Request, rows: Index, with_root: bool = True
+) -> Starts:
+    """Starts for some of the targets, sorted by target.
+
+    Args:
+        prepared: The tip map, with its cells and their tree.
+        request: What is asked; targets that follow each other are best near to each other.
+        rows: Numbers of the targets, ascending.
+        with_root: Whether to leave out tetrahedra whose quadratic does not reach the target.
+    """
+    parts = [Starts.empty(0)]
+    if not len(prepared.mesh.corner) or not len(rows):
+        return parts[0]
+    box, targets = prepared.rod.box, request.targets[rows]
+    low, high, out = box.low.copy(), box.high.copy(), Starts.empty(_ROOM)
+    first = 0
+    while first < len(rows):
+        done, found = candidates.find_starts(
+            prepared.mesh, prepared.tree, targets[first:], low, high, with_root, *out
+        )
+        part = out.first(found)
+        parts.append(part._replace(target=rows[part.target + first]))
+        first += done
+    return Starts.joined(parts)
+
+
+def with_torn_cells(prepared: PreparedMap, request: Request, starts: Starts) -> Starts:
+    """The starts, and more from corners of cells that have no image."""
+    target, gamma = prepared.torn_cells.starts(request.targets)
+    nowhere, unknown = np.full(len(target), -1), np.zeros((len(target), 3, 3))
+    return Starts.joined([starts, Starts(target, nowhere, gamma, unknown)]).by_target()
+
+
+def spatial_order(points: Array) -> Index:
+    """An order in which points (n, 3) that follow each other share most of their candidates."""
+    if len(points) < 2:
+        return np.arange(len(points))
+    low, high = points.min(axis=0), points.max(axis=0)
+    place = ((points - low) * (_PLACES / np.maximum(high - low, 1e-300))).astype(np.int64)
+    place = np.minimum(place, _PLACES - 1)
+    return np.argsort(place @ np.array([_PLACES**2, _PLACES, 1]), kind="stable")
