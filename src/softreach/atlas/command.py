@@ -20,7 +20,7 @@ from softreach.sampling import check_sampler
 
 __all__ = ["ATLAS_VERSION", "Command"]
 
-ATLAS_VERSION = 2
+ATLAS_VERSION = 3
 """Version of the layout of a store."""
 STATIONS = tuple(np.linspace(0.5, 1.0, 6).tolist())
 
