@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from os import PathLike, fspath
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,14 @@ from softreach.rod.tip_map import BLOCK, TipMap, tip_map
 from softreach.sampling import check_sampler, cube_blocks
 from softreach.stores.damage import Watch, storage_errors
 from softreach.stores.durable import sync_folder, sync_tree
-from softreach.stores.place import READING, REMEDY, check_dimensions, checked_place, opened_root
+from softreach.stores.place import (
+    ARRAYS,
+    READING,
+    REMEDY,
+    check_arrays,
+    checked_place,
+    opened_root,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -109,14 +116,14 @@ def _write(cloud: xr.Dataset, path: Path) -> None:
     """Write all variables, with a checksum for each chunk, also for those of NaN alone."""
     from zarr.codecs import Crc32cCodec, ZstdCodec
 
-    encoding = {
+    encoding: dict[Hashable, Any] = {
         name: {"compressors": (ZstdCodec(level=0), Crc32cCodec())} for name in cloud.variables
     }
     chunk = min(cloud.sizes["sample"], _CHUNK)
     for name in ("tip", "activation"):
         encoding[name]["chunks"] = (chunk, cloud[name].shape[1])
     place = checked_place(path, Watch(location=path, remedy=REMEDY["cloud"]), mode="r+")
-    cloud.to_zarr(
+    cloud.assign_attrs({ARRAYS: sorted(map(str, cloud.variables))}).to_zarr(
         place,
         mode="w",
         zarr_format=3,
@@ -143,9 +150,11 @@ def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
         raise InvalidInput("cloud", location, "a Zarr store written by softreach", hint)
     opened.watch.required = lambda _: True
     with _few_chunks_at_a_time(), storage_errors(f"{location} cannot be read"):
-        check_dimensions(opened)
+        check_arrays(opened)
         with xr.open_zarr(opened.place, **READING) as stored:
-            return schema.check_stored_cloud(stored.load())
+            cloud = stored.load()
+        cloud.attrs.pop(ARRAYS, None)
+        return schema.check_stored_cloud(cloud)
 
 
 def _few_chunks_at_a_time() -> AbstractContextManager[object]:

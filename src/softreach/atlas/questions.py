@@ -91,11 +91,7 @@ def verify_atlas(store: StoreLike) -> AtlasStatus:
         InvalidInput: There is no atlas.
         DamagedStore: What all designs share is damaged.
     """
-    held = AtlasStore.open(store, "r")
-    for plan in array_plans(held.command):
-        if plan.name not in PER_DESIGN:
-            held.array(plan.name)[...]
-    return _verified(held, tips=True)
+    return _verified(AtlasStore.open(store, "r"), tips=True)
 
 
 _QUICK = 3e8  # bytes of tips
@@ -109,6 +105,9 @@ def _is_small(store: AtlasStore) -> bool:
 
 
 def _verified(store: AtlasStore, *, tips: bool) -> AtlasStatus:
+    for plan in array_plans(store.command):
+        if plan.name not in PER_DESIGN:
+            store.array(plan.name)[...]
     numbers = range(store.command.space.size) if tips else ()
     found = contents(store, tips_of=numbers)
     return _counted(found.status, found.messages, tips)

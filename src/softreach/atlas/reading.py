@@ -13,7 +13,7 @@ from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import KNOWN, AtlasStore
 from softreach.errors import InvalidInput, SoftreachWarning
 from softreach.stores.damage import Chunk, storage_errors
-from softreach.stores.place import READING, check_dimensions
+from softreach.stores.place import READING, check_arrays
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -99,7 +99,7 @@ def _opened(store: StoreLike, *, metrics: bool) -> xr.Dataset:
         then = "left out; the command that built the atlas computes again what is damaged"
         warnings.warn(f"{found.damage} ({then})", SoftreachWarning, stacklevel=4)
     with storage_errors(f"{held.location} cannot be read"):
-        check_dimensions(held.opened)
+        check_arrays(held.opened)
         raw = xr.open_zarr(held.opened.place, drop_variables=_READ_HERE, **READING)
         coordinates = _coordinates(held, raw)
     variables = _variables(held, found) | (_metrics(held.command, found) if metrics else {})

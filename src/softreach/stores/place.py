@@ -17,12 +17,13 @@ if TYPE_CHECKING:
     from zarr.storage import StoreLike, StorePath
 
 __all__ = [
+    "ARRAYS",
     "READING",
     "REMEDY",
     "Kind",
     "Opened",
     "absolute",
-    "check_dimensions",
+    "check_arrays",
     "checked_place",
     "kind_of",
     "opened_root",
@@ -104,6 +105,9 @@ def opened_root(
 _SAID = {"cloud": "a Zarr store written by softreach", "atlas": "a new folder, or an atlas"}
 
 
+ARRAYS = "arrays"
+"""Attribute of a cloud's store: the names of all of its arrays."""
+
 READING: Mapping[str, Any] = {
     "consolidated": False,
     "zarr_format": 3,
@@ -113,14 +117,18 @@ READING: Mapping[str, Any] = {
 """How xarray reads a store: as it was written, and numbers as numbers."""
 
 
-def check_dimensions(opened: Opened) -> None:
-    """Check that the arrays of a store agree on the sizes of their dimensions.
+def check_arrays(opened: Opened) -> None:
+    """Check that the arrays of a store are there, and agree on the sizes of their dimensions.
 
     Raises:
-        DamagedStore: They do not, or have none.
+        DamagedStore: One is missing, or of another size, or has no dimensions.
     """
+    arrays: dict[str, Any] = dict(opened.group.arrays())
+    for name in opened.group.attrs.get(ARRAYS, ()):
+        if name not in arrays:
+            opened.watch.report(Chunk(name, None), "missing")
     sizes: dict[str, tuple[int, str]] = {}
-    for name, array in opened.group.arrays():
+    for name, array in arrays.items():
         dims = array.metadata.dimension_names or ()
         if len(dims) != array.ndim or None in dims:
             opened.watch.report(Chunk(name, None), f"over {dims}", f"over {array.ndim} dimensions")

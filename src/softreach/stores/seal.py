@@ -11,13 +11,14 @@ __all__ = ["SEAL", "Broken", "sealed", "unsealed"]
 SEAL = "metadata_sha256"
 """Attribute of every zarr.json: digest of all of it but this attribute."""
 
-_TYPES = frozenset(
-    ("bool", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
-    + ("float32", "float64", "string")
+_TYPES = (
+    *("bool", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64"),
+    *("float32", "float64", "string"),
 )
 """Numbers and texts: nothing complex, no dates, no bytes, no objects."""
-_CODECS = frozenset(("bytes", "vlen-utf8", "blosc", "zstd", "gzip", "crc32c"))
+_CODECS = ("bytes", "vlen-utf8", "blosc", "zstd", "gzip", "crc32c")
 """Those of the Zarr v3 core; none of them can run code."""
+_GROUP = {"zarr_format", "node_type", "attributes", "consolidated_metadata"}
 
 
 class Broken(Exception):
@@ -40,7 +41,7 @@ def sealed(text: bytes) -> bytes:
         Broken: It describes an array of a kind that no store of softreach holds.
     """
     document = _parsed(text)
-    _check_array(document)
+    _check_kind(document)
     attributes = {key: value for key, value in _attributes(document).items() if key != SEAL}
     document["attributes"] = attributes
     document["attributes"] = {**attributes, SEAL: _digest(document)}
@@ -60,7 +61,7 @@ def unsealed(text: bytes) -> dict[str, Any]:
         raise Broken("without a checksum", allowed)
     if seal != _digest(document):
         raise Broken("changed since it was written")
-    _check_array(document)
+    _check_kind(document)
     return document
 
 
@@ -86,13 +87,16 @@ def _digest(document: dict[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _check_array(document: dict[str, Any]) -> None:
+def _check_kind(document: dict[str, Any]) -> None:
+    """Check that it is a group, or an array of a kind that softreach writes."""
     if document.get("node_type") != "array":
+        if not _GROUP.issuperset(document):
+            raise Broken("of neither a group nor an array")
         return
     if document.get("data_type") not in _TYPES:
         shown = json.dumps(document.get("data_type"))
         raise Broken(f"of type {shown}", "of numbers or of texts")
     codecs = [codec.get("name") for codec in document.get("codecs", [])]
-    if not _CODECS.issuperset(codecs) or codecs[-1:] != ["crc32c"]:
-        allowed = f"some of {', '.join(sorted(_CODECS))}, the last of them crc32c"
+    if not set(codecs) <= set(_CODECS) or codecs[-1:] != ["crc32c"]:
+        allowed = f"some of {', '.join(_CODECS)}, the last of them crc32c"
         raise Broken(f"with the codecs {', '.join(map(str, codecs))}", allowed)
