@@ -126,7 +126,8 @@ class Command:
                 raise InvalidInput(f"{name} of the atlas", repr(values[name]), kind[0].__name__)
         values |= {name: tuple(values[name]) for name in ("stations", "quantiles")}
         values["metrics"] = tuple(_recorded(metric) for metric in values["metrics"])
-        return cls(**values | {"space": DesignSpace.from_dict(values["space"])})
+        values["space"] = DesignSpace.from_dict(values["space"])
+        return cls(**values)
 
     def differences(self, other: Command) -> list[str]:
         """What differs between this command and another, one line each."""

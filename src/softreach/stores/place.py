@@ -85,10 +85,11 @@ def opened_root(
     import zarr
 
     watch = Watch(location=location, remedy=REMEDY[kind])
-    if isinstance(location, str) and "://" not in location and not Path(location).is_dir():
-        if Path(location).exists():
-            raise InvalidInput("store", location, f"a folder, or {_SAID[kind]}")
-        return None
+    if isinstance(location, str) and "://" not in location:
+        if Path(location).is_file():
+            raise InvalidInput("store", location, _SAID[kind], "it is a file")
+        if not Path(location).is_dir():
+            return None
     with storage_errors(f"{location} cannot be opened"):
         try:
             place = checked_place(location, watch, mode=mode, durable=durable)
@@ -124,7 +125,8 @@ def check_arrays(opened: Opened) -> None:
         DamagedStore: One is missing, or of another size, or has no dimensions.
     """
     arrays: dict[str, Any] = dict(opened.group.arrays())
-    for name in opened.group.attrs.get(ARRAYS, ()):
+    names: Any = opened.group.attrs.get(ARRAYS)
+    for name in map(str, names if isinstance(names, list) else ()):
         if name not in arrays:
             opened.watch.report(Chunk(name, None), "missing")
     sizes: dict[str, tuple[int, str]] = {}
