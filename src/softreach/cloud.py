@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from os import PathLike, fspath
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,16 @@ from softreach.rod.measured_bundles import MeasuredBundles
 from softreach.rod.stable_tips import StableTips
 from softreach.rod.tip_map import BLOCK, TipMap, tip_map
 from softreach.sampling import check_sampler, cube_blocks
+from softreach.stores.damage import Watch, storage_errors
+from softreach.stores.durable import sync_folder, sync_tree
+from softreach.stores.place import (
+    ARRAYS,
+    READING,
+    REMEDY,
+    check_arrays,
+    checked_place,
+    opened_root,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -78,19 +88,49 @@ def compute_cloud(
     return schema.with_status(cloud, status) if rod.supports_unstable else cloud
 
 
-def save_cloud(cloud: xr.Dataset, path: str | PathLike[str]) -> None:
+def save_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, durable: bool = False) -> None:
     """Write a cloud as a Zarr v3 store; it appears whole, in place of an older one, or not at all.
 
+    Every file carries a checksum, so that `open_cloud` notices damage.
+
+    Args:
+        cloud: From `compute_cloud`, or a part of its samples.
+        path: The folder to write.
+        durable: Whether to return only when not even a power cut can lose it, which takes longer.
+
     Raises:
-        InvalidInput: The dataset is no cloud.
+        InvalidInput: The dataset is no cloud, or its design, bundles and length do not agree.
+        StoreFailed: It cannot be written.
     """
-    schema.check_cloud(cloud)
-    chunk = min(cloud.sizes["sample"], _CHUNK)
-    encoding = {name: {"chunks": (chunk, cloud[name].shape[1])} for name in ("tip", "activation")}
+    schema.check_stored_cloud(cloud)
     with replacing(path) as partial_path, _few_chunks_at_a_time():
-        schema.storable(cloud).to_zarr(
-            partial_path, mode="w", zarr_format=3, consolidated=False, encoding=encoding
-        )
+        with storage_errors(f"{fspath(path)} cannot be written"):
+            _write(schema.storable(cloud), partial_path)
+        if durable:
+            sync_tree(partial_path)
+    if durable:
+        sync_folder(Path(path).absolute().parent)
+
+
+def _write(cloud: xr.Dataset, path: Path) -> None:
+    """Write all variables, with a checksum for each chunk, also for those of NaN alone."""
+    from zarr.codecs import Crc32cCodec, ZstdCodec
+
+    encoding: dict[Hashable, Any] = {
+        name: {"compressors": (ZstdCodec(level=0), Crc32cCodec())} for name in cloud.variables
+    }
+    chunk = min(cloud.sizes["sample"], _CHUNK)
+    for name in ("tip", "activation"):
+        encoding[name]["chunks"] = (chunk, cloud[name].shape[1])
+    place = checked_place(path, Watch(location=path, remedy=REMEDY["cloud"]), mode="r+")
+    cloud.assign_attrs({ARRAYS: sorted(map(str, cloud.variables))}).to_zarr(
+        place,
+        mode="w",
+        zarr_format=3,
+        consolidated=False,
+        encoding=encoding,
+        write_empty_chunks=True,
+    )
 
 
 def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
@@ -98,16 +138,23 @@ def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
 
     Raises:
         InvalidInput: There is no such store, or it holds something else.
+        DamagedStore: It is not what was written; which array and chunk, and what to do.
+        StoreFailed: It cannot be read.
     """
     import xarray as xr
 
-    if not (Path(path) / "zarr.json").is_file():
-        raise InvalidInput("cloud", fspath(path), "a Zarr store written by softreach")
-    with (
-        _few_chunks_at_a_time(),
-        xr.open_zarr(path, consolidated=False, zarr_format=3, chunks=None) as stored,
-    ):
-        return schema.check_cloud(stored.load())
+    location = fspath(path)
+    opened = opened_root(location, "cloud")
+    if opened is None or "command" in opened.group.attrs:
+        hint = "" if opened is None else "this is an atlas"
+        raise InvalidInput("cloud", location, "a Zarr store written by softreach", hint)
+    opened.watch.required = lambda _: True
+    with _few_chunks_at_a_time(), storage_errors(f"{location} cannot be read"):
+        check_arrays(opened)
+        with xr.open_zarr(opened.place, **READING) as stored:
+            cloud = stored.load()
+        cloud.attrs.pop(ARRAYS, None)
+        return schema.check_stored_cloud(cloud)
 
 
 def _few_chunks_at_a_time() -> AbstractContextManager[object]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +26,7 @@ __all__ = [
     "bundle_coordinates",
     "cell_dataset",
     "check_cloud",
+    "check_stored_cloud",
     "cloud_dataset",
     "configuration_dataset",
     "is_stable",
@@ -107,6 +109,10 @@ def check_cloud(cloud: xr.Dataset) -> xr.Dataset:
     Raises:
         InvalidInput: What is missing, or of another shape or version.
     """
+    import xarray as xr
+
+    if not isinstance(cloud, xr.Dataset):
+        raise InvalidInput("cloud", type(cloud).__name__, "a dataset from compute_cloud")
     for name, (dims, _, _) in _CLOUD.items():
         if name not in cloud or cloud[name].dims != dims:
             found = cloud[name].dims if name in cloud else "missing"
@@ -115,6 +121,68 @@ def check_cloud(cloud: xr.Dataset) -> xr.Dataset:
     if found != SCHEMA_VERSION:
         raise InvalidInput("cloud.attrs['schema_version']", found, str(SCHEMA_VERSION))
     return cloud
+
+
+def check_stored_cloud(cloud: xr.Dataset) -> xr.Dataset:
+    """The dataset itself, if it is a cloud that agrees with its own design.
+
+    Raises:
+        InvalidInput: What is missing, of another type, or does not agree.
+    """
+    check_cloud(cloud)
+    for name, (kind, allowed) in _KINDS.items():
+        if name in cloud and cloud[name].dtype != kind:
+            raise InvalidInput(f"cloud.{name}", f"of type {cloud[name].dtype}", allowed)
+    for name, (types, allowed) in _ATTRIBUTES.items():
+        value = cloud.attrs.get(name)
+        if not isinstance(value, types) or isinstance(value, bool):
+            raise InvalidInput(f"cloud.attrs['{name}']", repr(value), allowed)
+    if not 0 < cloud.attrs["tol"] < np.inf:
+        raise InvalidInput("cloud.attrs['tol']", cloud.attrs["tol"], "a finite number > 0")
+    arm = Manipulator.from_toml(cloud.attrs["design"], source="the cloud's design")
+    for fault in _disagreements(cloud, arm):
+        raise fault
+    return cloud
+
+
+_KINDS = {
+    "tip": (np.dtype(np.float64), "of float64"),
+    "activation": (np.dtype(np.float64), "of float64"),
+    "status": (np.dtype(np.int8), "of int8"),
+}
+_ATTRIBUTES = {
+    "design": (str, "the text of a design file"),
+    "softreach_version": (str, "a text"),
+    "sampler": (str, "the name of a sampler"),
+    "tol": ((int, float), "a number"),
+}
+
+
+def _disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[InvalidInput]:
+    """What of a cloud is not as its design says."""
+    seed = cloud.attrs.get("seed", 0)  # a cloud of another program has none
+    if not isinstance(seed, int) or isinstance(seed, bool):
+        yield InvalidInput("cloud.attrs['seed']", repr(seed), "a whole number")
+    found = {
+        "axis": (cloud.get("axis"), AXES),
+        "bundle": (cloud.get("bundle"), arm.bundle_names),
+        "unit": (cloud.get("unit"), arm.bundle_units),
+    }
+    for name, (labels, wanted) in found.items():
+        if labels is not None and tuple(map(str, labels.values)) != tuple(wanted):
+            shown = ", ".join(map(str, labels.values))
+            yield InvalidInput(f"cloud.{name}", shown, f"{', '.join(wanted)}, as its design says")
+    for name, size in (("axis", len(AXES)), ("bundle", arm.bundles)):
+        if cloud.sizes[name] != size:
+            yield InvalidInput(
+                f"cloud.sizes['{name}']", cloud.sizes[name], f"{size}, as its design says"
+            )
+    length = cloud.tip.attrs.get("length")
+    if not isinstance(length, int | float) or not math.isclose(length, arm.length):
+        allowed = f"{arm.length} m, as its design says"
+        yield InvalidInput("cloud.tip.attrs['length']", repr(length), allowed)
+    if "status" in cloud.coords and not np.isin(cloud["status"].values, (0, 1, 2)).all():
+        yield InvalidInput("cloud.status", "another number", f"one of {_STATUS}")
 
 
 def bundle_coordinates(arm: Manipulator) -> dict[str, Any]:

@@ -5,14 +5,21 @@ from softreach.atlas.build import build_atlas
 from softreach.atlas.metric import Metric, MetricFailed, Need
 from softreach.atlas.metrics import METRIC_GROUPS
 from softreach.atlas.processes import worker_processes
-from softreach.atlas.questions import AtlasStatus, atlas_cloud, atlas_design, atlas_status
+from softreach.atlas.questions import (
+    AtlasStatus,
+    atlas_cloud,
+    atlas_design,
+    atlas_status,
+    verify_atlas,
+)
 from softreach.atlas.reading import open_atlas, over_length
 from softreach.atlas.space import DesignSpace
-from softreach.atlas.store_root import StoreFailed
+from softreach.stores.damage import DamagedStore, StoreFailed
 
 __all__ = [
     "METRIC_GROUPS",
     "AtlasStatus",
+    "DamagedStore",
     "DesignSpace",
     "Metric",
     "MetricFailed",
@@ -25,5 +32,6 @@ __all__ = [
     "build_atlas",
     "open_atlas",
     "over_length",
+    "verify_atlas",
     "worker_processes",
 ]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softreach.atlas.command import Command
+from softreach.atlas.contents import contents
 from softreach.atlas.executor import ExecutorLike, run_designs
 from softreach.atlas.metric import Metric
 from softreach.atlas.metrics import METRIC_GROUPS, chosen_metrics
@@ -40,13 +41,15 @@ def build_atlas(
     keep_clouds: bool = True,
     executor: ExecutorLike = None,
     shard: tuple[int, int] = (0, 1),
+    durable: bool = False,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Compute the cloud and the metrics of every design (sections 3 and 4), or what is missing.
 
     All designs share one set of unit activations, scaled to each one's bounds. Every design is
     stored when it is done: after an interruption, even by kill -9, the same call continues and ends
-    with the same numbers. A design that fails is recorded with its error, the rest goes on, and the
+    with the same numbers. What is stored is verified first: damaged designs are computed again. A
+    design that fails is recorded with its error, the rest goes on, and the
     next call tries it again. Combinations that no arm can have stay gaps.
 
     Under loads, only samples with a stable equilibrium count, and `lost_share` tells the share of
@@ -75,6 +78,8 @@ def build_atlas(
             ``SOFTREACH_NUM_THREADS`` says otherwise.
         shard: (i, k) computes every k-th design from the i-th on, i from 0: k processes share a
             store without knowing of each other.
+        durable: Whether a design counts as done only when not even a power cut can lose it.
+            Without, it can damage designs of the last seconds, which the next call notices.
         progress: Called with the number of designs done since its last call; by default a bar is
             shown on a terminal.
 
@@ -84,11 +89,12 @@ def build_atlas(
     Raises:
         InvalidInput: An argument out of range, no valid design, or a store that another command
             began; the message says what differs.
+        DamagedStore: The root of the store is damaged, so that nobody knows what it holds.
         StoreFailed: The store cannot be written, for instance because the disk is full.
 
     Warns:
-        SoftreachWarning: There are gaps, failed designs, or designs whose points are too sparse for
-            the radius.
+        SoftreachWarning: There are gaps, failed or damaged designs, or designs whose points are too
+            sparse for the radius.
     """
     command = Command(
         space=space,
@@ -103,10 +109,12 @@ def build_atlas(
     )
     indices = _checked_shard(shard, space.size)
     _warn_of_gaps(space)
-    atlas = AtlasStore.begin(store, command)
-    _run(
-        atlas, indices[~np.isin(atlas.status()[indices], (DONE, GAP, UNSTABLE))], executor, progress
-    )
+    atlas = AtlasStore.begin(store, command, durable=durable)
+    held = contents(atlas, tips_of=indices.tolist())
+    if held.damage:
+        _warn(f"{held.damage}; what is damaged is computed again")
+    ended = np.isin(held.status[indices], (DONE, GAP, UNSTABLE))
+    _run(atlas, indices[~ended], executor, progress)
     built = open_atlas(store)
     _warn_of_unstable(built)
     _warn_of_sparse(built)

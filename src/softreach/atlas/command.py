@@ -15,12 +15,12 @@ from softreach.atlas.metric import Metric
 from softreach.atlas.metrics import known_metric
 from softreach.atlas.space import DesignSpace
 from softreach.curvature import QUANTILES
-from softreach.errors import InvalidInput, counted
+from softreach.errors import InvalidInput, SoftreachError, counted
 from softreach.sampling import check_sampler
 
 __all__ = ["ATLAS_VERSION", "Command"]
 
-ATLAS_VERSION = 2
+ATLAS_VERSION = 3
 """Version of the layout of a store."""
 STATIONS = tuple(np.linspace(0.5, 1.0, 6).tolist())
 
@@ -29,6 +29,18 @@ _RESERVED = frozenset(
     + ("design", "metric", "metrics", "curvature", "quantity", "station", "quantile", "rank")
 )
 """Names that no metric may have, as an atlas or a question about it uses them itself."""
+_PLAIN = {
+    "n": (int,),
+    "seed": (int,),
+    "sampler": (str,),
+    "tol": (float, int),
+    "alpha_over_length": (float, int),
+    "accuracy": (float, int),
+    "keep_clouds": (bool,),
+    "softreach_version": (str,),
+}
+"""Types of the settings in a store."""
+_SHOWN = 60  # characters of a text that is no command
 _LONGEST = 1e3  # ratio of the lengths of designs whose tips share one fixed-point step
 
 
@@ -93,15 +105,29 @@ class Command:
         """The command that `to_json` wrote; metrics that are not softreach's lack their function.
 
         Raises:
-            InvalidInput: The store has another version.
+            InvalidInput: The store has another version, or the text is no command.
         """
-        values = json.loads(text)
+        try:
+            return cls._of_values(json.loads(text))
+        except SoftreachError:
+            raise
+        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+            reason = f"{type(error).__name__}: {error}"
+            allowed = "what build_atlas wrote"
+            raise InvalidInput("command of the atlas", text[:_SHOWN], allowed, reason) from None
+
+    @classmethod
+    def _of_values(cls, values: dict[str, Any]) -> Self:
         if (found := values.get("atlas_version")) != ATLAS_VERSION:
             hint = "build the atlas again in a new folder"
             raise InvalidInput("version of the atlas", found, str(ATLAS_VERSION), hint)
+        for name, kind in _PLAIN.items():
+            if type(values[name]) not in kind:
+                raise InvalidInput(f"{name} of the atlas", repr(values[name]), kind[0].__name__)
         values |= {name: tuple(values[name]) for name in ("stations", "quantiles")}
         values["metrics"] = tuple(_recorded(metric) for metric in values["metrics"])
-        return cls(**values | {"space": DesignSpace.from_dict(values["space"])})
+        values["space"] = DesignSpace.from_dict(values["space"])
+        return cls(**values)
 
     def differences(self, other: Command) -> list[str]:
         """What differs between this command and another, one line each."""

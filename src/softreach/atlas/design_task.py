@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from softreach.atlas.intermediates import Intermediates
 from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import UNSTABLE, AtlasStore, Result
-from softreach.atlas.store_root import StoreFailed
 from softreach.errors import SoftreachError, SoftreachWarning
 from softreach.rod.never_at_rest import none_of
+from softreach.stores.damage import StoreFailed
 
 __all__ = ["Outcome", "Remote", "begin_design", "run_remotely"]
 
@@ -57,6 +57,7 @@ class Remote:
     def __init__(self, store: AtlasStore) -> None:
         self._store: AtlasStore | None = store
         self.metrics = store.command.metrics
+        self._durable = store.durable
         self._location, self._origin = store.location, (socket.gethostname(), os.getpid())
 
     def __getstate__(self) -> dict[str, Any]:
@@ -73,7 +74,7 @@ class Remote:
         key = repr(self._location), self._origin
         if key not in _opened:
             _opened.clear()
-            _opened[key] = AtlasStore.open(self._location)
+            _opened[key] = AtlasStore.open(self._location, durable=self._durable)
         return _opened[key]
 
     def bound_threads(self) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,13 +13,16 @@ from softreach.atlas.command import Command
 from softreach.atlas.metric import Metric
 from softreach.schema import AXES
 
-__all__ = ["MISSING", "RESOLUTION", "SEAL", "Plan", "array_plans"]
+__all__ = ["CUBE", "MISSING", "RESOLUTION", "SEAL", "Plan", "array_plans"]
 
 RESOLUTION = 1e-5
 """Step of stored tips over the shortest length: no coordinate is off by more than half of it."""
 
 SEAL = "metrics"
 """The array that is created last: if it exists, so do all others."""
+
+CUBE = "unit_activation"
+"""The array of activations that all designs share."""
 
 MISSING = int(np.iinfo(np.int32).min)
 """What stands for a tip that is NaN, or not stored."""
@@ -37,22 +40,25 @@ class Plan:
     fill: Any
     attrs: dict[str, Any] = field(default_factory=dict)
     data: Any = None
-    """Values to write at once; None for those that designs bring."""
+    """Values to write at once; None for those that designs bring, and for activations."""
 
-    def compressor(self) -> Any:
-        """Codecs of the Zarr v3 core, which every reader has."""
-        from zarr.codecs import BloscCodec
+    def compressors(self) -> Any:
+        """Codecs of the Zarr v3 core, which every reader has; a checksum comes last."""
+        from zarr.codecs import BloscCodec, Crc32cCodec
 
-        large = self.name in ("tip", "unit_activation")
-        return BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle") if large else None
+        large = self.name in ("tip", CUBE)
+        blosc = BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle")
+        return (blosc, Crc32cCodec()) if large else (Crc32cCodec(),)
 
 
-def array_plans(command: Command, cube: np.ndarray) -> Iterator[Plan]:
-    """Every array of an atlas, the seal last; `cube` are its unit activations, (n, bundles)."""
+def array_plans(command: Command) -> Iterator[Plan]:
+    """Every array of an atlas, the seal last."""
     yield from _parameters(command)
     yield _labels("metric", [metric.name for metric in command.numbers])
     yield _labels("axis", list(AXES))
-    yield _shared("unit_activation", cube, ("sample", "bundle"), _CUBE)
+    shape = (command.n, command.space.bundles)
+    plan = _shared(CUBE, np.broadcast_to(0.0, shape), ("sample", "bundle"), _CUBE)
+    yield replace(plan, data=None)
     yield _per_design(command, "status", np.uint8, 0, attrs=_STATUS)
     yield _per_design(
         command, "message", str, "", attrs={"long_name": "why a design has no numbers"}
@@ -71,8 +77,8 @@ _CUBE = {
 }
 _STATUS = {
     "long_name": "status of the design",
-    "flag_values": [0, 1, 2, 3, 4],
-    "flag_meanings": "to_do done failed gap unstable",
+    "flag_values": [0, 1, 2, 3, 4, 5],
+    "flag_meanings": "to_do done failed gap unstable damaged",
 }
 
 

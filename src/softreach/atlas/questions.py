@@ -3,25 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
+from softreach.atlas.contents import TOLD, contents
 from softreach.atlas.intermediates import activations_of
+from softreach.atlas.layout import array_plans
 from softreach.atlas.reading import command_of, opened_atlas
-from softreach.atlas.store import DONE, FAILED, GAP, KNOWN, TODO, UNSTABLE
+from softreach.atlas.store import (
+    DAMAGED,
+    DONE,
+    FAILED,
+    GAP,
+    KNOWN,
+    PER_DESIGN,
+    TODO,
+    UNSTABLE,
+    AtlasStore,
+)
 from softreach.errors import InvalidInput
 from softreach.rod.tip_map import tip_map
 from softreach.schema import cloud_dataset, with_status
 
 if TYPE_CHECKING:
     import xarray as xr
+    from zarr.storage import StoreLike
 
     from softreach.atlas.reading import AtlasLike
 
-__all__ = ["AtlasStatus", "atlas_cloud", "atlas_design", "atlas_status"]
+__all__ = ["AtlasStatus", "atlas_cloud", "atlas_design", "atlas_status", "verify_atlas"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,31 +47,84 @@ class AtlasStatus:
     gaps: int
     unstable: int
     """Designs of which no activation has a stable equilibrium."""
+    damaged: int
+    """Designs of which a stored chunk is damaged; the command that built them does so again."""
     todo: int
+    tips_verified: bool = field(compare=False)
+    """Whether stored tips were read too, or there are none."""
     messages: dict[int, str]
-    """Why designs failed, cannot exist or are nowhere stable: number -> message."""
+    """Why designs failed, cannot exist, are nowhere stable or are damaged: number -> message."""
 
 
 def atlas_status(atlas: AtlasLike) -> AtlasStatus:
     """How many designs of an atlas are done, and what is wrong with the others.
+
+    Metrics are verified, and so are tips if they are on disk and take no more than a second;
+    `verify_atlas` verifies all of them.
 
     Args:
         atlas: A store; or a dataset from `open_atlas`, which has the status of when it was opened.
 
     Raises:
         InvalidInput: There is no atlas.
+        DamagedStore: What all designs share is damaged.
     """
-    opened = opened_atlas(atlas, metrics=False)
-    status = opened["status"].values.ravel()
-    counts = np.bincount(status, minlength=5).tolist()
+    import xarray as xr
+
+    if isinstance(atlas, xr.Dataset):
+        opened = opened_atlas(atlas)
+        status = opened["status"].values.ravel()
+        return _counted(status, _messages(opened, np.isin(status, (*TOLD, DAMAGED))), False)
+    store = AtlasStore.open(atlas, "r")
+    return _verified(store, tips=_is_small(store))
+
+
+def verify_atlas(store: StoreLike) -> AtlasStatus:
+    """Read all of an atlas and check it: what is damaged, and how much is done.
+
+    The command that built the atlas computes again what is damaged.
+
+    Args:
+        store: Path, URL or Zarr store.
+
+    Raises:
+        InvalidInput: There is no atlas.
+        DamagedStore: What all designs share is damaged.
+    """
+    return _verified(AtlasStore.open(store, "r"), tips=True)
+
+
+_QUICK = 3e8  # bytes of tips
+
+
+def _is_small(store: AtlasStore) -> bool:
+    command = store.command
+    at_hand = isinstance(store.location, str) and "://" not in store.location
+    size = 12.0 * command.n * command.space.size
+    return not command.keep_clouds or (at_hand and size <= _QUICK)
+
+
+def _verified(store: AtlasStore, *, tips: bool) -> AtlasStatus:
+    for plan in array_plans(store.command):
+        if plan.name not in PER_DESIGN:
+            store.array(plan.name)[...]
+    numbers = range(store.command.space.size) if tips else ()
+    found = contents(store, tips_of=numbers)
+    return _counted(found.status, found.messages, tips)
+
+
+def _counted(status: np.ndarray, messages: dict[int, str], tips_verified: bool) -> AtlasStatus:
+    counts = np.bincount(status, minlength=DAMAGED + 1).tolist()
     return AtlasStatus(
         designs=status.size,
         done=counts[DONE],
         failed=counts[FAILED],
         gaps=counts[GAP],
         unstable=counts[UNSTABLE],
+        damaged=counts[DAMAGED],
         todo=counts[TODO],
-        messages=_messages(opened, np.isin(status, (FAILED, GAP, UNSTABLE))),
+        tips_verified=tips_verified,
+        messages=messages,
     )
 
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softreach.atlas.command import Command
+from softreach.atlas.contents import Contents, contents
 from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import KNOWN, AtlasStore
-from softreach.atlas.store_root import absolute
-from softreach.errors import InvalidInput
+from softreach.errors import InvalidInput, SoftreachWarning
+from softreach.stores.damage import Chunk, storage_errors
+from softreach.stores.place import READING, check_arrays
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,6 +43,10 @@ def open_atlas(store: StoreLike) -> xr.Dataset:
 
     Raises:
         InvalidInput: There is no atlas.
+        DamagedStore: What all designs share is damaged; tips raise it when they are read.
+
+    Warns:
+        SoftreachWarning: Designs are damaged; they are NaN, and their status says so.
     """
     return _opened(store, metrics=True)
 
@@ -86,25 +93,45 @@ def over_length(atlas: xr.Dataset, metric: str) -> xr.DataArray:
 def _opened(store: StoreLike, *, metrics: bool) -> xr.Dataset:
     import xarray as xr
 
-    command = AtlasStore.open(store, "r").command
-    raw = xr.open_zarr(absolute(store), consolidated=False, zarr_format=3, chunks=None)
-    # Status first: what it calls done is complete by then.
-    done = raw["status"].load().isin(KNOWN).values
-    atlas = raw.drop_vars(["metrics", "metric", "curvature", "quantity"], errors="ignore")
-    if metrics:
-        atlas = atlas.assign(_metrics(command, raw, done))
-    return atlas.assign_coords(_coordinates(command, raw))
+    held = AtlasStore.open(store, "r")
+    found = contents(held, metrics=metrics)
+    if found.damage:
+        then = "left out; the command that built the atlas computes again what is damaged"
+        warnings.warn(f"{found.damage} ({then})", SoftreachWarning, stacklevel=4)
+    with storage_errors(f"{held.location} cannot be read"):
+        check_arrays(held.opened)
+        raw = xr.open_zarr(held.opened.place, drop_variables=_READ_HERE, **READING)
+        coordinates = _coordinates(held, raw)
+    variables = _variables(held, found) | (_metrics(held.command, found) if metrics else {})
+    return raw.assign(variables).assign_coords(coordinates)
 
 
-def _metrics(command: Command, raw: xr.Dataset, done: np.ndarray) -> dict[str, Any]:
-    dims, table = command.space.dims, raw["metrics"].values
+_READ_HERE = ("metrics", "metric", "curvature", "quantity", "status", "message")
+
+
+def _variables(store: AtlasStore, found: Contents) -> dict[str, Any]:
+    """Status and message of every design."""
+    space = store.command.space
+    texts = np.full(space.size, "", dtype=np.dtypes.StringDType())
+    for index, text in found.messages.items():
+        texts[index] = text
+    values = {"status": found.status, "message": texts}
+    return {
+        name: (space.dims, column.reshape(space.shape), store.array(name).attrs.asdict())
+        for name, column in values.items()
+    }
+
+
+def _metrics(command: Command, contents: Contents) -> dict[str, Any]:
+    dims, table = command.space.dims, contents.tables["metrics"]
+    done = np.isin(contents.status, KNOWN).reshape(command.space.shape)
     found = {
         metric.name: (dims, np.where(done, table[..., k], np.nan), _attributes(command, metric))
         for k, metric in enumerate(command.numbers)
     }
-    profiles = raw["curvature"].values if command.profiles else np.empty(0)
     for k, metric in enumerate(command.profiles):
-        values = np.where(done[..., None, None], profiles[..., k, :, :], np.nan)
+        profiles = contents.tables["curvature"][..., k, :, :]
+        values = np.where(done[..., None, None], profiles, np.nan)
         found[metric.name] = (*dims, *metric.over), values, _attributes(command, metric)
     return found
 
@@ -116,9 +143,12 @@ def _attributes(command: Command, metric: Metric) -> dict[str, Any]:
     return attrs
 
 
-def _coordinates(command: Command, raw: xr.Dataset) -> dict[str, Any]:
+def _coordinates(store: AtlasStore, raw: xr.Dataset) -> dict[str, Any]:
     """Parameters, length and number of every design."""
-    space = command.space
+    space = store.command.space
+    for name, values in space.parameters:
+        if not np.array_equal(raw[name].values, values):
+            store.watch.report(Chunk(name, None), "with other values", "those of the command")
     numbers = np.arange(space.size, dtype=np.uint32).reshape(space.shape)
     found: dict[str, Any] = {
         "length": ((), space.base.length, {"units": "m"}),

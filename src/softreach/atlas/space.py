@@ -116,13 +116,15 @@ class DesignSpace:
         """What varies, by name."""
         return find_parameters(self.base, self.names)
 
+    def place(self, index: int) -> tuple[int, ...]:
+        """Where the design with this number is, along each dimension."""
+        return tuple(map(int, np.unravel_index(index, self.shape)))
+
     def values(self, index: int) -> dict[str, float]:
         """Parameters of the design with this number, counted in C order over `shape`."""
-        place = np.unravel_index(index, self.shape)
+        place = self.place(index)
         where = place if self.layout == "grid" else place * len(self.parameters)
-        return {
-            name: values[int(k)] for (name, values), k in zip(self.parameters, where, strict=True)
-        }
+        return {name: values[k] for (name, values), k in zip(self.parameters, where, strict=True)}
 
     def design(self, index: int) -> Manipulator:
         """The design with this number.

@@ -24,28 +24,39 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.atlas.command import Command
-from softreach.atlas.layout import MISSING, SEAL, Plan, array_plans
-from softreach.atlas.store_root import (
-    StoreFailed,
-    absolute,
-    claim,
-    opened_root,
-    storage_errors,
-    writing,
-)
+from softreach.atlas.layout import CUBE, MISSING, SEAL, array_plans
+from softreach.atlas.store_root import claim
 from softreach.errors import InvalidInput
 from softreach.sampling import sample_cube
+from softreach.stores.damage import Chunk, Watch, storage_errors, writing
+from softreach.stores.place import Opened, absolute, opened_root
 
 if TYPE_CHECKING:
     import zarr
     from zarr.storage import StoreLike
 
-__all__ = ["DONE", "FAILED", "GAP", "KNOWN", "TODO", "UNSTABLE", "AtlasStore", "Result"]
+__all__ = [
+    "DAMAGED",
+    "DONE",
+    "FAILED",
+    "GAP",
+    "KNOWN",
+    "PER_DESIGN",
+    "TODO",
+    "UNSTABLE",
+    "AtlasStore",
+    "Result",
+    "digest",
+    "drawn_cube",
+]
 
-TODO, DONE, FAILED, GAP, UNSTABLE = range(5)
+TODO, DONE, FAILED, GAP, UNSTABLE, DAMAGED = range(6)
 
 KNOWN = (DONE, UNSTABLE)
 """The status of designs of which metrics are stored."""
+
+PER_DESIGN = ("status", "message", "curvature", "tip", "metrics")
+"""The arrays whose chunks are designs."""
 
 
 class Result(NamedTuple):
@@ -63,95 +74,167 @@ class AtlasStore:
 
     location: StoreLike
     command: Command
-    group: zarr.Group = field(repr=False)
+    opened: Opened = field(repr=False)
 
     @classmethod
-    def begin(cls, location: StoreLike, command: Command) -> Self:
-        """Create the store, or open one that the same command began.
+    def begin(cls, location: StoreLike, command: Command, *, durable: bool = False) -> Self:
+        """Create the store, or open one that the same command began, and mend what is damaged.
+
+        Args:
+            location: Where it is.
+            command: What it holds.
+            durable: Whether a power cut may lose nothing that was written.
 
         Raises:
             InvalidInput: The place holds something else, or an atlas of another command, and how
                 that differs.
+            DamagedStore: Its root is damaged, so that nobody knows whose store it is.
             StoreFailed: It cannot be written to.
         """
+        from softreach.atlas.creation import complete
+
         location = absolute(location)
         with writing(location):
-            if opened_root(location) is None:
-                claim(location, _attributes(command))
-        begun = cls._begun(location)
-        if differences := command.differences(begun.command):
+            if opened_root(location, "atlas", "r+") is None:
+                claim(location, _attributes(command), durable=durable)
+        opened, begun = cls._begun(location, durable)
+        if differences := command.differences(begun):
             hint = f"it differs in {'; '.join(differences)}"
             raise InvalidInput("store", location, "new, or begun by the same command", hint)
-        store = cls(location, command, begun.group)  # this command has all functions
-        if SEAL not in store.group:
-            with writing(location):
-                store._complete()
+        store = cls(location, command, opened)  # this command has all functions
+        with writing(location):
+            complete(store)
         return store
 
     @classmethod
-    def open(cls, location: StoreLike, mode: Literal["r", "r+"] = "r+") -> Self:
+    def open(
+        cls, location: StoreLike, mode: Literal["r", "r+"] = "r+", *, durable: bool = False
+    ) -> Self:
         """Open an atlas.
 
         Args:
             location: Where it is.
             mode: "r" for a place that cannot be written to.
+            durable: Whether a power cut may lose nothing that is written.
 
         Raises:
             InvalidInput: There is none, or of another version.
+            DamagedStore: What describes it, or one of its arrays, is damaged.
         """
         location = absolute(location)
-        group = opened_root(location, mode)
-        text = None if group is None or SEAL not in group else group.attrs.get("command")
-        if group is None or not isinstance(text, str):
+        opened = opened_root(location, "atlas", mode, durable=durable)
+        text = None if opened is None else opened.group.attrs.get("command")
+        if opened is None or not isinstance(text, str):
             raise InvalidInput("store", location, "an atlas written by build_atlas")
-        return cls(location, Command.from_json(text), group)
+        if SEAL not in opened.group:
+            hint = "it is not complete: the command that began it goes on"
+            raise InvalidInput("store", location, "an atlas written by build_atlas", hint)
+        store = cls(location, Command.from_json(text), opened)
+        opened.watch.required = _is_shared
+        for plan in array_plans(store.command):
+            store.check(plan.name, plan.shape, plan.dims, plan.dtype)
+        return store
 
     @classmethod
-    def _begun(cls, location: StoreLike) -> Self:
-        """The store, though its arrays may be missing."""
-        group = opened_root(location)
-        text = None if group is None else group.attrs.get("command")
-        if group is None or not isinstance(text, str):
+    def _begun(cls, location: StoreLike, durable: bool) -> tuple[Opened, Command]:
+        """The store and its command, though its arrays may be missing."""
+        opened = opened_root(location, "atlas", "r+", durable=durable)
+        text = None if opened is None else opened.group.attrs.get("command")
+        if opened is None or not isinstance(text, str):
             allowed = "a new folder, or an atlas; it holds something else"
             raise InvalidInput("store", location, allowed)
-        return cls(location, Command.from_json(text), group)
+        opened.watch.required = _is_shared
+        return opened, Command.from_json(text)
 
-    def _complete(self) -> None:
-        """Write everything but the designs, or what is missing of it, and the seal last."""
-        cube = _cube(self.command)
-        self._check_cube(cube, "this machine draws other activations than the one that began it")
-        *plans, seal = array_plans(self.command, cube)
-        for plan in plans:
-            _create_array(self.location, self.group, plan)
-        for index, reason in self.command.space.gaps.items():
-            _write_status(self.group, self.command, index, reason, GAP)
-        _create_array(self.location, self.group, seal)
+    @property
+    def group(self) -> zarr.Group:
+        """The arrays."""
+        return self.opened.group
+
+    @property
+    def watch(self) -> Watch:
+        """What becomes of damage that is found."""
+        return self.opened.watch
+
+    @property
+    def durable(self) -> bool:
+        """Whether a power cut may lose nothing that was written."""
+        return self.opened.durable
+
+    def check(self, name: str, shape: tuple[int, ...], dims: tuple[str, ...], dtype: Any) -> None:
+        """Check that an array is there and of this kind.
+
+        Raises:
+            DamagedStore: It is not.
+        """
+        array = self.array(name)
+        found = array.shape, array.metadata.dimension_names, _kind(array.dtype)
+        wanted = shape, dims, _kind(dtype)
+        if found != wanted:
+            shown, allowed = (f"of shape {s} over {d} of {k}" for s, d, k in (found, wanted))
+            self.watch.report(Chunk(name, None), shown, allowed)
+
+    def array(self, name: str) -> Any:
+        """One of the arrays, which writes also chunks that are empty.
+
+        Raises:
+            DamagedStore: It is missing, or what describes it is damaged.
+        """
+        if name not in self._arrays:
+            try:
+                array: Any = self.group[name]
+            except KeyError:
+                self.watch.report(Chunk(name, None), "missing")
+                raise
+            # No message is no chunk; all else is written, so that what is missing is damaged.
+            empty = name != "message"
+            self._arrays[name] = array.with_config({"write_empty_chunks": empty})
+        return self._arrays[name]
+
+    @cached_property
+    def _arrays(self) -> dict[str, Any]:
+        return {}
 
     def status(self) -> NDArray[np.uint8]:
-        """TODO, DONE, FAILED, GAP or UNSTABLE of every design, in C order, shape (designs,)."""
-        return np.asarray(self._array("status")[...]).ravel()
+        """The status of every design, TODO to DAMAGED, in C order, shape (designs,)."""
+        array = self.array("status")
+        with self.watch.noting() as noted:
+            status = np.array(array[...]).ravel()
+        status[[self.number(chunk) for chunk in noted]] = DAMAGED
+        return status
+
+    def number(self, chunk: Chunk) -> int:
+        """The design that a chunk belongs to."""
+        shape = self.command.space.shape
+        return int(np.ravel_multi_index((chunk.place or ())[: len(shape)], shape))
 
     def messages(self) -> dict[int, str]:
         """Why designs failed, cannot exist or are nowhere stable: number -> message."""
-        texts = np.asarray(self._array("message")[...]).ravel()
         told = np.flatnonzero(np.isin(self.status(), (FAILED, GAP, UNSTABLE))).tolist()
-        return {index: str(texts[index]) for index in told}
+        return {index: self.message(index) for index in told}
+
+    def message(self, index: int) -> str:
+        """Why a design has no numbers; empty if there is no reason."""
+        return str(np.asarray(self.array("message")[self.command.space.place(index)]).item())
 
     @cached_property
     def cube(self) -> NDArray[np.float64]:
         """Unit activations that all designs share, shape (n, bundles).
 
         Raises:
-            StoreFailed: They are not what they were when the store was created.
+            DamagedStore: They are not what they were when the store was created.
         """
+        array = self.array(CUBE)
         with storage_errors(f"{self.location} cannot be read"):
-            cube = np.asarray(self._array("unit_activation")[...])
-        self._check_cube(cube, "the stored activations are damaged; remove it")
+            cube = np.asarray(array[...])
+        if digest(cube) != self.cube_digest:
+            self.watch.report(Chunk(CUBE, None), "with other activations")
         return cube
 
-    def _check_cube(self, cube: NDArray[np.float64], otherwise: str) -> None:
-        if _digest(cube) != self.group.attrs["unit_activation_sha256"]:
-            raise StoreFailed(f"{self.location}: {otherwise}")
+    @property
+    def cube_digest(self) -> object:
+        """What tells the activations from any others."""
+        return self.group.attrs["unit_activation_sha256"]
 
     def write(self, index: int, result: Result, status: int = DONE, message: str = "") -> None:
         """Store a design; its status comes last.
@@ -159,17 +242,17 @@ class AtlasStore:
         Raises:
             StoreFailed: It cannot be written.
         """
-        place = np.unravel_index(index, self.command.space.shape)
+        place = self.command.space.place(index)
         numbers = [result.metrics[metric.name] for metric in self.command.numbers]
         profiles = [result.metrics[metric.name] for metric in self.command.profiles]
         with writing(self.location):
-            self._array("metrics")[place] = np.array(numbers, float)
+            self.array("metrics")[place] = np.array(numbers, float)
             if profiles:
-                self._array("curvature")[place] = np.array(profiles, float)
+                self.array("curvature")[place] = np.array(profiles, float)
             if result.tips is not None:
-                tip = self._array("tip")
+                tip = self.array("tip")
                 tip[place] = fixed_point(result.tips, float(str(tip.attrs["scale_factor"])))
-            _write_status(self.group, self.command, index, message, status)
+            self.write_status(index, message, status)
 
     def write_failure(self, index: int, message: str, status: int = FAILED) -> None:
         """Store why a design has no numbers.
@@ -178,10 +261,13 @@ class AtlasStore:
             StoreFailed: It cannot be written.
         """
         with writing(self.location):
-            _write_status(self.group, self.command, index, message, status)
+            self.write_status(index, message, status)
 
-    def _array(self, name: str) -> Any:
-        return self.group[name]
+    def write_status(self, index: int, message: str, status: int) -> None:
+        """Store how a design ended, and why."""
+        place = self.command.space.place(index)
+        self.array("message")[place] = np.array(message, dtype=np.dtypes.StringDType())
+        self.array("status")[place] = status
 
 
 def fixed_point(tips: NDArray[np.float64], scale: float) -> NDArray[np.int32]:
@@ -196,44 +282,27 @@ def _attributes(command: Command) -> dict[str, str]:
     return {
         "title": "reachability cloud atlas",
         "design": command.space.base.to_toml(),
-        "unit_activation_sha256": _digest(_cube(command)),
+        "unit_activation_sha256": digest(drawn_cube(command)),
         "versions": ", ".join(f"{name} {number}" for name, number in versions.items()),
         "command": command.to_json(),
     }
 
 
-def _cube(command: Command) -> NDArray[np.float64]:
+def drawn_cube(command: Command) -> NDArray[np.float64]:
+    """The activations that the command draws on this machine."""
     return sample_cube(command.sampler, command.n, command.space.bundles, command.seed)
 
 
-def _create_array(location: StoreLike, group: zarr.Group, plan: Plan) -> None:
-    from zarr.errors import ContainsArrayError
-
-    try:
-        array = group.create_array(
-            plan.name,
-            shape=plan.shape,
-            dtype=plan.dtype,
-            chunks=plan.chunks,
-            fill_value=plan.fill,
-            compressors=plan.compressor(),
-            dimension_names=plan.dims,
-            attributes=plan.attrs,
-        )
-    except ContainsArrayError:  # begun by another task, or by a run that was killed
-        array: Any = group[plan.name]
-        if array.shape != plan.shape or array.attrs.asdict() != plan.attrs:
-            allowed = "a new folder, or an atlas; it holds one that was never finished: remove it"
-            raise InvalidInput("store", location, allowed) from None
-    if plan.data is not None:
-        array[...] = plan.data
-
-
-def _write_status(group: Any, command: Command, index: int, message: str, status: int) -> None:
-    place = np.unravel_index(index, command.space.shape)
-    group["message"][place] = np.array(message, dtype=np.dtypes.StringDType())
-    group["status"][place] = status
-
-
-def _digest(cube: NDArray[np.float64]) -> str:
+def digest(cube: NDArray[np.float64]) -> str:
+    """SHA-256 of activations."""
     return hashlib.sha256(np.ascontiguousarray(cube).tobytes()).hexdigest()
+
+
+def _is_shared(chunk: Chunk) -> bool:
+    return chunk.array not in PER_DESIGN
+
+
+def _kind(dtype: Any) -> str:
+    """Name of a type of numbers, or str."""
+    kind = np.dtype(dtype)
+    return "str" if kind.kind in "UTO" else kind.name

@@ -1,4 +1,4 @@
-"""`softreach atlas`: sweeps over designs; build, status, figures, best."""
+"""`softreach atlas`: sweeps over designs; build, status, verify, figures, best."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
-from softreach.cli.inputs import AsJson, Sampler, design_from
+from softreach.cli.inputs import AsJson, Durable, Sampler, design_from
 from softreach.cli.output import print_rows
 from softreach.errors import InvalidInput, MissingExtra
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from softreach.atlas import AtlasStatus
     from softreach.atlas.executor import ExecutorLike
     from softreach.atlas.space import DesignSpace
 
-__all__ = ["atlas", "best", "build", "figures", "status"]
+__all__ = ["atlas", "best", "build", "figures", "status", "verify"]
 
 atlas = App(name="atlas", help="Clouds and volumes of whole families of designs.")
 
@@ -59,9 +60,10 @@ def build(
     shard: Annotated[
         str, Parameter(help="Only part i of k, i from 0, as i/k; all k may share the store.")
     ] = "0/1",
+    durable: Durable = False,
     json: AsJson = False,
 ) -> None:
-    """Compute the cloud and the metrics of every design; run again to continue.
+    """Compute the cloud and the metrics of every design; run again to continue, or to mend damage.
 
     Examples: softreach atlas build a.zarr --vary revolution_deg=0:108:16 --vary taper_deg=0:3:16
     softreach atlas build atlas.zarr --space space.toml --shard 3/8
@@ -79,6 +81,7 @@ def build(
         keep_clouds=keep_clouds,
         executor=_executor(workers, scheduler, scheduler_file),
         shard=_shard(shard),
+        durable=durable,
     )
     status(store, json=json)
 
@@ -91,10 +94,30 @@ def status(store: Store, *, json: AsJson = False) -> None:
     """
     from softreach.atlas import atlas_status
 
-    found = atlas_status(store)
-    counts = ("designs", "done", "todo", "failed", "gaps", "unstable")
+    _print_status(store, atlas_status(store), json)
+
+
+@atlas.command
+def verify(store: Store, *, json: AsJson = False) -> None:
+    """Read all of an atlas and check it; the command that built it computes again what is damaged.
+
+    Example: softreach atlas verify atlas.zarr
+    """
+    from softreach.atlas import verify_atlas
+
+    found = verify_atlas(store)
+    _print_status(store, found, json)
+    if found.damaged:
+        allowed = "0; the command that built the atlas computes them again"
+        raise InvalidInput(f"damaged designs of {store}", found.damaged, allowed)
+
+
+def _print_status(store: str, found: AtlasStatus, json: bool) -> None:
+    counts = ("designs", "done", "todo", "failed", "gaps", "unstable", "damaged")
     rows: dict[str, tuple[Any, str]] = {name: (getattr(found, name), "") for name in counts}
+    rows["tips verified"] = ("yes" if found.tips_verified else "no: softreach atlas verify", "")
     if json:
+        rows["tips verified"] = (found.tips_verified, "")
         rows["messages"] = ({str(k): text for k, text in found.messages.items()}, "")
     else:
         rows |= {f"number {k}": (text, "") for k, text in list(found.messages.items())[:10]}
@@ -208,7 +231,7 @@ def _over_length(text: str) -> float:
 
 def _shard(text: str) -> tuple[int, int]:
     first, _, count = text.partition("/")
-    if not (first.isdigit() and count.isdigit()):
+    if not (text.isascii() and first.isdigit() and count.isdigit()):
         raise InvalidInput("shard", text, "i/k with 0 <= i < k")
     return int(first), int(count)
 

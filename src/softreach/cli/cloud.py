@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
-from softreach.cli.inputs import AsJson, Design, Sampler, design_from
+from softreach.cli.inputs import AsJson, Design, Durable, Sampler, design_from
 from softreach.cli.load_rows import load_rows
 from softreach.cli.output import print_rows
 
@@ -26,6 +26,7 @@ def cloud(
     seed: Annotated[int, Parameter(help="Seed of the sampler.")] = 0,
     sampler: Sampler = "uniform",
     tol: Annotated[float, Parameter(help="Largest tip error, in L.")] = 1e-6,
+    durable: Durable = False,
     changes: Changes = UNCHANGED,
     json: AsJson = False,
 ) -> None:
@@ -42,7 +43,7 @@ def cloud(
     start = perf_counter()
     dataset = compute_cloud(arm, n, seed, sampler, tol=tol)
     seconds = perf_counter() - start
-    save_cloud(dataset, out)
+    save_cloud(dataset, out, durable=durable)
     rows = {
         "samples": (n, ""),
         "sampler": (sampler, ""),

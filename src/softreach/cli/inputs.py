@@ -20,6 +20,7 @@ __all__ = [
     "Activation",
     "AsJson",
     "Design",
+    "Durable",
     "Sampler",
     "Source",
     "activation_of",
@@ -36,6 +37,9 @@ Design = Annotated[
 Source = Annotated[str, Parameter(help="Cloud (.zarr), design file (.toml) or built-in design.")]
 Sampler = Annotated[str, Parameter(help="uniform, boundary, sobol or grid.")]
 AsJson = Annotated[bool, Parameter(name="--json", negative="", help="Print JSON for machines.")]
+Durable = Annotated[
+    bool, Parameter(negative="", help="Wait until not even a power cut can lose what is written.")
+]
 Activation = Annotated[
     str | None,
     Parameter(

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from softreach.errors import SoftreachWarning
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,8 +56,8 @@ def _thinned(atlas: xr.Dataset, panels: int) -> xr.Dataset:
 
 
 def _clouds(atlas: xr.Dataset) -> Callable[[int, int], xr.Dataset | None]:
-    """(column, row) -> the cloud of the design there, if it is done."""
-    from softreach.atlas import atlas_cloud
+    """(column, row) -> the cloud of the design there, if it is done and not damaged."""
+    from softreach.atlas import DamagedStore, atlas_cloud
     from softreach.atlas.store import DONE
 
     first, second = map(str, atlas["status"].dims)
@@ -63,7 +66,11 @@ def _clouds(atlas: xr.Dataset) -> Callable[[int, int], xr.Dataset | None]:
         if int(atlas["status"][column, row]) != DONE:
             return None
         at = {first: float(atlas[first][column]), second: float(atlas[second][row])}
-        return atlas_cloud(atlas, **at)
+        try:
+            return atlas_cloud(atlas, **at)
+        except DamagedStore as error:
+            warnings.warn(f"a cloud is left out: {error}", SoftreachWarning, stacklevel=2)
+            return None
 
     return cloud_at
 

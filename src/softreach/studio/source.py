@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
+from softreach.stores.place import kind_of
 from softreach.studio.atlas_map import metric_names
 from softreach.studio.reach import Quality, Reach, reached
 from softreach.studio.state import StudioState
@@ -56,7 +56,7 @@ def start_on_store(path: str | PathLike[str], quality: Quality | None = None) ->
         InvalidInput: The store is neither, or the atlas holds no design yet.
     """
     quality = quality or Quality()
-    if not _is_atlas(Path(path)):
+    if kind_of(path) == "cloud":
         from softreach.cloud import open_cloud
 
         reach = reached(open_cloud(path), quality)
@@ -65,15 +65,6 @@ def start_on_store(path: str | PathLike[str], quality: Quality | None = None) ->
 
     atlas = open_atlas(path)
     return Start(state=StudioState(design=_best(atlas)), quality=quality, atlas=atlas)
-
-
-def _is_atlas(path: Path) -> bool:
-    """Whether the store holds the command of an atlas."""
-    try:
-        about = json.loads((path / "zarr.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        raise InvalidInput("store", str(path), "a Zarr store written by softreach") from None
-    return "command" in about.get("attributes", {})
 
 
 def _best(atlas: xr.Dataset) -> Manipulator:
