@@ -101,7 +101,7 @@ _COMMANDS = {
     ),
     "warmup": (
         "Compile all kernels now, so that no later command has to.",
-        "softreach warmup",
+        "softreach warmup --loads",
     ),
 }
 _KEYWORDS = {"import": "import_file"}  # commands that no Python function can be called
