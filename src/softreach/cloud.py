@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
@@ -16,6 +17,7 @@ from softreach import parallel, schema
 from softreach.arm.manipulator import Manipulator
 from softreach.atomic import replacing
 from softreach.errors import InvalidInput
+from softreach.file_kinds import FileKind, Formats
 from softreach.progress import Progress, bar, silent
 from softreach.rod.free_bundles import FreeBundles
 from softreach.rod.measured_bundles import MeasuredBundles
@@ -26,7 +28,7 @@ from softreach.sampling import check_sampler, cube_blocks
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["compute_cloud", "design_of", "open_cloud", "save_cloud", "tip_map_of"]
+__all__ = ["CLOUD_STORE", "compute_cloud", "design_of", "open_cloud", "save_cloud", "tip_map_of"]
 
 Array = NDArray[np.float64]
 
@@ -78,16 +80,40 @@ def compute_cloud(
     return schema.with_status(cloud, status) if rod.supports_unstable else cloud
 
 
-def save_cloud(cloud: xr.Dataset, path: str | PathLike[str]) -> None:
+def _is_cloud(path: Path) -> bool:
+    """Whether a folder holds a stored cloud and nothing else."""
+    try:
+        about = json.loads((path / "zarr.json").read_bytes())["attributes"]
+        names = {entry.name for entry in path.iterdir()} - {"zarr.json"}
+        arrays = all((path / name / "zarr.json").is_file() for name in names)
+        return arrays and {"tip", "activation"} <= names and {"sampler", "tol"} <= about.keys()
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return False
+
+
+CLOUD_STORE: Formats = {".zarr": FileKind("a stored cloud", _is_cloud)}
+"""What `save_cloud` writes, and replaces."""
+
+
+def save_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write a cloud as a Zarr v3 store; it appears whole, in place of an older one, or not at all.
 
+    Args:
+        cloud: As `compute_cloud` makes it.
+        path: The folder of the store.
+        overwrite: Whether it may replace any file and any Zarr store, and not only a cloud.
+
     Raises:
-        InvalidInput: The dataset is no cloud.
+        InvalidInput: The dataset is no cloud, or something else is there.
+        NotWritten: It cannot be written.
     """
     schema.check_cloud(cloud)
     chunk = min(cloud.sizes["sample"], _CHUNK)
     encoding = {name: {"chunks": (chunk, cloud[name].shape[1])} for name in ("tip", "activation")}
-    with replacing(path) as partial_path, _few_chunks_at_a_time():
+    with (
+        replacing(path, CLOUD_STORE[".zarr"], overwrite=overwrite) as partial_path,
+        _few_chunks_at_a_time(),
+    ):
         schema.storable(cloud).to_zarr(
             partial_path, mode="w", zarr_format=3, consolidated=False, encoding=encoding
         )

@@ -4,30 +4,35 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Mapping
-from os import PathLike, fspath
+from io import BufferedWriter
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from softreach.atomic import replacing
-from softreach.errors import InvalidInput, MissingExtra
+from softreach.atomic import writing
+from softreach.errors import MissingExtra
+from softreach.file_kinds import Formats, format_of
 
-__all__ = ["load_library", "write_by_suffix"]
+__all__ = ["Writers", "load_library", "write_by_suffix"]
+
+Writers = Mapping[str, Callable[[Any, BufferedWriter], None]]
+"""Suffix -> what writes a content to a file."""
 
 
 def write_by_suffix(
-    path: str | PathLike[str], writers: Mapping[str, Callable[[Any, Path], None]], content: Any
+    path: str | PathLike[str], formats: Formats, writers: Writers, content: Any, overwrite: bool
 ) -> None:
     """Write the content whole, or leave what was there.
 
     Raises:
-        InvalidInput: No writer for the suffix; the error lists those there are.
+        InvalidInput: No writer for the suffix (the error lists those there are), or something else
+            is there.
         MissingExtra: The format needs a library that is not installed.
+        NotWritten: It cannot be written.
     """
-    writer = writers.get(Path(path).suffix.lower())
-    if writer is None:
-        raise InvalidInput("path", fspath(path), "a file name ending in " + ", ".join(writers))
-    with replacing(path) as lent:
-        writer(content, lent)
+    kind = format_of(path, formats)
+    with writing(path, kind, overwrite=overwrite) as file:
+        writers[Path(path).suffix.lower()](content, file)
 
 
 def load_library(module: str) -> Any:
