@@ -10,7 +10,7 @@ import numpy as np
 
 from softreach.errors import InvalidInput
 from softreach.export import ply
-from softreach.export.formats import Writers, load_library, write_by_suffix
+from softreach.export.formats import Writers, load_library, write_by_suffix, write_vtu
 from softreach.export.table import CloudTable, cloud_table
 from softreach.file_kinds import FileKind, Formats, Recognizes, beginning_with, text_with
 from softreach.palette import activation_colors
@@ -117,7 +117,7 @@ def _write_mat(table: CloudTable, file: BufferedWriter) -> None:
 def _write_vtu(table: CloudTable, file: BufferedWriter) -> None:
     # compressed it takes five times as long for a file two thirds as large
     options = {"compression": None, "header_type": "UInt64"}
-    load_library("meshio").vtu.write(file, _point_mesh(table), **options)
+    write_vtu(_point_mesh(table), file, **options)
 
 
 def _write_vtk(table: CloudTable, file: BufferedWriter) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 from collections.abc import Callable, Mapping
 from io import BufferedWriter
 from os import PathLike
@@ -13,7 +14,7 @@ from softreach.atomic import writing
 from softreach.errors import MissingExtra
 from softreach.file_kinds import Formats, format_of
 
-__all__ = ["Writers", "load_library", "write_by_suffix"]
+__all__ = ["Writers", "load_library", "write_by_suffix", "write_vtu"]
 
 Writers = Mapping[str, Callable[[Any, BufferedWriter], None]]
 """Suffix -> what writes a content to a file."""
@@ -33,6 +34,11 @@ def write_by_suffix(
     kind = format_of(path, formats)
     with writing(path, kind, overwrite=overwrite) as file:
         writers[Path(path).suffix.lower()](content, file)
+
+
+def write_vtu(mesh: Any, file: BufferedWriter, **options: Any) -> None:
+    """Write a mesh of meshio, which for this format opens what it is given itself."""
+    load_library("meshio").vtu.write(os.dup(file.fileno()), mesh, **options)
 
 
 def load_library(module: str) -> Any:
