@@ -182,6 +182,8 @@ def _take_place(partial: Path, target: Path, replaced: Path) -> None:
 
 def _sync(partial: Path) -> None:
     """Wait until a file, or all files of a folder, would survive a loss of power."""
+    if os.environ.get("SOFTREACH_SYNC") == "0":
+        return
     if not partial.is_dir():
         _sync_file(partial)
         return

@@ -18,6 +18,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.atomic import replacing
 from softreach.errors import InvalidInput
 from softreach.file_kinds import FileKind, Formats
+from softreach.memory import check_memory
 from softreach.progress import Progress, bar, silent
 from softreach.rod.free_bundles import FreeBundles
 from softreach.rod.measured_bundles import MeasuredBundles
@@ -28,7 +29,15 @@ from softreach.sampling import check_sampler, cube_blocks
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["CLOUD_STORE", "compute_cloud", "design_of", "open_cloud", "save_cloud", "tip_map_of"]
+__all__ = [
+    "CLOUD_STORE",
+    "compute_cloud",
+    "design_of",
+    "open_cloud",
+    "sample_bytes",
+    "save_cloud",
+    "tip_map_of",
+]
 
 Array = NDArray[np.float64]
 
@@ -63,13 +72,18 @@ def compute_cloud(
         the coordinate `status` (sample), a `TipStatus`; a tip without equilibrium is NaN.
 
     Raises:
-        InvalidInput: An argument out of range; the message says what to use instead.
+        InvalidInput: An argument out of range, or more samples than fit into memory; the message
+            says what to use instead.
+
+    Warns:
+        SoftreachWarning: The samples take more than half of the free memory.
     """
     rod = _of_all_bundles(tip_map(arm, tol))
     if rod.supports_unstable:
         rod.tips(rod.box.low[None])  # what all samples need, once and not on every thread
     bundles = rod.box.bundles
     check_sampler(sampler, n, bundles, seed)
+    check_memory("n", n, sample_bytes(bundles) * int(n))
     activation, tip = np.empty((n, bundles)), np.empty((n, 3))
     status = np.empty(n if rod.supports_unstable else 0, np.int8)
     with _shown(progress, n) as shown:
@@ -151,6 +165,11 @@ def design_of(cloud: xr.Dataset) -> Manipulator:
 def tip_map_of(cloud: xr.Dataset) -> TipMap:
     """The tip map that a cloud was computed with."""
     return tip_map(design_of(cloud), float(cloud.attrs["tol"]))
+
+
+def sample_bytes(bundles: int) -> int:
+    """What a sample takes: its tip, its activation and its status."""
+    return 8 * (3 + bundles) + 1
 
 
 def _of_all_bundles(rod: TipMap) -> TipMap:

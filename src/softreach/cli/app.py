@@ -1,14 +1,25 @@
-"""The `softreach` command and what its exit codes mean: 0 done, 2 wrong input, 130 interrupted."""
+"""The `softreach` command and what its exit codes mean.
+
+0 done, 2 wrong input or nowhere to write, 130 interrupted, 141 nobody reads the output any more.
+"""
 
 from __future__ import annotations
 
+import os
 import sys
 import warnings
+from contextlib import suppress
 from importlib.metadata import version
 
 from cyclopts import App, CycloptsError
 
 from softreach.cli.first_run import compilation_announced
+from softreach.cli.terminal import (
+    discard_output,
+    flush_output,
+    open_missing_streams,
+    spelling_out,
+)
 from softreach.errors import SoftreachError, SoftreachWarning
 
 __all__ = ["app", "main"]
@@ -116,28 +127,45 @@ for _place, (_name, (_summary, _example)) in enumerate(_COMMANDS.items()):
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit."""
+    open_missing_streams()
+    os.environ["MPLBACKEND"] = "agg"  # pictures go to files, whatever windows there are
     sys.exit(run(sys.argv[1:] if arguments is None else arguments))
 
 
 def run(arguments: list[str]) -> int:
     """Run the command line and return its exit code; wrong input costs one line, no traceback."""
-    with warnings.catch_warnings(), compilation_announced():
+    with warnings.catch_warnings(), compilation_announced(), spelling_out():
         warnings.showwarning = _show_warning
         try:
             app(arguments, result_action="return_value")
-        except (CycloptsError, SoftreachError, OSError) as error:
-            return _failed(str(error) or type(error).__name__)
+            flush_output()
+        except BrokenPipeError:
+            discard_output()
+            return 141
+        except (CycloptsError, SoftreachError, OSError, MemoryError) as error:
+            return _failed(_message(error))
         except KeyboardInterrupt:
             sys.stderr.write("interrupted: nothing half-written was left behind\n")
             return 130
     return 0
 
 
+def _message(error: Exception) -> str:
+    """What went wrong; of an option that cannot be read, in our words."""
+    if isinstance(error, CycloptsError) and isinstance(error.__cause__, SoftreachError):
+        error = error.__cause__
+    if isinstance(error, MemoryError):
+        return "there is not enough memory for this; ask for fewer samples or less accuracy"
+    return str(error) or type(error).__name__
+
+
 def _failed(message: str) -> int:
-    sys.stderr.write(f"error: {message}\n")
+    with suppress(OSError, ValueError):  # nobody reads it
+        sys.stderr.write(f"error: {message}\n")
     return 2
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: object) -> None:
     if issubclass(category, SoftreachWarning):
-        sys.stderr.write(f"warning: {message}\n")
+        with suppress(OSError, ValueError):
+            sys.stderr.write(f"warning: {message}\n")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from softreach.cli.inputs import design_from
+from softreach.cli.numbers import WHOLE
 
 if TYPE_CHECKING:
     from softreach.studio import Start
@@ -23,7 +24,7 @@ def studio(
     host: Annotated[
         str, Parameter(help="Address to listen on; anyone who can reach it may use the page.")
     ] = "127.0.0.1",
-    port: Annotated[int | None, Parameter(help="A free port by default.")] = None,
+    port: Annotated[int | None, WHOLE, Parameter(help="A free port by default.")] = None,
     open_page: Annotated[
         bool, Parameter(name="--open", help="Open the page in the browser.")
     ] = True,
