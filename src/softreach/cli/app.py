@@ -18,6 +18,7 @@ from softreach.cli.terminal import (
     discard_output,
     flush_output,
     open_missing_streams,
+    readable_width,
     spelling_out,
 )
 from softreach.errors import SoftreachError, SoftreachWarning
@@ -134,7 +135,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 def run(arguments: list[str]) -> int:
     """Run the command line and return its exit code; wrong input costs one line, no traceback."""
-    with warnings.catch_warnings(), compilation_announced(), spelling_out():
+    with warnings.catch_warnings(), compilation_announced(), spelling_out(), readable_width():
         warnings.showwarning = _show_warning
         try:
             app(arguments, result_action="return_value")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import os
+import shutil
 import sys
 import unicodedata
 from collections.abc import Iterator
@@ -12,7 +13,13 @@ from io import TextIOWrapper
 
 from softreach.errors import NotWritten
 
-__all__ = ["discard_output", "flush_output", "open_missing_streams", "spelling_out"]
+__all__ = [
+    "discard_output",
+    "flush_output",
+    "open_missing_streams",
+    "readable_width",
+    "spelling_out",
+]
 
 _HANDLER = "softreach.spelled_out"
 
@@ -66,6 +73,27 @@ def spelling_out() -> Iterator[None]:
 
 def _streams() -> list[TextIOWrapper]:
     return [one for one in (sys.stdout, sys.stderr) if isinstance(one, TextIOWrapper)]
+
+
+_NARROWEST = 60  # columns; tables of options lose words below, and lines that wrap do not
+
+
+@contextmanager
+def readable_width() -> Iterator[None]:
+    """Let help on a narrow terminal wrap instead of losing its words, in the block."""
+    given = os.environ.get("COLUMNS")
+    asked = int(given) if given is not None and given.isdecimal() else _NARROWEST
+    if min(asked, shutil.get_terminal_size().columns) >= _NARROWEST:
+        yield
+        return
+    os.environ["COLUMNS"] = str(_NARROWEST)
+    try:
+        yield
+    finally:
+        if given is None:
+            del os.environ["COLUMNS"]
+        else:
+            os.environ["COLUMNS"] = given
 
 
 def open_missing_streams() -> None:
