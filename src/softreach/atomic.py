@@ -81,9 +81,16 @@ def replacing(
 
 
 class _WatchedFile(io.BufferedWriter):
-    """A file that remembers the first error of writing, whatever the library did about it."""
+    """A file that remembers the first error of writing, whatever the library did about it.
+
+    Nobody writes behind its back: libraries that take the descriptor of a file lose what a full
+    disk takes only a part of.
+    """
 
     failure: OSError | None = None
+
+    def fileno(self) -> int:
+        raise io.UnsupportedOperation("fileno")
 
     def write(self, data: Any, /) -> int:
         try:

@@ -99,8 +99,9 @@ def _is_cloud(path: Path) -> bool:
     try:
         about = json.loads((path / "zarr.json").read_bytes())["attributes"]
         names = {entry.name for entry in path.iterdir()} - {"zarr.json"}
-        arrays = all((path / name / "zarr.json").is_file() for name in names)
-        return arrays and {"tip", "activation"} <= names and {"sampler", "tol"} <= about.keys()
+        inside = (entry.name for name in names for entry in (path / name).iterdir())
+        only = set(inside) <= {"zarr.json", "c"}
+        return only and {"tip", "activation"} <= names and {"sampler", "tol"} <= about.keys()
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return False
 

@@ -198,7 +198,7 @@ def _options():
             yield pytest.param(hint, id=f"{getattr(function, '__name__', function)} {name}")
 
 
-@pytest.mark.parametrize("hint", _options())
+@pytest.mark.parametrize("hint", list(_options()))
 def test_every_number_on_the_command_line_has_the_one_reader(hint):
     kind, *meanings = typing.get_args(hint) or (hint,)
     plain = {kind, *typing.get_args(kind)}

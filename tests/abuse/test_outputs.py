@@ -59,9 +59,10 @@ def _figure(things, path, **options):
     save_figure(things["figure"], path, **options)
 
 
+TABLES = ("ply", "csv", "parquet", "npz", "mat", "vtu", "vtk")
 WRITERS = {
     "cloud.zarr": lambda things, path, **options: sr.save_cloud(things["cloud"], path, **options),
-    **{f"cloud.{suffix}": _cloud for suffix in ("ply", "csv", "parquet", "npz", "mat", "vtu", "vtk")},
+    **{f"cloud.{suffix}": _cloud for suffix in TABLES},
     **{f"mesh.{suffix}": _mesh for suffix in ("ply", "stl", "obj", "glb", "vtu", "vtk")},
     "arm.stl": _arm,
     **{f"figure.{suffix}": _figure for suffix in ("png", "pdf", "svg", "jpg")},

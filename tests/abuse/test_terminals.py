@@ -162,7 +162,7 @@ START = f"{sys.executable} -m softreach"
         (f"{START} --help <&-", 0, ""),
         (f"{START} design nowhere.toml 2>&-", 2, ""),
         (f"{START} design nowhere.toml 2>/dev/full", 2, ""),
-        (f"{START} --help >/dev/full", 2, "error: standard output cannot be written"),
+        (f"{START} --help >/dev/full", 2, "No space left on device"),
         (f"LC_ALL=C PYTHONUTF8=0 PYTHONCOERCECLOCALE=0 {START} --help", 0, ""),
         (f"PYTHONIOENCODING=ascii {START} volume --help", 0, ""),
         (f"MPLBACKEND=nonsense {START} show minimal_trunk --n 500 --out a.png", 0, ""),

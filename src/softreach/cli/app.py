@@ -21,7 +21,7 @@ from softreach.cli.terminal import (
     readable_width,
     spelling_out,
 )
-from softreach.errors import SoftreachError, SoftreachWarning
+from softreach.errors import NotWritten, SoftreachError, SoftreachWarning
 
 __all__ = ["app", "main"]
 
@@ -144,6 +144,8 @@ def run(arguments: list[str]) -> int:
             discard_output()
             return 141
         except (CycloptsError, SoftreachError, OSError, MemoryError) as error:
+            with suppress(BrokenPipeError, NotWritten):
+                flush_output()
             return _failed(_message(error))
         except KeyboardInterrupt:
             sys.stderr.write("interrupted: nothing half-written was left behind\n")

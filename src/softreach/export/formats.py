@@ -38,7 +38,7 @@ def write_by_suffix(
 
 def write_vtu(mesh: Any, file: BufferedWriter, **options: Any) -> None:
     """Write a mesh of meshio, which for this format opens what it is given itself."""
-    load_library("meshio").vtu.write(os.dup(file.fileno()), mesh, **options)
+    load_library("meshio").vtu.write(os.fspath(file.name), mesh, **options)
 
 
 def load_library(module: str) -> Any:
