@@ -140,7 +140,9 @@ def run(arguments: list[str]) -> int:
         try:
             app(arguments, result_action="return_value")
             flush_output()
-        except BrokenPipeError:
+        except (BrokenPipeError, SystemExit) as error:
+            if isinstance(error, SystemExit) and not isinstance(error.__context__, BrokenPipeError):
+                raise  # by anyone but the printer of help
             discard_output()
             return 141
         except (CycloptsError, SoftreachError, OSError, MemoryError) as error:

@@ -8,11 +8,15 @@ from cyclopts import Parameter
 
 from softreach.cli.inputs import design_from
 from softreach.cli.numbers import WHOLE
+from softreach.errors import InvalidInput
 
 if TYPE_CHECKING:
     from softreach.studio import Start
 
 __all__ = ["studio"]
+
+
+_LAST_PORT = 65535
 
 
 def studio(
@@ -39,6 +43,8 @@ def studio(
 
     from softreach.studio import Studio
 
+    if port is not None and not 0 <= port <= _LAST_PORT:
+        raise InvalidInput("port", port, f"a whole number from 0 to {_LAST_PORT}")
     with Studio(_start(source), host, port) as running:
         sys.stdout.write(f"{running.url}  (Ctrl-C ends it)\n")
         sys.stdout.flush()
