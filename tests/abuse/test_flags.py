@@ -165,7 +165,7 @@ def test_a_decimal_number_is_what_python_reads(text):
 def test_an_atlas_that_the_disk_cannot_hold_is_not_begun(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("softreach.memory.free_disk", lambda path: 1e6)
-    arguments = "atlas build a.zarr --vary taper_deg=0:3:4 --n 1e5".split()
+    arguments = ["atlas", "build", "a.zarr", "--vary", "taper_deg=0:3:4", "--n", "1e5"]
     said = refusal_of(arguments, capsys, tmp_path)
     assert "n = 100000 samples of 4 designs" in said
     assert "it takes 2.48 MB of disk space, of which 1 MB are free" in said
@@ -178,6 +178,8 @@ FILES = [
     pytest.param(b"x,y,z\n0,0,nan", "must be three", id="NaN"),
     pytest.param(b"x,y,z\n0,0,1e200", "must be three", id="far away"),
     pytest.param("0,0,1".encode("utf-16"), "which is text in UTF-8", id="UTF-16"),
+    pytest.param(b"", "a row x,y,z for each position", id="nothing"),
+    pytest.param(b"x,y,z\n", "a row x,y,z for each position", id="a header alone"),
     pytest.param(b"0,0," + b"1" * 100_000, "must be three", id="a very long line"),
 ]
 

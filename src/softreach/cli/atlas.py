@@ -192,6 +192,8 @@ def _executor(
     if workers is not None:
         from softreach.atlas import worker_processes
 
+        if workers < 1:
+            raise InvalidInput("workers", workers, "a whole number, 1 or more")
         return worker_processes(workers)
     if scheduler is None and scheduler_file is None:
         return None

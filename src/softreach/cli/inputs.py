@@ -133,8 +133,15 @@ def points_of(text: str | None, file: Path | None) -> list[list[float]]:
     if file is None or not file.is_file():
         raise InvalidInput("targets", file, "a CSV file that exists")
     lines = [line for line in _text_of(file).splitlines() if line.strip()]
-    rows = lines[1:] if lines and numbers_in(lines[0]) is None else lines
+    rows = lines[1:] if lines and _is_header(lines[0]) else lines
+    if not rows:
+        raise InvalidInput("targets", file, "a CSV file with a row x,y,z for each position")
     return [_position(f"{file}, point {k + 1}", row) for k, row in enumerate(rows)]
+
+
+def _is_header(line: str) -> bool:
+    """Whether a line holds names: no part of it begins as a number does."""
+    return not any(part.strip().startswith(tuple("+-.0123456789")) for part in line.split(","))
 
 
 _LARGEST_FILE = 200_000_000  # bytes of a table of positions, some million of them
