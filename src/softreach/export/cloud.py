@@ -10,7 +10,7 @@ import numpy as np
 
 from softreach.errors import InvalidInput
 from softreach.export import ply
-from softreach.export.formats import Writers, load_library, write_by_suffix, write_vtu
+from softreach.export.formats import Writers, load_library, write_by_suffix, write_vtk, write_vtu
 from softreach.export.table import CloudTable, cloud_table
 from softreach.file_kinds import FileKind, Formats, Recognizes, beginning_with, text_with
 from softreach.palette import activation_colors
@@ -121,7 +121,7 @@ def _write_vtu(table: CloudTable, file: BufferedWriter) -> None:
 
 
 def _write_vtk(table: CloudTable, file: BufferedWriter) -> None:
-    load_library("meshio").vtk.write(file, _point_mesh(table))
+    write_vtk(_point_mesh(table), file)
 
 
 def _point_mesh(table: CloudTable) -> Any:

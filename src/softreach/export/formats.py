@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
 import os
 from collections.abc import Callable, Mapping
@@ -14,7 +15,7 @@ from softreach.atomic import writing
 from softreach.errors import MissingExtra
 from softreach.file_kinds import Formats, format_of
 
-__all__ = ["Writers", "load_library", "write_by_suffix", "write_vtu"]
+__all__ = ["Writers", "load_library", "write_by_suffix", "write_vtk", "write_vtu"]
 
 Writers = Mapping[str, Callable[[Any, BufferedWriter], None]]
 """Suffix -> what writes a content to a file."""
@@ -39,6 +40,22 @@ def write_by_suffix(
 def write_vtu(mesh: Any, file: BufferedWriter, **options: Any) -> None:
     """Write a mesh of meshio, which for this format opens what it is given itself."""
     load_library("meshio").vtu.write(os.fspath(file.name), mesh, **options)
+
+
+def write_vtk(mesh: Any, file: BufferedWriter) -> None:
+    """Write a mesh of meshio, and read it back.
+
+    The function that it writes arrays with does not notice when a full disk takes only a part of
+    the last bytes.
+    """
+    vtk, path = load_library("meshio").vtk, os.fspath(file.name)
+    vtk.write(path, mesh)
+    try:
+        whole = vtk.read(path).points.shape == mesh.points.shape
+    except Exception:  # whatever reading half a file may raise
+        whole = False
+    if not whole:
+        raise OSError(errno.EIO, "the file is cut off; is the disk full?")
 
 
 def load_library(module: str) -> Any:

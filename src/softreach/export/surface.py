@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arrays import Faces
 from softreach.errors import InvalidInput
 from softreach.export import ply
-from softreach.export.formats import Writers, load_library, write_by_suffix, write_vtu
+from softreach.export.formats import Writers, load_library, write_by_suffix, write_vtk, write_vtu
 from softreach.file_kinds import FileKind, Formats, Recognizes, beginning_with, text_with
 from softreach.geometry.surface import SurfaceMesh
 from softreach.palette import BODY, Color
@@ -120,7 +120,7 @@ def _write_vtu(parts: Sequence[Part], file: BufferedWriter) -> None:
 
 
 def _write_vtk(parts: Sequence[Part], file: BufferedWriter) -> None:
-    load_library("meshio").vtk.write(file, _mesh(parts))
+    write_vtk(_mesh(parts), file)
 
 
 def _mesh(parts: Sequence[Part]) -> Any:
