@@ -30,11 +30,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = [
-    "CLOUD_STORE",
     "compute_cloud",
     "design_of",
     "open_cloud",
-    "sample_bytes",
     "save_cloud",
     "tip_map_of",
 ]
