@@ -283,8 +283,11 @@ helical_angle_deg = 0.0
             "elephant: must be a .toml file, or one of elephant_trunk, filament",
         ),
         (["design", "minimal_trunk", "--tapr-deg", "3"], "Did you mean --taper-deg"),
-        (["design", "minimal_trunk", "--taper-deg", "steep"], '"steep" into float'),
-        (["cloud", "minimal_trunk", "--n", "many"], '"many" into int'),
+        (
+            ["design", "minimal_trunk", "--taper-deg", "steep"],
+            "taper_deg = steep: must be a finite number",
+        ),
+        (["cloud", "minimal_trunk", "--n", "many"], "n = many: must be a whole number"),
         (["cloud", "minimal_trunk", "--n", "0"], "n = 0: must be a whole number, 1 or more"),
         (["cloud", "minimal_trunk", "--seed", "-1"], "seed = -1"),
         (["cloud", "minimal_trunk", "--tol", "0"], "tol = 0"),

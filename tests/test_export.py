@@ -216,16 +216,16 @@ class TestWhole:
         self, stop, cloud, tmp_path, monkeypatch
     ):
         path = tmp_path / "cloud.ply"
-        path.write_text("old")
+        path.write_text("ply\nold")
 
         def fail(file, *_):
-            file.write_text("half")
+            file.write(b"half")
             raise stop
 
         monkeypatch.setattr("softreach.export.ply.write_points", fail)
         with pytest.raises(stop):
             export_cloud(cloud, path)
-        assert path.read_text() == "old"
+        assert path.read_text() == "ply\nold"
         assert not left_over(tmp_path, "cloud.ply")
 
     def test_an_unknown_suffix_names_the_known_ones(self, trunk, cloud, ball, bent, tmp_path):

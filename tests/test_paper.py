@@ -167,7 +167,7 @@ def test_an_interrupted_report_keeps_its_finished_parts(tmp_path, small, monkeyp
 
         return compute
 
-    monkeypatch.setattr(reproduce, "write_report", lambda path, *_: path)
+    monkeypatch.setattr(reproduce, "write_report", lambda path, *_, **__: path)
     monkeypatch.setattr(reproduce, "PARTS", {"a": part("a"), "b": part("b", fails=True)})
     with pytest.raises(KeyboardInterrupt):
         reproduce_paper(tmp_path, quick=True)

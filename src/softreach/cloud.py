@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
@@ -16,6 +17,8 @@ from softreach import parallel, schema
 from softreach.arm.manipulator import Manipulator
 from softreach.atomic import replacing
 from softreach.errors import InvalidInput
+from softreach.file_kinds import FileKind, Formats
+from softreach.memory import check_memory
 from softreach.progress import Progress, bar, silent
 from softreach.rod.free_bundles import FreeBundles
 from softreach.rod.measured_bundles import MeasuredBundles
@@ -23,7 +26,6 @@ from softreach.rod.stable_tips import StableTips
 from softreach.rod.tip_map import BLOCK, TipMap, tip_map
 from softreach.sampling import check_sampler, cube_blocks
 from softreach.stores.damage import Watch, storage_errors
-from softreach.stores.durable import sync_folder, sync_tree
 from softreach.stores.place import (
     ARRAYS,
     READING,
@@ -36,7 +38,13 @@ from softreach.stores.place import (
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["compute_cloud", "design_of", "open_cloud", "save_cloud", "tip_map_of"]
+__all__ = [
+    "compute_cloud",
+    "design_of",
+    "open_cloud",
+    "save_cloud",
+    "tip_map_of",
+]
 
 Array = NDArray[np.float64]
 
@@ -71,13 +79,18 @@ def compute_cloud(
         the coordinate `status` (sample), a `TipStatus`; a tip without equilibrium is NaN.
 
     Raises:
-        InvalidInput: An argument out of range; the message says what to use instead.
+        InvalidInput: An argument out of range, or more samples than fit into memory; the message
+            says what to use instead.
+
+    Warns:
+        SoftreachWarning: The samples take more than half of the free memory.
     """
     rod = _of_all_bundles(tip_map(arm, tol))
     if rod.supports_unstable:
         rod.tips(rod.box.low[None])  # what all samples need, once and not on every thread
     bundles = rod.box.bundles
     check_sampler(sampler, n, bundles, seed)
+    check_memory("n", n, sample_bytes(bundles) * int(n))
     activation, tip = np.empty((n, bundles)), np.empty((n, 3))
     status = np.empty(n if rod.supports_unstable else 0, np.int8)
     with _shown(progress, n) as shown:
@@ -88,7 +101,29 @@ def compute_cloud(
     return schema.with_status(cloud, status) if rod.supports_unstable else cloud
 
 
-def save_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, durable: bool = False) -> None:
+def _is_cloud(path: Path) -> bool:
+    """Whether a folder holds a stored cloud and nothing else."""
+    try:
+        about = json.loads((path / "zarr.json").read_bytes())["attributes"]
+        names = {entry.name for entry in path.iterdir()} - {"zarr.json"}
+        inside = (entry.name for name in names for entry in (path / name).iterdir())
+        only = set(inside) <= {"zarr.json", "c"}
+        return only and {"tip", "activation"} <= names and {"sampler", "tol"} <= about.keys()
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return False
+
+
+CLOUD_STORE: Formats = {".zarr": FileKind("a stored cloud", _is_cloud)}
+"""What `save_cloud` writes, and replaces."""
+
+
+def save_cloud(
+    cloud: xr.Dataset,
+    path: str | PathLike[str],
+    *,
+    durable: bool = False,
+    overwrite: bool = False,
+) -> None:
     """Write a cloud as a Zarr v3 store; it appears whole, in place of an older one, or not at all.
 
     Every file carries a checksum, so that `open_cloud` notices damage.
@@ -97,19 +132,20 @@ def save_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, durable: bool = 
         cloud: From `compute_cloud`, or a part of its samples.
         path: The folder to write.
         durable: Whether to return only when not even a power cut can lose it, which takes longer.
+        overwrite: Whether it may replace any file and any Zarr store, and not only a cloud.
 
     Raises:
-        InvalidInput: The dataset is no cloud, or its design, bundles and length do not agree.
-        StoreFailed: It cannot be written.
+        InvalidInput: The dataset is no cloud, its design, bundles and length do not agree, or
+            something else is there.
+        NotWritten: It cannot be written.
     """
     schema.check_stored_cloud(cloud)
-    with replacing(path) as partial_path, _few_chunks_at_a_time():
-        with storage_errors(f"{fspath(path)} cannot be written"):
-            _write(schema.storable(cloud), partial_path)
-        if durable:
-            sync_tree(partial_path)
-    if durable:
-        sync_folder(Path(path).absolute().parent)
+    kind = CLOUD_STORE[".zarr"]
+    with (
+        replacing(path, kind, overwrite=overwrite, durable=durable) as partial_path,
+        _few_chunks_at_a_time(),
+    ):
+        _write(schema.storable(cloud), partial_path)
 
 
 def _write(cloud: xr.Dataset, path: Path) -> None:
@@ -172,6 +208,11 @@ def design_of(cloud: xr.Dataset) -> Manipulator:
 def tip_map_of(cloud: xr.Dataset) -> TipMap:
     """The tip map that a cloud was computed with."""
     return tip_map(design_of(cloud), float(cloud.attrs["tol"]))
+
+
+def sample_bytes(bundles: int) -> int:
+    """What a sample takes: its tip, its activation and its status."""
+    return 8 * (3 + bundles) + 1
 
 
 def _of_all_bundles(rod: TipMap) -> TipMap:

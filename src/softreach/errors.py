@@ -11,6 +11,7 @@ __all__ = [
     "InvalidDesign",
     "InvalidInput",
     "MissingExtra",
+    "NotWritten",
     "Range",
     "SoftreachError",
     "SoftreachWarning",
@@ -130,6 +131,22 @@ class MissingExtra(SoftreachError, ImportError):
 
     def __init__(self, library: str, extra: str) -> None:
         super().__init__(f"this needs {library}; install it with: pip install 'softreach[{extra}]'")
+
+
+class NotWritten(SoftreachError, OSError):
+    """A file that could not be written: nothing of it is there, and an older one is as it was.
+
+    Attributes:
+        errno: The system's number of the reason, or 0.
+    """
+
+    def __init__(self, path: str, number: int, reason: str, hint: str = "") -> None:
+        super().__init__(number, reason)
+        message = f"{path} cannot be written: {' '.join(reason.split())}"
+        self._message = f"{message}; {hint}" if hint else message
+
+    def __str__(self) -> str:
+        return self._message
 
 
 class SoftreachWarning(UserWarning):

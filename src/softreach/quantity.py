@@ -6,12 +6,16 @@ import math
 import re
 from decimal import Decimal
 
-__all__ = ["quantity", "read_quantity", "unit_names"]
+__all__ = ["quantity", "read_number", "read_quantity", "read_whole_number", "unit_names"]
 
 _SMALLEST = 1e-3  # below it, numbers are written with a power of ten
 _FINEST = 1e-9  # of the value: what follows is rounding
 
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
+_DECIMAL = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_NUMBER = re.compile(rf"\s*({_DECIMAL})\s*(.*?)\s*", re.ASCII)
+_GROUPED = re.compile(r"[+-]?\d+(?:_\d+)+", re.ASCII)
+_LONGEST = 40  # characters of a whole number
+_LARGEST = 30  # its power of ten
 _UNITS = {
     "kg": {"kg": "1", "g": "1e-3", "mg": "1e-6"},
     "m": {"m": "1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "µm": "1e-6"},
@@ -47,6 +51,31 @@ def _with_error(value: float, error: float) -> str:
     decimals = max(0, -math.floor(math.log10(error / scale)))
     text = f"{value / scale:.{decimals}f} ± {error / scale:.{decimals}f}"
     return f"({text})e{power}" if power else text
+
+
+def read_number(text: str) -> float:
+    """The finite number that a text is: decimal, with a point or an exponent if need be.
+
+    Raises:
+        ValueError: Anything else, also infinity, hexadecimal numbers and foreign digits.
+    """
+    return read_quantity(text, "1")
+
+
+def read_whole_number(text: str) -> int:
+    """The whole number that a text is, such as "400000", "400_000" or "4e5".
+
+    Raises:
+        ValueError: Anything else, also what is written with a point, or has more than 30 digits.
+    """
+    plain = text.strip().replace("_", "") if _GROUPED.fullmatch(text.strip()) else text
+    found = _NUMBER.fullmatch(plain)
+    if found is None or found[2] or len(plain) > _LONGEST:
+        raise ValueError(text)
+    number = Decimal(found[1])
+    if number.adjusted() > _LARGEST or number != number.to_integral_value():
+        raise ValueError(text)
+    return int(number)
 
 
 def unit_names(unit: str) -> tuple[str, ...]:

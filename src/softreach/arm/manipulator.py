@@ -20,7 +20,7 @@ from softreach.arm.material import Material
 from softreach.arm.part_checks import fit_faults, kind_faults, named, part_faults, shared_names
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.section import Ring, Section
-from softreach.atomic import replacing
+from softreach.atomic import writing
 from softreach.errors import InvalidDesign, InvalidInput
 
 __all__ = ["Manipulator"]
@@ -193,10 +193,21 @@ class Manipulator:
         """
         return cls.from_toml(file.text_of(path), source=fspath(path))
 
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write a design file; an older one is replaced whole."""
-        with replacing(path) as partial:
-            partial.write_text(self.to_toml(), encoding="utf-8")
+    def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+        """Write a design file; an older one is replaced whole.
+
+        Args:
+            path: The file.
+            overwrite: Whether it may replace any file, and not only a design file.
+
+        Raises:
+            InvalidInput: Something else is there.
+            NotWritten: It cannot be written.
+            InvalidDesign: The design has no text; see `to_toml`.
+        """
+        text = self.to_toml()
+        with writing(path, file.DESIGN_FILE[".toml"], overwrite=overwrite) as stream:
+            stream.write(text.encode())
 
     @property
     def length(self) -> float:

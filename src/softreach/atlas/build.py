@@ -11,6 +11,7 @@ import numpy as np
 
 from softreach.atlas.command import Command
 from softreach.atlas.contents import contents
+from softreach.atlas.demand import check_demand
 from softreach.atlas.executor import ExecutorLike, run_designs
 from softreach.atlas.metric import Metric
 from softreach.atlas.metrics import METRIC_GROUPS, chosen_metrics
@@ -108,6 +109,7 @@ def build_atlas(
         keep_clouds=keep_clouds,
     )
     indices = _checked_shard(shard, space.size)
+    check_demand(command, len(indices), store)
     _warn_of_gaps(space)
     atlas = AtlasStore.begin(store, command, durable=durable)
     held = contents(atlas, tips_of=indices.tolist())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -13,10 +14,13 @@ from softreach.arm.parameters.unknown import unknown_parameter
 from softreach.arm.parameters.written import from_written, written_parameters
 from softreach.atlas.space import DesignSpace
 from softreach.errors import InvalidInput
+from softreach.quantity import read_number, read_whole_number
 
 __all__ = ["parse_parameter", "parse_space"]
 
 _KEYS = ("design", "layout", "designs", "seed", "parameters")
+_WHOLE = re.compile(r"[+-]?\d+", re.ASCII)
+_MOST = 100_000  # values of one parameter
 _LAYOUTS = ("grid", "list", "sobol", "latin")
 
 
@@ -107,7 +111,7 @@ def _space(
 
 
 def _numbers(key: str, value: Any) -> list[float]:
-    allowed = "numbers: a list, or start:stop:count with both ends"
+    allowed = f"numbers: a list, or start:stop:count with both ends and a count up to {_MOST}"
     try:
         if isinstance(value, str):
             return _range(value) if ":" in value else [_number(part) for part in value.split(",")]
@@ -117,11 +121,15 @@ def _numbers(key: str, value: Any) -> list[float]:
 
 
 def _number(text: str) -> float:
-    return int(text) if text.strip().lstrip("-").isdigit() else float(text)
+    number = read_number(text)
+    return read_whole_number(text) if _WHOLE.fullmatch(text.strip()) else number
 
 
 def _range(text: str) -> list[float]:
     start, stop, count = text.split(":")
-    values = np.linspace(float(start), float(stop), int(count))
+    number = read_whole_number(count)
+    if not 0 < number <= _MOST:
+        raise ValueError(text)
+    values = np.linspace(read_number(start), read_number(stop), number)
     # 1.8 and not 1.8000000000000003
     return [float(f"{value:.15g}") for value in values]

@@ -1,16 +1,26 @@
-"""The `softreach` command and its exit codes: 0 done, 2 wrong input, 128 + signal."""
+"""The `softreach` command and what its exit codes mean.
+
+0 done, 2 wrong input or nowhere to write, 141 nobody reads the output any more, 128 + signal.
+"""
 
 from __future__ import annotations
 
 import sys
 import warnings
+from contextlib import suppress
 from importlib.metadata import version
 
 from cyclopts import App, CycloptsError
 
 from softreach.cli.first_run import compilation_announced
 from softreach.cli.signals import INTERRUPTED
-from softreach.errors import SoftreachError, SoftreachWarning
+from softreach.cli.terminal import (
+    discard_output,
+    flush_output,
+    readable_width,
+    spelling_out,
+)
+from softreach.errors import NotWritten, SoftreachError, SoftreachWarning
 
 __all__ = ["app", "run"]
 
@@ -117,23 +127,42 @@ for _place, (_name, (_summary, _example)) in enumerate(_COMMANDS.items()):
 
 def run(arguments: list[str]) -> int:
     """Run the command line and return its exit code; wrong input costs one line, no traceback."""
-    with warnings.catch_warnings(), compilation_announced():
+    with warnings.catch_warnings(), compilation_announced(), spelling_out(), readable_width():
         warnings.showwarning = _show_warning
         try:
             app(arguments, result_action="return_value")
-        except (CycloptsError, SoftreachError, OSError) as error:
-            return _failed(str(error) or type(error).__name__)
+            flush_output()
+        except (BrokenPipeError, SystemExit) as error:
+            if isinstance(error, SystemExit) and not isinstance(error.__context__, BrokenPipeError):
+                raise  # by anyone but the printer of help
+            discard_output()
+            return 141
+        except (CycloptsError, SoftreachError, OSError, MemoryError) as error:
+            with suppress(BrokenPipeError, NotWritten):
+                flush_output()
+            return _failed(_message(error))
         except KeyboardInterrupt:
             sys.stderr.write(f"{INTERRUPTED}\n")
             return 130
     return 0
 
 
+def _message(error: Exception) -> str:
+    """What went wrong; of an option that cannot be read, in our words."""
+    if isinstance(error, CycloptsError) and isinstance(error.__cause__, SoftreachError):
+        error = error.__cause__
+    if isinstance(error, MemoryError):
+        return "there is not enough memory for this; ask for fewer samples or less accuracy"
+    return str(error) or type(error).__name__
+
+
 def _failed(message: str) -> int:
-    sys.stderr.write(f"error: {message}\n")
+    with suppress(OSError, ValueError):  # nobody reads it
+        sys.stderr.write(f"error: {message}\n")
     return 2
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: object) -> None:
     if issubclass(category, SoftreachWarning):
-        sys.stderr.write(f"warning: {message}\n")
+        with suppress(OSError, ValueError):
+            sys.stderr.write(f"warning: {message}\n")

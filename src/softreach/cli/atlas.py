@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
-from softreach.cli.inputs import AsJson, Durable, Sampler, design_from
+from softreach.cli.inputs import AsJson, Durable, Sampler, Seed, design_from
+from softreach.cli.numbers import WHOLE, numbers_in, shortened
 from softreach.cli.output import print_rows
+from softreach.cli.output_files import Overwrite, check_picture
 from softreach.errors import InvalidInput, MissingExtra
 
 if TYPE_CHECKING:
@@ -42,8 +44,8 @@ def build(
         ),
     ] = None,
     changes: Changes = UNCHANGED,
-    n: Annotated[int, Parameter(help="Samples of each design.")] = 400_000,
-    seed: Annotated[int, Parameter(help="Seed of the sampler.")] = 0,
+    n: Annotated[int, WHOLE, Parameter(help="Samples of each design.")] = 400_000,
+    seed: Seed = 0,
     sampler: Sampler = "uniform",
     alpha: Annotated[
         str, Parameter(help="Radius of the α-shapes over the length of each design, as in 0.05L.")
@@ -53,7 +55,7 @@ def build(
     ] = "extent,convex,concave,exact,curvature",
     keep_clouds: Annotated[bool, Parameter(help="Store the tips.")] = True,
     workers: Annotated[
-        int | None, Parameter(help="Use this many processes instead of threads.")
+        int | None, WHOLE, Parameter(help="Use this many processes instead of threads.")
     ] = None,
     scheduler: Annotated[str | None, Parameter(help="Dask scheduler: tcp://host:port")] = None,
     scheduler_file: Annotated[Path | None, Parameter(help="Dask scheduler file.")] = None,
@@ -134,7 +136,7 @@ def best(
         list[str] | None,
         Parameter(help="A constraint: unreachability<=0.4 or taper_deg>=1."),
     ] = None,
-    count: Annotated[int, Parameter(help="How many designs.")] = 1,
+    count: Annotated[int, WHOLE, Parameter(help="How many designs.")] = 1,
     json: AsJson = False,
 ) -> None:
     """The designs with the largest (or smallest) metric that meet the constraints.
@@ -158,7 +160,10 @@ def figures(
     store: Store,
     *,
     out: Annotated[Path, Parameter(help="Folder for the figures.")] = Path("figures"),
-    panels: Annotated[int, Parameter(help="Largest number of columns and rows of a sheet.")] = 7,
+    panels: Annotated[
+        int, WHOLE, Parameter(help="Largest number of columns and rows of a sheet.")
+    ] = 7,
+    overwrite: Overwrite = False,
 ) -> None:
     """Draw the atlas, each figure as PNG and PDF: sheets, corners, maps, curvature.
 
@@ -170,9 +175,11 @@ def figures(
     from softreach.paper.atlas_figures import atlas_figures
     from softreach.plot.style import pyplot, save_figure
 
+    for suffix in ("png", "pdf"):  # tried by a name that any of them may have
+        check_picture("out", out / f"clouds.{suffix}", overwrite)
     for name, figure in atlas_figures(open_atlas(store), panels):
         for suffix in ("png", "pdf"):
-            save_figure(figure, out / f"{name}.{suffix}")
+            save_figure(figure, out / f"{name}.{suffix}", overwrite=overwrite)
             sys.stdout.write(f"{out / name}.{suffix}\n")
         pyplot().close(figure.get_figure(root=True))
 
@@ -208,6 +215,8 @@ def _executor(
     if workers is not None:
         from softreach.atlas import worker_processes
 
+        if workers < 1:
+            raise InvalidInput("workers", workers, "a whole number, 1 or more")
         return worker_processes(workers)
     if scheduler is None and scheduler_file is None:
         return None
@@ -220,19 +229,21 @@ def _executor(
 
 def _over_length(text: str) -> float:
     """0.05 from `0.05L`: a length in m would not suit designs of every length."""
-    try:
-        radius = float(text.removesuffix("L")) if text.endswith("L") else 0.0
-    except ValueError:
-        radius = 0.0
+    values = numbers_in(text.removesuffix("L"), 1) if text.endswith("L") else None
+    radius = values[0] if values else 0.0
     if not 0 < radius < math.inf:
-        raise InvalidInput("alpha", text, "a radius > 0 over the length of each design, like 0.05L")
+        raise InvalidInput(
+            "alpha",
+            shortened(text) or "''",
+            "a radius > 0 over the length of each design, like 0.05L",
+        )
     return radius
 
 
 def _shard(text: str) -> tuple[int, int]:
     first, _, count = text.partition("/")
-    if not (text.isascii() and first.isdigit() and count.isdigit()):
-        raise InvalidInput("shard", text, "i/k with 0 <= i < k")
+    if not (text.isascii() and first.isdigit() and count.isdigit() and len(text) < 20):
+        raise InvalidInput("shard", shortened(text) or "''", "i/k with 0 <= i < k")
     return int(first), int(count)
 
 
@@ -256,10 +267,11 @@ def _constraint(
         name, found, number = text.partition(sign)
         if found:
             break
-    try:
-        value = float(number)
-    except ValueError:
-        raise InvalidInput("where", text, "a name, <= or >=, and a number") from None
+    values = numbers_in(number, 1)
+    if values is None:
+        allowed = "a name, <= or >=, and a finite number"
+        raise InvalidInput("where", shortened(text) or "''", allowed)
+    value = values[0]
     name = name.strip()
     if name in written:
         name, unit = str(written[name].name), str(written[name].attrs.get("units", "1"))

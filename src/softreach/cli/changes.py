@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
+from softreach.cli.numbers import NUMBER
 from softreach.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -37,9 +38,12 @@ class Changes:
 
     revolution_deg: Annotated[
         float | None,
+        NUMBER,
         Parameter(help="Give every helical fiber this revolution [deg], each in its own sense."),
     ] = None
-    taper_deg: Annotated[float | None, Parameter(help="Use this taper angle instead [deg].")] = None
+    taper_deg: Annotated[
+        float | None, NUMBER, Parameter(help="Use this taper angle instead [deg].")
+    ] = None
     payload: Annotated[
         str | None,
         Parameter(

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
-from softreach.cli.inputs import AsJson, Design, Durable, Sampler, design_from
+from softreach.cli.inputs import AsJson, Design, Durable, Sampler, Seed, design_from
 from softreach.cli.load_rows import load_rows
+from softreach.cli.numbers import NUMBER, WHOLE
 from softreach.cli.output import print_rows
+from softreach.cli.output_files import Overwrite, check_output
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,12 +23,13 @@ __all__ = ["cloud"]
 def cloud(
     design: Design,
     *,
-    out: Annotated[Path, Parameter(help="Where the cloud goes.")] = Path("cloud.zarr"),
-    n: Annotated[int, Parameter(help="Number of samples.")] = 400_000,
-    seed: Annotated[int, Parameter(help="Seed of the sampler.")] = 0,
+    out: Annotated[Path, Parameter(help="Where the cloud goes (.zarr).")] = Path("cloud.zarr"),
+    n: Annotated[int, WHOLE, Parameter(help="Number of samples.")] = 400_000,
+    seed: Seed = 0,
     sampler: Sampler = "uniform",
-    tol: Annotated[float, Parameter(help="Largest tip error, in L.")] = 1e-6,
+    tol: Annotated[float, NUMBER, Parameter(help="Largest tip error, in L.")] = 1e-6,
     durable: Durable = False,
+    overwrite: Overwrite = False,
     changes: Changes = UNCHANGED,
     json: AsJson = False,
 ) -> None:
@@ -36,14 +39,17 @@ def cloud(
     """
     from time import perf_counter
 
-    from softreach.cloud import compute_cloud, save_cloud
+    from softreach.cloud import CLOUD_STORE, compute_cloud, sample_bytes, save_cloud
+    from softreach.memory import check_disk
     from softreach.rod.tip_map import tip_map
 
     arm = design_from(design, changes)
+    check_output("out", out, CLOUD_STORE, overwrite)
+    check_disk("n", n, sample_bytes(arm.bundles) * n, out)
     start = perf_counter()
     dataset = compute_cloud(arm, n, seed, sampler, tol=tol)
     seconds = perf_counter() - start
-    save_cloud(dataset, out, durable=durable)
+    save_cloud(dataset, out, durable=durable, overwrite=overwrite)
     rows = {
         "samples": (n, ""),
         "sampler": (sampler, ""),

@@ -8,8 +8,10 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from softreach.cli.inputs import AsJson
+from softreach.cli.numbers import WHOLE
 from softreach.cli.output import print_rows
-from softreach.cli.volume import volume_rows
+from softreach.cli.output_files import Overwrite, check_output
+from softreach.cli.volume import check_hull_memory, volume_rows
 
 __all__ = ["demo"]
 
@@ -17,7 +19,8 @@ __all__ = ["demo"]
 def demo(
     *,
     out: Annotated[Path, Parameter(help="Folder for the results.")] = Path("out"),
-    n: Annotated[int, Parameter(help="Number of samples.")] = 400_000,
+    n: Annotated[int, WHOLE, Parameter(help="Number of samples.")] = 400_000,
+    overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
     """The paper's design (Ω = 108°, φ = 2°): cloud, volumes, hull and picture, into a folder.
@@ -34,7 +37,8 @@ def demo(
 
     start = perf_counter()
     arm = designs.minimal_trunk()
-    arm.save(out / "design.toml")
+    _check(out, overwrite)
+    check_hull_memory(n)
     cloud = compute_cloud(arm, n)
     computed = perf_counter() - start
 
@@ -42,16 +46,33 @@ def demo(
         return concave_hull(cloud.tip, bias=True), convex_hull(cloud.tip)
 
     with parallel.meanwhile(hulls) as found:
-        save_cloud(cloud, out / "cloud.zarr")
-        export.export_cloud(cloud, out / "cloud.ply")
+        arm.save(out / "design.toml", overwrite=overwrite)
+        save_cloud(cloud, out / "cloud.zarr", overwrite=overwrite)
+        export.export_cloud(cloud, out / "cloud.ply", overwrite=overwrite)
         shape = configuration(arm, [-1.0, 0.0, -0.4])
-        plot.save_figure(plot.plot_views(cloud, arm, shape), out / "cloud.png")
+        figure = plot.plot_views(cloud, arm, shape)
+        plot.save_figure(figure, out / "cloud.png", overwrite=overwrite)
         concave, convex = found()
-    export.export_mesh(concave, out / "hull.ply")
+    export.export_mesh(concave, out / "hull.ply", overwrite=overwrite)
 
     rows = volume_rows(concave, convex, arm.length)
     rows["time to compute the cloud"] = (round(computed, 3), "s")
     rows["time in all"] = (round(perf_counter() - start, 3), "s")
-    files = ("design.toml", "cloud.zarr", "cloud.ply", "hull.ply", "cloud.png")
-    rows["written"] = ([str(out / name) for name in files], "")
+    rows["written"] = ([str(out / name) for name in _FILES], "")
     print_rows("minimal trunk, revolution 108°, taper 2°", rows, json)
+
+
+_FILES = ("design.toml", "cloud.zarr", "cloud.ply", "hull.ply", "cloud.png")
+
+
+def _check(folder: Path, overwrite: bool) -> None:
+    """Look at every place before anything is written to one of them."""
+    from softreach.arm.file import DESIGN_FILE
+    from softreach.cloud import CLOUD_STORE
+    from softreach.export.cloud import CLOUD_FILES
+    from softreach.file_kinds import PICTURES
+
+    for name, formats in zip(
+        _FILES, (DESIGN_FILE, CLOUD_STORE, CLOUD_FILES, CLOUD_FILES, PICTURES), strict=True
+    ):
+        check_output("out", folder / name, formats, overwrite)

@@ -11,6 +11,7 @@ from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import AsJson, Design, design_from
 from softreach.cli.load_rows import load_rows, rest_rows
 from softreach.cli.output import print_rows
+from softreach.cli.output_files import Overwrite, check_output
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -26,6 +27,7 @@ def design(
     *,
     changes: Changes = UNCHANGED,
     save: Annotated[Path | None, Parameter(help="Write the design to this TOML file.")] = None,
+    overwrite: Overwrite = False,
     schema: Annotated[
         bool, Parameter(negative="", help="Print the JSON schema of design files for editors.")
     ] = False,
@@ -40,6 +42,7 @@ def design(
     """
     import sys
 
+    from softreach.arm.file import DESIGN_FILE
     from softreach.arm.summary import describe
     from softreach.errors import InvalidInput
 
@@ -49,9 +52,10 @@ def design(
     if design is None:
         raise InvalidInput("design", design, "a design file or a built-in design, or use --schema")
     arm = design_from(design, changes)
+    check_output("save", save, DESIGN_FILE, overwrite)
     facts = describe(arm)
     if save is not None:
-        arm.save(save)
+        arm.save(save, overwrite=overwrite)
     if json:
         print_rows("", {**_rows(arm, facts), **_rows_for_machines(arm, facts)}, as_json=True)
         return

@@ -18,7 +18,7 @@ from softreach.cli.inputs import (
     activation_of,
     design_from,
 )
-from softreach.cli.show import check_picture
+from softreach.cli.output_files import Overwrite, check_picture
 from softreach.errors import counted
 
 if TYPE_CHECKING:
@@ -33,25 +33,25 @@ def equilibria(
     activation: Activation = None,
     figure: Annotated[Path | None, Parameter(help="Draw them: .png .pdf .svg")] = None,
     view: Annotated[str, Parameter(help="front, side, top or oblique.")] = "oblique",
+    overwrite: Overwrite = False,
     changes: Changes = UNCHANGED,
     json: AsJson = False,
 ) -> None:
     """Every equilibrium of a loaded arm, stable ones first, and which one the arm comes to."""
     from softreach.rod import equilibria as all_of
 
-    if figure is not None:
-        check_picture("figure", figure)
+    check_picture("figure", figure, overwrite)
     arm = design_from(design, changes)
     found = all_of(arm, activation_of(activation, arm))
+    if figure is not None:
+        from softreach import plot
+
+        plot.save_figure(plot.plot_equilibria(found, view=view), figure, overwrite=overwrite)
     if json:
         json_format.dump(_as_json(found), sys.stdout)
         sys.stdout.write("\n")
     else:
         sys.stdout.write("\n".join(_lines(found)) + "\n")
-    if figure is not None:
-        from softreach import plot
-
-        plot.save_figure(plot.plot_equilibria(found, view=view), figure)
 
 
 def _as_json(found: AllEquilibria) -> dict[str, object]:

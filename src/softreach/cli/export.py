@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
-from softreach.cli.inputs import Activation, Source, design_from, shape_of
+from softreach.cli.inputs import Activation, Source, design_from, is_stored, shape_of
+from softreach.cli.output_files import Overwrite, check_output, check_surface
 from softreach.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ def export(
     *,
     activation: Activation = None,
     format: Format = None,
+    overwrite: Overwrite = False,
     changes: Changes = UNCHANGED,
 ) -> None:
     """Write a cloud (.ply .csv .parquet .npz .mat .vtu .vtk), or a design's arm as a surface mesh.
@@ -43,44 +45,52 @@ def export(
 
     if format not in (None, "activefilaments"):
         raise InvalidInput("format", format, "activefilaments, or left out")
-    if source.rstrip("/").endswith(".zarr"):
+    if is_stored(source):
         if activation is not None:
             raise InvalidInput("activation", activation, "left out for a cloud, which has many")
         changes.refuse("left out for a stored cloud: give the design instead")
-        written = _cloud(source, out, format)
+        written = _cloud(source, out, format, overwrite)
     else:
-        written = _design(design_from(source, changes), out, activation, format)
+        arm = design_from(source, changes)
+        written = _design(arm, out, activation, format, overwrite)
     sys.stdout.writelines(f"{path}\n" for path in written)
 
 
-def _cloud(source: str, out: Path, format: str | None) -> list[Path]:
+def _cloud(source: str, out: Path, format: str | None, overwrite: bool) -> list[Path]:
     from softreach.cloud import open_cloud
 
-    cloud = open_cloud(source)
     if format is None:
-        from softreach.export import export_cloud
+        from softreach.export.cloud import CLOUD_FILES, export_cloud
 
-        export_cloud(cloud, out)
+        check_output("out", out, CLOUD_FILES, overwrite)
+        export_cloud(open_cloud(source), out, overwrite=overwrite)
         return [out]
-    from softreach.exchange import activefilaments
+    from softreach.exchange.activefilaments.cloud import CLOUD_PAIR, gamma_path, write_cloud
 
     if out.suffix != ".csv":
         raise InvalidInput(
             "out", out, "a file name ending in .csv for clouds of ActiveFilaments.jl"
         )
-    activefilaments.write_cloud(cloud, out)
-    return [out, activefilaments.gamma_path(out)]
+    written = [out, gamma_path(out)]
+    for path in written:
+        check_output("out", path, CLOUD_PAIR, overwrite)
+    write_cloud(open_cloud(source), out, overwrite=overwrite)
+    return written
 
 
-def _design(arm: Manipulator, out: Path, activation: str | None, format: str | None) -> list[Path]:
+def _design(
+    arm: Manipulator, out: Path, activation: str | None, format: str | None, overwrite: bool
+) -> list[Path]:
     if out.suffix == ".jl":
-        from softreach.exchange.activefilaments import write_design
+        from softreach.exchange.activefilaments.script import FILAMENT_SCRIPT, write_design
 
-        write_design(arm, out)
+        check_output("out", out, FILAMENT_SCRIPT, overwrite)
+        write_design(arm, out, overwrite=overwrite)
         return [out]
     if format is not None:
         raise InvalidInput("out", out, "a file name ending in .jl for a filament's definition")
     from softreach.export import export_arm
 
-    export_arm(arm, shape_of(activation, arm), out)
+    check_surface("out", out, overwrite)
+    export_arm(arm, shape_of(activation, arm), out, overwrite=overwrite)
     return [out]

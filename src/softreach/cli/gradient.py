@@ -8,6 +8,7 @@ from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import AsJson, Design, design_from
+from softreach.cli.numbers import NUMBER
 from softreach.cli.output import print_rows
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ def gradient(
     ],
     *,
     accuracy: Annotated[
-        float, Parameter(help="Relative error allowed in what is rasterized.")
+        float, NUMBER, Parameter(help="Relative error allowed in what is rasterized.")
     ] = 3e-3,
     changes: Changes = UNCHANGED,
     json: AsJson = False,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
+from softreach.cli.numbers import WHOLE, numbers_in, shortened
 from softreach.errors import InvalidDesign, InvalidInput
 
 if TYPE_CHECKING:
@@ -22,10 +23,13 @@ __all__ = [
     "Design",
     "Durable",
     "Sampler",
+    "Samples",
+    "Seed",
     "Source",
     "activation_of",
     "cloud_of",
     "design_from",
+    "is_stored",
     "points_of",
     "radius_of",
     "shape_of",
@@ -36,6 +40,8 @@ Design = Annotated[
 ]
 Source = Annotated[str, Parameter(help="Cloud (.zarr), design file (.toml) or built-in design.")]
 Sampler = Annotated[str, Parameter(help="uniform, boundary, sobol or grid.")]
+Samples = Annotated[int, WHOLE, Parameter(help="Samples, when the source is a design.")]
+Seed = Annotated[int, WHOLE, Parameter(help="Seed of the sampler.")]
 AsJson = Annotated[bool, Parameter(name="--json", negative="", help="Print JSON for machines.")]
 Durable = Annotated[
     bool, Parameter(negative="", help="Wait until not even a power cut can lose what is written.")
@@ -82,13 +88,18 @@ def _loaded(path: str) -> Manipulator:
     return Manipulator.load(path)
 
 
+def is_stored(source: str) -> bool:
+    """Whether a source is a stored cloud; else it is a design."""
+    return source.rstrip("/").endswith(".zarr")
+
+
 def cloud_of(
     source: str, n: int, seed: int, sampler: str, changes: Changes = UNCHANGED
 ) -> xr.Dataset:
     """The stored cloud, or one computed from the design."""
     from softreach.cloud import compute_cloud, open_cloud
 
-    if source.rstrip("/").endswith(".zarr"):
+    if is_stored(source):
         changes.refuse("left out for a stored cloud: give the design instead")
         return open_cloud(source)
     return compute_cloud(design_from(source, changes), n, seed, sampler)
@@ -98,13 +109,10 @@ def activation_of(text: str | None, arm: Manipulator) -> list[float]:
     """Numbers from `-1,0,-0.5`; every bundle at its lower bound when there is none."""
     if text is None:
         return arm.bounds[:, 0].tolist()
-    try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError:
-        values = []
-    if len(values) != arm.bundles:
+    values = numbers_in(text, arm.bundles)
+    if values is None:
         allowed = f"{arm.bundles} comma-separated numbers ({', '.join(arm.bundle_names)})"
-        raise InvalidInput("activation", text, allowed)
+        raise InvalidInput("activation", shortened(text), allowed)
     return values
 
 
@@ -128,34 +136,51 @@ def points_of(text: str | None, file: Path | None) -> list[list[float]]:
         return [_position("target", text)]
     if file is None or not file.is_file():
         raise InvalidInput("targets", file, "a CSV file that exists")
-    lines = [line for line in file.read_text(encoding="utf-8").splitlines() if line.strip()]
-    rows = lines[1:] if lines and _numbers(lines[0]) is None else lines
+    lines = [line for line in _text_of(file).splitlines() if line.strip()]
+    rows = lines[1:] if lines and _is_header(lines[0]) else lines
+    if not rows:
+        raise InvalidInput("targets", file, "a CSV file with a row x,y,z for each position")
     return [_position(f"{file}, point {k + 1}", row) for k, row in enumerate(rows)]
 
 
-def _position(name: str, text: str) -> list[float]:
-    values = _numbers(text)
-    if values is None:
-        raise InvalidInput(name, text, "three comma-separated numbers x,y,z in m")
-    return values
+def _is_header(line: str) -> bool:
+    """Whether a line holds names: no part of it begins as a number does."""
+    return not any(part.strip().startswith(tuple("+-.0123456789")) for part in line.split(","))
 
 
-def _numbers(text: str) -> list[float] | None:
+_LARGEST_FILE = 200_000_000  # bytes of a table of positions, some million of them
+
+
+def _text_of(file: Path) -> str:
+    size = file.stat().st_size
+    if size > _LARGEST_FILE:
+        allowed = f"a table of positions of at most {_LARGEST_FILE / 1e6:g} MB"
+        raise InvalidInput("targets", f"{file} of {size / 1e6:.0f} MB", allowed)
     try:
-        values = [float(part) for part in text.split(",")[:3]]
-    except ValueError:
-        return None
-    return values if len(values) == 3 else None
+        return file.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise InvalidInput("targets", file, "a CSV file, which is text in UTF-8") from None
+
+
+_FARTHEST = 1e100  # m; squares of larger numbers leave the range of floats
+
+
+def _position(name: str, text: str) -> list[float]:
+    values = numbers_in(text, 3)
+    if values is None or max(map(abs, values)) > _FARTHEST:
+        allowed = f"three comma-separated numbers x,y,z in m, up to {_FARTHEST:g}"
+        raise InvalidInput(name, shortened(text) or "''", allowed)
+    return values
 
 
 def radius_of(text: str, length: float) -> float | str:
     """An alpha radius in m from `0.05L`, `0.05` (m) or `critical`."""
     if text == "critical":
         return text
-    try:
-        radius = float(text[:-1]) * length if text.endswith("L") else float(text)
-    except ValueError:
-        radius = math.nan
-    if not radius > 0:
-        raise InvalidInput("alpha", text, "a radius > 0 like 0.05L or 0.05 (m), or critical")
+    values = numbers_in(text.removesuffix("L"), 1)
+    radius = (length if text.endswith("L") else 1.0) * (values[0] if values else 0.0)
+    if not 0.0 < radius < math.inf:
+        raise InvalidInput(
+            "alpha", shortened(text) or "''", "a radius > 0 like 0.05L or 0.05 (m), or critical"
+        )
     return radius

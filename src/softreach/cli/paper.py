@@ -8,6 +8,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from softreach.cli.output_files import Overwrite
+
 __all__ = ["paper"]
 
 
@@ -17,6 +19,7 @@ def paper(
     quick: Annotated[
         bool, Parameter(negative="", help="Small clouds: coarse numbers in under a minute.")
     ] = False,
+    overwrite: Overwrite = False,
 ) -> None:
     """Recompute the paper's figures and statements into a report; run again to continue.
 
@@ -24,5 +27,10 @@ def paper(
     """
     from softreach.paper import reproduce_paper
 
-    report = reproduce_paper(out, quick=quick, say=lambda line: sys.stderr.write(f"{line}\n"))
+    report = reproduce_paper(
+        out,
+        quick=quick,
+        overwrite=overwrite,
+        say=lambda line: sys.stderr.write(f"{line}\n"),
+    )
     sys.stdout.write(f"{report}\n")

@@ -10,10 +10,13 @@ from cyclopts import Parameter
 from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import AsJson, Design, design_from
 from softreach.cli.load_rows import load_rows
+from softreach.cli.numbers import NUMBER
 from softreach.cli.output import print_rows
+from softreach.cli.output_files import Overwrite, check_picture, check_surface
 from softreach.errors import InvalidInput
 
 if TYPE_CHECKING:
+    from softreach.arm.manipulator import Manipulator
     from softreach.workspace import ReachableSet, ReachableSolid
 
 __all__ = ["reach"]
@@ -24,7 +27,9 @@ _LEFT_OUT = "left out for a design with so few free bundles"
 def reach(
     design: Design,
     *,
-    accuracy: Annotated[float, Parameter(help="Relative error allowed in the volume.")] = 3e-3,
+    accuracy: Annotated[
+        float, NUMBER, Parameter(help="Relative error allowed in the volume.")
+    ] = 3e-3,
     changes: Changes = UNCHANGED,
     surface: Annotated[
         Path | None, Parameter(help="Write the boundary: .ply .stl .obj .glb .vtu .vtk")
@@ -32,27 +37,49 @@ def reach(
     figure: Annotated[
         Path | None, Parameter(help="Draw slices through the base: .png .pdf .svg")
     ] = None,
+    overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
     """The exact reachable set: volume with its error, blind share, multiplicity, folds."""
     from softreach import progress
-    from softreach.workspace import ReachableSolid, ReachableSurface, reachable_set
+    from softreach.workspace import reachable_set
 
     arm = design_from(design, changes)
+    _check_outputs(arm, surface, figure, overwrite)
     with progress.bar("mapping the activation box", None) as shown:
         found = reachable_set(arm, accuracy=accuracy, progress=shown)
     rows = load_rows(arm.loads) | _rows(found) | _lost(found)
+    _write(found, surface, figure, overwrite)
     print_rows(f"reachable set of {design}", rows, json)
+
+
+def _check_outputs(
+    arm: Manipulator, surface: Path | None, figure: Path | None, overwrite: bool
+) -> None:
+    """Refuse files that cannot be written, or that a set of so few dimensions has not."""
+    free = int((arm.bounds[:, 0] < arm.bounds[:, 1]).sum())
+    for name, path, needed in (("surface", surface, 2), ("figure", figure, 3)):
+        if path is not None and free < needed:
+            raise InvalidInput(name, path, _LEFT_OUT)
+    check_surface("surface", surface, overwrite)
+    check_picture("figure", figure, overwrite)
+
+
+def _write(found: ReachableSet, surface: Path | None, figure: Path | None, overwrite: bool) -> None:
+    from softreach.workspace import ReachableSolid, ReachableSurface
+
     if surface is not None:
         from softreach.export import export_mesh
 
         if not isinstance(found, ReachableSolid | ReachableSurface):
             raise InvalidInput("surface", surface, _LEFT_OUT)
-        export_mesh(found.surface(), surface)
+        export_mesh(found.surface(), surface, overwrite=overwrite)
     if figure is not None:
+        from softreach.plot import plot_slices, save_figure
+
         if not isinstance(found, ReachableSolid):
             raise InvalidInput("figure", figure, _LEFT_OUT)
-        _draw(found, figure)
+        save_figure(plot_slices(found.grid), figure, overwrite=overwrite)
 
 
 def _rows(found: ReachableSet) -> dict[str, tuple[Any, str]]:
@@ -100,9 +127,3 @@ def _solid_rows(found: ReachableSolid) -> dict[str, tuple[Any, str]]:
     if found.multiplicity:
         rows["behind folds"] = (found.fold_volume / cube, "L³")
     return rows
-
-
-def _draw(found: ReachableSolid, path: Path) -> None:
-    from softreach.plot import plot_slices, save_figure
-
-    save_figure(plot_slices(found.grid), path)

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
-from softreach.cli.inputs import Activation, Sampler, Source, cloud_of, shape_of
-from softreach.errors import InvalidInput
+from softreach.cli.inputs import Activation, Sampler, Samples, Seed, Source, cloud_of, shape_of
+from softreach.cli.output_files import Overwrite, check_picture
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["check_picture", "show"]
+__all__ = ["show"]
 
 
 def show(
@@ -25,9 +25,10 @@ def show(
         str, Parameter(help="rgb, the name of a bundle, or compliance: how far the tip yields.")
     ] = "rgb",
     activation: Activation = None,
-    n: Annotated[int, Parameter(help="Samples, when the source is a design.")] = 400_000,
-    seed: int = 0,
+    n: Samples = 400_000,
+    seed: Seed = 0,
     sampler: Sampler = "uniform",
+    overwrite: Overwrite = False,
     changes: Changes = UNCHANGED,
 ) -> None:
     """Draw a cloud in three orthogonal views and an oblique one, with the arm in it.
@@ -39,11 +40,12 @@ def show(
     from softreach import plot
     from softreach.cloud import design_of
 
-    check_picture("out", out)
+    check_picture("out", out, overwrite)
     cloud = cloud_of(source, n, seed, sampler, changes)
     arm = design_of(cloud)
     shape = None if activation is None else shape_of(activation, arm)
-    plot.save_figure(plot.plot_views(cloud, arm, shape, color=_colors(cloud, color)), out)
+    figure = plot.plot_views(cloud, arm, shape, color=_colors(cloud, color))
+    plot.save_figure(figure, out, overwrite=overwrite)
     sys.stdout.write(f"{out}\n")
 
 
@@ -55,12 +57,3 @@ def _colors(cloud: xr.Dataset, color: str) -> str | xr.DataArray:
     if color != "compliance" or color in bundle_names(cloud):
         return color
     return cloud_compliance(cloud)["largest_compliance"]
-
-
-def check_picture(name: str, out: Path) -> None:
-    """Refuse a picture format that matplotlib cannot write, before anything is computed."""
-    from softreach.plot.style import pyplot
-
-    known = pyplot().Figure().canvas.get_supported_filetypes()
-    if out.suffix.lower().removeprefix(".") not in known:
-        raise InvalidInput(name, out, "a file name ending in .png, .pdf, .svg or the like")

@@ -12,6 +12,7 @@ from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import AsJson, Design, design_from, points_of
+from softreach.cli.numbers import WHOLE
 from softreach.errors import InvalidInput, counted
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def solve(
     ] = None,
     targets: Annotated[Path | None, Parameter(help="CSV file with columns x, y, z [m].")] = None,
     family: Annotated[
-        int, Parameter(help="With more than three free bundles: solutions for each target.")
+        int, WHOLE, Parameter(help="With more than three free bundles: solutions for each target.")
     ] = 1,
     prove_least: Annotated[
         bool,

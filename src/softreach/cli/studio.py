@@ -7,11 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from softreach.cli.inputs import design_from
+from softreach.cli.numbers import WHOLE
+from softreach.errors import InvalidInput
 
 if TYPE_CHECKING:
     from softreach.studio import Start
 
 __all__ = ["studio"]
+
+
+_LAST_PORT = 65535
 
 
 def studio(
@@ -23,7 +28,7 @@ def studio(
     host: Annotated[
         str, Parameter(help="Address to listen on; anyone who can reach it may use the page.")
     ] = "127.0.0.1",
-    port: Annotated[int | None, Parameter(help="A free port by default.")] = None,
+    port: Annotated[int | None, WHOLE, Parameter(help="A free port by default.")] = None,
     open_page: Annotated[
         bool, Parameter(name="--open", help="Open the page in the browser.")
     ] = True,
@@ -38,6 +43,8 @@ def studio(
 
     from softreach.studio import Studio
 
+    if port is not None and not 0 <= port <= _LAST_PORT:
+        raise InvalidInput("port", port, f"a whole number from 0 to {_LAST_PORT}")
     with Studio(_start(source), host, port) as running:
         sys.stdout.write(f"{running.url}  (Ctrl-C ends it)\n")
         sys.stdout.flush()

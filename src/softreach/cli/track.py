@@ -10,34 +10,43 @@ from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import Design, activation_of, design_from, points_of
+from softreach.cli.output_files import Overwrite, check_output
+from softreach.file_kinds import FileKind, text_with
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["track"]
 
+_TABLE = {".csv": FileKind("a table of activations along a path", text_with(",tip_error_m\n"))}
+
 
 def track(
     design: Design,
     path: Annotated[Path, Parameter(help="CSV file with columns x, y, z [m], in order.")],
     *,
-    out: Annotated[Path, Parameter(help="CSV file for the activations.")] = Path("path.csv"),
+    out: Annotated[Path, Parameter(help="CSV file for the activations.")] = Path("activations.csv"),
     start: Annotated[
         str | None,
         Parameter(help="Activations to start from: -1,0,-0.5", allow_leading_hyphen=True),
     ] = None,
+    overwrite: Overwrite = False,
     changes: Changes = UNCHANGED,
 ) -> None:
     """Follow a path of tip positions on one branch of activations, and say where it ends."""
+    from softreach.atomic import writing
     from softreach.export.table import column_names
     from softreach.path import track_path
 
     arm = design_from(design, changes)
+    check_output("out", out, _TABLE, overwrite)
     first = None if start is None else activation_of(start, arm)
     found = track_path(arm, points_of(None, path), first)
     rows = zip(found.activation.values.tolist(), found.tip_error.values.tolist(), strict=True)
     header = ",".join([*column_names(arm.bundle_names), "tip_error_m"])
-    _write(out, [header, *(",".join(f"{x:.12g}" for x in (*g, error)) for g, error in rows)])
+    lines = [header, *(",".join(f"{x:.12g}" for x in (*g, error)) for g, error in rows)]
+    with writing(out, _TABLE[".csv"], overwrite=overwrite) as file:
+        file.write("\n".join([*lines, ""]).encode())
     followed = int((found.status == 0).sum())
     of_all = f"{followed} of {found.sizes['point']} points followed"
     sys.stdout.write(f"{of_all}, up to {_end(found)}: {out}\n")
@@ -57,10 +66,3 @@ def _end(found: xr.Dataset) -> str:
     }
     bound = f"{at}, where {found.attrs['end_bundle']} is at its {found.attrs['end_bound']} bound"
     return named.get(end, bound)
-
-
-def _write(path: Path, lines: list[str]) -> None:
-    from softreach.atomic import replacing
-
-    with replacing(path) as partial:
-        partial.write_text("\n".join([*lines, ""]), encoding="utf-8")

@@ -21,7 +21,12 @@ _CLEAR = 0.45  # opacity of a body that has something inside
 
 
 def export_arm(
-    arm: Manipulator, configuration: xr.Dataset, path: str | PathLike[str], *, sides: int = 64
+    arm: Manipulator,
+    configuration: xr.Dataset,
+    path: str | PathLike[str],
+    *,
+    sides: int = 64,
+    overwrite: bool = False,
 ) -> None:
     """Write a deformed arm as .ply, .stl, .obj, .glb, .vtu or .vtk, chosen by the suffix.
 
@@ -35,10 +40,12 @@ def export_arm(
         configuration: One configuration of that arm [m].
         path: The file; it is replaced only when the new one is complete.
         sides: Corners of each section of the body.
+        overwrite: Whether it may replace any file, and not only a surface of that format.
 
     Raises:
-        InvalidInput: Unknown suffix, or several configurations.
+        InvalidInput: Unknown suffix, several configurations, or something else is there.
         MissingExtra: The format needs a library that is not installed.
+        NotWritten: It cannot be written.
     """
     body = arm_surface(arm, configuration, sides)
     opacity = _CLEAR if any(inside(arm)) else 1.0
@@ -46,7 +53,7 @@ def export_arm(
     for index, skin in enumerate(bundle_surfaces(arm, configuration)):
         name = _part_name(arm.bundle_names, index)
         parts.append(Part(name, skin.vertices, skin.faces, bundle_color(index)))
-    write_parts(parts, path)
+    write_parts(parts, path, overwrite=overwrite)
 
 
 def _part_name(names: tuple[str, ...], index: int) -> str:

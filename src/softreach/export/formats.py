@@ -2,32 +2,60 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
+import os
 from collections.abc import Callable, Mapping
-from os import PathLike, fspath
+from io import BufferedWriter
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from softreach.atomic import replacing
-from softreach.errors import InvalidInput, MissingExtra
+from softreach.atomic import writing
+from softreach.errors import MissingExtra
+from softreach.file_kinds import Formats, format_of
 
-__all__ = ["load_library", "write_by_suffix"]
+__all__ = ["Writers", "load_library", "write_by_suffix", "write_vtk", "write_vtu"]
+
+Writers = Mapping[str, Callable[[Any, BufferedWriter], None]]
+"""Suffix -> what writes a content to a file."""
 
 
 def write_by_suffix(
-    path: str | PathLike[str], writers: Mapping[str, Callable[[Any, Path], None]], content: Any
+    path: str | PathLike[str], formats: Formats, writers: Writers, content: Any, overwrite: bool
 ) -> None:
     """Write the content whole, or leave what was there.
 
     Raises:
-        InvalidInput: No writer for the suffix; the error lists those there are.
+        InvalidInput: No writer for the suffix (the error lists those there are), or something else
+            is there.
         MissingExtra: The format needs a library that is not installed.
+        NotWritten: It cannot be written.
     """
-    writer = writers.get(Path(path).suffix.lower())
-    if writer is None:
-        raise InvalidInput("path", fspath(path), "a file name ending in " + ", ".join(writers))
-    with replacing(path) as lent:
-        writer(content, lent)
+    kind = format_of(path, formats)
+    with writing(path, kind, overwrite=overwrite) as file:
+        writers[Path(path).suffix.lower()](content, file)
+
+
+def write_vtu(mesh: Any, file: BufferedWriter, **options: Any) -> None:
+    """Write a mesh of meshio, which for this format opens what it is given itself."""
+    load_library("meshio").vtu.write(os.fspath(file.name), mesh, **options)
+
+
+def write_vtk(mesh: Any, file: BufferedWriter) -> None:
+    """Write a mesh of meshio, and read it back.
+
+    The function that it writes arrays with does not notice when a full disk takes only a part of
+    the last bytes.
+    """
+    vtk, path = load_library("meshio").vtk, os.fspath(file.name)
+    vtk.write(path, mesh)
+    try:
+        whole = vtk.read(path).points.shape == mesh.points.shape
+    except Exception:  # whatever reading half a file may raise
+        whole = False
+    if not whole:
+        raise OSError(errno.EIO, "the file is cut off; is the disk full?")
 
 
 def load_library(module: str) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ _TYPES = {"f8": "double", "f4": "float", "u1": "uchar"}
 
 
 def write_points(
-    path: Path,
+    file: BinaryIO,
     count: int,
     blocks: Iterable[Mapping[str, NDArray[np.generic]]],
     description: Mapping[str, object],
@@ -22,26 +22,25 @@ def write_points(
     """Write blocks of equally named columns as one `vertex` element.
 
     Args:
-        path: Where to.
+        file: Where to.
         count: Rows of all blocks together.
         blocks: Columns of float64, float32 or uint8, by name.
         description: Goes into the header, one comment per line of text.
     """
-    with path.open("wb") as file:
-        for number, block in enumerate(blocks):
-            rows = _records(block)
-            if number == 0:
-                file.write(_header(count, rows.dtype, description))
-            rows.tofile(file)
+    for number, block in enumerate(blocks):
+        rows = _records(block)
+        if number == 0:
+            file.write(_header(count, rows.dtype, description))
+        file.write(rows.data)
 
 
 def write_mesh(
-    path: Path, vertices: Mapping[str, NDArray[np.generic]], faces: NDArray[np.integer]
+    file: BinaryIO, vertices: Mapping[str, NDArray[np.generic]], faces: NDArray[np.integer]
 ) -> None:
     """Write triangles.
 
     Args:
-        path: Where to.
+        file: Where to.
         vertices: Columns of float64, float32 or uint8, by name.
         faces: Corners, shape (f, 3).
     """
@@ -49,10 +48,9 @@ def write_mesh(
     triangles = np.empty(len(faces), [("count", "u1"), ("corners", "<i4", 3)])
     triangles["count"], triangles["corners"] = 3, faces
     element = f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
-    with path.open("wb") as file:
-        file.write(_header(len(rows), rows.dtype, {}, element))
-        rows.tofile(file)
-        triangles.tofile(file)
+    file.write(_header(len(rows), rows.dtype, {}, element))
+    file.write(rows.data)
+    file.write(triangles.data)
 
 
 def _records(columns: Mapping[str, NDArray[np.generic]]) -> NDArray[np.void]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from io import BufferedWriter
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,11 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arrays import Faces
 from softreach.errors import InvalidInput
 from softreach.export import ply
-from softreach.export.formats import load_library, write_by_suffix
+from softreach.export.formats import Writers, load_library, write_by_suffix, write_vtk, write_vtu
+from softreach.file_kinds import FileKind, Formats, Recognizes, beginning_with, text_with
 from softreach.geometry.surface import SurfaceMesh
 from softreach.palette import BODY, Color
 
-__all__ = ["Part", "export_mesh", "write_parts"]
+__all__ = ["SURFACE_FILES", "Part", "export_mesh", "write_parts"]
 
 _Z_UP_TO_Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
 
@@ -35,7 +37,10 @@ class Part(NamedTuple):
 
 
 def export_mesh(
-    mesh_or_hull: SurfaceMesh | tuple[ArrayLike, ArrayLike], path: str | PathLike[str]
+    mesh_or_hull: SurfaceMesh | tuple[ArrayLike, ArrayLike],
+    path: str | PathLike[str],
+    *,
+    overwrite: bool = False,
 ) -> None:
     """Write a triangle mesh as .ply, .stl, .obj, .glb, .vtu or .vtk, chosen by the suffix.
 
@@ -45,10 +50,12 @@ def export_mesh(
     Args:
         mesh_or_hull: An object with vertices [m] and faces, or the pair of them.
         path: The file; it is replaced only when the new one is complete.
+        overwrite: Whether it may replace any file, and not only a surface of that format.
 
     Raises:
-        InvalidInput: Unknown suffix, or no triangles to write.
+        InvalidInput: Unknown suffix, no triangles to write, or something else is there.
         MissingExtra: The format needs a library that is not installed.
+        NotWritten: It cannot be written.
     """
     pair = mesh_or_hull
     if not isinstance(pair, tuple):
@@ -56,44 +63,48 @@ def export_mesh(
     vertices, faces = np.asarray(pair[0], float), np.asarray(pair[1], np.int64)
     if not len(faces):
         raise InvalidInput("mesh.faces", "none", "at least one triangle")
-    write_parts([Part("surface", vertices, faces)], path)
+    write_parts([Part("surface", vertices, faces)], path, overwrite=overwrite)
 
 
-def write_parts(parts: Sequence[Part], path: str | PathLike[str]) -> None:
+def write_parts(
+    parts: Sequence[Part], path: str | PathLike[str], *, overwrite: bool = False
+) -> None:
     """Write surfaces that belong together.
 
     Names survive in OBJ (objects), GLB (nodes) and VTK (a number per triangle, in order); colors in
     PLY, OBJ and GLB.
 
     Raises:
-        InvalidInput: Unknown suffix.
+        InvalidInput: Unknown suffix, or something else is there.
         MissingExtra: The format needs a library that is not installed.
+        NotWritten: It cannot be written.
     """
-    write_by_suffix(path, _WRITERS, parts)
+    write_by_suffix(path, SURFACE_FILES, _WRITERS, parts, overwrite)
 
 
-def _write_ply(parts: Sequence[Part], path: Path) -> None:
+def _write_ply(parts: Sequence[Part], file: BufferedWriter) -> None:
     vertices, faces = _joined(parts)
     colors = np.concatenate([np.tile(_rgba(part), (len(part.vertices), 1)) for part in parts])
     columns = dict(zip("xyz", vertices.T, strict=True))
     columns |= dict(zip(("red", "green", "blue", "alpha"), colors.T, strict=True))
-    ply.write_mesh(path, columns, faces)
+    ply.write_mesh(file, columns, faces)
 
 
-def _write_stl(parts: Sequence[Part], path: Path) -> None:
+def _write_stl(parts: Sequence[Part], file: BufferedWriter) -> None:
     trimesh = load_library("trimesh")
-    trimesh.util.concatenate([_colored(part) for part in parts]).export(path)
+    mesh = trimesh.util.concatenate([_colored(part) for part in parts])
+    file.write(mesh.export(file_type="stl"))
 
 
-def _write_obj(parts: Sequence[Part], path: Path) -> None:
+def _write_obj(parts: Sequence[Part], file: BufferedWriter) -> None:
     trimesh = load_library("trimesh")
     scene = trimesh.Scene([_colored(part) for part in parts])
     # exact enough for an arm of a millimeter; a name of ours, not an address, in the first line
     options = {"include_normals": False, "digits": 12, "header": "softreach, lengths in m"}
-    path.write_text(trimesh.exchange.obj.export_obj(scene, **options), encoding="utf-8")
+    file.write(trimesh.exchange.obj.export_obj(scene, **options).encode())
 
 
-def _write_glb(parts: Sequence[Part], path: Path) -> None:
+def _write_glb(parts: Sequence[Part], file: BufferedWriter) -> None:
     trimesh = load_library("trimesh")
     scene = trimesh.Scene(base_frame="world")
     # as a node and not in the numbers, so that a reader gets back the vertices we have
@@ -101,15 +112,22 @@ def _write_glb(parts: Sequence[Part], path: Path) -> None:
     for part in parts:
         names = {"node_name": part.name, "geom_name": part.name}
         scene.add_geometry(_shiny(part), parent_node_name="z_up", **names)
-    path.write_bytes(scene.export(file_type="glb"))
+    file.write(scene.export(file_type="glb"))
 
 
-def _write_vtk(parts: Sequence[Part], path: Path) -> None:
+def _write_vtu(parts: Sequence[Part], file: BufferedWriter) -> None:
+    write_vtu(_mesh(parts), file)
+
+
+def _write_vtk(parts: Sequence[Part], file: BufferedWriter) -> None:
+    write_vtk(_mesh(parts), file)
+
+
+def _mesh(parts: Sequence[Part]) -> Any:
     meshio = load_library("meshio")
     vertices, faces = _joined(parts)
     number = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])
-    mesh = meshio.Mesh(vertices, [("triangle", faces)], cell_data={"part": [number]})
-    meshio.write(path, mesh)
+    return meshio.Mesh(vertices, [("triangle", faces)], cell_data={"part": [number]})
 
 
 def _joined(parts: Sequence[Part]) -> tuple[NDArray[np.float64], Faces]:
@@ -151,11 +169,33 @@ def _shiny(part: Part) -> Any:
     )
 
 
-_WRITERS = {
+def _is_stl(path: Path) -> bool:
+    """A binary STL has no signature: its number of triangles, after 80 bytes, tells its size."""
+    with path.open("rb") as file:
+        head = file.read(84)
+    size = 84 + 50 * int.from_bytes(head[80:], "little")
+    return head.startswith(b"solid ") or (len(head) == 84 and path.stat().st_size == size)
+
+
+def _file(name: str, recognizes: Recognizes, library: str = "") -> FileKind:
+    return FileKind(f"{name} file", recognizes, (library,) if library else (), "export")
+
+
+SURFACE_FILES: Formats = {
+    ".ply": _file("a PLY", beginning_with(b"ply\n", b"ply\r")),
+    ".stl": _file("an STL", _is_stl, "trimesh"),
+    ".obj": _file("an OBJ", text_with("\nv "), "trimesh"),
+    ".glb": _file("a GLB", beginning_with(b"glTF"), "trimesh"),
+    ".vtu": _file("a VTU", text_with("<VTKFile", "UnstructuredGrid"), "meshio"),
+    ".vtk": _file("a VTK", beginning_with(b"# vtk DataFile"), "meshio"),
+}
+"""What surfaces and arms can be written as."""
+
+_WRITERS: Writers = {
     ".ply": _write_ply,
     ".stl": _write_stl,
     ".obj": _write_obj,
     ".glb": _write_glb,
-    ".vtu": _write_vtk,
+    ".vtu": _write_vtu,
     ".vtk": _write_vtk,
 }

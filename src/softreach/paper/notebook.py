@@ -8,13 +8,17 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from softreach.atomic import replacing
+from softreach.atomic import writing
+from softreach.file_kinds import FileKind, text_with
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["Notebook", "Picture"]
+
+
+_NOTES = FileKind("what a part of the report found", text_with('"folder": null,\n "part": '))
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,8 @@ class Notebook:
     part: str
     key: Mapping[str, Any]
     """What the results depend on; a notebook of another key is stale."""
+    overwrite: bool = False
+    """Whether files of other kinds may be replaced."""
     numbers: dict[str, Any] = field(default_factory=dict)
     pictures: list[Picture] = field(default_factory=list)
     seconds: float = 0.0
@@ -49,7 +55,7 @@ class Notebook:
         from softreach.plot.style import pyplot, save_figure
 
         for suffix in ("png", "pdf"):
-            save_figure(figure, self.folder / f"{name}.{suffix}")
+            save_figure(figure, self.folder / f"{name}.{suffix}", overwrite=self.overwrite)
         pyplot().close(figure.get_figure(root=True))
         self.pictures.append(Picture(label, name, caption))
 
@@ -57,8 +63,9 @@ class Notebook:
         """Write what was found; the last act, so that a file means a finished part."""
         self.seconds = seconds
         content = asdict(self) | {"folder": None, "key": dict(self.key)}
-        with replacing(self._file) as lent:
-            lent.write_text(json.dumps(content, indent=1), encoding="utf-8")
+        del content["overwrite"]
+        with writing(self._file, _NOTES, overwrite=self.overwrite) as file:
+            file.write(json.dumps(content, indent=1).encode())
 
     @classmethod
     def opened(cls, folder: Path, part: str, key: Mapping[str, Any]) -> Self | None:

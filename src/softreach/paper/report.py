@@ -12,20 +12,36 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from softreach.atomic import replacing
+from softreach.atomic import writing
 from softreach.errors import MissingExtra
+from softreach.file_kinds import FileKind, Formats, text_with
 from softreach.paper.claims import CLAIMS
 from softreach.paper.notebook import Notebook
 from softreach.paper.settings import Settings
 from softreach.paper.verdict import Verdict
 
-__all__ = ["report_template", "write_report"]
+__all__ = ["REPORT", "report_template", "write_report"]
+
+REPORT: Formats = {
+    ".html": FileKind(
+        "an older report",
+        text_with("<title>Minimal activation with maximal reach"),
+        ("jinja2",),
+        "paper",
+    )
+}
+"""What is written in the end."""
 
 _NARROW = 900  # pixels; two such figures stand side by side
 
 
 def write_report(
-    path: Path, notebooks: Mapping[str, Notebook], settings: Settings, quick: bool
+    path: Path,
+    notebooks: Mapping[str, Notebook],
+    settings: Settings,
+    quick: bool,
+    *,
+    overwrite: bool = False,
 ) -> Path:
     """Write what was found beside what the paper says.
 
@@ -34,6 +50,7 @@ def write_report(
         notebooks: What each part found, by name.
         settings: The sizes it was computed with.
         quick: Whether these are small ones.
+        overwrite: Whether it may replace any file, and not only an older report.
 
     Returns:
         The file.
@@ -53,8 +70,8 @@ def write_report(
         version=version("softreach"),
         date=f"{datetime.now(UTC):%Y-%m-%d}",
     )
-    with replacing(path) as lent:
-        lent.write_text(page, encoding="utf-8")
+    with writing(path, REPORT[".html"], overwrite=overwrite) as file:
+        file.write(page.encode())
     return path
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from softreach.atomic import check_place
 from softreach.paper.notebook import Notebook
 from softreach.paper.parts.misprints import misprints
 from softreach.paper.parts.model import model
@@ -19,7 +20,7 @@ from softreach.paper.parts.redundancy import redundancy
 from softreach.paper.parts.sweep import sweep
 from softreach.paper.parts.uniqueness import uniqueness
 from softreach.paper.parts.volume import volume
-from softreach.paper.report import report_template, write_report
+from softreach.paper.report import REPORT, report_template, write_report
 from softreach.paper.settings import FULL, QUICK
 from softreach.plot.style import pyplot
 
@@ -40,6 +41,7 @@ def reproduce_paper(
     out: str | PathLike[str],
     *,
     quick: bool = False,
+    overwrite: bool = False,
     say: Callable[[str], object] = lambda line: None,
 ) -> Path:
     """Recompute every figure and number of the paper and set them beside what it says.
@@ -49,6 +51,7 @@ def reproduce_paper(
     Args:
         out: Folder for figures (PNG and PDF), numbers (JSON), the atlas and the report.
         quick: Small clouds, in under a minute, in a folder of their own inside `out`.
+        overwrite: Whether files in the way that are no older outputs of this are replaced.
         say: Called with a line about each part.
 
     Returns:
@@ -56,20 +59,22 @@ def reproduce_paper(
 
     Raises:
         MissingExtra: matplotlib or Jinja2 is not installed.
-        OSError: The folder cannot be written to.
+        InvalidInput: Something else is where the report goes.
+        NotWritten: The folder cannot be written to.
     """
     pyplot()
     report_template()  # what is missing is reported now, not after a quarter of an hour
     settings = QUICK if quick else FULL
     folder = Path(out) / "quick" if quick else Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
+    report = folder / "report.html"
+    check_place(report, REPORT[".html"], overwrite=overwrite, name="out")
     key = {**asdict(settings), "softreach": version("softreach"), "source": _source()}
     notebooks: dict[str, Notebook] = {}
     for number, (name, part) in enumerate(PARTS.items(), 1):
         say(f"[{number}/{len(PARTS)}] {name}")
-        notebooks[name] = _computed(name, part, settings, folder, key)
+        notebooks[name] = _computed(name, part, settings, folder, key, overwrite)
         say(f"      {notebooks[name].seconds:.1f} s")
-    return write_report(folder / "report.html", notebooks, settings, quick)
+    return write_report(report, notebooks, settings, quick, overwrite=overwrite)
 
 
 def _source() -> str:
@@ -81,13 +86,18 @@ def _source() -> str:
 
 
 def _computed(
-    name: str, part: Callable[..., None], settings: Any, folder: Path, key: Mapping[str, Any]
+    name: str,
+    part: Callable[..., None],
+    settings: Any,
+    folder: Path,
+    key: Mapping[str, Any],
+    overwrite: bool,
 ) -> Notebook:
     """The notebook of a part: of an earlier run, or written now."""
     pages = folder / "figures"
     if (done := Notebook.opened(pages, name, key)) is not None:
         return done
-    notes, start = Notebook(pages, name, key), perf_counter()
+    notes, start = Notebook(pages, name, key, overwrite), perf_counter()
     part(settings, folder, notes)
     notes.close(perf_counter() - start)
     return notes

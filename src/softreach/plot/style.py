@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import AbstractContextManager, nullcontext
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softreach.atomic import replacing
-from softreach.errors import MissingExtra
+from softreach.atomic import writing
+from softreach.errors import InvalidInput, MissingExtra
+from softreach.file_kinds import PICTURES, format_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,11 +50,16 @@ def pyplot() -> Any:
 
     Raises:
         MissingExtra: matplotlib is not installed.
+        InvalidInput: The environment names a backend that it does not have.
     """
     try:
         from matplotlib import pyplot as plt
     except ModuleNotFoundError as error:
         raise MissingExtra("matplotlib", "plot") from error
+    except ValueError as error:  # of a backend that does not exist
+        backend = os.environ.get("MPLBACKEND", "")
+        allowed = "a backend of matplotlib"
+        raise InvalidInput("MPLBACKEND", backend, allowed, "unset it or use agg") from error
     return plt
 
 
@@ -65,22 +73,30 @@ def small_axes(width: float = 3.4, height: float = 2.8) -> Axes:
     return pyplot().subplots(figsize=(width, height), layout="constrained")[1]
 
 
-def save_figure(figure: Figure | Axes, path: str | PathLike[str]) -> None:
+def save_figure(
+    figure: Figure | Axes, path: str | PathLike[str], *, overwrite: bool = False
+) -> None:
     """Save as .png, .pdf, .svg or another format that matplotlib knows, whole or not at all.
 
     Args:
         figure: The figure, or axes in it.
         path: The file; it is replaced only when the new one is complete.
+        overwrite: Whether it may replace any file, and not only a picture of that format.
+
+    Raises:
+        InvalidInput: Unknown suffix, or something else is there.
+        NotWritten: It cannot be written.
     """
-    with pyplot().rc_context(_SAVING), replacing(path) as lent:
+    kind, suffix = format_of(path, PICTURES), Path(path).suffix.lower()
+    with pyplot().rc_context(_SAVING), writing(path, kind, overwrite=overwrite) as file:
         whole = figure.get_figure(root=True)
         if whole is not None:
-            whole.savefig(lent, dpi=DPI, **_encoding(lent.suffix))
+            whole.savefig(file, dpi=DPI, format=suffix[1:], **_encoding(suffix))
 
 
 def _encoding(suffix: str) -> dict[str, Any]:
     """PNG at a level that takes less than half the time of the default for 5 % more bytes."""
-    return {"pil_kwargs": {"compress_level": 4}} if suffix.lower() == ".png" else {}
+    return {"pil_kwargs": {"compress_level": 4}} if suffix == ".png" else {}
 
 
 def write_note(ax: Axes, text: str, right: float, up: float) -> None:

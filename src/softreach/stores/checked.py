@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Self
 import google_crc32c
 from zarr.storage import LocalStore, WrapperStore  # noqa: TID253  (imported where stores are)
 
+from softreach.durable import sync_file_in
 from softreach.stores.damage import Chunk, Watch
-from softreach.stores.durable import sync_file
 from softreach.stores.seal import Broken, sealed, unsealed
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class CheckedStore(WrapperStore[Any]):
 
     async def _synced(self, key: str) -> None:
         if self.durable and isinstance(self._store, LocalStore):
-            await asyncio.to_thread(sync_file, self._store.root / key, self._store.root)
+            await asyncio.to_thread(sync_file_in, self._store.root / key, self._store.root)
 
 
 def _with_seal(key: str, value: Buffer) -> Buffer:

@@ -12,11 +12,16 @@ from softreach.arm.loads import Loads
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.errors import Fault, InvalidDesign
+from softreach.file_kinds import FileKind, Formats, text_with
 
-__all__ = ["LONGEST", "Parts", "document_of", "text_of"]
+__all__ = ["DESIGN_FILE", "LONGEST", "Parts", "document_of", "text_of"]
 
 LONGEST = 1_000_000
 """Characters that a design file may have: thousands of times as many as designs take."""
+
+
+DESIGN_FILE: Formats = {".toml": FileKind("a design file", text_with("length_m"))}
+"""What a design is saved as, and replaces."""
 
 
 class Parts(NamedTuple):

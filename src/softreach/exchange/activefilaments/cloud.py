@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import warnings
+from io import BufferedWriter
 from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,17 +16,18 @@ from numpy.typing import NDArray
 
 from softreach import schema
 from softreach.arm.manipulator import Manipulator
-from softreach.atomic import replacing
+from softreach.atomic import check_place, writing
 from softreach.cloud import design_of
 from softreach.errors import InvalidInput, SoftreachWarning, counted
 from softreach.exchange.activefilaments.filament import Filament, filament_of
+from softreach.file_kinds import FileKind, Formats
 from softreach.memory import free_memory
 from softreach.rod.kinematics import tip_positions
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["gamma_path", "read_cloud", "write_cloud"]
+__all__ = ["CLOUD_PAIR", "gamma_path", "read_cloud", "write_cloud"]
 
 Array = NDArray[np.float64]
 
@@ -82,28 +85,54 @@ def read_cloud(arm: Manipulator, path: str | PathLike[str], *, tol: float = 1e-6
     return cloud
 
 
-def write_cloud(cloud: xr.Dataset, path: str | PathLike[str]) -> None:
+def write_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write tips to NAME.csv and activations to NAME_gamma.csv, as ActiveFilaments.jl does.
 
     Args:
         cloud: tip(sample, axis) [m] and activation(sample, bundle) [-].
         path: NAME.csv; each file is replaced only when the new one is complete.
+        overwrite: Whether they may replace any files, and not only such a pair.
 
     Raises:
-        InvalidInput: No cloud, or one of an arm that ActiveFilaments.jl cannot have.
+        InvalidInput: No cloud, one of an arm that ActiveFilaments.jl cannot have, or something else
+            is there.
+        NotWritten: It cannot be written.
     """
     filament = filament_of(design_of(schema.check_cloud(cloud)))
-    _write(gamma_path(path), cloud["activation"].values, filament)
-    _write(Path(path), cloud["tip"].values)
+    kind = CLOUD_PAIR[".csv"]
+    check_place(path, kind, overwrite=overwrite)
+    with writing(gamma_path(path), kind, overwrite=overwrite) as file:
+        _write(file, cloud["activation"].values, filament)
+    with writing(path, kind, overwrite=overwrite) as file:
+        _write(file, cloud["tip"].values)
 
 
-def _write(path: Path, values: Array, filament: Filament | None = None) -> None:
+def _write(file: BufferedWriter, values: Array, filament: Filament | None = None) -> None:
     """Rows of the shortest numbers that read back to the same ones."""
-    with replacing(path) as partial, partial.open("w", encoding="ascii", newline="\n") as file:
-        for first in range(0, len(values), _BLOCK):
-            block = values[first : first + _BLOCK]
-            rows = block if filament is None else filament.to_columns(block)
-            file.writelines(",".join(map(repr, row)) + "\n" for row in rows.tolist())
+    for first in range(0, len(values), _BLOCK):
+        block = values[first : first + _BLOCK]
+        rows = block if filament is None else filament.to_columns(block)
+        text = "".join(",".join(map(repr, row)) + "\n" for row in rows.tolist())
+        file.write(text.encode("ascii"))
+
+
+def _is_of_pair(path: Path) -> bool:
+    """Whether a file holds numbers alone, and the other file of a cloud is beside it."""
+    tips = path.with_name(f"{path.stem.removesuffix(_ENDING)}{path.suffix}")
+    if not (tips.is_file() and gamma_path(tips).is_file()):
+        return False
+    with path.open("rb") as file:
+        first = file.readline(1 << 16)
+    try:
+        return all(math.isfinite(float(part)) for part in first.split(b","))
+    except ValueError:
+        return False
+
+
+CLOUD_PAIR: Formats = {
+    ".csv": FileKind("one of NAME.csv and NAME_gamma.csv of numbers alone", _is_of_pair)
+}
+"""What `write_cloud` writes, and replaces."""
 
 
 def _warn(arm: Manipulator, activation: Array, difference: float) -> None:

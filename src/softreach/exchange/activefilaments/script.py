@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from os import PathLike
-from pathlib import Path
 
 from softreach.arm.along import Pieces
 from softreach.arm.manipulator import Manipulator
-from softreach.atomic import replacing
+from softreach.atomic import writing
 from softreach.exchange.activefilaments.filament import (
     Angle,
     Filament,
     FilamentRing,
     filament_of,
 )
+from softreach.file_kinds import FileKind, Formats, text_with
 
-__all__ = ["design_script", "write_design"]
+__all__ = ["FILAMENT_SCRIPT", "design_script", "write_design"]
 
 _HEAD = """\
 # The filament of ActiveFilaments.jl with the tips of a design of softreach.
@@ -26,20 +26,28 @@ using ActiveFilaments
 """
 
 
-def write_design(arm: Manipulator, path: str | PathLike[str]) -> None:
+FILAMENT_SCRIPT: Formats = {
+    ".jl": FileKind("a filament's definition", text_with("using ActiveFilaments", "AFilament("))
+}
+"""What `write_design` writes, and replaces."""
+
+
+def write_design(arm: Manipulator, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write a Julia script that defines the filament of ActiveFilaments.jl with an arm's tips.
 
     Args:
         arm: The design.
         path: The file; it is replaced only when the new one is complete.
+        overwrite: Whether it may replace any file, and not only a filament's definition.
 
     Raises:
         InvalidInput: The arm has what no filament there has: another profile than a linear taper,
-            a bore, or other actuators than fibers along all of it.
+            a bore, or other actuators than fibers along all of it; or something else is there.
+        NotWritten: It cannot be written.
     """
     script = design_script(arm)
-    with replacing(path) as partial:
-        Path(partial).write_text(script, encoding="utf-8")
+    with writing(path, FILAMENT_SCRIPT[".jl"], overwrite=overwrite) as file:
+        file.write(script.encode())
 
 
 def design_script(arm: Manipulator) -> str:

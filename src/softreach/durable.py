@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import os
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-__all__ = ["sync_file", "sync_folder", "sync_tree"]
+__all__ = ["sync_file", "sync_file_in", "sync_folder", "sync_tree"]
 
 
-def sync_file(path: Path, root: Path) -> None:
+def sync_file(path: Path) -> None:
+    """Wait until what a file holds is on the disk."""
+    _sync(path)
+
+
+def sync_file_in(path: Path, root: Path) -> None:
     """Wait until a file is on the disk, with its name and those of its folders up to `root`."""
     _sync(path)
     for folder in path.parents:
@@ -19,9 +25,11 @@ def sync_file(path: Path, root: Path) -> None:
 
 def sync_tree(root: Path) -> None:
     """Wait until everything below a folder is on the disk, with all names."""
-    for folder, _, files in os.walk(root):
-        for name in files:
-            _sync(Path(folder, name))
+    walked = list(os.walk(root))
+    files = [Path(folder, name) for folder, _, names in walked for name in names]
+    with ThreadPoolExecutor(min(8, len(files) or 1)) as threads:  # the disk waits for all at once
+        list(threads.map(_sync, files))
+    for folder, _, _ in walked:
         sync_folder(Path(folder))
 
 

@@ -1,0 +1,67 @@
+"""The one reader of numbers on the command line: decimal digits, and nothing that rounds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from cyclopts import Parameter, Token
+
+from softreach.errors import InvalidInput
+
+__all__ = ["NUMBER", "WHOLE", "numbers_in", "shortened"]
+
+_SHOWN = 60  # characters of what was typed
+
+
+def _whole(kind: Any, tokens: Sequence[Token]) -> int:
+    """A whole number: 400000, 400_000 or 4e5."""
+    from softreach.quantity import read_whole_number
+
+    del kind
+    try:
+        return read_whole_number(tokens[0].value)
+    except ValueError:
+        allowed = "a whole number such as 20000 or 2e4"
+        raise InvalidInput(*_name_and_value(tokens[0]), allowed) from None
+
+
+def _number(kind: Any, tokens: Sequence[Token]) -> float:
+    """A finite number: 0.5, 1e-6."""
+    from softreach.quantity import read_number
+
+    del kind
+    try:
+        return read_number(tokens[0].value)
+    except ValueError:
+        allowed = "a finite number such as 0.5 or 1e-3"
+        raise InvalidInput(*_name_and_value(tokens[0]), allowed) from None
+
+
+WHOLE = Parameter(converter=_whole)
+"""Of every option that is an `int`."""
+
+NUMBER = Parameter(converter=_number)
+"""Of every option that is a `float`."""
+
+
+def numbers_in(text: str, count: int | None = None) -> list[float] | None:
+    """Comma-separated numbers; None if they are anything else, or not so many."""
+    from softreach.quantity import read_number
+
+    try:
+        values = [read_number(part) for part in text.split(",")]
+    except ValueError:
+        return None
+    return values if count in (None, len(values)) else None
+
+
+def shortened(text: str) -> str:
+    """What was typed, such that it fits into a line and can be printed."""
+    plain = "".join(one if one.isprintable() else "?" for one in text)
+    return plain if len(plain) <= _SHOWN else f"{plain[: _SHOWN // 2]}...{plain[-_SHOWN // 4 :]}"
+
+
+def _name_and_value(token: Token) -> tuple[str, str]:
+    name = (token.keyword or "number").lstrip("-").replace("-", "_")
+    return name, shortened(token.value) or "''"

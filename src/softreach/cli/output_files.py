@@ -1,0 +1,56 @@
+"""Where a command writes: looked at before anything is computed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+if TYPE_CHECKING:
+    from softreach.file_kinds import Formats
+
+__all__ = ["Overwrite", "check_output", "check_picture", "check_surface"]
+
+Overwrite = Annotated[
+    bool,
+    Parameter(
+        negative="", help="Replace what is in the way, and not only an older output of its kind."
+    ),
+]
+
+
+def check_output(name: str, path: Path | None, formats: Formats, overwrite: bool) -> None:
+    """Refuse what could not be written in the end; nothing to do for an option that is not given.
+
+    Args:
+        name: The option.
+        path: Its value.
+        formats: What can be written there, by suffix.
+        overwrite: Whether it may replace anything else.
+
+    Raises:
+        InvalidInput: Another suffix, or something else is there.
+        MissingExtra: A library that writes it is not installed.
+        NotWritten: Nothing can be written there.
+    """
+    from softreach.atomic import check_place
+    from softreach.file_kinds import format_of
+
+    if path is not None:
+        check_place(path, format_of(path, formats, name), overwrite=overwrite, name=name)
+
+
+def check_picture(name: str, path: Path | None, overwrite: bool) -> None:
+    """Refuse a place for a picture, as `check_output`."""
+    from softreach.file_kinds import PICTURES
+
+    check_output(name, path, PICTURES, overwrite)
+
+
+def check_surface(name: str, path: Path | None, overwrite: bool) -> None:
+    """Refuse a place for a surface, as `check_output`."""
+    if path is not None:
+        from softreach.export.surface import SURFACE_FILES
+
+        check_output(name, path, SURFACE_FILES, overwrite)

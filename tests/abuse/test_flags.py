@@ -1,0 +1,219 @@
+"""Numbers and options that no command can use: each is refused in one line, before any work."""
+
+from __future__ import annotations
+
+import inspect
+import typing
+
+import pytest
+
+from softreach.cli.app import app
+from softreach.cli.changes import Changes
+from softreach.cli.numbers import NUMBER, WHOLE
+from softreach.quantity import read_number, read_whole_number
+from tests.abuse.refusals import refusal_of
+
+WHOLE_NUMBER = "must be a whole number such as 20000 or 2e4"
+FINITE = "must be a finite number such as 0.5 or 1e-3"
+TRUNK = "minimal_trunk"
+POSITION = "three comma-separated numbers x,y,z in m"
+RADIUS = "must be a radius > 0"
+HUGE = "9" * 5_000
+
+
+def case(words: str, expected: str, name: str | None = None):
+    """A command line, its words apart by spaces, and what is said of it."""
+    return pytest.param(words.split(" "), expected, id=name or words)
+
+
+WRONG = [
+    # numbers of samples, seeds and the like
+    *(
+        case(f"cloud {TRUNK} {option}={value}", f"{option[2:]} = {shown}: {WHOLE_NUMBER}")
+        for option in ("--n", "--seed")
+        for value, shown in {
+            "1.5": "1.5",
+            "0x10": "0x10",
+            "１２": "１２",
+            "": "''",
+            "nan": "nan",
+            "inf": "inf",
+            "1e400": "1e400",
+            "1e-3": "1e-3",
+            "10**23": "10**23",
+            "1,000": "1,000",
+            "1__0": "1__0",
+            "_1": "_1",
+            "1 2 ": "1",
+            "True": "True",
+        }.items()
+        if " " not in value
+    ),
+    case(f"cloud {TRUNK} --n={HUGE}", "...", "n of 5000 digits"),
+    case(f"cloud {TRUNK} --n=0", "n = 0: must be a whole number, 1 or more"),
+    case(f"cloud {TRUNK} --n=-5", "n = -5: must be a whole number, 1 or more"),
+    case(f"cloud {TRUNK} --seed=-1", "seed = -1: must be a whole number, 0 or more"),
+    # what cannot fit is told by its size, before a byte of it is asked for
+    case(f"cloud {TRUNK} --n=1e18", "takes 49 EB of"),
+    case(f"cloud {TRUNK} --n={10**23}", "EB of"),
+    case(f"cloud {TRUNK} --n=4e12", "takes 196 TB of"),
+    case(f"volume {TRUNK} --n=1e15", "it takes 700 PB of memory"),
+    case(f"show {TRUNK} --n=1e18", "it takes 49 EB of memory"),
+    case("demo --n=1e18", "it takes 700 EB of memory"),
+    case("atlas build a.zarr --vary taper_deg=0:3:4 --n 1e15", "of memory"),
+    # other whole numbers
+    case(f"solve {TRUNK} --target 0,0,1 --family 1.5", f"family = 1.5: {WHOLE_NUMBER}"),
+    case(f"solve {TRUNK} --target 0,0,1 --family 0", "family = 0: must be a whole number"),
+    case(f"solve {TRUNK} --target 0,0,1 --family 1e9", "must be a whole number between 1 and"),
+    case("atlas build a.zarr --vary taper_deg=0,1 --workers 0", "workers = 0: must be"),
+    case("atlas build a.zarr --vary taper_deg=0,1 --workers -2", "workers = -2: must be"),
+    case("atlas build a.zarr --vary taper_deg=0,1 --workers 1.5", f"workers = 1.5: {WHOLE_NUMBER}"),
+    case("atlas build a.zarr --vary taper_deg=0,1 --shard １/2", "shard = １/2: must be i/k"),
+    case("atlas build a.zarr --vary taper_deg=0,1 --shard 2/2", "shard = 2/2: must be i/k"),
+    case("atlas build a.zarr --vary taper_deg=0,1 --shard /", "shard = /: must be i/k"),
+    case("atlas build a.zarr --vary taper_deg=0:3:1e9", "a count up to 100000"),
+    case("atlas build a.zarr --vary taper_deg=0:3:1.5", "a count up to 100000"),
+    case("atlas build a.zarr --vary taper_deg=0:3:0", "a count up to 100000"),
+    case("atlas build a.zarr --vary taper_deg=0:inf:3", "must be numbers"),
+    case("atlas build a.zarr --vary taper_deg=nan,1", "must be numbers"),
+    case("atlas build a.zarr --vary taper_deg=", "taper_deg = : must be numbers"),
+    case("atlas build a.zarr --vary taper_deg=0,1 --alpha 0.05", "like 0.05L"),
+    case("atlas build a.zarr --vary taper_deg=0,1 --alpha 1e400L", "like 0.05L"),
+    case(f"studio {TRUNK} --port 80000", "port = 80000: must be a whole number from 0 to 65535"),
+    case(f"studio {TRUNK} --port -1", "port = -1: must be a whole number from 0 to 65535"),
+    case(f"studio {TRUNK} --port 80.5", f"port = 80.5: {WHOLE_NUMBER}"),
+    # finite numbers
+    *(
+        case(f"cloud {TRUNK} --tol={value}", f"tol = {value or repr('')}: {FINITE}")
+        for value in ("nan", "inf", "-inf", "1e400", "", "0x1p-3", "１e-6", "1_0.5", "1e", "1e-6L")
+    ),
+    case(f"cloud {TRUNK} --tol=0", "tol = 0"),
+    case(f"cloud {TRUNK} --tol=-1", "tol = -1"),
+    case(f"reach {TRUNK} --accuracy nan", f"accuracy = nan: {FINITE}"),
+    case(f"design {TRUNK} --taper-deg 1e400", f"taper_deg = 1e400: {FINITE}"),
+    case(f"design {TRUNK} --revolution-deg nan", f"revolution_deg = nan: {FINITE}"),
+    case(f"design {TRUNK} --set taper=２deg", "taper = ２deg: must be a finite number"),
+    case("payload lce_arm --gravity up --share inf", f"share = inf: {FINITE}"),
+    # places
+    case(f"solve {TRUNK} --target 0,1", POSITION),
+    case(f"solve {TRUNK} --target 0,0,1,5", POSITION),
+    case(f"solve {TRUNK} --target 0,0,1e155", POSITION),
+    case(f"solve {TRUNK} --target 0,0,1e400", POSITION),
+    case(f"solve {TRUNK} --target 0,0,nan", POSITION),
+    case(f"solve {TRUNK} --target=0,0,", POSITION),
+    case(f"solve {TRUNK} --target=", "target = '': must be three"),
+    case(f"solve {TRUNK} --target=0,0,１", POSITION),
+    case(f"solve {TRUNK} --target={HUGE}", POSITION, "target of 5000 digits"),
+    case(f"solve {TRUNK} --target={'1,' * 3000}1", POSITION, "target of 3001 numbers"),
+    # activations and radii
+    case(f"equilibria {TRUNK} --activation=1,2", "3 comma-separated numbers"),
+    case(f"equilibria {TRUNK} --activation=0,0,nan", "3 comma-separated numbers"),
+    case(f"equilibria {TRUNK} --activation=0,0,0x1", "3 comma-separated numbers"),
+    case(f"equilibria {TRUNK} --activation={'0,' * 3000}0", "3 comma-separated", "activations"),
+    *(
+        case(f"volume {TRUNK} --alpha={value}", RADIUS)
+        for value in (
+            "0",
+            "0L",
+            "-1L",
+            "nan",
+            "infL",
+            "1e400",
+            "",
+            "L",
+            "LL",
+            "0.05l",
+            "0x1L",
+            "５L",
+        )
+    ),
+]
+
+
+@pytest.mark.parametrize(("arguments", "expected"), WRONG)
+def test_a_number_that_cannot_be_used_is_refused_in_one_line(
+    arguments, expected, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    assert expected in refusal_of(arguments, capsys, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [
+        ("7", 7),
+        ("+7", 7),
+        ("-7", -7),
+        ("007", 7),
+        ("1e6", 1_000_000),
+        ("4E5", 400_000),
+        ("2.5e3", 2_500),
+        ("1.0", 1),
+        ("400_000", 400_000),
+        (" 12 ", 12),
+    ],
+)
+def test_a_whole_number_may_be_written_in_every_way_that_rounds_nothing(text, number):
+    assert read_whole_number(text) == number
+
+
+@pytest.mark.parametrize("text", ["1e-6", ".5", "5.", "-0", "1E3", "+2.5"])
+def test_a_decimal_number_is_what_python_reads(text):
+    assert read_number(text) == float(text)
+
+
+def test_an_atlas_that_the_disk_cannot_hold_is_not_begun(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("softreach.memory.free_disk", lambda path: 1e6)
+    arguments = ["atlas", "build", "a.zarr", "--vary", "taper_deg=0:3:4", "--n", "1e5"]
+    said = refusal_of(arguments, capsys, tmp_path)
+    assert "n = 100000 samples of 4 designs" in said
+    assert "it takes 2.48 MB of disk space, of which 1 MB are free" in said
+
+
+FILES = [
+    pytest.param(b"\x00\xff\xfe" * 50, "which is text in UTF-8", id="binary"),
+    pytest.param(b"0,0,1\n0,0", "point 2 = 0,0: must be three", id="two columns"),
+    pytest.param(b"x,y,z\n0,0,1,5", "point 1 = 0,0,1,5: must be three", id="four columns"),
+    pytest.param(b"x,y,z\n0,0,nan", "must be three", id="NaN"),
+    pytest.param(b"x,y,z\n0,0,1e200", "must be three", id="far away"),
+    pytest.param("0,0,1".encode("utf-16"), "which is text in UTF-8", id="UTF-16"),
+    pytest.param(b"", "a row x,y,z for each position", id="nothing"),
+    pytest.param(b"x,y,z\n", "a row x,y,z for each position", id="a header alone"),
+    pytest.param(b"0,0," + b"1" * 100_000, "must be three", id="a very long line"),
+]
+
+
+@pytest.mark.parametrize(("content", "expected"), FILES)
+def test_a_file_of_targets_that_is_no_table_of_places_is_refused(
+    content, expected, tmp_path, capsys
+):
+    path = tmp_path / "targets.csv"
+    path.write_bytes(content)
+    arguments = ["solve", TRUNK, "--targets", str(path)]
+    assert expected in refusal_of(arguments, capsys, tmp_path)
+
+
+def _commands():
+    for name in app:
+        if not name.startswith("-"):
+            one = app[name]
+            below = [one[part] for part in one if not part.startswith("-")]
+            yield from (sub.default_command for sub in [one, *below] if sub.default_command)
+
+
+def _options():
+    for function in (*_commands(), Changes):
+        for name, hint in typing.get_type_hints(function, include_extras=True).items():
+            yield pytest.param(hint, id=f"{getattr(function, '__name__', function)} {name}")
+
+
+@pytest.mark.parametrize("hint", list(_options()))
+def test_every_number_on_the_command_line_has_the_one_reader(hint):
+    kind, *meanings = typing.get_args(hint) or (hint,)
+    plain = {kind, *typing.get_args(kind)}
+    if int in plain and bool not in plain:
+        assert WHOLE in meanings
+    if float in plain:
+        assert NUMBER in meanings
+    assert not inspect.isclass(hint) or hint not in (int, float)

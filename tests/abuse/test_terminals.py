@@ -1,0 +1,184 @@
+"""Whatever a terminal can show, and whether or not there is one, a command says what it has to."""
+
+from __future__ import annotations
+
+import io
+import os
+import subprocess
+import sys
+
+import pytest
+
+from softreach.cli.app import run
+from softreach.cli.terminal import spelled, spelling_out
+
+ENCODINGS = ["ascii", "latin-1", "cp1252", "cp437", "koi8-r", "utf-8"]
+
+
+@pytest.fixture
+def streams(monkeypatch):
+    """Standard output and error of an encoding that refuses what it does not have."""
+
+    def of(encoding: str, out: io.RawIOBase | None = None):
+        made = [
+            io.TextIOWrapper(io.BytesIO() if raw is None else io.BufferedWriter(raw), encoding)
+            for raw in (out, None)
+        ]
+        monkeypatch.setattr(sys, "stdout", made[0])
+        monkeypatch.setattr(sys, "stderr", made[1])
+        return made
+
+    return of
+
+
+def printed(stream: io.TextIOWrapper) -> str:
+    stream.flush()
+    return stream.buffer.getvalue().decode(stream.encoding)
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+@pytest.mark.parametrize(
+    ("arguments", "code", "expected"),
+    [
+        (["--help"], 0, "softreach demo --out out"),
+        (["cloud", "--help"], 0, "--sampler"),
+        (["volume", "--help"], 0, "-shape radius: 0.05L"),
+        (["atlas", "build", "--help"], 0, "--vary"),
+        (["design", "minimal_trunk"], 0, "-1.667 to 0"),
+        (["design", "nowhere.toml"], 2, "a file that exists"),
+        (["design", "σ.toml"], 2, ".toml: must be"),
+        (["design", "中文.toml"], 2, ".toml: must be"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_every_encoding_can_show_what_is_said(arguments, code, expected, encoding, streams):
+    out, err = streams(encoding)
+    assert run(arguments) == code
+    assert expected in printed(out) + printed(err)
+
+
+@pytest.mark.parametrize(
+    ("character", "text"),
+    [
+        ("γ", "gamma"), ("Ω", "Omega"), ("φ", "phi"), ("ζ", "zeta"), ("α", "alpha"),
+        ("³", "^3"), ("²", "^2"), ("°", " deg"), ("±", "+-"), ("×", "x"), ("Å", "A"),
+        ("é", "e"), ("ﬁ", "fi"), ("中", "\\u4e2d"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_shown_is_spelled_out(character, text):
+    assert spelled(character) == text
+
+
+def test_a_terminal_that_has_a_letter_shows_the_letter(streams):
+    out, _ = streams("latin-1")
+    with spelling_out():
+        out.write("L³ ± é γ")
+    assert printed(out) == "L³ ± é gamma"
+
+
+def test_a_name_of_a_file_that_is_no_text_keeps_its_bytes(streams):
+    out, _ = streams("utf-8")
+    with spelling_out():
+        out.write(os.fsdecode(b"caf\xe9.toml"))
+    out.flush()
+    assert out.buffer.getvalue() == b"caf\xe9.toml"
+
+
+def test_the_streams_are_as_they_were_afterwards(streams):
+    out, err = streams("ascii")
+    run(["--version"])
+    assert (out.errors, err.errors) == ("strict", "strict")
+
+
+class Gone(io.RawIOBase):
+    """A pipe that nobody reads any more."""
+
+    gone = True
+
+    def writable(self):
+        return True
+
+    def write(self, data):
+        if self.gone:
+            raise BrokenPipeError
+        return len(data)
+
+
+@pytest.mark.parametrize("arguments", [["design", "--schema"], ["design", "minimal_trunk"]])
+def test_a_reader_that_has_gone_ends_a_command_without_a_word(arguments, streams):
+    out, err = streams("utf-8", pipe := Gone())
+    assert run(arguments) == 141
+    assert "rror" not in printed(err)
+    pipe.gone = False
+    out.close()
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full on this system")
+@pytest.mark.parametrize("arguments", [["--help"], ["design", "--schema"], ["--version"]])
+def test_results_that_cannot_be_written_are_an_error(arguments, streams):
+    out, err = streams("utf-8", io.FileIO("/dev/full", "w"))
+    assert run(arguments) == 2
+    out.close()
+    assert "No space left on device" in printed(err)
+    assert printed(err).count("\n") == 1
+
+
+@pytest.mark.parametrize("width", ["1", "20", "200", "0", "-3", "wide"])
+@pytest.mark.parametrize("arguments", [["--help"], ["cloud", "--help"]], ids=" ".join)
+def test_help_is_whole_on_terminals_of_every_width(arguments, width, streams, monkeypatch):
+    monkeypatch.setenv("COLUMNS", width)
+    out, _ = streams("ascii")
+    assert run(arguments) == 0
+    letters = "".join(printed(out).split())
+    assert "softreachdemo--outout" in letters or "--sampler" in letters
+
+
+@pytest.mark.parametrize("variable", ["NO_COLOR", "FORCE_COLOR", "TERM", "LINES"])
+def test_colors_and_terminals_that_are_asked_for_change_no_word(variable, streams, monkeypatch):
+    out, _ = streams("ascii")
+    assert run(["design", "nowhere.toml"]) == 2
+    monkeypatch.setenv(variable, "dumb")
+    again, err = streams("ascii")
+    assert run(["design", "nowhere.toml"]) == 2
+    assert printed(again) == printed(out)
+    assert "\x1b" not in printed(err)
+
+
+def test_a_backend_that_does_not_exist_is_named(monkeypatch):
+    from softreach.errors import InvalidInput
+    from softreach.plot.style import pyplot
+
+    monkeypatch.setenv("MPLBACKEND", "nonsense")
+    for name in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"]:
+        monkeypatch.delitem(sys.modules, name)
+    with pytest.raises(InvalidInput, match="MPLBACKEND = nonsense"):
+        pyplot()
+
+
+START = f"{sys.executable} -m softreach"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("line", "code", "error"),
+    [
+        (f"{START} --help | head -1", 0, ""),
+        (f"{START} --help >&-", 0, ""),
+        (f"{START} --help 2>&-", 0, ""),
+        (f"{START} --help <&-", 0, ""),
+        (f"{START} design nowhere.toml 2>&-", 2, ""),
+        (f"{START} design nowhere.toml 2>/dev/full", 2, ""),
+        (f"{START} --help >/dev/full", 2, "No space left on device"),
+        (f"LC_ALL=C PYTHONUTF8=0 PYTHONCOERCECLOCALE=0 {START} --help", 0, ""),
+        (f"PYTHONIOENCODING=ascii {START} volume --help", 0, ""),
+        (f"MPLBACKEND=nonsense {START} show minimal_trunk --n 500 --out a.png", 0, ""),
+    ],
+)
+def test_processes_end_as_they_should(line, code, error, tmp_path):
+    command = ["bash", "-c", f"set -o pipefail; {line}" if "|" not in line else line]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert done.returncode == code
+    assert "Traceback" not in done.stderr
+    assert error in done.stderr
+    if not error:
+        assert not [one for one in done.stderr.splitlines() if not one.startswith("softreach: ")]
