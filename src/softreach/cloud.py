@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach import parallel, schema
+from softreach.arguments import checked, dataset, function, optional, path
 from softreach.arm.manipulator import Manipulator
 from softreach.atomic import replacing
 from softreach.errors import InvalidInput
@@ -22,6 +23,7 @@ from softreach.rod.measured_bundles import MeasuredBundles
 from softreach.rod.stable_tips import StableTips
 from softreach.rod.tip_map import BLOCK, TipMap, tip_map
 from softreach.sampling import check_sampler, cube_blocks
+from softreach.schema import a_cloud
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,6 +33,7 @@ __all__ = ["compute_cloud", "design_of", "open_cloud", "save_cloud", "tip_map_of
 Array = NDArray[np.float64]
 
 
+@checked(progress=optional(function))
 def compute_cloud(
     arm: Manipulator | TipMap,
     n: int = 400_000,
@@ -78,6 +81,7 @@ def compute_cloud(
     return schema.with_status(cloud, status) if rod.supports_unstable else cloud
 
 
+@checked(cloud=a_cloud, path=path)
 def save_cloud(cloud: xr.Dataset, path: str | PathLike[str]) -> None:
     """Write a cloud as a Zarr v3 store; it appears whole, in place of an older one, or not at all.
 
@@ -93,6 +97,7 @@ def save_cloud(cloud: xr.Dataset, path: str | PathLike[str]) -> None:
         )
 
 
+@checked(path=path)
 def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
     """Read a cloud that `save_cloud` wrote.
 
@@ -117,11 +122,13 @@ def _few_chunks_at_a_time() -> AbstractContextManager[object]:
     return zarr.config.set({"async.concurrency": min(4, parallel.thread_count())})
 
 
+@checked(cloud=dataset())
 def design_of(cloud: xr.Dataset) -> Manipulator:
     """The design that a cloud or configuration was computed from."""
     return Manipulator.from_toml(cloud.attrs["design"], source="the cloud's design")
 
 
+@checked(cloud=dataset())
 def tip_map_of(cloud: xr.Dataset) -> TipMap:
     """The tip map that a cloud was computed with."""
     return tip_map(design_of(cloud), float(cloud.attrs["tol"]))

@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
+from softreach.arguments import checked, whole
 from softreach.arm.manipulator import Manipulator
+from softreach.arrays import as_floats, as_shares
 from softreach.cloud import tip_map_of
 from softreach.errors import InvalidInput
-from softreach.rod.activation_box import as_floats
 from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import Strains, TipMap, tip_map
-from softreach.schema import provenance
+from softreach.schema import a_cloud, provenance
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,6 +49,7 @@ QUANTITIES = {
 _AT_A_TIME = 1 << 19  # samples times stations whose strains stay in the cache
 
 
+@checked(cloud=a_cloud, bins=whole(1, 1 << 24), quantiles=as_shares)
 def curvature_statistics(
     cloud: xr.Dataset,
     stations: ArrayLike | None = None,
@@ -84,6 +86,7 @@ def curvature_statistics(
     )
 
 
+@checked(bins=whole(1, 1 << 24), quantiles=as_shares)
 def stream_statistics(
     arm: Manipulator | TipMap,
     activations: Iterable[Array],
@@ -107,7 +110,6 @@ def stream_statistics(
     rod = stable_tips(tip_map(arm))
     asked = distal_stations(rod) if stations is None else stations
     z = rod.check_stations(np.atleast_1d(as_floats("stations", asked)), ascending=False)
-    _check_resolution(bins, quantiles)
     ranges = rod.strain_range(z)._asdict()
     tallies = {name: _Tally.between(ranges[name], bins) for name in QUANTITIES}
     for strains in _strains(rod, activations, z):
@@ -119,6 +121,7 @@ def stream_statistics(
     return _dataset(rod, z, tallies, quantiles)
 
 
+@checked(count=whole(1, 1 << 24))
 def distal_stations(arm: Manipulator | TipMap, count: int = 6) -> Array:
     """Even stations from the middle of the arm to its tip, both included, Z [m] (figure 3c)."""
     return np.linspace(0.5, 1.0, count) * arm.length
@@ -230,11 +233,3 @@ def _dataset(
     samples = int(tallies["bending"].count[0].sum())
     attrs = {**provenance(rod.arm), "length": rod.length, "samples": samples}
     return xr.Dataset(variables, coordinates, attrs)
-
-
-def _check_resolution(bins: int, quantiles: Sequence[float]) -> None:
-    if bins < 1:
-        raise InvalidInput("bins", bins, "1 or more")
-    shares = np.asarray(quantiles, float)
-    if not shares.size or not ((shares >= 0) & (shares <= 1)).all():
-        raise InvalidInput("quantiles", quantiles, "numbers in [0, 1]")

@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-__all__ = ["free_memory"]
+from softreach.errors import InvalidInput, in_short
+
+__all__ = ["check_room", "free_memory"]
 
 _UNKNOWN = 4e9  # where the system does not say
 
@@ -14,6 +16,25 @@ def free_memory() -> float:
     """Memory that can be had without swapping [bytes], or 4e9 where the system does not say."""
     free = min(_system(), _control_group())
     return free if free < float("inf") else _UNKNOWN
+
+
+def check_room(name: str, rows: int, columns: int) -> None:
+    """Refuse a number of rows for which there is no memory, before any is asked for.
+
+    Args:
+        name: What errors call that number.
+        rows: How many.
+        columns: Doubles that each row takes.
+
+    Raises:
+        InvalidInput: They would take more memory than there is.
+    """
+    each = 8 * columns
+    if (needed := each * rows) > (free := free_memory()):
+        text = f"{needed / 1e9:,.3g}" if needed < 1e300 else "endless"
+        found = f"{in_short(f'{rows:,}')} ({text} GB)" if rows < 10**30 else "a number beyond 1e30"
+        allowed = f"at most {int(free) // each:,}, for which there is memory"
+        raise InvalidInput(name, found, f"{allowed} ({free / 1e9:.2g} GB free)")
 
 
 def _system() -> float:

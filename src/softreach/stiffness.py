@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
+from softreach.arguments import checked
 from softreach.arm.manipulator import Manipulator
+from softreach.arrays import as_floats
 from softreach.cloud import tip_map_of
 from softreach.errors import InvalidDesign, InvalidInput
-from softreach.rod.activation_box import as_floats
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.tip_map import BLOCK, TipMap, tip_map
-from softreach.schema import AXES, check_cloud
+from softreach.schema import AXES, a_cloud, check_cloud
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -118,6 +119,7 @@ def stiffness_along(compliance: ArrayLike, direction: ArrayLike) -> Array:
         return 1.0 / np.einsum("na,nab,nb->n", d, matrices, d)
 
 
+@checked(cloud=a_cloud)
 def cloud_compliance(cloud: xr.Dataset) -> xr.Dataset:
     """The compliance of the tip at each sample of a cloud.
 

@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach import parallel
+from softreach.arguments import POSITIVE, as_given, checked, flag, plain
+from softreach.arrays import as_floats, as_points
 from softreach.errors import InvalidInput, SoftreachWarning
 from softreach.geometry import hull as hulls
 from softreach.geometry.alpha_shape import AlphaComplex
-from softreach.geometry.delaunay import delaunay, finite_points
+from softreach.geometry.delaunay import delaunay
 from softreach.geometry.hull import Hull
 from softreach.schema import is_stable
 
@@ -30,6 +32,7 @@ QUARTER_SPACINGS = 2.5  # below, V(N/4) leaves the law N^-1/2: design/triangulat
 Method = Literal["auto", "numba", "qhull"]
 
 
+@checked(bias=flag)
 def concave_hull(
     points: np.ndarray | xr.DataArray,
     alpha: float | str | None = None,
@@ -146,10 +149,13 @@ def volume_curve(
         Volumes [m³], shape of the radii.
 
     Raises:
-        InvalidInput: Points of another shape, or not finite.
+        InvalidInput: Points of another shape, or not finite; radii that are negative or NaN.
     """
+    radii = as_floats("alphas", alphas)
+    if not (radii >= 0).all():  # NaN too
+        raise InvalidInput("alphas", radii, "radii of 0 or more [m]")
     shape = _alpha_complex(_positions(points), method)
-    return np.asarray(shape.volume(np.asarray(alphas, dtype=float)))
+    return np.asarray(shape.volume(radii))
 
 
 def _positions(points: np.ndarray | xr.DataArray) -> np.ndarray:
@@ -157,12 +163,12 @@ def _positions(points: np.ndarray | xr.DataArray) -> np.ndarray:
 
     Of an arm under loads those tips that are stable equilibria.
     """
-    array = np.asarray(points)
+    array = as_floats("points", points)
     if getattr(points, "dims", None) == ("axis", "sample"):
         array = array.T
     if not isinstance(points, np.ndarray) and "status" in getattr(points, "coords", ()):
         array = array[is_stable(points)]
-    return finite_points(array)
+    return as_points("points", array)
 
 
 def _radius(alpha: float | str | None, points: np.ndarray | xr.DataArray) -> float | str:
@@ -174,9 +180,10 @@ def _radius(alpha: float | str | None, points: np.ndarray | xr.DataArray) -> flo
         if alpha != "critical":
             raise InvalidInput("alpha", repr(alpha), allowed)
         return alpha
-    if not alpha > 0:  # NaN too
-        raise InvalidInput("alpha", alpha, allowed)
-    return float(alpha)
+    radius = plain(alpha)
+    if POSITIVE.admits(radius) or (isinstance(radius, float) and radius == np.inf):
+        return float(radius)  # infinity keeps every tetrahedron
+    raise InvalidInput("alpha", as_given(alpha), allowed)
 
 
 def _default_radius(points: np.ndarray | xr.DataArray) -> float:

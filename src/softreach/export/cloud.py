@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softreach.arguments import checked, dataset, path
 from softreach.errors import InvalidInput
 from softreach.export import ply
 from softreach.export.formats import load_library, write_by_suffix
@@ -22,6 +23,7 @@ __all__ = ["export_cloud"]
 _MAT_LIMIT = 2**31  # bytes of one variable in a version 5 file
 
 
+@checked(cloud=dataset("tip", "activation", what="a cloud"), path=path)
 def export_cloud(cloud: xr.Dataset, path: str | PathLike[str]) -> None:
     """Write a cloud as .ply, .csv, .parquet, .npz, .mat, .vtu or .vtk, chosen by the suffix.
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arguments import checked, path
 from softreach.arrays import Faces
 from softreach.errors import InvalidInput
 from softreach.export import ply
@@ -34,6 +35,7 @@ class Part(NamedTuple):
     opacity: float = 1.0
 
 
+@checked(path=path)
 def export_mesh(
     mesh_or_hull: SurfaceMesh | tuple[ArrayLike, ArrayLike], path: str | PathLike[str]
 ) -> None:

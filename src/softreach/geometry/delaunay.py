@@ -7,12 +7,12 @@ from typing import Literal
 
 import numpy as np
 
-from softreach.arrays import Points
-from softreach.errors import InvalidInput
+from softreach.arguments import one_of
+from softreach.arrays import Points, as_points
 from softreach.kernels.delaunay import triangulate
 from softreach.kernels.spatial_sort import insertion_order
 
-__all__ = ["Delaunay", "delaunay", "finite_points", "unit_scale"]
+__all__ = ["Delaunay", "delaunay", "unit_scale"]
 
 FINEST = 200  # bits below the largest coordinate that `kernels.predicates` may see
 METHODS = ("auto", "numba", "qhull")
@@ -51,34 +51,13 @@ def delaunay(points: np.ndarray, method: Literal["auto", "numba", "qhull"] = "au
     Raises:
         InvalidInput: Points of another shape, or not finite; an unknown method.
     """
-    points = finite_points(points)
-    if method not in METHODS:
-        raise InvalidInput("method", repr(method), f"one of {', '.join(METHODS)}")
+    points = as_points("points", points)
+    one_of(METHODS)("method", method)
     build = _by_qhull if method == "qhull" else _by_insertion
     tetrahedra, neighbors, duplicate_of = build(unit_scale(points)[0])
     return Delaunay(
         points=points, tetrahedra=tetrahedra, neighbors=neighbors, duplicate_of=duplicate_of
     )
-
-
-def finite_points(points: object) -> Points:
-    """Points as floats in memory order, shape (n, 3), or a clear error.
-
-    Raises:
-        InvalidInput: Another shape, or rows that are not finite.
-    """
-    array = np.ascontiguousarray(points, dtype=np.float64)
-    if array.size == 0:
-        return array.reshape(0, 3)
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise InvalidInput("points", f"array of shape {array.shape}", "of shape (n, 3) [m]")
-    wrong = np.flatnonzero(~np.isfinite(array).all(axis=1))
-    if len(wrong):
-        found = f"{len(wrong)} rows with NaN or infinity, the first at index {wrong[0]}"
-        raise InvalidInput(
-            "points", found, "finite", "drop these rows, or find out where they come from"
-        )
-    return array
 
 
 def unit_scale(points: Points) -> tuple[Points, int]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
+from softreach.arguments import checked, flag
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
 from softreach.inverse.branches import distinct, every_branch
@@ -39,6 +40,7 @@ _NEARLY = 1e-2  # gap in L at which a target may have a root where ∂r/∂γ is
 _BLOCK = 32_768  # targets at once: bounds the memory of a call
 
 
+@checked(prove_least=flag)
 def solve_inverse(
     arm: Manipulator | TipMap | PreparedMap,
     targets: ArrayLike,

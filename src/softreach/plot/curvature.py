@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arguments import checked, dataset, mapping_of
 from softreach.errors import InvalidInput
+from softreach.plot.arguments import AX
 from softreach.plot.lengths import LengthUnit, common_unit, unit_of
 from softreach.plot.style import figure_style, small_axes
 
@@ -25,6 +27,7 @@ _SYMBOLS = {"bending": "κ", "torsion": "$u_3$", "extension": "ζ"}
 _BINS = 64
 
 
+@checked(statistics=mapping_of(dataset("bending_count", "Z")), ax=AX)
 def plot_curvature(
     statistics: Mapping[str, xr.Dataset], *, ax: Axes | None = None, quantity: str = "bending"
 ) -> Axes:

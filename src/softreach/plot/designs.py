@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from softreach.arguments import checked, optional
 from softreach.arm_shape import rest_configuration
+from softreach.arrays import as_floats
 from softreach.picture.projection import View
+from softreach.plot.arguments import WIDTH
 from softreach.plot.arm import arm_points, plot_arm
 from softreach.plot.cross_section import plot_cross_section, section_reach
 from softreach.plot.frame import bounding_box
@@ -32,6 +35,7 @@ class DesignPanel(NamedTuple):
     """Which to draw, by index; None for all."""
 
 
+@checked(stations_over_length=as_floats, width=optional(WIDTH))
 def plot_designs(
     panels: Sequence[DesignPanel],
     *,

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arguments import checked, instance
 from softreach.picture.projection import View, is_mirrored, project, view_axes
+from softreach.plot.arguments import DRAWN
 from softreach.plot.arm import arm_points, draw_arms, shapes_of
 from softreach.plot.frame import Panel
 from softreach.plot.lengths import in_lengths
@@ -33,6 +35,7 @@ _LEAST_WIDTH, _ENTRY = 2.6, 0.18  # of figures, and the height of an entry of th
 _ABOVE = 4  # the order of lines over images
 
 
+@checked(**DRAWN, equilibria=instance(AllEquilibria, "what `softreach.equilibria` returned"))
 def plot_equilibria(
     equilibria: AllEquilibria,
     *,

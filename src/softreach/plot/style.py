@@ -6,8 +6,9 @@ from contextlib import AbstractContextManager, nullcontext
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
+from softreach.arguments import as_given, checked, path
 from softreach.atomic import replacing
-from softreach.errors import MissingExtra
+from softreach.errors import InvalidInput, MissingExtra
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,6 +66,14 @@ def small_axes(width: float = 3.4, height: float = 2.8) -> Axes:
     return pyplot().subplots(figsize=(width, height), layout="constrained")[1]
 
 
+def _drawn(name: str, value: Any) -> Any:
+    """A figure, or axes in it."""
+    if hasattr(value, "get_figure") and not isinstance(value, type):
+        return value
+    raise InvalidInput(name, as_given(value), "a figure or axes of matplotlib")
+
+
+@checked(figure=_drawn, path=path)
 def save_figure(figure: Figure | Axes, path: str | PathLike[str]) -> None:
     """Save as .png, .pdf, .svg or another format that matplotlib knows, whole or not at all.
 

@@ -19,11 +19,11 @@ from numpy.typing import ArrayLike, NDArray
 from softreach import schema
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
+from softreach.arrays import as_floats
 from softreach.errors import InvalidInput, SoftreachWarning
 from softreach.geometry.sphere_mesh import icosphere
 from softreach.geometry.sphere_rings import is_axisymmetric, pole_rings
 from softreach.geometry.sphere_roots import Map, Roots, polished_roots, sphere_roots
-from softreach.rod.activation_box import as_floats
 from softreach.rod.equilibrium import Solver
 from softreach.rod.free import FreeRod
 from softreach.rod.kinematics import configuration, even_stations

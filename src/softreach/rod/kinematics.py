@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import schema
+from softreach.arguments import as_given, plain
 from softreach.arm.manipulator import Manipulator
+from softreach.arrays import as_floats
 from softreach.errors import InvalidInput
-from softreach.rod.activation_box import as_floats
+from softreach.memory import check_room
 from softreach.rod.tip_map import TipMap, tip_map
 
 if TYPE_CHECKING:
@@ -22,6 +24,8 @@ if TYPE_CHECKING:
 __all__ = ["configuration", "even_stations", "tip_jacobian", "tip_positions"]
 
 Array = NDArray[np.float64]
+
+_COLUMNS = 64  # numbers at a station of one sample, those that come and go included
 
 
 def tip_positions(arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6) -> Array:
@@ -85,8 +89,11 @@ def configuration(
         InvalidInput: Activations or stations of another shape or out of range.
     """
     rod = tip_map(arm, tol)
-    gamma = rod.box.check(np.atleast_2d(as_floats("activation", activation)))
-    z = even_stations(rod, stations) if np.ndim(stations) == 0 else rod.check_stations(stations)
+    given = as_floats("activation", activation)
+    gamma = rod.box.check(np.atleast_2d(given))
+    several = isinstance(stations, list | tuple) or getattr(stations, "ndim", 0) > 0
+    columns = _COLUMNS * max(1, len(gamma))
+    z = rod.check_stations(stations) if several else even_stations(rod, stations, columns)
     position, directors = rod.frames(gamma, z)
     curvature, extension = rod.strains(gamma, z)
     dataset = schema.configuration_dataset(
@@ -101,11 +108,22 @@ def configuration(
     )
     if rod.supports_unstable:
         dataset = schema.with_status(dataset, rod.status(gamma))
-    return dataset.isel(sample=0) if np.ndim(activation) == 1 else dataset
+    return dataset.isel(sample=0) if given.ndim == 1 else dataset
 
 
-def even_stations(rod: TipMap, stations: object) -> Array:
-    """Z [m] of a number of stations, evenly spaced from base to tip."""
-    if isinstance(stations, bool) or not isinstance(stations, int | np.integer) or stations < 2:
-        raise InvalidInput("stations", stations, "2 or more, or the stations' Z in m")
-    return np.linspace(0.0, rod.length, int(stations))
+def even_stations(rod: TipMap, stations: object, columns: int = 1) -> Array:
+    """Z [m] of a number of stations, evenly spaced from base to tip.
+
+    Args:
+        rod: Whose base and tip.
+        stations: How many, 2 or more.
+        columns: Numbers that are computed at each; there must be memory for them.
+
+    Raises:
+        InvalidInput: No such number, or one so large that there is no memory.
+    """
+    number = plain(stations)
+    if isinstance(number, bool) or not isinstance(number, int) or number < 2:
+        raise InvalidInput("stations", as_given(stations), "2 or more, or the stations' Z in m")
+    check_room("stations", number, columns)
+    return np.linspace(0.0, rod.length, number)

@@ -17,10 +17,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
+from softreach.arguments import as_given, checked, flag
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.weight import VERIFIED_LOAD_NUMBER, is_overloaded
+from softreach.arrays import as_floats
 from softreach.errors import InvalidInput, SoftreachWarning, counted
-from softreach.rod.activation_box import ActivationBox, as_floats
+from softreach.rod.activation_box import ActivationBox
 from softreach.rod.steps import check_tol
 
 __all__ = [
@@ -268,7 +270,7 @@ class TipMap(ABC):
         inside = z.ndim == 1 and z.size > 0 and ((z >= 0) & (z <= self.length)).all()
         if not inside or (ascending and (np.diff(z) < 0).any()):
             order = "ascending " if ascending else ""
-            raise InvalidInput("stations", stations, f"{order}Z within [0, {self.length:g}] m")
+            raise InvalidInput("stations", z, f"{order}Z within [0, {self.length:g}] m")
         return z
 
     def __repr__(self) -> str:
@@ -285,6 +287,7 @@ def position_slopes(tips: Array, twists: Array, slopes: Array) -> None:
         slopes[:, i] += w[:, j] * tips[:, k, None] - w[:, k] * tips[:, j, None]
 
 
+@checked(warn=flag)
 def tip_map(arm: Manipulator | TipMap, tol: float = 1e-6, *, warn: bool = True) -> TipMap:
     """The tip map of an arm, kept for the next call; a tip map is returned as it is.
 
@@ -300,7 +303,7 @@ def tip_map(arm: Manipulator | TipMap, tol: float = 1e-6, *, warn: bool = True) 
     if isinstance(arm, TipMap):
         return arm
     if not isinstance(arm, Manipulator):
-        raise InvalidInput("arm", f"{arm!r:.80}", "a Manipulator or a TipMap")
+        raise InvalidInput("arm", as_given(arm), "a Manipulator or a TipMap")
     rod = _of_arm(arm, check_tol(tol))
     if warn and arm.loads is not None:
         _warn_of_large_loads(arm)

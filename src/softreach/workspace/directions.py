@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach import parallel
+from softreach.arguments import POSITIVE, checked, optional, within
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
 from softreach.rod.settled import check_settled
@@ -28,6 +29,7 @@ _PER_CELL = 64  # samples in a cell of the bounding box, on average
 _STEPS = 32  # the cone is then too wide by some percent at most
 
 
+@checked(cell=optional(within(POSITIVE._replace(unit="m"))))
 def direction_spread(
     arm: Manipulator | TipMap,
     *,

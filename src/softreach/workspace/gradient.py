@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.manipulator import Manipulator
+from softreach.arguments import checked, function, optional, within
+from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters
 from softreach.errors import InvalidInput
 from softreach.progress import Progress, silent
@@ -19,7 +20,7 @@ from softreach.schema import provenance
 from softreach.workspace.flux import Flux, flux_tol, signed_volume
 from softreach.workspace.hull_corners import HullCorners, hull_corners
 from softreach.workspace.measure import Estimate
-from softreach.workspace.reach import rasterized_set, reachable_set
+from softreach.workspace.reach import ACCURACIES, rasterized_set, reachable_set
 from softreach.workspace.shifts import Shifts, shifts_along
 from softreach.workspace.solid import ReachableSolid
 
@@ -102,6 +103,7 @@ _MEANINGS = {
 }
 
 
+@checked(arm=a_manipulator, accuracy=within(ACCURACIES), progress=optional(function))
 def volume_gradient(
     arm: Manipulator,
     parameters: str | Sequence[str],

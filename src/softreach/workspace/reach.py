@@ -10,8 +10,9 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arguments import POSITIVE, checked, function, optional, within
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import InvalidInput, SoftreachWarning
+from softreach.errors import InvalidInput, Range, SoftreachWarning
 from softreach.memory import free_memory
 from softreach.progress import Progress, silent
 from softreach.rod.tip_map import TipMap, tip_map
@@ -27,16 +28,25 @@ from softreach.workspace.solid import ReachableSolid
 from softreach.workspace.tears import coarser, finer, left_out_cells
 from softreach.workspace.thin import thin_set
 
-__all__ = ["rasterized_set", "reachable_set"]
+__all__ = ["ACCURACIES", "rasterized_set", "reachable_set"]
 
 Array = NDArray[np.float64]
 
 T = TypeVar("T")
 
+ACCURACIES = Range(1e-6, 0.2)
+"""Relative errors of a volume that can be asked for."""
+
 _MOST_VERTICES = 3.3e6  # of the activation grid
 _MOST_CELLS = 2.0**26
 
 
+@checked(
+    accuracy=within(ACCURACIES),
+    cell=optional(within(POSITIVE._replace(unit="m"))),
+    memory=optional(within(POSITIVE._replace(unit="bytes"))),
+    progress=optional(function),
+)
 def reachable_set(
     arm: Manipulator | TipMap,
     *,
@@ -93,8 +103,6 @@ def reachable_set(
     Warns:
         SoftreachWarning: The estimated error is larger than asked.
     """
-    if not 1e-6 <= accuracy <= 0.2:
-        raise InvalidInput("accuracy", accuracy, "1e-6 to 0.2")
     rod = tip_map(arm, tol)
     m = rod.box.dimension
     if m < 3:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from softreach.arm.manipulator import Manipulator
+from softreach.arguments import checked, text
+from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.of_arm import by_ring_name, parameters
 from softreach.arm.parameters.parameter import Parameter
@@ -24,6 +25,7 @@ def parameters_by_every_name(arm: Manipulator) -> dict[str, Parameter]:
     }
 
 
+@checked(arm=a_manipulator, name=text)
 def find_parameter(arm: Manipulator, name: str) -> Parameter:
     """The parameter of this name.
 
@@ -57,6 +59,7 @@ def find_parameters(
     return {asked[one]: _renamed(known[one], asked[one]) for one in known if one in asked}
 
 
+@checked(arm=a_manipulator)
 def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
     """The design with these parameters, everything else unchanged.
 

@@ -11,6 +11,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
+from softreach.arguments import checked, path
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidDesign, InvalidInput
 from softreach.exchange.activefilaments.constructors import filament_from
@@ -30,6 +31,7 @@ _PASSED_OVER = {"using", "import", "export", "@"}
 _ASSIGNMENTS = {f"{dot}{sign}=" for dot in ("", ".") for sign in ("", *"+-*/^")}
 
 
+@checked(path=path)
 def read_design(path: str | PathLike[str]) -> Manipulator:
     """Read the definition of a filament from Julia source for ActiveFilaments.jl.
 

@@ -7,8 +7,9 @@ from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 
+from softreach.arguments import checked, path
 from softreach.arm.along import Pieces
-from softreach.arm.manipulator import Manipulator
+from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.atomic import replacing
 from softreach.exchange.activefilaments.filament import (
     Angle,
@@ -26,6 +27,7 @@ using ActiveFilaments
 """
 
 
+@checked(arm=a_manipulator, path=path)
 def write_design(arm: Manipulator, path: str | PathLike[str]) -> None:
     """Write a Julia script that defines the filament of ActiveFilaments.jl with an arm's tips.
 
@@ -42,6 +44,7 @@ def write_design(arm: Manipulator, path: str | PathLike[str]) -> None:
         Path(partial).write_text(script, encoding="utf-8")
 
 
+@checked(arm=a_manipulator)
 def design_script(arm: Manipulator) -> str:
     """The text that `write_design` writes.
 
