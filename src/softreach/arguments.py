@@ -33,6 +33,8 @@ __all__ = [
     "function",
     "instance",
     "mapping_of",
+    "name_or_index",
+    "names",
     "one_of",
     "optional",
     "path",
@@ -194,6 +196,31 @@ def path(name: str, value: object) -> str:
     raise InvalidInput(name, as_given(value), "a path: text that is not empty, or a pathlib.Path")
 
 
+def name_or_index(name: str, value: object) -> str | int:
+    """Text or a whole number; which there are is known elsewhere.
+
+    Raises:
+        InvalidInput: Anything else.
+    """
+    found = plain(value)
+    if isinstance(found, str | int) and not isinstance(found, bool):
+        return found
+    raise InvalidInput(name, as_given(value), "a name or an index")
+
+
+def names(name: str, value: object) -> tuple[str, ...]:
+    """One name or a sequence of names.
+
+    Raises:
+        InvalidInput: Anything else.
+    """
+    if isinstance(value, str):
+        return (value,)
+    if isinstance(value, list | tuple | Mapping) and all(isinstance(one, str) for one in value):
+        return tuple(value)
+    raise InvalidInput(name, as_given(value), "a name, or a list or tuple of names")
+
+
 def function(name: str, value: object) -> Callable[..., Any]:
     """What can be called.
 
@@ -237,7 +264,9 @@ def as_whole_number(name: str, value: object, low: int = 0, high: float = math.i
 
 def plain(value: Any) -> Any:
     """A value of Python for a scalar of NumPy or an array of no dimensions; others as they are."""
-    return value.item() if hasattr(value, "item") and getattr(value, "ndim", 1) == 0 else value
+    if getattr(value, "ndim", 1) == 0 and hasattr(value, "item"):
+        return value if getattr(value, "mask", False) else value.item()
+    return value
 
 
 def as_given(value: object) -> object:

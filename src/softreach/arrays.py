@@ -17,6 +17,7 @@ from softreach.errors import InvalidInput
 __all__ = [
     "Faces",
     "Points",
+    "as_faces",
     "as_floats",
     "as_indices",
     "as_points",
@@ -156,6 +157,23 @@ def as_indices(name: str, values: object, count: int, what: str) -> NDArray[np.i
         found = f"indices from {array.min():,} to {array.max():,}"
         raise InvalidInput(name, found, allowed)
     return array.astype(np.intp)
+
+
+def as_faces(name: str, values: object, count: int) -> Faces:
+    """Triangles whose corners are indices from 0 to count - 1, shape (f, 3).
+
+    Raises:
+        InvalidInput: Other numbers, or of another shape.
+    """
+    allowed = f"of shape (f, 3), whole numbers from 0 to {count - 1:,}"
+    faces = _array(name, values, allowed)
+    if faces.size == 0:
+        return np.empty((0, 3), np.int64)
+    if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu":
+        raise InvalidInput(name, _described(values, faces), allowed)
+    if not (faces.min() >= 0 and faces.max() < count):
+        raise InvalidInput(name, f"indices from {faces.min():,} to {faces.max():,}", allowed)
+    return faces.astype(np.int64)
 
 
 def _array(name: str, values: object, allowed: str) -> NDArray[Any]:

@@ -6,7 +6,7 @@ box allows, and no array of all samples by stations ever exists.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
-from softreach.arguments import checked, whole
+from softreach.arguments import as_given, checked, whole
 from softreach.arm.manipulator import Manipulator
 from softreach.arrays import as_floats, as_shares
 from softreach.cloud import tip_map_of
 from softreach.errors import InvalidInput
 from softreach.rod.stable_tips import stable_tips
-from softreach.rod.tip_map import Strains, TipMap, tip_map
+from softreach.rod.tip_map import Strains, TipMap, an_arm, tip_map
 from softreach.schema import a_cloud, provenance
 
 if TYPE_CHECKING:
@@ -47,6 +47,13 @@ QUANTITIES = {
 """Quantity -> unit and meaning."""
 
 _AT_A_TIME = 1 << 19  # samples times stations whose strains stay in the cache
+
+
+def _blocks(name: str, value: object) -> object:
+    """Arrays that come one after the other."""
+    if isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping | Set | type):
+        return value
+    raise InvalidInput(name, as_given(value), "an iterable of arrays of shape (n, bundles)")
 
 
 @checked(cloud=a_cloud, bins=whole(1, 1 << 24), quantiles=as_shares)
@@ -86,7 +93,7 @@ def curvature_statistics(
     )
 
 
-@checked(bins=whole(1, 1 << 24), quantiles=as_shares)
+@checked(activations=_blocks, bins=whole(1, 1 << 24), quantiles=as_shares)
 def stream_statistics(
     arm: Manipulator | TipMap,
     activations: Iterable[Array],
@@ -121,7 +128,7 @@ def stream_statistics(
     return _dataset(rod, z, tallies, quantiles)
 
 
-@checked(count=whole(1, 1 << 24))
+@checked(arm=an_arm, count=whole(1, 1 << 24))
 def distal_stations(arm: Manipulator | TipMap, count: int = 6) -> Array:
     """Even stations from the middle of the arm to its tip, both included, Z [m] (figure 3c)."""
     return np.linspace(0.5, 1.0, count) * arm.length
@@ -130,7 +137,8 @@ def distal_stations(arm: Manipulator | TipMap, count: int = 6) -> Array:
 def _strains(rod: TipMap, activations: Iterable[Array], z: Array) -> Iterator[Strains]:
     """Strains, a few samples at a time."""
     strains = rod.strains_at(z)
-    for block in activations:
+    for given in activations:
+        block = rod.box.check(given)
         for rows in parallel.blocks(len(block), max(1, _AT_A_TIME // len(z))):
             found = strains(block[rows])
             yield _in_equilibrium(found) if rod.supports_unstable else found

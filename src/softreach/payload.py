@@ -16,7 +16,7 @@ from softreach.errors import InvalidDesign, InvalidInput
 from softreach.progress import Progress, silent
 from softreach.quantity import quantity
 from softreach.schema import provenance
-from softreach.workspace import reachable_set
+from softreach.workspace.reach import ACCURACIES, reachable_set
 
 if TYPE_CHECKING:
     import xarray as xr

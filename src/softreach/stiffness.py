@@ -181,13 +181,25 @@ def unit_directions(direction: ArrayLike, n: int) -> Array:
     Raises:
         InvalidInput: Another shape, or a direction without length.
     """
-    d = as_floats("direction", direction)
+    d = a_direction("direction", direction)
     if d.shape not in ((3,), (n, 3)):
         raise InvalidInput("direction.shape", d.shape, f"(3,) or ({n}, 3)")
-    size = np.linalg.norm(d, axis=-1, keepdims=True)
+    return np.broadcast_to(d / np.linalg.norm(d, axis=-1, keepdims=True), (n, 3))
+
+
+def a_direction(name: str, value: object) -> Array:
+    """Vectors that have a direction, shape (3,) or (n, 3).
+
+    Raises:
+        InvalidInput: Another shape, numbers that are not finite, or no length.
+    """
+    vectors = as_floats(name, value)
+    if vectors.shape[-1:] != (3,) or vectors.ndim > 2:
+        raise InvalidInput(f"{name}.shape", vectors.shape, "(3,) or (n, 3)")
+    size = np.linalg.norm(vectors, axis=-1)
     if not (np.isfinite(size).all() and (size > 0).all()):
-        raise InvalidInput("direction", direction, "finite vectors longer than 0")
-    return np.broadcast_to(d / size, (n, 3))
+        raise InvalidInput(name, vectors, "finite vectors longer than 0")
+    return vectors
 
 
 def _checked_compliance(compliance: ArrayLike) -> Array:

@@ -52,9 +52,23 @@ def reached():
 
 
 @cache
-def density():
+def grid():
     """A grid over space."""
-    return sr.redundancy.tip_density(cloud())
+    return reached().grid
+
+
+@cache
+def equilibria():
+    """The only one of a light arm."""
+    return sr.equilibria(HEAVY, GAMMA[0])
+
+
+@cache
+def figure():
+    """One without anything."""
+    from matplotlib.figure import Figure
+
+    return Figure()
 
 
 @cache
@@ -160,7 +174,11 @@ CALLS: dict[str, Call] = {
     "arm.Manipulator.with_bounds": Call(
         ARM.with_bounds, lambda: {"activation_bounds": (-1.0, 0.0)}, {"activation_bounds": ARRAY}
     ),
-    "arm.Profile.radius": Call(ARM.profile.radius, lambda: {"z": [0.0]}, {"z": ARRAY}),
+    "arm.Profile.radius": Call(
+        ARM.profile.radius,
+        lambda: {"z": [0.0]},
+        {"z": bad("array", "seven dimensions", "seven columns", "NaN", "infinity")},
+    ),
     "cloud.compute_cloud": Call(
         sr.compute_cloud,
         lambda: {"arm": ARM, "n": 4},
@@ -176,7 +194,9 @@ CALLS: dict[str, Call] = {
     "cloud.design_of": Call(sr.cloud.design_of, lambda: {"cloud": cloud()}, {"cloud": DATA}),
     "cloud.tip_map_of": Call(sr.cloud.tip_map_of, lambda: {"cloud": cloud()}, {"cloud": DATA}),
     "cloud.save_cloud": Call(
-        sr.save_cloud, lambda: {"cloud": cloud()}, {"cloud": DATA, "path": PATH}
+        sr.save_cloud,
+        lambda: {"cloud": cloud(), "path": "missing/x.zarr"},
+        {"cloud": DATA, "path": PATH},
     ),
     "cloud.open_cloud": Call(sr.open_cloud, dict, {"path": PATH}),
     "curvature.curvature_statistics": Call(
@@ -227,12 +247,12 @@ CALLS: dict[str, Call] = {
     ),
     "exchange.activefilaments.write_cloud": Call(
         sr.exchange.activefilaments.write_cloud,
-        lambda: {"cloud": cloud()},
+        lambda: {"cloud": cloud(), "path": "missing/x.csv"},
         {"cloud": DATA, "path": PATH},
     ),
     "exchange.activefilaments.write_design": Call(
         sr.exchange.activefilaments.write_design,
-        lambda: {"arm": sr.designs.filament()},
+        lambda: {"arm": sr.designs.filament(), "path": "missing/x.jl"},
         {"arm": ANY_ARM, "path": PATH},
     ),
     "export.export_arm": Call(
@@ -373,7 +393,9 @@ CALLS: dict[str, Call] = {
         lambda: {"distances": {"a": distance()}},
         {"distances": bad("mapping"), "bins": WHOLE, "width": NUMBER},
     ),
-    "plot.plot_equilibria": Call(sr.plot.plot_equilibria, dict, {"equilibria": DATA, **DRAWN}),
+    "plot.plot_equilibria": Call(
+        sr.plot.plot_equilibria, lambda: {"equilibria": equilibria()}, {"equilibria": DATA, **DRAWN}
+    ),
     "plot.plot_hull": Call(
         sr.plot.plot_hull,
         lambda: {"hull": hull()},
@@ -390,7 +412,7 @@ CALLS: dict[str, Call] = {
         {
             "clouds": bad("mapping"),
             "distances": bad("mapping"),
-            "bundles": bad("mapping", "none"),
+            "bundles": bad("mapping", "none", "a dictionary"),
             "thickness": OPTIONAL_NUMBER,
             "width": NUMBER,
         },
@@ -410,12 +432,12 @@ CALLS: dict[str, Call] = {
     ),
     "plot.plot_slice": Call(
         sr.plot.plot_slice,
-        lambda: {"grid": density()},
+        lambda: {"grid": grid()},
         {"grid": DATA, "ax": AX, "view": VIEW, "at": NUMBER, "key": FLAG},
     ),
     "plot.plot_slices": Call(
         sr.plot.plot_slices,
-        lambda: {"grid": density()},
+        lambda: {"grid": grid()},
         {"grid": DATA, "at": ARRAY, "width": NUMBER},
     ),
     "plot.plot_views": Call(
@@ -443,7 +465,11 @@ CALLS: dict[str, Call] = {
             "convex": OPTIONAL_NUMBER,
         },
     ),
-    "plot.save_figure": Call(sr.plot.save_figure, dict, {"figure": DATA, "path": PATH}),
+    "plot.save_figure": Call(
+        sr.plot.save_figure,
+        lambda: {"figure": figure(), "path": "missing/x.png"},
+        {"figure": DATA, "path": PATH},
+    ),
     "redundancy.activation_distance": Call(
         sr.activation_distance,
         lambda: {"cloud": cloud(), "radius": 0.1},
@@ -515,7 +541,7 @@ CALLS: dict[str, Call] = {
         lambda: {"points": cloud().tip, "alpha": 0.5},
         {
             "points": ARRAY,
-            "alpha": bad("number", "none"),
+            "alpha": bad("number", "none", "infinity"),
             "bias": FLAG,
             "method": WORD,
         },
@@ -524,7 +550,7 @@ CALLS: dict[str, Call] = {
     "volume.unreachability": Call(
         sr.volume.unreachability,
         lambda: {"points": cloud().tip, "alpha": 0.5},
-        {"points": ARRAY, "alpha": bad("number", "none"), "method": WORD},
+        {"points": ARRAY, "alpha": bad("number", "none", "infinity"), "method": WORD},
     ),
     "volume.volume_curve": Call(
         sr.volume.volume_curve,

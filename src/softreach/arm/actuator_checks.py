@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from softreach.arguments import plain
 from softreach.arm.value_checks import (
     as_numbers,
-    plain_number,
     range_faults,
     sound_values,
     text_faults,
@@ -94,7 +94,7 @@ def angle_faults(angle: Any) -> list[Fault]:
 def constant_angle_faults(angle: Any) -> list[Fault]:
     """What is no helical angle that stays the same along the arm."""
     allowed = FIBER_RANGES["helical_angle"]
-    return [] if allowed.admits(plain_number(angle)) else [Fault("helical_angle", angle, allowed)]
+    return [] if allowed.admits(plain(angle)) else [Fault("helical_angle", angle, allowed)]
 
 
 def winding_faults(angle: Any, revolution: Any) -> list[Fault]:
@@ -147,7 +147,7 @@ def one_length_faults(
 def stretch_faults(values: Mapping[str, Any]) -> list[Fault]:
     """Everything wrong with where along the arm an actuator begins and ends."""
     faults = range_faults(values, STRETCH_RANGES)
-    start, end = (plain_number(values[name]) for name in STRETCH_RANGES)
+    start, end = (plain(values[name]) for name in STRETCH_RANGES)
     if not faults and start >= end:
         faults = [Fault("end_over_length", end, f"must be above start_over_length = {start:g}")]
     return faults

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from softreach.arguments import plain
 from softreach.arm.actuator_checks import bounds_faults
-from softreach.arm.value_checks import plain_number, range_faults, sound_values, text_faults
+from softreach.arm.value_checks import range_faults, sound_values, text_faults
 from softreach.errors import Fault, Range
 
 __all__ = [
@@ -70,7 +71,7 @@ def material_faults(values: Mapping[str, Any]) -> list[Fault]:
 def ring_faults(values: Mapping[str, Any]) -> list[Fault]:
     """Everything wrong with the fields of a ring."""
     faults = range_faults(values, RING_RANGES) + text_faults(values)
-    inner, outer = (plain_number(values[name]) for name in RING_RANGES)
+    inner, outer = (plain(values[name]) for name in RING_RANGES)
     if not faults and inner >= outer:
         faults = [Fault("inner_ratio", inner, f"must be below outer_ratio = {outer:g}")]
     return faults
@@ -85,7 +86,7 @@ def section_faults(values: Mapping[str, Any]) -> list[Fault]:
     if max(outer) != 1.0:
         allowed = "must be 1 for the outermost ring, which reaches the surface of the arm"
         faults.append(Fault(f"rings[{int(np.argmax(outer))}].outer_ratio", max(outer), allowed))
-    if not faults and (bore := plain_number(values["bore_ratio"])) > inner:
+    if not faults and (bore := plain(values["bore_ratio"])) > inner:
         allowed = f"must be at most the smallest inner_ratio of the rings, {inner:g}"
         faults.append(Fault("bore_ratio", bore, allowed))
     return faults

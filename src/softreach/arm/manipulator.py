@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arguments import checked, flag, instance, path, text, whole
+from softreach.arguments import checked, flag, instance, name_or_index, path, text, whole
 from softreach.arm import file
 from softreach.arm.actuator_checks import bounds_faults
 from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
@@ -129,7 +129,7 @@ class Manipulator:
         parts = zip(self.actuators, np.split(pairs, ends)[:-1], strict=True)
         return self.replace(actuators=tuple(one.with_bounds(part) for one, part in parts))
 
-    @checked(count=whole(1, 1000), keep_extent=flag)
+    @checked(fiber=name_or_index, count=whole(1, 1000), keep_extent=flag)
     def split(self, fiber: str | int, count: int, *, keep_extent: bool = True) -> Self:
         """Replace an architecture of one bundle by `count` independent ones beside each other.
 

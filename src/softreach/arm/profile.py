@@ -12,8 +12,8 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arguments import plain
 from softreach.arm.checks import PROFILE_RANGES, profile_faults
-from softreach.arm.value_checks import plain_number
 from softreach.arm.variable import Variable
 from softreach.arrays import as_floats
 from softreach.errors import InvalidDesign
@@ -104,7 +104,7 @@ class LinearTaper(Profile):
         if faults := profile_faults(vars(self)):
             raise InvalidDesign(faults)
         for field in PROFILE_RANGES:
-            object.__setattr__(self, field, float(plain_number(getattr(self, field))))
+            object.__setattr__(self, field, float(plain(getattr(self, field))))
 
     @property
     def breakpoints(self) -> tuple[float, ...]:

@@ -10,10 +10,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arguments import plain
 from softreach.arm.along import monotone_cubic
 from softreach.arm.checks import PROFILE_RANGES
 from softreach.arm.profile import Profile, relative_expm1, relative_log
-from softreach.arm.value_checks import INSIDE_RANGE, plain_number, range_faults, series_faults
+from softreach.arm.value_checks import INSIDE_RANGE, range_faults, series_faults
 from softreach.arm.variable import Variable
 from softreach.arrays import as_floats
 from softreach.errors import Fault, InvalidDesign
@@ -55,7 +56,7 @@ class _GivenRadii(Profile):
             faults = [Fault("radii", self.radii, "must be positive, in m")]
         if faults:
             raise InvalidDesign(faults)
-        object.__setattr__(self, "length", float(plain_number(self.length)))
+        object.__setattr__(self, "length", float(plain(self.length)))
         for field in ("stations_over_length", "radii"):
             numbers = np.asarray(getattr(self, field), float).tolist()
             object.__setattr__(self, field, tuple(numbers))

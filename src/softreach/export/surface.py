@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arguments import checked, path
-from softreach.arrays import Faces
+from softreach.arguments import as_given, checked, path
+from softreach.arrays import Faces, as_faces, as_points
 from softreach.errors import InvalidInput
 from softreach.export import ply
 from softreach.export.formats import load_library, write_by_suffix
@@ -35,7 +35,20 @@ class Part(NamedTuple):
     opacity: float = 1.0
 
 
-@checked(path=path)
+def _mesh(name: str, value: Any) -> tuple[NDArray[np.float64], Faces]:
+    """Vertices and faces of a surface, or the pair of them."""
+    allowed = "an object with vertices [m] and faces, or the pair of them"
+    if isinstance(value, tuple) and len(value) == 2:
+        vertices, faces = value
+    elif hasattr(value, "vertices") and hasattr(value, "faces") and not isinstance(value, type):
+        vertices, faces = value.vertices, value.faces
+    else:
+        raise InvalidInput(name, as_given(value), allowed)
+    points = as_points(f"{name}.vertices", vertices)
+    return points, as_faces(f"{name}.faces", faces, len(points))
+
+
+@checked(mesh_or_hull=_mesh, path=path)
 def export_mesh(
     mesh_or_hull: SurfaceMesh | tuple[ArrayLike, ArrayLike], path: str | PathLike[str]
 ) -> None:
@@ -52,10 +65,7 @@ def export_mesh(
         InvalidInput: Unknown suffix, or no triangles to write.
         MissingExtra: The format needs a library that is not installed.
     """
-    pair = mesh_or_hull
-    if not isinstance(pair, tuple):
-        pair = (pair.vertices, pair.faces)
-    vertices, faces = np.asarray(pair[0], float), np.asarray(pair[1], np.int64)
+    vertices, faces = cast("tuple[NDArray[np.float64], Faces]", mesh_or_hull)
     if not len(faces):
         raise InvalidInput("mesh.faces", "none", "at least one triangle")
     write_parts([Part("surface", vertices, faces)], path)

@@ -21,7 +21,7 @@ from softreach.rod.loaded import LoadedRod
 from softreach.rod.pushing_tip import PushingTip
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
-from softreach.stiffness import unit_directions, yielding_rod
+from softreach.stiffness import a_direction, unit_directions, yielding_rod
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,7 +35,7 @@ _OF_TOL = 1e-2  # what the search may use up of the tolerance
 _MOST_STEPS = 256  # along the arm
 
 
-@checked(family=whole(1, 10_000), progress=optional(function))
+@checked(direction=a_direction, family=whole(1, 10_000), progress=optional(function))
 def blocked_force(
     arm: Manipulator | TipMap,
     places: ArrayLike | None,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arguments import checked, dataset, mapping_of
+from softreach.arguments import checked, dataset, mapping_of, one_of
 from softreach.errors import InvalidInput
 from softreach.plot.arguments import AX
 from softreach.plot.lengths import LengthUnit, common_unit, unit_of
@@ -48,8 +48,7 @@ def plot_curvature(
     """
     if not 1 <= len(statistics) <= 2:
         raise InvalidInput("statistics", f"of {len(statistics)} designs", "of one or two")
-    if quantity not in _SYMBOLS:
-        raise InvalidInput("quantity", quantity, f"one of {', '.join(_SYMBOLS)}")
+    one_of(_SYMBOLS)("quantity", quantity)
     unit = common_unit([unit_of(found) for found in statistics.values()])
     places = _common_places(statistics)
     with figure_style(ax):

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from softreach.arguments import checked, optional
+from softreach.arguments import checked, each_of, instance, optional
 from softreach.arm_shape import rest_configuration
-from softreach.arrays import as_floats
+from softreach.arrays import as_stations
+from softreach.errors import InvalidInput
 from softreach.picture.projection import View
 from softreach.plot.arguments import WIDTH
 from softreach.plot.arm import arm_points, plot_arm
@@ -35,7 +36,15 @@ class DesignPanel(NamedTuple):
     """Which to draw, by index; None for all."""
 
 
-@checked(stations_over_length=as_floats, width=optional(WIDTH))
+def _panels(name: str, value: object) -> list[DesignPanel]:
+    """One panel or more."""
+    panels = each_of(instance(DesignPanel, "a DesignPanel"))(name, value)
+    if panels:
+        return panels
+    raise InvalidInput(name, "none", "at least one DesignPanel")
+
+
+@checked(panels=_panels, stations_over_length=as_stations, width=optional(WIDTH))
 def plot_designs(
     panels: Sequence[DesignPanel],
     *,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arguments import as_given, checked, dataset, mapping_of, optional, plain
+from softreach.arguments import checked, dataset, mapping_of, name_or_index, optional
 from softreach.errors import InvalidInput
 from softreach.plot.arguments import LENGTH, POINTS, WIDTH
 from softreach.plot.cloud import drawn_tips, plot_cloud
@@ -33,18 +33,10 @@ _MARGINS = {"left": 0.75, "right": 0.1, "bottom": 0.4, "top": 0.55, "gap": 0.12}
 _COLUMNS = ("cloud", *_SLABS, "distance")
 
 
-def _bundle(name: str, value: object) -> object:
-    """The name or index of a bundle; which there are, the cloud knows."""
-    found = plain(value)
-    if isinstance(found, str) or (isinstance(found, int) and not isinstance(found, bool)):
-        return found
-    raise InvalidInput(name, as_given(value), "the name or index of a bundle")
-
-
 @checked(
     clouds=mapping_of(POINTS),
     distances=mapping_of(dataset(kind="DataArray")),
-    bundles=optional(mapping_of(_bundle)),
+    bundles=optional(mapping_of(name_or_index)),
     thickness=optional(LENGTH),
     width=WIDTH,
 )

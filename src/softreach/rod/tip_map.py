@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
-from softreach.arguments import as_given, checked, flag
+from softreach.arguments import as_given, checked, flag, instance
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.weight import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.arrays import as_floats
@@ -33,6 +33,8 @@ __all__ = [
     "TipMap",
     "TipMotions",
     "TipStatus",
+    "a_tip_map",
+    "an_arm",
     "position_slopes",
     "tip_map",
 ]
@@ -335,3 +337,9 @@ def _warn_of_large_loads(arm: Manipulator) -> None:
             SoftreachWarning,
             stacklevel=3,
         )
+
+
+an_arm = instance((Manipulator, TipMap), "a Manipulator or a TipMap")
+"""An argument that is a design, or its tip map."""
+
+a_tip_map = instance(TipMap, "a TipMap")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arguments import checked, function, optional, within
+from softreach.arguments import checked, function, names, optional, within
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters
 from softreach.errors import InvalidInput
@@ -103,7 +103,9 @@ _MEANINGS = {
 }
 
 
-@checked(arm=a_manipulator, accuracy=within(ACCURACIES), progress=optional(function))
+@checked(
+    arm=a_manipulator, parameters=names, accuracy=within(ACCURACIES), progress=optional(function)
+)
 def volume_gradient(
     arm: Manipulator,
     parameters: str | Sequence[str],
@@ -135,23 +137,21 @@ def volume_gradient(
             that counts something, or one whose change holds or frees a bundle.
         InvalidDesign: The design has no neighbors with other values of a parameter.
     """
-    names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
-    if not names:
+    asked = tuple(parameters)
+    if not asked:
         raise InvalidInput("parameters", "none", "the name of one or more")
-    if not isinstance(arm, Manipulator):
-        raise InvalidInput("arm", f"{arm!r:.80}", "a Manipulator")
-    found = find_parameters(arm, names)
+    found = find_parameters(arm, asked)
     solid = _solid(arm, accuracy)
     base = _Base(solid, accuracy)
     rows = []
-    for name in names:
+    for name in asked:
         rows.append(base.derivatives(found[name]))
         (progress or silent)(1)
     volume, convex = zip(*rows, strict=True)
     return VolumeGradient(
         solid=solid,
-        parameters=names,
-        units=tuple(found[name].unit for name in names),
+        parameters=asked,
+        units=tuple(found[name].unit for name in asked),
         volume=np.array([each.value for each in volume]),
         volume_error=np.array([each.error for each in volume]),
         convex_volume=np.array([each.value for each in convex]),

@@ -10,10 +10,10 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arguments import POSITIVE, checked, function, optional, within
+from softreach.arguments import POSITIVE, as_given, checked, function, optional, plain, within
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput, Range, SoftreachWarning
-from softreach.memory import free_memory
+from softreach.memory import check_room, free_memory
 from softreach.progress import Progress, silent
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.workspace import measure
@@ -38,12 +38,23 @@ ACCURACIES = Range(1e-6, 0.2)
 """Relative errors of a volume that can be asked for."""
 
 _MOST_VERTICES = 3.3e6  # of the activation grid
+_OF_VERTEX = 8  # doubles that a vertex of the grid takes at least
 _MOST_CELLS = 2.0**26
+
+
+def _even(name: str, value: object) -> int:
+    """An even number of cells that fits into memory."""
+    cells = plain(value)
+    if isinstance(cells, int) and cells >= 2 and cells % 2 == 0:
+        check_room(name, (cells + 1) ** 3, _OF_VERTEX)
+        return cells
+    raise InvalidInput(name, as_given(value), "an even number of cells, 2 or more")
 
 
 @checked(
     accuracy=within(ACCURACIES),
     cell=optional(within(POSITIVE._replace(unit="m"))),
+    grid=optional(_even),
     memory=optional(within(POSITIVE._replace(unit="bytes"))),
     progress=optional(function),
 )
@@ -121,7 +132,7 @@ def reachable_set(
 def _of_three(
     rod: TipMap, accuracy: float, cell: float | None, grid: int | None, progress: Progress
 ) -> ReachableSolid:
-    cells = _checked_grid(grid) if grid is not None else _grid_for(accuracy)
+    cells = grid if grid is not None else _grid_for(accuracy)
     if is_one_to_one(rod):
         return solid_by_flux(rod, cells, partial(_lattice, cell=cell, accuracy=accuracy), progress)
     found = rasterized_set(rod, cells, cell, accuracy, progress)
@@ -311,12 +322,6 @@ def _grid_for(accuracy: float) -> int:
     """The rule for n: even, within what memory and patience hold."""
     most = np.cbrt(_MOST_VERTICES) - 1.0
     return max(2, 2 * int(np.ceil(min(np.sqrt(5.0 / accuracy), most) / 2)))
-
-
-def _checked_grid(grid: int) -> int:
-    if isinstance(grid, bool) or int(grid) != grid or grid < 2 or grid % 2:
-        raise InvalidInput("grid", grid, "an even number of cells, 2 or more")
-    return int(grid)
 
 
 def _lattice(tips: Array, *, cell: float | None, accuracy: float) -> Lattice:

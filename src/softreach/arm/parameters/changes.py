@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from softreach.arguments import checked, text
+from softreach.arguments import checked, mapping_of, names, plain, text
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.of_arm import by_ring_name, parameters
 from softreach.arm.parameters.parameter import Parameter
 from softreach.arm.parameters.unknown import unknown_parameter
-from softreach.arm.value_checks import plain_number
 from softreach.errors import Fault, InvalidInput
 
 __all__ = ["changed", "find_parameter", "find_parameters", "parameters_by_every_name"]
@@ -40,6 +39,7 @@ def find_parameter(arm: Manipulator, name: str) -> Parameter:
     return find_parameters(arm, (name,))[name]
 
 
+@checked(arm=a_manipulator, names=names)
 def find_parameters(
     arm: Manipulator, names: Mapping[str, object] | tuple[str, ...]
 ) -> dict[str, Parameter]:
@@ -59,7 +59,7 @@ def find_parameters(
     return {asked[one]: _renamed(known[one], asked[one]) for one in known if one in asked}
 
 
-@checked(arm=a_manipulator)
+@checked(arm=a_manipulator, values=mapping_of(lambda _, value: value))
 def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
     """The design with these parameters, everything else unchanged.
 
@@ -77,7 +77,7 @@ def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
     """
     draft = Draft(arm)
     for name, parameter in find_parameters(arm, tuple(values)).items():
-        value = plain_number(values[name])
+        value = plain(values[name])
         if isinstance(value, int | float) and not isinstance(value, bool):
             parameter.change(draft, value)
         else:
