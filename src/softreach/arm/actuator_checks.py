@@ -20,6 +20,8 @@ from softreach.errors import Fault, Range
 
 __all__ = [
     "FIBER_RANGES",
+    "MOST_BUNDLES",
+    "MOST_TURN",
     "STRETCH_RANGES",
     "actuator_faults",
     "angle_faults",
@@ -35,12 +37,21 @@ __all__ = [
     "winding_faults",
 ]
 
+MOST_TURN = 200 * math.pi
+"""A hundred turns [rad]: steps along the arm grow with them, and with a thousand no tolerance is
+met."""
+
+MOST_BUNDLES = 100
+"""Of a whole arm: the time to bound its bending grows with their square."""
+
+_LARGEST = 1e15  # activation, in any unit: its products stay far from where doubles end
+
 FIBER_RANGES = {
     "helical_angle": Range(-math.pi / 2, math.pi / 2, "rad", open_low=True, open_high=True),
-    "revolution": Range(unit="rad"),
-    "offset": Range(unit="rad"),
+    "revolution": Range(-MOST_TURN, MOST_TURN, "rad"),
+    "offset": Range(-MOST_TURN, MOST_TURN, "rad"),
     "extent": Range(0.0, 2 * math.pi, "rad", open_low=True),
-    "bundles": Range(low=1, high=1000, whole=True),
+    "bundles": Range(low=1, high=MOST_BUNDLES, whole=True),
 }
 
 STRETCH_RANGES = {
@@ -159,8 +170,9 @@ def bounds_faults(bounds: Any, bundles: int | None) -> list[Fault]:
     if pairs.shape[-1:] != (2,) or pairs.ndim > 2 or not pairs.size:
         allowed = "must be a pair (lower, upper), or one such pair for each bundle"
         return [Fault("activation_bounds", bounds, allowed)]
-    if not np.isfinite(pairs).all():
-        return [Fault("activation_bounds", bounds, "must hold finite numbers")]
+    if not (np.abs(pairs) <= _LARGEST).all():  # NaN too
+        allowed = f"must hold finite numbers from -{_LARGEST:g} to {_LARGEST:g}"
+        return [Fault("activation_bounds", bounds, allowed)]
     if (pairs[..., 0] > pairs[..., 1]).any():
         return [Fault("activation_bounds", bounds, "must have lower <= upper")]
     if pairs.ndim == 2 and bundles is not None and len(pairs) != bundles:

@@ -28,16 +28,18 @@ __all__ = [
     "tube_faults",
 ]
 
+# Fourth powers of radii and cubes of lengths stay far from where doubles end, and so does all that
+# is computed from them.
 PROFILE_RANGES = {
-    "length": Range(0.0, unit="m", open_low=True),
-    "outer_radius": Range(0.0, unit="m", open_low=True),
+    "length": Range(1e-9, 1e9, "m"),
+    "outer_radius": Range(1e-12, 1e9, "m"),
     "taper": Range(-math.pi / 2, math.pi / 2, "rad", open_low=True, open_high=True),
 }
 
 MATERIAL_RANGES = {
-    "young_modulus": Range(0.0, unit="Pa", open_low=True),
+    "young_modulus": Range(1e-3, 1e15, "Pa"),
     "poisson_ratio": Range(0.0, 0.5),
-    "density": Range(0.0, unit="kg/m³", open_low=True),
+    "density": Range(1e-6, 1e9, "kg/m³"),
 }
 
 RING_RANGES = {

@@ -24,7 +24,7 @@ _CLEAR = 0.45  # opacity of a body that has something inside
 
 @checked(
     arm=a_manipulator,
-    configuration=dataset("position", "directors", "Z", what="a configuration"),
+    configuration=dataset("position", "directors", "extension", "Z", what="a configuration"),
     path=path,
     sides=whole(3, 10_000),
 )

@@ -32,7 +32,7 @@ __all__ = [
 ]
 
 MANIPULATOR = instance(Manipulator, "a Manipulator")
-SHAPE = dataset("position", "directors", "Z", what="a configuration")
+SHAPE = dataset("position", "directors", "extension", "Z", what="a configuration")
 POINTS = dataset("tip", "activation", what="a cloud")
 LENGTH = within(POSITIVE._replace(unit="m"))
 PLACE = within(Range(unit="m"))
