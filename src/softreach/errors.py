@@ -20,6 +20,10 @@ _LONGEST = 300
 """Characters of a value that an error shows."""
 
 
+_MOST = 30
+"""Faults of a design that an error lists."""
+
+
 def counted(number: int, noun: str) -> str:
     """A number of things in words: "1 design", "2 designs"."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
@@ -136,9 +140,11 @@ class InvalidDesign(SoftreachError, ValueError):
 
     def __init__(self, faults: Sequence[Fault], source: str = "") -> None:
         self.faults = tuple(faults)
-        lines = [str(fault) for fault in self.faults]
+        lines = [str(fault) for fault in self.faults[:_MOST]]
+        if more := len(self.faults) - len(lines):
+            lines.append(f"... and {more:,} more")
         if source:
-            count = counted(len(lines), "problem")
+            count = counted(len(self.faults), "problem")
             super().__init__("\n  ".join([f"{source}: {count}", *lines]))
         else:
             super().__init__("\n".join(lines))

@@ -55,7 +55,8 @@ def concave_hull(
     nor the volume there converges with N, as the most isolated point decides: compare clouds at a
     fixed radius.
 
-    Points in one plane, on one line or fewer than four have volume 0 and no faces.
+    Points in one plane, on one line or fewer than four have volume 0 and no faces; so have more
+    than some hundreds on a curve, such as the tips of one bundle.
 
     Args:
         points: Tips [m], shape (n, 3), or ``cloud.tip``, of which those that are no stable
@@ -128,7 +129,7 @@ def unreachability(
     positions = _positions(points)
     radius = _radius(alpha, points)
     shape = _alpha_complex(positions, method)
-    convex = float(shape.volumes.sum())
+    convex = float(shape.volumes.sum()) or hulls.convex_hull(positions).volume
     hull = shape.hull(shape.critical_alpha() if radius == "critical" else float(radius))
     _warn_if_fine(hull, convex)
     return 1.0 - hull.volume / convex if convex > 0 else np.nan  # theory (37)

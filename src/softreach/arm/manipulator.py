@@ -194,7 +194,7 @@ class Manipulator:
 
         Raises:
             InvalidDesign: The file's faults, all of them, in the file's own names and units.
-            OSError: The file cannot be read.
+            InvalidInput: No file that can be read, or no text in UTF-8.
         """
         return cls.from_toml(file.text_of(path), source=fspath(path))
 

@@ -10,6 +10,7 @@ from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
 from softreach.errors import InvalidDesign, InvalidInput
+from softreach.text_file import MEGABYTE, read_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,6 +30,8 @@ __all__ = [
     "radius_of",
     "shape_of",
 ]
+
+_MOST_TARGETS = 64 * MEGABYTE  # a million targets
 
 Design = Annotated[
     str, Parameter(help="Design file (.toml), or a built-in design such as minimal_trunk.")
@@ -122,9 +125,10 @@ def points_of(text: str | None, file: Path | None) -> list[list[float]]:
     """Positions [m] from `x,y,z`, or from a CSV file with such columns (a header is skipped)."""
     if text is not None:
         return [_position("target", text)]
-    if file is None or not file.is_file():
-        raise InvalidInput("targets", file, "a CSV file that exists")
-    lines = [line for line in file.read_text(encoding="utf-8").splitlines() if line.strip()]
+    if file is None:
+        raise InvalidInput("targets", file, "a CSV file")
+    text_of_file = read_text("targets", file, _MOST_TARGETS)
+    lines = [line for line in text_of_file.splitlines() if line.strip()]
     rows = lines[1:] if lines and _numbers(lines[0]) is None else lines
     return [_position(f"{file}, point {k + 1}", row) for k, row in enumerate(rows)]
 

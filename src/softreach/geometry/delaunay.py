@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
 
 from softreach.arguments import one_of
 from softreach.arrays import Points, as_points
+from softreach.geometry.dimension import lies_on_curve
 from softreach.kernels.delaunay import triangulate
 from softreach.kernels.spatial_sort import insertion_order
 
 __all__ = ["Delaunay", "delaunay", "unit_scale"]
 
 FINEST = 200  # bits below the largest coordinate that `kernels.predicates` may see
+_FEW = 1000  # of which even those on a curve are soon triangulated
 METHODS = ("auto", "numba", "qhull")
 
 
@@ -22,7 +25,8 @@ METHODS = ("auto", "numba", "qhull")
 class Delaunay:
     """Tetrahedra whose circumscribed spheres hold no other point.
 
-    Points in one plane, on one line or fewer than four give no tetrahedra at all.
+    Points in one plane, on one line or fewer than four give no tetrahedra at all; nor do more than
+    some hundreds on a curve in space, of which nearly every pair would have an edge.
     """
 
     points: Points
@@ -72,7 +76,7 @@ def _by_insertion(points: Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     if len(points) < 4:
         return *_nothing(), _first_equal(points)
     order = insertion_order(points)
-    cells, neighbors, same = triangulate(points[order])
+    cells, neighbors, same = triangulate(points[order], partial(lies_on_curve, points))
     if len(cells) == 0:
         return *_nothing(), _first_equal(points)
     duplicate_of = np.empty(len(points), np.int64)
@@ -87,7 +91,7 @@ def _by_qhull(points: Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
     duplicate_of = _first_equal(points)
     distinct = np.unique(duplicate_of)
-    if len(distinct) < 4:
+    if len(distinct) < 4 or (len(distinct) > _FEW and lies_on_curve(points)):
         return *_nothing(), duplicate_of
     inner = points[distinct] - points[distinct].mean(axis=0)
     try:
