@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from contextlib import suppress
@@ -37,8 +38,6 @@ NUMBERS = [
     ("revolution_deg", "[108]", "valid number"),
     ("revolution_deg", "2026-01-01", "valid number"),
     ("revolution_deg", "9" * 5000, "4300 digits"),
-    ("helical_angle_deg", "89.99999999", "must wind at most 100 times"),
-    ("helical_angle_deg", "-89.9999", "must wind at most 100 times"),
     ("helical_angle_deg", "90", "< 90 deg"),
     ("length_m", "99999999999999999999", "<= 1e+09 m"),
     ("length_m", "1e300", "<= 1e+09 m"),
@@ -48,14 +47,13 @@ NUMBERS = [
     ("length_m", "1" * 400, "valid number"),
     ("outer_radius_m", "1e300", "<= 1e+09 m"),
     ("outer_radius_m", "1e-300", ">= 1e-12"),
-    ("offset_deg", "1e300", "<= 36000 deg"),
     ("extent_deg", "0", "> 0"),
     ("extent_deg", "361", "<= 360 deg"),
     ("taper_deg", "90", "< 90 deg"),
     ("taper_deg", "89", "leaves no tip"),
     ("inner_ratio", "1", "< 1"),
     ("inner_ratio", "-1e-300", ">= 0"),
-    ("activation_bounds", "[-1e300, 0]", "from -1e+15 to 1e+15"),
+    ("activation_bounds", "[-1e300, 0]", "from -1e+30 to 1e+30"),
     ("activation_bounds", "[nan, 0]", "finite numbers"),
     ("activation_bounds", "[0, -1]", "lower <= upper"),
     ("activation_bounds", "[[0, 1], [0]]", "a pair"),
@@ -78,6 +76,15 @@ def test_a_value_that_no_arm_can_have_is_refused_with_what_is_allowed(key, value
     else:
         text = with_value(key, value)
     assert told in str(raised_by(lambda: sr.Manipulator.from_toml(text)))
+
+
+@pytest.mark.parametrize("angle", [89.9, 89.99999999, -89.9999, 89.999999999999])
+def test_an_angle_that_winds_without_end_is_refused_before_a_step_is_made(angle):
+    left, *others = sr.designs.minimal_trunk().actuators
+    steep = left.replace(helical_angle=math.radians(angle))
+    arm = sr.designs.minimal_trunk().replace(actuators=(steep, *others))
+    for asked in (sr.describe, sr.compute_cloud, sr.reachable_set):
+        assert "turns of left" in str(raised_by(lambda asked=asked: asked(arm)))
 
 
 @pytest.mark.parametrize("bundles", ["101", "1000000", "10000000000000000000", "1.0", "0", "-1"])
@@ -199,7 +206,7 @@ VALUES = st.recursive(
     st.one_of(
         st.floats(),
         st.integers(-(10**30), 10**30),
-        st.sampled_from([0, 1, 1e-320, 1e308, -1.0, 90.0, 1e15]),
+        st.sampled_from([0, 1, 1e-320, 1e308, -1.0, 90.0, 1e30]),
         st.text(max_size=8),
         st.booleans(),
         st.sampled_from(["fiber", "tendon", "chamber", "linear", "sampled", "steel"]),

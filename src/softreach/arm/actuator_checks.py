@@ -44,12 +44,12 @@ met."""
 MOST_BUNDLES = 100
 """Of a whole arm: the time to bound its bending grows with their square."""
 
-_LARGEST = 1e15  # activation, in any unit: its products stay far from where doubles end
+_LARGEST = 1e30  # activation, in any unit: its products stay far from where doubles end
 
 FIBER_RANGES = {
     "helical_angle": Range(-math.pi / 2, math.pi / 2, "rad", open_low=True, open_high=True),
     "revolution": Range(-MOST_TURN, MOST_TURN, "rad"),
-    "offset": Range(-MOST_TURN, MOST_TURN, "rad"),
+    "offset": Range(unit="rad"),
     "extent": Range(0.0, 2 * math.pi, "rad", open_low=True),
     "bundles": Range(low=1, high=MOST_BUNDLES, whole=True),
 }

@@ -37,9 +37,9 @@ PROFILE_RANGES = {
 }
 
 MATERIAL_RANGES = {
-    "young_modulus": Range(1e-3, 1e15, "Pa"),
+    "young_modulus": Range(1e-30, 1e30, "Pa"),
     "poisson_ratio": Range(0.0, 0.5),
-    "density": Range(1e-6, 1e9, "kg/m³"),
+    "density": Range(1e-30, 1e30, "kg/m³"),
 }
 
 RING_RANGES = {

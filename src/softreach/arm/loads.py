@@ -19,7 +19,7 @@ Triple = tuple[float, float, float]
 
 _ZERO: Triple = (0.0, 0.0, 0.0)
 
-_SIZE = Range(-1e15, 1e15)  # of any number: products stay far from where doubles end
+_SIZE = Range(-1e30, 1e30)  # of any number: products stay far from where doubles end
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,7 +129,7 @@ def _check(loads: Loads | PointLoad, scalars: dict[str, str]) -> None:
         triple = _triple(value)
         if triple is None:
             faults.append(
-                Fault(field.name, value, "must be three finite numbers from -1e+15 to 1e+15")
+                Fault(field.name, value, "must be three finite numbers from -1e+30 to 1e+30")
             )
             continue
         object.__setattr__(loads, field.name, triple)

@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arguments import checked, flag, instance, name_or_index, path, text, whole
+from softreach.arguments import as_given, checked, flag, instance, path, text, whole
 from softreach.arm import file
 from softreach.arm.actuator_checks import bounds_faults
 from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
@@ -129,7 +129,7 @@ class Manipulator:
         parts = zip(self.actuators, np.split(pairs, ends)[:-1], strict=True)
         return self.replace(actuators=tuple(one.with_bounds(part) for one, part in parts))
 
-    @checked(fiber=name_or_index, count=whole(1, 1000), keep_extent=flag)
+    @checked(count=whole(1, 1000), keep_extent=flag)
     def split(self, fiber: str | int, count: int, *, keep_extent: bool = True) -> Self:
         """Replace an architecture of one bundle by `count` independent ones beside each other.
 
@@ -289,11 +289,13 @@ class Manipulator:
             if isinstance(actuator, SectorActuator)
         }
         whole = isinstance(fiber, int | np.integer) and not isinstance(fiber, bool)
-        found = [k for k, name in names.items() if (k if whole else name) == fiber]
+        known = whole or isinstance(fiber, str)
+        found = [k for k, name in names.items() if known and (k if whole else name) == fiber]
         if found:
             return found[0]
-        known = ", ".join(f"{k} ({name})" for k, name in names.items())
-        raise InvalidInput("fiber", repr(fiber), f"the name or index of one architecture: {known}")
+        listed = ", ".join(f"{k} ({name})" for k, name in names.items())
+        allowed = f"the name or index of one architecture: {listed}"
+        raise InvalidInput("fiber", as_given(fiber), allowed)
 
 
 a_manipulator = instance(Manipulator, "a Manipulator")

@@ -146,7 +146,7 @@ class ActivationBox:
         Raises:
             InvalidInput: Another shape, or values that are not finite.
         """
-        allowed = f"of shape (n, {self.bundles}), one column per bundle"
+        allowed = f"an array of numbers of shape (n, {self.bundles}), one column per bundle"
         return as_rows("activations", activations, self.bundles, allowed)
 
     def clip(self, activations: Array) -> Array:

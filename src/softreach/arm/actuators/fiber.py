@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.actuator_checks import FIBER_RANGES, MOST_TURN, winding_faults
+from softreach.arm.actuator_checks import FIBER_RANGES, winding_faults
 from softreach.arm.actuators.actuator import STRETCH
 from softreach.arm.actuators.cone import cone_integrals
 from softreach.arm.actuators.ring_integrals import RingIntegrals
@@ -89,20 +89,6 @@ class FiberArchitecture(SectorActuator):
         """Ω = Θ(L) [rad], which the helical angle fixes: theory (14)."""
         end = np.asarray([self.end_over_length * profile.length])
         return float(self.rotation(profile, section, end)[0])
-
-    def section_faults(self, profile: Profile, section: Section) -> list[Fault]:
-        """A ring that the section does not have; an angle so steep that it winds without end."""
-        faults = super().section_faults(profile, section)
-        if faults or self.helical_angle is None:
-            return faults
-        with np.errstate(all="ignore"):
-            turn = abs(self.revolution_on(profile, section))
-        if turn <= MOST_TURN:
-            return []
-        why = (
-            f"must wind at most {MOST_TURN / (2 * math.pi):g} times, not {turn / (2 * math.pi):.3g}"
-        )
-        return [Fault("helical_angle", self.helical_angle, f"{why}: smaller, or give `revolution`")]
 
     def value_on(self, field: str, profile: Profile, section: Section) -> Any:
         """Value of a variable on an arm; of Ω and α, the one not given follows from the other."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from softreach.arguments import checked, mapping_of, names, plain, text
+from softreach.arguments import checked, instance, plain, text
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.of_arm import by_ring_name, parameters
 from softreach.arm.parameters.parameter import Parameter
 from softreach.arm.parameters.unknown import unknown_parameter
-from softreach.errors import Fault, InvalidInput
+from softreach.errors import Fault, InvalidInput, in_short
 
 __all__ = ["changed", "find_parameter", "find_parameters", "parameters_by_every_name"]
 
@@ -39,7 +39,7 @@ def find_parameter(arm: Manipulator, name: str) -> Parameter:
     return find_parameters(arm, (name,))[name]
 
 
-@checked(arm=a_manipulator, names=names)
+@checked(arm=a_manipulator, names=instance((Mapping, list, tuple), "names of parameters"))
 def find_parameters(
     arm: Manipulator, names: Mapping[str, object] | tuple[str, ...]
 ) -> dict[str, Parameter]:
@@ -52,14 +52,14 @@ def find_parameters(
     listed = {name: name for name in known} | by_ring_name(arm, known)
     asked: dict[str, str] = {}
     for name in names:
-        if name not in listed:
-            raise unknown_parameter(str(name), known)
+        if not isinstance(name, str) or name not in listed:
+            raise unknown_parameter(in_short(name), known)
         if (first := asked.setdefault(listed[name], name)) != name:
             raise InvalidInput("parameter", name, "given once", f"{first} is the same")
     return {asked[one]: _renamed(known[one], asked[one]) for one in known if one in asked}
 
 
-@checked(arm=a_manipulator, values=mapping_of(lambda _, value: value))
+@checked(arm=a_manipulator, values=instance(Mapping, "a dictionary of parameters"))
 def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
     """The design with these parameters, everything else unchanged.
 
