@@ -256,7 +256,8 @@ def as_whole_number(name: str, value: object, low: int = 0, high: float = math.i
         InvalidInput: Anything else, 2.0 too.
     """
     found = plain(value)
-    if isinstance(found, Integral) and not isinstance(found, bool) and low <= found <= high:
+    whole_one = isinstance(found, Integral) and not isinstance(found, bool)
+    if whole_one and low <= int(found) <= high:
         return int(found)
     limits = f"{low:,} or more" if high == math.inf else f"from {low:,} to {high:,}"
     raise InvalidInput(name, as_given(value), f"a whole number, {limits}")

@@ -20,7 +20,7 @@ _LONGEST = 300
 """Characters of a value that an error shows."""
 
 
-_MOST = 30
+_MOST = 50
 """Faults of a design that an error lists."""
 
 

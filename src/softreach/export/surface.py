@@ -35,15 +35,20 @@ class Part(NamedTuple):
     opacity: float = 1.0
 
 
+def _parts_of(value: Any) -> tuple[Any, Any] | None:
+    """Vertices and faces of an object that has them."""
+    if isinstance(value, type) or not (hasattr(value, "vertices") and hasattr(value, "faces")):
+        return None
+    return value.vertices, value.faces
+
+
 def _mesh(name: str, value: Any) -> tuple[NDArray[np.float64], Faces]:
     """Vertices and faces of a surface, or the pair of them."""
     allowed = "an object with vertices [m] and faces, or the pair of them"
-    if isinstance(value, tuple) and len(value) == 2:
-        vertices, faces = value
-    elif hasattr(value, "vertices") and hasattr(value, "faces") and not isinstance(value, type):
-        vertices, faces = value.vertices, value.faces
-    else:
+    pair = value if isinstance(value, tuple) else _parts_of(value)
+    if pair is None or len(pair) != 2:
         raise InvalidInput(name, as_given(value), allowed)
+    vertices, faces = pair
     points = as_points(f"{name}.vertices", vertices)
     return points, as_faces(f"{name}.faces", faces, len(points))
 

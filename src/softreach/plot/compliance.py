@@ -73,7 +73,8 @@ def plot_compliance(
         MissingExtra: matplotlib is not installed.
     """
     shapes = shapes_of(configuration)
-    matrices = compliance if np.ndim(compliance) == 3 else np.asarray(compliance)[None]
+    given = np.asarray(compliance, float)
+    matrices = given if given.ndim == 3 else given[None]
     if matrices.shape[1:] != (3, 3):
         raise InvalidInput("compliance.shape", np.shape(compliance), "(3, 3) or (n, 3, 3)")
     if len(matrices) != len(shapes):

@@ -52,7 +52,7 @@ def plot_opposite_sides(
         raise InvalidInput("clouds", f"of bundles {sorted(bundles)}", "one or more of one set")
     azimuth, elevation = view_angles(view)
     sides = ((azimuth, elevation), (azimuth + np.pi, elevation))
-    shown = _around(clouds) if box_over_length is None else box_over_length
+    shown = np.asarray(_around(clouds) if box_over_length is None else box_over_length, float)
     with figure_style():
         column = width / len(clouds)
         figure = pyplot().figure(figsize=(width, 2 * column + 0.5))
