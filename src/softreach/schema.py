@@ -103,7 +103,7 @@ def configuration_dataset(
     return xr.Dataset(variables, coordinates, provenance(arm))
 
 
-a_cloud = dataset("tip", "activation", what="a cloud")
+a_cloud = dataset(what="a cloud")
 """An argument that looks like a cloud; `check_cloud` looks closer."""
 
 

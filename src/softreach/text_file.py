@@ -46,6 +46,8 @@ def _bytes_of(name: str, path: str | os.PathLike[str], most: int) -> bytes:
             raise _too_large(name, shown, found.st_size, most)
         with Path(path).open("rb") as stream:
             content = stream.read(most + 1)
+    except FileNotFoundError:
+        raise InvalidInput(name, shown, "a file that exists") from None
     except OSError as error:
         raise InvalidInput(name, shown, f"a file that can be read; {error.strerror}") from None
     if len(content) > most:  # such as those of /proc, which tell no size

@@ -600,5 +600,11 @@ UNTRIED = {
     "arm.designs.helical_tendon_robot": "takes nothing",
     "arm.designs.lce_arm": "takes nothing",
     "arm.designs.three_chamber_arm": "takes nothing",
+    "plot.box_over_length": "takes an atlas",
+    "plot.plot_cloud_sheet": "takes functions of one's own",
+    "plot.plot_hull_sheet": "takes functions of one's own",
+    "plot.plot_metric_map": "takes an atlas",
+    "plot.plot_payload_curve": "takes minutes to prepare",
+    "plot.sheet_axes": "takes an atlas",
 }
 """Functions that the table leaves out, and why; those of atlases are tried with the stores."""

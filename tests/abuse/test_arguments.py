@@ -50,6 +50,6 @@ def test_every_public_function_is_tried_with_each_of_its_arguments():
         for name, function in functions.items()
         if not name.startswith(("atlas.", "errors.")) and name not in UNTRIED
     }
-    assert {name: args - set(CALLS[name].asked) for name, args in asked.items()} == {
-        name: set() for name in asked
-    }
+    assert {
+        n: args - set(CALLS[n].asked if n in CALLS else ()) for n, args in asked.items() if args
+    } == {name: set() for name, args in asked.items() if args}
