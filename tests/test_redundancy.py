@@ -95,7 +95,7 @@ def test_tips_that_are_not_finite_are_refused_by_their_index():
     tip = np.zeros((5, 3))
     tip[3, 1] = np.nan
     for function in (lambda cloud: activation_distance(cloud, 0.1), tip_density):
-        with pytest.raises(InvalidInput, match="points\\[3\\] = .*nan"):
+        with pytest.raises(InvalidInput, match=r"points\[3\] = .*nan"):
             function(made_up(tip))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach import parallel
-from softreach.arguments import POSITIVE, as_given, checked, flag, plain
+from softreach.arguments import POSITIVE, as_given, flag, plain
 from softreach.arrays import as_floats, as_points
 from softreach.errors import InvalidInput, SoftreachWarning
 from softreach.geometry import hull as hulls
@@ -32,7 +32,6 @@ QUARTER_SPACINGS = 2.5  # below, V(N/4) leaves the law N^-1/2: design/triangulat
 Method = Literal["auto", "numba", "qhull"]
 
 
-@checked(bias=flag)
 def concave_hull(
     points: np.ndarray | xr.DataArray,
     alpha: float | str | None = None,
@@ -76,6 +75,7 @@ def concave_hull(
     References:
         [EdelsbrunnerMuecke1994]
     """
+    flag("bias", bias)
     positions = _positions(points)
     radius = _radius(alpha, points)
     shape, *quarter = _alpha_complexes(

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
-from softreach.arguments import as_given, checked, flag, instance
+from softreach.arguments import as_given, flag, instance
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.weight import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.arrays import as_floats
@@ -289,7 +289,6 @@ def position_slopes(tips: Array, twists: Array, slopes: Array) -> None:
         slopes[:, i] += w[:, j] * tips[:, k, None] - w[:, k] * tips[:, j, None]
 
 
-@checked(warn=flag)
 def tip_map(arm: Manipulator | TipMap, tol: float = 1e-6, *, warn: bool = True) -> TipMap:
     """The tip map of an arm, kept for the next call; a tip map is returned as it is.
 
@@ -307,6 +306,7 @@ def tip_map(arm: Manipulator | TipMap, tol: float = 1e-6, *, warn: bool = True) 
     if not isinstance(arm, Manipulator):
         raise InvalidInput("arm", as_given(arm), "a Manipulator or a TipMap")
     rod = _of_arm(arm, check_tol(tol))
+    flag("warn", warn)
     if warn and arm.loads is not None:
         _warn_of_large_loads(arm)
     return rod

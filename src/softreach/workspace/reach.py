@@ -125,7 +125,7 @@ def reachable_set(
         found = _of_many(rod, accuracy, cell, grid, memory, progress or silent)
         finer = "a smaller cell" if cell is not None else "more memory"
     if found.volume_error > accuracy * found.volume:
-        warnings.warn(_inaccurate(found, accuracy, finer), SoftreachWarning, stacklevel=2)
+        warnings.warn(_inaccurate(found, accuracy, finer), SoftreachWarning, stacklevel=3)
     return found
 
 
