@@ -101,7 +101,7 @@ def test_what_is_no_cloud_is_refused(cloud, tmp_path):
 
 @pytest.mark.parametrize("n", [0, -5, 2.5, True, "10"])
 def test_a_count_that_is_no_count_is_refused(trunk, n):
-    with pytest.raises(InvalidInput, match=f"n = {n}: must be a whole number, 1 or more"):
+    with pytest.raises(InvalidInput, match=f"n = {n!r}: must be a whole number, 1 or more"):
         sr.compute_cloud(trunk, n=n)
 
 

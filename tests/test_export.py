@@ -126,7 +126,7 @@ class TestCloud:
         assert (tmp_path / f"none.{suffix}").stat().st_size > 0
 
     def test_other_datasets_and_too_large_ones_are_refused(self, cloud, tmp_path, monkeypatch):
-        with pytest.raises(InvalidInput, match="tip and activation"):
+        with pytest.raises(InvalidInput, match="tip, activation"):
             export_cloud(cloud.drop_vars("tip"), tmp_path / "cloud.csv")
         monkeypatch.setattr("softreach.export.cloud._MAT_LIMIT", 1000)
         with pytest.raises(InvalidInput, match="parquet"):

@@ -189,7 +189,8 @@ def return_hint(function: Callable) -> object:
 
     hint = function.__annotations__["return"]
     seen = {"xr": xarray, "Axes": Axes, "Figure": Figure, "Self": object}
-    return eval(hint, {**seen, **function.__globals__}) if isinstance(hint, str) else hint
+    known = {**seen, **inspect.unwrap(function).__globals__}
+    return eval(hint, known) if isinstance(hint, str) else hint
 
 
 @pytest.mark.parametrize("name", [n for n, f in FUNCTIONS.items() if "return" in f.__annotations__])

@@ -79,7 +79,7 @@ def test_no_queries_give_nothing(strewn, queries):
     [
         (-1, "queries = -1.*from 0 to the cloud's 4000 samples"),
         (4001, "queries = 4001.*from 0 to the cloud's 4000 samples"),
-        ([4000], "indices from 4000 to 4000.*from 0 to 3999"),
+        ([4000], "indices from 4,000 to 4,000.*from 0 to 3,999"),
         ([-1], "indices from -1"),
         ([0.5], "whole numbers"),
         ([[1]], "one-dimensional"),
@@ -95,7 +95,7 @@ def test_tips_that_are_not_finite_are_refused_by_their_index():
     tip = np.zeros((5, 3))
     tip[3, 1] = np.nan
     for function in (lambda cloud: activation_distance(cloud, 0.1), tip_density):
-        with pytest.raises(InvalidInput, match="1 rows with NaN or infinity, the first at index 3"):
+        with pytest.raises(InvalidInput, match=r"points\[3\] = .*nan"):
             function(made_up(tip))
 
 
@@ -206,7 +206,7 @@ def test_a_map_puts_every_value_where_its_tip_is():
 def test_distances_of_another_cloud_are_refused(strewn):
     distance = activation_distance(strewn, 0.02)
     small = strewn.isel(sample=slice(10))
-    with pytest.raises(InvalidInput, match=r"distance.sample = indices from 0 to 3999"):
+    with pytest.raises(InvalidInput, match=r"distance.sample = indices from 0 to 3,999"):
         distance_map(small, distance)
     with pytest.raises(InvalidInput, match="made by activation_distance"):
         redundancy_summary(strewn, distance.drop_vars("sample"))

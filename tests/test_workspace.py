@@ -323,10 +323,10 @@ def test_a_coarse_grid_is_warned_of():
 @pytest.mark.parametrize(
     ("argument", "value", "allowed"),
     [
-        ("accuracy", 0.0, "1e-6 to"),
+        ("accuracy", 0.0, ">= 1e-06"),
         ("grid", 7, "even"),
         ("cell", 1e-9, "at least"),
-        ("cell", np.nan, "at"),
+        ("cell", np.nan, "> 0"),
     ],
 )
 def test_a_wrong_argument_is_named(trunk, argument, value, allowed):

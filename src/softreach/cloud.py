@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach import parallel, schema
+from softreach.arguments import checked, dataset, function, optional, path
 from softreach.arm.manipulator import Manipulator
 from softreach.atomic import replacing
 from softreach.errors import InvalidInput
@@ -25,6 +26,7 @@ from softreach.rod.measured_bundles import MeasuredBundles
 from softreach.rod.stable_tips import StableTips
 from softreach.rod.tip_map import BLOCK, TipMap, tip_map
 from softreach.sampling import check_sampler, cube_blocks
+from softreach.schema import a_cloud
 from softreach.stores.damage import Watch, storage_errors
 from softreach.stores.place import (
     ARRAYS,
@@ -49,6 +51,7 @@ __all__ = [
 Array = NDArray[np.float64]
 
 
+@checked(progress=optional(function))
 def compute_cloud(
     arm: Manipulator | TipMap,
     n: int = 400_000,
@@ -117,6 +120,7 @@ CLOUD_STORE: Formats = {".zarr": FileKind("a stored cloud", _is_cloud)}
 """What `save_cloud` writes, and replaces."""
 
 
+@checked(cloud=a_cloud, path=path)
 def save_cloud(
     cloud: xr.Dataset,
     path: str | PathLike[str],
@@ -169,6 +173,7 @@ def _write(cloud: xr.Dataset, path: Path) -> None:
     )
 
 
+@checked(path=path)
 def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
     """Read a cloud that `save_cloud` wrote.
 
@@ -200,11 +205,13 @@ def _few_chunks_at_a_time() -> AbstractContextManager[object]:
     return zarr.config.set({"async.concurrency": min(4, parallel.thread_count())})
 
 
+@checked(cloud=dataset())
 def design_of(cloud: xr.Dataset) -> Manipulator:
     """The design that a cloud or configuration was computed from."""
     return Manipulator.from_toml(cloud.attrs["design"], source="the cloud's design")
 
 
+@checked(cloud=dataset())
 def tip_map_of(cloud: xr.Dataset) -> TipMap:
     """The tip map that a cloud was computed with."""
     return tip_map(design_of(cloud), float(cloud.attrs["tol"]))

@@ -6,7 +6,7 @@ box allows, and no array of all samples by stations ever exists.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,14 +14,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
+from softreach.arguments import as_given, checked, whole
 from softreach.arm.manipulator import Manipulator
+from softreach.arrays import as_floats, as_shares
 from softreach.cloud import tip_map_of
 from softreach.errors import InvalidInput
-from softreach.rod.activation_box import as_floats
 from softreach.rod.frames import Strains
 from softreach.rod.stable_tips import stable_tips
-from softreach.rod.tip_map import TipMap, tip_map
-from softreach.schema import provenance
+from softreach.rod.tip_map import TipMap, an_arm, tip_map
+from softreach.schema import a_cloud, provenance
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,6 +50,14 @@ QUANTITIES = {
 _AT_A_TIME = 1 << 19  # samples times stations whose strains stay in the cache
 
 
+def _blocks(name: str, value: object) -> object:
+    """Arrays that come one after the other."""
+    if isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping | Set | type):
+        return value
+    raise InvalidInput(name, as_given(value), "an iterable of arrays of shape (n, bundles)")
+
+
+@checked(cloud=a_cloud, bins=whole(1, 1 << 24), quantiles=as_shares)
 def curvature_statistics(
     cloud: xr.Dataset,
     stations: ArrayLike | None = None,
@@ -85,6 +94,7 @@ def curvature_statistics(
     )
 
 
+@checked(activations=_blocks, bins=whole(1, 1 << 24), quantiles=as_shares)
 def stream_statistics(
     arm: Manipulator | TipMap,
     activations: Iterable[Array],
@@ -108,7 +118,6 @@ def stream_statistics(
     rod = stable_tips(tip_map(arm))
     asked = distal_stations(rod) if stations is None else stations
     z = rod.check_stations(np.atleast_1d(as_floats("stations", asked)), ascending=False)
-    _check_resolution(bins, quantiles)
     ranges = rod.strain_range(z)._asdict()
     tallies = {name: _Tally.between(ranges[name], bins) for name in QUANTITIES}
     for strains in _strains(rod, activations, z):
@@ -120,6 +129,7 @@ def stream_statistics(
     return _dataset(rod, z, tallies, quantiles)
 
 
+@checked(arm=an_arm, count=whole(1, 1 << 24))
 def distal_stations(arm: Manipulator | TipMap, count: int = 6) -> Array:
     """Even stations from the middle of the arm to its tip, both included, Z [m] (figure 3c)."""
     return np.linspace(0.5, 1.0, count) * arm.length
@@ -128,7 +138,8 @@ def distal_stations(arm: Manipulator | TipMap, count: int = 6) -> Array:
 def _strains(rod: TipMap, activations: Iterable[Array], z: Array) -> Iterator[Strains]:
     """Strains, a few samples at a time."""
     strains = rod.strains_at(z)
-    for block in activations:
+    for given in activations:
+        block = rod.box.check(given)
         for rows in parallel.blocks(len(block), max(1, _AT_A_TIME // len(z))):
             found = strains(block[rows])
             yield _in_equilibrium(found) if rod.supports_unstable else found
@@ -231,11 +242,3 @@ def _dataset(
     samples = int(tallies["bending"].count[0].sum())
     attrs = {**provenance(rod.arm), "length": rod.length, "samples": samples}
     return xr.Dataset(variables, coordinates, attrs)
-
-
-def _check_resolution(bins: int, quantiles: Sequence[float]) -> None:
-    if bins < 1:
-        raise InvalidInput("bins", bins, "1 or more")
-    shares = np.asarray(quantiles, float)
-    if not shares.size or not ((shares >= 0) & (shares <= 1)).all():
-        raise InvalidInput("quantiles", quantiles, "numbers in [0, 1]")

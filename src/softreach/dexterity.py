@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach import parallel
+from softreach.arguments import POSITIVE, checked, optional, within
 from softreach.cloud import tip_map_of
 from softreach.errors import InvalidInput
 from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import BLOCK
-from softreach.schema import cell_dataset, check_cloud, tip_cells
+from softreach.schema import a_cloud, cell_dataset, check_cloud, tip_cells
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,6 +28,7 @@ Signs = NDArray[np.int8]
 _EVEN = ("uniform", "sobol")  # a grid has too many points on its faces
 
 
+@checked(cloud=a_cloud)
 def dexterity(cloud: xr.Dataset) -> xr.Dataset:
     """Manipulability, condition number and orientation of the tip map at each sample.
 
@@ -69,6 +71,7 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
     return result
 
 
+@checked(cloud=a_cloud, cell=optional(within(POSITIVE._replace(unit="m"))))
 def solution_measure(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Dataset:
     """How many activations reach each place: a number, or the size of the family of solutions.
 

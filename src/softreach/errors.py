@@ -21,9 +21,22 @@ _LONGEST = 300
 """Characters of a value that an error shows."""
 
 
+_MOST = 50
+"""Faults of a design that an error lists."""
+
+
 def counted(number: int, noun: str) -> str:
     """A number of things in words: "1 design", "2 designs"."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def in_short(value: object) -> str:
+    """A value in one line of moderate length, whatever it is."""
+    try:
+        text = " ".join(str(value).splitlines())  # an array may take several
+    except Exception:  # a value of a stranger's class, or a number of thousands of digits
+        return f"of type {type(value).__name__}"
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
 class SoftreachError(Exception):
@@ -43,8 +56,7 @@ class InvalidInput(SoftreachError, ValueError):
 
     def __init__(self, name: str, value: object, allowed: str, hint: str = "") -> None:
         self.name, self.value, self.allowed = name, value, allowed
-        shown = " ".join(str(value).splitlines())  # an array may take several lines
-        message = f"{name} = {shown}: must be {allowed}"
+        message = f"{name} = {in_short(value)}: must be {allowed}"
         super().__init__(f"{message}; {hint}" if hint else message)
 
 
@@ -73,13 +85,17 @@ class Range(NamedTuple):
         return self._replace(low=math.degrees(self.low), high=math.degrees(self.high), unit="deg")
 
     def __str__(self) -> str:
+        return f"{self.why}; must be {self.text}" if self.why else f"must be {self.text}"
+
+    @property
+    def text(self) -> str:
+        """What is allowed: "a finite number > 0 and <= 1 m"."""
         unit = f" {self.unit}" if self.unit else ""
         low = f"{'>' if self.open_low else '>='} {self.low:.6g}" if self.low > -math.inf else ""
         high = f"{'<' if self.open_high else '<='} {self.high:.6g}" if self.high < math.inf else ""
         limits = " and ".join(text for text in (low, high) if text)
         number = "a whole number" if self.whole else "a finite number"
-        allowed = f"must be {number} {limits}".rstrip() + unit
-        return f"{self.why}; {allowed}" if self.why else allowed
+        return f"{number} {limits}".rstrip() + unit
 
 
 def _is_finite(number: float) -> bool:
@@ -102,11 +118,18 @@ class Fault(NamedTuple):
 
     def __str__(self) -> str:
         if self.value is None:
-            return f"{self.path}: {self.allowed}"
-        shown = f"{self.value:.6g}" if isinstance(self.value, float) else repr(self.value)
-        if len(shown) > _LONGEST:
-            shown = f"{shown[:_LONGEST]}..."
-        return f"{self.path} = {shown}: {self.allowed}"
+            return f"{in_short(self.path)}: {self.allowed}"
+        return f"{in_short(self.path)} = {self._shown}: {self.allowed}"
+
+    @property
+    def _shown(self) -> str:
+        """The value, text in quotes."""
+        if isinstance(self.value, float):
+            return f"{self.value:.6g}"
+        try:
+            return in_short(repr(self.value))
+        except Exception:
+            return in_short(object.__repr__(self.value))
 
 
 class InvalidDesign(SoftreachError, ValueError):
@@ -118,9 +141,11 @@ class InvalidDesign(SoftreachError, ValueError):
 
     def __init__(self, faults: Sequence[Fault], source: str = "") -> None:
         self.faults = tuple(faults)
-        lines = [str(fault) for fault in self.faults]
+        lines = [str(fault) for fault in self.faults[:_MOST]]
+        if more := len(self.faults) - len(lines):
+            lines.append(f"... and {more:,} more")
         if source:
-            count = counted(len(lines), "problem")
+            count = counted(len(self.faults), "problem")
             super().__init__("\n  ".join([f"{source}: {count}", *lines]))
         else:
             super().__init__("\n".join(lines))

@@ -7,9 +7,9 @@ import shutil
 import warnings
 from pathlib import Path
 
-from softreach.errors import InvalidInput, SoftreachWarning
+from softreach.errors import InvalidInput, SoftreachWarning, in_short
 
-__all__ = ["check_disk", "check_memory", "free_disk", "free_memory"]
+__all__ = ["check_disk", "check_memory", "check_room", "free_disk", "free_memory"]
 
 _UNKNOWN = 4e9  # where the system does not say
 
@@ -67,6 +67,12 @@ def check_memory(name: str, value: object, needed: float) -> None:
     """
     if needed > _NOTICED:
         _check(name, value, needed, free_memory(), "memory")
+
+
+def check_room(name: str, rows: int, columns: int) -> None:
+    """As `check_memory`, for a number of rows, each of so many doubles."""
+    shown = in_short(f"{rows:,}") if rows < 10**30 else "a number beyond 1e30"
+    check_memory(name, shown, float(min(8 * columns * rows, 10**300)))
 
 
 def check_disk(name: str, value: object, needed: float, path: str | os.PathLike[str]) -> None:

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.manipulator import Manipulator
+from softreach.arguments import as_number, checked, function, optional
+from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.arrays import as_floats
 from softreach.errors import InvalidDesign, InvalidInput
 from softreach.progress import Progress, silent
 from softreach.quantity import quantity
-from softreach.rod.activation_box import as_floats
 from softreach.schema import provenance
-from softreach.workspace import reachable_set
+from softreach.workspace.reach import ACCURACIES, reachable_set
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,6 +29,7 @@ _USUAL = (0.0, 0.5, 1.0, 2.0, 4.0)  # payloads over the one that bends the arm b
 _DOUBLINGS = 6  # of the largest payload, in search of one that is too heavy
 
 
+@checked(arm=a_manipulator, progress=optional(function))
 def payload_curve(
     arm: Manipulator,
     payloads: ArrayLike | None = None,
@@ -60,6 +62,7 @@ def payload_curve(
     given = _usual_payloads(arm) if payloads is None else as_floats("payloads", payloads).ravel()
     if not (np.isfinite(given) & (given >= 0)).all():
         raise InvalidInput("payloads", given, "finite masses of 0 or more [kg]")
+    as_number("accuracy", accuracy, ACCURACIES)
     masses = np.unique(np.append(given, 0.0))
     done, volumes = progress or silent, []
     for mass in masses:

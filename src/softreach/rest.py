@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.manipulator import Manipulator
+from softreach.arguments import checked
+from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.errors import InvalidInput
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded import LoadedRod
@@ -32,6 +33,7 @@ class Rest:
     """Whether the equilibrium is stable."""
 
 
+@checked(arm=a_manipulator)
 def rest(arm: Manipulator, *, tol: float = 1e-6) -> Rest:
     """The arm at rest under its loads.
 

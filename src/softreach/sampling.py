@@ -11,13 +11,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arguments import as_whole_number, one_of
 from softreach.errors import InvalidInput
+from softreach.memory import check_room
 
 __all__ = ["SAMPLERS", "check_sampler", "cube_blocks", "sample_cube"]
 
 Array = NDArray[np.float64]
 Draw = Callable[[int, int], Array]
 """(first, count) -> the points first .. first + count; called in order, without gaps."""
+
+
+_LARGEST_SEED = 2**63 - 1  # what stores hold as a number
 
 
 class Sampler(NamedTuple):
@@ -55,13 +60,11 @@ def cube_blocks(sampler: str, n: int, dim: int, seed: int, size: int) -> Iterato
 
 def check_sampler(sampler: str, n: int, dim: int, seed: int) -> None:
     """Raise InvalidInput unless the sampler exists and can spread n points."""
-    if sampler not in SAMPLERS:
-        raise InvalidInput("sampler", repr(sampler), f"one of {', '.join(SAMPLERS)}")
-    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
-        raise InvalidInput("n", n, "a whole number, 1 or more")
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise InvalidInput("seed", seed, "a whole number, 0 or more")
-    if dim and (advice := SAMPLERS[sampler].refusal(int(n), dim)) is not None:
+    one_of(SAMPLERS)("sampler", sampler)
+    n = as_whole_number("n", n, 1)
+    check_room("n", n, dim + 3)
+    as_whole_number("seed", seed, 0, _LARGEST_SEED)
+    if dim and (advice := SAMPLERS[sampler].refusal(n, dim)) is not None:
         raise InvalidInput("n", n, advice)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arguments import dataset
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
 from softreach.versions import SCHEMA_VERSION, versions
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AXES",
+    "a_cloud",
     "activation_attributes",
     "activation_symbols",
     "activation_units",
@@ -101,6 +103,10 @@ def configuration_dataset(
         **bundle_coordinates(arm),
     }
     return xr.Dataset(variables, coordinates, provenance(arm))
+
+
+a_cloud = dataset(what="a cloud")
+"""An argument that looks like a cloud; `check_cloud` looks closer."""
 
 
 def check_cloud(cloud: xr.Dataset) -> xr.Dataset:

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
+from softreach.arguments import checked
 from softreach.arm.manipulator import Manipulator
+from softreach.arrays import as_floats
 from softreach.cloud import tip_map_of
 from softreach.errors import InvalidDesign, InvalidInput
-from softreach.rod.activation_box import as_floats
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.tip_map import BLOCK, TipMap, tip_map
-from softreach.schema import AXES, check_cloud
+from softreach.schema import AXES, a_cloud, check_cloud
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -118,6 +119,7 @@ def stiffness_along(compliance: ArrayLike, direction: ArrayLike) -> Array:
         return 1.0 / np.einsum("na,nab,nb->n", d, matrices, d)
 
 
+@checked(cloud=a_cloud)
 def cloud_compliance(cloud: xr.Dataset) -> xr.Dataset:
     """The compliance of the tip at each sample of a cloud.
 
@@ -179,13 +181,25 @@ def unit_directions(direction: ArrayLike, n: int) -> Array:
     Raises:
         InvalidInput: Another shape, or a direction without length.
     """
-    d = as_floats("direction", direction)
+    d = a_direction("direction", direction)
     if d.shape not in ((3,), (n, 3)):
         raise InvalidInput("direction.shape", d.shape, f"(3,) or ({n}, 3)")
-    size = np.linalg.norm(d, axis=-1, keepdims=True)
+    return np.broadcast_to(d / np.linalg.norm(d, axis=-1, keepdims=True), (n, 3))
+
+
+def a_direction(name: str, value: object) -> Array:
+    """Vectors that have a direction, shape (3,) or (n, 3).
+
+    Raises:
+        InvalidInput: Another shape, numbers that are not finite, or no length.
+    """
+    vectors = as_floats(name, value)
+    if vectors.shape[-1:] != (3,) or vectors.ndim > 2:
+        raise InvalidInput(f"{name}.shape", vectors.shape, "(3,) or (n, 3)")
+    size = np.linalg.norm(vectors, axis=-1)
     if not (np.isfinite(size).all() and (size > 0).all()):
-        raise InvalidInput("direction", direction, "finite vectors longer than 0")
-    return np.broadcast_to(d / size, (n, 3))
+        raise InvalidInput(name, vectors, "finite vectors longer than 0")
+    return vectors
 
 
 def _checked_compliance(compliance: ArrayLike) -> Array:

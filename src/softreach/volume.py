@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach import parallel
+from softreach.arguments import POSITIVE, as_given, flag, plain
+from softreach.arrays import as_floats, as_points
 from softreach.errors import InvalidInput, SoftreachWarning
 from softreach.geometry import hull as hulls
 from softreach.geometry.alpha_shape import AlphaComplex
-from softreach.geometry.delaunay import delaunay, finite_points
+from softreach.geometry.delaunay import delaunay
 from softreach.geometry.hull import Hull
 from softreach.schema import is_stable
 
@@ -52,7 +54,8 @@ def concave_hull(
     nor the volume there converges with N, as the most isolated point decides: compare clouds at a
     fixed radius.
 
-    Points in one plane, on one line or fewer than four have volume 0 and no faces.
+    Points in one plane, on one line or fewer than four have volume 0 and no faces; so have more
+    than some hundreds on a curve, such as the tips of one bundle.
 
     Args:
         points: Tips [m], shape (n, 3), or ``cloud.tip``, of which those that are no stable
@@ -72,6 +75,7 @@ def concave_hull(
     References:
         [EdelsbrunnerMuecke1994]
     """
+    flag("bias", bias)
     positions = _positions(points)
     radius = _radius(alpha, points)
     shape, *quarter = _alpha_complexes(
@@ -125,7 +129,7 @@ def unreachability(
     positions = _positions(points)
     radius = _radius(alpha, points)
     shape = _alpha_complex(positions, method)
-    convex = float(shape.volumes.sum())
+    convex = float(shape.volumes.sum()) or hulls.convex_hull(positions).volume
     hull = shape.hull(shape.critical_alpha() if radius == "critical" else float(radius))
     _warn_if_fine(hull, convex)
     return 1.0 - hull.volume / convex if convex > 0 else np.nan  # theory (37)
@@ -146,10 +150,13 @@ def volume_curve(
         Volumes [m³], shape of the radii.
 
     Raises:
-        InvalidInput: Points of another shape, or not finite.
+        InvalidInput: Points of another shape, or not finite; radii that are negative or NaN.
     """
+    radii = as_floats("alphas", alphas)
+    if not (radii >= 0).all():  # NaN too
+        raise InvalidInput("alphas", radii, "radii of 0 or more [m]")
     shape = _alpha_complex(_positions(points), method)
-    return np.asarray(shape.volume(np.asarray(alphas, dtype=float)))
+    return np.asarray(shape.volume(radii))
 
 
 def _positions(points: np.ndarray | xr.DataArray) -> np.ndarray:
@@ -157,12 +164,12 @@ def _positions(points: np.ndarray | xr.DataArray) -> np.ndarray:
 
     Of an arm under loads those tips that are stable equilibria.
     """
-    array = np.asarray(points)
+    array = as_floats("points", points)
     if getattr(points, "dims", None) == ("axis", "sample"):
         array = array.T
     if not isinstance(points, np.ndarray) and "status" in getattr(points, "coords", ()):
         array = array[is_stable(points)]
-    return finite_points(array)
+    return as_points("points", array)
 
 
 def _radius(alpha: float | str | None, points: np.ndarray | xr.DataArray) -> float | str:
@@ -174,9 +181,10 @@ def _radius(alpha: float | str | None, points: np.ndarray | xr.DataArray) -> flo
         if alpha != "critical":
             raise InvalidInput("alpha", repr(alpha), allowed)
         return alpha
-    if not alpha > 0:  # NaN too
-        raise InvalidInput("alpha", alpha, allowed)
-    return float(alpha)
+    radius = plain(alpha)
+    if POSITIVE.admits(radius) or (isinstance(radius, float) and radius == np.inf):
+        return float(radius)  # infinity keeps every tetrahedron
+    raise InvalidInput("alpha", as_given(alpha), allowed)
 
 
 def _default_radius(points: np.ndarray | xr.DataArray) -> float:

@@ -28,7 +28,8 @@ from softreach.arm import (
 )
 from tests.cable import Cable
 
-numbers = st.floats(allow_nan=False, allow_infinity=False)
+numbers = st.floats(-1e30, 1e30)
+turns = st.floats(-628, 628)
 sizes = st.floats(1e-6, 1e6)
 angles = st.floats(-1.57, 1.57)
 names = st.text(st.characters(exclude_categories=["C", "Z"], exclude_characters=".[]"), max_size=8)
@@ -88,7 +89,7 @@ def _sector(draw: st.DrawFn) -> dict[str, Any]:
 @st.composite
 def fibers(draw: st.DrawFn) -> FiberArchitecture:
     winding = draw(
-        st.fixed_dictionaries({"revolution": numbers})
+        st.fixed_dictionaries({"revolution": turns})
         | st.fixed_dictionaries({"helical_angle": angles | along(angles)})
     )
     return FiberArchitecture(**_sector(draw), **winding)
@@ -110,7 +111,7 @@ def tendons(draw: st.DrawFn) -> Tendon:
         | st.fixed_dictionaries({"distance_ratio": lengths})
     )
     turn = draw(
-        st.fixed_dictionaries({"revolution": numbers})
+        st.fixed_dictionaries({"revolution": turns})
         | st.fixed_dictionaries({"routing": samples(numbers)})
     )
     return Tendon(**draw(common(st.floats(0, 1e9))), **place, **turn, offset=draw(numbers))

@@ -82,7 +82,7 @@ profile.length_m = '1': must be a valid number
 profile.tapper_deg = 3: unknown key; did you mean "taper_deg"?
 materials.lce.young_modulus = 3: unknown key; did you mean "young_modulus_pa"?
 materials."a b".poisson_ratio = 0.7: must be a finite number >= 0 and <= 0.5
-materials."a b".density_kg_m3 = -3: must be a finite number > 0 kg/m³
+materials."a b".density_kg_m3 = -3: must be a finite number >= 1e-30
 rings[0].inner_ratio = 0.7: must be below outer_ratio = 0.6
 rings[1].material.poisson = 0.3: unknown key; did you mean "poisson_ratio"?
 rings[2].inner_ratio: required key is missing
@@ -229,11 +229,11 @@ def test_no_value_in_place_of_another_makes_the_reader_crash(data):
         ("name = 'Süd'".encode("latin-1"), "must be text in UTF-8, but byte 9 is none"),
         ("version = 2".encode("utf-16"), "must be text in UTF-8"),
         (bytes(range(256)), "must be"),
-        (b"#" * 5_000_000, "must be at most 1,000,000 characters long"),
+        (b"#" * 5_000_000, "must be at most 0.25 MB large"),
     ],
 )
 def test_a_file_that_is_no_text_or_too_long_is_refused(content, message, tmp_path):
     path = tmp_path / "bad.toml"
     path.write_bytes(content)
-    with pytest.raises(sr.InvalidDesign, match=message):
+    with pytest.raises((sr.InvalidDesign, sr.InvalidInput), match=message):
         sr.Manipulator.load(path)

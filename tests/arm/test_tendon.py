@@ -260,7 +260,7 @@ def test_a_tendon_is_measured_in_newtons():
             {"routing": Samples(stations_over_length=(0, 1), values=(0, 1)), "revolution": 1.0},
             "revolution = 1: must be left out where routing is given",
         ),
-        ({"revolution": None}, "revolution: must be a finite number rad"),
+        ({"revolution": None}, "revolution: must be a finite number >= -628"),
         ({"revolution": math.inf}, "revolution = inf"),
         ({"offset": None}, "offset: must be a finite number rad"),
         ({"activation_bounds": (-1, 5)}, "must be at least 0 N: a tendon pulls and cannot push"),

@@ -169,7 +169,7 @@ def test_the_command_line_goes_there_and_back(folder, filament, capsys):
         (["import", "cloud.zarr", "a.toml"], ".jl or .csv"),
         (["import", "filament.jl", "a.zarr"], "ending in .toml"),
         (["import", "filament.jl.csv", "a.zarr"], "--design"),
-        (["import", "binary.jl", "a.toml"], "no text"),
+        (["import", "binary.jl", "a.toml"], "text in UTF-8"),
         (["import", "binary.csv", "a.zarr", "--design", "filament.jl"], "no text"),
         (["export", "cloud.zarr", "a.csv", "--format", "julia"], "activefilaments"),
         (["export", "cloud.zarr", "a.txt", "--format", "activefilaments"], "ending in .csv"),

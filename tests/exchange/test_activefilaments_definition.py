@@ -291,9 +291,9 @@ def test_what_cannot_be_read_is_refused_with_its_line(read, text, line, told):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        (b"\xff\xfe\x00\x01", "no text"),
+        (b"\xff\xfe\x00\x01", "text in UTF-8"),
         ("", "no filament"),
-        ("x = 1\n" * 200_000, "bytes"),
+        ("x = 1\n" * 200_000, "at most 0.1 MB"),
         (PLAIN + PLAIN.replace("filament =", "other ="), "lines 1 and 3"),
         (PLAIN.replace("0.1, 0.2", "0.3, 0.2"), "an arm that can exist"),
         (PLAIN.replace("1.0e6, 0.5", "1.0e6, 0.7"), "poisson_ratio"),

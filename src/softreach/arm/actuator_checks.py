@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from softreach.arguments import plain
 from softreach.arm.value_checks import (
     as_numbers,
-    plain_number,
     range_faults,
     sound_values,
     text_faults,
@@ -20,6 +20,8 @@ from softreach.errors import Fault, Range
 
 __all__ = [
     "FIBER_RANGES",
+    "MOST_BUNDLES",
+    "MOST_TURN",
     "STRETCH_RANGES",
     "actuator_faults",
     "angle_faults",
@@ -35,12 +37,21 @@ __all__ = [
     "winding_faults",
 ]
 
+MOST_TURN = 200 * math.pi
+"""A hundred turns [rad]: steps along the arm grow with them, and with a thousand no tolerance is
+met."""
+
+MOST_BUNDLES = 100
+"""Of a whole arm: the time to bound its bending grows with their square."""
+
+_LARGEST = 1e30  # activation, in any unit: its products stay far from where doubles end
+
 FIBER_RANGES = {
     "helical_angle": Range(-math.pi / 2, math.pi / 2, "rad", open_low=True, open_high=True),
-    "revolution": Range(unit="rad"),
+    "revolution": Range(-MOST_TURN, MOST_TURN, "rad"),
     "offset": Range(unit="rad"),
     "extent": Range(0.0, 2 * math.pi, "rad", open_low=True),
-    "bundles": Range(low=1, high=1000, whole=True),
+    "bundles": Range(low=1, high=MOST_BUNDLES, whole=True),
 }
 
 STRETCH_RANGES = {
@@ -94,7 +105,7 @@ def angle_faults(angle: Any) -> list[Fault]:
 def constant_angle_faults(angle: Any) -> list[Fault]:
     """What is no helical angle that stays the same along the arm."""
     allowed = FIBER_RANGES["helical_angle"]
-    return [] if allowed.admits(plain_number(angle)) else [Fault("helical_angle", angle, allowed)]
+    return [] if allowed.admits(plain(angle)) else [Fault("helical_angle", angle, allowed)]
 
 
 def winding_faults(angle: Any, revolution: Any) -> list[Fault]:
@@ -147,7 +158,7 @@ def one_length_faults(
 def stretch_faults(values: Mapping[str, Any]) -> list[Fault]:
     """Everything wrong with where along the arm an actuator begins and ends."""
     faults = range_faults(values, STRETCH_RANGES)
-    start, end = (plain_number(values[name]) for name in STRETCH_RANGES)
+    start, end = (plain(values[name]) for name in STRETCH_RANGES)
     if not faults and start >= end:
         faults = [Fault("end_over_length", end, f"must be above start_over_length = {start:g}")]
     return faults
@@ -159,8 +170,9 @@ def bounds_faults(bounds: Any, bundles: int | None) -> list[Fault]:
     if pairs.shape[-1:] != (2,) or pairs.ndim > 2 or not pairs.size:
         allowed = "must be a pair (lower, upper), or one such pair for each bundle"
         return [Fault("activation_bounds", bounds, allowed)]
-    if not np.isfinite(pairs).all():
-        return [Fault("activation_bounds", bounds, "must hold finite numbers")]
+    if not (np.abs(pairs) <= _LARGEST).all():  # NaN too
+        allowed = f"must hold finite numbers from -{_LARGEST:g} to {_LARGEST:g}"
+        return [Fault("activation_bounds", bounds, allowed)]
     if (pairs[..., 0] > pairs[..., 1]).any():
         return [Fault("activation_bounds", bounds, "must have lower <= upper")]
     if pairs.ndim == 2 and bundles is not None and len(pairs) != bundles:

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from softreach.arguments import plain
 from softreach.arm.actuator_checks import bounds_faults
-from softreach.arm.value_checks import plain_number, range_faults, sound_values, text_faults
+from softreach.arm.value_checks import range_faults, sound_values, text_faults
 from softreach.errors import Fault, Range
 
 __all__ = [
@@ -27,16 +28,18 @@ __all__ = [
     "tube_faults",
 ]
 
+# Fourth powers of radii and cubes of lengths stay far from where doubles end, and so does all that
+# is computed from them.
 PROFILE_RANGES = {
-    "length": Range(0.0, unit="m", open_low=True),
-    "outer_radius": Range(0.0, unit="m", open_low=True),
+    "length": Range(1e-9, 1e9, "m"),
+    "outer_radius": Range(1e-12, 1e9, "m"),
     "taper": Range(-math.pi / 2, math.pi / 2, "rad", open_low=True, open_high=True),
 }
 
 MATERIAL_RANGES = {
-    "young_modulus": Range(0.0, unit="Pa", open_low=True),
+    "young_modulus": Range(1e-30, 1e30, "Pa"),
     "poisson_ratio": Range(0.0, 0.5),
-    "density": Range(0.0, unit="kg/m³", open_low=True),
+    "density": Range(1e-30, 1e30, "kg/m³"),
 }
 
 RING_RANGES = {
@@ -70,7 +73,7 @@ def material_faults(values: Mapping[str, Any]) -> list[Fault]:
 def ring_faults(values: Mapping[str, Any]) -> list[Fault]:
     """Everything wrong with the fields of a ring."""
     faults = range_faults(values, RING_RANGES) + text_faults(values)
-    inner, outer = (plain_number(values[name]) for name in RING_RANGES)
+    inner, outer = (plain(values[name]) for name in RING_RANGES)
     if not faults and inner >= outer:
         faults = [Fault("inner_ratio", inner, f"must be below outer_ratio = {outer:g}")]
     return faults
@@ -85,7 +88,7 @@ def section_faults(values: Mapping[str, Any]) -> list[Fault]:
     if max(outer) != 1.0:
         allowed = "must be 1 for the outermost ring, which reaches the surface of the arm"
         faults.append(Fault(f"rings[{int(np.argmax(outer))}].outer_ratio", max(outer), allowed))
-    if not faults and (bore := plain_number(values["bore_ratio"])) > inner:
+    if not faults and (bore := plain(values["bore_ratio"])) > inner:
         allowed = f"must be at most the smallest inner_ratio of the rings, {inner:g}"
         faults.append(Fault("bore_ratio", bore, allowed))
     return faults

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
-import numpy as np
-
+from softreach.arguments import plain
 from softreach.arm.variable import Variable
+from softreach.arrays import as_floats
 from softreach.errors import Fault, InvalidDesign, Range
 
 if TYPE_CHECKING:
@@ -18,6 +18,8 @@ __all__ = ["Loads", "PointLoad"]
 Triple = tuple[float, float, float]
 
 _ZERO: Triple = (0.0, 0.0, 0.0)
+
+_SIZE = Range(-1e30, 1e30)  # of any number: products stay far from where doubles end
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +38,7 @@ class PointLoad:
     """[N m]."""
 
     def __post_init__(self) -> None:
-        _check(self, scalars={"station": "a finite number of metres, at least 0"})
+        _check(self, scalars={"station": "a finite number of meters, at least 0"})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,7 +128,9 @@ def _check(loads: Loads | PointLoad, scalars: dict[str, str]) -> None:
             continue
         triple = _triple(value)
         if triple is None:
-            faults.append(Fault(field.name, value, "must be three finite numbers"))
+            faults.append(
+                Fault(field.name, value, "must be three finite numbers from -1e+30 to 1e+30")
+            )
             continue
         object.__setattr__(loads, field.name, triple)
     if faults:
@@ -134,13 +138,12 @@ def _check(loads: Loads | PointLoad, scalars: dict[str, str]) -> None:
 
 
 def _is_number(value: Any) -> bool:
-    plain = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    return plain and bool(np.isfinite(value))
+    return _SIZE.admits(plain(value))
 
 
 def _triple(value: Any) -> Triple | None:
     try:
-        x, y, z = (float(one) for one in value)
+        x, y, z = as_floats("triple", value).tolist()
     except (TypeError, ValueError):
         return None
-    return (x, y, z) if np.isfinite([x, y, z]).all() else None
+    return (x, y, z) if all(map(_is_number, (x, y, z))) else None

@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arguments import as_given, checked, flag, instance, path, text, whole
 from softreach.arm import file
 from softreach.arm.actuator_checks import bounds_faults
 from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
@@ -20,10 +21,11 @@ from softreach.arm.material import Material
 from softreach.arm.part_checks import fit_faults, kind_faults, named, part_faults, shared_names
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.section import Ring, Section
+from softreach.arrays import as_stations
 from softreach.atomic import writing
 from softreach.errors import InvalidDesign, InvalidInput
 
-__all__ = ["Manipulator"]
+__all__ = ["Manipulator", "a_manipulator"]
 
 Array = NDArray[np.float64]
 
@@ -127,6 +129,7 @@ class Manipulator:
         parts = zip(self.actuators, np.split(pairs, ends)[:-1], strict=True)
         return self.replace(actuators=tuple(one.with_bounds(part) for one, part in parts))
 
+    @checked(count=whole(1, 1000), keep_extent=flag)
     def split(self, fiber: str | int, count: int, *, keep_extent: bool = True) -> Self:
         """Replace an architecture of one bundle by `count` independent ones beside each other.
 
@@ -157,6 +160,7 @@ class Manipulator:
         )
 
     @classmethod
+    @checked(text=text, source=text)
     def from_toml(cls, text: str, source: str = "design") -> Self:
         """A design from the text of a file; `source` is what errors call it.
 
@@ -184,15 +188,17 @@ class Manipulator:
         return file.render(self.profile, self.section, self.actuators, self.loads)
 
     @classmethod
+    @checked(path=path)
     def load(cls, path: str | PathLike[str]) -> Self:
         """Read a design file (TOML, lengths in m, angles in degrees).
 
         Raises:
             InvalidDesign: The file's faults, all of them, in the file's own names and units.
-            OSError: The file cannot be read.
+            InvalidInput: No file that can be read, or no text in UTF-8.
         """
         return cls.from_toml(file.text_of(path), source=fspath(path))
 
+    @checked(path=path)
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write a design file; an older one is replaced whole.
 
@@ -259,7 +265,7 @@ class Manipulator:
 
     def outline(self, z: ArrayLike) -> Outline:
         """Where all bundles lie in the sections at stations Z [m], shape (station,)."""
-        stations = np.atleast_1d(np.asarray(z, float))
+        stations = as_stations("z", z)
         each = [one.outline(self.profile, self.section, stations) for one in self.actuators]
         each = each or [Outline.empty(len(stations))]
         return Outline(
@@ -294,8 +300,14 @@ class Manipulator:
             if isinstance(actuator, SectorActuator)
         }
         whole = isinstance(fiber, int | np.integer) and not isinstance(fiber, bool)
-        found = [k for k, name in names.items() if (k if whole else name) == fiber]
+        known = whole or isinstance(fiber, str)
+        found = [k for k, name in names.items() if known and (k if whole else name) == fiber]
         if found:
             return found[0]
-        known = ", ".join(f"{k} ({name})" for k, name in names.items())
-        raise InvalidInput("fiber", repr(fiber), f"the name or index of one architecture: {known}")
+        listed = ", ".join(f"{k} ({name})" for k, name in names.items())
+        allowed = f"the name or index of one architecture: {listed}"
+        raise InvalidInput("fiber", as_given(fiber), allowed)
+
+
+a_manipulator = instance(Manipulator, "a Manipulator")
+"""An argument that is a design."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Self
 
+from softreach.arguments import plain
 from softreach.arm.checks import MATERIAL_RANGES, material_faults
-from softreach.arm.value_checks import plain_number
 from softreach.arm.variable import Variable
 from softreach.errors import InvalidDesign
 
@@ -44,7 +44,7 @@ class Material:
             raise InvalidDesign(faults)
         for field in MATERIAL_RANGES:
             if (value := getattr(self, field)) is not None:
-                object.__setattr__(self, field, float(plain_number(value)))
+                object.__setattr__(self, field, float(plain(value)))
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed, checked like a new one."""

@@ -11,6 +11,7 @@ from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
+from softreach.arguments import checked, text
 from softreach.arm.material import Material
 from softreach.errors import InvalidInput
 
@@ -60,6 +61,7 @@ def material_record(name: str) -> MaterialRecord:
     return library[name]
 
 
+@checked(name=text)
 def named_material(name: str) -> Material:
     """A material of the library.
 

@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
+from softreach.arm.actuator_checks import MOST_BUNDLES
 from softreach.arm.actuators import Actuator
 from softreach.arm.checks import name_faults
 from softreach.arm.loads import Loads
@@ -35,9 +36,12 @@ def kind_faults(actuators: Any) -> Iterator[Fault]:
     if not isinstance(actuators, Sequence) or isinstance(actuators, str):
         yield Fault("actuators", actuators, "must be a sequence of actuators")
         return
-    for k, part in enumerate(actuators):
-        if not isinstance(part, Actuator):
-            yield Fault(f"actuators[{k}]", part, "must be an actuator, such as FiberArchitecture")
+    wrong = [k for k, part in enumerate(actuators) if not isinstance(part, Actuator)]
+    for k in wrong:
+        allowed = "must be an actuator, such as FiberArchitecture"
+        yield Fault(f"actuators[{k}]", actuators[k], allowed)
+    if not wrong and (count := sum(part.bundles for part in actuators)) > MOST_BUNDLES:
+        yield Fault("actuators", f"{count} bundles", f"must be at most {MOST_BUNDLES} in all")
 
 
 def fit_faults(arm: Manipulator) -> Iterator[Fault]:

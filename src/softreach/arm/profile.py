@@ -12,9 +12,10 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arguments import plain
 from softreach.arm.checks import PROFILE_RANGES, profile_faults
-from softreach.arm.value_checks import plain_number
 from softreach.arm.variable import Variable
+from softreach.arrays import as_floats
 from softreach.errors import InvalidDesign
 
 __all__ = ["LinearTaper", "Profile", "relative_expm1", "relative_log"]
@@ -103,7 +104,7 @@ class LinearTaper(Profile):
         if faults := profile_faults(vars(self)):
             raise InvalidDesign(faults)
         for field in PROFILE_RANGES:
-            object.__setattr__(self, field, float(plain_number(getattr(self, field))))
+            object.__setattr__(self, field, float(plain(getattr(self, field))))
 
     @property
     def breakpoints(self) -> tuple[float, ...]:
@@ -112,7 +113,7 @@ class LinearTaper(Profile):
 
     def radius(self, z: ArrayLike) -> Array:
         """R2(Z) [m]."""
-        return self.outer_radius - np.asarray(z, float) * np.tan(self.taper)
+        return self.outer_radius - as_floats("z", z) * np.tan(self.taper)
 
     def slope(self, z: ArrayLike) -> Array:
         """tan φ, the same everywhere [-]."""
@@ -120,12 +121,12 @@ class LinearTaper(Profile):
 
     def slender_coordinate(self, z: ArrayLike) -> Array:
         """S(Z) = Z/R2(0) · log(1 - q)/(-q) [-], with q = Z tan φ/R2(0): theory (15)."""
-        z = np.asarray(z, float)
+        z = as_floats("z", z)
         return z / self.outer_radius * relative_log(z * np.tan(self.taper) / self.outer_radius)
 
     def station(self, s: ArrayLike) -> Array:
         """Z(S) = R2(0) S (exp(y) - 1)/y [m] with y = -S tan φ: theory (16)."""
-        s = np.asarray(s, float)
+        s = as_floats("s", s)
         return self.outer_radius * s * relative_expm1(-s * np.tan(self.taper))
 
     def surface_coordinate(self, z: ArrayLike, ratio: float = 1.0) -> Array:

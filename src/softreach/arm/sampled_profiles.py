@@ -10,11 +10,13 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arguments import plain
 from softreach.arm.along import monotone_cubic
 from softreach.arm.checks import PROFILE_RANGES
 from softreach.arm.profile import Profile, relative_expm1, relative_log
-from softreach.arm.value_checks import INSIDE_RANGE, plain_number, range_faults, series_faults
+from softreach.arm.value_checks import INSIDE_RANGE, range_faults, series_faults
 from softreach.arm.variable import Variable
+from softreach.arrays import as_floats
 from softreach.errors import Fault, InvalidDesign
 
 __all__ = ["PiecewiseTaper", "SampledTaper"]
@@ -54,7 +56,7 @@ class _GivenRadii(Profile):
             faults = [Fault("radii", self.radii, "must be positive, in m")]
         if faults:
             raise InvalidDesign(faults)
-        object.__setattr__(self, "length", float(plain_number(self.length)))
+        object.__setattr__(self, "length", float(plain(self.length)))
         for field in ("stations_over_length", "radii"):
             numbers = np.asarray(getattr(self, field), float).tolist()
             object.__setattr__(self, field, tuple(numbers))
@@ -80,13 +82,13 @@ class _GivenRadii(Profile):
 
     def slender_coordinate(self, z: ArrayLike) -> Array:
         """S(Z) [-], piece by piece: theory (15)."""
-        z = np.asarray(z, float)
+        z = as_floats("z", z)
         piece = self._piece(z)
         return self._slender_knots[piece] + self._slender_gap(piece, z - self._knots[piece])
 
     def station(self, s: ArrayLike) -> Array:
         """Z(S) [m], the inverse of `slender_coordinate`."""
-        s = np.asarray(s, float)
+        s = as_floats("s", s)
         piece = np.searchsorted(self._slender_knots[1:-1], s, "right")
         return self._knots[piece] + self._length_gap(piece, s - self._slender_knots[piece])
 
@@ -109,11 +111,11 @@ class PiecewiseTaper(_GivenRadii):
 
     def radius(self, z: ArrayLike) -> Array:
         """R2(Z) [m]."""
-        return np.interp(np.asarray(z, float), self._knots, self.radii)
+        return np.interp(as_floats("z", z), self._knots, self.radii)
 
     def slope(self, z: ArrayLike) -> Array:
         """tan φ(Z) [-]; at a station, that of the piece which begins there."""
-        return self._slopes[self._piece(np.asarray(z, float))]
+        return self._slopes[self._piece(as_floats("z", z))]
 
     @cached_property
     def _slopes(self) -> Array:
@@ -121,7 +123,7 @@ class PiecewiseTaper(_GivenRadii):
 
     def surface_coordinate(self, z: ArrayLike, ratio: float = 1.0) -> Array:
         """∫ dZ/(R cos φ) [-], piece by piece: theory (17)."""
-        z = np.asarray(z, float)
+        z = as_floats("z", z)
         piece, secant = self._piece(z), np.hypot(1.0, ratio * self._slopes) / ratio
         whole = np.concatenate([[0.0], np.cumsum(np.diff(self._slender_knots) * secant)])
         rest = self._slender_gap(piece, z - self._knots[piece])
@@ -145,11 +147,11 @@ class SampledTaper(_GivenRadii):
 
     def radius(self, z: ArrayLike) -> Array:
         """R2(Z) [m]."""
-        return self._curve(np.asarray(z, float) / self.length)
+        return self._curve(as_floats("z", z) / self.length)
 
     def slope(self, z: ArrayLike) -> Array:
         """tan φ(Z) = -R2'(Z) [-]."""
-        return -self._curve_slope(np.asarray(z, float) / self.length) / self.length
+        return -self._curve_slope(as_floats("z", z) / self.length) / self.length
 
     @cached_property
     def _curve(self) -> Any:
@@ -161,7 +163,7 @@ class SampledTaper(_GivenRadii):
 
     def surface_coordinate(self, z: ArrayLike, ratio: float = 1.0) -> Array:
         """∫ dZ/(R cos φ) [-] by Gauss quadrature in each piece: theory (14)."""
-        z = np.asarray(z, float)
+        z = as_floats("z", z)
 
         def secant(station: Array) -> Array:
             return np.hypot(1.0, ratio * self.slope(station)) / (ratio * self.radius(station))

@@ -10,9 +10,9 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arguments import plain
 from softreach.arm.checks import RING_RANGES, ring_faults, section_faults
 from softreach.arm.material import Material
-from softreach.arm.value_checks import plain_number
 from softreach.arm.variable import Variable
 from softreach.errors import Fault, InvalidDesign
 
@@ -50,7 +50,7 @@ class Ring:
         if faults:
             raise InvalidDesign(faults)
         for ratio in RING_RANGES:
-            object.__setattr__(self, ratio, float(plain_number(getattr(self, ratio))))
+            object.__setattr__(self, ratio, float(plain(getattr(self, ratio))))
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed, checked like a new one."""
@@ -124,7 +124,7 @@ class Section:
         object.__setattr__(self, "rings", rings)
         if faults := section_faults(vars(self)) or list(_modulus_faults(self)):
             raise InvalidDesign(faults)
-        object.__setattr__(self, "bore_ratio", float(plain_number(self.bore_ratio)))
+        object.__setattr__(self, "bore_ratio", float(plain(self.bore_ratio)))
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed, checked like a new one."""

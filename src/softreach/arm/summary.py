@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arguments import checked
 from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
 from softreach.arm.along import AlongArm
 from softreach.arm.bending import bending_at, largest_bending, sharpest_bending, smallest_bending
-from softreach.arm.manipulator import Manipulator
+from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.section import Stiffness
 from softreach.arm.tables import both_sides, check_extension, extension_range
 from softreach.arm.weight import (
@@ -71,6 +72,7 @@ class DesignSummary:
     """Limits that the design touches, each with its number."""
 
 
+@checked(arm=a_manipulator)
 def describe(arm: Manipulator) -> DesignSummary:
     """Everything that `softreach design` prints.
 

@@ -6,12 +6,14 @@ profile or material changes these tables, and nothing that reads them.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arm.actuator_checks import MOST_TURN
 from softreach.arm.actuators import Actuator, Resultants
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import Fault, InvalidDesign
@@ -97,9 +99,11 @@ def check_extension(arm: Manipulator) -> None:
     """The theory ends where an activation would shorten the arm to nothing.
 
     Raises:
-        InvalidDesign: ζ <= 0 somewhere in the activation box and along the arm, or dimensions too
-            large or too small for numbers of double precision.
+        InvalidDesign: ζ <= 0 somewhere in the activation box and along the arm, dimensions too
+            large or too small for numbers of double precision, or more than a hundred turns.
     """
+    if faults := list(_winding_faults(arm)):
+        raise InvalidDesign(faults)
     with np.errstate(all="ignore"):
         table = tables(arm, _stations(arm))
     if not (np.isfinite(table.extension).all() and np.isfinite(table.curvature).all()):
@@ -110,6 +114,17 @@ def check_extension(arm: Manipulator) -> None:
     if smallest <= 0:
         allowed = f"reaches extension ζ = {smallest:.4g}; must keep ζ > 0: narrow the bounds"
         raise InvalidDesign([Fault("activation_bounds", arm.bounds.tolist(), allowed)])
+
+
+def _winding_faults(arm: Manipulator) -> Iterator[Fault]:
+    """Fibers and tendons that wind so often about the arm that no steps follow them."""
+    for one in arm.actuators:
+        if any(variable.field == "revolution" for variable in one.variables):
+            with np.errstate(all="ignore"):
+                turns = abs(one.value_on("revolution", arm.profile, arm.section)) / (2 * np.pi)
+            if not turns <= MOST_TURN / (2 * np.pi):
+                allowed = f"must be at most {MOST_TURN / (2 * np.pi):g}: give a smaller angle"
+                yield Fault(f"turns of {one.name}", float(turns), allowed)
 
 
 def extension_range(arm: Manipulator) -> tuple[float, float]:

@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from softreach.errors import Fault, Range
+from softreach.arguments import plain
+from softreach.arrays import as_floats
+from softreach.errors import Fault, InvalidInput, Range
 
 __all__ = [
     "INSIDE_RANGE",
     "as_numbers",
-    "plain_number",
     "range_faults",
     "series_faults",
     "sound_values",
@@ -38,7 +39,7 @@ def text_faults(values: Mapping[str, Any]) -> list[Fault]:
 
 def range_faults(values: Mapping[str, Any], ranges: Mapping[str, Range]) -> list[Fault]:
     """A fault for each value outside its range; absent ones are skipped."""
-    given = {name: plain_number(values[name]) for name in ranges if name in values}
+    given = {name: plain(values[name]) for name in ranges if name in values}
     return [
         Fault(name, value, ranges[name])
         for name, value in given.items()
@@ -67,24 +68,18 @@ def series_faults(values: Mapping[str, Any], field: str, per_station: bool = Tru
     return []
 
 
-def plain_number(value: Any) -> Any:
-    """A Python number for a NumPy scalar; anything else as it is."""
-    return value.item() if hasattr(value, "item") and getattr(value, "ndim", 0) == 0 else value
-
-
 def as_numbers(values: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
     """Numbers as an array; empty for text, booleans and anything else that is not a number."""
     try:
-        array = np.asarray(values)
-    except (TypeError, ValueError):
+        return as_floats("values", values)
+    except InvalidInput:
         return np.empty(0)
-    return array.astype(float) if array.dtype.kind in "iuf" else np.empty(0)
 
 
 def sound_values(values: Mapping[str, Any], faults: list[Fault]) -> dict[str, Any]:
     """The values without a fault so far."""
     blamed = {fault.path for fault in faults}
-    return {name: plain_number(value) for name, value in values.items() if name not in blamed}
+    return {name: plain(value) for name, value in values.items() if name not in blamed}
 
 
 def values_along(given: Any) -> tuple[float, ...] | None:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
+from softreach.arm.file.document import document_of
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters.unknown import unknown_parameter
 from softreach.arm.parameters.written import from_written, written_parameters
 from softreach.atlas.space import DesignSpace
-from softreach.errors import InvalidInput
+from softreach.errors import InvalidDesign, InvalidInput
 from softreach.quantity import read_number, read_whole_number
 
 __all__ = ["parse_parameter", "parse_space"]
@@ -85,9 +85,9 @@ def parse_parameter(base: Manipulator, key: str, value: Any) -> tuple[str, list[
 
 def _document(text: str) -> dict[str, Any]:
     try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InvalidInput("space", str(error), "valid TOML") from None
+        document = document_of(text, "space", float)
+    except InvalidDesign as error:
+        raise InvalidInput("space", error.faults[0], "valid TOML") from None
     for key in document:
         if key not in _KEYS:
             raise InvalidInput("key", key, f"one of {', '.join(_KEYS)}")

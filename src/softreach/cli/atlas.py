@@ -187,16 +187,16 @@ def figures(
 def _space_of(
     path: Path | None, design: str, vary: list[str] | None, changes: Changes
 ) -> DesignSpace:
+    from softreach.arm.file.document import LONGEST
     from softreach.atlas.space import DesignSpace
     from softreach.atlas.space_file import parse_parameter, parse_space
+    from softreach.text_file import read_text
 
     if (path is None) == (vary is None):
         raise InvalidInput("space", path, "given, or --vary, and not both")
     if path is not None:
         changes.refuse("left out with --space, whose file names the design")
-        if not path.is_file():
-            raise InvalidInput("space", path, "a file that exists")
-        return parse_space(path.read_text(encoding="utf-8"), design_from)
+        return parse_space(read_text("space", path, LONGEST), design_from)
     base = design_from(design, changes)
     return DesignSpace.grid(
         base, **dict(parse_parameter(base, *_key_and_values(text)) for text in vary or ())

@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.numbers import WHOLE, numbers_in, shortened
 from softreach.errors import InvalidDesign, InvalidInput
+from softreach.text_file import MEGABYTE, read_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,6 +35,8 @@ __all__ = [
     "radius_of",
     "shape_of",
 ]
+
+_MOST_TARGETS = 64 * MEGABYTE  # a million targets
 
 Design = Annotated[
     str, Parameter(help="Design file (.toml), or a built-in design such as minimal_trunk.")
@@ -134,9 +137,10 @@ def points_of(text: str | None, file: Path | None) -> list[list[float]]:
     """Positions [m] from `x,y,z`, or from a CSV file with such columns (a header is skipped)."""
     if text is not None:
         return [_position("target", text)]
-    if file is None or not file.is_file():
-        raise InvalidInput("targets", file, "a CSV file that exists")
-    lines = [line for line in _text_of(file).splitlines() if line.strip()]
+    if file is None:
+        raise InvalidInput("targets", file, "a CSV file")
+    text_of_file = read_text("targets", file, _MOST_TARGETS)
+    lines = [line for line in text_of_file.splitlines() if line.strip()]
     rows = lines[1:] if lines and _is_header(lines[0]) else lines
     if not rows:
         raise InvalidInput("targets", file, "a CSV file with a row x,y,z for each position")

@@ -5,6 +5,8 @@ from __future__ import annotations
 from os import PathLike
 from typing import TYPE_CHECKING
 
+from softreach.arguments import checked, dataset, path, whole
+from softreach.arm.manipulator import a_manipulator
 from softreach.arm.skin import inside
 from softreach.arm_shape import arm_surface, bundle_surfaces
 from softreach.export.surface import Part, write_parts
@@ -20,6 +22,12 @@ __all__ = ["export_arm"]
 _CLEAR = 0.45  # opacity of a body that has something inside
 
 
+@checked(
+    arm=a_manipulator,
+    configuration=dataset("position", "directors", "extension", "Z", what="a configuration"),
+    path=path,
+    sides=whole(3, 10_000),
+)
 def export_arm(
     arm: Manipulator,
     configuration: xr.Dataset,

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from io import BufferedWriter
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arrays import Faces
+from softreach.arguments import as_given, checked, path
+from softreach.arrays import Faces, as_faces, as_points
 from softreach.errors import InvalidInput
 from softreach.export import ply
 from softreach.export.formats import Writers, load_library, write_by_suffix, write_vtk, write_vtu
@@ -36,6 +37,25 @@ class Part(NamedTuple):
     opacity: float = 1.0
 
 
+def _parts_of(value: Any) -> tuple[Any, Any] | None:
+    """Vertices and faces of an object that has them."""
+    if isinstance(value, type) or not (hasattr(value, "vertices") and hasattr(value, "faces")):
+        return None
+    return value.vertices, value.faces
+
+
+def _a_mesh(name: str, value: Any) -> tuple[NDArray[np.float64], Faces]:
+    """Vertices and faces of a surface, or the pair of them."""
+    allowed = "an object with vertices [m] and faces, or the pair of them"
+    pair = value if isinstance(value, tuple) else _parts_of(value)
+    if pair is None or len(pair) != 2:
+        raise InvalidInput(name, as_given(value), allowed)
+    vertices, faces = pair
+    points = as_points(f"{name}.vertices", vertices)
+    return points, as_faces(f"{name}.faces", faces, len(points))
+
+
+@checked(mesh_or_hull=_a_mesh, path=path)
 def export_mesh(
     mesh_or_hull: SurfaceMesh | tuple[ArrayLike, ArrayLike],
     path: str | PathLike[str],
@@ -57,10 +77,7 @@ def export_mesh(
         MissingExtra: The format needs a library that is not installed.
         NotWritten: It cannot be written.
     """
-    pair = mesh_or_hull
-    if not isinstance(pair, tuple):
-        pair = (pair.vertices, pair.faces)
-    vertices, faces = np.asarray(pair[0], float), np.asarray(pair[1], np.int64)
+    vertices, faces = cast("tuple[NDArray[np.float64], Faces]", mesh_or_hull)
     if not len(faces):
         raise InvalidInput("mesh.faces", "none", "at least one triangle")
     write_parts([Part("surface", vertices, faces)], path, overwrite=overwrite)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arrays import as_points
 from softreach.errors import InvalidInput
-from softreach.geometry.delaunay import finite_points
 
 __all__ = ["CellGrid"]
 
@@ -41,7 +41,7 @@ class CellGrid:
                 or so small that the grid would not fit into memory.
         """
         placed = np.asarray(~np.isnan(points).all(axis=-1))
-        points = finite_points(points[placed])
+        points = as_points("points", points[placed])
         if len(points) == 0:
             raise InvalidInput("points", "none", "at least one")
         if not 0 < edge < np.inf:  # NaN too

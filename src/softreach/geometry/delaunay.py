@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
 
-from softreach.arrays import Points
-from softreach.errors import InvalidInput
+from softreach.arguments import one_of
+from softreach.arrays import Points, as_points
+from softreach.geometry.dimension import lies_on_curve
 from softreach.kernels.delaunay import triangulate
 from softreach.kernels.spatial_sort import insertion_order
 
-__all__ = ["Delaunay", "delaunay", "finite_points", "unit_scale"]
+__all__ = ["Delaunay", "delaunay", "unit_scale"]
 
 FINEST = 200  # bits below the largest coordinate that `kernels.predicates` may see
+_FEW = 1000  # of which even those on a curve are soon triangulated
 METHODS = ("auto", "numba", "qhull")
 
 
@@ -22,7 +25,8 @@ METHODS = ("auto", "numba", "qhull")
 class Delaunay:
     """Tetrahedra whose circumscribed spheres hold no other point.
 
-    Points in one plane, on one line or fewer than four give no tetrahedra at all.
+    Points in one plane, on one line or fewer than four give no tetrahedra at all; nor do more than
+    some hundreds on a curve in space, of which nearly every pair would have an edge.
     """
 
     points: Points
@@ -51,34 +55,13 @@ def delaunay(points: np.ndarray, method: Literal["auto", "numba", "qhull"] = "au
     Raises:
         InvalidInput: Points of another shape, or not finite; an unknown method.
     """
-    points = finite_points(points)
-    if method not in METHODS:
-        raise InvalidInput("method", repr(method), f"one of {', '.join(METHODS)}")
+    points = as_points("points", points)
+    one_of(METHODS)("method", method)
     build = _by_qhull if method == "qhull" else _by_insertion
     tetrahedra, neighbors, duplicate_of = build(unit_scale(points)[0])
     return Delaunay(
         points=points, tetrahedra=tetrahedra, neighbors=neighbors, duplicate_of=duplicate_of
     )
-
-
-def finite_points(points: object) -> Points:
-    """Points as floats in memory order, shape (n, 3), or a clear error.
-
-    Raises:
-        InvalidInput: Another shape, or rows that are not finite.
-    """
-    array = np.ascontiguousarray(points, dtype=np.float64)
-    if array.size == 0:
-        return array.reshape(0, 3)
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise InvalidInput("points", f"array of shape {array.shape}", "of shape (n, 3) [m]")
-    wrong = np.flatnonzero(~np.isfinite(array).all(axis=1))
-    if len(wrong):
-        found = f"{len(wrong)} rows with NaN or infinity, the first at index {wrong[0]}"
-        raise InvalidInput(
-            "points", found, "finite", "drop these rows, or find out where they come from"
-        )
-    return array
 
 
 def unit_scale(points: Points) -> tuple[Points, int]:
@@ -93,7 +76,7 @@ def _by_insertion(points: Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     if len(points) < 4:
         return *_nothing(), _first_equal(points)
     order = insertion_order(points)
-    cells, neighbors, same = triangulate(points[order])
+    cells, neighbors, same = triangulate(points[order], partial(lies_on_curve, points))
     if len(cells) == 0:
         return *_nothing(), _first_equal(points)
     duplicate_of = np.empty(len(points), np.int64)
@@ -108,7 +91,7 @@ def _by_qhull(points: Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
     duplicate_of = _first_equal(points)
     distinct = np.unique(duplicate_of)
-    if len(distinct) < 4:
+    if len(distinct) < 4 or (len(distinct) > _FEW and lies_on_curve(points)):
         return *_nothing(), duplicate_of
     inner = points[distinct] - points[distinct].mean(axis=0)
     try:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.arrays import Faces, Points
-from softreach.geometry.delaunay import finite_points, unit_scale
+from softreach.arrays import Faces, Points, as_points
+from softreach.geometry.delaunay import unit_scale
 from softreach.geometry.surface import compact_surface, enclosed_volume, surface_area
 from softreach.quantity import quantity
 from softreach.versions import versions
@@ -117,7 +117,7 @@ def convex_hull(points: np.ndarray) -> Hull:
     Raises:
         InvalidInput: Points of another shape, or not finite.
     """
-    points = finite_points(points)
+    points = as_points("points", points)
     vertices, faces = _convex_surface(points)
     volume = enclosed_volume(vertices, faces)
     return Hull(

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach import parallel
+from softreach.arrays import as_points
 from softreach.errors import InvalidInput
-from softreach.geometry.delaunay import finite_points
 from softreach.kernels.neighbors import (
     PLACE_BITS,
     SHIFTS,
@@ -60,7 +60,7 @@ def mean_value_distance(
     Raises:
         InvalidInput: Arrays of another shape or not finite, or a radius below zero.
     """
-    points, values = finite_points(points), _finite_values(values, len(points))
+    points, values = as_points("points", points), _finite_values(values, len(points))
     if not radius >= 0:  # NaN too
         raise InvalidInput("radius", radius, "a radius >= 0 [m]")
     if len(points) == 0:

@@ -8,6 +8,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arguments import checked, whole
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.bisection import CoarseCells
 from softreach.inverse.cells import activation_cells
@@ -110,6 +111,7 @@ class PreparedMap:
         return face_landmarks(self.rod)
 
 
+@checked(cells=whole(2, 256), depth=whole(0, 20))
 def prepared_map(
     arm: Manipulator | TipMap | PreparedMap,
     tol: float = 1e-6,

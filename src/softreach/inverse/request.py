@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.errors import InvalidInput
+from softreach.arguments import as_number, as_whole_number
+from softreach.arrays import as_floats, as_rows, check_finite
+from softreach.errors import InvalidInput, Range
 from softreach.rod.activation_box import ActivationBox
 
 __all__ = [
@@ -23,6 +25,7 @@ __all__ = [
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+_FARTHEST = 1e100  # [m]; squares of larger distances leave the range of numbers
 _RESIDUALS = (1e-13, 1e-2)  # in L; below, rounding of the tips decides
 
 
@@ -57,15 +60,11 @@ def checked_targets(name: str, targets: ArrayLike) -> Array:
     """The targets as a (t, 3) float array.
 
     Raises:
-        InvalidInput: Another shape, or values that are not finite.
+        InvalidInput: Another shape, or values that are not finite or beyond 1e100 m.
     """
-    allowed = "of shape (t, 3), positions in m"
-    points = np.ascontiguousarray(_numbers(name, targets, allowed))
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise InvalidInput(f"{name}.shape", points.shape, allowed)
-    if not np.isfinite(points).all():
-        row = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
-        raise InvalidInput(f"{name}[{row}]", points[row], "finite numbers")
+    points = as_rows(name, targets, 3, "of shape (t, 3), positions in m")
+    if points.size and (far := np.abs(points).max()) > _FARTHEST:
+        raise InvalidInput(name, f"up to {far:g} m", f"within {_FARTHEST:g} m")
     return points
 
 
@@ -82,11 +81,10 @@ def checked_activations(name: str, activations: ArrayLike, box: ActivationBox, c
         InvalidInput: Another shape, or values that are not finite.
     """
     m = box.bundles
-    rows = _numbers(name, activations, "numbers")
+    rows = as_floats(name, activations)
     if rows.shape not in ((m,), (count, m)):
         raise InvalidInput(f"{name}.shape", rows.shape, f"of shape ({m},), or ({count}, {m})")
-    if not np.isfinite(rows).all():
-        raise InvalidInput(name, activations, "finite numbers")
+    check_finite(name, rows)
     return np.ascontiguousarray(np.broadcast_to(rows, (count, m))[:, box.free])
 
 
@@ -94,7 +92,7 @@ def checked_direction(direction: ArrayLike | None, count: int) -> Array | None:
     """Unit vectors along the wanted tip tangents, shape (t, 3); None if there are none."""
     if direction is None:
         return None
-    rows = _numbers("direction", direction, "numbers")
+    rows = as_floats("direction", direction)
     if rows.shape not in ((3,), (count, 3)):
         raise InvalidInput("direction.shape", rows.shape, "of shape (3,) or (t, 3)")
     size = np.linalg.norm(rows, axis=-1, keepdims=True)
@@ -110,21 +108,9 @@ def checked_residual(residual_over_length: float) -> float:
 
 def checked_number(name: str, value: float, low: float, high: float) -> float:
     """The number itself, if it lies within the limits."""
-    if not low <= value <= high:
-        raise InvalidInput(name, value, f"between {low:g} and {high:g}")
-    return float(value)
+    return as_number(name, value, Range(low, high))
 
 
 def checked_whole_number(name: str, value: int, low: int, high: int) -> int:
     """The whole number itself, if it lies within the limits."""
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not whole or not low <= value <= high:
-        raise InvalidInput(name, value, f"a whole number between {low:g} and {high:g}")
-    return int(value)
-
-
-def _numbers(name: str, values: ArrayLike, allowed: str) -> Array:
-    try:
-        return np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        raise InvalidInput(name, f"{values!r:.80}", allowed) from None
+    return as_whole_number(name, value, low, high)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
+from softreach.arguments import checked, flag
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
 from softreach.inverse.branches import distinct, every_branch
@@ -40,6 +41,7 @@ _BLOCK = 32_768  # targets at once: bounds the memory of a call
 _BRANCH_BLOCK = 131_072  # where all roots are searched, which is done in smaller sets
 
 
+@checked(prove_least=flag)
 def solve_inverse(
     arm: Manipulator | TipMap | PreparedMap,
     targets: ArrayLike,

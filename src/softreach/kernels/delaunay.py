@@ -46,39 +46,55 @@ from softreach.kernels.triangulation import (
 
 __all__ = ["triangulate"]
 
+CROWDED = 50_000  # cells beside those that are usual
 INSIDE, UNSURE = np.intp(-1), np.intp(-2)
 
 
-def triangulate(points):
+def triangulate(points, lies_on_curve):
     """Insert points in the given order.
+
+    Points in space and on surfaces have four to eight cells each, those on a curve as many as there
+    are points. Such crowding shows after some hundred points.
 
     Args:
         points: Coordinates in [-1, 1], multiples of 2^-200 (see `predicates`), shape (n, 3).
+        lies_on_curve: Called without arguments when cells crowd; True gives up.
 
     Returns:
         Cells (m, 4), neighbors (m, 4) with -1 outside the hull, and for every point itself or the
-        equal point inserted before it, shape (n,). No cells if the points lie in one plane.
+        equal point inserted before it, shape (n,). No cells if the points lie in one plane, or
+        where it was given up.
     """
+    crowded = CROWDED
     w, start, same = scratch(), np.zeros(4, np.int64), np.arange(len(points))
     mesh = empty_triangulation(8 * len(points) + 64)
     table = np.empty((2, 2048), np.int64)
-    at, walls, used, free, last = _insert(points, mesh, start, same, table, w, 0, 0, DEAD, 0)
+    at, walls, used, free, last = _insert(
+        points, mesh, start, same, table, w, 0, 0, DEAD, 0, crowded
+    )
     while at < len(points):
-        mesh, table = enlarged(mesh, used, walls), np.empty((2, max(2048, 32 * walls)), np.int64)
+        if walls > 0:
+            mesh = enlarged(mesh, used, walls)
+            table = np.empty((2, max(2048, 32 * walls)), np.int64)
+        elif lies_on_curve():
+            return mesh.cells[:0], mesh.neighbors[:0], same
+        else:
+            crowded = np.iinfo(np.int64).max // 2
         at, walls, used, free, last = _insert(
-            points, mesh, start, same, table, w, at, used, free, last
+            points, mesh, start, same, table, w, at, used, free, last, crowded
         )
     return mesh.cells[:used], mesh.neighbors[:used], same
 
 
 @strict
-def _insert(points, mesh, start, same, table, w, at, used, free, last):
+def _insert(points, mesh, start, same, table, w, at, used, free, last, crowded):
     """Insert points from number `at` on while there is room; no cells yet if that is 0.
 
     Memory is left to the caller: a kernel that asks for it takes longer to compile.
 
     Returns:
-        The first point that was not inserted, and the walls of its cavity; slots used, the head of
+        The first point that was not inserted, and the walls of its cavity, or 0 if there are more
+        than `crowded` cells beside 16 for each point; slots used, the head of
         the freed slots and the last cell, to go on with. Once all are: slots used by finite cells.
     """
     if at == 0:
@@ -86,6 +102,8 @@ def _insert(points, mesh, start, same, table, w, at, used, free, last):
         if used == 0:
             return len(points), 0, used, free, last
     for p in range(at, len(points)):
+        if used > crowded + 16 * p:
+            return p, 0, used, free, last
         if p == start[0] or p == start[1] or p == start[2] or p == start[3]:
             continue
         found = locate(points, mesh, p, last, w)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arguments import checked, flag, optional
 from softreach.arm.skin import inside
 from softreach.arm_shape import arm_surface, bundle_skins, rest_configuration
 from softreach.palette import BODY, bundle_color
@@ -15,6 +16,7 @@ from softreach.picture.projection import View
 from softreach.picture.see_through import faces_to_eye
 from softreach.picture.shading import draw_mesh
 from softreach.picture.zbuffer import ZBuffer
+from softreach.plot.arguments import DRAWN, MANIPULATOR, SHAPE, some_bundles
 from softreach.plot.frame import Panel
 from softreach.plot.lengths import in_lengths
 from softreach.plot.style import figure_style
@@ -34,6 +36,7 @@ _BULGE = 1.01  # of R2, beyond which a bundle makes the picture wider
 _FADE = 0.62  # how far the colors of the arm at rest go toward white
 
 
+@checked(**DRAWN, arm=MANIPULATOR, configuration=optional(SHAPE), rest=flag)
 def plot_arm(
     arm: Manipulator,
     configuration: xr.Dataset | None = None,
@@ -68,7 +71,7 @@ def plot_arm(
     with figure_style(ax):
         points = np.concatenate([arm_points(arm, shape) for shape in shapes + resting])
         panel = Panel.opened(points, in_lengths(arm.length), ax, view, box)
-        drawn = range(arm.bundles) if bundles is None else bundles
+        drawn = range(arm.bundles) if bundles is None else some_bundles("bundles", bundles, arm)
         draw_arms(panel, arm, resting, drawn, _FADE if shapes else 0.0)
         draw_arms(panel, arm, shapes, drawn)
     return panel.ax

@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arguments import checked, flag
 from softreach.picture.projection import View
 from softreach.picture.zbuffer import ZBuffer
+from softreach.plot.arguments import DRAWN, POINTS, SIZE
 from softreach.plot.coloring import color_samples, draw_key
 from softreach.plot.frame import Panel
 from softreach.plot.lengths import unit_of
@@ -23,6 +25,7 @@ __all__ = ["cloud_image", "drawn_tips", "plot_cloud", "point_size"]
 _LARGEST = 8.0  # pixels
 
 
+@checked(**DRAWN, cloud=POINTS, size=SIZE, key=flag)
 def plot_cloud(
     cloud: xr.Dataset,
     *,

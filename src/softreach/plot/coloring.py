@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arrays import as_floats
 from softreach.errors import InvalidInput
 from softreach.palette import activation_colors
 from softreach.schema import activation_symbols, activation_units
@@ -112,7 +113,7 @@ def _colored(cloud: xr.Dataset, color: str | int | ArrayLike) -> Coloring:
         lights = activation_colors(np.eye(len(names)))
         key = BundleKey(names, lights, symbols)
         return Coloring(activation_colors(_comparable(activation.values, units)), key)
-    if isinstance(color, str | int | np.integer):
+    if isinstance(color, str | int | np.integer) and not isinstance(color, bool):
         bundle = _bundle(names, color)
         magnitude = np.abs(activation.values[:, bundle])
         unit = "" if units[bundle] == "1" else f" [{units[bundle]}]"
@@ -195,7 +196,7 @@ def _bundle(names: tuple[str, ...], color: str | int | np.integer) -> int:
 
 
 def _given(color: ArrayLike, samples: int) -> Coloring:
-    values = np.asarray(color, float)
+    values = as_floats("color", color, '"rgb", a bundle or its index, or an array of numbers')
     if values.shape == (samples,):
         if _spans_decades(values, color):
             return _logarithmic(values, _described(color))

@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arguments import POSITIVE, checked, flag, optional, within
+from softreach.arrays import as_floats
 from softreach.errors import InvalidInput
 from softreach.picture.projection import View, is_mirrored, project
+from softreach.plot.arguments import DRAWN, MANIPULATOR, SHAPE
 from softreach.plot.arm import arm_points, plot_arm, shapes_of
 from softreach.plot.frame import bounding_box
 from softreach.plot.style import figure_style
@@ -29,6 +32,14 @@ _CORNERS = 120
 _COLOR = "tab:orange"
 
 
+@checked(
+    **DRAWN,
+    arm=MANIPULATOR,
+    configuration=SHAPE,
+    compliance=as_floats,
+    force=optional(within(POSITIVE)),
+    rest=flag,
+)
 def plot_compliance(
     arm: Manipulator,
     configuration: xr.Dataset,
@@ -62,7 +73,10 @@ def plot_compliance(
         MissingExtra: matplotlib is not installed.
     """
     shapes = shapes_of(configuration)
-    matrices = np.asarray(compliance, float).reshape(-1, 3, 3)
+    given = np.asarray(compliance, float)
+    matrices = given if given.ndim == 3 else given[None]
+    if matrices.shape[1:] != (3, 3):
+        raise InvalidInput("compliance.shape", np.shape(compliance), "(3, 3) or (n, 3, 3)")
     if len(matrices) != len(shapes):
         raise InvalidInput("compliance", f"{len(matrices)} of them", f"one each of {len(shapes)}")
     force = _round_force(matrices, arm.length) if force is None else force

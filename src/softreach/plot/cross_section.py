@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from softreach.arguments import checked, flag, optional
 from softreach.errors import InvalidInput
+from softreach.plot.arguments import AX, LENGTH, MANIPULATOR, PLACE, some_bundles
 from softreach.plot.lengths import in_lengths
 from softreach.plot.section_bundles import draw_bundles, placed_bundles
 from softreach.plot.section_key import needs_section_key, section_key
@@ -25,6 +27,7 @@ _SIZE = 2.0  # inches
 _MARGIN = 1.08
 
 
+@checked(arm=MANIPULATOR, z=PLACE, ax=AX, half_width=optional(LENGTH), legend=optional(flag))
 def plot_cross_section(
     arm: Manipulator,
     z: float = 0.0,
@@ -61,7 +64,9 @@ def plot_cross_section(
         raise InvalidInput("z", z, f"within [0, {arm.length:g}] m")
     unit = in_lengths(arm.length)
     outer = float(unit.of(arm.profile.radius(z)))
-    placed = placed_bundles(arm, z, range(arm.bundles) if bundles is None else bundles)
+    placed = placed_bundles(
+        arm, z, range(arm.bundles) if bundles is None else some_bundles("bundles", bundles, arm)
+    )
     legend = needs_section_key(arm) if legend is None else legend
     with figure_style(ax):
         key = section_key(arm, placed) if legend else None

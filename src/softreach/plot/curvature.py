@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arguments import checked, dataset, mapping_of, one_of
 from softreach.errors import InvalidInput
+from softreach.plot.arguments import AX
 from softreach.plot.lengths import LengthUnit, common_unit, unit_of
 from softreach.plot.style import figure_style, small_axes
 
@@ -25,6 +27,7 @@ _SYMBOLS = {"bending": "κ", "torsion": "$u_3$", "extension": "ζ"}
 _BINS = 64
 
 
+@checked(statistics=mapping_of(dataset("bending_count", "Z")), ax=AX)
 def plot_curvature(
     statistics: Mapping[str, xr.Dataset], *, ax: Axes | None = None, quantity: str = "bending"
 ) -> Axes:
@@ -45,8 +48,7 @@ def plot_curvature(
     """
     if not 1 <= len(statistics) <= 2:
         raise InvalidInput("statistics", f"of {len(statistics)} designs", "of one or two")
-    if quantity not in _SYMBOLS:
-        raise InvalidInput("quantity", quantity, f"one of {', '.join(_SYMBOLS)}")
+    one_of(_SYMBOLS)("quantity", quantity)
     unit = common_unit([unit_of(found) for found in statistics.values()])
     places = _common_places(statistics)
     with figure_style(ax):

@@ -7,8 +7,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from softreach.arguments import checked, each_of, instance, optional
 from softreach.arm_shape import rest_configuration
+from softreach.arrays import as_stations
+from softreach.errors import InvalidInput
 from softreach.picture.projection import View
+from softreach.plot.arguments import WIDTH
 from softreach.plot.arm import arm_points, plot_arm
 from softreach.plot.cross_section import plot_cross_section, section_reach
 from softreach.plot.frame import bounding_box
@@ -32,6 +36,15 @@ class DesignPanel(NamedTuple):
     """Which to draw, by index; None for all."""
 
 
+def _panels(name: str, value: object) -> list[DesignPanel]:
+    """One panel or more."""
+    panels = each_of(instance(DesignPanel, "a DesignPanel"))(name, value)
+    if panels:
+        return panels
+    raise InvalidInput(name, "none", "at least one DesignPanel")
+
+
+@checked(panels=_panels, stations_over_length=as_stations, width=optional(WIDTH))
 def plot_designs(
     panels: Sequence[DesignPanel],
     *,

@@ -8,8 +8,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arguments import (
+    POSITIVE,
+    checked,
+    dataset,
+    flag,
+    mapping_of,
+    optional,
+    whole,
+    within,
+)
 from softreach.errors import InvalidInput
 from softreach.picture.projection import View, project
+from softreach.plot.arguments import DRAWN, POINTS, SIZE, WIDTH
 from softreach.plot.cloud import drawn_tips
 from softreach.plot.coloring import COLORMAP, ScalarKey, draw_key
 from softreach.plot.frame import Panel
@@ -27,6 +38,14 @@ _ISOLATED = 190  # light gray
 _LABEL = "mean activation distance D̄"
 
 
+@checked(
+    **DRAWN,
+    cloud=POINTS,
+    distance=dataset(kind="DataArray"),
+    high=optional(within(POSITIVE)),
+    size=SIZE,
+    key=flag,
+)
 def plot_distance(
     cloud: xr.Dataset,
     distance: xr.DataArray,
@@ -75,6 +94,7 @@ def plot_distance(
     return panel.ax
 
 
+@checked(distances=mapping_of(dataset(kind="DataArray")), bins=whole(1, 10_000), width=WIDTH)
 def plot_distance_histograms(
     distances: Mapping[str, xr.DataArray], *, bins: int = 60, width: float = 6.9
 ) -> Figure:

@@ -7,7 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arguments import as_given, checked
+from softreach.errors import InvalidInput
 from softreach.picture.projection import View, is_mirrored, project, view_axes
+from softreach.plot.arguments import DRAWN
 from softreach.plot.arm import arm_points, draw_arms, shapes_of
 from softreach.plot.frame import Panel
 from softreach.plot.lengths import in_lengths
@@ -33,6 +36,14 @@ _LEAST_WIDTH, _ENTRY = 2.6, 0.18  # of figures, and the height of an entry of th
 _ABOVE = 4  # the order of lines over images
 
 
+def _equilibria(name: str, value: Any) -> Any:
+    """What `softreach.equilibria` returned, whose class need not be loaded."""
+    if type(value).__name__ == "AllEquilibria":
+        return value
+    raise InvalidInput(name, as_given(value), "what `softreach.equilibria` returned")
+
+
+@checked(**DRAWN, equilibria=_equilibria)
 def plot_equilibria(
     equilibria: AllEquilibria,
     *,

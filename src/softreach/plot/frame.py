@@ -56,7 +56,7 @@ class Panel:
         Raises:
             InvalidInput: Unknown view, a box of another shape, or no finite point to show.
         """
-        shown = bounding_box(points) if box is None else unit.of(_checked(box))
+        shown = bounding_box(points) if box is None else unit.of(box)
         return cls(_framed_axes(shown, view) if ax is None else ax, shown, view, unit)
 
     @property
@@ -127,13 +127,6 @@ def view_extent(box: Array, view: View) -> Extent:
 def _box_corners(box: Array) -> Array:
     """The eight corners, shape (8, 3)."""
     return np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
-
-
-def _checked(box: ArrayLike) -> Array:
-    corners = np.asarray(box, float)
-    if corners.shape != (2, 3) or not (corners[0] < corners[1]).all():
-        raise InvalidInput("box", corners.tolist(), "a lower and an upper corner [m], shape (2, 3)")
-    return corners
 
 
 def _framed_axes(box: Array, view: View) -> Axes:

@@ -6,10 +6,14 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
+from softreach.arguments import checked, optional
+from softreach.arrays import as_floats
+from softreach.errors import InvalidInput
 from softreach.geometry.surface import SurfaceMesh
 from softreach.palette import STEEL
 from softreach.picture.projection import View
 from softreach.picture.shading import draw_mesh
+from softreach.plot.arguments import DRAWN, LENGTH, a_surface
 from softreach.plot.frame import Panel
 from softreach.plot.lengths import in_lengths
 from softreach.plot.style import figure_style
@@ -20,6 +24,15 @@ if TYPE_CHECKING:
 __all__ = ["plot_hull"]
 
 
+def _rgb(name: str, value: object) -> tuple[float, float, float]:
+    """Three shares of red, green and blue."""
+    found = as_floats(name, value)
+    if found.shape != (3,) or not ((found >= 0) & (found <= 1)).all():
+        raise InvalidInput(name, found, "three numbers from 0 to 1: red, green, blue")
+    return float(found[0]), float(found[1]), float(found[2])
+
+
+@checked(**DRAWN, hull=a_surface, length=optional(LENGTH), color=_rgb)
 def plot_hull(
     hull: SurfaceMesh,
     *,

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arguments import checked, dataset, mapping_of, name_or_index, optional
 from softreach.errors import InvalidInput
+from softreach.plot.arguments import LENGTH, POINTS, WIDTH
 from softreach.plot.cloud import drawn_tips, plot_cloud
 from softreach.plot.coloring import ScalarKey, bundle_activations, color_map, color_samples
 from softreach.plot.distance import largest_distance, plot_distance
@@ -31,6 +33,13 @@ _MARGINS = {"left": 0.75, "right": 0.1, "bottom": 0.4, "top": 0.55, "gap": 0.12}
 _COLUMNS = ("cloud", *_SLABS, "distance")
 
 
+@checked(
+    clouds=mapping_of(POINTS),
+    distances=mapping_of(dataset(kind="DataArray")),
+    bundles=optional(mapping_of(name_or_index)),
+    thickness=optional(LENGTH),
+    width=WIDTH,
+)
 def plot_redundancy(
     clouds: Mapping[str, xr.Dataset],
     distances: Mapping[str, xr.DataArray],

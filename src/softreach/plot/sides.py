@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from softreach.arguments import checked, mapping_of
 from softreach.cloud import design_of
 from softreach.errors import InvalidInput
 from softreach.picture.projection import View, view_angles
+from softreach.plot.arguments import BOX, POINTS, WIDTH, a_view
 from softreach.plot.arm import plot_arm
 from softreach.plot.cloud import drawn_tips, plot_cloud
 from softreach.plot.coloring import bundle_names, color_samples, draw_figure_key
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["plot_opposite_sides"]
 
 
+@checked(clouds=mapping_of(POINTS), view=a_view, box_over_length=BOX, width=WIDTH)
 def plot_opposite_sides(
     clouds: Mapping[str, xr.Dataset],
     *,

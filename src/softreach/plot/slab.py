@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arguments import checked, flag, optional
 from softreach.errors import InvalidInput
 from softreach.picture.projection import View, sight_axis
+from softreach.plot.arguments import DRAWN, LENGTH, PLACE, POINTS, SIZE
 from softreach.plot.cloud import drawn_tips, plot_cloud
 from softreach.plot.coloring import color_samples, draw_key
 from softreach.plot.frame import Panel
@@ -24,6 +26,7 @@ __all__ = ["plot_slab"]
 _THICKNESS = 1 / 50  # of L, or of the cloud's extent
 
 
+@checked(**DRAWN, cloud=POINTS, at=PLACE, thickness=optional(LENGTH), size=SIZE, key=flag)
 def plot_slab(
     cloud: xr.Dataset,
     *,

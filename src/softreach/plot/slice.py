@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from softreach.arguments import checked, dataset, flag
+from softreach.arrays import as_floats
 from softreach.errors import InvalidInput
 from softreach.picture.projection import View, is_mirrored, plane_of, sight_axis
+from softreach.plot.arguments import AX, PLACE, WIDTH, a_view
 from softreach.plot.lengths import LengthUnit, unit_of
 from softreach.plot.style import figure_style, pyplot, small_axes
 
@@ -23,6 +26,7 @@ _COLORS = ("white", "#cfe3f2", "#f2a65a", "#c8553d", "#6b2737")
 _LABELS = ("out of reach", "one activation", "two", "three", "four or more")
 
 
+@checked(grid=dataset("x", "y", "z"), ax=AX, view=a_view, at=PLACE, key=flag)
 def plot_slice(
     grid: xr.Dataset,
     *,
@@ -61,6 +65,7 @@ def plot_slice(
     return ax
 
 
+@checked(grid=dataset("x", "y", "z"), at=as_floats, width=WIDTH)
 def plot_slices(
     grid: xr.Dataset, *, at: Sequence[float] = (0.0, 0.0, 0.0), width: float = 9.6
 ) -> Figure:
@@ -76,7 +81,7 @@ def plot_slices(
         MissingExtra: matplotlib is not installed.
     """
     if np.shape(at) != (3,):
-        raise InvalidInput("at", at, "a point (x, y, z) [m]")
+        raise InvalidInput("at.shape", np.shape(at), "a point (x, y, z) [m]")
     with figure_style():
         size = (width, 0.375 * width)
         figure, axes = pyplot().subplots(1, 3, figsize=size, layout="constrained")

@@ -8,6 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from softreach.arguments import as_given, checked, path
 from softreach.atomic import writing
 from softreach.errors import InvalidInput, MissingExtra
 from softreach.file_kinds import PICTURES, format_of
@@ -73,6 +74,14 @@ def small_axes(width: float = 3.4, height: float = 2.8) -> Axes:
     return pyplot().subplots(figsize=(width, height), layout="constrained")[1]
 
 
+def _drawn(name: str, value: Any) -> Any:
+    """A figure, or axes in it."""
+    if hasattr(value, "get_figure") and not isinstance(value, type):
+        return value
+    raise InvalidInput(name, as_given(value), "a figure or axes of matplotlib")
+
+
+@checked(figure=_drawn, path=path)
 def save_figure(
     figure: Figure | Axes, path: str | PathLike[str], *, overwrite: bool = False
 ) -> None:

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
+from softreach.arguments import checked, optional
 from softreach.arm_shape import rest_configuration
 from softreach.picture.projection import View
 from softreach.picture.zbuffer import ZBuffer
+from softreach.plot.arguments import MANIPULATOR, POINTS, SHAPE, SIZE, WIDTH, a_view
 from softreach.plot.arm import arm_images, arm_points, shapes_of
 from softreach.plot.cloud import cloud_image, drawn_tips
 from softreach.plot.coloring import color_samples, draw_figure_key
@@ -34,6 +36,14 @@ Images = tuple[ZBuffer, ZBuffer | None]
 _LEFT, _GAP, _RIGHT, _BOTTOM, _TOP = 0.55, 0.60, 0.12, 0.42, 0.42  # inches
 
 
+@checked(
+    cloud=POINTS,
+    arm=optional(MANIPULATOR),
+    configuration=optional(SHAPE),
+    view=a_view,
+    size=SIZE,
+    width=WIDTH,
+)
 def plot_views(
     cloud: xr.Dataset,
     arm: Manipulator | None = None,

@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.errors import InvalidInput
+from softreach.arguments import checked, mapping_of, optional, within
+from softreach.arrays import as_floats
+from softreach.errors import InvalidInput, Range
+from softreach.plot.arguments import AX, LENGTH
 from softreach.plot.lengths import in_lengths
 from softreach.plot.style import figure_style, small_axes
 
@@ -18,6 +21,14 @@ if TYPE_CHECKING:
 __all__ = ["plot_volume_curve"]
 
 
+@checked(
+    curves=mapping_of(as_floats),
+    alphas=as_floats,
+    ax=AX,
+    length=optional(LENGTH),
+    exact=optional(within(Range(0.0, unit="m³"))),
+    convex=optional(within(Range(0.0, unit="m³"))),
+)
 def plot_volume_curve(
     curves: Mapping[str, ArrayLike],
     alphas: ArrayLike,

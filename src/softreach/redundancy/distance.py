@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arguments import checked, plain, within
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import InvalidInput
+from softreach.arrays import as_indices
+from softreach.errors import InvalidInput, Range
 from softreach.geometry.neighbors import mean_value_distance
 from softreach.rod.measured_bundles import activation_measures
-from softreach.schema import check_cloud, is_stable
+from softreach.schema import a_cloud, check_cloud, is_stable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,6 +24,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 
+@checked(cloud=a_cloud, radius=within(Range(0.0, unit="m")))
 def activation_distance(
     cloud: xr.Dataset, radius: float, *, queries: int | ArrayLike | None = None
 ) -> xr.DataArray:
@@ -93,16 +96,17 @@ def evaluated_samples(distance: xr.DataArray, cloud: xr.Dataset) -> Index:
     n = cloud.sizes["sample"]
     if distance.dims != ("sample",) or "sample" not in distance.coords:
         raise InvalidInput("distance", distance.dims, "made by activation_distance")
-    return _indices(distance["sample"].values, n, "distance.sample")
+    return as_indices("distance.sample", distance["sample"].values, n, "samples of the cloud")
 
 
 def _chosen(queries: int | ArrayLike | None, n: int) -> Index | None:
     """Indices of the samples to be evaluated; None for all."""
     if queries is None:
         return None
-    if isinstance(queries, int | np.integer) and not isinstance(queries, bool):
-        return _strided(int(queries), n)
-    return _indices(queries, n, "queries")
+    count = plain(queries)
+    if isinstance(count, int) and not isinstance(count, bool):
+        return _strided(count, n)
+    return as_indices("queries", queries, n, "samples of the cloud")
 
 
 def _strided(count: int, n: int) -> Index:
@@ -115,14 +119,3 @@ def _strided(count: int, n: int) -> Index:
         raise InvalidInput("queries", count, f"from 0 to the cloud's {n} samples, or their indices")
     place = np.random.default_rng(0).random(count)
     return np.minimum((np.arange(count) + place) * (n / max(count, 1)), n - 1).astype(np.intp)
-
-
-def _indices(given: ArrayLike, n: int, name: str) -> Index:
-    array = np.asarray(given)
-    if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
-        found = f"{array.dtype} array of shape {array.shape}"
-        raise InvalidInput(name, found, "one-dimensional, of whole numbers")
-    if array.size and (array.min() < 0 or array.max() >= n):
-        found = f"indices from {array.min()} to {array.max()}"
-        raise InvalidInput(name, found, f"from 0 to {n - 1}, the cloud's last sample")
-    return array.astype(np.intp)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arguments import POSITIVE, checked, dataset, optional, within
 from softreach.redundancy.distance import evaluated_samples
-from softreach.schema import cell_dataset, tip_cells
+from softreach.schema import a_cloud, cell_dataset, tip_cells
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -16,6 +17,11 @@ if TYPE_CHECKING:
 __all__ = ["distance_map", "tip_density"]
 
 
+@checked(
+    cloud=a_cloud,
+    distance=dataset(kind="DataArray"),
+    cell=optional(within(POSITIVE._replace(unit="m"))),
+)
 def distance_map(
     cloud: xr.Dataset, distance: xr.DataArray, *, cell: float | None = None
 ) -> xr.Dataset:
@@ -51,6 +57,7 @@ def distance_map(
     ).assign_attrs(cloud.attrs)
 
 
+@checked(cloud=a_cloud, cell=optional(within(POSITIVE._replace(unit="m"))))
 def tip_density(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Dataset:
     """Local density of tips, and how uneven it is.
 

@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arguments import POSITIVE, checked, dataset, optional, within
+from softreach.arrays import as_shares
+from softreach.errors import Range
 from softreach.quantity import quantity
 from softreach.redundancy.distance import evaluated_samples
-from softreach.schema import is_stable, tip_cells
+from softreach.schema import a_cloud, is_stable, tip_cells
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,6 +88,13 @@ class RedundancySummary:
 _VOLUMES = ("measured_volume", "occupied_volume")
 
 
+@checked(
+    cloud=a_cloud,
+    distance=dataset(kind="DataArray"),
+    threshold=within(Range()),
+    cell=optional(within(POSITIVE._replace(unit="m"))),
+    quantiles=as_shares,
+)
 def redundancy_summary(
     cloud: xr.Dataset,
     distance: xr.DataArray,

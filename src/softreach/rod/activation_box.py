@@ -9,9 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arrays import as_rows
 from softreach.errors import InvalidInput
 
-__all__ = ["ActivationBox", "as_floats"]
+__all__ = ["ActivationBox"]
 
 Array = NDArray[np.float64]
 
@@ -38,7 +39,9 @@ class ActivationBox:
     @classmethod
     def between(cls, bounds: ArrayLike, names: Sequence[str]) -> ActivationBox:
         """The box of an array of bounds, shape (bundles, 2)."""
-        pairs = np.asarray(bounds, float).tolist()
+        pairs = as_rows(
+            "bounds", bounds, 2, "(lower, upper) of each bundle, shape (bundles, 2)"
+        ).tolist()
         return cls(tuple((low, high) for low, high in pairs), tuple(names))
 
     @property
@@ -143,14 +146,8 @@ class ActivationBox:
         Raises:
             InvalidInput: Another shape, or values that are not finite.
         """
-        gamma = as_floats("activations", activations)
-        if gamma.ndim != 2 or gamma.shape[1] != self.bundles:
-            allowed = f"of shape (n, {self.bundles}), one column per bundle"
-            raise InvalidInput("activations.shape", gamma.shape, allowed)
-        if gamma.size and not np.isfinite([gamma.min(), gamma.max()]).all():
-            row = int(np.flatnonzero(~np.isfinite(gamma).all(axis=1))[0])
-            raise InvalidInput(f"activations[{row}]", gamma[row], "finite numbers")
-        return gamma
+        allowed = f"an array of numbers of shape (n, {self.bundles}), one column per bundle"
+        return as_rows("activations", activations, self.bundles, allowed)
 
     def clip(self, activations: Array) -> Array:
         """The activations moved to the nearest bounds where they are outside."""
@@ -171,18 +168,6 @@ class ActivationBox:
         """All corners, shape (2^bundles, bundles), the last bundle varying fastest."""
         upper = np.indices((2,) * self.bundles).reshape(self.bundles, 2**self.bundles).T
         return np.where(upper, self.high, self.low)
-
-
-def as_floats(name: str, values: ArrayLike) -> Array:
-    """The values as a contiguous float array.
-
-    Raises:
-        InvalidInput: They are no numbers, or rows of different lengths.
-    """
-    try:
-        return np.asarray(values, dtype=float, order="C")
-    except (TypeError, ValueError):
-        raise InvalidInput(name, values, "an array of numbers") from None
 
 
 def _frozen(values: Array) -> Array:

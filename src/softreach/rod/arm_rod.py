@@ -44,7 +44,7 @@ class ArmRod(TipMap):
 
     def refined(self, tol: float) -> TipMap:
         """The map of the same arm to a smaller tolerance; itself if its own is no larger."""
-        return self if self.tol <= tol else tip_map(self.arm, tol)
+        return self if self.tol <= check_tol(tol) else tip_map(self.arm, tol)
 
     def radius(self, stations: ArrayLike) -> NDArray[np.float64]:
         """Outer radius R2 before activation at stations Z [m]."""

@@ -17,11 +17,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
+from softreach.arrays import as_floats
 from softreach.errors import InvalidInput, SoftreachWarning
 from softreach.geometry.sphere_mesh import icosphere
 from softreach.geometry.sphere_rings import is_axisymmetric, pole_rings
 from softreach.geometry.sphere_roots import Map, Roots, polished_roots, sphere_roots
-from softreach.rod.activation_box import as_floats
 from softreach.rod.all_equilibria import AllEquilibria
 from softreach.rod.equilibrium import Solver
 from softreach.rod.free import FreeRod

@@ -8,15 +8,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arguments import checked
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.affine_coordinates import AffineCoordinates
-from softreach.rod.tip_map import TipMap
+from softreach.rod.steps import check_tol
+from softreach.rod.tip_map import TipMap, a_tip_map
 
 __all__ = ["FreeBundles", "free_bundles"]
 
 Array = NDArray[np.float64]
 
 
+@checked(rod=a_tip_map)
 def free_bundles(rod: TipMap) -> TipMap:
     """The restriction of a tip map to its free bundles; the map itself if all are free."""
     if rod.box.dimension == rod.box.bundles:
@@ -43,7 +46,7 @@ class FreeBundles(AffineCoordinates):
         Args:
             tol: Largest tip error, in L.
         """
-        return self if self.tol <= tol else free_bundles(self.whole.refined(tol))
+        return self if self.tol <= check_tol(tol) else free_bundles(self.whole.refined(tol))
 
     def _activations(self, coordinates: Array) -> Array:
         return self.whole.box.with_held(coordinates)

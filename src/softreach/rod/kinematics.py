@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import schema
+from softreach.arguments import as_given, plain
 from softreach.arm.manipulator import Manipulator
+from softreach.arrays import as_floats
 from softreach.errors import InvalidInput
-from softreach.rod.activation_box import as_floats
+from softreach.memory import check_room
 from softreach.rod.frames import Frames, Strains
 from softreach.rod.tip_map import TipMap, tip_map
 
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
 __all__ = ["configuration", "shape_dataset", "stations_along", "tip_jacobian", "tip_positions"]
 
 Array = NDArray[np.float64]
+
+_COLUMNS = 64  # numbers at a station of one sample, those that come and go included
 
 
 def tip_positions(arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6) -> Array:
@@ -86,12 +90,13 @@ def configuration(
         InvalidInput: Activations or stations of another shape or out of range.
     """
     rod = tip_map(arm, tol)
-    gamma = rod.box.check(np.atleast_2d(as_floats("activation", activation)))
-    z = stations_along(rod, stations)
+    given = as_floats("activation", activation)
+    gamma = rod.box.check(np.atleast_2d(given))
+    z = stations_along(rod, stations, _COLUMNS * max(1, len(gamma)))
     dataset = shape_dataset(rod, gamma, z, rod.frames(gamma, z), rod.strains(gamma, z))
     if rod.supports_unstable:
         dataset = schema.with_status(dataset, rod.status(gamma))
-    return dataset.isel(sample=0) if np.ndim(activation) == 1 else dataset
+    return dataset.isel(sample=0) if given.ndim == 1 else dataset
 
 
 def shape_dataset(
@@ -103,15 +108,21 @@ def shape_dataset(
     )
 
 
-def stations_along(rod: TipMap, stations: int | ArrayLike) -> Array:
+def stations_along(rod: TipMap, stations: int | ArrayLike, columns: int = 1) -> Array:
     """Z [m] of stations given by their number or by themselves, ascending.
 
     Args:
         rod: The tip map.
         stations: Number of stations, evenly spaced from base to tip, or their Z [m].
+        columns: Numbers that are computed at each; there must be memory for them.
+
+    Raises:
+        InvalidInput: No such number or stations, or so many that there is no memory.
     """
-    if np.ndim(stations):
+    if isinstance(stations, list | tuple) or getattr(stations, "ndim", 0) > 0:
         return rod.check_stations(stations)
-    if isinstance(stations, bool) or not isinstance(stations, int | np.integer) or stations < 2:
-        raise InvalidInput("stations", stations, "2 or more, or the stations' Z in m")
-    return np.linspace(0.0, rod.length, int(stations))
+    number = plain(stations)
+    if isinstance(number, bool) or not isinstance(number, int) or number < 2:
+        raise InvalidInput("stations", as_given(stations), "2 or more, or the stations' Z in m")
+    check_room("stations", number, columns)
+    return np.linspace(0.0, rod.length, number)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.affine_coordinates import AffineCoordinates
+from softreach.rod.steps import check_tol
 from softreach.rod.tip_map import TipMap
 
 __all__ = ["MeasuredBundles", "activation_measures", "bundle_measures", "measured_bundles"]
@@ -72,7 +73,7 @@ class MeasuredBundles(AffineCoordinates):
 
     def refined(self, tol: float) -> TipMap:
         """The map in the same measures to a smaller tolerance; itself if its own is no larger."""
-        return self if self.tol <= tol else measured_bundles(self.whole.refined(tol))
+        return self if self.tol <= check_tol(tol) else measured_bundles(self.whole.refined(tol))
 
     def _activations(self, coordinates: Array) -> Array:
         return coordinates * self.measures

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.frames import Frames, StrainRange, Strains, TipMotions
+from softreach.rod.steps import check_tol
 from softreach.rod.tip_map import TipMap, TipStatus
 
 __all__ = ["StableTips", "stable_tips"]
@@ -50,7 +51,7 @@ class StableTips(TipMap):
 
     def refined(self, tol: float) -> TipMap:
         """The map of the same arm to a smaller tolerance; itself if its own is no larger."""
-        return self if self.tol <= tol else stable_tips(self.whole.refined(tol))
+        return self if self.tol <= check_tol(tol) else stable_tips(self.whole.refined(tol))
 
     def fill_tips(self, gamma: Array, out: Array) -> None:
         """Put the tips [m] of checked activations into `out`, (n, 3), on the calling thread."""

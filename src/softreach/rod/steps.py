@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
+from softreach.arguments import as_number
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.profile import Profile
 from softreach.arm.tables import both_sides, tables
-from softreach.errors import InvalidInput
+from softreach.errors import InvalidInput, Range
 from softreach.kernels import frames, magnus, rod
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.pilot import pilot_activations, worsened
@@ -245,8 +246,6 @@ def check_tol(tol: float) -> float:
     Raises:
         InvalidInput: It is below 1e-12 or not a number.
     """
-    number = isinstance(tol, int | float | np.number) and not isinstance(tol, bool)
-    if not (number and _SMALLEST_TOL <= tol < np.inf):
-        shown = repr(tol) if isinstance(tol, str) else tol
-        raise InvalidInput("tol", shown, f"at least {_SMALLEST_TOL:g} (in L)")
-    return float(tol)
+    if type(tol) is float and _SMALLEST_TOL <= tol < np.inf:  # by far the most, in a tenth of it
+        return tol
+    return as_number("tol", tol, Range(_SMALLEST_TOL, unit="(in L)"))

@@ -16,10 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
+from softreach.arguments import as_given, flag, instance
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.weight import VERIFIED_LOAD_NUMBER, is_overloaded
+from softreach.arrays import as_floats
 from softreach.errors import InvalidInput, SoftreachWarning, counted
-from softreach.rod.activation_box import ActivationBox, as_floats
+from softreach.rod.activation_box import ActivationBox
 from softreach.rod.frames import Frames, StrainRange, Strains, TipMotions, position_slopes
 from softreach.rod.steps import check_tol
 
@@ -27,6 +29,8 @@ __all__ = [
     "BLOCK",
     "TipMap",
     "TipStatus",
+    "a_tip_map",
+    "an_arm",
     "tip_map",
 ]
 
@@ -222,7 +226,7 @@ class TipMap(ABC):
         inside = z.ndim == 1 and z.size > 0 and ((z >= 0) & (z <= self.length)).all()
         if not inside or (ascending and (np.diff(z) < 0).any()):
             order = "ascending " if ascending else ""
-            raise InvalidInput("stations", stations, f"{order}Z within [0, {self.length:g}] m")
+            raise InvalidInput("stations", z, f"{order}Z within [0, {self.length:g}] m")
         return z
 
     def __repr__(self) -> str:
@@ -246,8 +250,9 @@ def tip_map(arm: Manipulator | TipMap, tol: float = 1e-6, *, warn: bool = True) 
     if isinstance(arm, TipMap):
         return arm
     if not isinstance(arm, Manipulator):
-        raise InvalidInput("arm", f"{arm!r:.80}", "a Manipulator or a TipMap")
+        raise InvalidInput("arm", as_given(arm), "a Manipulator or a TipMap")
     rod = _of_arm(arm, check_tol(tol))
+    flag("warn", warn)
     if warn and arm.loads is not None:
         _warn_of_large_loads(arm)
     return rod
@@ -278,3 +283,9 @@ def _warn_of_large_loads(arm: Manipulator) -> None:
             SoftreachWarning,
             stacklevel=3,
         )
+
+
+an_arm = instance((Manipulator, TipMap), "a Manipulator or a TipMap")
+"""An argument that is a design, or its tip map."""
+
+a_tip_map = instance(TipMap, "a TipMap")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach import parallel
+from softreach.arguments import POSITIVE, checked, optional, within
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
 from softreach.rod.tip_map import TipMap, TipStatus, tip_map
@@ -29,6 +30,7 @@ _STEPS = 32  # the cone is then too wide by some percent at most
 _TRIED = 4096  # activations of a loaded arm that must all come to rest
 
 
+@checked(cell=optional(within(POSITIVE._replace(unit="m"))))
 def direction_spread(
     arm: Manipulator | TipMap,
     *,

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.manipulator import Manipulator
+from softreach.arguments import checked, function, names, optional, within
+from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters
 from softreach.errors import InvalidInput
 from softreach.progress import Progress, silent
@@ -19,7 +20,7 @@ from softreach.schema import provenance
 from softreach.workspace.flux import Flux, flux_tol, signed_volume
 from softreach.workspace.hull_corners import HullCorners, hull_corners
 from softreach.workspace.measure import Estimate
-from softreach.workspace.reach import rasterized_set, reachable_set
+from softreach.workspace.reach import ACCURACIES, rasterized_set, reachable_set
 from softreach.workspace.shifts import Shifts, shifts_along
 from softreach.workspace.solid import ReachableSolid
 
@@ -102,6 +103,9 @@ _MEANINGS = {
 }
 
 
+@checked(
+    arm=a_manipulator, parameters=names, accuracy=within(ACCURACIES), progress=optional(function)
+)
 def volume_gradient(
     arm: Manipulator,
     parameters: str | Sequence[str],
@@ -133,23 +137,21 @@ def volume_gradient(
             that counts something, or one whose change holds or frees a bundle.
         InvalidDesign: The design has no neighbors with other values of a parameter.
     """
-    names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
-    if not names:
+    asked = tuple(parameters)
+    if not asked:
         raise InvalidInput("parameters", "none", "the name of one or more")
-    if not isinstance(arm, Manipulator):
-        raise InvalidInput("arm", f"{arm!r:.80}", "a Manipulator")
-    found = find_parameters(arm, names)
+    found = find_parameters(arm, asked)
     solid = _solid(arm, accuracy)
     base = _Base(solid, accuracy)
     rows = []
-    for name in names:
+    for name in asked:
         rows.append(base.derivatives(found[name]))
         (progress or silent)(1)
     volume, convex = zip(*rows, strict=True)
     return VolumeGradient(
         solid=solid,
-        parameters=names,
-        units=tuple(found[name].unit for name in names),
+        parameters=asked,
+        units=tuple(found[name].unit for name in asked),
         volume=np.array([each.value for each in volume]),
         volume_error=np.array([each.error for each in volume]),
         convex_volume=np.array([each.value for each in convex]),

@@ -10,8 +10,9 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arguments import POSITIVE, checked, function, optional, within
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import InvalidInput, SoftreachWarning
+from softreach.errors import InvalidInput, Range, SoftreachWarning
 from softreach.memory import free_memory
 from softreach.progress import Progress, silent
 from softreach.rod.never_at_rest import too_heavy
@@ -25,7 +26,7 @@ from softreach.workspace.one_to_one_solid import solid_by_flux
 from softreach.workspace.reachable import ReachableSet
 from softreach.workspace.redundant import lost_share, searched_set, smallest_memory
 from softreach.workspace.resolution import (
-    checked_grid,
+    even_cells,
     grid_for,
     is_settled,
     is_worthwhile,
@@ -35,13 +36,23 @@ from softreach.workspace.solid import ReachableSolid
 from softreach.workspace.tears import coarser, finer, left_out_cells
 from softreach.workspace.thin import thin_set
 
-__all__ = ["rasterized_set", "reachable_set"]
+__all__ = ["ACCURACIES", "rasterized_set", "reachable_set"]
 
 Array = NDArray[np.float64]
 
 T = TypeVar("T")
 
+ACCURACIES = Range(1e-6, 0.2)
+"""Relative errors of a volume that can be asked for."""
 
+
+@checked(
+    accuracy=within(ACCURACIES),
+    cell=optional(within(POSITIVE._replace(unit="m"))),
+    grid=optional(even_cells),
+    memory=optional(within(POSITIVE._replace(unit="bytes"))),
+    progress=optional(function),
+)
 def reachable_set(
     arm: Manipulator | TipMap,
     *,
@@ -98,8 +109,6 @@ def reachable_set(
     Warns:
         SoftreachWarning: The estimated error is larger than asked.
     """
-    if not 1e-6 <= accuracy <= 0.2:
-        raise InvalidInput("accuracy", accuracy, "1e-6 to 0.2")
     rod = tip_map(arm, tol)
     m = rod.box.dimension
     if m < 3:
@@ -111,14 +120,14 @@ def reachable_set(
         found = _of_many(rod, accuracy, cell, grid, memory, progress or silent)
         finer = "a smaller cell" if cell is not None else "more memory"
     if found.volume_error > accuracy * found.volume:
-        warnings.warn(_inaccurate(found, accuracy, finer), SoftreachWarning, stacklevel=2)
+        warnings.warn(_inaccurate(found, accuracy, finer), SoftreachWarning, stacklevel=3)
     return found
 
 
 def _of_three(
     rod: TipMap, accuracy: float, cell: float | None, grid: int | None, progress: Progress
 ) -> ReachableSolid:
-    cells = checked_grid(grid) if grid is not None else grid_for(accuracy)
+    cells = grid if grid is not None else grid_for(accuracy)
     if is_one_to_one(rod):
         return solid_by_flux(
             rod, cells, partial(lattice_for, cell=cell, accuracy=accuracy), progress

@@ -5,15 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arguments import as_given, plain
 from softreach.errors import InvalidInput
+from softreach.memory import check_room
 from softreach.workspace.image import Lattice
 from softreach.workspace.solid import ReachableSolid
 
-__all__ = ["checked_grid", "grid_for", "is_settled", "is_worthwhile", "lattice_for"]
+__all__ = ["even_cells", "grid_for", "is_settled", "is_worthwhile", "lattice_for"]
 
 Array = NDArray[np.float64]
 
 _MOST_VERTICES = 3.3e6  # of the activation grid
+_OF_VERTEX = 8  # doubles that a vertex of the grid takes at least
 _MOST_CELLS = 2.0**26
 
 
@@ -27,15 +30,17 @@ def grid_for(accuracy: float) -> int:
     return max(2, 2 * int(np.ceil(min(np.sqrt(5.0 / accuracy), most) / 2)))
 
 
-def checked_grid(grid: int) -> int:
+def even_cells(name: str, value: object) -> int:
     """A number of cells along each axis of the activation box, instead of the rule's.
 
     Raises:
-        InvalidInput: It is odd, or less than 2.
+        InvalidInput: It is odd, less than 2, or more than fits into memory.
     """
-    if isinstance(grid, bool) or int(grid) != grid or grid < 2 or grid % 2:
-        raise InvalidInput("grid", grid, "an even number of cells, 2 or more")
-    return int(grid)
+    cells = plain(value)
+    if isinstance(cells, int) and cells >= 2 and cells % 2 == 0:
+        check_room(name, (cells + 1) ** 3, _OF_VERTEX)
+        return cells
+    raise InvalidInput(name, as_given(value), "an even number of cells, 2 or more")
 
 
 def lattice_for(tips: Array, *, cell: float | None, accuracy: float) -> Lattice:

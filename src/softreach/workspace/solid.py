@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arrays import as_points
 from softreach.errors import MissingExtra
-from softreach.geometry.delaunay import finite_points
 from softreach.geometry.surface import Surface
 from softreach.quantity import quantity
 from softreach.rod.tip_map import TipMap
@@ -121,7 +121,7 @@ class ReachableSolid(ReachableSet):
         """
         from scipy.ndimage import map_coordinates
 
-        positions = finite_points(np.asarray(points, float))
+        positions = as_points("points", points)
         # A cell's diagonal inside nothing is to be decided; one cell where each place is a search.
         margin = np.sqrt(3.0) if isinstance(self.image, Image) else 1.0
         at = self.image.lattice.coordinates(positions)
@@ -143,7 +143,7 @@ class ReachableSolid(ReachableSet):
             InvalidInput: Points of another shape or not finite.
             MissingExtra: scikit-image is not installed.
         """
-        positions = finite_points(np.asarray(points, float))
+        positions = as_points("points", points)
         inside = self.contains(positions)
         out = np.empty(len(positions))
         out[inside] = -self._boundary.distance(positions[inside])

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.geometry.delaunay import finite_points
+from softreach.arrays import as_points
 from softreach.geometry.hull import convex_hull
 from softreach.geometry.surface import Surface, compact_surface
 from softreach.kernels.simplices import chains, corner_steps
@@ -79,7 +79,7 @@ class ReachableSurface(ReachableSet):
 
     def distance(self, points: ArrayLike) -> Array:
         """Distance of points to the triangles of the mapped grid [m], never negative."""
-        return self.mapped_grid.distance(finite_points(np.asarray(points, float)))
+        return self.mapped_grid.distance(as_points("points", points))
 
     def _repr_html_(self) -> str:
         """What `repr` says below a small picture, for notebooks."""
@@ -142,7 +142,7 @@ class ReachableCurve(ReachableSet):
 
     def distance(self, points: ArrayLike) -> Array:
         """Distance of points to the chords of `path` [m], never negative."""
-        return self._chords.distance(finite_points(np.asarray(points, float)))
+        return self._chords.distance(as_points("points", points))
 
     @cached_property
     def _chords(self) -> Surface:
@@ -192,7 +192,7 @@ class ReachablePoint(ReachableSet):
 
     def distance(self, points: ArrayLike) -> Array:
         """Distance of points to the tip [m]."""
-        return np.linalg.norm(finite_points(np.asarray(points, float)) - self.tip, axis=1)
+        return np.linalg.norm(as_points("points", points) - self.tip, axis=1)
 
     def _lines(self) -> list[str]:
         x, y, z = self.tip

@@ -9,10 +9,10 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arguments import plain
 from softreach.arm.actuator_checks import actuator_faults
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
-from softreach.arm.value_checks import plain_number
 from softreach.arm.variable import Variable
 from softreach.errors import Fault, InvalidDesign, Range
 
@@ -109,7 +109,7 @@ class Actuator(ABC):
         if faults := self._faults():
             raise InvalidDesign(faults)
         for variable in self.variables:
-            number = plain_number(getattr(self, variable.field))
+            number = plain(getattr(self, variable.field))
             object.__setattr__(self, variable.field, number)
         object.__setattr__(self, "activation_bounds", _plain_bounds(self.activation_bounds))
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 
+from softreach.arguments import checked, instance, optional, within
+from softreach.arm.actuator_checks import FIBER_RANGES
 from softreach.arm.actuators import FiberArchitecture
+from softreach.arm.checks import PROFILE_RANGES, RING_RANGES
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import Material
 from softreach.arm.section import Section
@@ -13,7 +16,19 @@ __all__ = ["minimal_trunk", "redundant_trunk"]
 
 _EXTENT = math.radians(48)
 
+_TURNS = within(FIBER_RANGES["revolution"])
+_TAPER = within(PROFILE_RANGES["taper"])
+_LENGTH = within(PROFILE_RANGES["length"])
+_RATIO = within(RING_RANGES["inner_ratio"])
 
+
+@checked(
+    revolution=_TURNS,
+    taper=_TAPER,
+    length=_LENGTH,
+    radius_ratio=_RATIO,
+    material=optional(instance(Material, "a Material, or None")),
+)
 def minimal_trunk(
     revolution: float = math.radians(108),
     taper: float = math.radians(2),
@@ -47,6 +62,13 @@ def minimal_trunk(
     return _trunk((*helices, _longitudinal(270)), taper, length, radius_ratio, material)
 
 
+@checked(
+    revolution=_TURNS,
+    taper=_TAPER,
+    length=_LENGTH,
+    radius_ratio=_RATIO,
+    material=optional(instance(Material, "a Material, or None")),
+)
 def redundant_trunk(
     revolution: float = math.radians(108),
     taper: float = math.radians(2),

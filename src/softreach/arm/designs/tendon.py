@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 
+from softreach.arguments import checked, whole
 from softreach.arm.actuators import Tendon
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import Material
 from softreach.arm.materials import named_material
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring, Section
-from softreach.errors import InvalidInput
 
 __all__ = ["helical_tendon_robot", "three_tendon_robot"]
 
 
+@checked(segments=whole(1, 2))
 def three_tendon_robot(*, segments: int = 1) -> Manipulator:
     """A nitinol wire of 0.2 m a segment with three parallel tendons for each.
 
@@ -29,8 +30,6 @@ def three_tendon_robot(*, segments: int = 1) -> Manipulator:
     Raises:
         InvalidInput: Another number of segments.
     """
-    if isinstance(segments, bool) or segments not in (1, 2):
-        raise InvalidInput("segments", segments, "1 or 2")
     names = ("tendon",) if segments == 1 else ("proximal", "distal")
     tendons = tuple(
         Tendon(

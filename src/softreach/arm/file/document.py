@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
-from os import PathLike, fspath
+from collections.abc import Callable
+from os import PathLike
 from typing import Any, NamedTuple
 
 from softreach.arm.actuators import Actuator
@@ -13,11 +15,15 @@ from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.errors import Fault, InvalidDesign
 from softreach.file_kinds import FileKind, Formats, text_with
+from softreach.text_file import read_text
 
 __all__ = ["DESIGN_FILE", "LONGEST", "Parts", "document_of", "text_of"]
 
-LONGEST = 1_000_000
-"""Characters that a design file may have: thousands of times as many as designs take."""
+LONGEST = 250_000
+"""Bytes, or characters, that a design file may have: thousands of times as many as designs take."""
+
+
+_DEEPEST = 64  # dotted parts of a key: the time that tomllib takes grows with their square
 
 
 DESIGN_FILE: Formats = {".toml": FileKind("a design file", text_with("length_m"))}
@@ -39,38 +45,35 @@ def text_of(path: str | PathLike[str]) -> str:
     """The text of a design file.
 
     Raises:
-        InvalidDesign: Bytes that are no UTF-8, or too many of them to be a design.
-        OSError: The file cannot be read.
+        InvalidInput: No file that can be read, one too large to be a design, or no text in UTF-8.
     """
-    with open(path, "rb") as stream:
-        content = stream.read(4 * LONGEST + 1)
-    if len(content) > 4 * LONGEST:
-        raise InvalidDesign([_too_long(f"more than {4 * LONGEST:,} bytes")], fspath(path))
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        allowed = f"must be text in UTF-8, but byte {error.start} is none: save it in that encoding"
-        raise InvalidDesign([Fault("TOML", None, allowed)], fspath(path)) from None
+    return read_text("design", path, LONGEST)
 
 
-def _too_long(length: str) -> Fault:
-    return Fault("TOML", None, f"must be at most {LONGEST:,} characters long, and has {length}")
+def longest_key(text: str) -> int:
+    """Points in the longest stretch of a text that may be a dotted key."""
+    return max(one.count(".") for one in re.split(r"[^\w.\-\"' \t]", text))
 
 
-def document_of(text: str, source: str) -> dict[str, Any]:
+def document_of(text: str, source: str, number: Callable[[str], Any] = Written) -> dict[str, Any]:
     """The tables of TOML text; numbers with a point or an exponent remember how they were written.
 
     Args:
         text: The text of a design file.
         source: What errors call it.
+        number: What makes a value of a number with a point or an exponent.
 
     Raises:
         InvalidDesign: Text that is no TOML, or too long or too deeply nested to be a design.
     """
     if len(text) > LONGEST:
-        raise InvalidDesign([_too_long(f"{len(text):,}")], source)
+        allowed = f"must be at most {LONGEST:,} characters long, and has {len(text):,}"
+        raise InvalidDesign([Fault("TOML", None, allowed)], source)
+    if longest_key(text) > _DEEPEST:
+        allowed = f"must have keys of {_DEEPEST} parts at most, such as a.b.c of three"
+        raise InvalidDesign([Fault("TOML", None, allowed)], source)
     try:
-        return tomllib.loads(text, parse_float=Written)
+        return tomllib.loads(text, parse_float=number)
     except RecursionError:
         trouble = "tables or lists in each other, hundreds deep"
     except ValueError as error:  # beside faults of syntax, numbers of thousands of digits

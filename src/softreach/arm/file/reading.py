@@ -7,6 +7,7 @@ import difflib
 from collections.abc import Iterator
 from typing import Any
 
+from softreach.arm.actuator_checks import MOST_BUNDLES
 from softreach.arm.actuators import Actuator
 from softreach.arm.checks import name_faults
 from softreach.arm.file.actuator_tables import ACTUATORS
@@ -79,6 +80,11 @@ class _DesignReader(TableReader):
         self._materials = dict(self._own_materials())
         rings = [self._ring(k, raw) for k, raw in self._tables("rings")]
         section = self._section(rings)
+        found = self._document.get("actuators")
+        if isinstance(found, list) and len(found) > MOST_BUNDLES:
+            allowed = f"must be at most {MOST_BUNDLES}"
+            self.faults.append(Fault("actuators", f"{len(found):,} tables", allowed))
+            return None
         actuators = [(k, self._actuator(k, raw)) for k, raw in self._tables("actuators")]
         loads = self._loads()
         self._check_names()

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from softreach.arm.manipulator import Manipulator
+from softreach.arguments import checked, instance, plain, text
+from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.of_arm import by_ring_name, parameters
 from softreach.arm.parameters.parameter import Parameter
 from softreach.arm.parameters.unknown import unknown_parameter
-from softreach.arm.value_checks import plain_number
-from softreach.errors import Fault, InvalidInput
+from softreach.errors import Fault, InvalidInput, in_short
 
 __all__ = ["changed", "find_parameter", "find_parameters", "parameters_by_every_name"]
 
@@ -24,6 +24,7 @@ def parameters_by_every_name(arm: Manipulator) -> dict[str, Parameter]:
     }
 
 
+@checked(arm=a_manipulator, name=text)
 def find_parameter(arm: Manipulator, name: str) -> Parameter:
     """The parameter of this name.
 
@@ -38,6 +39,7 @@ def find_parameter(arm: Manipulator, name: str) -> Parameter:
     return find_parameters(arm, (name,))[name]
 
 
+@checked(arm=a_manipulator, names=instance((Mapping, list, tuple), "names of parameters"))
 def find_parameters(
     arm: Manipulator, names: Mapping[str, object] | tuple[str, ...]
 ) -> dict[str, Parameter]:
@@ -50,13 +52,14 @@ def find_parameters(
     listed = {name: name for name in known} | by_ring_name(arm, known)
     asked: dict[str, str] = {}
     for name in names:
-        if name not in listed:
-            raise unknown_parameter(str(name), known)
+        if not isinstance(name, str) or name not in listed:
+            raise unknown_parameter(in_short(name), known)
         if (first := asked.setdefault(listed[name], name)) != name:
             raise InvalidInput("parameter", name, "given once", f"{first} is the same")
     return {asked[one]: _renamed(known[one], asked[one]) for one in known if one in asked}
 
 
+@checked(arm=a_manipulator, values=instance(Mapping, "a dictionary of parameters"))
 def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
     """The design with these parameters, everything else unchanged.
 
@@ -74,7 +77,7 @@ def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
     """
     draft = Draft(arm)
     for name, parameter in find_parameters(arm, tuple(values)).items():
-        value = plain_number(values[name])
+        value = plain(values[name])
         if isinstance(value, int | float) and not isinstance(value, bool):
             parameter.change(draft, value)
         else:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from softreach.arguments import checked
 from softreach.arm.actuator_checks import FIBER_RANGES
 from softreach.arm.actuators import Actuator
 from softreach.arm.checks import MATERIAL_RANGES, PROFILE_RANGES, RING_RANGES
-from softreach.arm.manipulator import Manipulator
+from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters.parameter import (
     BoundParameter,
     ElementParameter,
@@ -40,6 +41,7 @@ _BOUNDS = {
 }
 
 
+@checked(arm=a_manipulator)
 def parameters(arm: Manipulator) -> dict[str, Parameter]:
     """Every parameter of an arm by its name.
 

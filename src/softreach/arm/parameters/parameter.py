@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from softreach.arguments import plain
 from softreach.arm.actuators import Actuator
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.parts import part_of
-from softreach.arm.value_checks import plain_number
 from softreach.arm.variable import Variable
 from softreach.errors import Fault
 
@@ -114,7 +114,7 @@ class ElementParameter(Parameter):
 
     def change(self, draft: Draft, value: float) -> None:
         """Change that number, if it may have this value: whatever holds it names no places."""
-        if not self.variable.allowed.admits(plain_number(value)):
+        if not self.variable.allowed.admits(plain(value)):
             draft.refuse(Fault(self.name, value, self.variable.allowed))
             return
         draft.set_element(self.name, self.key, self.series, self.place, value)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from softreach.arguments import plain
 from softreach.arm.actuators import Actuator
 from softreach.arm.along import AlongArm
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.parameter import FieldParameter, Parameter
 from softreach.arm.parameters.parts import actuator_key
-from softreach.arm.value_checks import plain_number
 from softreach.errors import Fault
 
 __all__ = ["OuterRadius", "Revolution", "Taper"]
@@ -37,7 +37,7 @@ class OuterRadius(Parameter):
 
     def change(self, draft: Draft, value: float) -> None:
         """Change all radii."""
-        if not self.variable.allowed.admits(plain_number(value)):
+        if not self.variable.allowed.admits(plain(value)):
             draft.refuse(Fault(self.name, value, self.variable.allowed))
             return
         radii: tuple[float, ...] = draft.parts["profile"].start.radii

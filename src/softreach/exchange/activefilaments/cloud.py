@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach import schema
-from softreach.arm.manipulator import Manipulator
+from softreach.arguments import checked, path
+from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.atomic import check_place, writing
 from softreach.cloud import design_of
 from softreach.errors import InvalidInput, SoftreachWarning, counted
@@ -23,6 +24,7 @@ from softreach.exchange.activefilaments.filament import Filament, filament_of
 from softreach.file_kinds import FileKind, Formats
 from softreach.memory import free_memory
 from softreach.rod.kinematics import tip_positions
+from softreach.schema import a_cloud
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,12 +39,14 @@ _ENDING = "_gamma"
 _NO_NUMBER = re.compile(r"could not convert string (.*) to float64 at row (\d+), column (\d+)")
 
 
+@checked(path=path)
 def gamma_path(path: str | PathLike[str]) -> Path:
     """NAME_gamma.csv beside NAME.csv."""
     tips = Path(path)
     return tips.with_name(f"{tips.stem}{_ENDING}{tips.suffix}")
 
 
+@checked(arm=a_manipulator, path=path)
 def read_cloud(arm: Manipulator, path: str | PathLike[str], *, tol: float = 1e-6) -> xr.Dataset:
     """Read a cloud of ActiveFilaments.jl, and compare its tips with those that softreach computes.
 
@@ -85,6 +89,7 @@ def read_cloud(arm: Manipulator, path: str | PathLike[str], *, tol: float = 1e-6
     return cloud
 
 
+@checked(cloud=a_cloud, path=path)
 def write_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write tips to NAME.csv and activations to NAME_gamma.csv, as ActiveFilaments.jl does.
 

@@ -8,15 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from os import PathLike, fspath
-from pathlib import Path
 from typing import Any
 
+from softreach.arguments import checked, path
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidDesign, InvalidInput
 from softreach.exchange.activefilaments.constructors import filament_from
 from softreach.exchange.activefilaments.expressions import Call, Unreadable, value_of
 from softreach.exchange.activefilaments.filament import arm_of
 from softreach.exchange.activefilaments.tokens import Token, refused, statements
+from softreach.text_file import read_text
 
 __all__ = ["read_design"]
 
@@ -30,6 +31,7 @@ _PASSED_OVER = {"using", "import", "export", "@"}
 _ASSIGNMENTS = {f"{dot}{sign}=" for dot in ("", ".") for sign in ("", *"+-*/^")}
 
 
+@checked(path=path)
 def read_design(path: str | PathLike[str]) -> Manipulator:
     """Read the definition of a filament from Julia source for ActiveFilaments.jl.
 
@@ -46,24 +48,13 @@ def read_design(path: str | PathLike[str]) -> Manipulator:
             have.
     """
     source = fspath(path)
-    known = _definitions(source, _text(Path(path)))
+    known = _definitions(source, read_text("definition", path, _LARGEST))
     filament = filament_from(source, _the_filament(source, known), known)
     try:
         return arm_of(filament)
     except InvalidDesign as error:
         faults = "; ".join(str(fault) for fault in error.faults)
         raise InvalidInput(source, faults, "the filament of an arm that can exist") from None
-
-
-def _text(path: Path) -> str:
-    if not path.is_file():
-        raise InvalidInput("definition", fspath(path), "a file that exists")
-    if (size := path.stat().st_size) > _LARGEST:
-        raise InvalidInput(fspath(path), f"{size} bytes", f"at most {_LARGEST}")
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise InvalidInput(fspath(path), "no text", "Julia source in UTF-8") from None
 
 
 def _definitions(source: str, text: str) -> dict[str, Any]:

@@ -6,8 +6,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from os import PathLike
 
+from softreach.arguments import checked, path
 from softreach.arm.along import Pieces
-from softreach.arm.manipulator import Manipulator
+from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.atomic import writing
 from softreach.exchange.activefilaments.filament import (
     Angle,
@@ -32,6 +33,7 @@ FILAMENT_SCRIPT: Formats = {
 """What `write_design` writes, and replaces."""
 
 
+@checked(arm=a_manipulator, path=path)
 def write_design(arm: Manipulator, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write a Julia script that defines the filament of ActiveFilaments.jl with an arm's tips.
 
@@ -50,6 +52,7 @@ def write_design(arm: Manipulator, path: str | PathLike[str], *, overwrite: bool
         file.write(script.encode())
 
 
+@checked(arm=a_manipulator)
 def design_script(arm: Manipulator) -> str:
     """The text that `write_design` writes.
 

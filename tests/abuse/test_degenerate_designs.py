@@ -1,0 +1,196 @@
+"""Designs at the edges of what an arm can be: numbers that mean something, or a clear refusal."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import softreach as sr
+from softreach.arm.designs import minimal_trunk
+from softreach.geometry.dimension import local_dimension
+from tests.abuse.refusals import raised_by, within_budget
+from tests.laws import arm_of
+
+TRUNK = minimal_trunk()
+
+
+def many(bundles: int, **changes: object) -> sr.Manipulator:
+    """An arm of evenly spread helical bundles."""
+    fiber = sr.FiberArchitecture(
+        revolution=1.0, extent=0.2, bundles=bundles, activation_bounds=(-1.0 / bundles, 0.0)
+    )
+    return arm_of(fiber, **{"activation_bounds": None, **changes})
+
+
+def frozen(*held: int, at: float = -0.7) -> sr.Manipulator:
+    """The trunk with some bundles held."""
+    bounds = TRUNK.bounds.copy()
+    bounds[list(held)] = at
+    return TRUNK.with_bounds(bounds)
+
+
+def fiber(**changes: object) -> sr.FiberArchitecture:
+    """One bundle."""
+    return sr.FiberArchitecture(**{"revolution": 1.0, "extent": 0.5, **changes})
+
+
+DESIGNS: dict[str, sr.Manipulator] = {
+    **{f"{n} bundles": many(n) for n in range(1, 13)},
+    "every bundle frozen": frozen(0, 1, 2),
+    "every bundle frozen at rest": frozen(0, 1, 2, at=0.0),
+    "two bundles frozen": frozen(0, 1),
+    "one bundle frozen": frozen(2),
+    "bounds a rounding error wide": TRUNK.with_bounds((-1.0, -1.0 + 2e-16)),
+    "bounds of the smallest number": TRUNK.with_bounds((0.0, 5e-324)),
+    "positive activations": TRUNK.with_bounds((0.0, 2.0)),
+    "activations of both signs": TRUNK.with_bounds((-0.5, 5.0)),
+    "a revolution of 5000 degrees": minimal_trunk(math.radians(5000)),
+    "a revolution of 100 turns": arm_of(fiber(revolution=200 * math.pi)),
+    "a revolution of the smallest number": arm_of(fiber(revolution=5e-324)),
+    "no revolution": minimal_trunk(0.0),
+    "a tip radius near zero": minimal_trunk(taper=math.atan(1 / 16) * (1 - 1e-9)),
+    "a tip a thousand times wider": minimal_trunk(taper=-math.atan(1000 / 16)),
+    "a taper of the smallest number": minimal_trunk(taper=5e-324),
+    "a compressible arm": arm_of(fiber(), poisson_ratio=0.0),
+    "an incompressible arm": arm_of(fiber(), poisson_ratio=0.5),
+    "extents all around": arm_of(fiber(extent=2 * math.pi), fiber(extent=2 * math.pi, offset=1.0)),
+    "an extent of a millionth": arm_of(fiber(extent=1e-6)),
+    "bundles upon each other": arm_of(fiber(name="a"), fiber(name="b"), fiber(name="c")),
+    "a ring without a core": arm_of(fiber(), inner_radius=0.0),
+    "a ring thin as a film": arm_of(fiber(), inner_radius=(1 - 1e-9) / 16),
+    "an arm thick as it is long": arm_of(fiber(), outer_radius=1.0, inner_radius=0.5),
+    "an arm thin as a hair": arm_of(
+        fiber(activation_bounds=(-0.01, 0.0)),
+        outer_radius=1e-3,
+        inner_radius=5e-4,
+        activation_bounds=None,
+    ),
+    "no actuator at all": TRUNK.replace(actuators=()),
+}
+
+
+@pytest.mark.parametrize("arm", DESIGNS.values(), ids=DESIGNS.keys())
+def test_a_degenerate_design_has_finite_tips_within_its_reach(arm):
+    with within_budget():
+        cloud = sr.compute_cloud(arm, 64, sampler="boundary")
+        longest = 1.0 + np.abs(arm.bounds).sum()
+        assert np.isfinite(cloud.tip.values).all()
+        assert (np.linalg.norm(cloud.tip.values, axis=1) <= longest * arm.length).all()
+
+
+@pytest.mark.parametrize("arm", DESIGNS.values(), ids=DESIGNS.keys())
+def test_a_degenerate_design_survives_its_file(arm):
+    assert sr.Manipulator.from_toml(arm.to_toml()) == arm
+
+
+@pytest.mark.parametrize("arm", DESIGNS.values(), ids=DESIGNS.keys())
+def test_a_degenerate_design_describes_itself(arm):
+    with within_budget():
+        assert "L" in repr(arm)
+        sr.describe(arm)
+
+
+LENGTHS = [10.0**power for power in range(-6, 7)]
+
+
+@pytest.mark.parametrize("length", LENGTHS, ids=lambda length: f"L = {length:g} m")
+@pytest.mark.parametrize("taper", [0.0, 2.0, -3.0])
+def test_results_over_l_do_not_depend_on_l(length, taper):
+    one = sr.compute_cloud(minimal_trunk(taper=math.radians(taper)), 256)
+    other = sr.compute_cloud(minimal_trunk(taper=math.radians(taper), length=length), 256)
+    assert np.allclose(other.tip.values / length, one.tip.values, rtol=0.0, atol=1e-9)
+    assert sr.convex_hull(other.tip).volume / length**3 == pytest.approx(
+        sr.convex_hull(one.tip).volume, rel=1e-9
+    )
+    alpha = sr.concave_hull(other.tip, 0.5 * length).volume / length**3
+    assert alpha == pytest.approx(sr.concave_hull(one.tip, 0.5).volume, rel=1e-9)
+
+
+@pytest.mark.parametrize("length", [1e-6, 1e6], ids=lambda length: f"L = {length:g} m")
+def test_the_reachable_volume_over_l_cubed_does_not_depend_on_l(length):
+    volumes = [
+        sr.reachable_set(minimal_trunk(length=one), accuracy=0.05).volume / one**3
+        for one in (1.0, length)
+    ]
+    assert volumes[1] == pytest.approx(volumes[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("arm", [frozen(0, 1), frozen(1, 2), frozen(0, 2), many(1)])
+@pytest.mark.parametrize("sampler", ["uniform", "boundary"])
+def test_the_tips_of_one_bundle_lie_on_a_curve_that_has_no_volume(arm, sampler):
+    tip = sr.compute_cloud(arm, 5_000, sampler=sampler).tip
+    with within_budget():
+        hull = sr.concave_hull(tip)
+    assert (hull.volume, len(hull.faces), hull.regions) == (0.0, 0, 0)
+
+
+def test_a_curve_reaches_nothing_of_its_convex_hull():
+    tip = sr.compute_cloud(frozen(1, 2), 5_000).tip
+    with within_budget():
+        assert sr.volume.unreachability(tip) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("arm", "dimension"),
+    [(frozen(0, 1), 1.0), (frozen(0), 2.0), (frozen(2), 2.0), (TRUNK, 3.0)],
+    ids=["one bundle", "two helical bundles", "two bundles of one side", "three bundles"],
+)
+def test_a_cloud_fills_as_many_dimensions_as_it_has_free_bundles(arm, dimension):
+    points = sr.compute_cloud(arm, 100_000).tip.values
+    assert local_dimension(points) == pytest.approx(dimension, rel=0.12)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 1e-15, 1e-9])
+@pytest.mark.parametrize("curve", ["circle", "helix", "moment curve"])
+def test_points_near_any_curve_are_triangulated_within_the_budget_or_not_at_all(curve, jitter):
+    t = np.random.default_rng(0).random(5_000)
+    angle = 12.0 * t if curve == "helix" else 2 * np.pi * t
+    points = {
+        "circle": np.stack([np.cos(angle), np.sin(angle), 0.3 * np.cos(angle)], axis=1),
+        "helix": np.stack([np.cos(angle), np.sin(angle), t], axis=1),
+        "moment curve": np.stack([t, t**2, t**3], axis=1),
+    }[curve]
+    points = points + jitter * np.random.default_rng(1).standard_normal(points.shape)
+    with within_budget():
+        assert sr.concave_hull(points, 0.01).volume == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_surface_of_a_ball_is_no_curve_and_keeps_its_volume():
+    points = np.random.default_rng(0).standard_normal((5_000, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    with within_budget():
+        assert sr.concave_hull(points, 1.1).volume == pytest.approx(4 / 3 * np.pi, rel=5e-3)
+
+
+@pytest.mark.parametrize("stations", [10**9, 10**18, 10**400], ids=["1e9", "1e18", "1e400"])
+def test_stations_for_which_there_is_no_memory_are_refused_before_any_is_taken(stations):
+    error = raised_by(lambda: sr.configuration(TRUNK, [0, 0, 0], stations))
+    assert "there is memory" in str(error)
+
+
+@pytest.mark.parametrize("n", [10**12, 10**18, 10**23, 10**400], ids=["1e12", "1e18", "1e23", ""])
+def test_samples_for_which_there_is_no_memory_are_refused_before_any_is_taken(n):
+    assert "there is memory" in str(raised_by(lambda: sr.compute_cloud(TRUNK, n)))
+
+
+@pytest.mark.parametrize("station", [0.0, 0.5, 1.0])
+def test_a_single_station_is_a_row_of_its_own(station):
+    shape = sr.configuration(TRUNK, [-0.5, -0.5, -0.5], [station])
+    assert shape.position.shape == (1, 3)
+
+
+def test_one_number_of_stations_is_too_few():
+    assert "2 or more" in str(raised_by(lambda: sr.configuration(TRUNK, [0, 0, 0], 1)))
+
+
+@pytest.mark.parametrize("draw", ["plot_arm", "plot_views"])
+def test_a_shape_shortened_to_nothing_is_not_drawn(draw):
+    shape = sr.configuration(TRUNK, [-20.0, -20.0, -20.0])
+    cloud = sr.compute_cloud(TRUNK, 16)
+    calls = {
+        "plot_arm": lambda: sr.plot.plot_arm(TRUNK, shape),
+        "plot_views": lambda: sr.plot.plot_views(cloud, TRUNK, shape),
+    }
+    assert "extension ζ" in str(raised_by(calls[draw]))
