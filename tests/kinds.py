@@ -171,7 +171,7 @@ def driven(arm: Manipulator, sharpness: float = 3.0) -> Manipulator:
     table = tables(arm, np.linspace(0.0, arm.length, 51))
     stretch = np.abs(table.extension).max(axis=0) / 0.3
     bend = np.linalg.norm(table.curvature, axis=1).max(axis=0) * arm.length / sharpness
-    largest = 1.0 / np.maximum(np.maximum(stretch, bend), 1e-300) / arm.bundles
+    largest = 1.0 / np.maximum(np.maximum(stretch, bend), 1e-29) / arm.bundles
     pulls = np.array([isinstance(one, Tendon) for one in arm.actuators for _ in range(one.bundles)])
     return arm.with_bounds(np.stack([np.where(pulls, 0.0, -largest), largest], axis=1))
 

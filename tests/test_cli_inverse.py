@@ -106,8 +106,8 @@ def test_a_path_says_that_the_arm_loses_its_stability(tmp_path, capsys, monkeypa
     [
         (["solve", "minimal_trunk"], "--targets"),
         (["solve", "minimal_trunk", "--target", "1,2"], "three comma-separated numbers"),
-        (["solve", "minimal_trunk", "--targets", "nowhere.csv"], "a CSV file that exists"),
-        (["track", "minimal_trunk", "nowhere.csv"], "a CSV file that exists"),
+        (["solve", "minimal_trunk", "--targets", "nowhere.csv"], "must be a file that exists"),
+        (["track", "minimal_trunk", "nowhere.csv"], "must be a file that exists"),
         (["reach", "minimal_trunk", "--accuracy", "2"], "accuracy = 2.0: must be"),
     ],
 )

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach import parallel, schema
-from softreach.arguments import checked, dataset, function, optional, path
+from softreach.arguments import checked, dataset, flag, function, optional, path
 from softreach.arm.manipulator import Manipulator
 from softreach.atomic import replacing
 from softreach.errors import InvalidInput
 from softreach.file_kinds import FileKind, Formats
-from softreach.memory import check_memory
+from softreach.memory import check_room
 from softreach.progress import Progress, bar, silent
 from softreach.rod.free_bundles import FreeBundles
 from softreach.rod.measured_bundles import MeasuredBundles
@@ -93,7 +93,7 @@ def compute_cloud(
         rod.tips(rod.box.low[None])  # what all samples need, once and not on every thread
     bundles = rod.box.bundles
     check_sampler(sampler, n, bundles, seed)
-    check_memory("n", n, sample_bytes(bundles) * int(n))
+    check_room("n", int(n), bundles + 3)
     activation, tip = np.empty((n, bundles)), np.empty((n, 3))
     status = np.empty(n if rod.supports_unstable else 0, np.int8)
     with _shown(progress, n) as shown:
@@ -120,7 +120,7 @@ CLOUD_STORE: Formats = {".zarr": FileKind("a stored cloud", _is_cloud)}
 """What `save_cloud` writes, and replaces."""
 
 
-@checked(cloud=a_cloud, path=path)
+@checked(cloud=a_cloud, path=path, overwrite=flag, durable=flag)
 def save_cloud(
     cloud: xr.Dataset,
     path: str | PathLike[str],

@@ -95,7 +95,7 @@ class Range(NamedTuple):
         high = f"{'<' if self.open_high else '<='} {self.high:.6g}" if self.high < math.inf else ""
         limits = " and ".join(text for text in (low, high) if text)
         number = "a whole number" if self.whole else "a finite number"
-        return f"{number} {limits}".rstrip() + unit
+        return f"{number} {limits}{unit}" if limits else f"{number}{' in' if unit else ''}{unit}"
 
 
 def _is_finite(number: float) -> bool:

@@ -66,13 +66,13 @@ def check_memory(name: str, value: object, needed: float) -> None:
         SoftreachWarning: It is more than half of what there is.
     """
     if needed > _NOTICED:
-        _check(name, value, needed, free_memory(), "memory")
+        _check(name, value, float(min(needed, 1e300)), free_memory(), "memory")
 
 
 def check_room(name: str, rows: int, columns: int) -> None:
     """As `check_memory`, for a number of rows, each of so many doubles."""
     shown = in_short(f"{rows:,}") if rows < 10**30 else "a number beyond 1e30"
-    check_memory(name, shown, float(min(8 * columns * rows, 10**300)))
+    check_memory(name, shown, 8 * columns * rows)
 
 
 def check_disk(name: str, value: object, needed: float, path: str | os.PathLike[str]) -> None:

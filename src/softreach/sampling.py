@@ -22,6 +22,7 @@ Draw = Callable[[int, int], Array]
 """(first, count) -> the points first .. first + count; called in order, without gaps."""
 
 
+_LARGEST_N = 10**30  # more than any memory holds, and short enough to be shown
 _LARGEST_SEED = 2**63 - 1  # what stores hold as a number
 
 
@@ -45,8 +46,11 @@ def sample_cube(sampler: str, n: int, dim: int, seed: int = 0) -> Array:
         seed: What random samplers start from.
 
     Raises:
-        InvalidInput: An unknown sampler, or an n that the sampler cannot spread.
+        InvalidInput: An unknown sampler, an n that the sampler cannot spread, or more points than
+            fit into memory.
     """
+    check_sampler(sampler, n, dim, seed)
+    check_room("n", n, dim)
     return next(cube_blocks(sampler, n, dim, seed, size=n))
 
 
@@ -61,8 +65,7 @@ def cube_blocks(sampler: str, n: int, dim: int, seed: int, size: int) -> Iterato
 def check_sampler(sampler: str, n: int, dim: int, seed: int) -> None:
     """Raise InvalidInput unless the sampler exists and can spread n points."""
     one_of(SAMPLERS)("sampler", sampler)
-    n = as_whole_number("n", n, 1)
-    check_room("n", n, dim + 3)
+    n = as_whole_number("n", n, 1, _LARGEST_N)
     as_whole_number("seed", seed, 0, _LARGEST_SEED)
     if dim and (advice := SAMPLERS[sampler].refusal(n, dim)) is not None:
         raise InvalidInput("n", n, advice)

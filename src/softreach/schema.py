@@ -139,6 +139,7 @@ def check_stored_cloud(cloud: xr.Dataset) -> xr.Dataset:
     for name, (kind, allowed) in _KINDS.items():
         if name in cloud and cloud[name].dtype != kind:
             raise InvalidInput(f"cloud.{name}", f"of type {cloud[name].dtype}", allowed)
+    _check_storable(cloud)
     for name, (types, allowed) in _ATTRIBUTES.items():
         value = cloud.attrs.get(name)
         if not isinstance(value, types) or isinstance(value, bool):
@@ -151,6 +152,13 @@ def check_stored_cloud(cloud: xr.Dataset) -> xr.Dataset:
     return cloud
 
 
+def _check_storable(cloud: xr.Dataset) -> None:
+    for name, values in cloud.variables.items():
+        if values.dtype.kind not in _STORED:
+            raise InvalidInput(f"cloud.{name}", f"of type {values.dtype}", "of numbers or of texts")
+
+
+_STORED = "biufUOT"  # kinds of dtypes; texts may be objects
 _KINDS = {
     "tip": (np.dtype(np.float64), "of float64"),
     "activation": (np.dtype(np.float64), "of float64"),

@@ -164,7 +164,9 @@ CALLS: dict[str, Call] = {
         sr.Manipulator.from_toml, lambda: {"text": ARM.to_toml()}, {"text": bad("text")}
     ),
     "arm.Manipulator.load": Call(sr.Manipulator.load, dict, {"path": PATH}),
-    "arm.Manipulator.save": Call(ARM.save, dict, {"path": PATH}),
+    "arm.Manipulator.save": Call(
+        ARM.save, lambda: {"path": "missing/x.toml"}, {"path": PATH, "overwrite": FLAG}
+    ),
     "arm.Manipulator.outline": Call(ARM.outline, lambda: {"z": [0.0]}, {"z": ARRAY}),
     "arm.Manipulator.split": Call(
         ARM.split,
@@ -196,7 +198,7 @@ CALLS: dict[str, Call] = {
     "cloud.save_cloud": Call(
         sr.save_cloud,
         lambda: {"cloud": cloud(), "path": "missing/x.zarr"},
-        {"cloud": DATA, "path": PATH},
+        {"cloud": DATA, "path": PATH, "overwrite": FLAG, "durable": FLAG},
     ),
     "cloud.open_cloud": Call(sr.open_cloud, dict, {"path": PATH}),
     "curvature.curvature_statistics": Call(
@@ -248,27 +250,27 @@ CALLS: dict[str, Call] = {
     "exchange.activefilaments.write_cloud": Call(
         sr.exchange.activefilaments.write_cloud,
         lambda: {"cloud": cloud(), "path": "missing/x.csv"},
-        {"cloud": DATA, "path": PATH},
+        {"cloud": DATA, "path": PATH, "overwrite": FLAG},
     ),
     "exchange.activefilaments.write_design": Call(
         sr.exchange.activefilaments.write_design,
         lambda: {"arm": sr.designs.filament(), "path": "missing/x.jl"},
-        {"arm": ANY_ARM, "path": PATH},
+        {"arm": ANY_ARM, "path": PATH, "overwrite": FLAG},
     ),
     "export.export_arm": Call(
         sr.export.export_arm,
         lambda: {"arm": ARM, "configuration": shape(), "path": "missing/x.stl"},
-        {"arm": ANY_ARM, "configuration": DATA, "path": PATH, "sides": WHOLE},
+        {"arm": ANY_ARM, "configuration": DATA, "path": PATH, "overwrite": FLAG, "sides": WHOLE},
     ),
     "export.export_cloud": Call(
         sr.export.export_cloud,
         lambda: {"cloud": cloud(), "path": "missing/x.csv"},
-        {"cloud": DATA, "path": PATH},
+        {"cloud": DATA, "path": PATH, "overwrite": FLAG},
     ),
     "export.export_mesh": Call(
         sr.export.export_mesh,
         lambda: {"mesh_or_hull": hull(), "path": "missing/x.stl"},
-        {"mesh_or_hull": DATA, "path": PATH},
+        {"mesh_or_hull": DATA, "path": PATH, "overwrite": FLAG},
     ),
     "forces.blocked_force": Call(
         sr.forces.blocked_force,
@@ -468,7 +470,7 @@ CALLS: dict[str, Call] = {
     "plot.save_figure": Call(
         sr.plot.save_figure,
         lambda: {"figure": figure(), "path": "missing/x.png"},
-        {"figure": DATA, "path": PATH},
+        {"figure": DATA, "path": PATH, "overwrite": FLAG},
     ),
     "redundancy.activation_distance": Call(
         sr.activation_distance,

@@ -27,7 +27,7 @@ from tests.laws import arm_of, arms, in_box
         ({"bundles": 0}, "whole number >= 1"),
         ({"bundles": 1.5}, "whole number >= 1"),
         ({"bundles": True}, "whole number >= 1"),
-        ({"offset": math.inf}, "offset = inf: must be a finite number >= -628"),
+        ({"offset": math.inf}, "offset = inf: must be a finite number in rad"),
         ({"revolution": 1.0, "helical_angle": 0.2}, "exactly one of helical_angle and revolution"),
         ({"revolution": None, "helical_angle": None}, "exactly one"),
         ({"extent": None}, "extent: must be a finite number > 0"),

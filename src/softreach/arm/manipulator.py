@@ -198,7 +198,7 @@ class Manipulator:
         """
         return cls.from_toml(file.text_of(path), source=fspath(path))
 
-    @checked(path=path)
+    @checked(path=path, overwrite=flag)
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write a design file; an older one is replaced whole.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from os import PathLike
 from typing import TYPE_CHECKING
 
-from softreach.arguments import checked, dataset, path, whole
+from softreach.arguments import checked, dataset, flag, path, whole
 from softreach.arm.manipulator import a_manipulator
 from softreach.arm.skin import inside
 from softreach.arm_shape import arm_surface, bundle_surfaces
@@ -27,6 +27,7 @@ _CLEAR = 0.45  # opacity of a body that has something inside
     configuration=dataset("position", "directors", "extension", "Z", what="a configuration"),
     path=path,
     sides=whole(3, 10_000),
+    overwrite=flag,
 )
 def export_arm(
     arm: Manipulator,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.arguments import checked, dataset, path
+from softreach.arguments import checked, dataset, flag, path
 from softreach.errors import InvalidInput
 from softreach.export import ply
 from softreach.export.formats import Writers, load_library, write_by_suffix, write_vtk, write_vtu
@@ -24,7 +24,7 @@ __all__ = ["CLOUD_FILES", "export_cloud"]
 _MAT_LIMIT = 2**31  # bytes of one variable in a version 5 file
 
 
-@checked(cloud=dataset("tip", "activation", what="a cloud"), path=path)
+@checked(cloud=dataset("tip", "activation", what="a cloud"), path=path, overwrite=flag)
 def export_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write a cloud as .ply, .csv, .parquet, .npz, .mat, .vtu or .vtk, chosen by the suffix.
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arguments import as_given, checked, path
+from softreach.arguments import as_given, checked, flag, path
 from softreach.arrays import Faces, as_faces, as_points
 from softreach.errors import InvalidInput
 from softreach.export import ply
@@ -55,7 +55,7 @@ def _a_mesh(name: str, value: Any) -> tuple[NDArray[np.float64], Faces]:
     return points, as_faces(f"{name}.faces", faces, len(points))
 
 
-@checked(mesh_or_hull=_a_mesh, path=path)
+@checked(mesh_or_hull=_a_mesh, path=path, overwrite=flag)
 def export_mesh(
     mesh_or_hull: SurfaceMesh | tuple[ArrayLike, ArrayLike],
     path: str | PathLike[str],

@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from softreach.arguments import as_given, checked, path
+from softreach.arguments import as_given, checked, flag, path
 from softreach.atomic import writing
 from softreach.errors import InvalidInput, MissingExtra
 from softreach.file_kinds import PICTURES, format_of
@@ -81,7 +81,7 @@ def _drawn(name: str, value: Any) -> Any:
     raise InvalidInput(name, as_given(value), "a figure or axes of matplotlib")
 
 
-@checked(figure=_drawn, path=path)
+@checked(figure=_drawn, path=path, overwrite=flag)
 def save_figure(
     figure: Figure | Axes, path: str | PathLike[str], *, overwrite: bool = False
 ) -> None:

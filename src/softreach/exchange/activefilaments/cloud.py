@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach import schema
-from softreach.arguments import checked, path
+from softreach.arguments import checked, flag, path
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.atomic import check_place, writing
 from softreach.cloud import design_of
@@ -89,7 +89,7 @@ def read_cloud(arm: Manipulator, path: str | PathLike[str], *, tol: float = 1e-6
     return cloud
 
 
-@checked(cloud=a_cloud, path=path)
+@checked(cloud=a_cloud, path=path, overwrite=flag)
 def write_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write tips to NAME.csv and activations to NAME_gamma.csv, as ActiveFilaments.jl does.
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from os import PathLike
 
-from softreach.arguments import checked, path
+from softreach.arguments import checked, flag, path
 from softreach.arm.along import Pieces
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.atomic import writing
@@ -33,7 +33,7 @@ FILAMENT_SCRIPT: Formats = {
 """What `write_design` writes, and replaces."""
 
 
-@checked(arm=a_manipulator, path=path)
+@checked(arm=a_manipulator, path=path, overwrite=flag)
 def write_design(arm: Manipulator, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write a Julia script that defines the filament of ActiveFilaments.jl with an arm's tips.
 
