@@ -22,7 +22,7 @@ Draw = Callable[[int, int], Array]
 """(first, count) -> the points first .. first + count; called in order, without gaps."""
 
 
-_LARGEST_N = 10**30  # more than any memory holds, and short enough to be shown
+_LARGEST_SHOWN = 10**30  # more than any memory holds; larger ones would fill an error
 _LARGEST_SEED = 2**63 - 1  # what stores hold as a number
 
 
@@ -65,7 +65,9 @@ def cube_blocks(sampler: str, n: int, dim: int, seed: int, size: int) -> Iterato
 def check_sampler(sampler: str, n: int, dim: int, seed: int) -> None:
     """Raise InvalidInput unless the sampler exists and can spread n points."""
     one_of(SAMPLERS)("sampler", sampler)
-    n = as_whole_number("n", n, 1, _LARGEST_N)
+    n = as_whole_number("n", n, 1)
+    if n > _LARGEST_SHOWN:
+        check_room("n", n, max(dim, 1))
     as_whole_number("seed", seed, 0, _LARGEST_SEED)
     if dim and (advice := SAMPLERS[sampler].refusal(n, dim)) is not None:
         raise InvalidInput("n", n, advice)
