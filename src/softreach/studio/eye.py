@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +24,10 @@ class Eye:
     def __init__(self, client: ClientHandle) -> None:
         """Follow the camera of a client."""
         self._client = client
+
+    def on_move(self, moved: Callable[[], None]) -> None:
+        """Call this whenever the eye has moved."""
+        self._client.camera.on_update(lambda _: moved())
 
     def camera(self) -> Camera:
         """Where it is now."""

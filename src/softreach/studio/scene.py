@@ -14,9 +14,11 @@ from softreach.arm_shape import arm_surface, bundle_skins
 from softreach.palette import BODY, bundle_color
 from softreach.rod.kinematics import configuration
 from softreach.studio.axes import axes_box
+from softreach.studio.clouds import Clouds, Dots
 from softreach.studio.colors import FAINT, UNSTABLE, sample_colors
 from softreach.studio.reach import Reach, cloud_points, unstable_samples
 from softreach.studio.rod import solvable_rod
+from softreach.studio.shading import lit
 from softreach.studio.slicing import in_slice, sliced_faces
 from softreach.studio.state import Appearance, Slice
 from softreach.workspace import ReachableSolid, ReachableSurface
@@ -46,6 +48,9 @@ class Scene:
     def __init__(self, api: SceneApi) -> None:
         """Draw into the scene of a client, or of a server for a page that is saved."""
         self._api = api
+        self.clouds = Clouds(api)
+        self.spine: tuple[Array, Array] = np.empty((0, 3)), np.empty(0)
+        """Centers and radii along the arm [L], as it is drawn."""
         self._arms: dict[str, tuple[Manipulator, list[Any]]] = {}
 
     def draw_cloud(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
@@ -57,7 +62,8 @@ class Scene:
         coloring = sample_colors(reach, look.level, look.color)
         kept, unstable = in_slice(points, look.slice), unstable_samples(reach, look.level)
         stable = kept & ~unstable
-        self._points("/cloud", points[stable], coloring.rgb[stable], look.point_size)
+        colors = lit(coloring.rgb, points) if look.lit else coloring.rgb
+        self._points("/cloud", points[stable], colors[stable], look.point_size)
         self._draw_unstable(points[kept & unstable], look.point_size)
         self._slab(look.slice, points)
         return coloring.key
@@ -85,6 +91,8 @@ class Scene:
         if np.isnan(shape["position"].values).any():
             self.remove(path)
             return np.full(3, np.nan)
+        if path == "/arm":
+            self.spine = _spine(arm, shape)
         meshes = _arm_meshes(arm, shape)
         known, handles = self._arms.get(path, (None, []))
         if known is arm:
@@ -196,6 +204,7 @@ class Scene:
             for known in list(self._arms):  # a copy: workers draw at the same time
                 if known == path or known.startswith(f"{path}/"):
                     self._arms.pop(known, None)
+            self.clouds.forget(path)
             if self._api.get_handle_by_name(path) is not None:
                 self._api.remove_by_name(path)
 
@@ -210,16 +219,7 @@ class Scene:
         if not len(points):
             self.remove(path)
             return
-        # viser's default is float16: a quarter of a millimeter in a meter
-        self._api.add_point_cloud(
-            path,
-            points.astype(np.float32),
-            colors,
-            point_size=size,
-            precision="float32",
-            point_shape=shape,
-            point_shading="flat",
-        )
+        self.clouds.draw(path, Dots(points=points, colors=colors, size=size, shape=shape))
 
     def _mesh(
         self, path: str, vertices: Array, faces: Any, color: Color, opacity: float | None = None
@@ -260,6 +260,11 @@ class Scene:
             corners[list(side), other] = high[other]
         faces = np.array([[0, 1, 2], [0, 2, 3]])
         self._mesh("/slice", corners, faces, (200, 200, 205), opacity=0.25)
+
+
+def _spine(arm: Manipulator, shape: Any) -> tuple[Array, Array]:
+    """Balls that fill the arm [L]."""
+    return shape["position"].values / arm.length, shape["radius"].values / arm.length
 
 
 def _arm_meshes(arm: Manipulator, shape: Any) -> list[tuple[Array, NDArray[Any], Color]]:

@@ -9,6 +9,7 @@ from softreach.studio.jobs.job import Job
 from softreach.studio.jobs.map import DrawMap
 from softreach.studio.jobs.reach import ComputeReach, DrawCloud, DrawSurfaces
 from softreach.studio.jobs.reference import DrawReference
+from softreach.studio.jobs.sight import KeepSight
 from softreach.studio.state import StudioState
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "DrawReference",
     "DrawSurfaces",
     "Job",
+    "KeepSight",
     "SolveInverse",
     "what_follows",
 ]
@@ -34,6 +36,7 @@ JOBS: tuple[type[Job], ...] = (
     SolveInverse,
     DrawReference,
     DrawMap,
+    KeepSight,
 )
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from softreach.studio.colors import color_names
 from softreach.studio.panels.binding import bind
+from softreach.studio.sight import CUTS
 from softreach.studio.state import LEVELS, Appearance, StudioState
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["ViewPanel"]
 
 _COUNTS = {f"{1 << level:,}": level for level in LEVELS}
+_CUT_NAMES = {text: name for name, text in CUTS.items()}
 _ACROSS: tuple[str, ...] = ("none", "x", "y", "z")
 _TOGGLES = {
     "cloud": "cloud",
@@ -38,6 +40,8 @@ class ViewPanel:
             self._color = gui.add_dropdown("color by", tuple(names.values()))
             self._count = gui.add_dropdown("points", tuple(_COUNTS), initial_value=_count(look))
             self._size = gui.add_slider("point size / L", 5e-4, 0.02, 5e-4, look.point_size)
+            self._cut = gui.add_dropdown("cut away", tuple(CUTS.values()), initial_value=CUTS[look.cut])
+            self._lit = gui.add_checkbox("lit points", look.lit)
             with gui.add_folder("show"):
                 self._toggles = {
                     field: gui.add_checkbox(label, getattr(look, field))
@@ -57,6 +61,8 @@ class ViewPanel:
         bind(self._color, session, self._recolored)
         bind(self._count, session, lambda s, text: s.showing(level=_COUNTS[text]))
         bind(self._size, session, lambda s, size: s.showing(point_size=size))
+        bind(self._cut, session, lambda s, text: s.showing(cut=_CUT_NAMES[text]))
+        bind(self._lit, session, lambda s, on: s.showing(lit=on))
         for field, box in self._toggles.items():
             bind(box, session, lambda s, on, field=field: s.showing(**{field: on}))
         for field, widget in self._slice.items():
@@ -72,6 +78,7 @@ class ViewPanel:
         self._revision = session.revision
         self._color.value = names.get(look.color, names["rgb"])
         self._count.value, self._size.value = _count(look), look.point_size
+        self._cut.value, self._lit.value = CUTS[look.cut], look.lit
         for field, box in self._toggles.items():
             box.value = getattr(look, field)
         for field, widget in self._slice.items():

@@ -1,0 +1,50 @@
+"""Keeps the arm and the target in sight as the eye, the arm or the target moves."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from softreach.studio.jobs.job import Job
+from softreach.studio.sight import Sight
+from softreach.studio.state import StudioState
+from softreach.studio.worker import StaleCheck
+
+__all__ = ["KeepSight"]
+
+_PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
+_TARGET = 0.015  # [L]
+
+
+class KeepSight(Job):
+    """Cuts away the points in front of the arm and the target."""
+
+    @staticmethod
+    def depends_on(state: StudioState) -> object:
+        """What is cut and what is to be seen; arm and eye report when they have moved."""
+        return state.appearance.cut, state.appearance.arm, state.target
+
+    def run(self, check: StaleCheck) -> None:
+        """Look from where the eye is by now."""
+        time.sleep(_PAUSE)
+        session = self.session
+        with session.drawing, session.client.atomic():
+            session.scene.clouds.look(self._sight(), session.state.appearance.cut)
+
+    def _sight(self) -> Sight:
+        session, state = self.session, self.session.state
+        camera = session.eye.camera()
+        centers, radii = session.scene.spine if state.appearance.arm else _NOTHING
+        if state.target is not None:
+            target = np.asarray(state.target) / state.design.length
+            centers, radii = np.vstack([centers, target]), np.append(radii, _TARGET)
+        return Sight(
+            eye=np.asarray(camera.position),
+            look_at=np.asarray(camera.look_at),
+            centers=centers,
+            radii=radii,
+        )
+
+
+_NOTHING = np.empty((0, 3)), np.empty(0)
