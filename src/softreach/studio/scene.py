@@ -37,7 +37,7 @@ _STATIONS, _SIDES, _ACROSS = 51, 24, np.pi / 12
 _LIFT = 0.02  # of the fibers above the body, in R2
 _CLEAR = 0.45  # opacity of a body that has something inside
 _GHOST, _REFERENCE, _SURFACE, _HULL = 0.35, (150, 150, 158), (90, 140, 200), (220, 150, 60)
-_MARK: Color = (220, 30, 120)
+_MARK: Color = (235, 90, 0)
 _FREE_LEVEL, _FREE_SIZE = 15, 0.6
 _UNSTABLE_SIZE = 2.0  # times that of other points: they are few, and not to be overlooked
 

@@ -73,7 +73,7 @@ class Appearance:
     """What is drawn and how."""
 
     level: int = 17
-    color: str = "rgb"
+    color: str = "effort"
     """One of `colors.color_names`."""
     point_size: float = 0.007
     """[L]."""

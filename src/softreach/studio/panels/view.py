@@ -40,7 +40,9 @@ class ViewPanel:
             self._color = gui.add_dropdown("color by", tuple(names.values()))
             self._count = gui.add_dropdown("points", tuple(_COUNTS), initial_value=_count(look))
             self._size = gui.add_slider("point size / L", 5e-4, 0.02, 5e-4, look.point_size)
-            self._cut = gui.add_dropdown("cut away", tuple(CUTS.values()), initial_value=CUTS[look.cut])
+            self._cut = gui.add_dropdown(
+                "cut away", tuple(CUTS.values()), initial_value=CUTS[look.cut]
+            )
             self._lit = gui.add_checkbox("lit points", look.lit)
             with gui.add_folder("show"):
                 self._toggles = {
