@@ -70,10 +70,14 @@ class Clouds:
         """Draw a cloud no more; its node is the caller's to remove."""
         self._known.pop(path, None)
 
-    def _kept(self, dots: Dots) -> NDArray[np.bool_]:
+    def hidden(self, points: Array) -> NDArray[np.bool_]:
+        """Which points [L], shape (n, 3), are cut away."""
         if self._sight is None:
-            return np.ones(len(dots.points), bool)
-        return ~in_the_way(dots.points, self._sight, self._cut)
+            return np.zeros(len(points), bool)
+        return in_the_way(points, self._sight, self._cut)
+
+    def _kept(self, dots: Dots) -> NDArray[np.bool_]:
+        return ~self.hidden(dots.points)
 
     def _send(self, path: str, dots: Dots) -> None:
         if not len(dots.points):

@@ -13,7 +13,7 @@ from softreach.arm.skin import inside
 from softreach.arm_shape import arm_surface, bundle_skins
 from softreach.palette import BODY, bundle_color
 from softreach.rod.kinematics import configuration
-from softreach.studio.axes import axes_box
+from softreach.studio.axes import AxesBox, axes_box, round_box, seen_from
 from softreach.studio.clouds import Clouds, Dots
 from softreach.studio.colors import FAINT, UNSTABLE, sample_colors
 from softreach.studio.reach import Reach, cloud_points, unstable_samples
@@ -49,6 +49,9 @@ class Scene:
         """Draw into the scene of a client, or of a server for a page that is saved."""
         self._api = api
         self.clouds = Clouds(api)
+        self.box = np.array([-0.5, -0.5, 0.0]), np.array([0.5, 0.5, 1.0])
+        """Lowest and highest corner around everything [L]."""
+        self._eye: Array = np.array([50.0, -80.0, 30.0])
         self.spine: tuple[Array, Array] = np.empty((0, 3)), np.empty(0)
         """Centers and radii along the arm [L], as it is drawn."""
         self._arms: dict[str, tuple[Manipulator, list[Any]]] = {}
@@ -128,12 +131,27 @@ class Scene:
 
     def draw_axes(self, reach: Reach, look: Appearance, free: Reach | None = None) -> None:
         """The box with numbers around cloud and arm, and the cloud without loads."""
-        self.remove("/axes")
-        if not look.axes:
-            return
         clouds = [reach] if free is None or not look.free else [reach, free]
         around = (cloud_points(one, 14) for one in clouds)
-        box = axes_box(*around, np.array([[0, 0, 0], [0, 0, 1.0]]))
+        self.box = round_box(*around, np.array([[0, 0, 0], [0, 0, 1.0]]))
+        self.remove("/axes")
+        if look.axes:
+            self._draw_box(axes_box(*self._corners, eye=self._eye))
+
+    def turn_axes(self, eye: Array) -> None:
+        """Number the edges that are the outer ones from where the eye is [L]."""
+        before, self._eye = self._eye, eye
+        if seen_from(eye, *self.box) == seen_from(before, *self.box):
+            return
+        if self._api.get_handle_by_name("/axes/lines") is not None:
+            self.remove("/axes")
+            self._draw_box(axes_box(*self._corners, eye=eye))
+
+    @property
+    def _corners(self) -> tuple[Array, Array]:
+        return self.box[0][None], self.box[1][None]
+
+    def _draw_box(self, box: AxesBox) -> None:
         self._api.add_line_segments(
             "/axes/lines", box.lines.astype(np.float32), (170, 170, 175), thickness=0.003
         )

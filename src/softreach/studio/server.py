@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 
 from softreach.errors import InvalidInput, MissingExtra
 from softreach.studio.connections import refuse_unless, sending_headers
+from softreach.studio.eye import FOV
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 __all__ = ["LOOPBACK", "page_headers", "page_url", "same_origin", "start_server", "stop_server"]
 
 LOOPBACK = "127.0.0.1"
-_FOV = 0.6  # [rad]; viser's 75 degrees draw a ball at the rim as an egg
 _LOCAL_NAMES = {"localhost", "127.0.0.1", "::1"}
 
 
@@ -51,7 +51,7 @@ def start_server(host: str = LOOPBACK, port: int | None = None) -> ViserServer:
     server.scene.add_light_ambient("/light", intensity=1.6)
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
     server.gui.main_panel.dock_right()
-    server.initial_camera.fov = _FOV
+    server.initial_camera.fov = FOV
     return server
 
 

@@ -82,6 +82,8 @@ class Appearance:
     """What of the cloud is cut away in front of the arm: one of `sight.CUTS`."""
     lit: bool = True
     """Whether a lamp shines on the points."""
+    orthographic: bool = False
+    """Whether parallels stay parallel."""
     cloud: bool = True
     arm: bool = True
     axes: bool = True

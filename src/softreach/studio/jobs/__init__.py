@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from softreach.studio.jobs.arm import DrawArm
+from softreach.studio.jobs.eye import FollowEye
 from softreach.studio.jobs.free import DrawFree
 from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.jobs.job import Job
 from softreach.studio.jobs.map import DrawMap
 from softreach.studio.jobs.reach import ComputeReach, DrawCloud, DrawSurfaces
 from softreach.studio.jobs.reference import DrawReference
-from softreach.studio.jobs.sight import KeepSight
 from softreach.studio.state import StudioState
 
 __all__ = [
@@ -21,8 +21,8 @@ __all__ = [
     "DrawMap",
     "DrawReference",
     "DrawSurfaces",
+    "FollowEye",
     "Job",
-    "KeepSight",
     "SolveInverse",
     "what_follows",
 ]
@@ -36,7 +36,7 @@ JOBS: tuple[type[Job], ...] = (
     SolveInverse,
     DrawReference,
     DrawMap,
-    KeepSight,
+    FollowEye,
 )
 
 

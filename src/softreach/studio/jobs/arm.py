@@ -38,7 +38,7 @@ class DrawArm(Job):
             self._draw(state)
         self._draw_trail()
         draw_reference_arm(session)
-        session.keep_sight()
+        session.look_again()
         session.show()
 
     def _draw(self, state: StudioState) -> None:

@@ -6,7 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from softreach.studio.colors import color_names
-from softreach.studio.panels.binding import bind
+from softreach.studio.eye import VIEWS
+from softreach.studio.panels.binding import bind, bind_button
 from softreach.studio.sight import CUTS
 from softreach.studio.state import LEVELS, Appearance, StudioState
 
@@ -49,6 +50,10 @@ class ViewPanel:
                     field: gui.add_checkbox(label, getattr(look, field))
                     for field, label in _TOGGLES.items()
                 }
+            with gui.add_folder("camera"):
+                views = gui.add_button_group("look from", tuple(VIEWS))
+                self._orthographic = gui.add_checkbox("orthographic", look.orthographic)
+                reset = gui.add_button("Reset the view")
             with gui.add_folder("slice"):
                 self._slice = {
                     "axis": gui.add_dropdown("across", _ACROSS, initial_value=look.slice.axis),
@@ -58,6 +63,9 @@ class ViewPanel:
                     ),
                 }
         self._listen(session)
+        bind(self._orthographic, session, lambda s, on: s.showing(orthographic=on))
+        bind_button(views, session, lambda: session.look_from(views.value))
+        bind_button(reset, session, lambda: self._reset(session))
 
     def _listen(self, session: Session) -> None:
         bind(self._color, session, self._recolored)
@@ -81,10 +89,16 @@ class ViewPanel:
         self._color.value = names.get(look.color, names["rgb"])
         self._count.value, self._size.value = _count(look), look.point_size
         self._cut.value, self._lit.value = CUTS[look.cut], look.lit
+        self._orthographic.value = look.orthographic
         for field, box in self._toggles.items():
             box.value = getattr(look, field)
         for field, widget in self._slice.items():
             widget.value = getattr(look.slice, field)
+
+    def _reset(self, session: Session) -> None:
+        session.update(lambda s: s.showing(orthographic=False))
+        session.eye.project(orthographic=False)
+        session.look_from("oblique")
 
     def _recolored(self, state: StudioState, label: str) -> StudioState:
         names = color_names(state.design)

@@ -1,4 +1,4 @@
-"""Keeps the arm and the target in sight as the eye, the arm or the target moves."""
+"""What follows from where the eye is: the points that hide the arm, and the edges with numbers."""
 
 from __future__ import annotations
 
@@ -11,30 +11,35 @@ from softreach.studio.sight import Sight
 from softreach.studio.state import StudioState
 from softreach.studio.worker import StaleCheck
 
-__all__ = ["KeepSight"]
+__all__ = ["FollowEye"]
 
 _PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
 _TARGET = 0.015  # [L]
 
 
-class KeepSight(Job):
-    """Cuts away the points in front of the arm and the target."""
+class FollowEye(Job):
+    """Cuts away what is in front of the arm and the target, and turns the axes to the eye."""
 
     @staticmethod
     def depends_on(state: StudioState) -> object:
         """What is cut and what is to be seen; arm and eye report when they have moved."""
-        return state.appearance.cut, state.appearance.arm, state.target
+        look = state.appearance
+        return look.cut, look.arm, look.orthographic, state.target
 
     def run(self, check: StaleCheck) -> None:
         """Look from where the eye is by now."""
         time.sleep(_PAUSE)
         session = self.session
+        session.eye.project(orthographic=session.state.appearance.orthographic)
+        session.eye.focus()
         with session.drawing, session.client.atomic():
-            session.scene.clouds.look(self._sight(), session.state.appearance.cut)
+            sight = self._sight()
+            session.scene.clouds.look(sight, session.state.appearance.cut)
+            session.scene.turn_axes(sight.eye)
 
     def _sight(self) -> Sight:
         session, state = self.session, self.session.state
-        camera = session.eye.camera()
+        camera = session.eye.place()
         centers, radii = session.scene.spine if state.appearance.arm else _NOTHING
         if state.target is not None:
             target = np.asarray(state.target) / state.design.length
