@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.errors import InvalidInput
 from softreach.studio.state import Camera, vector
 
 if TYPE_CHECKING:
@@ -28,6 +29,8 @@ VIEWS: dict[str, Array] = {
 
 _STEP_BACK = 1.4  # times the distance, for two clouds side by side
 _AWAY = 40.0  # times the distance from which parallels stay parallel, to 1 %
+_PATIENCE = 30.0  # [s] for a picture
+_UPRIGHT = 0.75  # aspect below which a window is that of a phone
 _ROOM = 1.12  # times what would just fill the picture
 
 
@@ -68,8 +71,11 @@ def framing(low: Array, high: Array, direction: Array, aspect: float) -> Camera:
     middle, radius = (low + high) / 2, _ROOM * float(np.linalg.norm(high - low)) / 2
     half = np.arctan(np.tan(FOV / 2) * min(1.0, aspect))
     distance = radius / np.sin(half)
-    position = middle + distance * direction / np.linalg.norm(direction)
-    return Camera(position=vector(position), look_at=vector(middle))
+    toward = direction / np.linalg.norm(direction)
+    if aspect < _UPRIGHT:  # the sheet of a phone covers the lower half
+        up = np.cross(toward, (-toward[1], toward[0], 0.0))
+        middle = middle - 0.45 * distance * np.tan(FOV / 2) * up / np.linalg.norm(up)
+    return Camera(position=vector(middle + distance * toward), look_at=vector(middle))
 
 
 class Eye:
@@ -83,6 +89,11 @@ class Eye:
     def on_move(self, moved: Callable[[], None]) -> None:
         """Call this whenever the eye has moved."""
         self._client.camera.on_update(lambda _: moved())
+
+    @property
+    def is_upright(self) -> bool:
+        """Whether the window is that of a phone."""
+        return self.aspect < _UPRIGHT
 
     @property
     def aspect(self) -> float:
@@ -126,6 +137,20 @@ class Eye:
             shown = self._client.camera
             if not 0.7 < shown.far / found.far < 1.4:
                 shown.near, shown.far = found.near, found.far
+
+    def picture(self) -> NDArray[np.uint8]:
+        """What it sees now, RGBA on a transparent ground, shape (height, width, 4).
+
+        Raises:
+            InvalidInput: The tab does not answer: browsers stop drawing tabs in the background.
+        """
+        camera, client = self._client.camera, self._client
+        size = {"height": camera.image_height, "width": camera.image_width}
+        try:
+            return client.get_render(**size, transport_format="png", timeout=_PATIENCE)
+        except TimeoutError:
+            allowed = "in the foreground"
+            raise InvalidInput("tab", "not drawing", allowed, "bring it to the front") from None
 
     def step_back(self, shift: Array) -> None:
         """Make room for a second cloud that stands `shift` [L] beside the first."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from softreach.studio import markup
 from softreach.studio.colors import key_html
 from softreach.studio.eye import lens
+from softreach.studio.head import headed
 from softreach.studio.panels.status import legend_text, reach_text
 from softreach.studio.reach import Reach
 from softreach.studio.scene import Scene
@@ -45,7 +46,7 @@ def static_page(state: StudioState, reach: Reach, picture: NDArray[np.uint8] | N
         if state.camera is not None:
             _place(server, state.camera, orthographic=state.appearance.orthographic)
         key = _draw(Scene(server.scene), state, reach)
-        page = server.scene.as_html()
+        page = headed(server.scene.as_html(dark_mode=state.appearance.dark))
     finally:
         stop_server(server)
     end = page.rindex("</body>")

@@ -49,7 +49,7 @@ class Scene:
         """Draw into the scene of a client, or of a server for a page that is saved."""
         self._api = api
         self.clouds = Clouds(api)
-        self.box = np.array([-0.5, -0.5, 0.0]), np.array([0.5, 0.5, 1.0])
+        self.box = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
         """Lowest and highest corner around everything [L]."""
         self._eye: Array = np.array([50.0, -80.0, 30.0])
         self.spine: tuple[Array, Array] = np.empty((0, 3)), np.empty(0)

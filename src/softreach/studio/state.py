@@ -84,6 +84,8 @@ class Appearance:
     """Whether a lamp shines on the points."""
     orthographic: bool = False
     """Whether parallels stay parallel."""
+    dark: bool = False
+    """Whether the page is dark."""
     cloud: bool = True
     arm: bool = True
     axes: bool = True

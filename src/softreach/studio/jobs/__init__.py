@@ -10,6 +10,7 @@ from softreach.studio.jobs.job import Job
 from softreach.studio.jobs.map import DrawMap
 from softreach.studio.jobs.reach import ComputeReach, DrawCloud, DrawSurfaces
 from softreach.studio.jobs.reference import DrawReference
+from softreach.studio.jobs.theme import SetTheme
 from softreach.studio.state import StudioState
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "DrawSurfaces",
     "FollowEye",
     "Job",
+    "SetTheme",
     "SolveInverse",
     "what_follows",
 ]
@@ -37,6 +39,7 @@ JOBS: tuple[type[Job], ...] = (
     DrawReference,
     DrawMap,
     FollowEye,
+    SetTheme,
 )
 
 

@@ -27,6 +27,8 @@ _TOGGLES = {
     "surface": "exact surface",
     "alpha_shape": "α-shape (0.05 L)",
     "axes": "axes",
+    "lit": "lit points",
+    "dark": "dark page",
 }
 
 
@@ -44,7 +46,6 @@ class ViewPanel:
             self._cut = gui.add_dropdown(
                 "cut away", tuple(CUTS.values()), initial_value=CUTS[look.cut]
             )
-            self._lit = gui.add_checkbox("lit points", look.lit)
             with gui.add_folder("show"):
                 self._toggles = {
                     field: gui.add_checkbox(label, getattr(look, field))
@@ -72,7 +73,6 @@ class ViewPanel:
         bind(self._count, session, lambda s, text: s.showing(level=_COUNTS[text]))
         bind(self._size, session, lambda s, size: s.showing(point_size=size))
         bind(self._cut, session, lambda s, text: s.showing(cut=_CUT_NAMES[text]))
-        bind(self._lit, session, lambda s, on: s.showing(lit=on))
         for field, box in self._toggles.items():
             bind(box, session, lambda s, on, field=field: s.showing(**{field: on}))
         for field, widget in self._slice.items():
@@ -88,7 +88,7 @@ class ViewPanel:
         self._revision = session.revision
         self._color.value = names.get(look.color, names["rgb"])
         self._count.value, self._size.value = _count(look), look.point_size
-        self._cut.value, self._lit.value = CUTS[look.cut], look.lit
+        self._cut.value = CUTS[look.cut]
         self._orthographic.value = look.orthographic
         for field, box in self._toggles.items():
             box.value = getattr(look, field)
