@@ -10,8 +10,7 @@ __all__ = ["headed", "headed_body"]
 _THEIRS = "<title>Viser</title>"
 # viser's sheet for phones leaves a third of the width unused, and tabs break into two lines.
 _OURS = """<title>softreach</title><style>
-.mantine-Tabs-tab{padding:0.55em 0.42em!important}
-.mantine-Tabs-tab .mantine-Tabs-tabLabel{font-size:0.78rem}
+[role="tab"]{padding-inline:0.4em!important;font-size:0.78rem!important}
 @media (max-width:36em){
 div[style*="position: fixed"][style*="max-height: 60%"]{
 width:100%!important;max-height:50%!important}
