@@ -87,9 +87,9 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike = "rgb") -> Co
         cloud: activation(sample, bundle), each in its unit.
         color: "rgb" for |γ| / max |γ| of all bundles, of each where their units differ; the name or
             index of one bundle; one number per sample, whose attributes `long_name` and `units` go
-            to the key if it is a DataArray, of which the attribute `scale` is "log" if ratios count,
-            and `clipped` true if its extreme values stand for all beyond them; or RGB from 0 to 1
-            per sample.
+            to the key if it is a DataArray, of which the attribute `scale` is "log" if ratios
+            count, and `clipped` true if its extreme values stand for all beyond them; or RGB from 0
+            to 1 per sample.
 
     Unstable equilibria of arms under loads are magenta, whatever the color of the others.
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["design_text", "picture_file"]
 
 _DPI = 100.0
-_KEY, _LINE, _EDGE = 46.0, 17.0, 14.0  # pixels: height of the key and of a line of text, margin
+_KEY, _LINE, _EDGE = 46, 17, 14  # pixels: height of the key and of a line of text, margin
 _CHARACTER = 6.4  # pixels
 _INK = {False: ("white", "#222"), True: ("#141414", "#ddd")}
 
@@ -42,7 +42,7 @@ def picture_file(
 
     height, width = scene.shape[:2]
     lines = _wrapped(_caption(state, reach), width)
-    below = _EDGE * 2 + _LINE * len(lines) + (_KEY if key is not None else 0.0)
+    below = 2 * _EDGE + _LINE * len(lines) + (_KEY if key is not None else 0)
     total = height + below
     paper, ink = _INK[state.appearance.dark]
     figure = Figure(figsize=(width / _DPI, total / _DPI), dpi=_DPI, facecolor=paper)

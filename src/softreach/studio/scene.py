@@ -21,7 +21,7 @@ from softreach.studio.rod import solvable_rod
 from softreach.studio.shading import lit
 from softreach.studio.slicing import in_slice, sliced_faces
 from softreach.studio.state import Appearance, Slice
-from softreach.workspace import ReachableSolid, ReachableSurface
+from softreach.workspace import ReachableSolid, ReachableSurface, Surface
 
 if TYPE_CHECKING:
     from viser import SceneApi
@@ -125,7 +125,7 @@ class Scene:
         """The exact boundary and the α-shape, as asked for; slow the first time."""
         self.remove("/surface", "/alpha-shape")
         if look.surface and isinstance(reach.exact, ReachableSolid | ReachableSurface):
-            self._surface("/surface", reach.exact.surface(), reach, look.slice, _SURFACE)
+            self._surface("/surface", boundary_of(reach.exact), reach, look.slice, _SURFACE)
         if look.alpha_shape and len(reach.alpha_shape.faces):
             self._surface("/alpha-shape", reach.alpha_shape, reach, look.slice, _HULL)
 
@@ -193,7 +193,9 @@ class Scene:
         if np.any(shift):
             self._draw_beside(reach, look, shift)
         elif isinstance(reach.exact, ReachableSolid):
-            self._surface("/reference", reach.exact.surface(), reach, look.slice, _REFERENCE, 0.3)
+            self._surface(
+                "/reference", boundary_of(reach.exact), reach, look.slice, _REFERENCE, 0.3
+            )
         else:
             points = cloud_points(reach, min(look.level, 16))
             self._points("/reference", points, np.array(_REFERENCE, np.uint8), look.point_size)
@@ -278,6 +280,11 @@ class Scene:
             corners[list(side), other] = high[other]
         faces = np.array([[0, 1, 2], [0, 2, 3]])
         self._mesh("/slice", corners, faces, (200, 200, 205), opacity=0.25)
+
+
+def boundary_of(exact: ReachableSolid | ReachableSurface) -> Surface:
+    """What is drawn of the boundary of a reachable set."""
+    return exact.sheets() if isinstance(exact, ReachableSolid) else exact.surface()
 
 
 def _spine(arm: Manipulator, shape: Any) -> tuple[Array, Array]:
