@@ -171,7 +171,7 @@ class Scene:
         self.remove("/target", "/gap")
         if target is None:
             return
-        self._api.add_icosphere("/target", 0.012, _MARK, position=target)
+        self._api.add_icosphere("/target", 0.018, _MARK, position=target)
         if nearest is not None:
             gap = np.stack([target, nearest])[None].astype(np.float32)
             self._api.add_line_segments("/gap", gap, _MARK, thickness=0.004)

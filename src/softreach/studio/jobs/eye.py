@@ -14,7 +14,7 @@ from softreach.studio.worker import StaleCheck
 __all__ = ["FollowEye"]
 
 _PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
-_TARGET = 0.015  # [L]
+_TARGET = 0.02  # [L]
 
 
 class FollowEye(Job):
