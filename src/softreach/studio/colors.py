@@ -122,7 +122,7 @@ def _effort(reach: Reach, rows: NDArray[np.int64]) -> Array:
     """Mean over the bundles of |γ| over the largest that each can have [-]."""
     largest = np.abs(rod_of(reach.arm).box.bounds).max(axis=1)
     share = np.abs(reach.cloud.activation.values[rows]) / np.where(largest > 0, largest, 1.0)
-    return share[:, largest > 0].mean(axis=1)
+    return share.sum(axis=1) / max(np.count_nonzero(largest), 1)
 
 
 def _multiplicity(reach: Reach, rows: NDArray[np.int64]) -> Array:
