@@ -17,9 +17,9 @@ PATIENCE = 90.0  # a loaded machine compiles shaders slowly
 class Tab:
     """One page and its session."""
 
-    def __init__(self, browser, studio: Studio) -> None:
+    def __init__(self, browser, studio: Studio, *, width: int = 900, height: int = 560) -> None:
         self.context = browser.new_context(
-            viewport={"width": 900, "height": 560}, accept_downloads=True
+            viewport={"width": width, "height": height}, accept_downloads=True
         )
         self.requests: list[str] = []
         self.errors: list[str] = []

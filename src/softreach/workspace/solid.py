@@ -17,7 +17,9 @@ from softreach.quantity import quantity
 from softreach.rod.tip_map import TipMap
 from softreach.schema import provenance
 from softreach.workspace.boundary import boundary_surface, critical_surface, signed_field
+from softreach.workspace.face_image import face_image
 from softreach.workspace.image import Image
+from softreach.workspace.outer_sheets import outer_sheets
 from softreach.workspace.reachable import Number, ReachableSet
 from softreach.workspace.reached_cells import ReachedCells
 
@@ -102,10 +104,27 @@ class ReachableSolid(ReachableSet):
     def surface(self) -> Surface:
         """The boundary: closed, oriented outwards, without staircase.
 
+        For the route "flux" it is the image of the faces of the activation box, on which its
+        vertices lie exactly; otherwise it is found in the raster, in which parts thinner than a
+        cell are lost.
+
         Raises:
             MissingExtra: scikit-image is not installed.
         """
-        return self._boundary
+        found = self._face_image if self.route == "flux" and not self.lost_share else None
+        return self._boundary if found is None else found
+
+    def sheets(self) -> Surface:
+        """The boundary as the sheets it consists of: images of faces of the box, and folds.
+
+        Unlike `surface()` it ends sharply at rims and has parts of any thinness, but where sheets
+        cross it reaches a little inside: it is for pictures. Of more than three free bundles it is
+        `surface()`.
+
+        Raises:
+            MissingExtra: scikit-image is not installed.
+        """
+        return self._sheets
 
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Whether points are reachable: whether a mapped simplex of the grid covers them.
@@ -134,7 +153,7 @@ class ReachableSolid(ReachableSet):
 
         Outside it is the distance to the image of the grid itself, or for more than three free
         bundles to the nearest tip that a search finds. Inside it is the distance to
-        `surface()`, in which parts and gaps thinner than a cell are lost.
+        the surface found in the raster, in which parts and gaps thinner than a cell are lost.
 
         Args:
             points: Positions [m], shape (n, 3).
@@ -181,6 +200,16 @@ class ReachableSolid(ReachableSet):
     @cached_property
     def _boundary(self) -> Surface:
         return boundary_surface(self.image, self._field, self.volume)
+
+    @cached_property
+    def _sheets(self) -> Surface:
+        if self.route == "raster" and isinstance(self.image, Image):
+            return outer_sheets(self.tip_map, self.image)
+        return self.surface()
+
+    @cached_property
+    def _face_image(self) -> Surface | None:
+        return face_image(self.tip_map)
 
     @cached_property
     def _critical(self) -> Surface:

@@ -6,7 +6,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from softreach.studio.colors import color_names
-from softreach.studio.panels.binding import bind
+from softreach.studio.eye import VIEWS
+from softreach.studio.panels.binding import bind, bind_button
+from softreach.studio.sight import CUTS
 from softreach.studio.state import LEVELS, Appearance, StudioState
 
 if TYPE_CHECKING:
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["ViewPanel"]
 
 _COUNTS = {f"{1 << level:,}": level for level in LEVELS}
+_CUT_NAMES = {text: name for name, text in CUTS.items()}
 _ACROSS: tuple[str, ...] = ("none", "x", "y", "z")
 _TOGGLES = {
     "cloud": "cloud",
@@ -24,6 +27,8 @@ _TOGGLES = {
     "surface": "exact surface",
     "alpha_shape": "α-shape (0.05 L)",
     "axes": "axes",
+    "lit": "lit points",
+    "dark": "dark page",
 }
 
 
@@ -38,11 +43,18 @@ class ViewPanel:
             self._color = gui.add_dropdown("color by", tuple(names.values()))
             self._count = gui.add_dropdown("points", tuple(_COUNTS), initial_value=_count(look))
             self._size = gui.add_slider("point size / L", 5e-4, 0.02, 5e-4, look.point_size)
+            self._cut = gui.add_dropdown(
+                "cut away", tuple(CUTS.values()), initial_value=CUTS[look.cut]
+            )
             with gui.add_folder("show"):
                 self._toggles = {
                     field: gui.add_checkbox(label, getattr(look, field))
                     for field, label in _TOGGLES.items()
                 }
+            with gui.add_folder("camera"):
+                views = gui.add_button_group("look from", tuple(VIEWS))
+                self._orthographic = gui.add_checkbox("orthographic", look.orthographic)
+                reset = gui.add_button("Reset the view")
             with gui.add_folder("slice"):
                 self._slice = {
                     "axis": gui.add_dropdown("across", _ACROSS, initial_value=look.slice.axis),
@@ -52,11 +64,15 @@ class ViewPanel:
                     ),
                 }
         self._listen(session)
+        bind(self._orthographic, session, lambda s, on: s.showing(orthographic=on))
+        bind_button(views, session, lambda: session.look_from(views.value))
+        bind_button(reset, session, lambda: self._reset(session))
 
     def _listen(self, session: Session) -> None:
         bind(self._color, session, self._recolored)
         bind(self._count, session, lambda s, text: s.showing(level=_COUNTS[text]))
         bind(self._size, session, lambda s, size: s.showing(point_size=size))
+        bind(self._cut, session, lambda s, text: s.showing(cut=_CUT_NAMES[text]))
         for field, box in self._toggles.items():
             bind(box, session, lambda s, on, field=field: s.showing(**{field: on}))
         for field, widget in self._slice.items():
@@ -72,10 +88,17 @@ class ViewPanel:
         self._revision = session.revision
         self._color.value = names.get(look.color, names["rgb"])
         self._count.value, self._size.value = _count(look), look.point_size
+        self._cut.value = CUTS[look.cut]
+        self._orthographic.value = look.orthographic
         for field, box in self._toggles.items():
             box.value = getattr(look, field)
         for field, widget in self._slice.items():
             widget.value = getattr(look.slice, field)
+
+    def _reset(self, session: Session) -> None:
+        session.update(lambda s: s.showing(orthographic=False))
+        session.eye.project(orthographic=False)
+        session.look_from("oblique")
 
     def _recolored(self, state: StudioState, label: str) -> StudioState:
         names = color_names(state.design)

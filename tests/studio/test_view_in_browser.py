@@ -1,0 +1,201 @@
+"""What the scene shows, as pixels: the arm in sight from every side, views, lights, pictures."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+
+from softreach.arm import designs
+from softreach.palette import bundle_color
+from softreach.studio import Quality, Start, Studio, StudioState
+from softreach.studio.eye import FOV, VIEWS
+from tests.studio.tab import Tab
+
+BUNDLES = [bundle_color(k) for k in range(3)]
+BLUE = BUNDLES[2]
+
+
+def pixels(tab) -> np.ndarray:
+    """What the canvas shows, RGB from 0 to 1."""
+    from matplotlib.image import imread
+
+    tab.settle()
+    tab.page.wait_for_timeout(400)
+    canvas = tab.page.locator("canvas").first.bounding_box()
+    return imread(io.BytesIO(tab.page.screenshot(clip=canvas)))[..., :3]
+
+
+def show(tab, **look) -> None:
+    tab.session.update(lambda s: s.showing(**look))
+    tab.settle()
+
+
+def like(image: np.ndarray, color) -> int:
+    """Number of pixels of about this hue, however bright."""
+    size = np.linalg.norm(image, axis=-1)
+    cosine = image @ np.asarray(color) / np.maximum(size, 1e-9) / np.linalg.norm(color)
+    return int(((cosine > 0.985) & (size > 0.25)).sum())
+
+
+@pytest.fixture(autouse=True)
+def usual(tab):
+    """Every test starts from the first picture."""
+    state = StudioState(design=tab.session.state.design).showing(level=14)
+    tab.session.update(lambda _: state)
+    tab.session.look_from("oblique")
+    tab.settle()
+
+
+def test_the_arm_is_seen_through_the_cloud_from_the_first_picture_on(tab):
+    show(tab, point_size=0.02)
+    seen = like(pixels(tab), BLUE)
+    show(tab, cut="none")
+    hidden = like(pixels(tab), BLUE)
+    show(tab, cloud=False)
+    alone = like(pixels(tab), BLUE)
+    assert seen > 0.9 * alone
+    assert hidden < 0.5 * alone
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_no_point_is_drawn_before_the_arm_from_any_side(tab, view):
+    tab.session.update(lambda s: s.replace(activation=(-1.0, -0.2, -0.5)))
+    tab.session.look_from(view)
+    show(tab, point_size=0.02)
+    with_cloud = pixels(tab)
+    show(tab, cloud=False)
+    alone = pixels(tab)
+    seen, there = (sum(like(image, color) for color in BUNDLES) for image in (with_cloud, alone))
+    assert there > 50
+    assert seen > 0.9 * there
+
+
+def test_a_page_that_nobody_touches_sends_no_clouds(tab, monkeypatch):
+    pixels(tab)
+    sent = []
+    clouds = tab.session.scene.clouds
+    monkeypatch.setattr(clouds, "_send", lambda path, _: sent.append(path))
+    tab.page.wait_for_timeout(1500)
+    tab.session.look_again()
+    tab.settle()
+    assert sent == []
+
+
+def test_the_target_is_seen_through_the_cloud(tab):
+    target = np.array([0.0, 0.1, 0.5])
+    show(tab, arm=False, ghosts=False, point_size=0.02)
+    tab.session.aim(target)
+    tab.wait(lambda: tab.session.answer is not None, "the target is solved for")
+    image = pixels(tab)
+    right, down = tab.projected(target)
+    mark = image[round(down * len(image)), round(right * image.shape[1])]
+    assert mark[0] > 0.6  # orange, which the scale of colors has nowhere
+    assert mark[2] < 0.3 * mark[0]
+    assert mark[1] < 0.75 * mark[0]
+
+
+def test_parallels_stay_parallel_for_the_orthographic_camera(tab):
+    def widths():
+        """Of two lines along x, the far one behind the near one."""
+        ends = [[tab.projected(np.array([x, y, 0.0]))[0] for x in (-0.5, 0.5)] for y in (-0.6, 0.6)]
+        return [right - left for left, right in ends]
+
+    tab.session.look_from("front")
+    tab.settle()
+    near, far = widths()
+    assert near > 1.2 * far
+    tab.open("View")
+    tab.page.get_by_label("orthographic").check()
+    tab.wait(lambda: tab.session.client.camera.fov < FOV / 10, "the lens is long")
+    tab.settle()
+    near, far = widths()
+    assert near == pytest.approx(far, rel=0.02)
+    assert like(pixels(tab), BLUE) > 100  # neither cut off nor out of sight
+    tab.press("Reset the view")
+    tab.wait(lambda: tab.session.client.camera.fov == pytest.approx(FOV, rel=1e-3), "it is reset")
+    assert not tab.session.state.appearance.orthographic
+
+
+def test_buttons_look_from_the_front_the_side_and_the_top(tab):
+    tab.open("View")
+    for view, axis in (("front", 1), ("side", 0), ("top", 2)):
+        tab.press(view)
+        tab.wait(lambda axis=axis: along(tab, axis) > 0.99, f"the {view} is seen")
+        tab.settle()
+        names = {f"{'xyz'[k]} / L" for k in range(3) if k != axis}
+        tab.wait(lambda names=names: named_axes(tab) == names, f"{names} are named")
+
+
+def named_axes(tab) -> set[str]:
+    labels = [tab.drawn(f"/axes/label {k}") for k in range(60)]
+    texts = [label.text for label in labels if label is not None]
+    return {text for text in texts if text.endswith("/ L")}
+
+
+def along(tab, axis: int) -> float:
+    """Cosine between where the eye looks and an axis."""
+    camera = tab.session.eye.camera()
+    way = np.subtract(camera.look_at, camera.position)
+    return abs(way[axis]) / np.linalg.norm(way)
+
+
+def test_numbers_stand_outside_of_what_they_number_from_every_side(tab):
+    low, high = tab.session.scene.box
+    middle = (low + high) / 2
+    for toward in ((2, -4, 1.5), (-3, 3, 1), (3, 2, -2), (-4, -1, -2)):
+        tab.session.scene.turn_axes(middle + np.array(toward))
+        labels = [tab.drawn(f"/axes/label {k}") for k in range(60)]
+        places = np.array([label.position for label in labels if label is not None])
+        assert ((places < low) | (places > high)).any(axis=1).all()
+
+
+def test_a_dark_page_is_dark_behind_the_scene_and_around_it(tab):
+    assert np.median(pixels(tab)) > 0.9
+    tab.open("View")
+    tab.page.get_by_label("dark page").check()
+    tab.wait(lambda: np.median(pixels(tab)) < 0.2, "it gets dark")
+    tab.page.get_by_label("dark page").uncheck()
+    tab.wait(lambda: np.median(pixels(tab)) > 0.9, "it gets light")
+
+
+def test_a_saved_picture_has_key_numbers_and_design_under_the_scene(tab, tmp_path):
+    from matplotlib.image import imread
+
+    tab.settle()
+    camera = tab.session.client.camera
+    tab.open("Export")
+    image = imread(tab.save("Save picture (PNG)", tmp_path))[..., :3]
+    assert image.shape[1] == camera.image_width
+    below = image[camera.image_height :]
+    assert len(below) > 80
+    yellow = (0.99, 0.91, 0.14)  # the end of the scale of colors
+    assert like(below, yellow) > 20
+    assert (below.max(axis=-1) < 0.5).sum() > 500  # text
+    assert like(image[: camera.image_height], BLUE) > 100
+
+
+def test_the_window_is_called_softreach(tab):
+    assert tab.page.title() == "softreach"
+
+
+@pytest.mark.parametrize(("width", "height"), [(1366, 768), (390, 844)])
+def test_tabs_stand_in_one_line_and_the_arm_is_in_sight(browser, width, height):
+    quality = Quality(coarse_level=12, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.1)
+    start = Start(
+        state=StudioState(design=designs.minimal_trunk()).showing(level=14), quality=quality
+    )
+    with Studio(start) as studio:
+        tab = Tab(browser, studio, width=width, height=height)
+        names = [tab.page.get_by_role("tab", name=name) for name in ("Design", "View", "Export")]
+        tops = {round(name.bounding_box()["y"]) for name in names}
+        assert len(tops) == 1
+        assert tab.page.evaluate("document.documentElement.scrollWidth") <= width
+        sheet = names[0].bounding_box()["y"] if width < 500 else height
+        arm = np.array([[0, 0, z] for z in (0.0, 0.5, 1.0)])
+        canvas = tab.page.locator("canvas").first.bounding_box()
+        for right, down in map(tab.projected, arm):
+            assert 0 < right < 1
+            assert 0 < canvas["y"] + down * canvas["height"] < sheet
+        tab.close()

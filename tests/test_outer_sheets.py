@@ -1,0 +1,43 @@
+"""The boundary by the faces of the activation box: whole and sharp where a raster frays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import softreach as sr
+from softreach.workspace.face_image import face_image
+from tests.test_flux import Mapped, mirrored, twisted
+
+
+@pytest.fixture(scope="module")
+def folded():
+    """A set with rims thinner than a cell."""
+    found = sr.reachable_set(sr.designs.minimal_trunk(), accuracy=0.02)
+    assert found.route == "raster"
+    return found
+
+
+@pytest.mark.parametrize("of", [twisted, mirrored])
+def test_the_image_of_the_faces_is_closed_and_bounds_what_a_one_to_one_map_fills(of):
+    found = sr.reachable_set(Mapped(of), accuracy=0.02)
+    assert found.route == "flux"
+    surface = found.surface()
+    edges = np.concatenate([surface.faces[:, [k, (k + 1) % 3]] for k in range(3)])
+    assert len(np.unique(edges, axis=0)) == len(edges)  # each once in each direction
+    np.testing.assert_array_equal(np.unique(edges, axis=0), np.unique(edges[:, ::-1], axis=0))
+    assert surface.volume == pytest.approx(found.volume, rel=2e-4)
+
+
+def test_sheets_reach_the_outermost_tips_where_the_raster_ends_before_them(folded):
+    from scipy.spatial import ConvexHull
+
+    faces = face_image(folded.tip_map, 120)
+    outermost = faces.vertices[ConvexHull(faces.vertices).vertices]
+    cell = folded.image.lattice.cell
+    assert folded.surface().distance(outermost).max() > cell
+    assert folded.sheets().distance(outermost).max() < 0.05 * cell
+
+
+def test_sheets_look_outwards_and_bound_the_volume(folded):
+    assert folded.sheets().volume == pytest.approx(folded.volume, rel=0.02)
