@@ -9,11 +9,32 @@ from __future__ import annotations
 import html
 from typing import Self
 
-__all__ = ["Part", "Strong", "Swatch", "Term", "alert", "inline", "link", "paragraph", "spread"]
+__all__ = [
+    "Part",
+    "Strong",
+    "Swatch",
+    "Term",
+    "alert",
+    "fields_style",
+    "inline",
+    "link",
+    "paragraph",
+    "spread",
+]
 
 _LINE = "font-size:0.85em;line-height:1.45;padding:0 0.8em 0.4em;overflow-wrap:anywhere"
 _SMALL = "font-size:0.8em;padding:0 0.8em 0.5em;overflow-wrap:anywhere"
 _HELP = "cursor:help;text-decoration:underline dotted"
+# A field that is typed into stands where viser has its own beside a slider, which rounds.
+_FIELDS = """
+div:has(+ form) > * .mantine-Slider-root + .mantine-NumberInput-root,
+div:has(+ form) .mantine-Slider-root + .mantine-NumberInput-root
+  {visibility:hidden;width:4.6rem !important}
+div:has(.mantine-Slider-root) + form
+  {margin:-2.35em 0 0 auto;width:5.8rem;position:relative;z-index:4}
+div:has(.mantine-Slider-root) + form input {padding:0 0.3em;letter-spacing:-0.5px}
+div:has(.mantine-Slider-root) + form div:has(> * > label):not(:has(input)) {display:none}
+"""
 _ALERT = f"color:#c92a2a;{_SMALL};white-space:pre-line"
 
 
@@ -53,6 +74,11 @@ def inline(*parts: Part) -> str:
 def paragraph(*parts: Part) -> str:
     """A line of text as HTML; nothing without text."""
     return f'<div style="{_LINE}">{inline(*parts)}</div>' if parts else ""
+
+
+def fields_style() -> str:
+    """How a slider and the field for the same number share a row, as HTML."""
+    return f"<style>{_FIELDS}</style>"
 
 
 def alert(text: str) -> str:

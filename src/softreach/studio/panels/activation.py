@@ -11,6 +11,7 @@ from softreach.schema import activation_symbols
 from softreach.studio.panels.binding import bind, bind_button
 from softreach.studio.panels.line import Line
 from softreach.studio.panels.status import tip_text
+from softreach.studio.panels.typed import SliderField
 from softreach.studio.rod import rod_of
 from softreach.studio.state import StudioState
 
@@ -35,8 +36,8 @@ class ActivationPanel:
         with tab:
             self._tip = Line(gui)
             self._folder = gui.add_folder("activation")
-            self._trail = gui.add_checkbox("show trail", False)
-            rest = gui.add_button("Rest")
+            self._trail = gui.add_checkbox("show trail", False, hint="Draws where the tip has been")
+            rest = gui.add_button("Rest", hint="Sets every activation to 0, or the nearest to it")
         bind(self._trail, session, lambda s, on: s.showing(trail=on))
         bind_button(rest, session, lambda: session.update(lambda s: s.replace(activation=())))
 
@@ -67,7 +68,8 @@ class ActivationPanel:
     def _slider(self, name: str, low: float, high: float, value: float) -> Any:
         room = 1e-6 * max(1.0, abs(low))
         high = max(high, low + room)  # a slider needs room; the state keeps to the bounds
-        slider = self._gui.add_slider(name, low, high, _step(high - low), value)
+        about = f"{name}: activation of a bundle, from {low:g} to {high:g}; 0 is at rest"
+        slider = SliderField(self._gui, name, (low, high), _step(high - low), value, about)
         bind(slider, self._session, self._wanted)
         return slider
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.colors import FAINT, UNSTABLE, key_html
-from softreach.studio.markup import Part, Strong, Swatch, Term
+from softreach.studio.markup import Part, Strong, Swatch, Term, fields_style
 from softreach.studio.panels.binding import bind_button
 from softreach.studio.panels.line import Line
 
@@ -44,6 +44,7 @@ class StatusPanel:
 
     def __init__(self, gui: GuiApi, session: Session) -> None:
         """Add the widgets."""
+        Line(gui).show(fields_style())
         self._numbers = Line(gui, "computing ...")
         self._comparison = Line(gui)
         self._key = Line(gui)
