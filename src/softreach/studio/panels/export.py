@@ -34,6 +34,19 @@ _ABOUT_LINK = (
     "this address."
 )
 
+_ABOUT = {
+    "Save state": "Everything that this tab shows, to be loaded again (JSON)",
+    "Link to this state": "An address that opens a tab in this state",
+    "Save design (TOML)": "The design alone, which the command line reads too",
+    "Load": "A state (.json) or a design (.toml) that was saved",
+    "cloud": "File type of all samples: tips [m] and activations",
+    "Save cloud": "All samples of the cloud: tips [m] and activations",
+    "surface": "File type of the boundary of the reachable set",
+    "Save surface": "The exact boundary of the reachable set [m]",
+    "Save figure (PNG)": "Three views and an oblique one of the points that are shown",
+    "Save web page (HTML)": "The scene in one file, to be turned without a studio",
+}
+
 
 class ExportPanel:
     """Buttons that send a file to the browser, and one that takes a file back."""
@@ -46,10 +59,12 @@ class ExportPanel:
             self._button("Link to this state", self._link)
             self._address = Line(gui)
             self._button("Save design (TOML)", self._save_design)
-            load = gui.add_upload_button("Load state or design")
-            self._cloud = gui.add_dropdown("cloud format", CLOUD_FORMATS)
+            load = gui.add_upload_button("Load state or design", hint=_ABOUT["Load"])
+            self._cloud = gui.add_dropdown("cloud format", CLOUD_FORMATS, hint=_ABOUT["cloud"])
             self._button("Save cloud", self._save_cloud)
-            self._surface = gui.add_dropdown("surface format", SURFACE_FORMATS)
+            self._surface = gui.add_dropdown(
+                "surface format", SURFACE_FORMATS, hint=_ABOUT["surface"]
+            )
             self._button("Save surface", self._save_surface)
             self._button("Save figure (PNG)", self._save_figure)
             self._button("Save web page (HTML)", self._save_page)
@@ -88,7 +103,9 @@ class ExportPanel:
         return static_page(self._session.state_now(), self._reach(), picture).encode()
 
     def _button(self, label: str, action: Callable[[], None]) -> None:
-        bind_button(self._session.client.gui.add_button(label), self._session, action)
+        bind_button(
+            self._session.client.gui.add_button(label, hint=_ABOUT[label]), self._session, action
+        )
 
     def _restore(self, file: UploadedFile) -> None:
         session = self._session

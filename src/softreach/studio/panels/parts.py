@@ -30,6 +30,12 @@ Change = Callable[[Manipulator], Manipulator]
 
 _AS_TYPED = "(as typed)"
 _NEW_RING = "ring"
+_ABOUT_BUTTONS = {
+    "Take this design": "Replaces the whole design by this one",
+    "Add": "Adds this part, with numbers to be changed below",
+    "Rename": "Gives the part this name",
+    "Remove": "Takes the part out of the design",
+}
 _ABOUT_EDIT = "The part whose numbers are below"
 _ABOUT_MATERIAL = "Sets modulus E, Poisson ratio ν and density ρ to those of a known material"
 
@@ -178,7 +184,7 @@ class PartsPanel:
         )
 
     def _button(self, label: str, action: Callable[[], None]) -> Any:
-        button = self._gui.add_button(label)
+        button = self._gui.add_button(label, hint=_ABOUT_BUTTONS[label])
         button.on_click(lambda _: action())
         return button
 

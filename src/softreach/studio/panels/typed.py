@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,8 @@ __all__ = ["NumberField", "SliderField", "VectorField", "number_of", "number_tex
 
 _PRECISION = 12
 """Digits after the point that viser leaves of what a slider holds."""
+_LATE = 0.15
+"""The page may tell of Enter before it tells of the last keys, which it gathers [s]."""
 _UNAPPLIED = "Enter applies it."
 
 
@@ -99,6 +102,7 @@ class _TypedField:
             self._message.say(*((_UNAPPLIED,) if unapplied else ()))
 
     def _submitted(self, event: Any) -> None:
+        time.sleep(_LATE)
         value = self._read(self._text.value)
         if value is None:
             self._message.warn(f"{self._text.value!r}: must be {self._wanted}")
