@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "COLORMAP",
+    "UNSTABLE",
     "BundleKey",
     "Coloring",
     "ScalarKey",
@@ -35,7 +36,8 @@ Array = NDArray[np.float64]
 
 COLORMAP = "viridis"
 _MISSING = 204  # light gray
-_UNSTABLE = (255, 0, 200)  # magenta, which no other coloring has
+UNSTABLE = (255, 0, 200)
+"""Magenta, RGB from 0 to 255, of unstable equilibria: no scale of colors has it."""
 _LINE = 44  # characters above axes of a column's width
 _WIDE = 8.0  # ratio of the largest to the smallest value from which ratios are shown
 
@@ -67,6 +69,8 @@ class ScalarKey(NamedTuple):
     """Whether some samples are marked as unstable equilibria."""
     logarithmic: bool = False
     """Whether equal ratios, and not equal differences, are equal steps of color."""
+    clipped: bool = False
+    """Whether the ends stand for all values beyond them too."""
 
 
 class Coloring(NamedTuple):
@@ -83,8 +87,9 @@ def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike = "rgb") -> Co
         cloud: activation(sample, bundle), each in its unit.
         color: "rgb" for |γ| / max |γ| of all bundles, of each where their units differ; the name or
             index of one bundle; one number per sample, whose attributes `long_name` and `units` go
-            to the key if it is a DataArray, and of which the attribute `scale` is "log" if ratios
-            count; or RGB from 0 to 1 per sample.
+            to the key if it is a DataArray, of which the attribute `scale` is "log" if ratios count,
+            and `clipped` true if its extreme values stand for all beyond them; or RGB from 0 to 1
+            per sample.
 
     Unstable equilibria of arms under loads are magenta, whatever the color of the others.
 
@@ -99,7 +104,7 @@ def _marked(coloring: Coloring, cloud: xr.Dataset) -> Coloring:
     unstable = cloud["status"].values == 1 if "status" in cloud else np.zeros(0, bool)
     if not unstable.any():
         return coloring
-    rgb = np.where(unstable[:, None], np.array(_UNSTABLE, np.uint8), coloring.rgb)
+    rgb = np.where(unstable[:, None], np.array(UNSTABLE, np.uint8), coloring.rgb)
     key = None if coloring.key is None else coloring.key._replace(unstable=True)
     return Coloring(rgb, key)
 
@@ -150,7 +155,7 @@ def draw_key(ax: Axes, key: BundleKey | ScalarKey | None) -> None:
         fits = sum(len(name) + 6 for name in key.names) <= _LINE
         ax.legend(handles=_patches(key), **_ABOVE | {"ncols": 4 if fits else 2})
     elif key is not None:
-        bar = {"label": key.label, "fraction": 0.046, "pad": 0.03}
+        bar = {"label": key.label, "fraction": 0.046, "pad": 0.03, "extend": _extend(key)}
         ax.figure.colorbar(color_map(key), ax=ax, **bar)
         if key.unstable:
             ax.legend(handles=_marks(key), **_ABOVE)
@@ -169,7 +174,7 @@ def draw_figure_key(figure: Figure, key: BundleKey | ScalarKey | None, top: floa
         figure.legend(handles=_patches(key), **options)
     elif key is not None:
         bar = figure.add_axes((0.4, 1 - 0.5 * top, 0.4, 0.2 * top))
-        figure.colorbar(color_map(key), cax=bar, orientation="horizontal")
+        figure.colorbar(color_map(key), cax=bar, orientation="horizontal", extend=_extend(key))
         bar.set_ylabel(key.label, rotation=0, ha="right", va="center")
         if key.unstable:
             options = _ABOVE | {"loc": "center", "bbox_to_anchor": (0.88, 1 - 0.4 * top)}
@@ -199,10 +204,16 @@ def _given(color: ArrayLike, samples: int) -> Coloring:
     if values.shape == (samples,):
         if _spans_decades(values, color):
             return _logarithmic(values, _described(color))
-        return _scalar(values, _described(color))
+        coloring = _scalar(values, _described(color))
+        return _clipped(coloring) if getattr(color, "attrs", {}).get("clipped") else coloring
     if values.shape == (samples, 3):
         return Coloring(np.rint(255 * np.clip(values, 0, 1)).astype(np.uint8), None)
     raise InvalidInput("color.shape", values.shape, f"({samples},) or ({samples}, 3)")
+
+
+def _clipped(coloring: Coloring) -> Coloring:
+    assert isinstance(coloring.key, ScalarKey)
+    return coloring._replace(key=coloring.key._replace(clipped=True))
 
 
 def _described(color: ArrayLike) -> str:
@@ -242,6 +253,10 @@ def _scalar(values: NDArray[np.float64], label: str, low: float | None = None) -
     return Coloring(table[np.where(finite, index, 256)], ScalarKey(label, start, stop))
 
 
+def _extend(key: ScalarKey) -> str:
+    return "both" if key.clipped else "neither"
+
+
 def color_map(key: ScalarKey) -> Any:
     """What matplotlib draws a color bar of."""
     from matplotlib.cm import ScalarMappable
@@ -262,5 +277,5 @@ def _marks(key: BundleKey | ScalarKey) -> list[Any]:
     """What marks unstable samples, if there are any."""
     from matplotlib.patches import Patch
 
-    color = tuple(np.array(_UNSTABLE) / 255)
+    color = tuple(np.array(UNSTABLE) / 255)
     return [Patch(facecolor=color, label="unstable")] if key.unstable else []

@@ -100,6 +100,8 @@ class Studio:
             self.sessions[client.client_id] = session
         _furnish(session, self.url)
         session.begin()
+        if session.eye.is_upright and session.board is None:
+            session.look_from("oblique")
         if session.atlas is not None and session.board is None:
             session.say("There is no map: the atlas is no grid of two parameters or more.")
         attempt(session, lambda: self._follow_link(session))

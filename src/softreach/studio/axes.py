@@ -1,19 +1,38 @@
-"""A box around everything, with numbers along three of its edges."""
+"""A box around everything, with numbers along its outer edges as seen from where the eye is."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["AxesBox", "axes_box"]
+__all__ = ["AxesBox", "Edge", "Side", "axes_box", "round_box", "seen_from"]
 
 Array = NDArray[np.float64]
 
 _TICK = 0.02  # length of a tick, of the largest side
 _MOST = 8  # ticks along the longest edge
-_OUTWARD = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])  # of each edge's ticks
+_END_ON = 0.97  # cosine of the angle to an axis below which its numbers would hide each other
+_FLAT = 0.25  # of its length, that a tick along the floor has at least in the picture
+
+
+class Edge(NamedTuple):
+    """The edge that carries the numbers of an axis."""
+
+    high: tuple[bool, bool, bool]
+    """Whether it is at the high side, along x, y and z."""
+    outward: int
+    """The axis along which its ticks lead out of the box."""
+
+
+class Side(NamedTuple):
+    """From where a box is seen, as far as its drawing depends on it."""
+
+    visible: tuple[int, int, int]
+    """Which of the faces across x, y and z is seen from outside: 1 the high one, -1 the low one."""
+    edges: tuple[Edge | None, Edge | None, Edge | None]
+    """With the numbers of x, y and z; None of an axis that is seen end on."""
 
 
 class AxesBox(NamedTuple):
@@ -25,13 +44,61 @@ class AxesBox(NamedTuple):
     """Text and where it stands."""
 
 
-def axes_box(*points: Array) -> AxesBox:
-    """The box around points, shapes (n, 3), its sides at round numbers."""
-    low, high = _round_sides(np.concatenate(points))
-    step = _round_step(float((high - low).max()))
-    lines, labels = list(_edges(low, high)), []
+def seen_from(eye: ArrayLike, low: Array, high: Array) -> Side:
+    """The side of a box that an eye sees [L]."""
+    place = np.asarray(eye, float)
+    x, y, z = ((place > high).astype(int) - (place < low)).tolist()
+    toward = place - (low + high) / 2
+    toward /= max(float(np.linalg.norm(toward)), 1e-12)
+    picture = _picture(toward)
+    edges = [_outer_edge(axis, (x, y, z), toward, picture) for axis in range(3)]
+    return Side((x, y, z), (edges[0], edges[1], edges[2]))
+
+
+def _picture(toward: Array) -> Array:
+    """Right and up of an eye in a direction, shape (2, 3)."""
+    right = np.array([-toward[1], toward[0], 0.0])
+    right = right / np.linalg.norm(right) if right.any() else np.array([1.0, 0.0, 0.0])
+    return np.stack([right, np.cross(toward, right)])
+
+
+def _outer_edge(
+    axis: int, visible: tuple[int, int, int], toward: Array, picture: Array
+) -> Edge | None:
+    """Of the edges in the outline the lowest one, and of upright ones the leftmost.
+
+    An edge is in the outline if the eye sees one of its two faces.
+    """
+    if abs(toward[axis]) > _END_ON:
+        return None
+    b, c = (k for k in range(3) if k != axis)
+    sides = [(p, q) for p in (-1, 1) for q in (-1, 1) if (p == visible[b]) != (q == visible[c])]
+    aims = -picture[0] if axis == 2 else -picture[1]
+    p, q = max(sides or [(-1, -1)], key=lambda at: at[0] * aims[b] + at[1] * aims[c])
+    # Out of the box along the floor, unless that leads towards the eye.
+    reach = np.linalg.norm(picture, axis=0)
+    first = p * aims[b] > q * aims[c] if axis == 2 else reach[b] > _FLAT
+    high = [False, False, False]
+    high[b], high[c] = p > 0, q > 0
+    return Edge((high[0], high[1], high[2]), b if first else c)
+
+
+def axes_box(*points: Array, eye: ArrayLike = (50.0, -80.0, 30.0)) -> AxesBox:
+    """The box around points, shapes (n, 3), without the edges that would run across them.
+
+    Args:
+        points: What is in the box [L].
+        eye: From where it is seen [L].
+    """
+    low, high = round_box(*points)
+    side, step = seen_from(eye, low, high), _round_step(float((high - low).max()))
+    lines, labels = [*_edges(low, high, side)], []
     size = _TICK * float((high - low).max())
-    for axis, (corner, away) in enumerate(zip(_corners(low, high), size * _OUTWARD, strict=True)):
+    for axis, edge in enumerate(side.edges):
+        if edge is None:
+            continue
+        corner, away = np.where(edge.high, high, low), np.zeros(3)
+        away[edge.outward] = size if edge.high[edge.outward] else -size
         for value in _ticks(low[axis], high[axis], step):
             at = np.where(np.arange(3) == axis, value, corner)
             lines.append(np.stack([at, at + away]))
@@ -39,11 +106,6 @@ def axes_box(*points: Array) -> AxesBox:
         middle = np.where(np.arange(3) == axis, (low[axis] + high[axis]) / 2, corner)
         labels.append((f"{'xyz'[axis]} / L", middle + 7 * away))
     return AxesBox(np.array(lines), labels)
-
-
-def _corners(low: Array, high: Array) -> Array:
-    """Where the three edges with numbers meet the others: in front, seen from +x and -y."""
-    return np.array([low, [high[0], low[1], low[2]], low])
 
 
 def _ticks(low: float, high: float, step: float) -> Array:
@@ -55,8 +117,10 @@ def _number(value: float) -> str:
     return f"{value:.10g}".replace("-", "\N{MINUS SIGN}")
 
 
-def _round_sides(points: Array) -> tuple[Array, Array]:
-    low, high = points.min(axis=0), points.max(axis=0)
+def round_box(*points: Array) -> tuple[Array, Array]:
+    """Lowest and highest corner of a box around points, shapes (n, 3), at round numbers."""
+    every = np.concatenate(points)
+    low, high = every.min(axis=0), every.max(axis=0)
     unit = _round_step(float((high - low).max())) / 2
     low, high = np.floor(low / unit) * unit, np.ceil(high / unit) * unit
     return low, np.maximum(high, low + unit)
@@ -68,15 +132,16 @@ def _round_step(span: float) -> float:
     return float(next(f * power for f in (1, 2, 5, 10) if span / (f * power) <= _MOST))
 
 
-def _edges(low: Array, high: Array) -> Array:
-    """The twelve edges, shape (12, 2, 3)."""
-    corners = np.array([[low[0], high[0]], [low[1], high[1]], [low[2], high[2]]])
+def _edges(low: Array, high: Array, side: Side) -> list[Array]:
+    """The edges, shape (2, 3) each, but those between two faces that the eye sees."""
     edges = []
     for axis in range(3):
+        others = [k for k in range(3) if k != axis]
         for pick in np.ndindex(2, 2):
-            ends = np.empty((2, 3))
-            ends[:, axis] = corners[axis]
-            others = [k for k in range(3) if k != axis]
-            ends[:, others] = [corners[k][p] for k, p in zip(others, pick, strict=True)]
+            if all(2 * p - 1 == side.visible[k] for k, p in zip(others, pick, strict=True)):
+                continue
+            ends = np.stack([low, high])
+            for k, p in zip(others, pick, strict=True):
+                ends[:, k] = high[k] if p else low[k]
             edges.append(ends)
-    return np.array(edges)
+    return edges

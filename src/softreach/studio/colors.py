@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.plot.coloring import BundleKey, Coloring, ScalarKey, color_samples
+from softreach.plot.coloring import UNSTABLE, BundleKey, Coloring, ScalarKey, color_samples
 from softreach.redundancy import activation_distance
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import activation_symbols
@@ -17,6 +17,9 @@ from softreach.studio.reach import Reach, shown_rows, shown_samples
 from softreach.studio.rod import rod_of
 from softreach.studio.worker import all_cores
 from softreach.workspace import ReachableSolid
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = [
     "FAINT",
@@ -31,18 +34,18 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-UNSTABLE = (255, 125, 0)
-"""Orange, RGB from 0 to 255, of samples whose equilibrium is unstable."""
 FAINT = (196, 198, 206)
 """Gray, of the cloud without loads."""
 
+_CLIPPED = ("manipulability", "activation distance")
+_PERCENTILES = (1.0, 99.0)
 _RADIUS = 1 / 60  # [L], within which D̄ compares activations
 
 
 def color_names(arm: Manipulator) -> dict[str, str]:
     """What points can be colored by: name -> what the menu says."""
     box = rod_of(arm).box
-    names = {"rgb": "all activations (RGB)"}
+    names = {"effort": "effort: mean |γ| / max |γ|", "rgb": "all activations (RGB)"}
     labels = zip(activation_symbols(arm.bundle_units), box.names, strict=True)
     names |= {f"bundle {k}": f"|{symbol}| {name}" for k, (symbol, name) in enumerate(labels)}
     names["manipulability"] = "manipulability"
@@ -53,16 +56,19 @@ def color_names(arm: Manipulator) -> dict[str, str]:
 
 
 def sample_colors(reach: Reach, level: int, color: str) -> Coloring:
-    """Colors of the samples that are shown; an unknown name colors by all activations."""
+    """Colors of the samples that are shown; an unknown name colors by all activations.
+
+    The few smallest and largest values of a scale look like the next ones: they would leave the
+    others one color.
+    """
     cloud = reach.cloud[["tip", "activation"]].isel(sample=shown_samples(reach, level))
-    coloring = color_samples(cloud, sample_values(reach, level, color))
-    if isinstance(coloring.key, ScalarKey) and color in _VALUES:
-        return coloring._replace(key=coloring.key._replace(label=color_label(color)))
-    return coloring
+    return color_samples(cloud, sample_values(reach, level, color))
 
 
-def sample_values(reach: Reach, level: int, color: str) -> Literal["rgb"] | int | Array:
+def sample_values(reach: Reach, level: int, color: str) -> Literal["rgb"] | int | xr.DataArray:
     """What the samples that are shown are colored by, as the library's own figures take it."""
+    import xarray as xr
+
     if color.startswith("bundle ") and int(color[7:]) < reach.arm.bundles:
         return int(color[7:])
     if color not in _VALUES or color not in color_names(reach.arm):
@@ -70,7 +76,12 @@ def sample_values(reach: Reach, level: int, color: str) -> Literal["rgb"] | int 
     if color == "multiplicity" and not isinstance(reach.exact, ReachableSolid):
         return "rgb"  # what counts it is not there yet, or never
     with all_cores:
-        return _VALUES[color](reach, shown_rows(reach, level))
+        values = _VALUES[color](reach, shown_rows(reach, level))
+    clipped = color in _CLIPPED and np.isfinite(values).any()
+    if clipped:
+        values = np.clip(values, *np.nanpercentile(values, _PERCENTILES))
+    attrs = {"long_name": color_label(color), "clipped": clipped}
+    return xr.DataArray(values, dims="sample", attrs=attrs)
 
 
 def color_label(color: str) -> str:
@@ -98,12 +109,20 @@ def key_html(key: BundleKey | ScalarKey | None) -> str:
         return ""
     stops = ("#440154", "#3b528b", "#21918c", "#5ec962", "#fde725")  # viridis
     bar = f"background:linear-gradient(90deg,{','.join(stops)});height:0.6em;margin:0.2em 0"
-    ends = markup.spread(f"{key.low:.3g}", key.label, f"{key.high:.3g}")
+    below, above = ("≤ ", "≥ ") if key.clipped else ("", "")
+    ends = markup.spread(f"{below}{key.low:.3g}", key.label, f"{above}{key.high:.3g}")
     return _line(f'<div style="{bar}"></div>{ends}')
 
 
 def _line(content: str) -> str:
     return f'<div style="font-size:0.8em;padding:0 0.8em 0.4em">{content}</div>'
+
+
+def _effort(reach: Reach, rows: NDArray[np.int64]) -> Array:
+    """Mean over the bundles of |γ| over the largest that each can have [-]."""
+    largest = np.abs(rod_of(reach.arm).box.bounds).max(axis=1)
+    share = np.abs(reach.cloud.activation.values[rows]) / np.where(largest > 0, largest, 1.0)
+    return share[:, largest > 0].mean(axis=1)
 
 
 def _multiplicity(reach: Reach, rows: NDArray[np.int64]) -> Array:
@@ -128,12 +147,14 @@ def _activation_distance(reach: Reach, rows: NDArray[np.int64]) -> Array:
 
 
 _VALUES = {
+    "effort": _effort,
     "multiplicity": _multiplicity,
     "manipulability": _manipulability,
     "activation distance": _activation_distance,
 }
 
 _LABELS = {
+    "effort": "effort: mean |γ| / max |γ| [-]",
     "multiplicity": "multiplicity",
     "manipulability": "manipulability [L³]",
     "activation distance": "activation distance D̄ [-]",

@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from softreach.studio.head import headed_body
+
 if TYPE_CHECKING:
     from viser import ViserServer
 
@@ -46,7 +48,7 @@ def refuse_unless(server: ViserServer, welcome: Callable[[Any], bool]) -> None:
 
 @contextmanager
 def sending_headers(headers: Callable[[str], Mapping[str, str]]) -> Iterator[None]:
-    """A server that starts inside the block sends these headers with everything it serves.
+    """A server that starts inside the block sends these headers with everything, and our title.
 
     Args:
         headers: From the host that was asked for, as the request names it.
@@ -59,6 +61,11 @@ def sending_headers(headers: Callable[[str], Mapping[str, str]]) -> Iterator[Non
         del connection
         for name, value in headers(request.headers.get("Host", "")).items():
             response.headers[name] = value
+        if response.headers.get("Content-Type", "").startswith("text/html"):
+            zipped = response.headers.get("Content-Encoding") == "gzip"
+            response.body = headed_body(response.body, zipped=zipped)
+            del response.headers["Content-Length"]
+            response.headers["Content-Length"] = str(len(response.body))
 
     def serve(*arguments: Any, **options: Any) -> Any:
         return plain(*arguments, process_response=add, **options)

@@ -36,7 +36,7 @@ class Control(NamedTuple):
     @property
     def shown(self) -> float:
         """The value on the slider."""
-        return float(f"{self.value / self.scale:.10g}")
+        return float(f"{self.value / self.scale:.12g}")
 
     @property
     def limits(self) -> tuple[float, float]:

@@ -2,19 +2,80 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.errors import InvalidInput
 from softreach.studio.state import Camera, vector
 
 if TYPE_CHECKING:
     from viser import ClientHandle
 
-__all__ = ["Eye"]
+__all__ = ["FOV", "VIEWS", "Eye", "Lens", "framing", "lens"]
+
+Array = NDArray[np.float64]
+
+FOV = 0.6  # [rad]; viser's 75 degrees draw a ball at the rim as an egg
+VIEWS: dict[str, Array] = {
+    "oblique": np.array([2.1, -3.85, 1.17]),
+    "front": np.array([0.0, -1.0, 0.0]),
+    "side": np.array([1.0, 0.0, 0.0]),
+    "top": np.array([0.0, -1e-3, 1.0]),  # not quite: z is the way up
+}
+"""From where the views look at the middle."""
 
 _STEP_BACK = 1.4  # times the distance, for two clouds side by side
+_AWAY = 40.0  # times the distance from which parallels stay parallel, to 1 %
+_PATIENCE = 30.0  # [s] for a picture
+_UPRIGHT = 0.75  # aspect below which a window is that of a phone
+_ROOM = 1.12  # times what would just fill the picture
+
+
+class Lens:
+    """How a camera shows what is around the place it looks at."""
+
+    def __init__(self, *, orthographic: bool, distance: float) -> None:
+        """A lens for an eye at this distance [L], were it not orthographic.
+
+        An orthographic one is a very long lens from very far away: viser has no other.
+        """
+        self.stretch = _AWAY if orthographic else 1.0
+        """Times the distance at which the eye is with this lens."""
+        self.fov = 2.0 * float(np.arctan(np.tan(FOV / 2) / self.stretch))
+        """Vertical angle [rad]."""
+        far = self.stretch * distance
+        # Depths are whole numbers to the graphics card, and finest where near and far are close.
+        self.near, self.far = (far / 2, 2 * far) if orthographic else (0.01, 1000.0)
+
+
+def lens(camera: Camera, *, orthographic: bool) -> tuple[Lens, Camera]:
+    """The lens for a camera, and where it has to be moved to show the same."""
+    offset = np.subtract(camera.position, camera.look_at)
+    found = Lens(orthographic=orthographic, distance=float(np.linalg.norm(offset)))
+    position = np.asarray(camera.look_at) + found.stretch * offset
+    return found, Camera(position=vector(position), look_at=camera.look_at)
+
+
+def framing(low: Array, high: Array, direction: Array, aspect: float) -> Camera:
+    """A camera that sees a whole box [L] from a direction.
+
+    Args:
+        low: Its lowest corner.
+        high: Its highest.
+        direction: From the middle of the box to the eye.
+        aspect: Width of the picture over its height.
+    """
+    middle, radius = (low + high) / 2, _ROOM * float(np.linalg.norm(high - low)) / 2
+    half = np.arctan(np.tan(FOV / 2) * min(1.0, aspect))
+    distance = radius / np.sin(half)
+    toward = direction / np.linalg.norm(direction)
+    if aspect < _UPRIGHT:  # the sheet of a phone covers the lower half
+        up = np.cross(toward, (-toward[1], toward[0], 0.0))
+        middle = middle - 0.45 * distance * np.tan(FOV / 2) * up / np.linalg.norm(up)
+    return Camera(position=vector(middle + distance * toward), look_at=vector(middle))
 
 
 class Eye:
@@ -23,27 +84,83 @@ class Eye:
     def __init__(self, client: ClientHandle) -> None:
         """Follow the camera of a client."""
         self._client = client
+        self._orthographic = False
 
-    def camera(self) -> Camera:
-        """Where it is now."""
+    def on_move(self, moved: Callable[[], None]) -> None:
+        """Call this whenever the eye has moved."""
+        self._client.camera.on_update(lambda _: moved())
+
+    @property
+    def is_upright(self) -> bool:
+        """Whether the window is that of a phone."""
+        return self.aspect < _UPRIGHT
+
+    @property
+    def aspect(self) -> float:
+        """Width of the picture over its height."""
+        return self._client.camera.aspect
+
+    @property
+    def narrowness(self) -> float:
+        """How much smaller angles are than through the usual lens [-]."""
+        return float(np.tan(self._client.camera.fov / 2) / np.tan(FOV / 2))
+
+    def place(self) -> Camera:
+        """Where it really is; with an orthographic lens far away."""
         camera = self._client.camera
         return Camera(position=vector(camera.position), look_at=vector(camera.look_at))
 
-    def look_from(self, camera: Camera) -> None:
-        """Move it."""
-        with self._client.atomic():
-            self._client.camera.position = camera.position
-            self._client.camera.look_at = camera.look_at
+    def camera(self) -> Camera:
+        """Where it would be with the usual lens."""
+        place, narrowness = self.place(), self.narrowness
+        offset = narrowness * np.subtract(place.position, place.look_at)
+        return Camera(position=vector(place.look_at + offset), look_at=place.look_at)
 
-    def step_back(self, shift: NDArray[np.float64]) -> None:
+    def look_from(self, camera: Camera) -> None:
+        """Move it to where it sees what the usual lens would see from there."""
+        found, place = lens(camera, orthographic=self._orthographic)
+        with self._client.atomic():
+            shown = self._client.camera
+            shown.fov, shown.near, shown.far = found.fov, found.near, found.far
+            shown.position, shown.look_at = place.position, place.look_at
+
+    def project(self, *, orthographic: bool) -> None:
+        """Change the lens and go on looking at the same."""
+        if orthographic != self._orthographic:
+            camera, self._orthographic = self.camera(), orthographic
+            self.look_from(camera)
+
+    def focus(self) -> None:
+        """See to it that nothing in sight is cut off by the lens, after a zoom."""
+        if self._orthographic:
+            found, _ = lens(self.camera(), orthographic=True)
+            shown = self._client.camera
+            if not 0.7 < shown.far / found.far < 1.4:
+                shown.near, shown.far = found.near, found.far
+
+    def picture(self) -> NDArray[np.uint8]:
+        """What it sees now, RGBA on a transparent ground, shape (height, width, 4).
+
+        Raises:
+            InvalidInput: The tab does not answer: browsers stop drawing tabs in the background.
+        """
+        camera, client = self._client.camera, self._client
+        size = {"height": camera.image_height, "width": camera.image_width}
+        try:
+            return client.get_render(**size, transport_format="png", timeout=_PATIENCE)
+        except TimeoutError:
+            allowed = "in the foreground"
+            raise InvalidInput("tab", "not drawing", allowed, "bring it to the front") from None
+
+    def step_back(self, shift: Array) -> None:
         """Make room for a second cloud that stands `shift` [L] beside the first."""
         self._step(shift, _STEP_BACK)
 
-    def step_forth(self, shift: NDArray[np.float64]) -> None:
+    def step_forth(self, shift: Array) -> None:
         """The inverse of `step_back`."""
         self._step(-shift, 1 / _STEP_BACK)
 
-    def _step(self, shift: NDArray[np.float64], stretch: float) -> None:
+    def _step(self, shift: Array, stretch: float) -> None:
         now = self.camera()
         look_at = np.asarray(now.look_at) + shift / 2
         position = (np.asarray(now.position) - now.look_at) * stretch + look_at

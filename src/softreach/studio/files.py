@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from softreach.errors import InvalidInput
 from softreach.export import export_cloud, export_mesh
 from softreach.rod.kinematics import configuration
-from softreach.studio.colors import color_label, sample_values
+from softreach.studio.colors import sample_values
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.rod import design_of_text
 from softreach.studio.slicing import in_slice
@@ -85,15 +85,12 @@ def figure_file(reach: Reach, state: StudioState) -> bytes:
 
 def _shown(reach: Reach, look: Appearance) -> tuple[xr.Dataset, str | int | xr.DataArray]:
     """The samples within the slice, and what they are colored by, with its name."""
-    import xarray as xr
-
-    cloud = reach.cloud[["tip", "activation"]].isel(sample=shown_samples(reach, look.level))
+    known = [name for name in ("tip", "activation", "status") if name in reach.cloud]
+    cloud = reach.cloud[known].isel(sample=shown_samples(reach, look.level))
     color = sample_values(reach, look.level, look.color)
     kept = in_slice(cloud_points(reach, look.level), look.slice)
-    if isinstance(color, np.ndarray):
-        color = xr.DataArray(
-            color[kept], dims="sample", attrs={"long_name": color_label(look.color)}
-        )
+    if not isinstance(color, str | int):
+        color = color.isel(sample=kept)
     return cloud.isel(sample=kept), color
 
 

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import base64
 import io
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.studio import markup
 from softreach.studio.colors import key_html
+from softreach.studio.eye import lens
+from softreach.studio.head import headed
 from softreach.studio.panels.status import legend_text, reach_text
 from softreach.studio.reach import Reach
 from softreach.studio.scene import Scene
 from softreach.studio.server import start_server, stop_server
-from softreach.studio.state import StudioState
+from softreach.studio.state import Camera, StudioState
+
+if TYPE_CHECKING:
+    from viser import ViserServer
 
 __all__ = ["static_page"]
 
@@ -38,14 +44,20 @@ def static_page(state: StudioState, reach: Reach, picture: NDArray[np.uint8] | N
     server = start_server()
     try:
         if state.camera is not None:
-            server.initial_camera.position = state.camera.position
-            server.initial_camera.look_at = state.camera.look_at
+            _place(server, state.camera, orthographic=state.appearance.orthographic)
         key = _draw(Scene(server.scene), state, reach)
-        page = server.scene.as_html()
+        page = headed(server.scene.as_html(dark_mode=state.appearance.dark))
     finally:
         stop_server(server)
     end = page.rindex("</body>")
     return page[:end] + _caption(state, reach, key + _image(picture)) + page[end:]
+
+
+def _place(server: ViserServer, camera: Camera, *, orthographic: bool) -> None:
+    found, place = lens(camera, orthographic=orthographic)
+    first = server.initial_camera
+    first.position, first.look_at = place.position, place.look_at
+    first.fov, first.near, first.far = found.fov, found.near, found.far
 
 
 def _draw(scene: Scene, state: StudioState, reach: Reach) -> str:

@@ -13,10 +13,12 @@ from softreach.arm.skin import inside
 from softreach.arm_shape import arm_surface, bundle_skins
 from softreach.palette import BODY, bundle_color
 from softreach.rod.kinematics import configuration
-from softreach.studio.axes import axes_box
+from softreach.studio.axes import AxesBox, axes_box, round_box, seen_from
+from softreach.studio.clouds import Clouds, Dots
 from softreach.studio.colors import FAINT, UNSTABLE, sample_colors
 from softreach.studio.reach import Reach, cloud_points, unstable_samples
 from softreach.studio.rod import solvable_rod
+from softreach.studio.shading import lit
 from softreach.studio.slicing import in_slice, sliced_faces
 from softreach.studio.state import Appearance, Slice
 from softreach.workspace import ReachableSolid, ReachableSurface
@@ -35,7 +37,7 @@ _STATIONS, _SIDES, _ACROSS = 51, 24, np.pi / 12
 _LIFT = 0.02  # of the fibers above the body, in R2
 _CLEAR = 0.45  # opacity of a body that has something inside
 _GHOST, _REFERENCE, _SURFACE, _HULL = 0.35, (150, 150, 158), (90, 140, 200), (220, 150, 60)
-_MARK: Color = (220, 30, 120)
+_MARK: Color = (235, 90, 0)
 _FREE_LEVEL, _FREE_SIZE = 15, 0.6
 _UNSTABLE_SIZE = 2.0  # times that of other points: they are few, and not to be overlooked
 
@@ -46,6 +48,12 @@ class Scene:
     def __init__(self, api: SceneApi) -> None:
         """Draw into the scene of a client, or of a server for a page that is saved."""
         self._api = api
+        self.clouds = Clouds(api)
+        self.box = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
+        """Lowest and highest corner around everything [L]."""
+        self._eye: Array = np.array([50.0, -80.0, 30.0])
+        self.spine: tuple[Array, Array] = np.empty((0, 3)), np.empty(0)
+        """Centers and radii along the arm [L], as it is drawn."""
         self._arms: dict[str, tuple[Manipulator, list[Any]]] = {}
 
     def draw_cloud(self, reach: Reach, look: Appearance) -> BundleKey | ScalarKey | None:
@@ -57,7 +65,8 @@ class Scene:
         coloring = sample_colors(reach, look.level, look.color)
         kept, unstable = in_slice(points, look.slice), unstable_samples(reach, look.level)
         stable = kept & ~unstable
-        self._points("/cloud", points[stable], coloring.rgb[stable], look.point_size)
+        colors = lit(coloring.rgb, points) if look.lit else coloring.rgb
+        self._points("/cloud", points[stable], colors[stable], look.point_size)
         self._draw_unstable(points[kept & unstable], look.point_size)
         self._slab(look.slice, points)
         return coloring.key
@@ -85,6 +94,8 @@ class Scene:
         if np.isnan(shape["position"].values).any():
             self.remove(path)
             return np.full(3, np.nan)
+        if path == "/arm":
+            self.spine = _spine(arm, shape)
         meshes = _arm_meshes(arm, shape)
         known, handles = self._arms.get(path, (None, []))
         if known is arm:
@@ -120,12 +131,27 @@ class Scene:
 
     def draw_axes(self, reach: Reach, look: Appearance, free: Reach | None = None) -> None:
         """The box with numbers around cloud and arm, and the cloud without loads."""
-        self.remove("/axes")
-        if not look.axes:
-            return
         clouds = [reach] if free is None or not look.free else [reach, free]
         around = (cloud_points(one, 14) for one in clouds)
-        box = axes_box(*around, np.array([[0, 0, 0], [0, 0, 1.0]]))
+        self.box = round_box(*around, np.array([[0, 0, 0], [0, 0, 1.0]]))
+        self.remove("/axes")
+        if look.axes:
+            self._draw_box(axes_box(*self._corners, eye=self._eye))
+
+    def turn_axes(self, eye: Array) -> None:
+        """Number the edges that are the outer ones from where the eye is [L]."""
+        before, self._eye = self._eye, eye
+        if seen_from(eye, *self.box) == seen_from(before, *self.box):
+            return
+        if self._api.get_handle_by_name("/axes/lines") is not None:
+            self.remove("/axes")
+            self._draw_box(axes_box(*self._corners, eye=eye))
+
+    @property
+    def _corners(self) -> tuple[Array, Array]:
+        return self.box[0][None], self.box[1][None]
+
+    def _draw_box(self, box: AxesBox) -> None:
         self._api.add_line_segments(
             "/axes/lines", box.lines.astype(np.float32), (170, 170, 175), thickness=0.003
         )
@@ -196,6 +222,7 @@ class Scene:
             for known in list(self._arms):  # a copy: workers draw at the same time
                 if known == path or known.startswith(f"{path}/"):
                     self._arms.pop(known, None)
+            self.clouds.forget(path)
             if self._api.get_handle_by_name(path) is not None:
                 self._api.remove_by_name(path)
 
@@ -210,16 +237,7 @@ class Scene:
         if not len(points):
             self.remove(path)
             return
-        # viser's default is float16: a quarter of a millimeter in a meter
-        self._api.add_point_cloud(
-            path,
-            points.astype(np.float32),
-            colors,
-            point_size=size,
-            precision="float32",
-            point_shape=shape,
-            point_shading="flat",
-        )
+        self.clouds.draw(path, Dots(points=points, colors=colors, size=size, shape=shape))
 
     def _mesh(
         self, path: str, vertices: Array, faces: Any, color: Color, opacity: float | None = None
@@ -260,6 +278,11 @@ class Scene:
             corners[list(side), other] = high[other]
         faces = np.array([[0, 1, 2], [0, 2, 3]])
         self._mesh("/slice", corners, faces, (200, 200, 205), opacity=0.25)
+
+
+def _spine(arm: Manipulator, shape: Any) -> tuple[Array, Array]:
+    """Balls that fill the arm [L]."""
+    return shape["position"].values / arm.length, shape["radius"].values / arm.length
 
 
 def _arm_meshes(arm: Manipulator, shape: Any) -> list[tuple[Array, NDArray[Any], Color]]:

@@ -12,14 +12,22 @@ from urllib.parse import urlsplit
 
 from softreach.errors import InvalidInput, MissingExtra
 from softreach.studio.connections import refuse_unless, sending_headers
+from softreach.studio.eye import FOV
 
 if TYPE_CHECKING:
-    from viser import ViserServer
+    from viser import GuiApi, ViserServer
 
-__all__ = ["LOOPBACK", "page_headers", "page_url", "same_origin", "start_server", "stop_server"]
+__all__ = [
+    "LOOPBACK",
+    "page_headers",
+    "page_url",
+    "same_origin",
+    "start_server",
+    "stop_server",
+    "theme",
+]
 
 LOOPBACK = "127.0.0.1"
-_FOV = 0.6  # [rad]; viser's 75 degrees draw a ball at the rim as an egg
 _LOCAL_NAMES = {"localhost", "127.0.0.1", "::1"}
 
 
@@ -49,10 +57,17 @@ def start_server(host: str = LOOPBACK, port: int | None = None) -> ViserServer:
     server.scene.configure_environment_map(None)
     server.scene.configure_default_lights(cast_shadow=False)
     server.scene.add_light_ambient("/light", intensity=1.6)
-    server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
+    theme(server.gui, dark=False)
     server.gui.main_panel.dock_right()
-    server.initial_camera.fov = _FOV
+    server.initial_camera.fov = FOV
     return server
+
+
+def theme(gui: GuiApi, *, dark: bool) -> None:
+    """How the page looks around the scene."""
+    gui.configure_theme(
+        control_width="large", show_logo=False, show_share_button=False, dark_mode=dark
+    )
 
 
 def stop_server(server: ViserServer) -> None:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from softreach.errors import SoftreachError
 from softreach.rod.tip_map import TipStatus
-from softreach.studio.eye import Eye
-from softreach.studio.jobs import JOBS, Job, SolveInverse, what_follows
+from softreach.studio.eye import VIEWS, Eye, framing
+from softreach.studio.jobs import JOBS, FollowEye, Job, SolveInverse, what_follows
 from softreach.studio.map_board import MapBoard, board_of
 from softreach.studio.reach import Reach
 from softreach.studio.scene import Scene
@@ -86,6 +86,7 @@ class Session:
         self._changing, self._showing = threading.RLock(), threading.RLock()
         self._jobs = {kind: kind(self) for kind in JOBS}
         self._workers = {kind: Latest(self.fail, self._rested) for kind in JOBS}
+        self.eye.on_move(self.look_again)
 
     def begin(self) -> None:
         """Do everything once."""
@@ -132,6 +133,10 @@ class Session:
         self.update(lambda _: state)
         if state.camera is not None:
             self.eye.look_from(state.camera)
+
+    def look_from(self, view: str) -> None:
+        """See everything from one of `eye.VIEWS`."""
+        self.eye.look_from(framing(*self.scene.box, VIEWS[view], self.eye.aspect))
 
     def state_now(self) -> StudioState:
         """The state with the camera, as it is saved."""
@@ -185,6 +190,10 @@ class Session:
         """Do these jobs as soon as they are free, for the state there is by then."""
         for kind in kinds:
             self._workers[kind].submit(self._jobs[kind].run)
+
+    def look_again(self) -> None:
+        """See to it that nothing hides the arm: it has moved, or the eye."""
+        self.follow(FollowEye)
 
     def settle(self, timeout: float = 60.0) -> bool:
         """Wait until all that was asked for is done; return whether it is."""

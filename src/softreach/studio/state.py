@@ -13,6 +13,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput, Range
 from softreach.rod.activation_box import ActivationBox
 from softreach.studio.rod import design_of_text, rod_of
+from softreach.studio.sight import CUTS
 
 __all__ = [
     "LEVELS",
@@ -72,11 +73,19 @@ class Appearance:
     """What is drawn and how."""
 
     level: int = 17
-    color: str = "rgb"
+    color: str = "effort"
     """One of `colors.color_names`."""
-    point_size: float = 0.003
+    point_size: float = 0.007
     """[L]."""
     slice: Slice = field(default_factory=Slice)
+    cut: str = "window"
+    """What of the cloud is cut away in front of the arm: one of `sight.CUTS`."""
+    lit: bool = True
+    """Whether a lamp shines on the points."""
+    orthographic: bool = False
+    """Whether parallels stay parallel."""
+    dark: bool = False
+    """Whether the page is dark."""
     cloud: bool = True
     arm: bool = True
     axes: bool = True
@@ -94,6 +103,8 @@ class Appearance:
     def __post_init__(self) -> None:
         if self.level not in LEVELS:
             raise InvalidInput("level", self.level, f"{LEVELS[0]} to {LEVELS[-1]}")
+        if self.cut not in CUTS:
+            raise InvalidInput("cut", self.cut, f"one of {', '.join(CUTS)}")
         _check_number("point_size", self.point_size, 0.0, 1.0)
         _check_plain("appearance", self)
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from softreach.studio.jobs.arm import DrawArm
+from softreach.studio.jobs.eye import FollowEye
 from softreach.studio.jobs.free import DrawFree
 from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.jobs.job import Job
 from softreach.studio.jobs.map import DrawMap
 from softreach.studio.jobs.reach import ComputeReach, DrawCloud, DrawSurfaces
 from softreach.studio.jobs.reference import DrawReference
+from softreach.studio.jobs.theme import SetTheme
 from softreach.studio.state import StudioState
 
 __all__ = [
@@ -20,7 +22,9 @@ __all__ = [
     "DrawMap",
     "DrawReference",
     "DrawSurfaces",
+    "FollowEye",
     "Job",
+    "SetTheme",
     "SolveInverse",
     "what_follows",
 ]
@@ -34,6 +38,8 @@ JOBS: tuple[type[Job], ...] = (
     SolveInverse,
     DrawReference,
     DrawMap,
+    FollowEye,
+    SetTheme,
 )
 
 

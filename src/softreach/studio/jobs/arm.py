@@ -38,6 +38,7 @@ class DrawArm(Job):
             self._draw(state)
         self._draw_trail()
         draw_reference_arm(session)
+        session.look_again()
         session.show()
 
     def _draw(self, state: StudioState) -> None:

@@ -57,7 +57,7 @@ class DrawCloud(Job):
     def depends_on(state: StudioState) -> object:
         """How points look and which of them are shown."""
         look = state.appearance
-        return look.level, look.color, look.point_size, look.slice, look.cloud, look.axes
+        return look.level, look.color, look.point_size, look.slice, look.cloud, look.axes, look.lit
 
     def run(self, check: StaleCheck) -> None:
         """Draw what is known; ask for more where it is not enough."""

@@ -19,6 +19,7 @@ from softreach.studio.link import state_link
 from softreach.studio.page import static_page
 from softreach.studio.panels.binding import attempt, bind_button
 from softreach.studio.panels.line import Line
+from softreach.studio.picture import picture_file
 
 if TYPE_CHECKING:
     from viser import GuiApi, UploadedFile
@@ -67,6 +68,7 @@ class ExportPanel:
             )
             self._button("Save surface", self._save_surface)
             self._button("Save figure (PNG)", self._save_figure)
+            self._button("Save picture (PNG)", self._save_picture)
             self._button("Save web page (HTML)", self._save_page)
         load.on_upload(lambda _: attempt(session, lambda: self._restore(load.value)))
 
@@ -93,6 +95,12 @@ class ExportPanel:
 
     def _save_figure(self) -> None:
         self._write("reachability.png", lambda: figure_file(self._reach(), self._session.state))
+
+    def _save_picture(self) -> None:
+        session, reach = self._session, self._reach()
+        self._send(
+            "studio.png", picture_file(session.eye.picture(), session.state, reach, session.key)
+        )
 
     def _save_page(self) -> None:
         self._write("reachability.html", self._page)

@@ -83,8 +83,9 @@ class InversePanel:
         if reach is None or not look.cloud or reach.arm != session.state.design:
             return False
         points = cloud_points(reach, look.level)
-        kept = np.flatnonzero(in_slice(points, look.slice))
-        found = picked_point(points[kept], origin, direction)
+        seen = in_slice(points, look.slice) & ~session.scene.clouds.hidden(points)
+        kept = np.flatnonzero(seen)
+        found = picked_point(points[kept], origin, direction, 0.01 * session.eye.narrowness)
         if found is None:
             return False
         activations = reach.cloud.activation.values[shown_samples(reach, look.level)]

@@ -1,4 +1,4 @@
-"""Fields for numbers that are kept as they are typed; Enter applies them.
+"""Fields for numbers that are kept as they are typed; Enter applies them, and leaving the field.
 
 viser's own number fields drop the sign of "-0.5" and the exponent of "1e-5" while one types, and
 round to the step of a slider. Texts are sent as they are, and a form tells when Enter is pressed.
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import threading
-import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -21,8 +20,6 @@ __all__ = ["NumberField", "SliderField", "VectorField", "number_of", "number_tex
 
 _PRECISION = 12
 """Digits after the point that viser leaves of what a slider holds."""
-_LATE = 0.15
-"""The page may tell of Enter before it tells of the last keys, which it gathers [s]."""
 _UNAPPLIED = "Enter applies it."
 
 
@@ -37,7 +34,7 @@ def number_of(text: str) -> float | None:
 
 def number_text(value: float) -> str:
     """A number as a person would type it."""
-    return f"{value:.10g}"
+    return f"{value:.12g}"
 
 
 def _vector_of(text: str) -> tuple[float, ...] | None:
@@ -102,7 +99,6 @@ class _TypedField:
             self._message.say(*((_UNAPPLIED,) if unapplied else ()))
 
     def _submitted(self, event: Any) -> None:
-        time.sleep(_LATE)
         value = self._read(self._text.value)
         if value is None:
             self._message.warn(f"{self._text.value!r}: must be {self._wanted}")

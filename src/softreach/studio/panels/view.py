@@ -6,8 +6,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from softreach.studio.colors import color_names
-from softreach.studio.panels.binding import bind
+from softreach.studio.eye import VIEWS
+from softreach.studio.panels.binding import bind, bind_button
 from softreach.studio.panels.typed import SliderField
+from softreach.studio.sight import CUTS
 from softreach.studio.state import LEVELS, Appearance, StudioState
 
 if TYPE_CHECKING:
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["ViewPanel"]
 
 _COUNTS = {f"{1 << level:,}": level for level in LEVELS}
+_CUT_NAMES = {text: name for name, text in CUTS.items()}
 _ACROSS: tuple[str, ...] = ("none", "x", "y", "z")
 _TOGGLES = {
     "cloud": "cloud",
@@ -25,6 +28,8 @@ _TOGGLES = {
     "surface": "exact surface",
     "alpha_shape": "α-shape (0.05 L)",
     "axes": "axes",
+    "lit": "lit points",
+    "dark": "dark page",
 }
 
 _ABOUT = {
@@ -36,6 +41,12 @@ _ABOUT = {
     "surface": "Boundary of all that the tip reaches, from the map itself",
     "alpha_shape": "The surface of a cloud by balls of radius α = 0.05 L, to compare with",
     "axes": "x, y and z [L] from the base",
+    "lit": "Points are shaded as spheres in a light",
+    "dark": "Light on dark",
+    "cut": "What of the cloud is taken away, so that arm and target are seen",
+    "views": "Along an axis of the base, or between them",
+    "orthographic": "Without perspective: what is parallel stays parallel",
+    "reset": "The view of the first picture",
     "axis": "Hides all but a slab across this axis",
     "center": "Middle of the slab along the axis [L]",
     "thickness": "Of the slab [L]",
@@ -57,11 +68,20 @@ class ViewPanel:
             self._size = SliderField(
                 gui, "point size / L", (5e-4, 0.02), 5e-4, look.point_size, _ABOUT["size"]
             )
+            self._cut = gui.add_dropdown(
+                "cut away", tuple(CUTS.values()), initial_value=CUTS[look.cut], hint=_ABOUT["cut"]
+            )
             with gui.add_folder("show"):
                 self._toggles = {
                     field: gui.add_checkbox(label, getattr(look, field), hint=_ABOUT[field])
                     for field, label in _TOGGLES.items()
                 }
+            with gui.add_folder("camera"):
+                views = gui.add_button_group("look from", tuple(VIEWS), hint=_ABOUT["views"])
+                self._orthographic = gui.add_checkbox(
+                    "orthographic", look.orthographic, hint=_ABOUT["orthographic"]
+                )
+                reset = gui.add_button("Reset the view", hint=_ABOUT["reset"])
             with gui.add_folder("slice"):
                 self._slice = {
                     "axis": gui.add_dropdown(
@@ -80,11 +100,15 @@ class ViewPanel:
                     ),
                 }
         self._listen(session)
+        bind(self._orthographic, session, lambda s, on: s.showing(orthographic=on))
+        bind_button(views, session, lambda: session.look_from(views.value))
+        bind_button(reset, session, lambda: self._reset(session))
 
     def _listen(self, session: Session) -> None:
         bind(self._color, session, self._recolored)
         bind(self._count, session, lambda s, text: s.showing(level=_COUNTS[text]))
         bind(self._size, session, lambda s, size: s.showing(point_size=size))
+        bind(self._cut, session, lambda s, text: s.showing(cut=_CUT_NAMES[text]))
         for field, box in self._toggles.items():
             bind(box, session, lambda s, on, field=field: s.showing(**{field: on}))
         for field, widget in self._slice.items():
@@ -100,10 +124,17 @@ class ViewPanel:
         self._revision = session.revision
         self._color.value = names.get(look.color, names["rgb"])
         self._count.value, self._size.value = _count(look), look.point_size
+        self._cut.value = CUTS[look.cut]
+        self._orthographic.value = look.orthographic
         for field, box in self._toggles.items():
             box.value = getattr(look, field)
         for field, widget in self._slice.items():
             widget.value = getattr(look.slice, field)
+
+    def _reset(self, session: Session) -> None:
+        session.update(lambda s: s.showing(orthographic=False))
+        session.eye.project(orthographic=False)
+        session.look_from("oblique")
 
     def _recolored(self, state: StudioState, label: str) -> StudioState:
         names = color_names(state.design)
