@@ -44,6 +44,7 @@ _ABOUT = {
     "Save cloud": "All samples of the cloud: tips [m] and activations",
     "surface": "File type of the boundary of the reachable set",
     "Save surface": "The exact boundary of the reachable set [m]",
+    "Save picture (PNG)": "The scene as it is seen, with legend, scale and design",
     "Save figure (PNG)": "Three views and an oblique one of the points that are shown",
     "Save web page (HTML)": "The scene in one file, to be turned without a studio",
 }
@@ -112,7 +113,7 @@ class ExportPanel:
 
     def _button(self, label: str, action: Callable[[], None]) -> None:
         bind_button(
-            self._session.client.gui.add_button(label, hint=_ABOUT[label]), self._session, action
+            self._session.client.gui.add_button(label, hint=_ABOUT.get(label)), self._session, action
         )
 
     def _restore(self, file: UploadedFile) -> None:
