@@ -113,7 +113,9 @@ class ExportPanel:
 
     def _button(self, label: str, action: Callable[[], None]) -> None:
         bind_button(
-            self._session.client.gui.add_button(label, hint=_ABOUT.get(label)), self._session, action
+            self._session.client.gui.add_button(label, hint=_ABOUT.get(label)),
+            self._session,
+            action,
         )
 
     def _restore(self, file: UploadedFile) -> None:
