@@ -101,3 +101,34 @@ def test_what_is_shown_of_the_design_before_is_marked(tab, monkeypatch):
     go.set()
     tab.settle()
     tab.page.get_by_text("of the design before").first.wait_for(state="hidden")
+
+
+def test_an_idle_page_uses_no_processor_of_the_server(tab):
+    tab.page.wait_for_timeout(500)
+    before = time.process_time()
+    time.sleep(3)
+    assert time.process_time() - before < 0.15  # [s], 5 % of one core
+
+
+def test_hundreds_of_bundles_show_a_cloud_and_say_what_is_left_out(tab):
+    changes = {"longitudinal.bundles": 120, "extent": 0.02}
+    tab.session.update(lambda s: s.replace(design=changed(designs.minimal_trunk(), changes)))
+    tab.wait(lambda: tab.session.reach.arm == tab.session.state.design, "a cloud is there")
+    tab.open("Activation")
+    tab.page.get_by_text("82 more bundles have no slider here; no bundle is drawn").wait_for()
+    tab.session.cancel()
+    tab.settle()
+
+
+def test_an_upload_of_50_mb_is_refused_in_one_line(tab, tmp_path):
+    path = tmp_path / "state.json"
+    path.write_bytes(b" " * 50_000_000)
+    tab.open("Export")
+    tab.load(path)
+    tab.page.get_by_text("state.json = 50 MB: must be at most 2 MB").wait_for()
+
+
+def test_an_export_says_that_it_works_and_what_it_wrote(tab, tmp_path):
+    tab.open("Export")
+    tab.save("Save cloud", tmp_path)
+    tab.page.get_by_text("cloud.parquet is written").wait_for()

@@ -120,8 +120,10 @@ class _Work(NamedTuple):
         budget = self._budget(f"computing the exact set to {100 * accuracy:g} %")
         try:
             exact = _exact(reach.arm, accuracy, self.quality.tol, budget)
-        except InvalidInput as error:  # some activation never comes to rest
-            return replace(reach, exact=None, refusal=str(error))
+        except InvalidInput as error:
+            if error.name == "memory":  # so many bundles that no search fits
+                return _without(reach, accuracy, MemoryError())
+            return replace(reach, exact=None, refusal=str(error))  # never at rest
         except (OverBudget, MemoryError) as error:
             return _without(reach, accuracy, error)
         return replace(reach, exact=exact, refusal="")

@@ -99,9 +99,8 @@ class ExportPanel:
 
     def _save_picture(self) -> None:
         session, reach = self._session, self._reach()
-        self._send(
-            "studio.png", picture_file(session.eye.picture(), session.state, reach, session.key)
-        )
+        picture, state = session.eye.picture(), session.state
+        self._write("studio.png", lambda: picture_file(picture, state, reach, session.key))
 
     def _save_page(self) -> None:
         self._write("reachability.html", self._page)
