@@ -11,7 +11,7 @@ from softreach.studio import budget, stages
 from softreach.studio.budget import Budget, OverBudget
 from softreach.studio.effort import level_in_memory
 from softreach.studio.reach import Quality
-from softreach.studio.worker import Dropped
+from softreach.studio.worker import Dropped, all_cores
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
 
@@ -94,3 +94,9 @@ def test_five_bundles_show_a_cloud_before_their_set_within_the_memory_they_are_g
     assert first.exact is None
     assert coarse.volume == pytest.approx(fine.volume, rel=0.1)
     assert set(given) == {0.2 * 2e9}
+
+
+def test_no_stage_keeps_the_turn_while_its_reach_is_drawn(trunk):
+    for arm in (trunk, changed(trunk, {"longitudinal.bundles": 2})):
+        for _ in stages.stages(arm, 10, SMALL, nothing):
+            assert not all_cores.taken

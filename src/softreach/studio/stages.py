@@ -86,7 +86,9 @@ def _slow_stages(work: _Work, level: int) -> Iterator[Reach]:
         if fine.samples < fine.wanted:
             note = f"fewer samples than asked: {fine.wanted:,} would take too long"
             fine = replace(fine, notes=(*fine.notes, note))
-        yield fine if first.refusal else work.measured(fine, quality.fine_accuracy)
+        if not first.refusal:
+            fine = work.measured(fine, quality.fine_accuracy)
+    yield fine  # outside of the turn: whoever draws it may take one
 
 
 class _Work(NamedTuple):

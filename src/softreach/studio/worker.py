@@ -36,6 +36,11 @@ class _Turns:
     def __init__(self) -> None:
         self._lock = threading.Lock()
 
+    @property
+    def taken(self) -> bool:
+        """Whether it is somebody's turn."""
+        return self._lock.locked()
+
     def __enter__(self) -> None:
         while not self._lock.acquire(timeout=_PATIENCE):
             check_wanted()
