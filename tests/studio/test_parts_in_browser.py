@@ -27,7 +27,7 @@ def typed(tab, label, text):
     field = tab.page.locator(f"xpath=//label[normalize-space()='{label}']/following::input[1]")
     field.scroll_into_view_if_needed()
     field.fill(text)
-    field.blur()
+    field.press("Enter")
 
 
 def test_a_tendon_asks_for_a_modulus_by_name(parts_tab):

@@ -11,6 +11,7 @@ import pytest
 
 import softreach.studio
 from softreach.errors import InvalidInput
+from softreach.studio.addresses import page_address, reachable_hosts
 from softreach.studio.server import page_headers, page_url, same_origin, start_server, stop_server
 
 
@@ -128,3 +129,64 @@ def test_text_becomes_markup_in_one_file_only():
     assert {name for name, text in sources.items() if "import html" in text} == {"markup.py"}
     assert {name for name, text in sources.items() if "add_html(" in text} == {"line.py"}
     assert not {name for name, text in sources.items() if "add_markdown(" in text}
+
+
+@pytest.fixture(scope="module")
+def guarded():
+    running = start_server(token="secret")
+    yield running
+    stop_server(running)
+
+
+def answer(server, path, headers):
+    line = HTTPConnection("127.0.0.1", server.get_port(), timeout=10)
+    line.request("GET", path, headers=headers)
+    found = line.getresponse()
+    found.read()
+    line.close()
+    return found
+
+
+@pytest.mark.parametrize(
+    ("path", "headers", "status"),
+    [
+        ("/", {}, 403),
+        ("/?token=guess", {}, 403),
+        ("/?token=", {}, 403),
+        ("/", {"Cookie": "softreach_token=guess"}, 403),
+        ("/", {"Cookie": "="}, 403),
+        ("/?token=secret", {}, 200),
+        ("/", {"Cookie": "other=1; softreach_token=secret"}, 200),
+    ],
+)
+def test_without_the_token_there_is_no_page(guarded, path, headers, status):
+    assert answer(guarded, path, headers).status == status
+
+
+def test_without_the_token_there_is_no_socket(guarded):
+    import viser
+    from websockets.exceptions import InvalidStatus
+    from websockets.sync.client import connect
+
+    address = page_url(guarded).replace("http", "ws")
+    version = [f"viser-v{viser.__version__}"]
+    with pytest.raises(InvalidStatus, match="403"), connect(address, subprotocols=version):
+        pass
+    cookie = answer(guarded, "/?token=secret", {}).headers["Set-Cookie"].split(";")[0]
+    shown = {"Cookie": cookie}
+    with connect(address, subprotocols=version, max_size=None, additional_headers=shown) as ours:
+        assert ours.recv(timeout=10)
+
+
+def test_a_number_that_is_no_port_is_refused_in_one_line():
+    for port in (80_000, -1):
+        with pytest.raises(InvalidInput, match=f"port = {port}: must be 1 to 65535"):
+            start_server(port=port)
+
+
+def test_others_are_told_addresses_that_they_can_use():
+    assert reachable_hosts("127.0.0.1") == []
+    assert reachable_hosts("192.0.2.7") == ["192.0.2.7"]
+    assert not {"0.0.0.0", "127.0.0.1"} & set(reachable_hosts("0.0.0.0"))
+    assert page_address("::", 80) == "http://127.0.0.1:80"
+    assert page_address("fe80::1", 80) == "http://[fe80::1]:80"

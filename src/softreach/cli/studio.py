@@ -8,15 +8,11 @@ from cyclopts import Parameter
 
 from softreach.cli.inputs import design_from
 from softreach.cli.numbers import WHOLE
-from softreach.errors import InvalidInput
 
 if TYPE_CHECKING:
     from softreach.studio import Start
 
 __all__ = ["studio"]
-
-
-_LAST_PORT = 65535
 
 
 def studio(
@@ -32,6 +28,10 @@ def studio(
     open_page: Annotated[
         bool, Parameter(name="--open", help="Open the page in the browser.")
     ] = True,
+    token: Annotated[
+        bool | None,
+        Parameter(help="Ask pages for a secret; by default where other machines can connect."),
+    ] = None,
 ) -> None:
     """Serve a page on this machine: move sliders and see what the design can reach.
 
@@ -42,15 +42,30 @@ def studio(
     import webbrowser
 
     from softreach.studio import Studio
+    from softreach.studio.addresses import check_port, is_local
+    from softreach.studio.token import new_token
 
-    if port is not None and not 0 <= port <= _LAST_PORT:
-        raise InvalidInput("port", port, f"a whole number from 0 to {_LAST_PORT}")
-    with Studio(_start(source), host, port) as running:
+    check_port(port or 0)
+    asked = not is_local(host) if token is None else token
+    with Studio(_start(source), host, port, new_token() if asked else "") as running:
         sys.stdout.write(f"{running.url}  (Ctrl-C ends it)\n")
+        for url in running.urls_for_others:
+            sys.stdout.write(f"{url}  (for other machines)\n")
         sys.stdout.flush()
+        if not is_local(host):
+            sys.stderr.write(_warning(asked=asked))
         if open_page:
             webbrowser.open(running.url)
         threading.Event().wait()
+
+
+def _warning(*, asked: bool) -> str:
+    """What everybody can do who reaches a studio that is not for this machine alone."""
+    who = "who has an address with its token" if asked else "in the network, as no token is asked,"
+    return (
+        f"warning: everyone {who} can use this studio and this machine's processor; "
+        "what is sent is not encrypted\n"
+    )
 
 
 def _start(source: str) -> Start:

@@ -7,14 +7,16 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
+from softreach.studio.addresses import LOOPBACK, page_address, reachable_hosts
 from softreach.studio.compiling import CompilationWatch
 from softreach.studio.connections import asked_path, close_all
 from softreach.studio.link import state_in_request
 from softreach.studio.panels.binding import attempt
-from softreach.studio.server import LOOPBACK, page_url, start_server, stop_server
+from softreach.studio.server import page_url, start_server, stop_server
 from softreach.studio.session import Session
 from softreach.studio.source import Start
 from softreach.studio.state import Camera
+from softreach.studio.token import with_token
 from softreach.studio.worker import Latest
 
 if TYPE_CHECKING:
@@ -29,24 +31,27 @@ _EYE_ON_MAP = Camera(position=(1.9, -6.3, 2.0), look_at=(-0.95, -0.5, 0.3))
 class Studio:
     """A local page on a design; every tab has its own state."""
 
-    def __init__(self, start: Start, host: str = LOOPBACK, port: int | None = None) -> None:
+    def __init__(
+        self, start: Start, host: str = LOOPBACK, port: int | None = None, token: str = ""
+    ) -> None:
         """Start serving.
 
         Args:
             start: What new tabs begin with.
             host: Address to listen on.
             port: None for a free one.
+            token: What every page has to know; "" for nothing.
 
         Raises:
             InvalidInput: The address cannot be used.
             MissingExtra: viser is not installed.
         """
-        self.start = start
+        self.start, self._token = start, token
         self.sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
         self._notice = Latest(_ignored)
         self._compilation = CompilationWatch(self._compiling)
-        self.server = start_server(host, port)
+        self.server = start_server(host, port, token)
         camera = start.state.camera or (_EYE if start.atlas is None else _EYE_ON_MAP)
         self.server.initial_camera.position = camera.position
         self.server.initial_camera.look_at = camera.look_at
@@ -55,8 +60,15 @@ class Studio:
 
     @property
     def url(self) -> str:
-        """Where the page is."""
-        return page_url(self.server)
+        """Where the page is, with its token."""
+        return with_token(page_url(self.server), self._token)
+
+    @property
+    def urls_for_others(self) -> list[str]:
+        """Where the page is for other machines; none if it is for this one alone."""
+        host, port = self.server.get_host(), self.server.get_port()
+        found = (page_address(one, port) for one in reachable_hosts(host))
+        return [with_token(one, self._token) for one in found]
 
     def stop(self) -> None:
         """Stop serving."""
@@ -98,7 +110,7 @@ class Studio:
         session.compiling = self._compilation.running
         with self._lock:
             self.sessions[client.client_id] = session
-        _furnish(session, self.url)
+        _furnish(session, page_url(self.server))
         session.begin()
         if session.eye.is_upright and session.board is None:
             session.look_from("oblique")
@@ -137,7 +149,7 @@ def _furnish(session: Session, url: str) -> None:
     from softreach.studio.panels.view import ViewPanel
 
     gui = session.client.gui
-    made: list[Any] = [StatusPanel(gui)]
+    made: list[Any] = [StatusPanel(gui, session)]
     tabs = gui.add_tab_group()
     kinds = {
         "Design": DesignPanel,

@@ -10,15 +10,18 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from http import HTTPStatus
 from typing import TYPE_CHECKING, Any
 
 from softreach.studio.head import headed_body
+from softreach.studio.token import cookie, is_welcome
 
 if TYPE_CHECKING:
     from viser import ViserServer
 
 __all__ = ["asked_path", "close_all", "refuse_unless", "sending_headers"]
 
+_FORBIDDEN = "The address lacks the token that softreach printed with it.\n"
 _starting = threading.Lock()
 
 
@@ -47,11 +50,12 @@ def refuse_unless(server: ViserServer, welcome: Callable[[Any], bool]) -> None:
 
 
 @contextmanager
-def sending_headers(headers: Callable[[str], Mapping[str, str]]) -> Iterator[None]:
+def sending_headers(headers: Callable[[str], Mapping[str, str]], token: str = "") -> Iterator[None]:
     """A server that starts inside the block sends these headers with everything, and our title.
 
     Args:
         headers: From the host that was asked for, as the request names it.
+        token: What requests have to show, pages and sockets alike; all others get 403.
     """
     import websockets.asyncio.server as sockets
 
@@ -61,14 +65,21 @@ def sending_headers(headers: Callable[[str], Mapping[str, str]]) -> Iterator[Non
         del connection
         for name, value in headers(request.headers.get("Host", "")).items():
             response.headers[name] = value
+        if kept := cookie(request.path, token):
+            response.headers["Set-Cookie"] = kept
         if response.headers.get("Content-Type", "").startswith("text/html"):
             zipped = response.headers.get("Content-Encoding") == "gzip"
             response.body = headed_body(response.body, zipped=zipped)
             del response.headers["Content-Length"]
             response.headers["Content-Length"] = str(len(response.body))
 
-    def serve(*arguments: Any, **options: Any) -> Any:
-        return plain(*arguments, process_response=add, **options)
+    def serve(*arguments: Any, process_request: Any = None, **options: Any) -> Any:
+        def admit(connection: Any, request: Any) -> Any:
+            if not is_welcome(request.path, request.headers, token):
+                return connection.respond(HTTPStatus.FORBIDDEN, _FORBIDDEN)
+            return process_request(connection, request) if process_request else None
+
+        return plain(*arguments, process_request=admit, process_response=add, **options)
 
     with _starting:
         sockets.serve = serve  # pyright: ignore[reportAttributeAccessIssue]

@@ -6,10 +6,12 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from softreach.arm.file import in_file_terms
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import Parameter, parameters
+from softreach.errors import Fault, InvalidDesign, Range
 
-__all__ = ["Control", "controls"]
+__all__ = ["Control", "Shown", "controls", "hint", "refusal"]
 
 _DEG = math.radians(1)
 
@@ -28,11 +30,13 @@ class Control(NamedTuple):
     step: float
     scale: float
     """Units of the parameter per shown unit."""
+    hint: str = ""
+    """Symbol, unit and meaning."""
 
     @property
     def shown(self) -> float:
         """The value on the slider."""
-        return round(self.value / self.scale, 6)
+        return float(f"{self.value / self.scale:.12g}")
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -121,4 +125,57 @@ def _control(arm: Manipulator, parameter: Parameter, slider: _Slider) -> Control
         high=slider.high,
         step=slider.step,
         scale={"rad": _DEG, "m": arm.length}.get(parameter.unit, 1.0),
+        hint=hint(parameter, _SHOWN_UNITS.get(parameter.unit, parameter.unit)),
     )
+
+
+def hint(parameter: Parameter, unit: str) -> str:
+    """Symbol, unit and meaning of a parameter, and what sweeps call it.
+
+    Args:
+        parameter: What is explained.
+        unit: That it is shown in; "1" for none.
+    """
+    what = f"{parameter.symbol} [{unit}]" if unit != "1" else parameter.symbol
+    more = f". {_MORE[parameter.field]}" if parameter.field in _MORE else ""
+    return f"{what}: {parameter.meaning}{more} (parameter {parameter.name})"
+
+
+class Shown(NamedTuple):
+    """How a parameter appears in a panel."""
+
+    label: str
+    scale: float
+    """Units of the parameter per shown unit."""
+
+
+def refusal(error: InvalidDesign, shown: Mapping[str, Shown]) -> str:
+    """What is wrong with a design, each number by the label and in the unit of its field.
+
+    Args:
+        error: What is wrong.
+        shown: The fields of a panel by the parameters that they are for.
+    """
+    return "\n".join(_line(fault, shown.get(fault.path)) for fault in error.faults)
+
+
+def _line(fault: Fault, control: Shown | None) -> str:
+    if control is None or not isinstance(fault.value, int | float):
+        return str(in_file_terms(InvalidDesign([fault]), ""))
+    allowed = fault.allowed
+    if isinstance(allowed, Range):
+        scaled = {end: getattr(allowed, end) / control.scale for end in ("low", "high")}
+        allowed = allowed._replace(unit="", **scaled)
+    return str(Fault(control.label, fault.value / control.scale, allowed))
+
+
+_SHOWN_UNITS = {"rad": "deg", "m": "L"}
+_MORE = {
+    "extent": "σ is the angle of the cross-section that the bundle covers",
+    "offset": "the angle around the axis at which the bundle starts at the base",
+    "revolution": "the angle that a fiber turns around the axis from base to tip",
+    "taper": "the angle between the axis and the side of the body",
+    "bundles": "how many equal bundles stand around the axis, each with its own activation",
+    "lower": "the most that a bundle contracts",
+    "upper": "the most that a bundle extends",
+}

@@ -35,6 +35,7 @@ __all__ = [
 Array = NDArray[np.float64]
 
 CLOUD_FORMATS = (".parquet", ".csv", ".ply", ".npz", ".mat", ".vtu")
+LARGEST = 2_000_000  # bytes of a design or a state
 SURFACE_FORMATS = (".stl", ".ply", ".obj", ".glb", ".vtu")
 
 
@@ -45,6 +46,8 @@ def state_from(name: str, content: bytes, state: StudioState) -> StudioState:
         InvalidInput: Neither of them.
         InvalidDesign: The design in it cannot exist.
     """
+    if len(content) > LARGEST:
+        raise InvalidInput(name, f"{len(content) / 1e6:.3g} MB", f"at most {LARGEST / 1e6:g} MB")
     if name.lower().endswith(".toml"):
         try:
             return state.replace(design=design_of_text(content.decode("utf-8"), name))

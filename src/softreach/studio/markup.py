@@ -7,11 +7,34 @@ makes it here; nobody else escapes, and nobody else writes tags around what is n
 from __future__ import annotations
 
 import html
+from typing import Self
 
-__all__ = ["Part", "Strong", "Swatch", "alert", "inline", "link", "paragraph", "spread"]
+__all__ = [
+    "Part",
+    "Strong",
+    "Swatch",
+    "Term",
+    "alert",
+    "fields_style",
+    "inline",
+    "link",
+    "paragraph",
+    "spread",
+]
 
 _LINE = "font-size:0.85em;line-height:1.45;padding:0 0.8em 0.4em;overflow-wrap:anywhere"
 _SMALL = "font-size:0.8em;padding:0 0.8em 0.5em;overflow-wrap:anywhere"
+_HELP = "cursor:help;text-decoration:underline dotted"
+# A field that is typed into stands where viser has its own beside a slider, which rounds.
+_FIELDS = """
+div:has(+ form) > * .mantine-Slider-root + .mantine-NumberInput-root,
+div:has(+ form) .mantine-Slider-root + .mantine-NumberInput-root
+  {visibility:hidden;width:4.6rem !important}
+div:has(.mantine-Slider-root) + form
+  {margin:-2.35em 0 0 auto;width:5.8rem;position:relative;z-index:4}
+div:has(.mantine-Slider-root) + form input {padding:0 0.3em;letter-spacing:-0.5px}
+div:has(.mantine-Slider-root) + form div:has(> * > label):not(:has(input)) {display:none}
+"""
 _ALERT = f"color:#c92a2a;{_SMALL};white-space:pre-line"
 
 
@@ -21,13 +44,26 @@ class Strong(str):
     __slots__ = ()
 
 
+class Term(str):
+    """Text in bold that explains itself when pointed at."""
+
+    __slots__ = ("meaning",)
+    meaning: str
+
+    def __new__(cls, text: str, meaning: str) -> Self:
+        """Text, and what it means."""
+        made = super().__new__(cls, text)
+        made.meaning = meaning
+        return made
+
+
 class Swatch(tuple[int, int, int]):
     """A little square of a color, RGB from 0 to 255."""
 
     __slots__ = ()
 
 
-Part = str | Strong | Swatch
+Part = str | Strong | Term | Swatch
 
 
 def inline(*parts: Part) -> str:
@@ -38,6 +74,11 @@ def inline(*parts: Part) -> str:
 def paragraph(*parts: Part) -> str:
     """A line of text as HTML; nothing without text."""
     return f'<div style="{_LINE}">{inline(*parts)}</div>' if parts else ""
+
+
+def fields_style() -> str:
+    """How a slider and the field for the same number share a row, as HTML."""
+    return f"<style>{_FIELDS}</style>"
 
 
 def alert(text: str) -> str:
@@ -62,4 +103,6 @@ def _part(part: Part) -> str:
         red, green, blue = (int(value) for value in part)
         return f'<span style="color:rgb({red},{green},{blue})">\N{BLACK SQUARE}</span>'
     text = html.escape(part)
+    if isinstance(part, Term):
+        return f'<b style="{_HELP}" title="{html.escape(part.meaning)}">{text}</b>'
     return f"<b>{text}</b>" if isinstance(part, Strong) else text

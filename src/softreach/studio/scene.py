@@ -28,7 +28,10 @@ if TYPE_CHECKING:
 
     from softreach.plot.coloring import BundleKey, ScalarKey
 
-__all__ = ["Scene"]
+__all__ = ["MOST_BUNDLES", "Scene"]
+
+MOST_BUNDLES = 100
+"""With more the body alone is drawn: skins of hundreds take a minute."""
 
 Array = NDArray[np.float64]
 Color = tuple[int, int, int]
@@ -105,7 +108,7 @@ class Scene:
             self.remove(path)
             ghost = path.startswith("/ghosts")
             body = _CLEAR if any(inside(arm)) else None
-            opacity = [_GHOST] * len(meshes) if ghost else [body] + [None] * arm.bundles
+            opacity = [_GHOST] * len(meshes) if ghost else [body] + [None] * (len(meshes) - 1)
             self._arms[path] = (
                 arm,
                 [
@@ -296,6 +299,8 @@ def _arm_meshes(arm: Manipulator, shape: Any) -> list[tuple[Array, NDArray[Any],
     """Vertices [L], faces and color of the body and of every bundle."""
     body = arm_surface(arm, shape, _SIDES)
     meshes = [(body.vertices / arm.length, body.faces, _rgb(BODY))]
+    if arm.bundles > MOST_BUNDLES:
+        return meshes
     for k, skin in enumerate(bundle_skins(arm, shape, lift=_LIFT, step=_ACROSS)):
         meshes.append((skin.vertices / arm.length, skin.faces, _rgb(bundle_color(k))))
     return meshes

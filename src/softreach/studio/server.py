@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from softreach.errors import InvalidInput, MissingExtra
+from softreach.studio.addresses import LOOPBACK, check_port, page_address
 from softreach.studio.connections import refuse_unless, sending_headers
 from softreach.studio.eye import FOV
 
@@ -27,19 +28,19 @@ __all__ = [
     "theme",
 ]
 
-LOOPBACK = "127.0.0.1"
 _LOCAL_NAMES = {"localhost", "127.0.0.1", "::1"}
 
 
-def start_server(host: str = LOOPBACK, port: int | None = None) -> ViserServer:
+def start_server(host: str = LOOPBACK, port: int | None = None, token: str = "") -> ViserServer:
     """Start serving the page.
 
     Args:
         host: Address to listen on; everyone who can reach it may use the studio.
         port: None for a free one.
+        token: What every page has to know; "" for nothing.
 
     Raises:
-        InvalidInput: The port is taken, or the host is not this machine's.
+        InvalidInput: The port is none or taken, or the host is not this machine's.
         MissingExtra: viser is not installed.
     """
     try:
@@ -47,9 +48,10 @@ def start_server(host: str = LOOPBACK, port: int | None = None) -> ViserServer:
     except ModuleNotFoundError as error:
         raise MissingExtra("viser", "studio") from error
 
+    check_port(port or 0)
     _check_free(host, port or 0)
     # viser prints a banner; we print our own line.
-    with contextlib.redirect_stdout(io.StringIO()), sending_headers(page_headers):
+    with contextlib.redirect_stdout(io.StringIO()), sending_headers(page_headers, token):
         server = viser.ViserServer(host=host, port=port or 0, verbose=False, label="softreach")
     _disable_tunnel(server)
     refuse_unless(server, lambda headers: same_origin(headers, host))
@@ -78,9 +80,7 @@ def stop_server(server: ViserServer) -> None:
 
 def page_url(server: ViserServer) -> str:
     """Where the page is, for a browser on this machine."""
-    host = server.get_host()
-    shown = LOOPBACK if host in ("0.0.0.0", "::") else host
-    return f"http://{f'[{shown}]' if ':' in shown else shown}:{server.get_port()}"
+    return page_address(server.get_host(), server.get_port())
 
 
 def same_origin(headers: Mapping[str, str], host: str) -> bool:

@@ -11,7 +11,9 @@ from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
 from softreach.stores.place import kind_of
 from softreach.studio.atlas_map import metric_names
-from softreach.studio.reach import Quality, Reach, reached
+from softreach.studio.files import LARGEST
+from softreach.studio.reach import Quality, Reach
+from softreach.studio.stages import reached
 from softreach.studio.state import StudioState
 
 if TYPE_CHECKING:
@@ -43,6 +45,9 @@ def start_on_state(path: str | PathLike[str], quality: Quality | None = None) ->
         InvalidDesign: A design in it cannot exist.
     """
     try:
+        if (size := Path(path).stat().st_size) > LARGEST:
+            most = f"at most {LARGEST / 1e6:g} MB"
+            raise InvalidInput("state file", f"{size / 1e6:.3g} MB", most)
         text = Path(path).read_bytes()
     except OSError as error:
         raise InvalidInput("state file", str(path), "a file that can be read", str(error)) from None

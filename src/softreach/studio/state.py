@@ -175,7 +175,7 @@ class StudioState:
         values = _parsed(text)
         try:
             return cls(**_fields(values))
-        except (AttributeError, KeyError, TypeError, ValueError) as error:
+        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
             if type(error).__module__.startswith("softreach"):
                 raise
             raise InvalidInput("state file", str(error), "one that the studio saved") from None
@@ -190,6 +190,8 @@ def _parsed(text: str | bytes) -> dict[str, Any]:
         values = json.loads(text)
     except ValueError as error:
         raise InvalidInput("state file", str(error), allowed) from None
+    except RecursionError:
+        raise InvalidInput("state file", "too deeply nested", allowed) from None
     found = values.pop("softreach_studio", None) if isinstance(values, dict) else None
     if found != VERSION:
         raise InvalidInput("state file", f"version {found}", allowed)

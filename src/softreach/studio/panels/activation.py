@@ -11,7 +11,9 @@ from softreach.schema import activation_symbols
 from softreach.studio.panels.binding import bind, bind_button
 from softreach.studio.panels.line import Line
 from softreach.studio.panels.status import tip_text
+from softreach.studio.panels.typed import SliderField
 from softreach.studio.rod import rod_of
+from softreach.studio.scene import MOST_BUNDLES
 from softreach.studio.state import StudioState
 
 if TYPE_CHECKING:
@@ -20,6 +22,9 @@ if TYPE_CHECKING:
     from softreach.studio.session import Session
 
 __all__ = ["ActivationPanel"]
+
+_MOST = 40
+"""Sliders: a page with hundreds takes minutes to build."""
 
 
 class ActivationPanel:
@@ -35,8 +40,9 @@ class ActivationPanel:
         with tab:
             self._tip = Line(gui)
             self._folder = gui.add_folder("activation")
-            self._trail = gui.add_checkbox("show trail", False)
-            rest = gui.add_button("Rest")
+            self._hidden = Line(gui)
+            self._trail = gui.add_checkbox("show trail", False, hint="Draws where the tip has been")
+            rest = gui.add_button("Rest", hint="Sets every activation to 0, or the nearest to it")
         bind(self._trail, session, lambda s, on: s.showing(trail=on))
         bind_button(rest, session, lambda: session.update(lambda s: s.replace(activation=())))
 
@@ -60,21 +66,27 @@ class ActivationPanel:
             self._sliders = [
                 self._slider(name, low, high, value)
                 for (name, low, high), value in zip(
-                    self._made_for, session.state.activation, strict=True
+                    self._made_for[:_MOST], session.state.activation, strict=False
                 )
             ]
+        hidden = len(self._made_for) - len(self._sliders)
+        drawn = "" if len(self._made_for) <= MOST_BUNDLES else "; no bundle is drawn"
+        text = f"{hidden} more bundles have no slider here{drawn}."
+        self._hidden.say(*([text] if hidden else []))
 
     def _slider(self, name: str, low: float, high: float, value: float) -> Any:
         room = 1e-6 * max(1.0, abs(low))
         high = max(high, low + room)  # a slider needs room; the state keeps to the bounds
-        slider = self._gui.add_slider(name, low, high, _step(high - low), value)
+        about = f"{name}: activation of a bundle, from {low:g} to {high:g}; 0 is at rest"
+        slider = SliderField(self._gui, name, (low, high), _step(high - low), value, about)
         bind(slider, self._session, self._wanted)
         return slider
 
     def _wanted(self, state: StudioState, moved: float) -> StudioState:
         """Read all sliders: the last of several events that run at once then has it right."""
         del moved
-        return state.replace(activation=tuple(float(slider.value) for slider in self._sliders))
+        shown = tuple(float(slider.value) for slider in self._sliders)
+        return state.replace(activation=shown + state.activation[len(shown) :])
 
 
 def _step(width: float) -> float:

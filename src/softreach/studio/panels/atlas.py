@@ -35,10 +35,14 @@ class AtlasPanel:
         names = tuple(str(dim) for dim in self._atlas["status"].dims)
         with tab:
             Line(gui, _HINT)
-            self._metric = gui.add_dropdown("metric", tuple(metric_names(self._atlas)))
-            self._right = gui.add_dropdown("to the right", names)
-            self._up = gui.add_dropdown("upward", names)
-            self._visible = gui.add_checkbox("show the map", True)
+            self._metric = gui.add_dropdown(
+                "metric", tuple(metric_names(self._atlas)), hint="What the map shows"
+            )
+            self._right = gui.add_dropdown(
+                "to the right", names, hint="The parameter from left to right"
+            )
+            self._up = gui.add_dropdown("upward", names, hint="The parameter from bottom to top")
+            self._visible = gui.add_checkbox("show the map", True, hint="Beside the arm")
         bind(self._metric, session, lambda s, name: _viewed(s, metric=name))
         bind(self._right, session, lambda s, name: self._turned(s, "right", name))
         bind(self._up, session, lambda s, name: self._turned(s, "up", name))

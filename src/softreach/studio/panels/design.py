@@ -5,15 +5,15 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from softreach.arm.file import in_file_terms
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed
 from softreach.errors import InvalidDesign
-from softreach.studio.controls import Control, controls
+from softreach.studio.controls import Control, Shown, controls, refusal
 from softreach.studio.markup import Part
 from softreach.studio.panels.binding import bind, bind_button
 from softreach.studio.panels.line import Line
 from softreach.studio.panels.status import reach_text
+from softreach.studio.panels.typed import SliderField
 from softreach.studio.reach import beside
 from softreach.studio.rod import rod_of
 
@@ -24,13 +24,15 @@ if TYPE_CHECKING:
 
 __all__ = ["DesignPanel"]
 
+_ABOUT_KEEP = "Keeps what the design reaches now, in gray, to compare others with"
+_ABOUT_BESIDE = "Stands the reference beside the design, pulled as the design is"
+
 
 class _Row(NamedTuple):
     control: Control
-    slider: Any
-    message: Line
+    field: SliderField
     first: float
-    """What the slider showed before anyone moved it."""
+    """What the field showed before anyone changed it."""
 
 
 class DesignPanel:
@@ -48,9 +50,9 @@ class DesignPanel:
             self._folder = gui.add_folder("design")
             with gui.add_folder("compare"):
                 self._reference = Line(gui)
-                keep = gui.add_button("Keep this design as reference")
-                self._beside = gui.add_checkbox("side by side", False)
-                clear = gui.add_button("Forget the reference")
+                keep = gui.add_button("Keep this design as reference", hint=_ABOUT_KEEP)
+                self._beside = gui.add_checkbox("side by side", False, hint=_ABOUT_BESIDE)
+                clear = gui.add_button("Forget the reference", hint="Takes the reference away")
         bind_button(keep, session, lambda: session.update(lambda s: s.replace(reference=s.design)))
         bind_button(clear, session, self._forget)
         bind(self._beside, session, lambda s, on: s.replace(side_by_side=on))
@@ -85,30 +87,27 @@ class DesignPanel:
 
     def _build(self, arm: Manipulator) -> None:
         for row in self._rows:
-            row.slider.remove()
-            row.message.remove()
+            row.field.remove()
         self._base = self._made = arm
         self._complaining = False
         with self._folder:
             self._rows = [self._row(control) for control in controls(arm)]
 
     def _row(self, control: Control) -> _Row:
-        low, high = control.limits
-        slider = self._gui.add_slider(control.label, low, high, control.step, control.shown)
-        message = Line(self._gui)
-        slider.on_update(lambda event: self._moved(control.name, event))
-        return _Row(control, slider, message, slider.value)
+        made = SliderField(
+            self._gui, control.label, control.limits, control.step, control.shown, control.hint
+        )
+        made.on_update(lambda _: self._moved(control.name))
+        return _Row(control, made, made.value)
 
-    def _moved(self, name: str, event: Any) -> None:
-        """Read all sliders, as older and newer events may come in any order."""
-        if event.client_id is None:
-            return
+    def _moved(self, name: str) -> None:
+        """Read all fields, as older and newer events may come in any order."""
         with self._lock:
             assert self._base is not None
             try:
                 made = rod_of(changed(self._base, self._values())).arm
             except InvalidDesign as error:
-                self._complain(name, str(in_file_terms(error, "")))
+                self._complain(name, refusal(error, self._shown()))
                 return
             known, self._made = self._made, made
             self._complain(name, "")
@@ -117,14 +116,18 @@ class DesignPanel:
         self._session.update(lambda s: s.replace(design=made), by_widget=True)
 
     def _values(self) -> dict[str, float]:
-        """What differs from the base, which a slider may show rounded."""
-        moved = (row for row in self._rows if row.slider.value != row.first)
-        return {row.control.name: row.slider.value * row.control.scale for row in moved}
+        """What differs from the base, which a field may show rounded."""
+        moved = (row for row in self._rows if row.field.value != row.first)
+        return {row.control.name: row.field.value * row.control.scale for row in moved}
+
+    def _shown(self) -> dict[str, Shown]:
+        controls = (row.control for row in self._rows)
+        return {one.name: Shown(one.label, one.scale) for one in controls}
 
     def _complain(self, name: str, text: str) -> None:
         self._complaining = bool(text)
         for row in self._rows:
-            row.message.warn(text if row.control.name == name else "")
+            row.field.warn(text if row.control.name == name else "")
 
 
 def _reference_text(session: Session) -> tuple[Part, ...]:

@@ -35,6 +35,20 @@ _ABOUT_LINK = (
     "this address."
 )
 
+_ABOUT = {
+    "Save state": "Everything that this tab shows, to be loaded again (JSON)",
+    "Link to this state": "An address that opens a tab in this state",
+    "Save design (TOML)": "The design alone, which the command line reads too",
+    "Load": "A state (.json) or a design (.toml) that was saved",
+    "cloud": "File type of all samples: tips [m] and activations",
+    "Save cloud": "All samples of the cloud: tips [m] and activations",
+    "surface": "File type of the boundary of the reachable set",
+    "Save surface": "The exact boundary of the reachable set [m]",
+    "Save picture (PNG)": "The scene as it is seen, with legend, scale and design",
+    "Save figure (PNG)": "Three views and an oblique one of the points that are shown",
+    "Save web page (HTML)": "The scene in one file, to be turned without a studio",
+}
+
 
 class ExportPanel:
     """Buttons that send a file to the browser, and one that takes a file back."""
@@ -47,10 +61,12 @@ class ExportPanel:
             self._button("Link to this state", self._link)
             self._address = Line(gui)
             self._button("Save design (TOML)", self._save_design)
-            load = gui.add_upload_button("Load state or design")
-            self._cloud = gui.add_dropdown("cloud format", CLOUD_FORMATS)
+            load = gui.add_upload_button("Load state or design", hint=_ABOUT["Load"])
+            self._cloud = gui.add_dropdown("cloud format", CLOUD_FORMATS, hint=_ABOUT["cloud"])
             self._button("Save cloud", self._save_cloud)
-            self._surface = gui.add_dropdown("surface format", SURFACE_FORMATS)
+            self._surface = gui.add_dropdown(
+                "surface format", SURFACE_FORMATS, hint=_ABOUT["surface"]
+            )
             self._button("Save surface", self._save_surface)
             self._button("Save figure (PNG)", self._save_figure)
             self._button("Save picture (PNG)", self._save_picture)
@@ -72,29 +88,34 @@ class ExportPanel:
 
     def _save_cloud(self) -> None:
         suffix = self._cloud.value
-        self._send(f"cloud{suffix}", cloud_file(self._reach(), suffix))
+        self._write(f"cloud{suffix}", lambda: cloud_file(self._reach(), suffix))
 
     def _save_surface(self) -> None:
         suffix = self._surface.value
-        self._send(f"surface{suffix}", surface_file(self._reach(), suffix))
+        self._write(f"surface{suffix}", lambda: surface_file(self._reach(), suffix))
 
     def _save_figure(self) -> None:
-        self._send("reachability.png", figure_file(self._reach(), self._session.state))
+        self._write("reachability.png", lambda: figure_file(self._reach(), self._session.state))
 
     def _save_picture(self) -> None:
         session, reach = self._session, self._reach()
-        self._send(
-            "studio.png", picture_file(session.eye.picture(), session.state, reach, session.key)
-        )
+        picture, state = session.eye.picture(), session.state
+        self._write("studio.png", lambda: picture_file(picture, state, reach, session.key))
 
     def _save_page(self) -> None:
+        self._write("reachability.html", self._page)
+
+    def _page(self) -> bytes:
         board = self._session.board
         picture = None if board is None or board.map is None else board.map.image
-        page = static_page(self._session.state_now(), self._reach(), picture)
-        self._send("reachability.html", page.encode())
+        return static_page(self._session.state_now(), self._reach(), picture).encode()
 
     def _button(self, label: str, action: Callable[[], None]) -> None:
-        bind_button(self._session.client.gui.add_button(label), self._session, action)
+        bind_button(
+            self._session.client.gui.add_button(label, hint=_ABOUT.get(label)),
+            self._session,
+            action,
+        )
 
     def _restore(self, file: UploadedFile) -> None:
         session = self._session
@@ -107,5 +128,17 @@ class ExportPanel:
             raise InvalidInput("cloud", "still being computed", "complete", "try again soon")
         return reach
 
+    def _write(self, name: str, content: Callable[[], bytes]) -> None:
+        """Send what takes a while to make, and say so meanwhile."""
+        with self._session.working(f"writing {name}"):
+            made = content()
+        self._send(name, made)
+        self._session.say(f"{name} is written: {_size(len(made))}.")
+
     def _send(self, name: str, content: bytes) -> None:
         self._session.client.send_file_download(name, content, save_immediately=True)
+
+
+def _size(count: int) -> str:
+    """Bytes in words."""
+    return f"{count / 1e6:.1f} MB" if count >= 1e5 else f"{count / 1e3:.1f} kB"

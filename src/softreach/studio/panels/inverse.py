@@ -37,11 +37,17 @@ class InversePanel:
         self._buttons: list[tuple[Any, Any]] = []
         with tab:
             self._text = Line(gui, _HINT)
-            self._target = gui.add_vector3("target / L", (0.0, 0.0, 1.0), step=0.001)
-            solve = gui.add_button("Solve")
-            self._ghosts = gui.add_checkbox("show all shapes", session.state.appearance.ghosts)
+            self._target = gui.add_vector3(
+                "target / L", (0.0, 0.0, 1.0), step=0.001, hint="Where the tip should go [L]"
+            )
+            solve = gui.add_button("Solve", hint="Finds every activation that reaches the target")
+            self._ghosts = gui.add_checkbox(
+                "show all shapes",
+                session.state.appearance.ghosts,
+                hint="Draws the arm in every solution at once",
+            )
             self._folder = gui.add_folder("activations that reach it", visible=False)
-            clear = gui.add_button("Clear")
+            clear = gui.add_button("Clear", hint="Takes target and solutions away")
         bind_button(solve, session, self._solve_typed)
         bind_button(clear, session, lambda: session.update(lambda s: s.replace(target=None)))
         bind(self._ghosts, session, lambda s, on: s.showing(ghosts=on))
@@ -92,7 +98,9 @@ class InversePanel:
 
     def _button(self, activation: Any) -> Any:
         wanted = tuple(activation.tolist())
-        button = self._gui.add_button(", ".join(f"{value:.4g}" for value in wanted))
+        button = self._gui.add_button(
+            ", ".join(f"{value:.4g}" for value in wanted), hint="Moves the arm to this solution"
+        )
         take = lambda: self._session.update(lambda s: s.replace(activation=wanted))  # noqa: E731
         bind_button(button, self._session, take)
         return button

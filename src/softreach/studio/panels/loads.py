@@ -19,6 +19,7 @@ from softreach.studio.loading import (
 from softreach.studio.panels.binding import bind
 from softreach.studio.panels.line import Line
 from softreach.studio.panels.status import tip_text
+from softreach.studio.panels.typed import NumberField, VectorField
 from softreach.studio.rod import rod_of
 from softreach.studio.state import vector
 
@@ -30,6 +31,13 @@ if TYPE_CHECKING:
 __all__ = ["LoadsPanel"]
 
 _TYPED = "as typed"
+_ZERO = (0.0, 0.0, 0.0)
+_ABOUT = {
+    "gravity": "g: acceleration of gravity as x, y, z in the frame of the base, whose tangent is z",
+    "payload": "m: mass at the tip; it weighs what gravity makes of it",
+    "arm": "From the tip to the center of the payload's mass, as x, y, z in the tip's directors",
+    "force": "F: force on the tip as x, y, z in the frame of the base",
+}
 
 
 class LoadsPanel:
@@ -40,32 +48,25 @@ class LoadsPanel:
         self._session, self._lock = session, threading.RLock()
         self._shown: Manipulator | None = None
         with tab:
-            self._direction = gui.add_dropdown("gravity", (*GRAVITIES, _TYPED))
-            self._gravity = gui.add_vector3(
-                "g [m/s²]",
-                (0.0, 0.0, 0.0),
-                step=0.01,
-                hint="as the base sees it, which points to +z",
+            self._direction = gui.add_dropdown(
+                "gravity", (*GRAVITIES, _TYPED), hint="Which way the base of the arm points"
             )
-            self._payload = gui.add_number(
-                "payload [g]",
-                0.0,
-                step=0.1,
-                hint="mass at the tip; weighs what gravity makes of it",
-            )
-            self._arm = gui.add_vector3(
-                "lever arm [mm]", (0.0, 0.0, 0.0), step=0.1, hint="from the tip, in its directors"
-            )
-            self._force = gui.add_vector3(
-                "tip force [N]", (0.0, 0.0, 0.0), step=0.001, hint="in the frame of the base"
-            )
+            self._gravity = VectorField(gui, "g [m/s²]", _ZERO, _ABOUT["gravity"])
+            self._payload = NumberField(gui, "payload [g]", 0.0, _ABOUT["payload"])
+            self._arm = VectorField(gui, "lever arm [mm]", _ZERO, _ABOUT["arm"])
+            self._force = VectorField(gui, "tip force [N]", _ZERO, _ABOUT["force"])
             self._message = Line(gui)
-            gui.add_button("Take all loads off").on_click(lambda _: self._clear())
-            self._free = gui.add_checkbox("show the cloud without loads", True)
+            clear = gui.add_button("Take all loads off", hint="Gravity, payload and all forces")
+            clear.on_click(lambda _: self._clear())
+            self._free = gui.add_checkbox(
+                "show the cloud without loads", True, hint="Faint, around that of the loaded arm"
+            )
             self._posture, self._others = Line(gui), Line(gui)
-        self._on(self._direction, self._directed)
-        for widget in (self._gravity, self._payload, self._arm, self._force):
-            self._on(widget, self._typed)
+        self._direction.on_update(
+            lambda event: self._directed() if event.client_id is not None else None
+        )
+        for field in (self._gravity, self._payload, self._arm, self._force):
+            field.on_update(lambda _, field=field: self._typed(field))
         bind(self._free, session, lambda s, on: s.showing(free=on))
 
     def show(self, session: Session) -> None:
@@ -101,37 +102,37 @@ class LoadsPanel:
             self._gravity.value = GRAVITIES[self._direction.value]
             self._apply()
 
-    def _typed(self) -> None:
+    def _typed(self, field: NumberField | VectorField) -> None:
         self._direction.value = gravity_name(vector(self._gravity.value)) or _TYPED
-        self._apply()
+        self._apply(field)
 
     def _clear(self) -> None:
         self._fill(TypedLoads())
         self._change(lambda arm: arm.replace(loads=None))
 
-    def _apply(self) -> None:
+    def _apply(self, field: NumberField | VectorField | None = None) -> None:
         typed = TypedLoads(
             vector(self._gravity.value),
             float(self._payload.value),
             vector(self._arm.value),
             vector(self._force.value),
         )
-        self._change(lambda arm: with_loads(arm, typed))
+        self._change(lambda arm: with_loads(arm, typed), field)
 
-    def _change(self, change: Callable[[Manipulator], Manipulator]) -> None:
-        """Change the design, or say below the fields why that cannot be."""
+    def _change(
+        self,
+        change: Callable[[Manipulator], Manipulator],
+        field: NumberField | VectorField | None = None,
+    ) -> None:
+        """Change the design, or say below the field why that cannot be."""
         with self._lock:
             known = self._session.state.design
             try:
                 made = rod_of(change(known)).arm
             except SoftreachError as error:
-                self._message.warn(str(error))
+                (field or self._message).warn(str(error))
                 return
             self._message.warn("")
             if made == known:
                 return  # a page reports fields that were only drawn anew
         self._session.update(lambda state: state.replace(design=made))
-
-    def _on(self, widget: Any, action: Callable[[], None]) -> None:
-        """Act when a person, and not the program, changed a widget."""
-        widget.on_update(lambda event: action() if event.client_id is not None else None)

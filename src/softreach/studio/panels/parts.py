@@ -8,13 +8,14 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from softreach.arm import designs
-from softreach.arm.file import in_file_terms
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.materials import material_names
 from softreach.arm.parameters import changed
 from softreach.errors import InvalidDesign, SoftreachError
 from softreach.studio import edits
+from softreach.studio.controls import Shown, refusal
 from softreach.studio.panels.line import Line
+from softreach.studio.panels.typed import NumberField
 from softreach.studio.parts import Number, Part, numbers, parts
 from softreach.studio.rod import rod_of
 
@@ -29,6 +30,14 @@ Change = Callable[[Manipulator], Manipulator]
 
 _AS_TYPED = "(as typed)"
 _NEW_RING = "ring"
+_ABOUT_BUTTONS = {
+    "Take this design": "Replaces the whole design by this one",
+    "Add": "Adds this part, with numbers to be changed below",
+    "Rename": "Gives the part this name",
+    "Remove": "Takes the part out of the design",
+}
+_ABOUT_EDIT = "The part whose numbers are below"
+_ABOUT_MATERIAL = "Sets modulus E, Poisson ratio ν and density ρ to those of a known material"
 
 
 class PartsPanel:
@@ -43,11 +52,17 @@ class PartsPanel:
         self._typed: dict[str, tuple[Number, Any]] = {}
         with tab:
             with gui.add_folder("start from"):
-                self._named = gui.add_dropdown("named design", tuple(designs.__all__))
+                self._named = gui.add_dropdown(
+                    "named design",
+                    tuple(designs.__all__),
+                    hint="Arms of the literature and examples",
+                )
                 self._button("Take this design", self._take)
             with gui.add_folder("add"):
                 kinds = (*edits.ACTUATOR_KINDS, _NEW_RING)
-                self._kind = gui.add_dropdown("kind", kinds)
+                self._kind = gui.add_dropdown(
+                    "kind", kinds, hint="An actuator, or a ring of the cross-section"
+                )
                 self._button("Add", self._add)
             self._folder = gui.add_folder("part")
             self._message = Line(gui)
@@ -85,8 +100,12 @@ class PartsPanel:
                 widget.value = _shown(one)
         return True
 
+    def _known(self) -> dict[str, Shown]:
+        """How the numbers of the chosen part are shown."""
+        return {name: Shown(one.label, one.scale) for name, (one, _) in self._typed.items()}
+
     def _list(self, known: dict[str, Part], chosen: str) -> list[Any]:
-        menu = self._gui.add_dropdown("edit", tuple(known), initial_value=chosen)
+        menu = self._gui.add_dropdown("edit", tuple(known), initial_value=chosen, hint=_ABOUT_EDIT)
 
         def choose(event: Any) -> None:
             if event.client_id is not None:
@@ -113,7 +132,7 @@ class PartsPanel:
         """Its name, its material, or the ring that it is in."""
         made: list[Any] = []
         if part.ring is not None or part.actuator:
-            name = self._gui.add_text("name", part.name)
+            name = self._gui.add_text("name", part.name, hint="What tables and files call it")
             made += [name, self._button("Rename", lambda: self._renamed(part, name.value))]
         if part.ring is not None:
             material = arm.section.rings[part.ring].material.name
@@ -126,23 +145,23 @@ class PartsPanel:
         return made
 
     def _number(self, one: Number) -> Any:
-        step = 1 if one.whole else 10.0 ** (math.floor(math.log10(abs(_shown(one)) or 1.0)) - 2)
-        widget = self._gui.add_number(one.label, _shown(one), step=step, hint=one.hint)
-        return self._on(widget, lambda: self._change(one.parameter, widget))
+        field = NumberField(self._gui, one.label, _shown(one), one.hint)
+        field.on_update(lambda _: self._change(one.parameter, field))
+        return field
 
-    def _change(self, parameter: str, widget: Any) -> None:
+    def _change(self, parameter: str, widget: NumberField) -> None:
         """One number typed; what a field only shows rounded is left as it is."""
         known, current = self._typed.get(parameter, (None, None))
         if known is None or current is not widget or widget.value == _shown(known):
             return  # of a field that is gone, or no change
         value = widget.value * known.scale
-        self._apply(lambda arm: changed(arm, {parameter: value}))
+        self._apply(lambda arm: changed(arm, {parameter: value}), field=widget)
 
     def _material(self, label: str, name: str, ring: int | None) -> Any:
         none = _AS_TYPED if ring is not None else "as the innermost ring"
         options = (none, *material_names())
         shown = name if name in options else none
-        menu = self._gui.add_dropdown(label, options, initial_value=shown)
+        menu = self._gui.add_dropdown(label, options, initial_value=shown, hint=_ABOUT_MATERIAL)
 
         def take() -> None:
             material = "" if menu.value == none else menu.value
@@ -157,13 +176,15 @@ class PartsPanel:
     def _home(self, arm: Manipulator, part: Part) -> Any:
         labels = [edits.ring_label(arm, k) for k in range(len(arm.section.rings))]
         here = arm.section.rings.index(arm.section.ring(part.home or 0))
-        menu = self._gui.add_dropdown("in ring", tuple(labels), initial_value=labels[here])
+        menu = self._gui.add_dropdown(
+            "in ring", tuple(labels), initial_value=labels[here], hint="The ring that it lies in"
+        )
         return self._on(
             menu, lambda: self._apply(lambda arm: _moved(arm, part, labels.index(menu.value)))
         )
 
     def _button(self, label: str, action: Callable[[], None]) -> Any:
-        button = self._gui.add_button(label)
+        button = self._gui.add_button(label, hint=_ABOUT_BUTTONS[label])
         button.on_click(lambda _: action())
         return button
 
@@ -210,15 +231,21 @@ class PartsPanel:
                 last=lambda _: name,
             )
 
-    def _apply(self, change: Change, last: Callable[[Manipulator], str] | None = None) -> None:
-        """Change the design, or say below the fields why that cannot be."""
+    def _apply(
+        self,
+        change: Change,
+        last: Callable[[Manipulator], str] | None = None,
+        field: NumberField | None = None,
+    ) -> None:
+        """Change the design, or say below the field why that cannot be."""
+        message = field or self._message
         try:
             made = rod_of(change(self._session.state.design)).arm
         except InvalidDesign as error:
-            self._message.warn(str(in_file_terms(error, "")))
+            message.warn(refusal(error, self._known()))
             return
         except SoftreachError as error:
-            self._message.warn(str(error))
+            message.warn(str(error))
             return
         self._message.warn("")
         if last is not None:

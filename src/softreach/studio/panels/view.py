@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from softreach.studio.colors import color_names
 from softreach.studio.eye import VIEWS
 from softreach.studio.panels.binding import bind, bind_button
+from softreach.studio.panels.typed import SliderField
 from softreach.studio.sight import CUTS
 from softreach.studio.state import LEVELS, Appearance, StudioState
 
@@ -31,6 +32,26 @@ _TOGGLES = {
     "dark": "dark page",
 }
 
+_ABOUT = {
+    "color": "What the color of a point says; the key is above the tabs",
+    "points": "Samples that are shown, at most as many as time and memory allow",
+    "size": "Edge of a point [L]",
+    "cloud": "Tips of sampled activations",
+    "arm": "The body and its bundles in the present activation",
+    "surface": "Boundary of all that the tip reaches, from the map itself",
+    "alpha_shape": "The surface of a cloud by balls of radius α = 0.05 L, to compare with",
+    "axes": "x, y and z [L] from the base",
+    "lit": "Points are shaded as spheres in a light",
+    "dark": "Light on dark",
+    "cut": "What of the cloud is taken away, so that arm and target are seen",
+    "views": "Along an axis of the base, or between them",
+    "orthographic": "Without perspective: what is parallel stays parallel",
+    "reset": "The view of the first picture",
+    "axis": "Hides all but a slab across this axis",
+    "center": "Middle of the slab along the axis [L]",
+    "thickness": "Of the slab [L]",
+}
+
 
 class ViewPanel:
     """Widgets of the appearance."""
@@ -40,27 +61,42 @@ class ViewPanel:
         self._revision = -1
         look, names = session.state.appearance, color_names(session.state.design)
         with tab:
-            self._color = gui.add_dropdown("color by", tuple(names.values()))
-            self._count = gui.add_dropdown("points", tuple(_COUNTS), initial_value=_count(look))
-            self._size = gui.add_slider("point size / L", 5e-4, 0.02, 5e-4, look.point_size)
+            self._color = gui.add_dropdown("color by", tuple(names.values()), hint=_ABOUT["color"])
+            self._count = gui.add_dropdown(
+                "points", tuple(_COUNTS), initial_value=_count(look), hint=_ABOUT["points"]
+            )
+            self._size = SliderField(
+                gui, "point size / L", (5e-4, 0.02), 5e-4, look.point_size, _ABOUT["size"]
+            )
             self._cut = gui.add_dropdown(
-                "cut away", tuple(CUTS.values()), initial_value=CUTS[look.cut]
+                "cut away", tuple(CUTS.values()), initial_value=CUTS[look.cut], hint=_ABOUT["cut"]
             )
             with gui.add_folder("show"):
                 self._toggles = {
-                    field: gui.add_checkbox(label, getattr(look, field))
+                    field: gui.add_checkbox(label, getattr(look, field), hint=_ABOUT[field])
                     for field, label in _TOGGLES.items()
                 }
             with gui.add_folder("camera"):
-                views = gui.add_button_group("look from", tuple(VIEWS))
-                self._orthographic = gui.add_checkbox("orthographic", look.orthographic)
-                reset = gui.add_button("Reset the view")
+                views = gui.add_button_group("look from", tuple(VIEWS), hint=_ABOUT["views"])
+                self._orthographic = gui.add_checkbox(
+                    "orthographic", look.orthographic, hint=_ABOUT["orthographic"]
+                )
+                reset = gui.add_button("Reset the view", hint=_ABOUT["reset"])
             with gui.add_folder("slice"):
                 self._slice = {
-                    "axis": gui.add_dropdown("across", _ACROSS, initial_value=look.slice.axis),
-                    "center": gui.add_slider("center / L", -1.5, 1.5, 0.01, look.slice.center),
-                    "thickness": gui.add_slider(
-                        "thickness / L", 0.01, 1.0, 0.01, look.slice.thickness
+                    "axis": gui.add_dropdown(
+                        "across", _ACROSS, initial_value=look.slice.axis, hint=_ABOUT["axis"]
+                    ),
+                    "center": SliderField(
+                        gui, "center / L", (-1.5, 1.5), 0.01, look.slice.center, _ABOUT["center"]
+                    ),
+                    "thickness": SliderField(
+                        gui,
+                        "thickness / L",
+                        (0.01, 1.0),
+                        0.01,
+                        look.slice.thickness,
+                        _ABOUT["thickness"],
                     ),
                 }
         self._listen(session)

@@ -1,0 +1,72 @@
+"""Files that no studio saved are refused in one line, at once."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from softreach.arm import designs
+from softreach.errors import SoftreachError
+from softreach.studio import StudioState
+from softreach.studio.files import state_from
+from softreach.studio.source import start_on_state
+
+STATE = StudioState(design=designs.minimal_trunk())
+
+
+def state_with(**changes):
+    return json.dumps(json.loads(STATE.to_json()) | changes)
+
+
+def look_with(**changes):
+    return state_with(appearance=json.loads(STATE.to_json())["appearance"] | changes)
+
+
+def design_with(old, new):
+    text = designs.minimal_trunk().to_toml()
+    assert old in text
+    return text.replace(old, new)
+
+
+HOSTILE = {
+    "many bundles.toml": design_with(
+        'name = "longitudinal"', 'name = "longitudinal"\nbundles = 1000000'
+    ),
+    "nested.toml": "a = " + "[" * 100_000 + "]" * 100_000,
+    "nested.json": "[" * 100_000,
+    "nested objects.json": '{"a":' * 100_000,
+    "50 MB.json": " " * 50_000_000,
+    "50 MB.toml": "#" * 50_000_000,
+    "huge point.json": look_with(point_size=10**300),
+    "huge level.json": look_with(level=10**4000),
+    "digits.json": '{"softreach_studio": 1, "activation": ' + "9" * 5000 + "}",
+    "huge activation.json": state_with(activation=[10**400] * 3),
+    "infinite activation.json": state_with(activation=[float("inf")] * 3),
+    "no activation.json": state_with(activation=None),
+    "words.json": state_with(activation=["x"]),
+    "no target.json": state_with(target=[1, 2]),
+    "huge target.json": state_with(target=[10**400, 0, 0]),
+    "design of numbers.json": state_with(design=7),
+    "list as look.json": state_with(appearance=[1]),
+    "camera.json": state_with(camera={"position": [1, 2, 3]}),
+    "list.json": "[]",
+    "null.json": "null",
+    "bytes.json": "\x00\x01",
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_file_is_refused_in_a_few_words(name):
+    with pytest.raises(SoftreachError) as caught:
+        state_from(name, HOSTILE[name].encode(), STATE)
+    assert len(str(caught.value)) < 6000
+    assert "Traceback" not in str(caught.value)
+
+
+def test_a_large_file_is_refused_before_it_is_read(tmp_path):
+    path = tmp_path / "state.json"
+    with path.open("wb") as file:
+        file.truncate(50_000_000)
+    with pytest.raises(SoftreachError, match="50 MB: must be at most 2 MB"):
+        start_on_state(path)

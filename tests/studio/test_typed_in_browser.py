@@ -1,0 +1,111 @@
+"""Numbers are kept as they are typed, and a refused one says why under its field."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from softreach.arm import designs
+from softreach.arm.parameters import find_parameter
+from softreach.studio import StudioState
+
+
+@pytest.fixture(autouse=True)
+def _small_design_again(tab):
+    yield
+    tab.session.update(lambda s: StudioState(design=designs.minimal_trunk()).showing(level=14))
+    tab.settle()
+
+
+def field(tab, label):
+    """What is typed into, beside the slider of a label or behind the label."""
+    row = f"xpath=//label[normalize-space()='{label}']"
+    return tab.page.locator(f"{row}/following::form[1]//input[1]")
+
+
+def typed(tab, label, text, enter=True):
+    """Key by key, as a person types."""
+    place = field(tab, label)
+    place.scroll_into_view_if_needed()
+    place.click()
+    tab.page.keyboard.press("Control+a")
+    tab.page.keyboard.type(text, delay=15)
+    if enter:
+        tab.page.keyboard.press("Enter")
+    return place
+
+
+def value(tab, name):
+    arm = tab.session.state.design
+    return find_parameter(arm, name).value(arm)
+
+
+@pytest.mark.parametrize(
+    ("label", "name", "text", "wanted"),
+    [
+        ("taper φ [deg]", "taper", "-0.00884", np.radians(-0.00884)),
+        ("extent σ [deg]", "extent", "36.5", np.radians(36.5)),
+        ("extent σ [deg]", "extent", "2.5e-1", np.radians(0.25)),
+        ("lowest γ", "lower", "-0.123456789", -0.123456789),
+        ("revolution Ω [deg]", "revolution", "400", np.radians(400)),
+    ],
+)
+def test_a_number_is_kept_to_the_last_digit(tab, label, name, text, wanted):
+    tab.open("Design")
+    place = typed(tab, label, text)
+    tab.wait(lambda: abs(value(tab, name) - wanted) < 1e-15, f"{label} is {text}")
+    tab.settle()
+    tab.page.wait_for_timeout(300)
+    assert place.input_value() == text
+    assert value(tab, name) == pytest.approx(wanted, abs=1e-15)
+
+
+def test_nothing_happens_before_enter_and_the_field_says_so(tab):
+    tab.open("Design")
+    before = tab.session.state.design
+    typed(tab, "taper φ [deg]", "1.5", enter=False)
+    tab.page.get_by_text("Enter applies it").wait_for()
+    assert tab.session.state.design == before
+    tab.page.keyboard.press("Enter")
+    tab.wait(lambda: tab.session.state.design != before, "Enter applies it")
+    tab.page.get_by_text("Enter applies it").wait_for(state="hidden")
+
+
+@pytest.mark.parametrize(
+    ("label", "text", "said"),
+    [
+        ("taper φ [deg]", "30", "taper φ [deg] = 30"),
+        ("extent σ [deg]", "500", "<= 360"),
+        ("taper φ [deg]", "much", "must be a number"),
+    ],
+)
+def test_a_refused_number_says_why_under_its_field_in_its_own_unit(tab, label, text, said):
+    tab.open("Design")
+    before = tab.session.state.design
+    place = typed(tab, label, text)
+    alert = tab.page.get_by_role("alert").filter(has_text=said)
+    alert.wait_for()
+    gap = alert.bounding_box()["y"] - place.bounding_box()["y"]
+    assert 0 < gap < 60
+    assert tab.session.state.design == before
+    typed(tab, label, "1.5")
+    tab.wait(lambda: tab.session.state.design != before, "a number that can be is taken")
+    alert.wait_for(state="hidden")
+
+
+def test_an_activation_below_zero_is_typed(tab):
+    tab.open("Activation")
+    typed(tab, "γ left", "-0.05")
+    tab.wait(lambda: tab.session.state.activation[0] == -0.05, "the bundle pulls")
+
+
+def test_every_control_has_a_tooltip_with_its_meaning(tab):
+    gui = tab.session.client.gui
+    inputs = [h for h in gui._gui_input_handle_from_uuid.values() if hasattr(h, "hint")]
+    lacking = [getattr(h, "label", "") for h in inputs if not h.hint]
+    assert len(inputs) > 40
+    assert not lacking
+    tab.open("Design")
+    tab.slider("extent σ [deg]").hover()
+    tab.page.get_by_text("the angle of the cross-section").wait_for()
+    assert "hull" in tab.page.get_by_text("UNR").first.get_attribute("title")
