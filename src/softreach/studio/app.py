@@ -128,6 +128,7 @@ def _furnish(session: Session, url: str) -> None:
     from softreach.studio.panels.atlas import AtlasPanel
     from softreach.studio.panels.design import DesignPanel
     from softreach.studio.panels.export import ExportPanel
+    from softreach.studio.panels.handle import HandlePanel
     from softreach.studio.panels.inverse import InversePanel
     from softreach.studio.panels.loads import LoadsPanel
     from softreach.studio.panels.parts import PartsPanel
@@ -138,14 +139,16 @@ def _furnish(session: Session, url: str) -> None:
     made: list[Any] = [StatusPanel(gui)]
     tabs = gui.add_tab_group()
     kinds = {
-        "Design": DesignPanel,
-        "Parts": PartsPanel,
-        "Loads": LoadsPanel,
-        "Activation": ActivationPanel,
-        "Inverse": InversePanel,
-        "View": ViewPanel,
+        "Design": (DesignPanel,),
+        "Parts": (PartsPanel,),
+        "Loads": (LoadsPanel,),
+        "Activation": (ActivationPanel,),
+        "Inverse": (HandlePanel, InversePanel),
+        "View": (ViewPanel,),
     }
-    made += [kind(gui, tabs.add_tab(name), session) for name, kind in kinds.items()]
+    for name, together in kinds.items():
+        tab = tabs.add_tab(name)
+        made += [kind(gui, tab, session) for kind in together]
     made.append(ExportPanel(gui, tabs.add_tab("Export"), session, url))
     if session.board is not None:
         made.append(AtlasPanel(gui, tabs.add_tab("Atlas"), session, session.board))

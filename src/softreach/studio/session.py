@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from softreach.errors import SoftreachError
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.eye import Eye
-from softreach.studio.jobs import JOBS, Job, SolveInverse, what_follows
+from softreach.studio.jobs import JOBS, Job, PullTip, SolveInverse, what_follows
+from softreach.studio.jobs.pull import PullOrder, TipPull
 from softreach.studio.map_board import MapBoard, board_of
 from softreach.studio.reach import Reach
 from softreach.studio.scene import Scene
@@ -72,6 +73,8 @@ class Session:
         """Where it has been."""
         self.answer: Solution | None = None
         """Of the inverse problem."""
+        self.tip_pull: TipPull | None = None
+        """What a drag of the tip has led to; None when nobody drags."""
         self.atlas: xr.Dataset | None = start.atlas
         self.board: MapBoard | None = board_of(self.scene, self.atlas)
         self.drawing = threading.RLock()
@@ -118,6 +121,18 @@ class Session:
             self.state = self.state.replace(target=vector(target))
         self.follow(SolveInverse)
         self.show()
+
+    def pull_tip(self, phase: str, wanted: Array) -> None:
+        """Follow a drag of the tip; returns at once.
+
+        Args:
+            phase: "start", "update" or "end".
+            wanted: Where the tip should be [L].
+        """
+        pull = self._jobs[PullTip]
+        assert isinstance(pull, PullTip)
+        pull.order = PullOrder(wanted, rests=phase == "end")
+        self.follow(PullTip)
 
     def restore(self, state: StudioState) -> None:
         """Take up a state that was saved, and its view."""

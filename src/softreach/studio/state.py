@@ -89,6 +89,8 @@ class Appearance:
     """The cloud without loads, faint, around that of a loaded arm."""
     ghosts: bool = True
     """The shapes of all solutions of the inverse problem at once."""
+    handle: bool = True
+    """The ball on the tip that is dragged."""
     map: MapView = field(default_factory=MapView)
 
     def __post_init__(self) -> None:

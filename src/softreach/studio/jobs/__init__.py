@@ -7,6 +7,7 @@ from softreach.studio.jobs.free import DrawFree
 from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.jobs.job import Job
 from softreach.studio.jobs.map import DrawMap
+from softreach.studio.jobs.pull import PullTip
 from softreach.studio.jobs.reach import ComputeReach, DrawCloud, DrawSurfaces
 from softreach.studio.jobs.reference import DrawReference
 from softreach.studio.state import StudioState
@@ -21,6 +22,7 @@ __all__ = [
     "DrawReference",
     "DrawSurfaces",
     "Job",
+    "PullTip",
     "SolveInverse",
     "what_follows",
 ]
@@ -32,6 +34,7 @@ JOBS: tuple[type[Job], ...] = (
     DrawFree,
     DrawSurfaces,
     SolveInverse,
+    PullTip,
     DrawReference,
     DrawMap,
 )

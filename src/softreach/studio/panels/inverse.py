@@ -1,4 +1,4 @@
-"""Every activation that reaches a place: click a point of the cloud, or type it."""
+"""Every activation that reaches a place: drag the tip there, click a point, or type it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ from softreach.studio.panels.binding import attempt, bind, bind_button
 from softreach.studio.panels.line import Line
 from softreach.studio.picking import picked_point
 from softreach.studio.reach import cloud_points, shown_samples
+from softreach.studio.rod import rod_of
 from softreach.studio.slicing import in_slice
+from softreach.studio.state import StudioState
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -23,7 +25,10 @@ if TYPE_CHECKING:
 
 __all__ = ["InversePanel"]
 
-_HINT = "Click a point of the cloud, or type a target."
+_HINT = "Drag the tip, type a target, or let a click on the cloud set it."
+_ABOUT_CLICKS = "off: a click in the scene changes nothing"
+_HELD = 1e-4
+"""Change of activation, in ranges, below which the arm holds a solution."""
 
 
 class InversePanel:
@@ -38,6 +43,7 @@ class InversePanel:
         with tab:
             self._text = Line(gui, _HINT)
             self._target = gui.add_vector3("target / L", (0.0, 0.0, 1.0), step=0.001)
+            self._clicks = gui.add_checkbox("clicks set the target", False, hint=_ABOUT_CLICKS)
             solve = gui.add_button("Solve")
             self._ghosts = gui.add_checkbox("show all shapes", session.state.appearance.ghosts)
             self._folder = gui.add_folder("activations that reach it", visible=False)
@@ -55,7 +61,7 @@ class InversePanel:
             self._shown = session.answer
             self._list(session.answer)
         for activation, button in self._buttons:
-            held = tuple(activation.tolist()) == session.state.activation
+            held = _is_held(activation, session.state)
             button.color = "green" if held else None
 
     def _list(self, answer: Solution | None) -> None:
@@ -71,8 +77,14 @@ class InversePanel:
                 self._buttons = [(row, self._button(row)) for row in answer.activations]
 
     def click(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
-        """Aim at the point of the cloud under the cursor; return whether there is one."""
+        """Aim at the point of the cloud under the cursor, if clicks are to do that.
+
+        Returns:
+            Whether they are, and there is one.
+        """
         session = self._session
+        if not self._clicks.value:
+            return False
         reach, look = session.reach, session.state.appearance
         if reach is None or not look.cloud or reach.arm != session.state.design:
             return False
@@ -95,6 +107,11 @@ class InversePanel:
         take = lambda: self._session.update(lambda s: s.replace(activation=wanted))  # noqa: E731
         bind_button(button, self._session, take)
         return button
+
+
+def _is_held(activation: Any, state: StudioState) -> bool:
+    scales = np.maximum(np.ptp(rod_of(state.design).box.bounds, axis=1), 1e-12)
+    return bool((np.abs(activation - state.activation) <= _HELD * scales).all())
 
 
 def _tip(arm: Manipulator, activation: Any) -> Any:
