@@ -11,6 +11,7 @@ from softreach.studio import StudioState
 
 @pytest.fixture(scope="module")
 def inverse_tab(tab):
+    tab.page.set_viewport_size({"width": 1366, "height": 768})  # else notices cover the tip
     tab.open("Inverse")
     return tab
 
@@ -86,7 +87,8 @@ def test_beyond_the_boundary_the_arm_stays_near_and_a_line_shows_the_gap(inverse
     tab.settle()
     pull = tab.session.tip_pull
     assert tab.drawn("/lag").visible
-    tab.page.get_by_text(f"{pull.pulled.gap:.3f} L short").wait_for()
+    assert tab.drawn("/lag label").text == f"{pull.pulled.gap:.3f} L short"
+    tab.page.get_by_text(f"This branch ends {pull.pulled.gap:.3f} L short").wait_for()
     answer = sr.solve_inverse(tab.session.state.design, [pull.wanted])[0]
     assert len(answer) == 0
     assert pull.pulled.gap == pytest.approx(answer.gap, abs=1e-5)

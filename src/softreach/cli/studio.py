@@ -24,11 +24,17 @@ def studio(
         str, Parameter(help="Address to listen on; anyone who can reach it may use the page.")
     ] = "127.0.0.1",
     port: Annotated[int | None, Parameter(help="A free port by default.")] = None,
+    fresh: Annotated[
+        bool,
+        Parameter(help="Begin with the source itself, not where the last work on it ended."),
+    ] = False,
     open_page: Annotated[
         bool, Parameter(name="--open", help="Open the page in the browser.")
     ] = True,
 ) -> None:
     """Serve a page on this machine: move sliders and see what the design can reach.
+
+    The work on a design and its snapshots are kept in a folder of your own, and found again.
 
     Example: softreach studio redundant_trunk --no-open
     """
@@ -37,8 +43,13 @@ def studio(
     import webbrowser
 
     from softreach.studio import Studio
+    from softreach.studio.kept_work import work_on
 
-    with Studio(_start(source), host, port) as running:
+    start = _start(source)
+    # A state that is opened by its file is what is wanted, not what came of it.
+    goes_on = not fresh and not source.lower().endswith(".json")
+    work = work_on(start.state.design, goes_on=goes_on)
+    with Studio(start, host, port, work) as running:
         sys.stdout.write(f"{running.url}  (Ctrl-C ends it)\n")
         sys.stdout.flush()
         if open_page:

@@ -9,12 +9,15 @@ from typing import TYPE_CHECKING, Any, Self
 
 from softreach.studio.compiling import CompilationWatch
 from softreach.studio.connections import asked_path, close_all
+from softreach.studio.history import History
+from softreach.studio.kept_work import KeptWork
 from softreach.studio.link import state_in_request
 from softreach.studio.panels.binding import attempt
 from softreach.studio.server import LOOPBACK, page_url, start_server, stop_server
 from softreach.studio.session import Session
+from softreach.studio.snapshots import Snapshots
 from softreach.studio.source import Start
-from softreach.studio.state import Camera
+from softreach.studio.state import Camera, StudioState
 from softreach.studio.worker import Latest
 
 if TYPE_CHECKING:
@@ -29,19 +32,30 @@ _EYE_ON_MAP = Camera(position=(1.9, -6.3, 2.0), look_at=(-0.95, -0.5, 0.3))
 class Studio:
     """A local page on a design; every tab has its own state."""
 
-    def __init__(self, start: Start, host: str = LOOPBACK, port: int | None = None) -> None:
+    def __init__(
+        self,
+        start: Start,
+        host: str = LOOPBACK,
+        port: int | None = None,
+        work: KeptWork | None = None,
+    ) -> None:
         """Start serving.
 
         Args:
             start: What new tabs begin with.
             host: Address to listen on.
             port: None for a free one.
+            work: Where the work is kept when tabs and server end; nowhere by default.
 
         Raises:
             InvalidInput: The address cannot be used.
             MissingExtra: viser is not installed.
         """
-        self.start = start
+        self.start, self.work = start, work
+        self.snapshots = Snapshots(work)
+        self.snapshots.changed = self._show_all
+        self._left: list[tuple[StudioState, History]] = []
+        """The work of tabs that are closed: a page that is reloaded takes up the latest."""
         self.sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
         self._notice = Latest(_ignored)
@@ -94,12 +108,17 @@ class Studio:
             session.show()
 
     def _connected(self, client: ClientHandle) -> None:
-        session = Session(client, self.start)
+        session = Session(client, self.start, work=self.work, snapshots=self.snapshots)
         session.compiling = self._compilation.running
         with self._lock:
+            left = self._work_left()
             self.sessions[client.client_id] = session
+        if left is not None:
+            session.resume(*left)
         _furnish(session, self.url)
         session.begin()
+        if self.work is not None and self.work.complaint:
+            session.say(self.work.complaint)
         if session.atlas is not None and session.board is None:
             session.say("There is no map: the atlas is no grid of two parameters or more.")
         attempt(session, lambda: self._follow_link(session))
@@ -115,6 +134,22 @@ class Studio:
             session = self.sessions.pop(client.client_id, None)
         if session is not None:
             session.close()
+            if self.work is not None:
+                session.keep()
+                self._left.append((session.state_now(), session.history))
+
+    def _work_left(self) -> tuple[StudioState, History] | None:
+        """What a new tab goes on with: nothing beside tabs that are open, as it is theirs."""
+        if self.work is None:
+            return None
+        if self._left:
+            return self._left.pop()
+        latest = None if self.sessions else self.work.latest
+        return None if latest is None else (latest, History())
+
+    def _show_all(self) -> None:
+        for session in list(self.sessions.values()):
+            session.show()
 
 
 def _ignored(error: Exception) -> None:

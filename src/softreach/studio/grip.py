@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 Dragged = Callable[[str, Array], None]
 """(phase "start", "update" or "end"; where the ball should be [L])."""
 
-_BALL, _HALO, _POINTER = 0.014, 0.036, 0.009  # radii [L]
+_HALO, _SMALLEST, _POINTER = 0.035, 0.016, 0.009  # radii [L]
 _COLOR, _LAG = (25, 25, 30), (220, 30, 120)
 
 
@@ -32,20 +32,23 @@ class Grip:
             dragged: Called on the event loop, so that it must not take long.
         """
         self._api, self._dragged = api, dragged
-        self._ball: Any = None
+        self._nodes: tuple[Any, Any] | None = None
         self._lag: tuple[Any, Any, Any] | None = None
         self._offset = np.zeros(3)
 
-    def move(self, tip: Array | None) -> None:
-        """Put the ball on the tip [L]; None hides it."""
+    def move(self, tip: Array | None, radius: float = 0.0) -> None:
+        """Put the ball on the tip [L], around an arm of this radius [L]; None hides it."""
         if tip is None:
-            if self._ball is not None:
-                self._ball.visible = False
+            if self._nodes is not None:
+                self._nodes[0].visible = False
             return
-        if self._ball is None:
-            self._ball = self._drawn(tip)
-        self._ball.position = tip
-        self._ball.visible = True
+        if self._nodes is None:
+            self._nodes = self._drawn(tip)
+        halo, ball = self._nodes
+        ball.radius = max(1.2 * radius, _SMALLEST)
+        halo.radius = max(1.6 * radius, _HALO)
+        halo.position = tip
+        halo.visible = True
 
     def show_lag(self, wanted: Array | None, tip: Array | None, gap: float = 0.0) -> None:
         """A line from the tip to where it was pulled to [L], and how long it is; None for none."""
@@ -62,11 +65,11 @@ class Grip:
         for node in self._lag:
             node.visible = True
 
-    def _drawn(self, tip: Array) -> Any:
+    def _drawn(self, tip: Array) -> tuple[Any, Any]:
         halo = self._api.add_icosphere(
             "/grip", _HALO, _COLOR, opacity=0.25, cast_shadow=False, position=tip
         )
-        self._api.add_icosphere("/grip/ball", _BALL, _COLOR, cast_shadow=False)
+        ball = self._api.add_icosphere("/grip/ball", _SMALLEST, _COLOR, cast_shadow=False)
 
         @halo.on_drag("left")
         async def _(event: Any) -> None:  # on the event loop, which keeps phases in order
@@ -75,7 +78,7 @@ class Grip:
                 self._offset = np.array(halo.position) - event.start_position
             self._dragged(event.phase, end + self._offset)
 
-        return halo
+        return halo, ball
 
     def _drawn_lag(self) -> tuple[Any, Any, Any]:
         pointer = self._api.add_icosphere("/lag", _POINTER, _LAG, cast_shadow=False)

@@ -12,11 +12,14 @@ from numpy.typing import NDArray
 from softreach.errors import SoftreachError
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.eye import Eye
+from softreach.studio.history import History
 from softreach.studio.jobs import JOBS, Job, PullTip, SolveInverse, what_follows
 from softreach.studio.jobs.pull import PullOrder, TipPull
+from softreach.studio.kept_work import KeptWork
 from softreach.studio.map_board import MapBoard, board_of
 from softreach.studio.reach import Reach
 from softreach.studio.scene import Scene
+from softreach.studio.snapshots import Snapshots
 from softreach.studio.source import Start
 from softreach.studio.state import StudioState, vector
 from softreach.studio.worker import Latest
@@ -44,10 +47,29 @@ class Panel(Protocol):
 class Session:
     """Holds the state of a tab; everything heavy happens in its jobs, on threads of their own."""
 
-    def __init__(self, client: ClientHandle, start: Start) -> None:
-        """Begin a session; `panels` are added by the app before the first `update`."""
+    def __init__(
+        self,
+        client: ClientHandle,
+        start: Start,
+        *,
+        work: KeptWork | None = None,
+        snapshots: Snapshots | None = None,
+    ) -> None:
+        """Begin a session; `panels` are added by the app before the first `update`.
+
+        Args:
+            client: The tab.
+            start: What it begins with.
+            work: Where its state is kept, if anywhere.
+            snapshots: Those of all tabs.
+        """
         self.client, self.quality = client, start.quality
         self.eye, self.scene = Eye(client), Scene(client.scene)
+        self.start, self.work = start, work
+        self.snapshots = snapshots or Snapshots()
+        self.history = History()
+        self.is_touched = False
+        """Whether there is anything to keep."""
         self.state: StudioState = start.state
         self.panels: list[Panel] = []
         self.note = ""
@@ -104,6 +126,7 @@ class Session:
         with self._changing:
             old, self.state, self.note = self.state, change(self.state), ""
             new = self.state
+            self._remember(old)
             self.revision += not by_widget
         self.follow(*what_follows(old, new))
         self.show()
@@ -118,7 +141,9 @@ class Session:
         assert isinstance(inverse, SolveInverse)
         inverse.take_nearest = True
         with self._changing:
-            self.state = self.state.replace(target=vector(target))
+            old = self.state
+            self.state = old.replace(target=vector(target))
+            self._remember(old)
         self.follow(SolveInverse)
         self.show()
 
@@ -139,6 +164,39 @@ class Session:
         self.update(lambda _: state)
         if state.camera is not None:
             self.eye.look_from(state.camera)
+
+    def step(self, *, back: bool) -> None:
+        """Undo the latest step of the work, or do again what was undone last."""
+        with self._changing:
+            walk = self.history.back if back else self.history.forth
+            history, state = walk(self.state)
+            if history is self.history:
+                self.say(f"There is nothing to {'undo' if back else 'redo'}.")
+                return
+            self.update(lambda _: state)
+            self.history = history
+
+    def reset(self) -> None:
+        """Go back to what the studio was opened on; can be undone."""
+        first = self.start.state
+        self.update(lambda s: first.replace(appearance=s.appearance, camera=s.camera))
+
+    def resume(self, state: StudioState, history: History) -> None:
+        """Go on where a tab left off, before anything is shown."""
+        self.state, self.history, self.is_touched = state, history, True
+        if state.design != self.start.state.design:
+            self.reach = None
+        if state.camera is not None:
+            self.eye.look_from(state.camera)
+
+    def keep(self) -> None:
+        """Write the state to where the next tab or server finds it."""
+        if self.work is not None and self.is_touched:
+            self.work.keep(self.state_now())
+
+    def _remember(self, old: StudioState) -> None:
+        self.history = self.history.after(old, self.state)
+        self.is_touched = self.is_touched or old != self.state
 
     def state_now(self) -> StudioState:
         """The state with the camera, as it is saved."""

@@ -6,6 +6,7 @@ from softreach.studio.jobs.arm import DrawArm
 from softreach.studio.jobs.free import DrawFree
 from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.jobs.job import Job
+from softreach.studio.jobs.keep import KeepState
 from softreach.studio.jobs.map import DrawMap
 from softreach.studio.jobs.pull import PullTip
 from softreach.studio.jobs.reach import ComputeReach, DrawCloud, DrawSurfaces
@@ -22,6 +23,7 @@ __all__ = [
     "DrawReference",
     "DrawSurfaces",
     "Job",
+    "KeepState",
     "PullTip",
     "SolveInverse",
     "what_follows",
@@ -37,6 +39,7 @@ JOBS: tuple[type[Job], ...] = (
     PullTip,
     DrawReference,
     DrawMap,
+    KeepState,
 )
 
 

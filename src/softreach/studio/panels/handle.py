@@ -27,7 +27,7 @@ class HandlePanel:
         self._session, self._revision = session, -1
         self._grip = Grip(session.client.scene, session.pull_tip)
         with tab:
-            Line(gui, _HINT)
+            self._text = Line(gui, _HINT)
             self._shown = gui.add_checkbox(
                 "handle on the tip", session.state.appearance.handle, hint=_HINT
             )
@@ -41,9 +41,13 @@ class HandlePanel:
             self._shown.value = state.appearance.handle
         movable = rod_of(state.design).box.dimension > 0
         grasped = state.appearance.handle and state.appearance.arm and movable
-        self._grip.move(session.tip if grasped else None)
+        arm = state.design
+        radius = float(arm.profile.radius(arm.length)) / arm.length
+        self._grip.move(session.tip if grasped else None, radius)
         if pull is None:
+            self._text.say(_HINT)
             self._grip.show_lag(None, None)
-        else:
-            length = state.design.length
-            self._grip.show_lag(pull.wanted, pull.pulled.tip / length, pull.pulled.gap / length)
+            return
+        gap = pull.pulled.gap / arm.length
+        self._text.say(f"This branch ends {gap:.3f} L short of the pointer." if gap else _HINT)
+        self._grip.show_lag(pull.wanted, pull.pulled.tip / arm.length, gap)
