@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 
 from softreach.arm import designs
@@ -22,7 +24,7 @@ def posed(state, first):
 
 def walked(states, times=None):
     history = History()
-    for k, (old, new) in enumerate(zip(states, states[1:], strict=False)):
+    for k, (old, new) in enumerate(pairwise(states)):
         now = 10.0 * k if times is None else times[k]
         history = history.after(old, new, lambda now=now: now)
     return history

@@ -53,7 +53,9 @@ class Studio:
         """
         self.start, self.work = start, work
         self.snapshots = Snapshots(work)
-        self.snapshots.changed = self._show_all
+        # On a thread of its own: two tabs that show each other's changes would wait for each other.
+        self._retold = Latest(_ignored)
+        self.snapshots.changed = lambda: self._retold.submit(lambda _: self._show_all())
         self._left: list[tuple[StudioState, History]] = []
         """The work of tabs that are closed: a page that is reloaded takes up the latest."""
         self.sessions: dict[int, Session] = {}
@@ -75,6 +77,7 @@ class Studio:
     def stop(self) -> None:
         """Stop serving."""
         self._compilation.close()
+        self._retold.close()
         for session in list(self.sessions.values()):
             session.close()
         self._disconnect_tabs()
@@ -161,9 +164,11 @@ def _furnish(session: Session, url: str) -> None:
     """Add the panels, and let clicks in the scene reach those that wait for them."""
     from softreach.studio.panels.activation import ActivationPanel
     from softreach.studio.panels.atlas import AtlasPanel
+    from softreach.studio.panels.compare import ComparePanel
     from softreach.studio.panels.design import DesignPanel
     from softreach.studio.panels.export import ExportPanel
     from softreach.studio.panels.handle import HandlePanel
+    from softreach.studio.panels.history import HistoryPanel
     from softreach.studio.panels.inverse import InversePanel
     from softreach.studio.panels.loads import LoadsPanel
     from softreach.studio.panels.parts import PartsPanel
@@ -171,7 +176,7 @@ def _furnish(session: Session, url: str) -> None:
     from softreach.studio.panels.view import ViewPanel
 
     gui = session.client.gui
-    made: list[Any] = [StatusPanel(gui)]
+    made: list[Any] = [StatusPanel(gui), HistoryPanel(gui, session)]
     tabs = gui.add_tab_group()
     kinds = {
         "Design": (DesignPanel,),
@@ -180,6 +185,7 @@ def _furnish(session: Session, url: str) -> None:
         "Activation": (ActivationPanel,),
         "Inverse": (HandlePanel, InversePanel),
         "View": (ViewPanel,),
+        "Compare": (ComparePanel,),
     }
     for name, together in kinds.items():
         tab = tabs.add_tab(name)

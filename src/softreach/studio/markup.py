@@ -19,7 +19,10 @@ _WIDE = "overflow-x:auto;padding:0 0.8em 0.6em"
 _TABLE = (
     "border-collapse:collapse;font-size:0.8em;line-height:1.35;font-variant-numeric:tabular-nums"
 )
-_CELL = "text-align:right;vertical-align:top;padding:0.25em 0.6em;white-space:nowrap;border-bottom:1px solid rgba(128,128,128,0.3)"
+_CELL = (
+    "text-align:right;vertical-align:top;padding:0.25em 0.6em;white-space:nowrap;"
+    "border-bottom:1px solid rgba(128,128,128,0.3)"
+)
 _STICKY = "position:sticky;left:0;text-align:left;background:var(--mantine-color-body,#fff);"
 
 
