@@ -115,7 +115,23 @@ def broken(**changes):
         broken(state={}),
         broken(state="{}"),
     ],
-    ids=lambda text: text[-24:],
+    ids=[
+        "empty",
+        "list",
+        "object",
+        "nested",
+        "version",
+        "nameless",
+        "two-lines",
+        "number",
+        "long",
+        "soon",
+        "never",
+        "size-number",
+        "size-empty",
+        "state-object",
+        "state-empty",
+    ],
 )
 def test_what_is_no_snapshot_is_refused_in_one_line(text, tmp_path):
     with pytest.raises(InvalidInput):

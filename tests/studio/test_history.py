@@ -26,7 +26,7 @@ def walked(states, times=None):
     history = History()
     for k, (old, new) in enumerate(pairwise(states)):
         now = 10.0 * k if times is None else times[k]
-        history = history.after(old, new, lambda now=now: now)
+        history = history.after(old, new, goes_on=True, clock=lambda now=now: now)
     return history
 
 
@@ -51,7 +51,7 @@ def test_where_there_is_nothing_to_go_to_the_state_stays(step):
 
 def test_a_change_after_a_step_back_forgets_what_was_undone():
     history, state = walked(STEPS).back(STEPS[-1])
-    history = history.after(state, posed(state, -0.1))
+    history = history.after(state, posed(state, -0.1), goes_on=True)
     assert history.future == ()
     assert history.back(posed(state, -0.1))[1] == state
 
@@ -60,6 +60,14 @@ def test_changes_of_one_kind_in_short_order_are_one_step():
     states = [START, *(tapered(START, 0.001 * k) for k in range(1, 6))]
     history = walked(states, times=[0.1 * k for k in range(5)])
     assert history.back(states[-1])[1] == START
+
+
+def test_a_change_that_does_not_go_on_is_a_step_of_its_own():
+    one, two = tapered(START, 0.01), tapered(START, 0.02)
+    history = History().after(START, one, goes_on=True)
+    assert history.after(one, two, goes_on=False).back(two)[1] == one
+    assert history.after(one, two, goes_on=True).back(two)[1] == START
+    assert history.at_rest().after(one, two, goes_on=True).back(two)[1] == one
 
 
 def test_changes_of_different_kinds_are_steps_of_their_own():

@@ -33,22 +33,33 @@ class History:
     """When that was [s]."""
 
     def after(
-        self, old: StudioState, new: StudioState, clock: Callable[[], float] = time.monotonic
+        self,
+        old: StudioState,
+        new: StudioState,
+        *,
+        goes_on: bool,
+        clock: Callable[[], float] = time.monotonic,
     ) -> History:
-        """The history after a change; many of one kind in short order are one step.
+        """The history after a change.
 
         Args:
             old: Before the change.
             new: After it. If only the view differs, the history stays.
+            goes_on: Whether it may be part of the step before, as while a slider is dragged: it is
+                if that was of the same kind, and a moment ago.
             clock: The time [s].
         """
         kind = _kind(old, new)
         if not kind:
             return self
         now = clock()
-        goes_on = kind == self.kind and now - self.at < _PAUSE
-        past = self.past if goes_on else (*self.past, old)[-_LONGEST:]
+        same = goes_on and kind == self.kind and now - self.at < _PAUSE
+        past = self.past if same else (*self.past, old)[-_LONGEST:]
         return History(past=past, kind=kind, at=now)
+
+    def at_rest(self) -> History:
+        """The same, of which the latest step is over: the next change is another."""
+        return replace(self, kind="")
 
     def back(self, present: StudioState) -> tuple[History, StudioState]:
         """The state before the latest step, seen as now; the present one if there was none."""

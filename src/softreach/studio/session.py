@@ -111,7 +111,11 @@ class Session:
         self.show()
 
     def update(
-        self, change: Callable[[StudioState], StudioState], *, by_widget: bool = False
+        self,
+        change: Callable[[StudioState], StudioState],
+        *,
+        by_widget: bool = False,
+        goes_on: bool = False,
     ) -> None:
         """Replace the state, and start what follows from that.
 
@@ -119,6 +123,8 @@ class Session:
             change: From the present state to the next.
             by_widget: Whether the widgets show the change already. They are left alone then: one
                 that is being dragged would jump back to where it was a moment ago.
+            goes_on: Whether the change may be part of the step before, for who undoes it; what
+                widgets do may be.
 
         Raises:
             SoftreachError: The change makes no valid state; nothing happens then.
@@ -126,7 +132,7 @@ class Session:
         with self._changing:
             old, self.state, self.note = self.state, change(self.state), ""
             new = self.state
-            self._remember(old)
+            self._remember(old, goes_on=goes_on or by_widget)
             self.revision += not by_widget
         self.follow(*what_follows(old, new))
         self.show()
@@ -143,7 +149,7 @@ class Session:
         with self._changing:
             old = self.state
             self.state = old.replace(target=vector(target))
-            self._remember(old)
+            self._remember(old, goes_on=False)
         self.follow(SolveInverse)
         self.show()
 
@@ -194,8 +200,13 @@ class Session:
         if self.work is not None and self.is_touched:
             self.work.keep(self.state_now())
 
-    def _remember(self, old: StudioState) -> None:
-        self.history = self.history.after(old, self.state)
+    def end_step(self) -> None:
+        """Make the next change a step of its own for who undoes it."""
+        with self._changing:
+            self.history = self.history.at_rest()
+
+    def _remember(self, old: StudioState, *, goes_on: bool) -> None:
+        self.history = self.history.after(old, self.state, goes_on=goes_on)
         self.is_touched = self.is_touched or old != self.state
 
     def state_now(self) -> StudioState:

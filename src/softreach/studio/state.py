@@ -179,7 +179,7 @@ def _parsed(text: str | bytes) -> dict[str, Any]:
     allowed = f"a state that the studio saved, version {VERSION}"
     try:
         values = json.loads(text)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InvalidInput("state file", str(error), allowed) from None
     found = values.pop("softreach_studio", None) if isinstance(values, dict) else None
     if found != VERSION:

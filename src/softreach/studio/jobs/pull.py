@@ -61,9 +61,11 @@ class PullTip(Job):
         pulled = self._pull_of(state).to(state.activation, target)
         if pulled is not None:
             session.tip_pull = None if rests else TipPull(wanted, pulled)
-            session.update(lambda s: _moved(s, state, pulled, vector(target) if rests else None))
-        if rests and self.order is order:
-            self.order = None
+            rest = vector(target) if rests else None
+            session.update(lambda s: _moved(s, state, pulled, rest), goes_on=True)
+        if rests:
+            session.end_step()
+            self.order = None if self.order is order else self.order
 
     def _pull_of(self, state: StudioState) -> Pull:
         solvable_rod(state.design)
