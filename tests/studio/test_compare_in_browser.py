@@ -52,7 +52,9 @@ def test_snapshots_stand_side_by_side_with_their_numbers_and_differences(compare
     volume, difference = other[1].split("\n")
     assert other[0] == "design 1"
     assert float(volume) == pytest.approx(second, abs=1e-4)
-    assert float(difference.split()[0]) == pytest.approx(second - first, rel=1e-3)
+    assert float(difference.split()[0].replace("\N{MINUS SIGN}", "-")) == pytest.approx(
+        second - first, rel=1e-3
+    )
     assert now[0] == "now"
 
 

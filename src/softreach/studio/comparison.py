@@ -20,6 +20,7 @@ __all__ = ["Candidate", "Comparison", "compared", "comparison_csv", "comparison_
 
 _DEGREE = math.degrees(1)
 _EQUAL = 1e-9  # relative difference that is rounding
+_MINUS = "\N{MINUS SIGN}"
 _MOST = 24
 """Columns of parameters; designs that differ in more are other arms altogether."""
 
@@ -127,7 +128,8 @@ def _cell(comparison: Comparison, row: int, column: int) -> list[Part]:
 
 
 def _written(value: float, error: Value) -> str:
-    return f"{value:.6g}" if error is None else f"{value:.4f}"
+    text = f"{value:.5g}" if error is None else f"{value:.4f}"
+    return text.replace("-", _MINUS)
 
 
 def _change(difference: float, first: Value, title: str) -> str:
@@ -136,7 +138,7 @@ def _change(difference: float, first: Value, title: str) -> str:
         return "="
     size = title.startswith(("volume", "area", "length ")) and first
     share = f" ({100 * difference / first:+.3g} %)" if size and first else ""
-    return f"{difference:+.4g}{share}"
+    return f"{difference:+.4g}{share}".replace("-", _MINUS)
 
 
 def _reach_columns(candidates: Sequence[Candidate]) -> list[_Column]:

@@ -23,6 +23,7 @@ _CELL = (
     "text-align:right;vertical-align:top;padding:0.25em 0.6em;white-space:nowrap;"
     "border-bottom:1px solid rgba(128,128,128,0.3)"
 )
+_HEAD = "white-space:normal;vertical-align:bottom;min-width:4em"
 _STICKY = "position:sticky;left:0;text-align:left;background:var(--mantine-color-body,#fff);"
 
 
@@ -76,7 +77,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[Sequence[Part]]]) -> str:
         rows: For every cell its lines.
     """
     titles = "".join(
-        f"<th style='{_CELL};{_STICKY * (k == 0)}'>{inline(text)}</th>"
+        f"<th style='{_CELL};{_HEAD};{_STICKY * (k == 0)}'>{inline(text)}</th>"
         for k, text in enumerate(head)
     )
     body = "".join(f"<tr>{_row(row)}</tr>" for row in rows)

@@ -31,7 +31,7 @@ class HistoryPanel:
             "Redo": lambda: session.step(back=False),
             "Reset": session.reset,
         }
-        row = gui.add_button_group("work", tuple(actions), hint=_HINT)
+        row = gui.add_button_group("history", tuple(actions), hint=_HINT)
         row.on_click(lambda _: attempt(session, actions[row.value]))
         self._bind(gui.add_command("Undo", hotkey="Z", modifier="cmd/ctrl"), actions["Undo"])
         again: Any = "cmd/ctrl+shift"
