@@ -10,6 +10,7 @@ from softreach.cli.inputs import design_from
 
 if TYPE_CHECKING:
     from softreach.studio import Start
+    from softreach.studio.kept_work import KeptWork
 
 __all__ = ["studio"]
 
@@ -43,18 +44,22 @@ def studio(
     import webbrowser
 
     from softreach.studio import Studio
-    from softreach.studio.kept_work import work_on
 
     start = _start(source)
-    # A state that is opened by its file is what is wanted, not what came of it.
-    goes_on = not fresh and not source.lower().endswith(".json")
-    work = work_on(start.state.design, goes_on=goes_on)
-    with Studio(start, host, port, work) as running:
+    with Studio(start, host, port, _work(start, source, fresh=fresh)) as running:
         sys.stdout.write(f"{running.url}  (Ctrl-C ends it)\n")
         sys.stdout.flush()
         if open_page:
             webbrowser.open(running.url)
         threading.Event().wait()
+
+
+def _work(start: Start, source: str, *, fresh: bool) -> KeptWork:
+    """What is kept of the work; a state or a cloud that is opened is shown as it is in its file."""
+    from softreach.studio.kept_work import work_on
+
+    as_it_is = source.lower().endswith(".json") or start.reach is not None
+    return work_on(start.state.design, goes_on=not fresh and not as_it_is)
 
 
 def _start(source: str) -> Start:

@@ -27,6 +27,7 @@ __all__ = ["Studio"]
 
 _EYE = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
 _EYE_ON_MAP = Camera(position=(1.9, -6.3, 2.0), look_at=(-0.95, -0.5, 0.3))
+_GOES_ON = "This goes on where the last work on it ended; Reset leads back to the beginning."
 
 
 class Studio:
@@ -122,6 +123,8 @@ class Studio:
         session.begin()
         if self.work is not None and self.work.complaint:
             session.say(self.work.complaint)
+        elif left is not None and not left[1].past:
+            session.say(_GOES_ON)
         if session.atlas is not None and session.board is None:
             session.say("There is no map: the atlas is no grid of two parameters or more.")
         attempt(session, lambda: self._follow_link(session))

@@ -43,7 +43,7 @@ class ComparePanel:
             self._table = Line(gui, _HINT)
             self._name = gui.add_text("name", "", hint="of the snapshot; empty for the next number")
             take = gui.add_button("Take snapshot", hint="keep design, activation and target")
-            self._choice = gui.add_dropdown("snapshot", (_NONE,))
+            self._choice: Any = gui.add_dropdown("snapshot", (_NONE,))
             restore = gui.add_button("Restore", hint="go back to it; the view stays")
             delete = gui.add_button("Delete", color="gray")
             save = gui.add_button("Save table (CSV)", color="gray")
