@@ -29,6 +29,10 @@ def taper(tab):
     return find_parameter(design, "taper").value(design)
 
 
+def shown_taper(tab):
+    return float(tab.slider("taper φ [deg]").get_attribute("aria-valuenow"))
+
+
 def become(tab, condition, what):
     tab.wait(condition, what)
     tab.settle()
@@ -39,13 +43,12 @@ def test_a_dragged_slider_is_one_step_that_buttons_and_keys_undo(tab):
     first = tab.session.state.design
     tab.drag("taper φ [deg]", 30)
     become(tab, lambda: tab.session.state.design != first, "the design changes")
-    tab.page.wait_for_timeout(200)  # until the last event of the drag is in
-    tab.settle()
+    tab.page.wait_for_timeout(500)  # until the last event of the drag is in
+    become(tab, lambda: abs(shown_taper(tab) - np.degrees(taper(tab))) < 0.03, "the drag is over")
     second = tab.session.state.design
     tab.press("Undo")
     become(tab, lambda: tab.session.state.design == first, "the design is back")
-    shown = float(tab.slider("taper φ [deg]").get_attribute("aria-valuenow"))
-    assert shown == pytest.approx(np.degrees(taper(tab)), abs=0.03)
+    tab.wait(lambda: abs(shown_taper(tab) - np.degrees(taper(tab))) < 0.03, "the slider is back")
     tab.press("Redo")
     become(tab, lambda: tab.session.state.design == second, "the change is there again")
     tab.page.locator("canvas").first.focus()
@@ -57,7 +60,7 @@ def test_a_dragged_slider_is_one_step_that_buttons_and_keys_undo(tab):
 
 
 def test_reset_leads_back_to_the_beginning_and_can_be_undone(tab):
-    tab.session.update(lambda s: s.replace(design=changed(TRUNK, {"revolution": 1.0})))
+    tab.session.update(lambda s: s.replace(design=changed(TRUNK, {"revolution": np.radians(60)})))
     tab.session.update(lambda s: s.showing(color="manipulability"))
     before = tab.session.state
     tab.press("Reset")

@@ -174,13 +174,14 @@ class Session:
     def step(self, *, back: bool) -> None:
         """Undo the latest step of the work, or do again what was undone last."""
         with self._changing:
+            old = self.state
             walk = self.history.back if back else self.history.forth
-            history, state = walk(self.state)
-            if history is self.history:
-                self.say(f"There is nothing to {'undo' if back else 'redo'}.")
-                return
-            self.update(lambda _: state)
-            self.history = history
+            self.history, self.state = walk(old)
+            stays = self.state is old
+            self.note = f"There is nothing to {'undo' if back else 'redo'}." if stays else ""
+            self.revision += 1
+        self.follow(*what_follows(old, self.state))
+        self.show()
 
     def reset(self) -> None:
         """Go back to what the studio was opened on; can be undone."""
