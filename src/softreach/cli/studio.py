@@ -46,7 +46,7 @@ def studio(
     from softreach.studio import Studio
 
     start = _start(source)
-    with Studio(start, host, port, _work(start, source, fresh=fresh)) as running:
+    with Studio(start, host, port, work=_work(start, source, fresh=fresh)) as running:
         sys.stdout.write(f"{running.url}  (Ctrl-C ends it)\n")
         sys.stdout.flush()
         if open_page:

@@ -38,6 +38,7 @@ class Studio:
         start: Start,
         host: str = LOOPBACK,
         port: int | None = None,
+        *,
         work: KeptWork | None = None,
     ) -> None:
         """Start serving.

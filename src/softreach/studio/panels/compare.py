@@ -43,10 +43,16 @@ class ComparePanel:
             self._table = Line(gui, _HINT)
             self._name = gui.add_text("name", "", hint="of the snapshot; empty for the next number")
             take = gui.add_button("Take snapshot", hint="keep design, activation and target")
-            self._choice: Any = gui.add_dropdown("snapshot", (_NONE,))
+            self._choice: Any = gui.add_dropdown(
+                "snapshot", (_NONE,), hint="the one to restore or delete"
+            )
             restore = gui.add_button("Restore", hint="go back to it; the view stays")
-            delete = gui.add_button("Delete", color="gray")
-            save = gui.add_button("Save table (CSV)", color="gray")
+            delete = gui.add_button("Delete", color="gray", hint="forget it, for good")
+            save = gui.add_button(
+                "Save table (CSV)",
+                color="gray",
+                hint="with errors and differences, for a spreadsheet",
+            )
         bind_button(take, session, self._take)
         bind_button(restore, session, self._restore)
         bind_button(delete, session, lambda: session.snapshots.remove(self._chosen().name))
