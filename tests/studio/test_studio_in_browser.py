@@ -64,6 +64,7 @@ def test_an_activation_puts_the_tip_where_the_library_says(tab):
 
 def test_a_click_on_a_point_of_the_cloud_finds_activations_that_reach_it(tab):
     tab.open("Inverse")
+    tab.page.get_by_label("clicks set the target").check()
     tab.click_at(tab.session.reach.cloud.tip.values[100] / tab.session.state.design.length)
     tab.wait(lambda: tab.session.answer is not None, "a target is solved for")
     tab.settle()

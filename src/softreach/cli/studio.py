@@ -11,6 +11,7 @@ from softreach.cli.numbers import WHOLE
 
 if TYPE_CHECKING:
     from softreach.studio import Start
+    from softreach.studio.kept_work import KeptWork
 
 __all__ = ["studio"]
 
@@ -25,6 +26,10 @@ def studio(
         str, Parameter(help="Address to listen on; anyone who can reach it may use the page.")
     ] = "127.0.0.1",
     port: Annotated[int | None, WHOLE, Parameter(help="A free port by default.")] = None,
+    fresh: Annotated[
+        bool,
+        Parameter(help="Begin with the source itself, not where the last work on it ended."),
+    ] = False,
     open_page: Annotated[
         bool, Parameter(name="--open", help="Open the page in the browser.")
     ] = True,
@@ -34,6 +39,8 @@ def studio(
     ] = None,
 ) -> None:
     """Serve a page on this machine: move sliders and see what the design can reach.
+
+    The work on a design and its snapshots are kept in a folder of your own, and found again.
 
     Example: softreach studio redundant_trunk --no-open
     """
@@ -47,7 +54,9 @@ def studio(
 
     check_port(port or 0)
     asked = not is_local(host) if token is None else token
-    with Studio(_start(source), host, port, new_token() if asked else "") as running:
+    start = _start(source)
+    secret, work = new_token() if asked else "", _work(start, source, fresh=fresh)
+    with Studio(start, host, port, secret, work=work) as running:
         sys.stdout.write(f"{running.url}  (Ctrl-C ends it)\n")
         for url in running.urls_for_others:
             sys.stdout.write(f"{url}  (for other machines)\n")
@@ -66,6 +75,14 @@ def _warning(*, asked: bool) -> str:
         f"warning: everyone {who} can use this studio and this machine's processor; "
         "what is sent is not encrypted\n"
     )
+
+
+def _work(start: Start, source: str, *, fresh: bool) -> KeptWork:
+    """What is kept of the work; a state or a cloud that is opened is shown as it is in its file."""
+    from softreach.studio.kept_work import work_on
+
+    as_it_is = source.lower().endswith(".json") or start.reach is not None
+    return work_on(start.state.design, goes_on=not fresh and not as_it_is)
 
 
 def _start(source: str) -> Start:

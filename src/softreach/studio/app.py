@@ -10,12 +10,15 @@ from typing import TYPE_CHECKING, Any, Self
 from softreach.studio.addresses import LOOPBACK, page_address, reachable_hosts
 from softreach.studio.compiling import CompilationWatch
 from softreach.studio.connections import asked_path, close_all
+from softreach.studio.history import History
+from softreach.studio.kept_work import KeptWork
 from softreach.studio.link import state_in_request
 from softreach.studio.panels.binding import attempt
 from softreach.studio.server import page_url, start_server, stop_server
 from softreach.studio.session import Session
+from softreach.studio.snapshots import Snapshots
 from softreach.studio.source import Start
-from softreach.studio.state import Camera
+from softreach.studio.state import Camera, StudioState
 from softreach.studio.token import with_token
 from softreach.studio.worker import Latest
 
@@ -26,13 +29,20 @@ __all__ = ["Studio"]
 
 _EYE = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
 _EYE_ON_MAP = Camera(position=(1.9, -6.3, 2.0), look_at=(-0.95, -0.5, 0.3))
+_GOES_ON = "This goes on where the last work on it ended; Reset leads back to the beginning."
 
 
 class Studio:
     """A local page on a design; every tab has its own state."""
 
     def __init__(
-        self, start: Start, host: str = LOOPBACK, port: int | None = None, token: str = ""
+        self,
+        start: Start,
+        host: str = LOOPBACK,
+        port: int | None = None,
+        token: str = "",
+        *,
+        work: KeptWork | None = None,
     ) -> None:
         """Start serving.
 
@@ -41,12 +51,19 @@ class Studio:
             host: Address to listen on.
             port: None for a free one.
             token: What every page has to know; "" for nothing.
+            work: Where the work is kept when tabs and server end; nowhere by default.
 
         Raises:
             InvalidInput: The address cannot be used.
             MissingExtra: viser is not installed.
         """
-        self.start, self._token = start, token
+        self.start, self._token, self.work = start, token, work
+        self.snapshots = Snapshots(work)
+        # On a thread of its own: two tabs that show each other's changes would wait for each other.
+        self._retold = Latest(_ignored)
+        self.snapshots.changed = lambda: self._retold.submit(lambda _: self._show_all())
+        self._left: list[tuple[StudioState, History]] = []
+        """The work of tabs that are closed: a page that is reloaded takes up the latest."""
         self.sessions: dict[int, Session] = {}
         self._lock = threading.Lock()
         self._notice = Latest(_ignored)
@@ -73,6 +90,7 @@ class Studio:
     def stop(self) -> None:
         """Stop serving."""
         self._compilation.close()
+        self._retold.close()
         for session in list(self.sessions.values()):
             session.close()
         self._disconnect_tabs()
@@ -106,14 +124,21 @@ class Studio:
             session.show()
 
     def _connected(self, client: ClientHandle) -> None:
-        session = Session(client, self.start)
+        session = Session(client, self.start, work=self.work, snapshots=self.snapshots)
         session.compiling = self._compilation.running
         with self._lock:
+            left = self._work_left()
             self.sessions[client.client_id] = session
+        if left is not None:
+            session.take_up(*left)
         _furnish(session, page_url(self.server))
         session.begin()
         if session.eye.is_upright and session.board is None:
             session.look_from("oblique")
+        if self.work is not None and self.work.complaint:
+            session.say(self.work.complaint)
+        elif left is not None and not left[1].past:
+            session.say(_GOES_ON)
         if session.atlas is not None and session.board is None:
             session.say("There is no map: the atlas is no grid of two parameters or more.")
         attempt(session, lambda: self._follow_link(session))
@@ -129,6 +154,22 @@ class Studio:
             session = self.sessions.pop(client.client_id, None)
         if session is not None:
             session.close()
+            if self.work is not None:
+                session.keep()
+                self._left.append((session.state_now(), session.history))
+
+    def _work_left(self) -> tuple[StudioState, History] | None:
+        """What a new tab goes on with: nothing beside tabs that are open, as it is theirs."""
+        if self.work is None:
+            return None
+        if self._left:
+            return self._left.pop()
+        latest = None if self.sessions else self.work.latest
+        return None if latest is None else (latest, History())
+
+    def _show_all(self) -> None:
+        for session in list(self.sessions.values()):
+            session.show()
 
 
 def _ignored(error: Exception) -> None:
@@ -140,8 +181,11 @@ def _furnish(session: Session, url: str) -> None:
     """Add the panels, and let clicks in the scene reach those that wait for them."""
     from softreach.studio.panels.activation import ActivationPanel
     from softreach.studio.panels.atlas import AtlasPanel
+    from softreach.studio.panels.compare import ComparePanel
     from softreach.studio.panels.design import DesignPanel
     from softreach.studio.panels.export import ExportPanel
+    from softreach.studio.panels.handle import HandlePanel
+    from softreach.studio.panels.history import HistoryPanel
     from softreach.studio.panels.inverse import InversePanel
     from softreach.studio.panels.loads import LoadsPanel
     from softreach.studio.panels.parts import PartsPanel
@@ -149,17 +193,20 @@ def _furnish(session: Session, url: str) -> None:
     from softreach.studio.panels.view import ViewPanel
 
     gui = session.client.gui
-    made: list[Any] = [StatusPanel(gui, session)]
+    made: list[Any] = [StatusPanel(gui, session), HistoryPanel(gui, session)]
     tabs = gui.add_tab_group()
     kinds = {
-        "Design": DesignPanel,
-        "Parts": PartsPanel,
-        "Loads": LoadsPanel,
-        "Activation": ActivationPanel,
-        "Inverse": InversePanel,
-        "View": ViewPanel,
+        "Design": (DesignPanel,),
+        "Parts": (PartsPanel,),
+        "Loads": (LoadsPanel,),
+        "Activation": (ActivationPanel,),
+        "Inverse": (HandlePanel, InversePanel),
+        "View": (ViewPanel,),
+        "Compare": (ComparePanel,),
     }
-    made += [kind(gui, tabs.add_tab(name), session) for name, kind in kinds.items()]
+    for name, together in kinds.items():
+        tab = tabs.add_tab(name)
+        made += [kind(gui, tab, session) for kind in together]
     made.append(ExportPanel(gui, tabs.add_tab("Export"), session, url))
     if session.board is not None:
         made.append(AtlasPanel(gui, tabs.add_tab("Atlas"), session, session.board))

@@ -7,6 +7,7 @@ makes it here; nobody else escapes, and nobody else writes tags around what is n
 from __future__ import annotations
 
 import html
+from collections.abc import Sequence
 from typing import Self
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "link",
     "paragraph",
     "spread",
+    "table",
 ]
 
 _LINE = "font-size:0.85em;line-height:1.45;padding:0 0.8em 0.4em;overflow-wrap:anywhere"
@@ -36,6 +38,17 @@ div:has(.mantine-Slider-root) + form input {padding:0 0.3em;letter-spacing:-0.5p
 div:has(.mantine-Slider-root) + form div:has(> * > label):not(:has(input)) {display:none}
 """
 _ALERT = f"color:#c92a2a;{_SMALL};white-space:pre-line"
+
+_WIDE = "overflow-x:auto;padding:0 0.8em 0.6em"
+_TABLE = (
+    "border-collapse:collapse;font-size:0.8em;line-height:1.35;font-variant-numeric:tabular-nums"
+)
+_CELL = (
+    "text-align:right;vertical-align:top;padding:0.25em 0.6em;white-space:nowrap;"
+    "border-bottom:1px solid rgba(128,128,128,0.3)"
+)
+_HEAD = "white-space:normal;vertical-align:bottom;min-width:4em"
+_STICKY = "position:sticky;left:0;text-align:left;background:var(--mantine-color-body,#fff);"
 
 
 class Strong(str):
@@ -96,6 +109,29 @@ def spread(*texts: str) -> str:
     """Texts from left to right over the whole width, as HTML."""
     cells = "".join(f"<span>{inline(text)}</span>" for text in texts)
     return f'<div style="display:flex;justify-content:space-between">{cells}</div>'
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[Sequence[Part]]]) -> str:
+    """A table as HTML, as wide as it needs to be; the first column stays in sight.
+
+    Args:
+        head: Titles of the columns.
+        rows: For every cell its lines.
+    """
+    titles = "".join(
+        f"<th style='{_CELL};{_HEAD};{_STICKY * (k == 0)}'>{inline(text)}</th>"
+        for k, text in enumerate(head)
+    )
+    body = "".join(f"<tr>{_row(row)}</tr>" for row in rows)
+    inner = f"<thead><tr>{titles}</tr></thead><tbody>{body}</tbody>"
+    return f'<div style="{_WIDE}"><table style="{_TABLE}">{inner}</table></div>'
+
+
+def _row(cells: Sequence[Sequence[Part]]) -> str:
+    return "".join(
+        f"<td style='{_CELL};{_STICKY * (k == 0)}'>{'<br>'.join(map(_part, lines))}</td>"
+        for k, lines in enumerate(cells)
+    )
 
 
 def _part(part: Part) -> str:

@@ -13,10 +13,14 @@ from numpy.typing import NDArray
 from softreach.errors import SoftreachError
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.eye import VIEWS, Eye, framing
-from softreach.studio.jobs import JOBS, FollowEye, Job, SolveInverse, what_follows
+from softreach.studio.history import History
+from softreach.studio.jobs import JOBS, FollowEye, Job, PullTip, SolveInverse, what_follows
+from softreach.studio.jobs.pull import PullOrder, TipPull
+from softreach.studio.kept_work import KeptWork
 from softreach.studio.map_board import MapBoard, board_of
 from softreach.studio.reach import Reach
 from softreach.studio.scene import Scene
+from softreach.studio.snapshots import Snapshots
 from softreach.studio.source import Start
 from softreach.studio.state import StudioState, vector
 from softreach.studio.worker import Latest
@@ -46,10 +50,29 @@ class Panel(Protocol):
 class Session:
     """Holds the state of a tab; everything heavy happens in its jobs, on threads of their own."""
 
-    def __init__(self, client: ClientHandle, start: Start) -> None:
-        """Begin a session; `panels` are added by the app before the first `update`."""
+    def __init__(
+        self,
+        client: ClientHandle,
+        start: Start,
+        *,
+        work: KeptWork | None = None,
+        snapshots: Snapshots | None = None,
+    ) -> None:
+        """Begin a session; `panels` are added by the app before the first `update`.
+
+        Args:
+            client: The tab.
+            start: What it begins with.
+            work: Where its state is kept, if anywhere.
+            snapshots: Those of all tabs.
+        """
         self.client, self.quality = client, start.quality
         self.eye, self.scene = Eye(client), Scene(client.scene)
+        self.start, self.work = start, work
+        self.snapshots = snapshots or Snapshots()
+        self.history = History()
+        self.is_touched = False
+        """Whether there is anything to keep."""
         self.state: StudioState = start.state
         self.panels: list[Panel] = []
         self.note = ""
@@ -79,6 +102,8 @@ class Session:
         """Where it has been."""
         self.answer: Solution | None = None
         """Of the inverse problem."""
+        self.tip_pull: TipPull | None = None
+        """What a drag of the tip has led to; None when nobody drags."""
         self.atlas: xr.Dataset | None = start.atlas
         self.board: MapBoard | None = board_of(self.scene, self.atlas)
         self.drawing = threading.RLock()
@@ -94,7 +119,11 @@ class Session:
         self.show()
 
     def update(
-        self, change: Callable[[StudioState], StudioState], *, by_widget: bool = False
+        self,
+        change: Callable[[StudioState], StudioState],
+        *,
+        by_widget: bool = False,
+        goes_on: bool = False,
     ) -> None:
         """Replace the state, and start what follows from that.
 
@@ -102,6 +131,8 @@ class Session:
             change: From the present state to the next.
             by_widget: Whether the widgets show the change already. They are left alone then: one
                 that is being dragged would jump back to where it was a moment ago.
+            goes_on: Whether the change may be part of the step before, for who undoes it; what
+                widgets do may be.
 
         Raises:
             SoftreachError: The change makes no valid state; nothing happens then.
@@ -109,6 +140,7 @@ class Session:
         with self._changing:
             old, self.state, self.note = self.state, change(self.state), ""
             new = self.state
+            self._remember(old, goes_on=goes_on or by_widget)
             self.revision += not by_widget
             self.canceled = False
         self.follow(*what_follows(old, new))
@@ -124,9 +156,23 @@ class Session:
         assert isinstance(inverse, SolveInverse)
         inverse.take_nearest = True
         with self._changing:
-            self.state = self.state.replace(target=vector(target))
+            old = self.state
+            self.state = old.replace(target=vector(target))
+            self._remember(old, goes_on=False)
         self.follow(SolveInverse)
         self.show()
+
+    def pull_tip(self, phase: str, wanted: Array) -> None:
+        """Follow a drag of the tip; returns at once.
+
+        Args:
+            phase: "start", "update" or "end".
+            wanted: Where the tip should be [L].
+        """
+        pull = self._jobs[PullTip]
+        assert isinstance(pull, PullTip)
+        pull.order = PullOrder(wanted, rests=phase == "end")
+        self.follow(PullTip)
 
     def restore(self, state: StudioState) -> None:
         """Take up a state that was saved, and its view."""
@@ -137,6 +183,45 @@ class Session:
     def look_from(self, view: str) -> None:
         """See everything from one of `eye.VIEWS`."""
         self.eye.look_from(framing(*self.scene.box, VIEWS[view], self.eye.aspect))
+
+    def step(self, *, back: bool) -> None:
+        """Undo the latest step of the work, or do again what was undone last."""
+        with self._changing:
+            old = self.state
+            walk = self.history.back if back else self.history.forth
+            self.history, self.state = walk(old)
+            stays = self.state is old
+            self.note = f"There is nothing to {'undo' if back else 'redo'}." if stays else ""
+            self.revision += 1
+        self.follow(*what_follows(old, self.state))
+        self.show()
+
+    def reset(self) -> None:
+        """Go back to what the studio was opened on; can be undone."""
+        first = self.start.state
+        self.update(lambda s: first.replace(appearance=s.appearance, camera=s.camera))
+
+    def take_up(self, state: StudioState, history: History) -> None:
+        """Go on where a tab left off, before anything is shown."""
+        self.state, self.history, self.is_touched = state, history, True
+        if state.design != self.start.state.design:
+            self.reach = None
+        if state.camera is not None:
+            self.eye.look_from(state.camera)
+
+    def keep(self) -> None:
+        """Write the state to where the next tab or server finds it."""
+        if self.work is not None and self.is_touched:
+            self.work.keep(self.state_now())
+
+    def end_step(self) -> None:
+        """Make the next change a step of its own for who undoes it."""
+        with self._changing:
+            self.history = self.history.at_rest()
+
+    def _remember(self, old: StudioState, *, goes_on: bool) -> None:
+        self.history = self.history.after(old, self.state, goes_on=goes_on)
+        self.is_touched = self.is_touched or old != self.state
 
     def state_now(self) -> StudioState:
         """The state with the camera, as it is saved."""

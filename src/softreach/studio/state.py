@@ -98,6 +98,8 @@ class Appearance:
     """The cloud without loads, faint, around that of a loaded arm."""
     ghosts: bool = True
     """The shapes of all solutions of the inverse problem at once."""
+    handle: bool = True
+    """The ball on the tip that is dragged."""
     map: MapView = field(default_factory=MapView)
 
     def __post_init__(self) -> None:
@@ -188,10 +190,8 @@ def _parsed(text: str | bytes) -> dict[str, Any]:
     allowed = f"a state that the studio saved, version {VERSION}"
     try:
         values = json.loads(text)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InvalidInput("state file", str(error), allowed) from None
-    except RecursionError:
-        raise InvalidInput("state file", "too deeply nested", allowed) from None
     found = values.pop("softreach_studio", None) if isinstance(values, dict) else None
     if found != VERSION:
         raise InvalidInput("state file", f"version {found}", allowed)

@@ -7,7 +7,9 @@ from softreach.studio.jobs.eye import FollowEye
 from softreach.studio.jobs.free import DrawFree
 from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.jobs.job import Job
+from softreach.studio.jobs.keep import KeepState
 from softreach.studio.jobs.map import DrawMap
+from softreach.studio.jobs.pull import PullTip
 from softreach.studio.jobs.reach import ComputeReach, DrawCloud, DrawSurfaces
 from softreach.studio.jobs.reference import DrawReference
 from softreach.studio.jobs.theme import SetTheme
@@ -24,6 +26,8 @@ __all__ = [
     "DrawSurfaces",
     "FollowEye",
     "Job",
+    "KeepState",
+    "PullTip",
     "SetTheme",
     "SolveInverse",
     "what_follows",
@@ -36,10 +40,12 @@ JOBS: tuple[type[Job], ...] = (
     DrawFree,
     DrawSurfaces,
     SolveInverse,
+    PullTip,
     DrawReference,
     DrawMap,
     FollowEye,
     SetTheme,
+    KeepState,
 )
 
 

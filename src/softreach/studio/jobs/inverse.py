@@ -61,7 +61,9 @@ class SolveInverse(Job):
         if wanted and answer is not None and len(answer):
             change = np.linalg.norm(answer.activations - self.session.state.activation, axis=1)
             best = answer.activations[int(np.argmin(change))]
-            self.session.update(lambda state: state.replace(activation=tuple(best.tolist())))
+            self.session.update(
+                lambda state: state.replace(activation=tuple(best.tolist())), goes_on=True
+            )
 
 
 def _solution(state: StudioState, target: Vector) -> Solution:

@@ -1,4 +1,4 @@
-"""Every activation that reaches a place: click a point of the cloud, or type it."""
+"""Every activation that reaches a place: drag the tip there, click a point, or type it."""
 
 from __future__ import annotations
 
@@ -11,9 +11,12 @@ from softreach.arm.manipulator import Manipulator
 from softreach.rod.kinematics import tip_positions
 from softreach.studio.panels.binding import attempt, bind, bind_button
 from softreach.studio.panels.line import Line
+from softreach.studio.panels.typed import VectorField
 from softreach.studio.picking import picked_point
 from softreach.studio.reach import cloud_points, shown_samples
+from softreach.studio.rod import rod_of
 from softreach.studio.slicing import in_slice
+from softreach.studio.state import StudioState
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -23,7 +26,10 @@ if TYPE_CHECKING:
 
 __all__ = ["InversePanel"]
 
-_HINT = "Click a point of the cloud, or type a target."
+_HINT = "Drag the tip, type a target, or let a click on the cloud set it."
+_ABOUT_CLICKS = "off: a click in the scene changes nothing"
+_HELD = 1e-4
+"""Change of activation, in ranges, below which the arm holds a solution."""
 
 
 class InversePanel:
@@ -37,9 +43,10 @@ class InversePanel:
         self._buttons: list[tuple[Any, Any]] = []
         with tab:
             self._text = Line(gui, _HINT)
-            self._target = gui.add_vector3(
-                "target / L", (0.0, 0.0, 1.0), step=0.001, hint="Where the tip should go [L]"
+            self._target = VectorField(
+                gui, "target / L", (0.0, 0.0, 1.0), "Where the tip should go [L]"
             )
+            self._clicks = gui.add_checkbox("clicks set the target", False, hint=_ABOUT_CLICKS)
             solve = gui.add_button("Solve", hint="Finds every activation that reaches the target")
             self._ghosts = gui.add_checkbox(
                 "show all shapes",
@@ -49,6 +56,7 @@ class InversePanel:
             self._folder = gui.add_folder("activations that reach it", visible=False)
             clear = gui.add_button("Clear", hint="Takes target and solutions away")
         bind_button(solve, session, self._solve_typed)
+        self._target.on_update(lambda _: attempt(session, self._solve_typed))
         bind_button(clear, session, lambda: session.update(lambda s: s.replace(target=None)))
         bind(self._ghosts, session, lambda s, on: s.showing(ghosts=on))
 
@@ -61,7 +69,7 @@ class InversePanel:
             self._shown = session.answer
             self._list(session.answer)
         for activation, button in self._buttons:
-            held = tuple(activation.tolist()) == session.state.activation
+            held = _is_held(activation, session.state)
             button.color = "green" if held else None
 
     def _list(self, answer: Solution | None) -> None:
@@ -71,14 +79,20 @@ class InversePanel:
         self._text.say(_HINT)
         if answer is not None:
             arm = self._session.state.design
-            self._target.value = answer.target / arm.length
+            self._target.value = tuple((answer.target / arm.length).tolist())
             self._text.say(_answer_text(answer, arm))
             with self._folder:
                 self._buttons = [(row, self._button(row)) for row in answer.activations]
 
     def click(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
-        """Aim at the point of the cloud under the cursor; return whether there is one."""
+        """Aim at the point of the cloud under the cursor, if clicks are to do that.
+
+        Returns:
+            Whether they are, and there is one.
+        """
         session = self._session
+        if not self._clicks.value:
+            return False
         reach, look = session.reach, session.state.appearance
         if reach is None or not look.cloud or reach.arm != session.state.design:
             return False
@@ -104,6 +118,11 @@ class InversePanel:
         take = lambda: self._session.update(lambda s: s.replace(activation=wanted))  # noqa: E731
         bind_button(button, self._session, take)
         return button
+
+
+def _is_held(activation: Any, state: StudioState) -> bool:
+    scales = np.maximum(np.ptp(rod_of(state.design).box.bounds, axis=1), 1e-12)
+    return bool((np.abs(activation - state.activation) <= _HELD * scales).all())
 
 
 def _tip(arm: Manipulator, activation: Any) -> Any:

@@ -1,0 +1,233 @@
+"""Several designs in a table: the parameters in which they differ, and what they reach."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.parameters import changed, parameters
+from softreach.errors import SoftreachError
+from softreach.studio.controls import controls
+from softreach.studio.markup import Part, Strong, paragraph, table
+from softreach.studio.snapshots import Numbers
+
+__all__ = ["Candidate", "Comparison", "compared", "comparison_csv", "comparison_html"]
+
+_DEGREE = math.degrees(1)
+_EQUAL = 1e-9  # relative difference that is rounding
+_MINUS = "\N{MINUS SIGN}"
+_MOST = 24
+"""Columns of parameters; designs that differ in more are other arms altogether."""
+
+Value = float | None
+
+
+class Candidate(NamedTuple):
+    """One of the designs."""
+
+    name: str
+    design: Manipulator
+    numbers: Numbers | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """A table; None where a design has no such value, or it is not known."""
+
+    names: tuple[str, ...]
+    """Of the designs."""
+    titles: tuple[str, ...]
+    """Of the columns, with units."""
+    values: tuple[tuple[Value, ...], ...]
+    """For every design one of every column."""
+    errors: tuple[tuple[Value, ...], ...]
+    """The largest errors of the values, where they have one."""
+    differ_otherwise: bool
+    """Whether designs differ in something that is no number in the table."""
+
+    def difference(self, row: int, column: int) -> Value:
+        """From the first design; None where either is not known."""
+        value, first = self.values[row][column], self.values[0][column]
+        return None if value is None or first is None else value - first
+
+
+class _Column(NamedTuple):
+    title: str
+    values: list[Value]
+    errors: list[Value]
+
+
+def compared(candidates: Sequence[Candidate]) -> Comparison:
+    """Put designs beside the first of them."""
+    designs = [one.design for one in candidates]
+    shown, explained = _shown_parameters(designs)
+    columns = [*_reach_columns(candidates), *shown]
+    return Comparison(
+        names=tuple(one.name for one in candidates),
+        titles=tuple(column.title for column in columns),
+        values=tuple(zip(*(column.values for column in columns), strict=True)),
+        errors=tuple(zip(*(column.errors for column in columns), strict=True)),
+        differ_otherwise=not explained,
+    )
+
+
+def comparison_html(comparison: Comparison) -> str:
+    """The table; under each value how far it is from that of the first design."""
+    rows = [
+        [[Strong(name)], *(_cell(comparison, k, j) for j in range(len(comparison.titles)))]
+        for k, name in enumerate(comparison.names)
+    ]
+    more = (
+        paragraph("Some differ in more than these numbers.") if comparison.differ_otherwise else ""
+    )
+    return table(["design", *comparison.titles], rows) + more
+
+
+def comparison_csv(comparison: Comparison) -> str:
+    """The table as text, with errors and with differences from the first design."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    parts = [part for j in range(len(comparison.titles)) for part in _csv_columns(comparison, j)]
+    writer.writerow(["design", *(title for title, _ in parts)])
+    for k, name in enumerate(comparison.names):
+        cells = (column[k] for _, column in parts)
+        numbers = ("" if cell is None else repr(cell) for cell in cells)
+        writer.writerow([_plain(name), *numbers])
+    return text.getvalue()
+
+
+def _csv_columns(comparison: Comparison, column: int) -> list[tuple[str, list[Value]]]:
+    """A column, its errors if it has any, and the differences from the first design."""
+    title, rows = _plain(comparison.titles[column]), range(len(comparison.names))
+    errors = [comparison.errors[k][column] for k in rows]
+    return [
+        (title, [comparison.values[k][column] for k in rows]),
+        *([(f"{title} error", errors)] if any(error is not None for error in errors) else []),
+        (f"{title} difference", [comparison.difference(k, column) for k in rows]),
+    ]
+
+
+def _plain(text: str) -> str:
+    """Text that no spreadsheet takes for a formula."""
+    return f"'{text}" if text[:1] in "=+-@\t" else text
+
+
+def _cell(comparison: Comparison, row: int, column: int) -> list[Part]:
+    value, difference = comparison.values[row][column], comparison.difference(row, column)
+    if value is None:
+        return ["–"]
+    lines: list[Part] = [_written(value, comparison.errors[row][column])]
+    if row and difference is not None:
+        lines.append(_change(difference, comparison.values[0][column], comparison.titles[column]))
+    return lines
+
+
+def _written(value: float, error: Value) -> str:
+    text = f"{value:.5g}" if error is None else f"{value:.4f}"
+    return text.replace("-", _MINUS)
+
+
+def _change(difference: float, first: Value, title: str) -> str:
+    """How far from the first design; of sizes in percent too."""
+    if difference == 0:
+        return "="
+    size = title.startswith(("volume", "area", "length ")) and first
+    share = f" ({100 * difference / first:+.3g} %)" if size and first else ""
+    return f"{difference:+.4g}{share}".replace("-", _MINUS)
+
+
+def _reach_columns(candidates: Sequence[Candidate]) -> list[_Column]:
+    """Volume, area or length, whatever each has, and UNR."""
+    known = [one.numbers for one in candidates]
+    kinds = dict.fromkeys((one.size.name, one.size.unit) for one in known if one is not None)
+    found = []
+    for name, unit in kinds or {("volume", "L³"): None}:
+        of = [one.size if one is not None and one.size.name == name else None for one in known]
+        title = f"{name} [{unit}]" if unit else name
+        values = [None if size is None else size.value for size in of]
+        found.append(_Column(title, values, [None if size is None else size.error for size in of]))
+    shares = [None if one is None else _finite(100 * one.unreachability) for one in known]
+    if any(share is not None for share in shares):
+        found.append(_Column("UNR [%]", shares, [None] * len(shares)))
+    return found
+
+
+def _shown_parameters(designs: Sequence[Manipulator]) -> tuple[list[_Column], bool]:
+    """The sliders that differ; where these do not explain everything, other parameters too.
+
+    Returns:
+        Columns, and whether equal columns mean equal designs.
+    """
+    sliders = [_of_sliders(design) for design in designs]
+    shown = _differing(sliders)
+    if _explained(designs, [title for title, _ in shown]):
+        return [column for _, column in shown], True
+    every = [_of_parameters(design) for design in designs]
+    known = {title for title, _ in shown}
+    others = [(name, column) for name, column in _differing(every) if name not in known]
+    return [column for _, column in [*shown, *others][:_MOST]], False
+
+
+def _of_sliders(design: Manipulator) -> dict[str, tuple[str, float]]:
+    return {one.name: (one.label, one.value / one.scale) for one in controls(design)}
+
+
+def _of_parameters(design: Manipulator) -> dict[str, tuple[str, float]]:
+    return {
+        name: _titled(name, one.unit, one.value(design)) for name, one in parameters(design).items()
+    }
+
+
+def _titled(name: str, unit: str, value: float) -> tuple[str, float]:
+    if unit == "rad":
+        return f"{name} [deg]", value * _DEGREE
+    return (name if unit == "1" else f"{name} [{unit}]"), value
+
+
+def _differing(designs: Sequence[dict[str, tuple[str, float]]]) -> list[tuple[str, _Column]]:
+    """Name and column of what is not the same in all."""
+    found = []
+    for name in dict.fromkeys(name for design in designs for name in design):
+        title = next(design[name][0] for design in designs if name in design)
+        values = [_finite(design[name][1]) if name in design else None for design in designs]
+        if not all(_same(values[0], value) for value in values):
+            found.append((name, _Column(title, values, [None] * len(values))))
+    return found
+
+
+def _explained(designs: Sequence[Manipulator], names: Sequence[str]) -> bool:
+    """Whether the first design becomes each of the others by these parameters alone."""
+    first = designs[0]
+    for other in designs[1:]:
+        try:
+            known = parameters(other)
+            made = changed(first, {name: known[name].value(other) for name in names})
+        except (KeyError, SoftreachError):
+            return False
+        if _shape(made) != _shape(other):
+            return False
+        if _differing([_of_parameters(made), _of_parameters(other)]):
+            return False
+    return True
+
+
+def _shape(arm: Manipulator) -> object:
+    """What is no number: kinds and names of the parts."""
+    rings = tuple((ring.name, ring.material) for ring in arm.section.rings)
+    parts = tuple((type(one), one.name) for one in arm.actuators)
+    return type(arm.profile), rings, parts, arm.loads is None
+
+
+def _same(one: Value, other: Value) -> bool:
+    if one is None or other is None:
+        return one is other
+    return abs(one - other) <= _EQUAL * max(abs(one), abs(other))
+
+
+def _finite(value: float) -> Value:
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,88 @@
+"""The ball on the tip that a person drags, and what shows how far the arm lags behind."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from viser import SceneApi
+
+__all__ = ["Grip"]
+
+Array = NDArray[np.float64]
+Dragged = Callable[[str, Array], None]
+"""(phase "start", "update" or "end"; where the ball should be [L])."""
+
+_HALO, _SMALLEST, _POINTER = 0.035, 0.016, 0.009  # radii [L]
+_COLOR, _LAG = (25, 25, 30), (220, 30, 120)
+
+
+class Grip:
+    """Nodes that move instead of being drawn anew: a node that is replaced is let go."""
+
+    def __init__(self, api: SceneApi, dragged: Dragged) -> None:
+        """Draw into the scene of a client once there is a tip.
+
+        Args:
+            api: The scene.
+            dragged: Called on the event loop, so that it must not take long.
+        """
+        self._api, self._dragged = api, dragged
+        self._nodes: tuple[Any, Any] | None = None
+        self._lag: tuple[Any, Any, Any] | None = None
+        self._offset = np.zeros(3)
+
+    def move(self, tip: Array | None, radius: float = 0.0) -> None:
+        """Put the ball on the tip [L], around an arm of this radius [L]; None hides it."""
+        if tip is None:
+            if self._nodes is not None:
+                self._nodes[0].visible = False
+            return
+        if self._nodes is None:
+            self._nodes = self._drawn(tip)
+        halo, ball = self._nodes
+        ball.radius = max(1.2 * radius, _SMALLEST)
+        halo.radius = max(1.6 * radius, _HALO)
+        halo.position = tip
+        halo.visible = True
+
+    def show_lag(self, wanted: Array | None, tip: Array | None, gap: float = 0.0) -> None:
+        """A line from the tip to where it was pulled to [L], and how long it is; None for none."""
+        if wanted is None or tip is None or gap == 0.0:
+            for node in self._lag or ():
+                node.visible = False
+            return
+        if self._lag is None:
+            self._lag = self._drawn_lag()
+        pointer, line, label = self._lag
+        pointer.position, label.position = wanted, wanted
+        line.points = np.stack([tip, wanted])[None].astype(np.float32)
+        label.text = f"{gap:.3f} L short"
+        for node in self._lag:
+            node.visible = True
+
+    def _drawn(self, tip: Array) -> tuple[Any, Any]:
+        halo = self._api.add_icosphere(
+            "/grip", _HALO, _COLOR, opacity=0.25, cast_shadow=False, position=tip
+        )
+        ball = self._api.add_icosphere("/grip/ball", _SMALLEST, _COLOR, cast_shadow=False)
+
+        @halo.on_drag("left")
+        async def _(event: Any) -> None:  # on the event loop, which keeps phases in order
+            end = np.array(event.end_position)
+            if event.phase == "start":
+                self._offset = np.array(halo.position) - event.start_position
+            self._dragged(event.phase, end + self._offset)
+
+        return halo, ball
+
+    def _drawn_lag(self) -> tuple[Any, Any, Any]:
+        pointer = self._api.add_icosphere("/lag", _POINTER, _LAG, cast_shadow=False)
+        points = np.zeros((1, 2, 3), np.float32)
+        line = self._api.add_line_segments("/lag line", points, _LAG, thickness=0.004)
+        label = self._api.add_label("/lag label", "", anchor="bottom-center")
+        return pointer, line, label

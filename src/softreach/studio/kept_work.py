@@ -1,0 +1,121 @@
+"""What stays of the work on a design when its tab is reloaded or the server ends.
+
+The page offers no place of its own, so the server keeps it: in the user's own folder, one folder
+for each design that the studio is opened on, one file for the latest state and one for each
+snapshot. Every file appears whole or not at all and none is shared by two writers' halves, so that
+two tabs, or two studios, cannot spoil each other's work: of two latest states the later one stays.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from pathlib import Path
+
+from softreach.arm.manipulator import Manipulator
+from softreach.atomic import replacing
+from softreach.errors import InvalidInput, SoftreachError
+from softreach.file_kinds import FileKind, text_with
+from softreach.studio.snapshots import Snapshot
+from softreach.studio.state import StudioState
+from softreach.studio.user_folder import user_folder
+
+__all__ = ["KeptWork", "work_on"]
+
+_LARGEST = 1 << 20  # bytes of a file
+_MOST = 200  # files that are read
+_STATE = FileKind("a state of the studio", text_with("softreach_studio"))
+
+
+class KeptWork:
+    """One folder; what in it cannot be read is left alone and named in `complaint`."""
+
+    def __init__(self, folder: Path, *, goes_on: bool = True) -> None:
+        """Read what there is.
+
+        Args:
+            folder: Made when first written to.
+            goes_on: Whether to begin with the latest state; snapshots are there in any case.
+        """
+        self._folder, self._writing = folder, threading.Lock()
+        self.complaint = ""
+        """Why something could not be read or written; one line."""
+        self.latest: StudioState | None = self._latest() if goes_on else None
+        """The state that was kept last."""
+
+    def keep(self, state: StudioState) -> None:
+        """Keep the latest state."""
+        self.latest = state
+        self._write("latest.json", state.to_json())
+
+    def snapshots(self) -> tuple[Snapshot, ...]:
+        """Those that can be read, in the order in which they were taken."""
+        found: dict[str, Snapshot] = {}
+        for path in sorted(self._folder.glob("snapshot-*.json"))[:_MOST]:
+            try:
+                one = Snapshot.from_json(_text(path))
+            except (SoftreachError, OSError) as error:
+                self._complain(path, error)
+            else:
+                found[one.name] = one
+        return tuple(sorted(found.values(), key=lambda one: one.taken))
+
+    def put(self, snapshot: Snapshot) -> None:
+        """Keep a snapshot, instead of an older one of its name."""
+        self._write(_file_of(snapshot.name), snapshot.to_json())
+
+    def remove(self, name: str) -> None:
+        """Forget a snapshot."""
+        try:
+            (self._folder / _file_of(name)).unlink(missing_ok=True)
+        except OSError as error:
+            self._complain(self._folder, error)
+
+    def _latest(self) -> StudioState | None:
+        path = self._folder / "latest.json"
+        try:
+            return StudioState.from_json(_text(path)) if path.exists() else None
+        except (SoftreachError, OSError) as error:
+            self._complain(path, error)
+            return None
+
+    def _write(self, name: str, text: str) -> None:
+        """A disk that is full or read-only costs the memory of the work, not the work."""
+        try:
+            with (
+                self._writing,
+                # Whatever is in a folder of ours by that name is an older one, whole or not.
+                replacing(self._folder / name, _STATE, overwrite=True, durable=False) as partial,
+            ):
+                partial.write_text(text, encoding="utf-8")
+        except (SoftreachError, OSError) as error:
+            self._complain(self._folder / name, error)
+
+    def _complain(self, path: Path, error: Exception) -> None:
+        self.complaint = f"Work is not kept: {path}: {' '.join(str(error).split())}"[:500]
+
+
+def work_on(design: Manipulator, *, goes_on: bool = True) -> KeptWork:
+    """What is kept of the work that began with a design."""
+    digest = hashlib.sha256(design.to_toml().encode()).hexdigest()[:16]
+    return KeptWork(user_folder() / "studio" / digest, goes_on=goes_on)
+
+
+def _file_of(name: str) -> str:
+    return f"snapshot-{hashlib.sha256(name.encode()).hexdigest()[:16]}.json"
+
+
+def _text(path: Path) -> bytes:
+    """The file, unless nobody would call it one of ours.
+
+    Raises:
+        InvalidInput: It is no plain file, or too large.
+        OSError: It cannot be read.
+    """
+    if not path.is_file():  # a pipe would never end
+        raise InvalidInput("file", path.name, "a plain file")
+    with path.open("rb") as file:
+        text = file.read(_LARGEST + 1)
+    if len(text) > _LARGEST:
+        raise InvalidInput("file", path.name, f"at most {_LARGEST} bytes")
+    return text

@@ -1,0 +1,110 @@
+"""Where an arm goes when its tip is pulled: on along its branch, or as near to it as that leads."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.manipulator import Manipulator
+from softreach.inverse import PathStatus, PreparedMap, prepared_map
+from softreach.inverse.continuation import Continuation
+from softreach.inverse.nearest import local_minima
+from softreach.inverse.request import Request
+
+__all__ = ["Pull", "Pulled"]
+
+Array = NDArray[np.float64]
+
+_RESIDUAL = 1e-8  # |tip - target| of an arm that follows, in L: far below a pixel
+_FLAT = 0.05  # smallest over largest singular value, below which a fold may be near
+_ASIDE = 0.02  # from a fold, where the search on its either side begins, in ranges
+
+
+class Pulled(NamedTuple):
+    """What a pull leads to."""
+
+    activation: tuple[float, ...]
+    """Of each bundle in its unit."""
+    tip: Array
+    """Where the tip is then [m], shape (3,)."""
+    gap: float
+    """How far that is from where it was pulled to [m]; 0 where it follows."""
+
+
+class Pull:
+    """One arm whose tip is pulled from place to place.
+
+    With three free bundles the arm stays on its branch: a fold, where two branches meet, is left
+    to the side from which it was entered. With more, each pull changes the activation least.
+    """
+
+    def __init__(self, arm: Manipulator) -> None:
+        """Prepare an arm; with fewer than three free bundles the tip keeps to what they reach."""
+        self.arm = arm
+        self._prepared: PreparedMap = prepared_map(arm)
+        self._rod = self._prepared.rod
+        self._residual = _RESIDUAL * self._rod.length
+        self._tracker = Continuation(self._rod, self._residual)
+        self._side = 0.0
+
+    def to(self, activation: tuple[float, ...], target: Array) -> Pulled | None:
+        """Pull the tip of the arm in an activation straight to a target [m].
+
+        Returns:
+            None where the arm has no stable equilibrium to begin with.
+        """
+        box, measures = self._prepared.whole.box, self._prepared.measures
+        gamma = self._rod.box.clip((np.asarray(activation) / measures)[box.free])
+        point = self._tracker.at(gamma)
+        if not np.isfinite(point.slope).all():
+            return None
+        self._side = self._sign(point.slope) or self._side
+        if box.dimension >= 3:
+            end = self._tracker.follow(point, point.tip, target)
+            if end.status == PathStatus.FOLLOWED:
+                return self._pulled(end.point.gamma, target)
+            gamma = end.point.gamma
+        return self._pulled(self._nearest(gamma, target), target)
+
+    def _nearest(self, gamma: Array, target: Array) -> Array:
+        """The activation around here that brings the tip nearest to the target."""
+        slope = self._tracker.at(gamma).slope
+        starts = self._rod.box.clip(np.array([gamma, *self._beside_fold(gamma, slope)]))
+        request = Request(
+            targets=np.tile(target, (len(starts), 1)), residual=self._residual, near=starts
+        )
+        found = local_minima(self._rod, request, starts).gamma
+        tips, slopes = self._rod.tips_and_slopes(found)
+        gaps = np.linalg.norm(tips - target, axis=1)
+        gaps = np.where(np.isfinite(gaps), gaps, np.inf)
+        best = gaps <= gaps.min() + self._residual
+        other_side = [self._side * self._sign(slope) < 0 for slope in slopes]
+        away = np.linalg.norm((found - gamma) / self._rod.box.scales, axis=1)
+        return found[np.lexsort((away, other_side, ~best))[0]]
+
+    def _beside_fold(self, gamma: Array, slope: Array) -> list[Array]:
+        """Starts on both sides of a fold: on it, no small change brings the tip nearer."""
+        scales = self._rod.box.scales
+        _, sizes, axes = np.linalg.svd(slope * scales)
+        if len(sizes) < 3 or sizes[2] > _FLAT * sizes[0]:
+            return []
+        step = _ASIDE * axes[2] * scales
+        return [gamma + step, gamma - step]
+
+    def _sign(self, slope: Array) -> float:
+        """The sheet of three free bundles that the arm is on; 0 next to a fold and for others."""
+        if slope.shape[1] != 3:
+            return 0.0
+        scaled = slope * self._rod.box.scales
+        sizes = np.linalg.svd(scaled, compute_uv=False)
+        return float(np.sign(np.linalg.det(scaled))) if sizes[2] > 1e-6 * sizes[0] else 0.0
+
+    def _pulled(self, gamma: Array, target: Array) -> Pulled:
+        whole = self._prepared.whole
+        activation = whole.box.with_held(gamma[None])[0] * self._prepared.measures
+        tip = self._tracker.at(gamma).tip
+        gap = float(np.linalg.norm(tip - target))
+        within = tuple(float(value) for value in activation)
+        return Pulled(within, tip, 0.0 if gap <= self._residual else gap)

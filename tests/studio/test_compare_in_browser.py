@@ -1,0 +1,106 @@
+"""Snapshots are taken in the page, compared in a table, restored and deleted."""
+
+from __future__ import annotations
+
+import csv
+
+import pytest
+
+from softreach.arm import designs
+from softreach.arm.parameters import changed
+
+TRUNK = designs.minimal_trunk()
+
+
+@pytest.fixture(scope="module")
+def compare_tab(tab):
+    tab.open("Compare")
+    return tab
+
+
+def cells(tab):
+    """Texts of the table, row by row."""
+    text = "tables => tables.flatMap(t => [...t.rows].map(r => [...r.cells].map(c => c.innerText)))"
+    return tab.page.locator("table").evaluate_all(text)
+
+
+def take(tab, name):
+    known = len(tab.session.snapshots.all)
+    tab.page.locator("xpath=//label[normalize-space()='name']/following::input[1]").fill(name)
+    tab.page.wait_for_timeout(200)
+    tab.press("Take snapshot")
+    tab.wait(lambda: len(tab.session.snapshots.all) > known, "the snapshot is taken")
+
+
+def become(tab, **values):
+    tab.session.update(lambda s: s.replace(design=changed(TRUNK, values)))
+    tab.settle()
+
+
+def test_snapshots_stand_side_by_side_with_their_numbers_and_differences(compare_tab):
+    tab = compare_tab
+    first = tab.session.reach.volume
+    take(tab, "wide")
+    become(tab, taper=0.01, revolution=1.0)
+    second = tab.session.reach.volume
+    take(tab, "")
+    tab.wait(lambda: len(cells(tab)) == 4, "two snapshots and the design have rows")
+    head, one, other, now = cells(tab)
+    assert head[:3] == ["design", "volume [L³]", "UNR [%]"]
+    assert set(head[3:]) == {"revolution Ω [deg]", "taper φ [deg]"}
+    assert one[:2] == ["wide", f"{first:.4f}"]
+    volume, difference = other[1].split("\n")
+    assert other[0] == "design 1"
+    assert float(volume) == pytest.approx(second, abs=1e-4)
+    assert float(difference.split()[0].replace("\N{MINUS SIGN}", "-")) == pytest.approx(
+        second - first, rel=1e-3
+    )
+    assert now[0] == "now"
+
+
+def test_the_row_of_the_present_design_follows_it(compare_tab):
+    tab = compare_tab
+    become(tab, taper=0.02)
+    wanted = f"{tab.session.reach.volume:.4f}"
+    tab.wait(lambda: cells(tab)[-1][1].startswith(wanted), "the row shows the new volume")
+
+
+def test_a_snapshot_is_restored_and_the_restoring_undone(compare_tab):
+    tab = compare_tab
+    before = tab.session.state.design
+    tab.choose("snapshot", "wide")
+    tab.press("Restore")
+    tab.wait(lambda: tab.session.state.design == TRUNK, "the design is back")
+    tab.settle()
+    tab.press("Undo")
+    tab.wait(lambda: tab.session.state.design == before, "the restoring is undone")
+    tab.settle()
+
+
+def test_the_table_is_saved(compare_tab, tmp_path):
+    file = compare_tab.save("Save table (CSV)", tmp_path)
+    with file.open(encoding="utf-8-sig", newline="") as text:
+        rows = list(csv.DictReader(text))
+    assert [row["design"] for row in rows] == ["wide", "design 1", "now"]
+    measured = compare_tab.session.snapshots.named("wide").numbers.size.value
+    assert float(rows[0]["volume [L³]"]) == measured
+
+
+def test_a_name_that_is_taken_is_refused_and_one_with_markup_is_text(compare_tab):
+    tab = compare_tab
+    struck = "<b class=struck>x"
+    take(tab, struck)
+    tab.wait(lambda: struck in [row[0] for row in cells(tab)], "the name is shown as it is")
+    assert tab.page.locator(".struck").count() == 0
+    tab.page.locator("xpath=//label[normalize-space()='name']/following::input[1]").fill("wide")
+    tab.page.wait_for_timeout(200)
+    tab.press("Take snapshot")
+    tab.page.get_by_text("snapshot name = wide").wait_for()
+
+
+def test_a_snapshot_is_deleted(compare_tab):
+    tab = compare_tab
+    tab.choose("snapshot", "design 1")
+    tab.press("Delete")
+    tab.wait(lambda: tab.session.snapshots.named("design 1") is None, "the snapshot is gone")
+    tab.wait(lambda: "design 1" not in [row[0] for row in cells(tab)], "its row is gone")

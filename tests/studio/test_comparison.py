@@ -1,0 +1,75 @@
+"""Designs side by side, without a server."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import numpy as np
+import pytest
+
+from softreach.arm import designs
+from softreach.arm.parameters import changed
+from softreach.studio.comparison import Candidate, compared, comparison_csv, comparison_html
+from softreach.studio.reach import Size
+from softreach.studio.snapshots import Numbers
+
+TRUNK = designs.minimal_trunk()
+
+
+def numbers(volume, unr=0.3):
+    return Numbers(Size("volume", volume, 1e-4, "L³"), unr)
+
+
+def trio():
+    flat = changed(TRUNK, {"taper": 0.0})
+    turned = changed(TRUNK, {"revolution": 1.0})
+    return compared(
+        [
+            Candidate("a", TRUNK, numbers(0.7)),
+            Candidate("b", flat, numbers(0.5, 0.4)),
+            Candidate("c", turned, None),
+        ]
+    )
+
+
+def test_only_the_parameters_that_differ_have_columns():
+    table = trio()
+    assert table.titles == (
+        "volume [L³]",
+        "UNR [%]",
+        "revolution Ω [deg]",
+        "taper φ [deg]",
+    )
+    assert not table.differ_otherwise
+
+
+def test_differences_are_from_the_first_design():
+    table = trio()
+    assert table.difference(1, 0) == pytest.approx(-0.2)
+    assert table.difference(1, 1) == pytest.approx(10)
+    assert table.difference(1, 3) == pytest.approx(-2)
+    assert table.difference(2, 0) is None
+    assert table.difference(2, 2) == pytest.approx(np.degrees(1.0) - 108)
+
+
+def test_designs_that_differ_in_more_than_sliders_say_so():
+    other = designs.redundant_trunk()
+    table = compared([Candidate("a", TRUNK, None), Candidate("b", other, None)])
+    assert table.differ_otherwise
+    assert "more than these numbers" in comparison_html(table)
+
+
+def test_the_table_as_text_has_every_number():
+    rows = list(csv.DictReader(io.StringIO(comparison_csv(trio()))))
+    assert [row["design"] for row in rows] == ["a", "b", "c"]
+    assert float(rows[1]["volume [L³]"]) == 0.5
+    assert float(rows[1]["volume [L³] error"]) == 1e-4
+    assert float(rows[1]["volume [L³] difference"]) == pytest.approx(-0.2)
+    assert rows[2]["volume [L³]"] == ""
+
+
+def test_no_name_is_a_formula_of_a_spreadsheet_or_markup():
+    table = compared([Candidate("=1+1", TRUNK, None), Candidate("<b>x", TRUNK, None)])
+    assert comparison_csv(table).splitlines()[1].startswith("'=1+1")
+    assert "<b>x" not in comparison_html(table)

@@ -1,0 +1,144 @@
+"""The tip is dragged in the page: the arm follows on its branch, as far as that leads."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import softreach as sr
+from softreach.studio import StudioState
+
+
+@pytest.fixture(scope="module")
+def inverse_tab(tab):
+    tab.page.set_viewport_size({"width": 1366, "height": 768})  # else notices cover the tip
+    tab.open("Inverse")
+    return tab
+
+
+def screen(tab, point):
+    """Pixels of a point of the scene [L] in the page."""
+    canvas = tab.page.locator("canvas").first.bounding_box()
+    right, down = tab.projected(point)
+    return canvas["x"] + right * canvas["width"], canvas["y"] + down * canvas["height"]
+
+
+def pose(tab, activation):
+    tab.session.update(lambda s: s.replace(activation=activation, target=None))
+    tab.settle()
+    tip = sr.tip_positions(tab.session.state.design, [activation])[0]
+    tab.wait(lambda: np.allclose(tab.drawn("/grip").position, tip, atol=1e-4), "the ball is there")
+    tab.page.wait_for_timeout(200)  # until the page has drawn it
+    return tip
+
+
+def drag_tip(tab, begin, end, steps=12):
+    """Grab the ball at a point [L] and pull it to another; the button stays down."""
+    mouse = tab.page.mouse
+    mouse.move(*screen(tab, begin))
+    tab.page.wait_for_timeout(100)
+    mouse.down()
+    for part in np.linspace(0, 1, steps + 1)[1:]:
+        mouse.move(*screen(tab, begin + part * (end - begin)))
+        tab.page.wait_for_timeout(30)
+
+
+def tip_of(tab):
+    return sr.tip_positions(tab.session.state.design, [tab.session.state.activation])[0]
+
+
+START = (-0.7, -0.4, -0.9)
+
+
+def test_the_arm_follows_a_drag_of_its_tip_on_its_branch(inverse_tab):
+    tab = inverse_tab
+    begin = pose(tab, START)
+    end = sr.tip_positions(tab.session.state.design, [(-0.6, -0.55, -0.8)])[0]
+    drag_tip(tab, begin, end)
+    tab.page.wait_for_timeout(300)
+    tab.settle()
+    middle = tab.session.tip_pull
+    assert middle.pulled.gap == 0.0
+    assert np.linalg.norm(tip_of(tab) - middle.wanted) < 1e-5
+    tab.page.mouse.up()
+    tab.wait(lambda: tab.session.state.target is not None, "the drag rests")
+    tab.settle()
+    state = tab.session.state
+    np.testing.assert_allclose(tip_of(tab), state.target, atol=1e-5)
+    # The pointer moves in the plane of the picture, and so does the tip.
+    np.testing.assert_allclose(screen(tab, np.array(state.target)), screen(tab, end), atol=3)
+    path = sr.track_path(state.design, [begin, state.target], START)
+    np.testing.assert_allclose(path.activation.values[-1], state.activation, atol=1e-3)
+
+
+def test_where_the_drag_rests_the_other_branches_are_ghosts(inverse_tab):
+    tab = inverse_tab
+    answer = tab.session.answer
+    held = np.abs(answer.activations - tab.session.state.activation).max(axis=1)
+    assert held.min() < 1e-3
+    assert all(tab.drawn(f"/ghosts/{k}/0") for k in range(len(answer)))
+
+
+def test_beyond_the_boundary_the_arm_stays_near_and_a_line_shows_the_gap(inverse_tab):
+    tab = inverse_tab
+    begin = pose(tab, (-0.2, -0.1, -0.1))
+    drag_tip(tab, begin, begin + [0.0, 0.0, 0.35])
+    tab.wait(lambda: tab.session.tip_pull and tab.session.tip_pull.pulled.gap > 0.02, "a gap")
+    tab.settle()
+    pull = tab.session.tip_pull
+    assert tab.drawn("/lag").visible
+    assert tab.drawn("/lag label").text == f"{pull.pulled.gap:.3f} L short"
+    tab.page.get_by_text(f"This branch ends {pull.pulled.gap:.3f} L short").wait_for()
+    answer = sr.solve_inverse(tab.session.state.design, [pull.wanted])[0]
+    assert len(answer) == 0
+    assert pull.pulled.gap == pytest.approx(answer.gap, abs=1e-5)
+    tab.page.mouse.up()
+    tab.wait(lambda: not tab.drawn("/lag").visible, "the drag rests")
+    tab.settle()
+    assert tab.drawn("/gap")
+
+
+def test_the_arm_comes_back_from_the_boundary_on_its_branch(inverse_tab):
+    tab = inverse_tab
+    begin = pose(tab, START)
+    there = np.array(screen(tab, begin))
+    mouse = tab.page.mouse
+    mouse.move(*there)
+    tab.page.wait_for_timeout(100)
+    mouse.down()
+    for up in (40, 100, 200, 300, 200, 100, 40, 0):
+        mouse.move(there[0], there[1] - up, steps=3)
+        tab.page.wait_for_timeout(60)
+        tab.settle()
+    mouse.up()
+    tab.wait(lambda: tab.session.state.target is not None, "the drag rests")
+    tab.settle()
+    np.testing.assert_allclose(tab.session.state.activation, START, atol=0.02)
+
+
+def test_a_click_on_the_cloud_sets_a_target_only_where_the_tab_says_so(inverse_tab):
+    tab = inverse_tab
+    start = (0.0, 0.0, 0.0)
+    pose(tab, start)
+    point = tab.session.reach.cloud.tip.values[100]
+    tab.click_at(point)
+    tab.page.wait_for_timeout(300)
+    assert tab.session.state.target is None
+    tab.page.get_by_label("clicks set the target").check()
+    tab.click_at(point)
+    tab.wait(lambda: tab.session.state.target is not None, "the click is taken")
+    tab.page.get_by_label("clicks set the target").uncheck()
+
+
+def test_the_handle_can_be_taken_away(inverse_tab):
+    tab = inverse_tab
+    tab.page.get_by_label("handle on the tip").uncheck()
+    tab.wait(lambda: not tab.drawn("/grip").visible, "the ball is gone")
+    assert not tab.session.state.appearance.handle
+    tab.page.get_by_label("handle on the tip").check()
+    tab.wait(lambda: tab.drawn("/grip").visible, "the ball is back")
+
+
+def test_a_state_without_a_handle_is_saved_as_such():
+    state = StudioState(design=sr.designs.minimal_trunk()).showing(handle=False)
+    assert StudioState.from_json(state.to_json()) == state

@@ -1,0 +1,133 @@
+"""Undone, done again, reset, and still there after the page or the server begins anew."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from softreach.arm import designs
+from softreach.arm.parameters import changed, find_parameter
+from softreach.studio import Start, Studio, StudioState
+from softreach.studio.kept_work import KeptWork
+from tests.studio.conftest import SMALL
+from tests.studio.tab import Tab
+
+TRUNK = designs.minimal_trunk()
+
+
+def start():
+    return Start(state=StudioState(design=TRUNK).showing(level=14), quality=SMALL)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return tmp_path / "work"
+
+
+def taper(tab):
+    design = tab.session.state.design
+    return find_parameter(design, "taper").value(design)
+
+
+def shown_taper(tab):
+    return float(tab.slider("taper φ [deg]").get_attribute("aria-valuenow"))
+
+
+def become(tab, condition, what):
+    tab.wait(condition, what)
+    tab.settle()
+
+
+def test_a_dragged_slider_is_one_step_that_buttons_and_keys_undo(tab):
+    tab.open("Design")
+    first = tab.session.state.design
+    tab.drag("taper φ [deg]", 30)
+    become(tab, lambda: tab.session.state.design != first, "the design changes")
+    tab.page.wait_for_timeout(500)  # until the last event of the drag is in
+    become(tab, lambda: abs(shown_taper(tab) - np.degrees(taper(tab))) < 0.03, "the drag is over")
+    second = tab.session.state.design
+    tab.press("Undo")
+    become(tab, lambda: tab.session.state.design == first, "the design is back")
+    tab.wait(lambda: abs(shown_taper(tab) - np.degrees(taper(tab))) < 0.03, "the slider is back")
+    tab.press("Redo")
+    become(tab, lambda: tab.session.state.design == second, "the change is there again")
+    tab.page.locator("canvas").first.focus()
+    tab.page.keyboard.press("Control+z")
+    become(tab, lambda: tab.session.state.design == first, "the key undoes")
+    tab.page.keyboard.press("Control+Shift+z")
+    become(tab, lambda: tab.session.state.design == second, "the key does it again")
+    assert tab.session.reach.arm == second
+
+
+def test_reset_leads_back_to_the_beginning_and_can_be_undone(tab):
+    tab.session.update(lambda s: s.replace(design=changed(TRUNK, {"revolution": np.radians(60)})))
+    tab.session.update(lambda s: s.showing(color="manipulability"))
+    before = tab.session.state
+    tab.press("Reset")
+    become(tab, lambda: tab.session.state.design == TRUNK, "the first design is back")
+    assert tab.session.state.appearance.color == "manipulability"
+    tab.press("Undo")
+    become(tab, lambda: tab.session.state == before, "the reset is undone")
+
+
+def test_where_there_is_nothing_to_redo_the_page_says_so(tab):
+    tab.session.update(lambda s: s.replace(activation=(-0.1, 0.0, 0.0)))
+    tab.press("Redo")
+    tab.page.get_by_text("There is nothing to redo.").wait_for()
+
+
+def reloaded(tab, studio):
+    """The session of a page after it was loaded again."""
+    known = set(studio.sessions)
+    tab.page.reload()
+    tab.page.get_by_text("volume 0").first.wait_for()  # a page may connect twice
+    tab.wait(lambda: set(studio.sessions) - known, "the page connects again")
+    session = studio.sessions[max(studio.sessions)]
+    assert session.settle()
+    return session
+
+
+def test_a_page_that_is_reloaded_goes_on_where_it_was_beside_another_tab(browser, folder):
+    with Studio(start(), work=KeptWork(folder)) as studio:
+        one, other = Tab(browser, studio), None
+        one.session.update(lambda s: s.replace(design=changed(TRUNK, {"taper": 0.02})))
+        one.settle()
+        other = Tab(browser, studio)
+        assert other.session.state.design == TRUNK  # what is open elsewhere stays there
+        other.session.update(lambda s: s.replace(design=changed(TRUNK, {"taper": 0.01})))
+        other.settle()
+        one.session = reloaded(one, studio)
+        assert taper(one) == 0.02
+        assert one.session.reach.arm == one.session.state.design
+        one.page.get_by_text(f"volume {one.session.reach.volume:.4f}").wait_for()
+        one.press("Undo")
+        become(one, lambda: one.session.state.design == TRUNK, "the history is there too")
+        assert taper(other) == 0.01
+        other.close()
+        one.close()
+
+
+def test_a_server_that_is_started_again_goes_on_where_the_last_one_ended(browser, folder):
+    with Studio(start(), work=KeptWork(folder)) as studio:
+        tab = Tab(browser, studio)
+        tab.session.update(lambda s: s.replace(design=changed(TRUNK, {"taper": 0.02})))
+        tab.session.update(lambda s: s.replace(activation=(-0.5, 0.0, 0.0)))
+        tab.settle()
+        kept = tab.session.state
+        tab.close()
+    with Studio(start(), work=KeptWork(folder)) as studio:
+        tab = Tab(browser, studio)
+        assert tab.session.state.replace(camera=None) == kept.replace(camera=None)
+        assert tab.session.reach.arm == kept.design
+        tab.close()
+
+
+def test_work_that_cannot_be_read_is_named_and_the_studio_begins_anew(browser, folder):
+    folder.mkdir()
+    (folder / "latest.json").write_text('{"softreach_studio": 1, "design": "<b class=struck>"}')
+    with Studio(start(), work=KeptWork(folder)) as studio:
+        tab = Tab(browser, studio)
+        tab.page.get_by_text("Work is not kept").wait_for()
+        assert tab.page.locator(".struck").count() == 0
+        assert tab.session.state.design == TRUNK
+        tab.close()
