@@ -17,9 +17,10 @@ pytest.importorskip("viser", reason="the studio needs viser")
 
 from softreach.arm import designs
 from softreach.arm.manipulator import Manipulator
-from softreach.studio.reach import Quality, stages
+from softreach.studio.reach import Quality
 from softreach.studio.scene import Scene
 from softreach.studio.server import start_server, stop_server
+from softreach.studio.stages import stages
 from softreach.studio.state import LEVELS, Appearance
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)

@@ -20,9 +20,10 @@ from softreach.studio.atlas_map import atlas_map, held_places, map_choices, metr
 from softreach.studio.colors import sample_values
 from softreach.studio.files import cloud_file, figure_file, state_from, surface_file
 from softreach.studio.page import static_page
-from softreach.studio.reach import Quality, stages
+from softreach.studio.reach import Quality
 from softreach.studio.slicing import in_slice
 from softreach.studio.source import start_on_design, start_on_state, start_on_store
+from softreach.studio.stages import stages
 from softreach.studio.state import MapView, Slice, StudioState
 
 SMALL = Quality(coarse_level=8, fine_level=10, coarse_accuracy=0.1, fine_accuracy=0.05)

@@ -20,8 +20,9 @@ from softreach.studio.loading import (
     typed_loads,
     with_loads,
 )
-from softreach.studio.reach import Quality, Reach, cloud_points, stages, unstable_samples
+from softreach.studio.reach import Quality, Reach, cloud_points, unstable_samples
 from softreach.studio.rod import solvable_rod
+from softreach.studio.stages import stages
 from softreach.studio.state import StudioState
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)

@@ -12,8 +12,9 @@ from softreach.rod.kinematics import tip_positions
 from softreach.studio.axes import axes_box
 from softreach.studio.colors import color_names, key_html, manipulability, sample_colors
 from softreach.studio.picking import picked_point, plane_crossing
-from softreach.studio.reach import Quality, Reach, reached, shown_samples, stages
+from softreach.studio.reach import Quality, Reach, shown_samples
 from softreach.studio.slicing import in_slice, sliced_faces
+from softreach.studio.stages import reached, stages
 from softreach.studio.state import Slice
 from softreach.studio.worker import Dropped
 

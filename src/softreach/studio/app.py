@@ -135,7 +135,7 @@ def _furnish(session: Session, url: str) -> None:
     from softreach.studio.panels.view import ViewPanel
 
     gui = session.client.gui
-    made: list[Any] = [StatusPanel(gui)]
+    made: list[Any] = [StatusPanel(gui, session)]
     tabs = gui.add_tab_group()
     kinds = {
         "Design": DesignPanel,

@@ -7,11 +7,13 @@ makes it here; nobody else escapes, and nobody else writes tags around what is n
 from __future__ import annotations
 
 import html
+from typing import Self
 
-__all__ = ["Part", "Strong", "Swatch", "alert", "inline", "link", "paragraph", "spread"]
+__all__ = ["Part", "Strong", "Swatch", "Term", "alert", "inline", "link", "paragraph", "spread"]
 
 _LINE = "font-size:0.85em;line-height:1.45;padding:0 0.8em 0.4em;overflow-wrap:anywhere"
 _SMALL = "font-size:0.8em;padding:0 0.8em 0.5em;overflow-wrap:anywhere"
+_HELP = "cursor:help;text-decoration:underline dotted"
 _ALERT = f"color:#c92a2a;{_SMALL};white-space:pre-line"
 
 
@@ -21,13 +23,26 @@ class Strong(str):
     __slots__ = ()
 
 
+class Term(str):
+    """Text in bold that explains itself when pointed at."""
+
+    __slots__ = ("meaning",)
+    meaning: str
+
+    def __new__(cls, text: str, meaning: str) -> Self:
+        """Text, and what it means."""
+        made = super().__new__(cls, text)
+        made.meaning = meaning
+        return made
+
+
 class Swatch(tuple[int, int, int]):
     """A little square of a color, RGB from 0 to 255."""
 
     __slots__ = ()
 
 
-Part = str | Strong | Swatch
+Part = str | Strong | Term | Swatch
 
 
 def inline(*parts: Part) -> str:
@@ -62,4 +77,6 @@ def _part(part: Part) -> str:
         red, green, blue = (int(value) for value in part)
         return f'<span style="color:rgb({red},{green},{blue})">\N{BLACK SQUARE}</span>'
     text = html.escape(part)
+    if isinstance(part, Term):
+        return f'<b style="{_HELP}" title="{html.escape(part.meaning)}">{text}</b>'
     return f"<b>{text}</b>" if isinstance(part, Strong) else text

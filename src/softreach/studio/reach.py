@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,19 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.cloud import compute_cloud, design_of
-from softreach.errors import InvalidInput, SoftreachWarning
+from softreach.errors import SoftreachWarning
 from softreach.rod.tip_map import TipStatus
-from softreach.studio.effort import affordable_level
-from softreach.studio.rod import TOL, solvable_rod
-from softreach.studio.worker import StaleCheck, all_cores
+from softreach.studio.budget import memory_share
+from softreach.studio.effort import level_in_memory
+from softreach.studio.rod import TOL
+from softreach.studio.worker import all_cores
 from softreach.volume import concave_hull
 from softreach.workspace import (
     ReachableCurve,
     ReachableSet,
     ReachableSolid,
     ReachableSurface,
-    reachable_set,
 )
 
 if TYPE_CHECKING:
@@ -39,12 +37,13 @@ __all__ = [
     "Size",
     "beside",
     "cloud_points",
-    "reached",
     "shown_rows",
     "shown_samples",
-    "stages",
     "unstable_samples",
 ]
+
+_ALPHA_NUMBERS = 128
+"""A point of an α-shape takes about as much memory as a sample of so many activations."""
 
 Rows = slice | NDArray[np.int64]
 
@@ -63,6 +62,8 @@ class Quality:
     coarse_seconds: float = 0.25
     """What the first cloud of a loaded arm may take; it has fewer points if they cost more."""
     fine_seconds: float = 5.0
+    most_seconds: float = 30.0
+    """What an exact set may take before the studio does without it."""
 
 
 class Size(NamedTuple):
@@ -86,6 +87,8 @@ class Reach:
     fine: bool
     refusal: str = ""
     """Why there is no exact set."""
+    notes: tuple[str, ...] = ()
+    """What was left out or is coarser than asked, and why."""
     wanted: int = 0
     """Samples that were asked for; there are fewer where each costs much."""
     order: NDArray[np.int64] | None = field(default=None, repr=False)
@@ -145,7 +148,7 @@ class Reach:
     @cached_property
     def alpha_shape(self) -> Hull:
         """The α-shape of at most 2^17 points that are stable, α = 0.05 L."""
-        rows = shown_rows(self, 17)
+        rows = shown_rows(self, level_in_memory(_ALPHA_NUMBERS, memory_share(), 17))
         with all_cores, warnings.catch_warnings():
             warnings.simplefilter("ignore", SoftreachWarning)  # coarse clouds are sparse
             return concave_hull(self.cloud.tip[rows[self.status[rows] == TipStatus.STABLE]])
@@ -155,64 +158,6 @@ class Reach:
         """Volume of the α-shape [L³], if it has been asked for; nothing is computed."""
         hull: Hull | None = vars(self).get("alpha_shape")
         return None if hull is None else hull.volume / self.arm.length**3
-
-
-def stages(arm: Manipulator, level: int, quality: Quality, check: StaleCheck) -> Iterator[Reach]:
-    """The reach of a design, coarse and then fine; waits for its turn where all cores are used.
-
-    Args:
-        arm: The design.
-        level: The fine cloud has at least 2^level points, if the arm is not loaded.
-        quality: How much is computed in each stage.
-        check: Called all the time; raises to stop.
-
-    Raises:
-        InvalidInput: Loads that cannot be computed.
-    """
-    if arm.loads is not None:
-        yield from _loaded_stages(arm, level, quality, check)
-        return
-    fine = max(level, quality.fine_level)
-    sizes = (quality.coarse_level, quality.coarse_accuracy), (fine, quality.fine_accuracy)
-    for stage, (points, accuracy) in enumerate(sizes):
-        check()
-        with all_cores:
-            cloud = _cloud(arm, points, quality, check)
-            exact = _exact(arm, accuracy, quality.tol, check)
-        yield Reach(arm=arm, cloud=cloud, exact=exact, fine=stage == 1)
-
-
-def _loaded_stages(
-    arm: Manipulator, level: int, quality: Quality, check: StaleCheck
-) -> Iterator[Reach]:
-    """First a cloud alone, as large as there is time for; the exact set takes much longer."""
-    rod = solvable_rod(arm)
-    check()
-    points = affordable_level(rod, quality.coarse_seconds, min(level, quality.coarse_level))
-    with all_cores:
-        cloud = _cloud(arm, points, quality, check)
-    first = Reach(arm=arm, cloud=cloud, exact=None, fine=False, wanted=1 << level)
-    yield first
-    check()
-    with all_cores:
-        first = _measured(first, quality.coarse_accuracy, quality.tol, check)
-    yield first
-    check()
-    points = affordable_level(rod, quality.fine_seconds, level)
-    with all_cores:
-        cloud = _cloud(arm, points, quality, check)
-        fine = replace(first, cloud=cloud, fine=True)
-        accuracy = quality.fine_accuracy
-        yield fine if first.refusal else _measured(fine, accuracy, quality.tol, check)
-
-
-def reached(cloud: xr.Dataset, quality: Quality) -> Reach:
-    """The reach that belongs to a cloud from a file."""
-    ordered = cloud.attrs.get("sampler") in ("uniform", "sobol")
-    shuffled = None if ordered else np.random.default_rng(0).permutation(cloud.sizes["sample"])
-    found = Reach(arm=design_of(cloud), cloud=cloud, exact=None, fine=True, order=shuffled)
-    with all_cores:
-        return _measured(found, quality.fine_accuracy, quality.tol, lambda: None)
 
 
 def shown_samples(reach: Reach, level: int) -> Rows:
@@ -242,21 +187,3 @@ def beside(reach: Reach) -> NDArray[np.float64]:
     """How far a cloud stands beside another of about its size [L], shape (3,)."""
     across = cloud_points(reach, 14)[:, 0]
     return np.array([1.3 * float(np.ptp(across)) if len(across) else 0.0, 0.0, 0.0])
-
-
-def _cloud(arm: Manipulator, level: int, quality: Quality, check: StaleCheck) -> xr.Dataset:
-    return compute_cloud(arm, 1 << level, 0, "sobol", tol=quality.tol, progress=lambda _: check())
-
-
-def _measured(reach: Reach, accuracy: float, tol: float, check: StaleCheck) -> Reach:
-    """With its exact set, or with why there is none: some activation never comes to rest."""
-    try:
-        return replace(reach, exact=_exact(reach.arm, accuracy, tol, check))
-    except InvalidInput as error:
-        return replace(reach, exact=None, refusal=str(error))
-
-
-def _exact(arm: Manipulator, accuracy: float, tol: float, check: StaleCheck) -> ReachableSet:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SoftreachWarning)  # the error is shown beside the volume
-        return reachable_set(arm, accuracy=accuracy, tol=tol, progress=lambda _: check())

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -31,6 +32,8 @@ __all__ = ["Panel", "Session"]
 
 Array = NDArray[np.float64]
 
+_LONGEST_NOTE = 1000  # characters: a file's own text may be in an error
+
 
 class Panel(Protocol):
     """Widgets of one concept; they call `Session.update` and are notified of every change."""
@@ -57,6 +60,10 @@ class Session:
         """What the design can reach, or the design before it until that is known."""
         self.refusal = ""
         """Why nothing can be computed of the design."""
+        self.canceled = False
+        """Whether the reader stopped what was being computed of this state."""
+        self.doing = ""
+        """What is being computed or written, for the reader."""
         self.compiling = False
         """Whether kernels are being compiled, for whichever tab."""
         self.free: Reach | None = None
@@ -78,7 +85,7 @@ class Session:
         """Held while nodes that several jobs draw are taken away and drawn again."""
         self._changing, self._showing = threading.RLock(), threading.RLock()
         self._jobs = {kind: kind(self) for kind in JOBS}
-        self._workers = {kind: Latest(self._failed) for kind in JOBS}
+        self._workers = {kind: Latest(self.fail, self._rested) for kind in JOBS}
 
     def begin(self) -> None:
         """Do everything once."""
@@ -102,6 +109,7 @@ class Session:
             old, self.state, self.note = self.state, change(self.state), ""
             new = self.state
             self.revision += not by_widget
+            self.canceled = False
         self.follow(*what_follows(old, new))
         self.show()
 
@@ -140,6 +148,39 @@ class Session:
             for panel in self.panels:
                 panel.show(self)
 
+    @property
+    def busy(self) -> bool:
+        """Whether any job has something to do."""
+        return any(worker.busy for worker in self._workers.values())
+
+    def cancel(self) -> None:
+        """Stop all that is being computed; what is known already stays."""
+        stopped = [worker.cancel() for worker in self._workers.values()]
+        if any(stopped):
+            self.canceled = True
+            self.say("Canceled: what was complete by then is shown.")
+
+    def resume(self) -> None:
+        """Compute what is missing since it was canceled, or failed."""
+        self.canceled, self.note = False, ""
+        self.follow(*what_follows(None, self.state))
+        self.show()
+
+    def report(self, doing: str) -> None:
+        """Tell the reader what is being done; "" for nothing."""
+        if doing != self.doing:
+            self.doing = doing
+            self.show()
+
+    @contextmanager
+    def working(self, doing: str) -> Iterator[None]:
+        """Tell the reader what is being done inside the block."""
+        self.report(doing)
+        try:
+            yield
+        finally:
+            self.report("")
+
     def follow(self, *kinds: type[Job]) -> None:
         """Do these jobs as soon as they are free, for the state there is by then."""
         for kind in kinds:
@@ -154,13 +195,28 @@ class Session:
         """Drop all work: the tab is gone."""
         for worker in self._workers.values():
             worker.close()
+        # viser may hold on to what belongs to a page for a while; clouds are large.
+        self.reach = self.free = self.reference = self.answer = self.atlas = None
+        self.panels, self.trail = [], []
 
-    def _failed(self, error: Exception) -> None:
-        """Show an error of a worker; one that is not ours is a bug and goes to the log too."""
-        if isinstance(error, SoftreachError):
-            self.say(str(error))
+    def _rested(self) -> None:
+        """A job has nothing left to do; if that is true of all, the reader is told."""
+        if not self.busy:
+            self.doing = ""
+            self.show()
+
+    def fail(self, error: Exception) -> None:
+        """Show an error; one that is not ours is a bug and goes to the log too."""
+        if isinstance(error, SoftreachError | OSError):
+            self.say(_shortened(str(error)))
+        elif isinstance(error, MemoryError):
+            self.say("There is not enough memory for that: show fewer points, or close other tabs.")
         else:
-            self.say(f"{type(error).__name__}: {error}")
+            self.say(_shortened(f"{type(error).__name__}: {error}"))
             threading.excepthook(
                 threading.ExceptHookArgs((type(error), error, error.__traceback__, None))
             )
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= _LONGEST_NOTE else f"{text[:_LONGEST_NOTE]} ..."

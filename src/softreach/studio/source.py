@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput
 from softreach.studio.atlas_map import metric_names
-from softreach.studio.reach import Quality, Reach, reached
+from softreach.studio.reach import Quality, Reach
+from softreach.studio.stages import reached
 from softreach.studio.state import StudioState
 
 if TYPE_CHECKING:

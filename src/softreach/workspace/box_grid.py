@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.kernels.contour import stretches
+from softreach.parallel import blocks
+from softreach.progress import Progress, silent
 from softreach.rod.never_at_rest import none_stable
 from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap
@@ -14,13 +16,19 @@ __all__ = ["corners_of", "every_second", "grid_stretches", "grid_tips", "image_m
 
 Array = NDArray[np.float64]
 
+_BLOCK = 1 << 16  # vertices
 _TOL = 1e-9  # far fewer evaluations than on the grids: their steps may be short
 _NEARLY_ALL = 0.9
 _DIFFERENCES = 200.0  # over n², more than differences on n cells err by, of the largest det J
 
 
-def grid_tips(rod: TipMap, cells: int) -> Array:
+def grid_tips(rod: TipMap, cells: int, progress: Progress = silent) -> Array:
     """Tips [m] of the grid of cells^m boxes over the free bundles, in C order.
+
+    Args:
+        rod: The tip map.
+        cells: Along each axis.
+        progress: Called with 0 now and then, so that it can raise.
 
     Returns:
         Shape ((cells + 1)^m, 3), the last free bundle varying fastest; NaN where there is no stable
@@ -30,7 +38,11 @@ def grid_tips(rod: TipMap, cells: int) -> Array:
         InvalidInput: There is none anywhere.
     """
     ticks = [np.linspace(0.0, 1.0, cells + 1)] * rod.box.dimension
-    tips = stable_tips(rod).tips(rod.box.from_free_cube(_product(ticks)))
+    places, stable = _product(ticks), stable_tips(rod)
+    tips = np.empty((len(places), 3))
+    for rows in blocks(len(places), _BLOCK):
+        tips[rows] = stable.tips(rod.box.from_free_cube(places[rows]))
+        progress(0)
     if rod.supports_unstable and np.isnan(tips[:, 0]).all():
         raise none_stable(len(tips))
     return tips

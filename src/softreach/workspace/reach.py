@@ -173,7 +173,7 @@ def rasterized_set(
         accuracy: Relative error of the volume that the cell is chosen for.
         progress: Called with the number of grid vertices done since its last call.
     """
-    tips = grid_tips(rod, cells)
+    tips = grid_tips(rod, cells, progress)
     left_out = left_out_cells(rod, tips, cells)
     lattice = lattice_for(_reached(tips, left_out), cell=cell, accuracy=accuracy)
     stretches = grid_stretches(rod, tips, cells, left_out)

@@ -7,7 +7,8 @@ from dataclasses import replace
 from softreach.arm.manipulator import Manipulator
 from softreach.studio.jobs.job import Job
 from softreach.studio.jobs.reach import draw_axes
-from softreach.studio.reach import Reach, stages
+from softreach.studio.reach import Reach
+from softreach.studio.stages import stages
 from softreach.studio.state import StudioState
 from softreach.studio.worker import StaleCheck
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from softreach.errors import InvalidInput
+from softreach.studio.budget import OverBudget
 from softreach.studio.jobs.job import Job
-from softreach.studio.reach import Reach, stages
+from softreach.studio.reach import Reach
+from softreach.studio.stages import stages
 from softreach.studio.state import StudioState
 from softreach.studio.worker import StaleCheck
 
@@ -32,12 +34,20 @@ class ComputeReach(Job):
             return
         session.refusal = ""
         try:
-            for reach in stages(state.design, state.appearance.level, session.quality, check):
-                check()
-                session.reach = reach
-                _draw_cloud(session)
+            self._compute(state, check)
         except InvalidInput as error:
             _withdraw(session, str(error))
+        except OverBudget as error:
+            _withdraw(session, f"Not computed: the cloud needs {error}.")
+        except MemoryError:
+            _withdraw(session, "Not computed: there is not enough free memory.")
+
+    def _compute(self, state: StudioState, check: StaleCheck) -> None:
+        session, level = self.session, state.appearance.level
+        for reach in stages(state.design, level, session.quality, check, session.report):
+            check()
+            session.reach = reach
+            _draw_cloud(session)
 
 
 class DrawCloud(Job):
@@ -53,8 +63,8 @@ class DrawCloud(Job):
         """Draw what is known; ask for more where it is not enough."""
         check()
         if _is_complete(self.session.reach, self.session.state):
-            _draw_points(self.session)
-            self.session.show()
+            with self.session.working("coloring the points"):
+                _draw_points(self.session)
         else:
             self.session.follow(ComputeReach)
 
@@ -72,8 +82,16 @@ class DrawSurfaces(Job):
         """Draw them, which computes them the first time."""
         check()
         if self.session.reach is not None:
-            self.session.scene.draw_surfaces(self.session.reach, self.session.state.appearance)
+            self._draw(self.session.reach)
             self.session.show()
+
+    def _draw(self, reach: Reach) -> None:
+        session, look = self.session, self.session.state.appearance
+        if not (look.surface or look.alpha_shape):
+            session.scene.draw_surfaces(reach, look)
+            return
+        with session.working("computing surfaces"):
+            session.scene.draw_surfaces(reach, look)
 
 
 def _is_complete(known: Reach | None, state: StudioState) -> bool:

@@ -8,7 +8,8 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.studio.jobs.job import Job
-from softreach.studio.reach import Reach, beside, stages
+from softreach.studio.reach import Reach, beside
+from softreach.studio.stages import stages
 from softreach.studio.state import StudioState
 from softreach.studio.worker import StaleCheck
 

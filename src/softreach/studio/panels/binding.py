@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from softreach.errors import SoftreachError
 from softreach.studio.state import StudioState
 
 if TYPE_CHECKING:
@@ -39,5 +38,5 @@ def attempt(session: Session, action: Callable[[], object]) -> None:
     """Act, and show the reader what is wrong if that fails."""
     try:
         action()
-    except (SoftreachError, OSError) as error:
-        session.say(str(error))
+    except Exception as error:  # whoever presses a button sees no log
+        session.fail(error)

@@ -70,20 +70,22 @@ class ExportPanel:
 
     def _save_cloud(self) -> None:
         suffix = self._cloud.value
-        self._send(f"cloud{suffix}", cloud_file(self._reach(), suffix))
+        self._write(f"cloud{suffix}", lambda: cloud_file(self._reach(), suffix))
 
     def _save_surface(self) -> None:
         suffix = self._surface.value
-        self._send(f"surface{suffix}", surface_file(self._reach(), suffix))
+        self._write(f"surface{suffix}", lambda: surface_file(self._reach(), suffix))
 
     def _save_figure(self) -> None:
-        self._send("reachability.png", figure_file(self._reach(), self._session.state))
+        self._write("reachability.png", lambda: figure_file(self._reach(), self._session.state))
 
     def _save_page(self) -> None:
+        self._write("reachability.html", self._page)
+
+    def _page(self) -> bytes:
         board = self._session.board
         picture = None if board is None or board.map is None else board.map.image
-        page = static_page(self._session.state_now(), self._reach(), picture)
-        self._send("reachability.html", page.encode())
+        return static_page(self._session.state_now(), self._reach(), picture).encode()
 
     def _button(self, label: str, action: Callable[[], None]) -> None:
         bind_button(self._session.client.gui.add_button(label), self._session, action)
@@ -99,5 +101,17 @@ class ExportPanel:
             raise InvalidInput("cloud", "still being computed", "complete", "try again soon")
         return reach
 
+    def _write(self, name: str, content: Callable[[], bytes]) -> None:
+        """Send what takes a while to make, and say so meanwhile."""
+        with self._session.working(f"writing {name}"):
+            made = content()
+        self._send(name, made)
+        self._session.say(f"{name} is written: {_size(len(made))}.")
+
     def _send(self, name: str, content: bytes) -> None:
         self._session.client.send_file_download(name, content, save_immediately=True)
+
+
+def _size(count: int) -> str:
+    """Bytes in words."""
+    return f"{count / 1e6:.1f} MB" if count >= 1e5 else f"{count / 1e3:.1f} kB"

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.colors import FAINT, UNSTABLE, key_html
-from softreach.studio.markup import Part, Strong, Swatch
+from softreach.studio.markup import Part, Strong, Swatch, Term
+from softreach.studio.panels.binding import bind_button
 from softreach.studio.panels.line import Line
 
 if TYPE_CHECKING:
@@ -18,6 +19,18 @@ if TYPE_CHECKING:
 
 __all__ = ["StatusPanel", "legend_text", "reach_text", "tip_text"]
 
+_CANCEL, _GO_ON = "Cancel", "Compute what is missing"
+_ABOUT_CANCEL = "Stops what is being computed; what is complete stays. Every change starts anew."
+UNREACHABILITY = (
+    "Unreachability UNR [%]: the share of the convex hull of all tips that no activation reaches, "
+    "1 − V / V of the hull"
+)
+_SIZES = {
+    "volume": "V [L³]: volume of all places that the tip reaches, its error beside it; L: length",
+    "area": "Area [L²] of all places that the tip reaches, its error beside it; L: length",
+    "length": "Length [L] of the curve that the tip reaches, its error beside it",
+    "point": "All activations are held: the tip is at one place",
+}
 _GAP = "\N{EN SPACE} "
 _POSTURES = {
     TipStatus.STABLE: "a stable equilibrium",
@@ -29,14 +42,17 @@ _POSTURES = {
 class StatusPanel:
     """Text above all tabs."""
 
-    def __init__(self, gui: GuiApi) -> None:
+    def __init__(self, gui: GuiApi, session: Session) -> None:
         """Add the widgets."""
         self._numbers = Line(gui, "computing ...")
         self._comparison = Line(gui)
         self._key = Line(gui)
         self._legend = Line(gui)
         self._refusal = Line(gui)
+        self._coarser = Line(gui)
         self._note = Line(gui)
+        self._cancel = gui.add_button(_CANCEL, disabled=True, hint=_ABOUT_CANCEL)
+        bind_button(self._cancel, session, lambda: _stop_or_go_on(session))
 
     def show(self, session: Session) -> None:
         """Show what is known, and whether it is about to change."""
@@ -45,6 +61,16 @@ class StatusPanel:
         self._key.show(key_html(session.key))
         self._explain_marks(session)
         self._note.say(*((session.note,) if session.note else ()))
+        self._offer(session)
+
+    def _offer(self, session: Session) -> None:
+        """What the button does at this moment; it keeps its place, so that nothing jumps."""
+        busy, lacking = session.busy, is_behind(session) and not session.refusal
+        label, disabled = _CANCEL if busy or not lacking else _GO_ON, not (busy or lacking)
+        if self._cancel.label != label:
+            self._cancel.label = label
+        if self._cancel.disabled != disabled:
+            self._cancel.disabled = disabled
 
     def _explain_marks(self, session: Session) -> None:
         reach = session.reach
@@ -52,20 +78,42 @@ class StatusPanel:
         self._legend.say(*(legend_text(reach, free=free) if reach is not None else ()))
         refusal = reach.refusal if reach is not None else ""
         self._refusal.say(*((f"No exact volume: {refusal}",) if refusal else ()))
+        notes = reach.notes if reach is not None and reach.fine else ()
+        self._coarser.say(*((f"{'; '.join(notes)}.",) if notes else ()))
+
+
+def is_behind(session: Session) -> bool:
+    """Whether what is shown is not yet, or not all, of the design in the fields."""
+    reach = session.reach
+    return reach is None or reach.arm != session.state.design or not reach.fine
 
 
 def _numbers_text(session: Session) -> list[Part]:
     reach, work = session.reach, _work(session)
     if reach is None:
         return [session.refusal or work]
-    stale = reach.arm != session.state.design
     hull = reach.alpha_volume if session.state.appearance.alpha_shape else None
-    hull_text = [f" · α-shape {hull:.4f} L³"] if hull is not None else []
-    return [*reach_text(reach), *hull_text, *([f" · {work}"] if stale or not reach.fine else [])]
+    parts = [*reach_text(reach), *([f" · α-shape {hull:.4f} L³"] if hull is not None else [])]
+    if reach.arm != session.state.design:
+        parts = [Strong("of the design before: "), *parts]
+    return [*parts, *([f" · {work}"] if work else [])]
 
 
 def _work(session: Session) -> str:
-    return "compiling, once on this machine ..." if session.compiling else "computing ..."
+    """What is being done; that nothing is, where something is missing."""
+    if session.compiling:
+        return "compiling, once on this machine ..."
+    if session.doing:
+        return f"{session.doing} ..."
+    if not is_behind(session):
+        return ""
+    if session.busy:
+        return "computing ..."
+    return "canceled" if session.canceled else "not computed"
+
+
+def _stop_or_go_on(session: Session) -> None:
+    (session.cancel if session.busy else session.resume)()
 
 
 def reach_text(reach: Reach) -> list[Part]:
@@ -73,14 +121,15 @@ def reach_text(reach: Reach) -> list[Part]:
     parts: list[Part] = []
     if reach.size is not None:
         name, value, error, unit = reach.size
-        parts += [Strong(f"{name} {value:.4f} ± {error:.1g} {unit}"), " · "]
+        value_text = f"{name} {value:.4f} ± {error:.1g} {unit}"
+        parts += [Term(value_text, _SIZES[name]), " · "]
     if not math.isnan(reach.unreachability):
-        parts += [Strong(f"UNR {100 * reach.unreachability:.2f} %"), " · "]
+        parts += [Term(f"UNR {100 * reach.unreachability:.2f} %", UNREACHABILITY), " · "]
     if reach.lost_share:
         parts.append(f"{_percent(reach.lost_share)} of the activations left out · ")
     parts.append(f"{reach.samples:,} samples")
     if reach.fine and reach.samples < reach.wanted:
-        parts.append(f" of {reach.wanted:,}: those of a loaded arm take long")
+        parts.append(f" of {reach.wanted:,}")
     return parts
 
 

@@ -1,0 +1,103 @@
+"""No design and no failure takes the server or the tab away."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+from softreach.arm import designs
+from softreach.arm.parameters import changed
+from softreach.studio import Quality, StudioState, stages
+from softreach.studio.worker import all_cores
+from tests.studio.conftest import SMALL
+from tests.studio.tab import Tab
+
+ENDLESS = Quality(coarse_level=12, fine_level=12, fine_accuracy=1e-5, most_seconds=60.0)
+
+
+def five_bundles():
+    return changed(designs.minimal_trunk(), {"longitudinal.bundles": 3})
+
+
+@pytest.fixture(autouse=True)
+def _small_design_again(tab):
+    yield
+    tab.session.quality = SMALL
+    tab.session.update(lambda s: StudioState(design=designs.minimal_trunk()).showing(level=14))
+    tab.settle()
+
+
+def test_a_slider_that_makes_five_bundles_leaves_the_server_alive(tab):
+    tab.open("Design")
+    tab.drag("bundles of longitudinal", 60)
+    tab.wait(lambda: tab.session.state.design.bundles >= 5, "there are more bundles")
+    tab.settle()
+    reach = tab.session.reach
+    assert reach.arm == tab.session.state.design
+    assert reach.fine
+    tab.page.get_by_text(f"{reach.samples:,} samples").first.wait_for()
+
+
+def begin_endless(tab):
+    tab.session.quality = ENDLESS
+    tab.session.update(lambda s: s.replace(design=five_bundles()))
+    tab.page.get_by_text("computing the exact set").first.wait_for()
+
+
+def test_a_running_computation_is_canceled_and_taken_up_again(tab):
+    begin_endless(tab)
+    start = time.monotonic()
+    tab.press("Cancel")
+    tab.settle()
+    assert time.monotonic() - start < 10
+    tab.page.get_by_text("Canceled").first.wait_for()
+    tab.session.quality = SMALL
+    tab.press("Compute what is missing")
+    tab.wait(lambda: tab.session.reach.fine, "the rest is computed")
+    tab.settle()
+    tab.page.get_by_text(f"volume {tab.session.reach.volume:.4f}").first.wait_for()
+
+
+def test_what_runs_out_of_memory_says_so_and_the_next_change_is_computed(tab, monkeypatch):
+    def fails(*_, **__):
+        raise MemoryError
+
+    monkeypatch.setattr(stages, "compute_cloud", fails)
+    tab.session.update(lambda s: s.replace(design=changed(s.design, {"taper": 0.02})))
+    tab.page.get_by_text("there is not enough free memory").first.wait_for()
+    tab.settle()
+    assert tab.page.get_by_text("computing").count() == 0
+    monkeypatch.undo()
+    tab.session.update(lambda s: s.replace(design=changed(s.design, {"taper": 0.03})))
+    tab.settle()
+    tab.page.get_by_text(f"volume {tab.session.reach.volume:.4f}").first.wait_for()
+
+
+def test_a_tab_that_closes_in_mid_computation_ends_it_and_frees_its_memory(browser, studio):
+    tab = Tab(browser, studio)
+    session = tab.session
+    begin_endless(tab)
+    start = time.monotonic()
+    tab.context.close()
+    assert session.settle(20)
+    assert time.monotonic() - start < 10
+    assert session.reach is None
+    with all_cores:
+        pass
+
+
+def test_what_is_shown_of_the_design_before_is_marked(tab, monkeypatch):
+    go, made = threading.Event(), stages.compute_cloud
+
+    def waits(*given, **options):
+        go.wait(60)
+        return made(*given, **options)
+
+    monkeypatch.setattr(stages, "compute_cloud", waits)
+    tab.session.update(lambda s: s.replace(design=changed(s.design, {"taper": 0.02})))
+    tab.page.get_by_text("of the design before").first.wait_for()
+    go.set()
+    tab.settle()
+    tab.page.get_by_text("of the design before").first.wait_for(state="hidden")
