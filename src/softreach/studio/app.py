@@ -131,6 +131,7 @@ def _furnish(session: Session, url: str) -> None:
     from softreach.studio.panels.inverse import InversePanel
     from softreach.studio.panels.loads import LoadsPanel
     from softreach.studio.panels.parts import PartsPanel
+    from softreach.studio.panels.plots import PlotsPanel
     from softreach.studio.panels.status import StatusPanel
     from softreach.studio.panels.view import ViewPanel
 
@@ -144,6 +145,7 @@ def _furnish(session: Session, url: str) -> None:
         "Activation": ActivationPanel,
         "Inverse": InversePanel,
         "View": ViewPanel,
+        "Plots": PlotsPanel,
     }
     made += [kind(gui, tabs.add_tab(name), session) for name, kind in kinds.items()]
     made.append(ExportPanel(gui, tabs.add_tab("Export"), session, url))

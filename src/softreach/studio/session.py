@@ -15,6 +15,7 @@ from softreach.rod.tip_map import TipStatus
 from softreach.studio.eye import Eye
 from softreach.studio.jobs import JOBS, Job, SolveInverse, what_follows
 from softreach.studio.map_board import MapBoard, board_of
+from softreach.studio.plots.figures import Figures
 from softreach.studio.reach import Reach
 from softreach.studio.scene import Scene
 from softreach.studio.source import Start
@@ -79,6 +80,8 @@ class Session:
         """Where it has been."""
         self.answer: Solution | None = None
         """Of the inverse problem."""
+        self.figures = Figures()
+        """What was found for the plots beside the scene."""
         self.atlas: xr.Dataset | None = start.atlas
         self.board: MapBoard | None = board_of(self.scene, self.atlas)
         self.drawing = threading.RLock()
@@ -197,7 +200,7 @@ class Session:
             worker.close()
         # viser may hold on to what belongs to a page for a while; clouds are large.
         self.reach = self.free = self.reference = self.answer = self.atlas = None
-        self.panels, self.trail = [], []
+        self.panels, self.trail, self.figures = [], [], Figures()
 
     def _rested(self) -> None:
         """A job has nothing left to do; if that is true of all, the reader is told."""

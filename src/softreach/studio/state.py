@@ -13,6 +13,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.errors import InvalidInput, Range
 from softreach.rod.activation_box import ActivationBox
 from softreach.studio.rod import design_of_text, rod_of
+from softreach.studio.wishes import PlotView, TipPath
 
 __all__ = [
     "LEVELS",
@@ -90,6 +91,7 @@ class Appearance:
     ghosts: bool = True
     """The shapes of all solutions of the inverse problem at once."""
     map: MapView = field(default_factory=MapView)
+    plots: PlotView = field(default_factory=PlotView)
 
     def __post_init__(self) -> None:
         if self.level not in LEVELS:
@@ -129,6 +131,8 @@ class StudioState:
     """A design kept for comparison."""
     side_by_side: bool = False
     camera: Camera | None = None
+    path: TipPath | None = None
+    """What the tip follows."""
 
     def __post_init__(self) -> None:
         if self.reference is not None:
@@ -149,6 +153,7 @@ class StudioState:
         values = {name: getattr(self, name) for name in _PLAIN}
         values["appearance"] = asdict(self.appearance)
         values["camera"] = self.camera and asdict(self.camera)
+        values["path"] = self.path and asdict(self.path)
         values["design"] = self.design.to_toml()
         values["reference"] = self.reference and self.reference.to_toml()
         return json.dumps({"softreach_studio": VERSION, **values}, indent=1, ensure_ascii=False)
@@ -188,7 +193,8 @@ def _parsed(text: str | bytes) -> dict[str, Any]:
 def _fields(values: dict[str, Any]) -> dict[str, Any]:
     look = dict(values["appearance"])
     look["slice"], look["map"] = Slice(**look["slice"]), MapView(**look["map"])
-    camera, reference = values["camera"], values["reference"]
+    look["plots"] = PlotView(**look.get("plots", {}))
+    camera, reference, path = values["camera"], values["reference"], values.get("path")
     return {
         "design": design_of_text(values["design"], "state file"),
         "activation": tuple(map(float, values["activation"])),
@@ -197,6 +203,7 @@ def _fields(values: dict[str, Any]) -> dict[str, Any]:
         "reference": reference and design_of_text(reference, "state file"),
         "side_by_side": bool(values["side_by_side"]),
         "camera": camera and Camera(**{name: vector(v) for name, v in camera.items()}),
+        "path": path and TipPath.from_fields(path),
     }
 
 

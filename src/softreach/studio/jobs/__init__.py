@@ -7,6 +7,13 @@ from softreach.studio.jobs.free import DrawFree
 from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.jobs.job import Job
 from softreach.studio.jobs.map import DrawMap
+from softreach.studio.jobs.plots import (
+    CountActivations,
+    CutSection,
+    FollowArm,
+    MeasureVolumes,
+    SweepParameter,
+)
 from softreach.studio.jobs.reach import ComputeReach, DrawCloud, DrawSurfaces
 from softreach.studio.jobs.reference import DrawReference
 from softreach.studio.state import StudioState
@@ -14,14 +21,19 @@ from softreach.studio.state import StudioState
 __all__ = [
     "JOBS",
     "ComputeReach",
+    "CountActivations",
+    "CutSection",
     "DrawArm",
     "DrawCloud",
     "DrawFree",
     "DrawMap",
     "DrawReference",
     "DrawSurfaces",
+    "FollowArm",
     "Job",
+    "MeasureVolumes",
     "SolveInverse",
+    "SweepParameter",
     "what_follows",
 ]
 
@@ -34,6 +46,11 @@ JOBS: tuple[type[Job], ...] = (
     SolveInverse,
     DrawReference,
     DrawMap,
+    FollowArm,
+    MeasureVolumes,
+    SweepParameter,
+    CountActivations,
+    CutSection,
 )
 
 

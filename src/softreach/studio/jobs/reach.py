@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from softreach.errors import InvalidInput
 from softreach.studio.budget import OverBudget
 from softreach.studio.jobs.job import Job
+from softreach.studio.jobs.plots import CountActivations, CutSection, MeasureVolumes
 from softreach.studio.reach import Reach
 from softreach.studio.stages import stages
 from softreach.studio.state import StudioState
@@ -112,7 +113,7 @@ def _withdraw(session: Session, refusal: str) -> None:
 
 def _draw_cloud(session: Session) -> None:
     _draw_points(session)
-    session.follow(DrawSurfaces)
+    session.follow(DrawSurfaces, MeasureVolumes, CountActivations, CutSection)
     session.show()
 
 
