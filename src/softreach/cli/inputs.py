@@ -120,28 +120,13 @@ def shape_of(text: str | None, arm: Manipulator) -> xr.Dataset:
 
 def points_of(text: str | None, file: Path | None) -> list[list[float]]:
     """Positions [m] from `x,y,z`, or from a CSV file with such columns (a header is skipped)."""
+    from softreach.inverse.target_table import position_in, positions_in
+
     if text is not None:
-        return [_position("target", text)]
+        return [position_in("target", text)]
     if file is None or not file.is_file():
         raise InvalidInput("targets", file, "a CSV file that exists")
-    lines = [line for line in file.read_text(encoding="utf-8").splitlines() if line.strip()]
-    rows = lines[1:] if lines and _numbers(lines[0]) is None else lines
-    return [_position(f"{file}, point {k + 1}", row) for k, row in enumerate(rows)]
-
-
-def _position(name: str, text: str) -> list[float]:
-    values = _numbers(text)
-    if values is None:
-        raise InvalidInput(name, text, "three comma-separated numbers x,y,z in m")
-    return values
-
-
-def _numbers(text: str) -> list[float] | None:
-    try:
-        values = [float(part) for part in text.split(",")[:3]]
-    except ValueError:
-        return None
-    return values if len(values) == 3 else None
+    return positions_in(file.read_text(encoding="utf-8"), str(file))
 
 
 def radius_of(text: str, length: float) -> float | str:

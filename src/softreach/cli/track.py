@@ -29,15 +29,15 @@ def track(
     changes: Changes = UNCHANGED,
 ) -> None:
     """Follow a path of tip positions on one branch of activations, and say where it ends."""
-    from softreach.export.table import column_names
+    from softreach.atomic import replacing
+    from softreach.export.path_table import path_csv
     from softreach.path import track_path
 
     arm = design_from(design, changes)
     first = None if start is None else activation_of(start, arm)
     found = track_path(arm, points_of(None, path), first)
-    rows = zip(found.activation.values.tolist(), found.tip_error.values.tolist(), strict=True)
-    header = ",".join([*column_names(arm.bundle_names), "tip_error_m"])
-    _write(out, [header, *(",".join(f"{x:.12g}" for x in (*g, error)) for g, error in rows)])
+    with replacing(out) as partial:
+        partial.write_text(path_csv(found), encoding="utf-8")
     followed = int((found.status == 0).sum())
     of_all = f"{followed} of {found.sizes['point']} points followed"
     sys.stdout.write(f"{of_all}, up to {_end(found)}: {out}\n")
@@ -57,10 +57,3 @@ def _end(found: xr.Dataset) -> str:
     }
     bound = f"{at}, where {found.attrs['end_bundle']} is at its {found.attrs['end_bound']} bound"
     return named.get(end, bound)
-
-
-def _write(path: Path, lines: list[str]) -> None:
-    from softreach.atomic import replacing
-
-    with replacing(path) as partial:
-        partial.write_text("\n".join([*lines, ""]), encoding="utf-8")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 __all__ = ["Panel", "Session"]
 
 Array = NDArray[np.float64]
+_Kind = TypeVar("_Kind", bound=Job)
 
 _LONGEST_NOTE = 1000  # characters: a file's own text may be in an error
 
@@ -188,6 +189,12 @@ class Session:
         """Do these jobs as soon as they are free, for the state there is by then."""
         for kind in kinds:
             self._workers[kind].submit(self._jobs[kind].run)
+
+    def job(self, kind: type[_Kind]) -> _Kind:
+        """The job of a kind."""
+        found = self._jobs[kind]
+        assert isinstance(found, kind)
+        return found
 
     def settle(self, timeout: float = 60.0) -> bool:
         """Wait until all that was asked for is done; return whether it is."""

@@ -7,6 +7,7 @@ from softreach.studio.jobs.free import DrawFree
 from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.jobs.job import Job
 from softreach.studio.jobs.map import DrawMap
+from softreach.studio.jobs.path import FollowPath, PlayPath, WriteMovie
 from softreach.studio.jobs.plots import (
     CountActivations,
     CutSection,
@@ -30,10 +31,13 @@ __all__ = [
     "DrawReference",
     "DrawSurfaces",
     "FollowArm",
+    "FollowPath",
     "Job",
     "MeasureVolumes",
+    "PlayPath",
     "SolveInverse",
     "SweepParameter",
+    "WriteMovie",
     "what_follows",
 ]
 
@@ -51,6 +55,9 @@ JOBS: tuple[type[Job], ...] = (
     SweepParameter,
     CountActivations,
     CutSection,
+    FollowPath,
+    PlayPath,
+    WriteMovie,
 )
 
 

@@ -78,9 +78,14 @@ class SweepParameter(Job):
         if not state.appearance.plots.sweep or control is None:
             return
         known = session.figures.sweep
-        if known is not None and known.complete and (known.arm, known.control) == (
-            state.design,
-            control,
+        if (
+            known is not None
+            and known.complete
+            and (known.arm, known.control)
+            == (
+                state.design,
+                control,
+            )
         ):
             return
         for found in sweep(state.design, control, session.quality, check):

@@ -33,8 +33,8 @@ _BLUE, _ORANGE, _GREEN, _GRAY = "#2f6db5", "#e8590c", "#2b8a3e", "#868e96"
 _COMPUTING = "computing ..."
 _PLOTS = {
     "along_arm": (
-        "curvature and strain along the arm",
-        "κ, u₃ (times L) and the axial extension ζ at stations Z, in the present activation",
+        "along the arm",
+        "curvature κ and torsion u₃ (times L) and the axial extension ζ at stations Z, in the present activation",
     ),
     "section": (
         "section",
@@ -42,15 +42,15 @@ _PLOTS = {
         "boundary, and how many activations reach each place",
     ),
     "histogram": (
-        "activations of the samples",
+        "activations",
         "how often the samples that the slice leaves pull each bundle how much",
     ),
     "volume_curve": (
-        "volume against α",
+        "V against α",
         "V(α): volume of the α-shape of the cloud against the radius α, beside the exact volume",
     ),
     "sweep": (
-        "volume against a parameter",
+        "V against parameter",
         "volume of designs that differ from this one in one parameter, computed while you look",
     ),
 }
@@ -69,8 +69,8 @@ class PlotsPanel:
                 name: gui.add_checkbox(label, False, hint=hint)
                 for name, (label, hint) in _PLOTS.items()
             }
-            self._parameter = gui.add_dropdown(
-                "parameter", ("",), hint="the parameter of the last plot"
+            self._parameter: Any = gui.add_dropdown(
+                "parameter", ("",), hint="what changes in the plot of V against a parameter"
             )
         self._window = gui.add_panel(visible=False)
         self._window.dock_left()

@@ -45,13 +45,13 @@ class Chart:
             logarithmic: Whether the horizontal axis is.
         """
         self._gui, self._container = gui, container
-        self._axes = tuple(
+        self._axes: Any = tuple(
             {"label": label, "stroke": _INK, "grid": {"stroke": _GRID}, "ticks": {"stroke": _GRID}}
             | ({"size": 56} if label == y else {})
             for label in (x, y)
         )
         across = {"time": False, **({"distr": 3, "log": 10} if logarithmic else {})}
-        self._scales = {"x": across, "y": {"auto": True}}
+        self._scales: Any = {"x": across, "y": {"auto": True}}
         self._x = x
         self._widget: Any = None
         self._made_of: tuple[Curve, ...] = ()
@@ -87,7 +87,7 @@ class Chart:
         self._widget = None
 
 
-def _series(curve: Curve) -> dict[str, Any]:
+def _series(curve: Curve) -> Any:
     made: dict[str, Any] = {"label": curve.name, "stroke": curve.color, "width": 2}
     made["points"] = {"show": curve.points, "size": 7, "fill": curve.color}
     return made | ({"dash": (6.0, 4.0)} if curve.dashed else {})

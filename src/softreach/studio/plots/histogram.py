@@ -63,7 +63,7 @@ def histogram_picture(
     activation = reach.cloud.activation.values[shown_samples(reach, level)][kept]
     figure = blank_figure(0.5 + 0.95 * reach.arm.bundles)
     axes = figure.subplots(reach.arm.bundles, 1, squeeze=False)[:, 0]
-    bounds = rod_of(reach.arm).box.bounds
+    bounds = np.array(rod_of(reach.arm).box.bounds)
     found = shares(activation, bounds)
     for k, ax in enumerate(axes):
         _draw(ax, found[k], bounds[k], bundle_color(k))

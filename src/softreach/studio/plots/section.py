@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -50,16 +51,14 @@ def section_picture(reach: Reach, cut: Slice) -> Picture:
     plane = _plane(cut)
     with all_cores:
         curves = section_curves(reach, cut)
-        counted = isinstance(reach.exact, ReachableSolid) and len(curves) > 0
-        grid = reach.exact.grid if counted else None
+        found = reach.exact
+        grid = found.grid if isinstance(found, ReachableSolid) and curves else None
     figure = blank_figure(4.6)
     ax = figure.subplots()
     view = _VIEWS[plane.axis]
     if grid is not None:
-        try:
+        with suppress(InvalidInput):  # the curves reach half a cell beyond the grid
             plot_slice(grid, ax=ax, view=view, at=plane.center * reach.arm.length)
-        except InvalidInput:  # the curves reach half a cell beyond the grid
-            pass
     _draw_boundary(ax, curves, view)
     where = f"{plane.axis} = {plane.center:.3g} L"
     ax.set_title(f"section {where}")
