@@ -34,7 +34,8 @@ _COMPUTING = "computing ..."
 _PLOTS = {
     "along_arm": (
         "along the arm",
-        "curvature κ and torsion u₃ (times L) and the axial extension ζ at stations Z, in the present activation",
+        "curvature κ and torsion u₃ (times L) and axial extension ζ at stations Z, in the "
+        "present activation",
     ),
     "section": (
         "section",
@@ -73,9 +74,7 @@ class PlotsPanel:
                 "parameter", ("",), hint="what changes in the plot of V against a parameter"
             )
         self._window = gui.add_panel(visible=False)
-        self._window.dock_left()
-        self._window.set_width(_WIDTH)
-        with self._window.add_tab("Plots"):
+        with self._window.add_tab("Figures"):
             self._folders = {
                 name: gui.add_folder(label, visible=False) for name, (label, _) in _PLOTS.items()
             }
@@ -119,6 +118,10 @@ class PlotsPanel:
         wish = session.state.appearance.plots
         for name, folder in self._folders.items():
             _set_visible(folder, getattr(wish, name))
+        if wish.any and not self._window.visible:
+            self._window.visible = True
+            self._window.dock_left()  # a page forgets where a hidden window was
+            self._window.set_width(_WIDTH)
         _set_visible(self._window, wish.any)
         self._offer(session.state)
         if session.revision != self._revision:
