@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from softreach.arm import designs
 from softreach.geometry.plane_cut import plane_cut
+from softreach.inverse import solve_inverse
+from softreach.studio.plots.plane_counts import plane_counts, within
 from softreach.studio.plots.section import enclosed_area, section_curves
+from softreach.studio.stages import stages
 from softreach.studio.state import Slice
 from softreach.studio.wishes import PlotView
+from tests.studio.conftest import SMALL
 
 
 def test_the_section_is_that_of_the_exact_set(tab):
@@ -50,6 +55,21 @@ def test_beside_the_set_nothing_is_reached(tab):
     tab.page.get_by_text("Nothing is reached at x = 1.4 L.").wait_for()
     tab.session.update(lambda s: s.showing(slice=Slice(), plots=PlotView()))
     tab.settle()
+
+
+def test_the_numbers_in_the_plane_are_those_of_the_inverse():
+    arm = designs.minimal_trunk(revolution=np.radians(180), taper=np.radians(2))
+    *_, reach = stages(arm, 14, SMALL, lambda: None)
+    tips = reach.cloud.tip.values[:4000]
+    folded = tips[solve_inverse(arm, tips).counts > 1] / arm.length
+    cut = Slice(axis="x", center=float(np.median(folded[:, 0])))
+    curves = section_curves(reach, cut)
+    counts = plane_counts(reach, curves, 0)["count"].stack(place=("x", "y", "z"))
+    rows = np.flatnonzero(counts.values)[::20]
+    targets = np.array([counts.place.values[row] for row in rows])
+    np.testing.assert_array_equal(counts.values[rows], solve_inverse(arm, targets).counts)
+    assert counts.values.max() > 1  # this arm folds
+    assert within(curves, targets / arm.length, 0).all()
 
 
 def test_the_areas_of_sections_sum_up_to_the_volume(tab):

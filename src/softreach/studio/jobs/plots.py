@@ -132,7 +132,7 @@ class CutSection(Job):
         reach = _complete_reach(self)
         if look.plots.section and reach is not None:
             with session.working("cutting the reachable set"):
-                session.figures.section = section_picture(reach, look.slice)
+                session.figures.section = section_picture(reach, look.slice, check)
             session.show()
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -13,9 +12,10 @@ from softreach.geometry.plane_cut import plane_cut
 from softreach.picture.projection import View, is_mirrored, plane_of
 from softreach.plot.slice import plot_slice
 from softreach.studio.plots.image import Picture, blank_figure, pixels
+from softreach.studio.plots.plane_counts import plane_counts
 from softreach.studio.reach import Reach
 from softreach.studio.state import Slice
-from softreach.studio.worker import all_cores
+from softreach.studio.worker import StaleCheck, all_cores
 from softreach.workspace import ReachableSolid, ReachableSurface
 
 if TYPE_CHECKING:
@@ -42,23 +42,28 @@ def section_curves(reach: Reach, cut: Slice) -> list[Array]:
     return [curve / length for curve in curves]
 
 
-def section_picture(reach: Reach, cut: Slice) -> Picture:
+def section_picture(reach: Reach, cut: Slice, check: StaleCheck = lambda: None) -> Picture:
     """Draw the section, in L; without a slice that of the plane y = 0.
+
+    Args:
+        reach: Of the design.
+        cut: The slice, of which the middle plane is cut.
+        check: Called all the time; raises to stop.
 
     Raises:
         InvalidInput: As `section_curves`.
     """
     plane = _plane(cut)
+    axis = "xyz".index(plane.axis)
     with all_cores:
         curves = section_curves(reach, cut)
-        found = reach.exact
-        grid = found.grid if isinstance(found, ReachableSolid) and curves else None
+    closed = isinstance(reach.exact, ReachableSolid) and bool(curves)
+    grid = plane_counts(reach, curves, axis, check) if closed else None
     figure = blank_figure(4.6)
     ax = figure.subplots()
     view = _VIEWS[plane.axis]
     if grid is not None:
-        with suppress(InvalidInput):  # the curves reach half a cell beyond the grid
-            plot_slice(grid, ax=ax, view=view, at=plane.center * reach.arm.length)
+        plot_slice(grid, ax=ax, view=view, at=plane.center * reach.arm.length)
     _draw_boundary(ax, curves, view)
     where = f"{plane.axis} = {plane.center:.3g} L"
     ax.set_title(f"section {where}")
