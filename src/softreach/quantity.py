@@ -6,7 +6,15 @@ import math
 import re
 from decimal import Decimal
 
-__all__ = ["quantity", "read_number", "read_quantity", "read_whole_number", "unit_names"]
+__all__ = [
+    "numbers_in",
+    "quantity",
+    "read_number",
+    "read_quantity",
+    "read_whole_number",
+    "shortened",
+    "unit_names",
+]
 
 _SMALLEST = 1e-3  # below it, numbers are written with a power of ten
 _FINEST = 1e-9  # of the value: what follows is rounding
@@ -14,6 +22,7 @@ _FINEST = 1e-9  # of the value: what follows is rounding
 _DECIMAL = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _NUMBER = re.compile(rf"\s*({_DECIMAL})\s*(.*?)\s*", re.ASCII)
 _GROUPED = re.compile(r"[+-]?\d+(?:_\d+)+", re.ASCII)
+_SHOWN = 60  # characters of what was typed
 _LONGEST = 40  # characters of a whole number
 _LARGEST = 30  # its power of ten
 _UNITS = {
@@ -76,6 +85,21 @@ def read_whole_number(text: str) -> int:
     if number.adjusted() > _LARGEST or number != number.to_integral_value():
         raise ValueError(text)
     return int(number)
+
+
+def numbers_in(text: str, count: int | None = None) -> list[float] | None:
+    """Comma-separated numbers; None if they are anything else, or not so many."""
+    try:
+        values = [read_number(part) for part in text.split(",")]
+    except ValueError:
+        return None
+    return values if count in (None, len(values)) else None
+
+
+def shortened(text: str) -> str:
+    """What was typed, such that it fits into a line and can be printed."""
+    plain = "".join(one if one.isprintable() else "?" for one in text)
+    return plain if len(plain) <= _SHOWN else f"{plain[: _SHOWN // 2]}...{plain[-_SHOWN // 4 :]}"
 
 
 def unit_names(unit: str) -> tuple[str, ...]:

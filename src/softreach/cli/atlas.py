@@ -11,10 +11,11 @@ from cyclopts import App, Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import AsJson, Durable, Sampler, Seed, design_from
-from softreach.cli.numbers import WHOLE, numbers_in, shortened
+from softreach.cli.numbers import WHOLE
 from softreach.cli.output import print_rows
 from softreach.cli.output_files import Overwrite, check_picture
 from softreach.errors import InvalidInput, MissingExtra
+from softreach.quantity import numbers_in, shortened
 
 if TYPE_CHECKING:
     import xarray as xr

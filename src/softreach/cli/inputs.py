@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
-from softreach.cli.numbers import WHOLE, numbers_in, shortened
+from softreach.cli.numbers import WHOLE
 from softreach.errors import InvalidDesign, InvalidInput
+from softreach.quantity import numbers_in, shortened
 from softreach.text_file import MEGABYTE, read_text
 
 if TYPE_CHECKING:
@@ -135,46 +136,13 @@ def shape_of(text: str | None, arm: Manipulator) -> xr.Dataset:
 
 def points_of(text: str | None, file: Path | None) -> list[list[float]]:
     """Positions [m] from `x,y,z`, or from a CSV file with such columns (a header is skipped)."""
+    from softreach.inverse.target_table import position_in, positions_in
+
     if text is not None:
-        return [_position("target", text)]
+        return [position_in("target", text)]
     if file is None:
         raise InvalidInput("targets", file, "a CSV file")
-    text_of_file = read_text("targets", file, _MOST_TARGETS)
-    lines = [line for line in text_of_file.splitlines() if line.strip()]
-    rows = lines[1:] if lines and _is_header(lines[0]) else lines
-    if not rows:
-        raise InvalidInput("targets", file, "a CSV file with a row x,y,z for each position")
-    return [_position(f"{file}, point {k + 1}", row) for k, row in enumerate(rows)]
-
-
-def _is_header(line: str) -> bool:
-    """Whether a line holds names: no part of it begins as a number does."""
-    return not any(part.strip().startswith(tuple("+-.0123456789")) for part in line.split(","))
-
-
-_LARGEST_FILE = 200_000_000  # bytes of a table of positions, some million of them
-
-
-def _text_of(file: Path) -> str:
-    size = file.stat().st_size
-    if size > _LARGEST_FILE:
-        allowed = f"a table of positions of at most {_LARGEST_FILE / 1e6:g} MB"
-        raise InvalidInput("targets", f"{file} of {size / 1e6:.0f} MB", allowed)
-    try:
-        return file.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise InvalidInput("targets", file, "a CSV file, which is text in UTF-8") from None
-
-
-_FARTHEST = 1e100  # m; squares of larger numbers leave the range of floats
-
-
-def _position(name: str, text: str) -> list[float]:
-    values = numbers_in(text, 3)
-    if values is None or max(map(abs, values)) > _FARTHEST:
-        allowed = f"three comma-separated numbers x,y,z in m, up to {_FARTHEST:g}"
-        raise InvalidInput(name, shortened(text) or "''", allowed)
-    return values
+    return positions_in(read_text("targets", file, _MOST_TARGETS), str(file))
 
 
 def radius_of(text: str, length: float) -> float | str:

@@ -8,16 +8,13 @@ from typing import Any
 from cyclopts import Parameter, Token
 
 from softreach.errors import InvalidInput
+from softreach.quantity import read_number, read_whole_number, shortened
 
-__all__ = ["NUMBER", "WHOLE", "numbers_in", "shortened"]
-
-_SHOWN = 60  # characters of what was typed
+__all__ = ["NUMBER", "WHOLE"]
 
 
 def _whole(kind: Any, tokens: Sequence[Token]) -> int:
     """A whole number: 400000, 400_000 or 4e5."""
-    from softreach.quantity import read_whole_number
-
     del kind
     try:
         return read_whole_number(tokens[0].value)
@@ -28,8 +25,6 @@ def _whole(kind: Any, tokens: Sequence[Token]) -> int:
 
 def _number(kind: Any, tokens: Sequence[Token]) -> float:
     """A finite number: 0.5, 1e-6."""
-    from softreach.quantity import read_number
-
     del kind
     try:
         return read_number(tokens[0].value)
@@ -43,23 +38,6 @@ WHOLE = Parameter(converter=_whole)
 
 NUMBER = Parameter(converter=_number)
 """Of every option that is a `float`."""
-
-
-def numbers_in(text: str, count: int | None = None) -> list[float] | None:
-    """Comma-separated numbers; None if they are anything else, or not so many."""
-    from softreach.quantity import read_number
-
-    try:
-        values = [read_number(part) for part in text.split(",")]
-    except ValueError:
-        return None
-    return values if count in (None, len(values)) else None
-
-
-def shortened(text: str) -> str:
-    """What was typed, such that it fits into a line and can be printed."""
-    plain = "".join(one if one.isprintable() else "?" for one in text)
-    return plain if len(plain) <= _SHOWN else f"{plain[: _SHOWN // 2]}...{plain[-_SHOWN // 4 :]}"
 
 
 def _name_and_value(token: Token) -> tuple[str, str]:

@@ -35,18 +35,15 @@ def track(
 ) -> None:
     """Follow a path of tip positions on one branch of activations, and say where it ends."""
     from softreach.atomic import writing
-    from softreach.export.table import column_names
+    from softreach.export.path_table import path_csv
     from softreach.path import track_path
 
     arm = design_from(design, changes)
     check_output("out", out, _TABLE, overwrite)
     first = None if start is None else activation_of(start, arm)
     found = track_path(arm, points_of(None, path), first)
-    rows = zip(found.activation.values.tolist(), found.tip_error.values.tolist(), strict=True)
-    header = ",".join([*column_names(arm.bundle_names), "tip_error_m"])
-    lines = [header, *(",".join(f"{x:.12g}" for x in (*g, error)) for g, error in rows)]
     with writing(out, _TABLE[".csv"], overwrite=overwrite) as file:
-        file.write("\n".join([*lines, ""]).encode())
+        file.write(path_csv(found).encode())
     followed = int((found.status == 0).sum())
     of_all = f"{followed} of {found.sizes['point']} points followed"
     sys.stdout.write(f"{of_all}, up to {_end(found)}: {out}\n")

@@ -189,6 +189,8 @@ def _furnish(session: Session, url: str) -> None:
     from softreach.studio.panels.inverse import InversePanel
     from softreach.studio.panels.loads import LoadsPanel
     from softreach.studio.panels.parts import PartsPanel
+    from softreach.studio.panels.path import PathPanel
+    from softreach.studio.panels.plots import PlotsPanel
     from softreach.studio.panels.status import StatusPanel
     from softreach.studio.panels.view import ViewPanel
 
@@ -201,7 +203,9 @@ def _furnish(session: Session, url: str) -> None:
         "Loads": (LoadsPanel,),
         "Activation": (ActivationPanel,),
         "Inverse": (HandlePanel, InversePanel),
+        "Path": (PathPanel,),
         "View": (ViewPanel,),
+        "Plots": (PlotsPanel,),
         "Compare": (ComparePanel,),
     }
     for name, together in kinds.items():
@@ -211,7 +215,8 @@ def _furnish(session: Session, url: str) -> None:
     if session.board is not None:
         made.append(AtlasPanel(gui, tabs.add_tab("Atlas"), session, session.board))
     session.panels = made
-    waiting = [panel for panel in reversed(made) if isinstance(panel, AtlasPanel | InversePanel)]
+    clickable = AtlasPanel | PathPanel | InversePanel
+    waiting = [panel for panel in reversed(made) if isinstance(panel, clickable)]
 
     @session.client.scene.on_click()
     def _(event: Any) -> None:

@@ -19,10 +19,11 @@ if TYPE_CHECKING:
 
 __all__ = ["AtlasMap", "atlas_map", "held_places", "map_choices", "metric_names"]
 
-_INCHES, _DPI = 4.0, 160
-_FRAME = (0.16, 0.14, 0.62, 0.72)  # of the axes: left, bottom, width, height
+_INCHES, _DPI = 3.1, 400  # small type would be lost in the scene, few pixels would blur it
+_FRAME = (0.19, 0.16, 0.57, 0.68)  # of the axes: left, bottom, width, height
 _SLACK = 0.03  # of the axes: designs lie on their rim
-_BAR = (0.82, 0.14, 0.035, 0.72)
+_BAR = (0.79, 0.16, 0.035, 0.68)
+_TICKS = 5  # intervals between them, at most
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -143,13 +144,21 @@ def _shown(atlas: xr.Dataset, name: str) -> NDArray[np.float64]:
 def _label(atlas: xr.Dataset, name: str) -> str:
     given = atlas[name].attrs.get("units", "1")
     unit = {"rad": "deg", "1": ""}.get(given, given)
-    return f"{name.replace('_', ' ')} [{unit}]" if unit else name.replace("_", " ")
+    words = " ".join([name.replace("_", " "), *_symbol(atlas[name])])
+    return f"{words} [{unit}]" if unit else words
+
+
+def _symbol(parameter: xr.DataArray) -> list[str]:
+    """Its symbol, if the atlas knows one and the name does not say whose it is."""
+    symbol = str(parameter.attrs.get("symbol", ""))
+    return [symbol] if symbol and "." not in str(parameter.name) else []
 
 
 def _drawn(atlas: xr.Dataset, metric: str, labels: list[str], title: str) -> NDArray[np.uint8]:
     # Not through pyplot, which belongs to one thread.
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
 
     figure = Figure(figsize=(_INCHES, _INCHES), dpi=_DPI)
     canvas = FigureCanvasAgg(figure)
@@ -158,7 +167,8 @@ def _drawn(atlas: xr.Dataset, metric: str, labels: list[str], title: str) -> NDA
     x, y = (_shown(atlas, str(name)) for name in atlas["status"].dims)
     ax.set_xlim(x[0], _end(x))
     ax.set_ylim(y[0], _end(y))
-    figure.colorbar(ax.collections[0], cax=figure.add_axes(_BAR))
+    ax.locator_params(nbins=_TICKS)
+    figure.colorbar(ax.collections[0], cax=figure.add_axes(_BAR), ticks=MaxNLocator(_TICKS))
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 

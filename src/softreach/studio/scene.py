@@ -41,6 +41,8 @@ _LIFT = 0.02  # of the fibers above the body, in R2
 _CLEAR = 0.45  # opacity of a body that has something inside
 _GHOST, _REFERENCE, _SURFACE, _HULL = 0.35, (150, 150, 158), (90, 140, 200), (220, 150, 60)
 _MARK: Color = (235, 90, 0)
+_ASKED: Color = (240, 175, 205)  # of a path, where the arm does not follow it
+_BLOCKED: Color = (30, 30, 30)
 _FREE_LEVEL, _FREE_SIZE = 15, 0.6
 _UNSTABLE_SIZE = 2.0  # times that of other points: they are few, and not to be overlooked
 
@@ -168,6 +170,19 @@ class Scene:
             return
         pieces = np.stack([tips[:-1], tips[1:]], axis=1).astype(np.float32)
         self._api.add_line_segments("/trail", pieces, _MARK, thickness=0.004)
+
+    def draw_path(self, points: Array, followed: Array) -> None:
+        """A path [L], pale, and as far as the arm can follow it, dark; a ball where that ends."""
+        self.remove("/path")
+        for path, line, color in (
+            ("/path/asked", points, _ASKED),
+            ("/path/followed", followed, _MARK),
+        ):
+            if len(line) > 1:
+                pieces = np.stack([line[:-1], line[1:]], axis=1).astype(np.float32)
+                self._api.add_line_segments(path, pieces, color, thickness=0.006)
+        if len(followed) and not np.array_equal(followed[-1], points[-1]):
+            self._api.add_icosphere("/path/end", 0.014, _BLOCKED, position=followed[-1])
 
     def draw_target(self, target: Array | None, nearest: Array | None = None) -> None:
         """A mark where the tip should go [L], and a line to the nearest place in reach."""

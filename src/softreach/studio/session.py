@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from softreach.studio.jobs import JOBS, FollowEye, Job, PullTip, SolveInverse, w
 from softreach.studio.jobs.pull import PullOrder, TipPull
 from softreach.studio.kept_work import KeptWork
 from softreach.studio.map_board import MapBoard, board_of
+from softreach.studio.plots.figures import Figures
 from softreach.studio.reach import Reach
 from softreach.studio.scene import Scene
 from softreach.studio.snapshots import Snapshots
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 __all__ = ["Panel", "Session"]
 
 Array = NDArray[np.float64]
+_Kind = TypeVar("_Kind", bound=Job)
 
 _LONGEST_NOTE = 1000  # characters: a file's own text may be in an error
 
@@ -104,6 +106,8 @@ class Session:
         """Of the inverse problem."""
         self.tip_pull: TipPull | None = None
         """What a drag of the tip has led to; None when nobody drags."""
+        self.figures = Figures()
+        """What was found for the plots beside the scene."""
         self.atlas: xr.Dataset | None = start.atlas
         self.board: MapBoard | None = board_of(self.scene, self.atlas)
         self.drawing = threading.RLock()
@@ -280,6 +284,12 @@ class Session:
         """See to it that nothing hides the arm: it has moved, or the eye."""
         self.follow(FollowEye)
 
+    def job(self, kind: type[_Kind]) -> _Kind:
+        """The job of a kind."""
+        found = self._jobs[kind]
+        assert isinstance(found, kind)
+        return found
+
     def settle(self, timeout: float = 60.0) -> bool:
         """Wait until all that was asked for is done; return whether it is."""
         # Work of one kind may order work of another.
@@ -291,7 +301,7 @@ class Session:
             worker.close()
         # viser may hold on to what belongs to a page for a while; clouds are large.
         self.reach = self.free = self.reference = self.answer = self.atlas = None
-        self.panels, self.trail = [], []
+        self.panels, self.trail, self.figures = [], [], Figures()
 
     def _rested(self) -> None:
         """A job has nothing left to do; if that is true of all, the reader is told."""

@@ -23,7 +23,7 @@ from softreach.workspace import ReachableSet, reachable_set
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["reached", "stages"]
+__all__ = ["exact_set", "reached", "stages"]
 
 Report = Callable[[str], None]
 """Told what is being computed, and how far it is."""
@@ -155,6 +155,25 @@ def reached(cloud: xr.Dataset, quality: Quality) -> Reach:
     work = _Work(found.arm, solvable_rod(found.arm), quality, lambda: None, _silent)
     with all_cores:
         return work.measured(found, quality.fine_accuracy)
+
+
+def exact_set(
+    arm: Manipulator, accuracy: float, tol: float, check: StaleCheck, seconds: float
+) -> ReachableSet:
+    """The exact set alone.
+
+    Args:
+        arm: The design.
+        accuracy: Relative error allowed in the volume.
+        tol: Largest tip error, in L.
+        check: Called all the time; raises to stop.
+        seconds: What it may take [s].
+
+    Raises:
+        InvalidInput: Some activation never comes to rest.
+        OverBudget: It takes more time or memory.
+    """
+    return _exact(arm, accuracy, tol, Budget(check, seconds))
 
 
 def _exact(arm: Manipulator, accuracy: float, tol: float, budget: Budget) -> ReachableSet:

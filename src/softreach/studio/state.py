@@ -14,6 +14,7 @@ from softreach.errors import InvalidInput, Range
 from softreach.rod.activation_box import ActivationBox
 from softreach.studio.rod import design_of_text, rod_of
 from softreach.studio.sight import CUTS
+from softreach.studio.wishes import PlotView, TipPath
 
 __all__ = [
     "LEVELS",
@@ -101,6 +102,7 @@ class Appearance:
     handle: bool = True
     """The ball on the tip that is dragged."""
     map: MapView = field(default_factory=MapView)
+    plots: PlotView = field(default_factory=PlotView)
 
     def __post_init__(self) -> None:
         if self.level not in LEVELS:
@@ -142,6 +144,8 @@ class StudioState:
     """A design kept for comparison."""
     side_by_side: bool = False
     camera: Camera | None = None
+    path: TipPath | None = None
+    """What the tip follows."""
 
     def __post_init__(self) -> None:
         if self.reference is not None:
@@ -162,6 +166,7 @@ class StudioState:
         values = {name: getattr(self, name) for name in _PLAIN}
         values["appearance"] = asdict(self.appearance)
         values["camera"] = self.camera and asdict(self.camera)
+        values["path"] = self.path and asdict(self.path)
         values["design"] = self.design.to_toml()
         values["reference"] = self.reference and self.reference.to_toml()
         return json.dumps({"softreach_studio": VERSION, **values}, indent=1, ensure_ascii=False)
@@ -201,7 +206,8 @@ def _parsed(text: str | bytes) -> dict[str, Any]:
 def _fields(values: dict[str, Any]) -> dict[str, Any]:
     look = dict(values["appearance"])
     look["slice"], look["map"] = Slice(**look["slice"]), MapView(**look["map"])
-    camera, reference = values["camera"], values["reference"]
+    look["plots"] = PlotView(**look.get("plots", {}))
+    camera, reference, path = values["camera"], values["reference"], values.get("path")
     return {
         "design": design_of_text(values["design"], "state file"),
         "activation": tuple(map(float, values["activation"])),
@@ -210,6 +216,7 @@ def _fields(values: dict[str, Any]) -> dict[str, Any]:
         "reference": reference and design_of_text(reference, "state file"),
         "side_by_side": bool(values["side_by_side"]),
         "camera": camera and Camera(**{name: vector(v) for name, v in camera.items()}),
+        "path": path and TipPath.from_fields(path),
     }
 
 

@@ -9,6 +9,14 @@ from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.jobs.job import Job
 from softreach.studio.jobs.keep import KeepState
 from softreach.studio.jobs.map import DrawMap
+from softreach.studio.jobs.path import FollowPath, PlayPath, WriteMovie
+from softreach.studio.jobs.plots import (
+    CountActivations,
+    CutSection,
+    FollowArm,
+    MeasureVolumes,
+    SweepParameter,
+)
 from softreach.studio.jobs.pull import PullTip
 from softreach.studio.jobs.reach import ComputeReach, DrawCloud, DrawSurfaces
 from softreach.studio.jobs.reference import DrawReference
@@ -18,18 +26,26 @@ from softreach.studio.state import StudioState
 __all__ = [
     "JOBS",
     "ComputeReach",
+    "CountActivations",
+    "CutSection",
     "DrawArm",
     "DrawCloud",
     "DrawFree",
     "DrawMap",
     "DrawReference",
     "DrawSurfaces",
+    "FollowArm",
     "FollowEye",
+    "FollowPath",
     "Job",
     "KeepState",
+    "MeasureVolumes",
+    "PlayPath",
     "PullTip",
     "SetTheme",
     "SolveInverse",
+    "SweepParameter",
+    "WriteMovie",
     "what_follows",
 ]
 
@@ -43,6 +59,14 @@ JOBS: tuple[type[Job], ...] = (
     PullTip,
     DrawReference,
     DrawMap,
+    FollowArm,
+    MeasureVolumes,
+    SweepParameter,
+    CountActivations,
+    CutSection,
+    FollowPath,
+    PlayPath,
+    WriteMovie,
     FollowEye,
     SetTheme,
     KeepState,

@@ -22,3 +22,4 @@ class DrawMap(Job):
         check()
         if self.session.board is not None:
             self.session.board.draw(self.session.state.appearance.map, self.session.state.design)
+            self.session.show()

@@ -8,6 +8,7 @@ from softreach.errors import InvalidInput
 from softreach.studio.budget import OverBudget
 from softreach.studio.colors import shown_color
 from softreach.studio.jobs.job import Job
+from softreach.studio.jobs.plots import CountActivations, CutSection, MeasureVolumes
 from softreach.studio.multiplicity import count_activations, uncounted
 from softreach.studio.reach import Reach, shown_rows
 from softreach.studio.stages import stages
@@ -116,7 +117,7 @@ def _withdraw(session: Session, refusal: str) -> None:
 
 def _draw_cloud(session: Session) -> None:
     _draw_points(session)
-    session.follow(DrawSurfaces)
+    session.follow(DrawSurfaces, MeasureVolumes, CountActivations, CutSection)
     session.show()
 
 

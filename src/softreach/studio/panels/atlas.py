@@ -6,10 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from softreach.arm.manipulator import Manipulator
 from softreach.studio.atlas_map import map_choices, metric_names
+from softreach.studio.atlas_numbers import nearest_numbers
 from softreach.studio.map_board import MapBoard
 from softreach.studio.panels.binding import attempt, bind
 from softreach.studio.panels.line import Line
+from softreach.studio.panels.picture import PictureFrame
 from softreach.studio.state import MapView, StudioState
 
 if TYPE_CHECKING:
@@ -32,6 +35,7 @@ class AtlasPanel:
         """Add the widgets."""
         self._session, self._board, self._atlas = session, board, board.atlas
         self._revision = -1
+        self._explained: tuple[Manipulator, str] | None = None
         names = tuple(str(dim) for dim in self._atlas["status"].dims)
         with tab:
             Line(gui, _HINT)
@@ -43,6 +47,8 @@ class AtlasPanel:
             )
             self._up = gui.add_dropdown("upward", names, hint="The parameter from bottom to top")
             self._visible = gui.add_checkbox("show the map", True, hint="Beside the arm")
+            self._numbers = Line(gui)
+            self._picture = PictureFrame(gui, gui.add_folder("the map"))
         bind(self._metric, session, lambda s, name: _viewed(s, metric=name))
         bind(self._right, session, lambda s, name: self._turned(s, "right", name))
         bind(self._up, session, lambda s, name: self._turned(s, "up", name))
@@ -50,9 +56,12 @@ class AtlasPanel:
 
     def show(self, session: Session) -> None:
         """Bring the widgets in line with the state."""
+        if self._board.map is not None:
+            self._picture.show(self._board.map.image)
         if session.revision != self._revision:
             self._revision = session.revision
             attempt(session, lambda: self._follow(session.state.appearance.map))
+        self._explain(session.state)
 
     def click(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
         """Load the design under the cursor; return whether the map is there."""
@@ -65,6 +74,14 @@ class AtlasPanel:
         metric, right, up = map_choices(self._atlas, view)
         self._metric.value, self._right.value, self._up.value = metric, right, up
         self._visible.value = view.shown
+
+    def _explain(self, state: StudioState) -> None:
+        """Say what the atlas knows of the nearest design; once for each design and metric."""
+        asked = state.design, state.appearance.map.metric
+        if asked != self._explained:
+            self._explained = asked
+            metric, *_ = map_choices(self._atlas, state.appearance.map)
+            self._numbers.say(nearest_numbers(self._atlas, metric, state.design))
 
     def _turned(self, state: StudioState, axis: str, name: str) -> StudioState:
         """A parameter on one axis; the other axis takes what this one had if it is the same."""

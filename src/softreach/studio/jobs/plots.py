@@ -1,0 +1,143 @@
+"""Computes what is plotted beside the scene; what is not shown is not computed."""
+
+from __future__ import annotations
+
+from softreach.errors import InvalidInput
+from softreach.studio.jobs.job import Job
+from softreach.studio.plots.along_arm import along_arm
+from softreach.studio.plots.histogram import histogram_picture
+from softreach.studio.plots.section import section_picture
+from softreach.studio.plots.sweep import sweep, swept_control
+from softreach.studio.plots.volumes import volume_curve_of
+from softreach.studio.reach import Reach
+from softreach.studio.state import StudioState
+from softreach.studio.worker import StaleCheck
+
+__all__ = [
+    "CountActivations",
+    "CutSection",
+    "FollowArm",
+    "MeasureVolumes",
+    "SweepParameter",
+]
+
+
+class FollowArm(Job):
+    """Curvature and strain along the arm, while its activations move."""
+
+    @staticmethod
+    def depends_on(state: StudioState) -> object:
+        """The arm in its activation."""
+        return state.appearance.plots.along_arm and (state.design, state.activation)
+
+    def run(self, check: StaleCheck) -> None:
+        """Compute them; nothing for an arm that cannot be computed, which `ComputeReach` says."""
+        check()
+        session, state = self.session, self.session.state
+        if state.appearance.plots.along_arm:
+            try:
+                session.figures.along_arm = along_arm(state.design, state.activation)
+            except InvalidInput:
+                session.figures.along_arm = None
+            session.show()
+
+
+class MeasureVolumes(Job):
+    """V(α) of the cloud."""
+
+    @staticmethod
+    def depends_on(state: StudioState) -> object:
+        """Which points are shown; the cloud itself is told by `ComputeReach`."""
+        return state.appearance.plots.volume_curve and state.appearance.level
+
+    def run(self, check: StaleCheck) -> None:
+        """Triangulate the cloud, once it is complete."""
+        check()
+        session, look = self.session, self.session.state.appearance
+        reach = _complete_reach(self)
+        if look.plots.volume_curve and reach is not None:
+            with session.working("V(α): triangulating the cloud"):
+                session.figures.volume_curve = volume_curve_of(reach, look.level)
+            session.show()
+
+
+class SweepParameter(Job):
+    """Volume against one parameter of the design."""
+
+    @staticmethod
+    def depends_on(state: StudioState) -> object:
+        """The design and the parameter."""
+        plots = state.appearance.plots
+        return plots.sweep and (state.design, plots.parameter)
+
+    def run(self, check: StaleCheck) -> None:
+        """Compute one design after the other, and show each."""
+        check()
+        session, state = self.session, self.session.state
+        control = swept_control(state.design, state.appearance.plots.parameter)
+        if not state.appearance.plots.sweep or control is None:
+            return
+        known = session.figures.sweep
+        if (
+            known is not None
+            and known.complete
+            and (known.arm, known.control)
+            == (
+                state.design,
+                control,
+            )
+        ):
+            return
+        for found in sweep(state.design, control, session.quality, check):
+            check()
+            session.figures.sweep = found
+            session.show()
+
+
+class CountActivations(Job):
+    """Histograms of the activations of the samples that are shown."""
+
+    @staticmethod
+    def depends_on(state: StudioState) -> object:
+        """Which samples are shown, the present activation and the target."""
+        look = state.appearance
+        return look.plots.histogram and (look.level, look.slice, state.activation, state.target)
+
+    def run(self, check: StaleCheck) -> None:
+        """Draw them, once the cloud is complete."""
+        check()
+        session, state = self.session, self.session.state
+        look, reach = state.appearance, _complete_reach(self)
+        if look.plots.histogram and reach is not None:
+            solutions = None if session.answer is None else session.answer.activations
+            session.figures.histogram = histogram_picture(
+                reach, look.level, look.slice, state.activation, solutions
+            )
+            session.show()
+
+
+class CutSection(Job):
+    """The reachable set in the plane of the slice."""
+
+    @staticmethod
+    def depends_on(state: StudioState) -> object:
+        """The plane; the set itself is told by `ComputeReach`."""
+        cut = state.appearance.slice
+        return state.appearance.plots.section and (cut.axis, cut.center)
+
+    def run(self, check: StaleCheck) -> None:
+        """Cut and draw it, once the exact set is complete."""
+        check()
+        session, look = self.session, self.session.state.appearance
+        reach = _complete_reach(self)
+        if look.plots.section and reach is not None:
+            with session.working("cutting the reachable set"):
+                session.figures.section = section_picture(reach, look.slice, check)
+            session.show()
+
+
+def _complete_reach(job: Job) -> Reach | None:
+    """What the design of the state can reach, if it is complete; its job says when it is."""
+    reach = job.session.reach
+    wanted = reach is not None and reach.fine and reach.arm == job.session.state.design
+    return reach if wanted else None

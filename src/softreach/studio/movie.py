@@ -1,0 +1,155 @@
+"""An animation of an arm that follows a path, as a GIF."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Sequence
+from copy import deepcopy
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.skin import inside
+from softreach.arm_shape import arm_surface, bundle_skins
+from softreach.errors import MissingExtra
+from softreach.geometry.surface import Surface
+from softreach.palette import BODY, bundle_color
+from softreach.picture.projection import View, project
+from softreach.picture.see_through import faces_to_eye, seen_through
+from softreach.picture.shading import draw_mesh
+from softreach.picture.zbuffer import Extent, ZBuffer
+from softreach.rod.kinematics import configuration
+from softreach.studio.rod import solvable_rod
+
+__all__ = ["frames_along", "path_movie"]
+
+Array = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+_PIXELS, _SIDES, _STATIONS = 420, 32, 41
+_MOST_FRAMES = 60
+_PATH, _TRACE, _CLOUD = (225, 150, 185), (220, 30, 120), (214, 218, 226)
+_DENSE = 3  # points of the path per pixel
+_MARGIN = 0.06  # of the picture
+_PAUSE = 60  # [ms] between frames
+_LAST = 1200  # [ms]
+
+
+def frames_along(count: int, most: int = _MOST_FRAMES) -> list[int]:
+    """Which of the points of a path are shown: evenly, the first and the last among them."""
+    return sorted({round(k) for k in np.linspace(0, count - 1, min(count, most))})
+
+
+def path_movie(
+    arm: Manipulator,
+    activations: Array,
+    path: Array,
+    cloud: Array,
+    *,
+    view: View = "oblique",
+    progress: Callable[[float], None] = lambda share: None,
+) -> bytes:
+    """Draw the arm along a path, and the path as far as it has come.
+
+    Args:
+        arm: The design.
+        activations: At the points that are followed, shape (n, bundles).
+        path: All points [L], shape (k, 3), k not below n.
+        cloud: Faint points behind [L], shape (m, 3).
+        view: The direction of the eye.
+        progress: Told the share of frames drawn so far; may raise to stop.
+
+    Returns:
+        The content of a GIF file.
+
+    Raises:
+        MissingExtra: Pillow is not installed.
+    """
+    shown = frames_along(len(activations))
+    shapes = [_shape(arm, activations[k]) for k in shown]
+    extent = _extent([cloud, path, *(body.vertices / arm.length for body, _ in shapes)], view)
+    behind, line = (ZBuffer(extent, _PIXELS, oversample=2) for _ in range(2))
+    behind.draw_points(cloud, _CLOUD, 1.5, view=view)
+    line.draw_points(_dense(path, extent), _PATH, 2.0, view=view)
+    paper = _over(behind.rgba(), np.full((*behind.shape, 3), 255, np.uint8))
+    frames = []
+    for number, (k, shape) in enumerate(zip(shown, shapes, strict=True)):
+        progress(number / len(shown))
+        buffer = deepcopy(line)
+        buffer.draw_points(_dense(path[: k + 1], extent), _TRACE, 4.0, view=view)
+        within = ZBuffer(extent, _PIXELS, oversample=2)
+        frames.append(_over(_drawn(buffer, within, arm, shape, view), paper))
+    return _gif(frames)
+
+
+class _Shape(NamedTuple):
+    """An arm in one activation."""
+
+    body: Surface
+    bundles: Sequence[Surface]
+
+
+def _shape(arm: Manipulator, activation: Array) -> _Shape:
+    shape = configuration(solvable_rod(arm), activation, _STATIONS)
+    return _Shape(arm_surface(arm, shape, _SIDES), bundle_skins(arm, shape, lift=0.02))
+
+
+def _drawn(buffer: ZBuffer, within: ZBuffer, arm: Manipulator, shape: _Shape, view: View) -> Image:
+    body, skins = shape
+    draw_mesh(buffer, body.vertices / arm.length, body.faces, BODY, view)
+    clear = any(inside(arm))
+    for k, skin in enumerate(skins):
+        points = skin.vertices / arm.length
+        draw_mesh(buffer, points, skin.faces, bundle_color(k), view)
+        if clear:
+            faces = faces_to_eye(points, skin.faces, view)
+            draw_mesh(within, points, faces, bundle_color(k), view)
+    image = buffer.rgba()
+    return seen_through(image, within.rgba()) if clear else image
+
+
+def _over(image: Image, paper: Image) -> Image:
+    """RGBA over RGB."""
+    cover = image[..., 3:] / 255
+    return np.rint(image[..., :3] * cover + paper * (1 - cover)).astype(np.uint8)
+
+
+def _extent(parts: Sequence[Array], view: View) -> Extent:
+    """A square around everything, with a margin."""
+    points = project(np.concatenate([part[:: max(1, len(part) // 5000)] for part in parts]), view)
+    flat = points[np.isfinite(points).all(axis=1), :2]
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    middle, half = (low + high) / 2, (0.5 + _MARGIN) * max(float((high - low).max()), 1e-9)
+    return Extent(middle[0] - half, middle[0] + half, middle[1] - half, middle[1] + half)
+
+
+def _dense(path: Array, extent: Extent) -> Array:
+    """So many points along a path that they make a line."""
+    from softreach.studio.drawn_paths import straight_path
+
+    if len(path) < 2:
+        return path
+    pixel = (extent.right - extent.left) / _PIXELS
+    length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+    return straight_path(path, 2 + int(_DENSE * length / pixel))
+
+
+def _gif(frames: Sequence[Image]) -> bytes:
+    try:
+        from PIL import Image as images
+    except ModuleNotFoundError as error:
+        raise MissingExtra("Pillow", "plot") from error
+    # One palette for all frames: colors that change from frame to frame flicker.
+    first = images.fromarray(frames[len(frames) // 2]).quantize(256, dither=images.Dither.NONE)
+    made = [
+        images.fromarray(frame).quantize(palette=first, dither=images.Dither.NONE)
+        for frame in frames
+    ]
+    times = [_PAUSE] * (len(made) - 1) + [_LAST]
+    file = io.BytesIO()
+    made[0].save(
+        file, "GIF", save_all=True, append_images=made[1:], duration=times, loop=0, optimize=False
+    )
+    return file.getvalue()

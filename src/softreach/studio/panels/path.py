@@ -1,0 +1,239 @@
+"""A path of the tip: loaded or drawn, followed, played and saved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from softreach.errors import InvalidInput
+from softreach.export.path_table import path_csv
+from softreach.inverse.target_table import positions_in
+from softreach.palette import bundle_color
+from softreach.path import PathStatus
+from softreach.studio.drawn_paths import PATH_SHAPES, PLANES, drawn_path, straight_path
+from softreach.studio.jobs.path import PlayPath, WriteMovie, at_point
+from softreach.studio.panels.binding import attempt, bind_button
+from softreach.studio.panels.line import Line
+from softreach.studio.picking import picked_point
+from softreach.studio.plots.chart import Chart, Curve
+from softreach.studio.reach import cloud_points
+from softreach.studio.rod import solvable_rod
+from softreach.studio.slicing import in_slice
+from softreach.studio.state import StudioState
+from softreach.studio.wishes import MOST_POINTS, TipPath
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from viser import GuiApi, UploadedFile
+
+    from softreach.studio.session import Session
+
+__all__ = ["PathPanel", "end_text"]
+
+_HINT = "The tip follows a path as far as its branch of solutions goes."
+_MOST_CURVES = 8  # in the timeline: more are not told apart
+_FILE_SIZE = 1 << 20  # bytes of a path that is loaded
+
+
+class PathPanel:
+    """The path of a tab."""
+
+    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
+        """Add the widgets."""
+        self._session, self._gui = session, gui
+        self._shown: xr.Dataset | None = None
+        self._revision = -1
+        with tab:
+            Line(gui, _HINT)
+            self._draw_widgets(gui)
+            self._text = Line(gui)
+            self._walk = gui.add_folder("follow it", visible=False)
+            with self._walk:
+                self._walk_widgets(gui)
+        self._listen()
+
+    def _draw_widgets(self, gui: GuiApi) -> None:
+        self._shape = gui.add_dropdown(
+            "shape", tuple(PATH_SHAPES), hint="of a path that begins at the tip"
+        )
+        self._plane = gui.add_dropdown("plane", tuple(PLANES), hint="in which the shape lies")
+        self._size = gui.add_number(
+            "size / L", 0.1, min=-2.0, max=2.0, step=0.01, hint="extent; < 0 for the other side"
+        )
+        self._draw = gui.add_button("Draw the path")
+        self._load = gui.add_upload_button(
+            "Load a path (CSV)", mime_type=".csv,text/csv", hint="columns x, y, z [m]"
+        )
+        self._clicks = gui.add_checkbox(
+            "clicks add points", False, hint="a click on a point of the cloud leads the path there"
+        )
+        self._clear = gui.add_button("Remove the path")
+
+    def _walk_widgets(self, gui: GuiApi) -> None:
+        self._play = gui.add_button_group("", ("Play", "Stop"))
+        self._at = gui.add_slider("point", 0, 1, 1, 0, hint="point of the path where the arm is")
+        graph = gui.add_folder("activations along the path")
+        self._timeline = Chart(gui, graph, "way / L", "activation")
+        self._save = gui.add_button_group(
+            "save", ("CSV", "GIF"), hint="the activations as a table, or the arm as an animation"
+        )
+
+    def _listen(self) -> None:
+        session = self._session
+        bind_button(self._draw, session, self._drawn)
+        bind_button(self._clear, session, lambda: self._take(None))
+        bind_button(self._play, session, self._played)
+        bind_button(self._save, session, self._saved)
+        self._load.on_upload(lambda _: attempt(session, lambda: self._read(self._load.value)))
+        self._at.on_update(self._moved)
+
+    def show(self, session: Session) -> None:
+        """Say how far the arm follows, and where it is."""
+        found, path = session.figures.track, session.state.path
+        if path is None or found is None or found.sizes["point"] != len(path.points):
+            self._shown, self._walk.visible = None, False
+            self._text.say(*(("following ...",) if path is not None else ()))
+            return
+        if found is not self._shown:
+            self._shown = found
+            self._list(found)
+        if self._at.value != path.at and session.revision != self._revision:
+            self._revision, self._at.value = session.revision, min(path.at, int(self._at.max))
+
+    def click(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
+        """Lead the path to the point of the cloud under the cursor, if clicks are for that."""
+        session = self._session
+        reach, look = session.reach, session.state.appearance
+        if not self._clicks.value:
+            return False
+        if reach is not None and look.cloud and reach.arm == session.state.design:
+            points = cloud_points(reach, look.level)
+            points = points[in_slice(points, look.slice)]
+            found = picked_point(points, origin, direction)
+            if found is not None:
+                attempt(session, lambda: self._extend(points[found] * reach.arm.length))
+        return True
+
+    def _list(self, found: xr.Dataset) -> None:
+        """Show the result of following."""
+        count = int((found.status == PathStatus.FOLLOWED).sum())
+        arm = self._session.state.design
+        self._text.say(end_text(found, arm.length))
+        self._walk.visible = count > 0
+        if count == 0:
+            return
+        self._at.max = max(count - 1, 1)
+        way = np.linalg.norm(np.diff(found.position.values[:count], axis=0), axis=1)
+        along = np.concatenate([[0.0], np.cumsum(way)]) / arm.length
+        names = [str(name) for name in found["bundle"].values][:_MOST_CURVES]
+        curves = [Curve(name, _css(bundle_color(k))) for k, name in enumerate(names)]
+        values = [found.activation.values[:count, k] for k in range(len(names))]
+        if count > 1:
+            self._timeline.show(along, curves, values)
+
+    def _take(self, path: TipPath | None) -> None:
+        self._session.update(lambda state: state.replace(path=path))
+
+    def _drawn(self) -> None:
+        """A shape from the tip, on the branch of the present activation."""
+        state, size = self._session.state, float(self._size.value)
+        points = drawn_path(
+            self._shape.value, self._plane.value, size * state.design.length, _tip(state)
+        )
+        self._take(TipPath.through(points, state.activation))
+
+    def _extend(self, point: np.ndarray) -> None:
+        """On to one more point, straight; what there is of a path begins at the tip."""
+        state, path = self._session.state, self._session.state.path
+        known = np.array(path.points) if path is not None else _tip(state)[None]
+        start = state.activation if path is None else path.start
+        more = straight_path([known[-1], point], 24)[1:]
+        self._take(TipPath.through(np.concatenate([known, more]), start))
+
+    def _read(self, file: UploadedFile) -> None:
+        if len(file.content) > _FILE_SIZE:
+            raise InvalidInput(file.name, f"{len(file.content)} bytes", f"at most {_FILE_SIZE}")
+        try:
+            text = file.content.decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            raise InvalidInput(file.name, str(error), "a CSV file, UTF-8") from None
+        points = positions_in(text, file.name)
+        if not 2 <= len(points) <= MOST_POINTS:
+            raise InvalidInput(file.name, f"{len(points)} points", f"2 to {MOST_POINTS} points")
+        state = self._session.state
+        tip = _tip(state)
+        near = np.linalg.norm(tip - points[0]) < 1e-3 * state.design.length
+        self._take(TipPath.through(points, state.activation if near else None))
+
+    def _moved(self, event: Any) -> None:
+        if event.client_id is None or self._shown is None:
+            return
+        activations, session = self._shown.activation.values, self._session
+        attempt(session, lambda: session.update(self._walked(activations)))
+
+    def _walked(self, activations: np.ndarray) -> Any:
+        return lambda state: at_point(state, activations, int(self._at.value))
+
+    def _ask(self, kind: type[PlayPath | WriteMovie]) -> None:
+        job = self._session.job(kind)
+        job.wanted = True
+        self._session.follow(kind)
+
+    def _played(self) -> None:
+        if self._play.value == "Play":
+            self._ask(PlayPath)
+        else:
+            self._session.follow(PlayPath)  # which drops what it is doing
+
+    def _saved(self) -> None:
+        if self._save.value == "CSV":
+            self._save_csv()
+        else:
+            self._ask(WriteMovie)
+
+    def _save_csv(self) -> None:
+        if self._shown is not None:
+            content = path_csv(self._shown).encode()
+            self._session.client.send_file_download("path.csv", content, save_immediately=True)
+
+
+def end_text(found: xr.Dataset, length: float) -> str:
+    """How far a path is followed, and why no farther.
+
+    Args:
+        found: From `track_path`.
+        length: L [m].
+    """
+    count, points = int((found.status == PathStatus.FOLLOWED).sum()), found.sizes["point"]
+    end, way = found.attrs["end"], float(found.end_length) / length
+    if end == "no_start":
+        return "The first point is not reached: out of reach, or not from this activation."
+    followed = f"{count} of {points} points are followed"
+    reasons = {
+        "": f"All {points} points are followed: {way:.4g} L of path.",
+        "fold": f"{followed}, {way:.4g} L of path: there the branch turns back (a fold).",
+        "unstable": f"{followed}, {way:.4g} L of path: there the arm loses its stability.",
+        "bound": (
+            f"{followed}, {way:.4g} L of path: there {found.attrs['end_bundle']} is at its "
+            f"{found.attrs['end_bound']} bound."
+        ),
+    }
+    return reasons[end]
+
+
+def _tip(state: StudioState) -> np.ndarray:
+    """Where the tip is [m].
+
+    Raises:
+        InvalidInput: The arm has no equilibrium.
+    """
+    tip = solvable_rod(state.design).tips(np.array([state.activation]))[0]
+    if not np.isfinite(tip).all():
+        raise InvalidInput("activation", state.activation, "one with an equilibrium")
+    return tip
+
+
+def _css(color: tuple[float, float, float]) -> str:
+    return "rgb({},{},{})".format(*(round(255 * part) for part in color))

@@ -1,0 +1,1 @@
+"""What the studio shows beside the scene: numbers along the arm, volumes, histograms, sections."""

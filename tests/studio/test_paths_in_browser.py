@@ -1,0 +1,154 @@
+"""End to end: a path of the tip is drawn, loaded, followed, played and saved."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import softreach as sr
+from softreach.cli.app import run
+from softreach.studio.jobs.path import WriteMovie
+from softreach.studio.panels.path import PathPanel
+
+ACTIVATION = (-1.0, -0.2, -0.5)
+
+
+@pytest.fixture(autouse=True)
+def _begin(tab):
+    tab.session.update(lambda s: s.replace(path=None, activation=ACTIVATION, target=None))
+    tab.settle()
+    tab.open("Path")
+
+
+def drawn(tab):
+    tab.press("Draw the path")
+    tab.wait(lambda: tab.session.figures.track is not None, "the path is followed")
+    tab.settle()
+    return tab.session.figures.track
+
+
+def test_a_drawn_path_is_followed_from_the_present_activation(tab):
+    found, state = drawn(tab), tab.session.state
+    tab.page.get_by_text("All 97 points are followed").wait_for()
+    np.testing.assert_allclose(found.activation.values[0], ACTIVATION, atol=1e-6)
+    tips = sr.tip_positions(state.design, found.activation.values)
+    np.testing.assert_allclose(tips, found.position, atol=2e-5 * state.design.length)
+    assert tab.drawn("/path/followed")
+    assert not tab.drawn("/path/end")
+    tab.page.locator(".uplot canvas").first.wait_for()
+
+
+def test_playing_leads_the_arm_to_the_end_and_the_slider_back(tab):
+    found = drawn(tab)
+    tab.press("Play")
+    tab.wait(lambda: tab.session.state.path.at > 2, "the arm moves")
+    tab.press("Stop")
+    tab.settle()
+    stopped = tab.session.state.path.at
+    assert stopped < 96
+    tab.press("Play")
+    tab.wait(lambda: tab.session.state.path.at == 96, "the arm is at the end")
+    tab.settle()
+    np.testing.assert_allclose(tab.session.state.activation, found.activation.values[-1])
+    tab.drag("point", -60)
+    tab.wait(lambda: tab.session.state.path.at < 96, "the arm goes back")
+    tab.settle()
+    at, state = tab.session.state.path.at, tab.session.state
+    np.testing.assert_allclose(state.activation, found.activation.values[at])
+    place = found.position.values[at] / state.design.length
+    np.testing.assert_allclose(tab.session.tip, place, atol=2e-5)
+
+
+def test_the_page_says_where_the_branch_ends_and_why(tab, tmp_path):
+    state = tab.session.state
+    tip = sr.tip_positions(state.design, [ACTIVATION])[0]
+    file = tmp_path / "out.csv"
+    share = np.linspace(0, 1, 21)[:, None]
+    np.savetxt(file, tip + share * [1.5, 0, 0], "%.9g", ",", header="x,y,z", comments="")
+    load(tab, file)
+    tab.page.get_by_text("of 21 points are followed").wait_for()
+    tab.settle()
+    found = tab.session.figures.track
+    assert found.attrs["end"] in ("bound", "fold")
+    reason = "bound." if found.attrs["end"] == "bound" else "turns back"
+    assert tab.page.get_by_text(reason).count()
+    end = tab.drawn("/path/end")
+    np.testing.assert_allclose(end.position, found.end_position / state.design.length, atol=1e-6)
+
+
+def test_a_file_that_is_no_path_is_refused_in_one_line(tab, tmp_path):
+    file = tmp_path / "<b>odd.csv"
+    file.write_text("x,y,z\n0,0,1\nzero,0,1\n")
+    load(tab, file)
+    tab.page.get_by_text("<b>odd.csv, point 2").wait_for()
+    assert tab.session.state.path is None
+
+
+def test_clicks_lead_the_path_on_only_while_they_are_for_that(tab):
+    tab.page.get_by_label("clicks add points").check()
+    panel = next(panel for panel in tab.session.panels if isinstance(panel, PathPanel))
+    tab.wait(lambda: panel._clicks.value, "clicks are for the path")
+    points = tab.session.reach.cloud.tip.values / tab.session.state.design.length
+    one, other = lowest(tab, points)  # notes of uploads cover the upper part of the canvas
+    tab.click_at(one)
+    tab.wait(lambda: tab.session.state.path is not None, "the path begins")
+    first = tab.session.state.path
+    np.testing.assert_allclose(first.points[0], tab.session.tip, atol=1e-4)
+    assert tab.session.state.target is None
+    tab.click_at(other)
+    tab.wait(lambda: tab.session.state.path != first, "the path goes on")
+    assert tab.session.state.path.points[: len(first.points)] == first.points
+    tab.page.get_by_label("clicks add points").uncheck()
+    tab.press("Remove the path")
+    tab.wait(lambda: tab.session.state.path is None, "the path is gone")
+    tab.settle()
+    assert not tab.drawn("/path")
+
+
+def test_the_saved_table_is_that_of_the_command_line(tab, tmp_path):
+    found = drawn(tab)
+    table = tab.save("CSV", tmp_path)
+    state, points = tab.session.state, tmp_path / "points.csv"
+    np.savetxt(points, found.position, "%.17g", ",")
+    state.design.save(tmp_path / "arm.toml")
+    start = ",".join(map(str, ACTIVATION))
+    out = tmp_path / "cli.csv"
+    arguments = ["track", f"{tmp_path}/arm.toml", str(points), "--out", str(out)]
+    assert run([*arguments, "--start", start]) == 0
+    saved, ours = (path.read_text().splitlines() for path in (table, out))
+    assert saved[0] == ours[0]
+    values = [np.loadtxt(lines[1:], delimiter=",") for lines in (saved, ours)]
+    np.testing.assert_allclose(values[0][:, :3], values[1][:, :3], atol=1e-4)
+
+
+def test_an_animation_is_written_with_progress_and_can_be_canceled(tab, tmp_path):
+    drawn(tab)
+    tab.press("GIF")
+    tab.page.get_by_text("drawing path.gif").wait_for()
+    tab.press("Cancel")
+    tab.page.get_by_text("Canceled").wait_for()
+    tab.settle()
+    assert not tab.session.job(WriteMovie).wanted
+    movie = tab.save("GIF", tmp_path)
+    images = pytest.importorskip("PIL.Image")
+    with images.open(movie) as made:
+        assert made.n_frames == 60
+        first = np.asarray(made.convert("RGB"))
+        made.seek(30)
+        assert (np.asarray(made.convert("RGB")) != first).any()
+    tab.page.get_by_text("path.gif is written").wait_for()
+
+
+def test_the_console_stays_clean(tab):
+    assert tab.errors == []
+
+
+def lowest(tab, points, count=2):
+    """Points of those given that appear low in the canvas."""
+    return [point for point in points[:2000] if tab.projected(point)[1] > 0.65][:count]
+
+
+def load(tab, path) -> None:
+    with tab.page.expect_file_chooser() as caught:
+        tab.press("Load a path (CSV)")
+    caught.value.set_files(path)

@@ -1,0 +1,111 @@
+"""End to end: plots beside the scene that follow the arm, the design and the slice."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import softreach as sr
+from softreach.arm.parameters import changed
+from softreach.studio.state import Slice
+from softreach.studio.wishes import PlotView
+from softreach.volume import volume_curve
+
+
+@pytest.fixture(autouse=True)
+def _nothing_beside_the_scene(tab):
+    yield
+    tab.session.update(lambda s: s.showing(plots=PlotView(), slice=Slice()))
+    tab.settle()
+
+
+def test_curvature_along_the_arm_follows_a_slider(tab):
+    tab.open("Plots")
+    assert not tab.page.get_by_text("largest κL").is_visible()
+    tab.page.get_by_label("along the arm", exact=True).check()
+    tab.page.get_by_text("largest κL").wait_for()
+    tab.wait(lambda: tab.page.locator(".uplot canvas").count() == 2, "two charts are drawn")
+    tab.open("Activation")
+    before = ink(tab)
+    tab.drag("γ left", -60)
+    tab.settle()
+    state, found = tab.session.state, tab.session.figures.along_arm
+    shape = sr.configuration(state.design, state.activation, len(found.station))
+    bending = np.linalg.norm(shape.curvature.values[:, :2], axis=1) * state.design.length
+    np.testing.assert_allclose(found.bending, bending, atol=1e-9)
+    np.testing.assert_allclose(found.extension, shape.extension.values, atol=1e-12)
+    tab.page.get_by_text(f"largest κL {bending.max():.4g}").wait_for()
+    tab.wait(lambda: ink(tab) != before, "the chart is drawn anew")
+
+
+def test_the_volume_against_alpha_is_that_of_the_cloud(tab):
+    tab.open("Plots")
+    tab.page.get_by_label("V against α").check()
+    tab.page.get_by_text("V(0.05 L)").wait_for()
+    tab.settle()
+    found, reach = tab.session.figures.volume_curve, tab.session.reach
+    tips = reach.cloud.tip[: found.samples]
+    np.testing.assert_allclose(found.volume[::20], volume_curve(tips, found.radius[::20]))
+    assert found.exact == reach.volume
+    assert (found.volume <= found.convex * (1 + 1e-9)).all()
+
+
+def test_the_volume_against_a_parameter_is_computed_while_one_looks(tab):
+    tab.open("Plots")
+    tab.page.get_by_label("V against parameter").check()
+    tab.choose("parameter", "taper φ [deg]")
+    tab.wait(lambda: tab.session.state.appearance.plots.parameter == "taper", "it is chosen")
+    tab.page.get_by_text("here V =").wait_for()
+    tab.settle()
+    found, design = tab.session.figures.sweep, tab.session.state.design
+    assert found.complete
+    assert (np.diff(found.value) > 0).all()
+    assert found.refused  # the steepest tapers leave no tip
+    tab.page.get_by_text(f"{found.refused} values make no design").wait_for()
+    made = changed(design, {"taper": np.radians(found.value[1])})
+    assert found.volume[1] == pytest.approx(sr.reachable_set(made).volume, rel=0.02)
+
+
+def test_a_sweep_in_progress_is_dropped_for_that_of_another_design(tab):
+    tab.session.update(lambda s: s.showing(plots=PlotView(sweep=True, parameter="revolution")))
+    tab.wait(lambda: tab.session.figures.sweep is not None, "the sweep begins")
+    tab.session.update(lambda s: s.replace(design=changed(s.design, {"taper": 0.02})))
+    tab.settle()
+    assert tab.session.figures.sweep.arm == tab.session.state.design
+    assert tab.session.figures.sweep.complete
+
+
+def test_histograms_are_those_of_the_samples_that_the_slice_leaves(tab):
+    tab.open("Plots")
+    tab.page.get_by_label("activations", exact=True).check()
+    samples = tab.session.reach.samples
+    tab.page.get_by_text(f"{samples:,} samples; the line").or_(
+        tab.page.get_by_text("samples; the line is the present")
+    ).first.wait_for()
+    cut = Slice(axis="z", center=0.6, thickness=0.1)
+    tab.session.update(lambda s: s.showing(slice=cut))
+    tab.page.get_by_text("within the slice z = 0.6 L").wait_for()
+    picture = tab.page.locator("img").first
+    assert picture.evaluate("image => image.naturalWidth") > 600
+
+
+def test_names_in_a_chart_are_text(tab):
+    from softreach.studio.plots.chart import Chart, Curve
+
+    gui = tab.session.client.gui
+    folder = gui.add_folder("names")
+    chart = Chart(gui, folder, "x", "y")
+    name = "<img src=x onerror=alert(1)>"
+    chart.show(np.array([0.0, 1.0]), (Curve(name, "red"),), (np.array([0.0, 1.0]),))
+    tab.page.get_by_text(name).wait_for()
+    assert tab.page.locator("img[src=x]").count() == 0
+    folder.remove()
+
+
+def test_the_console_stays_clean(tab):
+    assert tab.errors == []
+
+
+def ink(tab) -> str:
+    """What the first chart shows."""
+    return tab.page.locator(".uplot canvas").first.evaluate("canvas => canvas.toDataURL()")
