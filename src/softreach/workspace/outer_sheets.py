@@ -58,7 +58,7 @@ def outer_sheets(rod: TipMap, image: Image) -> Surface:
     nodes = np.stack(np.unravel_index(triangles, (cells + 1,) * 3), axis=-1)
     keys, faces = _divided(nodes * _PARTS, cells * _PARTS + 1)
     tips = stable_tips(rod).tips(rod.box.from_free_cube(keys / (cells * _PARTS)))
-    known: NDArray[np.bool_] = np.isfinite(tips).all(axis=1)
+    known = np.asarray(np.isfinite(tips).all(axis=1))
     vertices, faces = compact_surface(tips, faces[known[faces].all(axis=1)])
     return Surface(vertices=vertices, faces=faces)
 
