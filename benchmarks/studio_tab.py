@@ -1,0 +1,128 @@
+"""Latencies of the studio in a real browser, from an event in the page to what answers it there."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from softreach import tip_positions
+from softreach.arm import designs
+from softreach.studio import Studio
+from softreach.studio.jobs import PullTip
+from softreach.studio.source import start_on_design
+from tests.browser import CHROMIUM, FLAGS
+from tests.studio.tab import Tab
+
+if TYPE_CHECKING:
+    from softreach.studio.worker import StaleCheck
+
+_WATCH = """key => new Promise(done => {
+    const shown = () => document.body.innerText.match(/volume [^·]*/)?.[0];
+    const old = shown(), begin = performance.now();
+    const watch = new MutationObserver(() => {
+        const now = shown();
+        if (now === old || document.body.innerText.includes("of the design before")) return;
+        watch.disconnect();
+        done((performance.now() - begin) / 1000);
+    });
+    watch.observe(document.body, {subtree: true, childList: true, characterData: true});
+})"""
+"""Resolves when the page shows the volume of another design [s]; the first cloud is sent before."""
+
+CURLED, NEXT = (-0.7, -0.4, -0.9), (-0.6, -0.55, -0.8)
+
+
+def moved_slider(tab: Tab) -> float:
+    """From a key on the slider of the taper to the volume of the new design in the page [s]."""
+    thumb = tab.slider("taper φ [deg]")
+    thumb.focus()
+    waiting = tab.page.evaluate_handle(f"() => {{ window.waited = ({_WATCH})(); }}")
+    tab.page.keyboard.press("ArrowRight")
+    taken = tab.page.evaluate("() => window.waited")
+    waiting.dispose()
+    tab.settle()
+    return float(taken)
+
+
+def dragged_tip(tab: Tab, seconds: float = 3.0) -> tuple[float, float]:
+    """Drag the tip to and fro.
+
+    Returns:
+        Events of the mouse, and how often the arm followed [1/s].
+    """
+    tab.session.update(lambda state: state.replace(activation=CURLED))
+    tab.settle()
+    tab.page.wait_for_timeout(500)
+    arm = tab.session.state.design
+    ends = [np.array(place(tab, tip)) for tip in np.asarray(tip_positions(arm, [CURLED, NEXT]))]
+    served = _count_pulls(tab)
+    mouse = tab.page.mouse
+    mouse.move(*ends[0])
+    tab.page.wait_for_timeout(200)
+    mouse.down()
+    mouse.move(*(ends[0] + 0.1 * (ends[1] - ends[0])))  # the first pull prepares the arm
+    tab.page.wait_for_timeout(300)
+    events, first, begin = 0, len(served), time.perf_counter()
+    while (spent := time.perf_counter() - begin) < seconds:
+        share = 0.5 - 0.5 * np.cos(2 * np.pi * spent)
+        mouse.move(*(ends[0] + share * (ends[1] - ends[0])))
+        events += 1
+    count = len(served) - first
+    mouse.up()
+    tab.settle()
+    return events / spent, count / spent
+
+
+def _count_pulls(tab: Tab) -> list[float]:
+    """Times at which a pull of this tab was done; grows while the tip is dragged."""
+    job, done = tab.session.job(PullTip), []
+    run = job.run
+
+    def counted(check: StaleCheck) -> None:
+        run(check)
+        done.append(time.perf_counter())
+
+    job.run = counted
+    return done
+
+
+def place(tab: Tab, point: np.ndarray) -> tuple[float, float]:
+    """Pixels of a point of the scene [L] in the page."""
+    canvas = tab.page.locator("canvas").first.bounding_box()
+    right, down = tab.projected(point)
+    return canvas["x"] + right * canvas["width"], canvas["y"] + down * canvas["height"]
+
+
+def print_latencies(repeat: int = 5) -> None:
+    """Rows of the table; a line that says so where there is no browser."""
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        sync_playwright = None
+    if sync_playwright is None or CHROMIUM is None:
+        print("\nNo browser was found on this machine to measure in.\n")
+        return
+    with sync_playwright() as playwright, Studio(start_on_design(designs.minimal_trunk())) as run:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        tab = Tab(browser, run, width=1366, height=768)
+        slider = [moved_slider(tab) for _ in range(repeat + 1)][1:]
+        tab.open("Inverse")
+        events, served = max((dragged_tip(tab) for _ in range(2)), key=lambda found: found[1])
+        tab.close()
+        browser.close()
+    print("\n### In a browser without a graphics card, on the same cores\n")
+    print("| what | median | best | wanted |")
+    print("|---|--:|--:|--:|")
+    middle, least = np.median(slider), min(slider)
+    print(
+        f"| slider to first cloud and volume in the page | {middle:.2f} s | {least:.2f} s | < 0.5 s |"
+    )
+    print(f"| updates of the arm while its tip is dragged | {served:.0f} /s | | > 20 /s |")
+    print(f"\nThe mouse moved {events:.0f} times a second; of the places it passes only the latest")
+    print("is followed. Drawing the points in the browser comes on top.\n")
+
+
+if __name__ == "__main__":
+    print_latencies()
