@@ -6,19 +6,19 @@ import time
 from typing import TYPE_CHECKING
 
 import numpy as np
+from tests.browser import CHROMIUM, FLAGS
+from tests.studio.tab import Tab
 
 from softreach import tip_positions
 from softreach.arm import designs
 from softreach.studio import Studio
 from softreach.studio.jobs import PullTip
 from softreach.studio.source import start_on_design
-from tests.browser import CHROMIUM, FLAGS
-from tests.studio.tab import Tab
 
 if TYPE_CHECKING:
     from softreach.studio.worker import StaleCheck
 
-_WATCH = """key => new Promise(done => {
+_WATCH = """() => new Promise(done => {
     const shown = () => document.body.innerText.match(/volume [^·]*/)?.[0];
     const old = shown(), begin = performance.now();
     const watch = new MutationObserver(() => {
@@ -38,10 +38,9 @@ def moved_slider(tab: Tab) -> float:
     """From a key on the slider of the taper to the volume of the new design in the page [s]."""
     thumb = tab.slider("taper φ [deg]")
     thumb.focus()
-    waiting = tab.page.evaluate_handle(f"() => {{ window.waited = ({_WATCH})(); }}")
+    tab.page.evaluate(f"() => {{ window.waited = ({_WATCH})(); }}")
     tab.page.keyboard.press("ArrowRight")
     taken = tab.page.evaluate("() => window.waited")
-    waiting.dispose()
     tab.settle()
     return float(taken)
 
@@ -102,7 +101,7 @@ def print_latencies(repeat: int = 5) -> None:
     except ImportError:
         sync_playwright = None
     if sync_playwright is None or CHROMIUM is None:
-        print("\nNo browser was found on this machine to measure in.\n")
+        print("No browser was found on this machine to measure in.\n")
         return
     with sync_playwright() as playwright, Studio(start_on_design(designs.minimal_trunk())) as run:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
@@ -112,13 +111,11 @@ def print_latencies(repeat: int = 5) -> None:
         events, served = max((dragged_tip(tab) for _ in range(2)), key=lambda found: found[1])
         tab.close()
         browser.close()
-    print("\n### In a browser without a graphics card, on the same cores\n")
+    print("### In a browser without a graphics card, on the same cores\n")
     print("| what | median | best | wanted |")
     print("|---|--:|--:|--:|")
-    middle, least = np.median(slider), min(slider)
-    print(
-        f"| slider to first cloud and volume in the page | {middle:.2f} s | {least:.2f} s | < 0.5 s |"
-    )
+    shown = f"{np.median(slider):.2f} s | {min(slider):.2f} s"
+    print(f"| slider to first cloud and volume in the page | {shown} | < 0.5 s |")
     print(f"| updates of the arm while its tip is dragged | {served:.0f} /s | | > 20 /s |")
     print(f"\nThe mouse moved {events:.0f} times a second; of the places it passes only the latest")
     print("is followed. Drawing the points in the browser comes on top.\n")

@@ -13,16 +13,16 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 from playwright.sync_api import sync_playwright
+from tests.browser import CHROMIUM, FLAGS
+from tests.studio.tab import Tab
+from tests.studio.test_compare_in_browser import take
+from tests.studio.test_handle_in_browser import drag_tip, pose
 
 from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.studio import Studio
 from softreach.studio.source import start_on_design
 from softreach.studio.wishes import PlotView
-from tests.browser import CHROMIUM, FLAGS
-from tests.studio.tab import Tab
-from tests.studio.test_compare_in_browser import take
-from tests.studio.test_handle_in_browser import drag_tip, pose
 
 PICTURES = Path(__file__).parent.parent / "docs" / "images"
 LAPTOP, PHONE = (1366, 768), (390, 844)
@@ -98,7 +98,6 @@ def main() -> None:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         for name in sys.argv[1:] or SCENES:
-            print(name, flush=True)
             with Studio(start_on_design(designs.minimal_trunk())) as running:
                 take_picture(browser, running, name)
         browser.close()
