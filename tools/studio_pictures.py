@@ -48,7 +48,8 @@ def studio_handle(tab: Tab) -> None:
     tab.session.update(lambda state: state.replace(target=place).showing(cut="half"))
     tab.session.look_from("side")
     tab.wait(lambda: tab.session.answer is not None, "the inverse answers")
-    assert len(tab.session.answer) > 1, "there is no ghost to see"
+    answer = tab.session.answer
+    assert answer is not None and len(answer) > 1, "there is no ghost to see"
 
 
 def studio_plots(tab: Tab) -> None:
