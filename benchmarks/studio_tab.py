@@ -36,6 +36,7 @@ CURLED, NEXT = (-0.7, -0.4, -0.9), (-0.6, -0.55, -0.8)
 
 def moved_slider(tab: Tab) -> float:
     """From a key on the slider of the taper to the volume of the new design in the page [s]."""
+    _wait_for_numbers(tab)
     thumb = tab.slider("taper φ [deg]")
     thumb.focus()
     tab.page.evaluate(f"() => {{ window.waited = ({_WATCH})(); }}")
@@ -43,6 +44,15 @@ def moved_slider(tab: Tab) -> float:
     taken = tab.page.evaluate("() => window.waited")
     tab.settle()
     return float(taken)
+
+
+def _wait_for_numbers(tab: Tab) -> None:
+    """Until the page shows all that the server has found: the last of it may be on its way."""
+    tab.settle()
+    reach = tab.session.reach
+    assert reach is not None and reach.size is not None, "the design has a volume"  # noqa: PT018
+    name, value, error, unit = reach.size
+    tab.page.get_by_text(f"{name} {value:.4f} ± {error:.1g} {unit}").first.wait_for()
 
 
 class Drag(NamedTuple):
