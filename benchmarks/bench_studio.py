@@ -1,7 +1,7 @@
-"""The studio's server side: from a moved slider to what the page is sent.
+"""The studio: from a moved slider to what the page is sent, and to what a browser has of it.
 
-`python -m benchmarks.bench_studio` prints a Markdown table; under pytest the same work runs small.
-The browser's own drawing is not in it.
+`python -m benchmarks.bench_studio` prints Markdown tables; under pytest the server's work runs
+small. The browser's own drawing is in none of them.
 """
 
 from __future__ import annotations
@@ -15,8 +15,11 @@ import pytest
 
 pytest.importorskip("viser", reason="the studio needs viser")
 
+from benchmarks.studio_tab import print_latencies
+from softreach import tip_positions
 from softreach.arm import designs
 from softreach.arm.manipulator import Manipulator
+from softreach.studio.pull import Pull
 from softreach.studio.reach import Quality
 from softreach.studio.scene import Scene
 from softreach.studio.server import start_server, stop_server
@@ -64,6 +67,20 @@ def arm_updates(scene: Scene, count: int) -> Cost:
     return Cost((time.perf_counter() - wall) / count, (time.process_time() - cpu) / count)
 
 
+def tip_pulls(scene: Scene, count: int) -> Cost:
+    """What one update of the arm costs while its tip is dragged along its branch."""
+    arm, activation = designs.minimal_trunk(), (-0.7, -0.4, -0.9)
+    pull = Pull(arm)
+    begin, end = tip_positions(arm, [activation, (-0.6, -0.55, -0.8)])
+    wall, cpu = time.perf_counter(), time.process_time()
+    for share in np.linspace(0, 1, count):
+        pulled = pull.to(activation, begin + share * (end - begin))
+        assert pulled is not None
+        activation = pulled.activation
+        scene.draw_arm(arm, activation)
+    return Cost((time.perf_counter() - wall) / count, (time.process_time() - cpu) / count)
+
+
 def with_scene(use: Callable[[Scene], None]) -> None:
     """A scene that nobody looks at."""
     server = start_server()
@@ -81,9 +98,14 @@ def test_a_dragged_activation(benchmark):
     with_scene(lambda scene: benchmark(arm_updates, scene, 3))
 
 
+def test_a_dragged_tip(benchmark):
+    with_scene(lambda scene: benchmark(tip_pulls, scene, 3))
+
+
 def main(repeat: int = 5) -> None:
-    """Print the table."""
+    """Print the tables."""
     with_scene(lambda scene: print_table(scene, repeat))
+    print_latencies(repeat)
 
 
 def print_table(scene: Scene, repeat: int) -> None:
@@ -96,6 +118,8 @@ def print_table(scene: Scene, repeat: int) -> None:
     most = first_picture(scene, moved(repeat + 1), Quality(), max(LEVELS))
     arm_updates(scene, 10)
     arm = best([arm_updates(scene, 60) for _ in range(repeat)])
+    tip_pulls(scene, 3)
+    pulled = best([tip_pulls(scene, 60) for _ in range(repeat)])
     print(f"## Studio, server side: the best of {repeat}, minimal trunk\n")
     print("| what | wall [s] | CPU [s] | wanted |")
     print("|---|--:|--:|--:|")
@@ -105,6 +129,7 @@ def print_table(scene: Scene, repeat: int) -> None:
     row("first cloud and volume with four bundles, once", four["coarse"])
     row("fine result with four bundles, once", four["fine"], 0.9)
     row("update of the arm while an activation is dragged", arm, 0.05)
+    row("update of the arm while its tip is dragged", pulled, 0.05)
     print(f"\nThe first volume is off by {100 * off:.2g} % at most (wanted: < 2 %). The browser's")
     print("own drawing is not in these numbers.\n")
 

@@ -137,7 +137,7 @@ def hint(parameter: Parameter, unit: str) -> str:
         unit: That it is shown in; "1" for none.
     """
     what = f"{parameter.symbol} [{unit}]" if unit != "1" else parameter.symbol
-    more = f". {_MORE[parameter.field]}" if parameter.field in _MORE else ""
+    more = f"; {_MORE[parameter.field]}" if parameter.field in _MORE else ""
     return f"{what}: {parameter.meaning}{more} (parameter {parameter.name})"
 
 

@@ -10,7 +10,8 @@ __all__ = ["headed", "headed_body"]
 _THEIRS = "<title>Viser</title>"
 # viser's sheet for phones leaves a third of the width unused, and tabs break into two lines.
 _OURS = """<title>softreach</title><style>
-[role="tab"]{padding-inline:0.4em!important;font-size:0.78rem!important}
+[role="tab"]{padding-inline:0.24em!important;font-size:0.73rem!important}
+input{text-overflow:ellipsis}
 @media (max-width:36em){
 div[style*="position: fixed"][style*="max-height: 60%"]{
 width:100%!important;max-height:50%!important}

@@ -16,6 +16,8 @@ from softreach.studio.worker import StaleCheck
 
 __all__ = ["PullOrder", "PullTip", "TipPull"]
 
+_DECIMALS = 5  # of the place where a drag rests [L]: a hundredth of a pixel, and can be read
+
 
 class PullOrder(NamedTuple):
     """What a drag asks for."""
@@ -57,6 +59,8 @@ class PullTip(Job):
         if order is None:
             return
         wanted, rests = order
+        if rests:
+            wanted = np.round(wanted, _DECIMALS)
         target = wanted * state.design.length
         pulled = self._pull_of(state).to(state.activation, target)
         if pulled is not None:

@@ -1,0 +1,155 @@
+"""Latencies of the studio in a real browser, from an event in the page to what answers it there."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from tests.browser import CHROMIUM, FLAGS
+from tests.studio.tab import Tab
+
+from softreach import tip_positions
+from softreach.arm import designs
+from softreach.studio import Studio
+from softreach.studio.jobs import PullTip
+from softreach.studio.source import start_on_design
+
+if TYPE_CHECKING:
+    from softreach.studio.worker import StaleCheck
+
+_WATCH = """() => new Promise(done => {
+    const shown = () => document.body.innerText.match(/volume [^·]*/)?.[0];
+    const old = shown(), begin = performance.now();
+    const watch = new MutationObserver(() => {
+        const now = shown();
+        if (now === old || document.body.innerText.includes("of the design before")) return;
+        watch.disconnect();
+        done((performance.now() - begin) / 1000);
+    });
+    watch.observe(document.body, {subtree: true, childList: true, characterData: true});
+})"""
+"""Resolves when the page shows the volume of another design [s]; the first cloud is sent before."""
+
+CURLED, NEXT = (-0.7, -0.4, -0.9), (-0.6, -0.55, -0.8)
+
+
+def moved_slider(tab: Tab) -> float:
+    """From a key on the slider of the taper to the volume of the new design in the page [s]."""
+    _wait_for_numbers(tab)
+    thumb = tab.slider("taper φ [deg]")
+    thumb.focus()
+    tab.page.evaluate(f"() => {{ window.waited = ({_WATCH})(); }}")
+    tab.page.keyboard.press("ArrowRight")
+    taken = tab.page.evaluate("() => window.waited")
+    tab.settle()
+    return float(taken)
+
+
+def _wait_for_numbers(tab: Tab) -> None:
+    """Until the page shows all that the server has found: the last of it may be on its way."""
+    tab.settle()
+    reach = tab.session.reach
+    assert reach is not None and reach.size is not None, "the design has a volume"  # noqa: PT018
+    name, value, error, unit = reach.size
+    tab.page.get_by_text(f"{name} {value:.4f} ± {error:.1g} {unit}").first.wait_for()
+
+
+class Drag(NamedTuple):
+    """What became of a drag of the tip."""
+
+    moved: float
+    """Places that the mouse was at [1/s]."""
+    served: float
+    """How often the arm followed [1/s]."""
+
+
+def dragged_tip(tab: Tab, seconds: float = 2.0) -> Drag:
+    """Drag the tip to and fro."""
+    tab.session.update(lambda state: state.replace(activation=CURLED))
+    tab.settle()
+    tab.page.wait_for_timeout(500)
+    arm = tab.session.state.design
+    ends = [np.array(place(tab, tip)) for tip in np.asarray(tip_positions(arm, [CURLED, NEXT]))]
+    served = _count_pulls(tab)
+    mouse = tab.page.mouse
+    mouse.move(*ends[0])
+    tab.page.wait_for_timeout(200)
+    mouse.down()
+    mouse.move(*(ends[0] + 0.1 * (ends[1] - ends[0])))  # the first pull prepares the arm
+    tab.page.wait_for_timeout(300)
+    events, first, begin = 0, len(served), time.perf_counter()
+    while (spent := time.perf_counter() - begin) < seconds:
+        share = 0.5 - 0.5 * np.cos(2 * np.pi * spent)
+        mouse.move(*(ends[0] + share * (ends[1] - ends[0])))
+        events += 1
+    count = len(served) - first
+    mouse.up()
+    tab.settle()
+    del tab.session.job(PullTip).run  # counts no more
+    return Drag(events / spent, count / spent)
+
+
+def measured(tab: Tab, repeat: int, *, cloud: bool) -> tuple[list[float], list[Drag]]:
+    """Seconds from the slider to the volume, and drags, with or without the cloud in the scene."""
+    tab.session.update(lambda state: state.showing(cloud=cloud))
+    tab.open("Design")
+    slider = [moved_slider(tab) for _ in range(repeat)]
+    tab.open("Inverse")
+    return slider, [dragged_tip(tab) for _ in range(repeat)]
+
+
+def _count_pulls(tab: Tab) -> list[float]:
+    """Times at which a pull of this tab was done; grows while the tip is dragged."""
+    job, done = tab.session.job(PullTip), []
+    run = job.run
+
+    def counted(check: StaleCheck) -> None:
+        run(check)
+        done.append(time.perf_counter())
+
+    job.run = counted
+    return done
+
+
+def place(tab: Tab, point: np.ndarray) -> tuple[float, float]:
+    """Pixels of a point of the scene [L] in the page."""
+    canvas = tab.page.locator("canvas").first.bounding_box()
+    right, down = tab.projected(point)
+    return canvas["x"] + right * canvas["width"], canvas["y"] + down * canvas["height"]
+
+
+def print_latencies(repeat: int = 5) -> None:
+    """Rows of the table; a line that says so where there is no browser."""
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        sync_playwright = None
+    if sync_playwright is None or CHROMIUM is None:
+        print("No browser was found on this machine to measure in.\n")
+        return
+    with sync_playwright() as playwright, Studio(start_on_design(designs.minimal_trunk())) as run:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        tab = Tab(browser, run, width=1366, height=768)
+        moved_slider(tab)  # compile
+        found = {cloud: measured(tab, repeat, cloud=cloud) for cloud in (True, False)}
+        tab.close()
+        browser.close()
+    print("### In a browser without a graphics card, on the same cores\n")
+    print("| what | median | best | wanted |")
+    print("|---|--:|--:|--:|")
+    for cloud, (slider, drags) in found.items():
+        scene = "131,072 points drawn" if cloud else "only the arm drawn"
+        shown = f"{np.median(slider):.2f} s | {min(slider):.2f} s"
+        print(f"| slider to volume in the page, {scene} | {shown} | < 0.5 s |")
+        rates = [drag.served for drag in drags]
+        shown = f"{np.median(rates):.1f} /s | {max(rates):.1f} /s"
+        print(f"| arm after the dragged tip, {scene} | {shown} | > 20 /s |")
+    print("\nThe first cloud is sent before the volume. The arm cannot follow more often than the")
+    moved = [max(drag.moved for drag in drags) for _, drags in found.values()]
+    print(f"page tells where the mouse is: {moved[0]:.0f} times a second with the points,")
+    print(f"{moved[1]:.0f} without.\n")
+
+
+if __name__ == "__main__":
+    print_latencies()

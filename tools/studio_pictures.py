@@ -1,0 +1,126 @@
+"""Takes the pictures of docs/studio.md in a real browser: `python -m tools.studio_pictures`.
+
+It takes two minutes. `python -m tools.studio_pictures NAME ...` takes these alone.
+"""
+
+from __future__ import annotations
+
+import io
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+from playwright.sync_api import sync_playwright
+from tests.browser import CHROMIUM, FLAGS
+from tests.studio.tab import Tab
+from tests.studio.test_compare_in_browser import take
+from tests.studio.test_handle_in_browser import pose
+
+from softreach.arm import designs
+from softreach.arm.parameters import changed
+from softreach.studio import Studio
+from softreach.studio.source import start_on_design
+from softreach.studio.wishes import PlotView
+
+PICTURES = Path(__file__).parent.parent / "docs" / "images"
+LAPTOP, PHONE = (1366, 768), (390, 844)
+COLORS = 255  # the palette of a picture: what keeps it below MOST
+MOST = 250_000  # bytes
+NOTICE = ".mantine-Notification-closeButton"  # of the note on missing graphics cards
+CURLED = (-0.7, -0.4, -0.9)
+FOLDED = designs.minimal_trunk(revolution=np.radians(36), taper=np.radians(3))
+TWICE = (-0.4, -0.65, -0.18)  # brings it where one more activation does
+
+
+def studio(tab: Tab) -> None:
+    """The first picture, with the arm curled."""
+    pose(tab, CURLED)
+
+
+def studio_handle(tab: Tab) -> None:
+    """The handle on the tip of a design that folds, and a ghost of the other solution."""
+    tab.open("Inverse")
+    tab.session.update(lambda state: state.replace(design=FOLDED))
+    tab.settle()
+    place = tuple(round(float(x), 5) for x in pose(tab, TWICE))
+    tab.session.update(lambda state: state.replace(target=place).showing(cut="half"))
+    tab.session.look_from("side")
+    tab.wait(lambda: tab.session.answer is not None, "the inverse answers")
+    assert len(tab.session.answer or ()) > 1, "there is no ghost to see"
+
+
+def studio_plots(tab: Tab) -> None:
+    """The section and the curves along the arm."""
+    pose(tab, CURLED)
+    tab.open("Plots")
+    views = PlotView(along_arm=True, section=True)
+    tab.session.update(lambda state: state.showing(plots=views))
+    tab.settle()
+    tab.page.get_by_text("one closed curve").wait_for()
+
+
+def studio_compare(tab: Tab) -> None:
+    """Three designs in a table."""
+    tab.open("Compare")
+    first = tab.session.state.design
+    for name, taper in (("published", None), ("taper 1.5°", 1.5), ("taper 1°", 1.0)):
+        if taper is not None:
+            design = changed(first, {"taper": np.radians(taper)})
+            tab.session.update(
+                lambda state, design=design: state.replace(design=design, activation=CURLED)
+            )
+            tab.settle()
+        take(tab, name)
+
+
+def studio_phone(tab: Tab) -> None:
+    """The sheet of controls under the scene."""
+    tab.session.update(lambda state: state.replace(activation=CURLED))
+
+
+SCENES: dict[str, Callable[[Tab], None]] = {
+    "studio": studio,
+    "studio-handle": studio_handle,
+    "studio-plots": studio_plots,
+    "studio-compare": studio_compare,
+    "studio-phone": studio_phone,
+}
+
+
+def main() -> None:
+    """Take the pictures named on the command line, or all."""
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        for name in sys.argv[1:] or SCENES:
+            with Studio(start_on_design(designs.minimal_trunk())) as running:
+                take_picture(browser, running, name)
+        browser.close()
+
+
+def take_picture(browser: object, running: Studio, name: str) -> None:
+    """Open a tab of the right size, bring it into its state, and save what it shows."""
+    width, height = PHONE if name.endswith("phone") else LAPTOP
+    tab = Tab(browser, running, width=width, height=height)
+    SCENES[name](tab)
+    tab.settle()
+    tab.page.locator(NOTICE).first.click()
+    tab.page.mouse.move(20, 0.45 * height)  # away from tooltips
+    tab.page.wait_for_timeout(2500)  # notices fade, the page draws
+    save(tab.page.screenshot(), PICTURES / f"{name}.png")
+    tab.close()
+
+
+def save(screenshot: bytes, path: Path) -> None:
+    """Write a picture with a small palette."""
+    image = Image.open(io.BytesIO(screenshot)).convert("RGB")
+    few = image.quantize(COLORS, method=Image.Quantize.MAXCOVERAGE, kmeans=1)
+    few.save(path, optimize=True)
+    size = path.stat().st_size
+    if size > MOST:
+        sys.exit(f"{path.name} has {size:,} bytes; at most {MOST:,} are meant for the page")
+
+
+if __name__ == "__main__":
+    main()
