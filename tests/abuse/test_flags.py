@@ -79,8 +79,11 @@ WRONG = [
     case("atlas build a.zarr --vary taper_deg=", "taper_deg = : must be numbers"),
     case("atlas build a.zarr --vary taper_deg=0,1 --alpha 0.05", "like 0.05L"),
     case("atlas build a.zarr --vary taper_deg=0,1 --alpha 1e400L", "like 0.05L"),
-    case(f"studio {TRUNK} --port 80000", "port = 80000: must be a whole number from 0 to 65535"),
-    case(f"studio {TRUNK} --port -1", "port = -1: must be a whole number from 0 to 65535"),
+    case(
+        f"studio {TRUNK} --port 80000",
+        "port = 80000: must be 1 to 65535; leave it out for a free one",
+    ),
+    case(f"studio {TRUNK} --port -1", "port = -1: must be 1 to 65535; leave it out for a free one"),
     case(f"studio {TRUNK} --port 80.5", f"port = 80.5: {WHOLE_NUMBER}"),
     # finite numbers
     *(

@@ -25,6 +25,7 @@ from benchmarks.bench_interruption import (
 )
 
 from softreach.atomic import replacing
+from softreach.file_kinds import PICTURES
 
 pytestmark = [
     pytest.mark.slow,
@@ -88,15 +89,16 @@ def test_what_a_kill_leaves_of_a_file_goes_with_the_next_file_in_that_folder(tmp
         """
         import os, signal
         from softreach.atomic import replacing
+        from softreach.file_kinds import PICTURES
 
-        with replacing("table.csv") as partial:
+        with replacing("table.csv", PICTURES[".png"]) as partial:
             partial.write_text("half a ta")
             os.kill(os.getpid(), signal.SIGKILL)
         """,
     )
     process.communicate(timeout=60)
     assert [path.name[:12] for path in tmp_path.glob(".*")] == [".softreach-u"]
-    with replacing(tmp_path / "other.csv") as partial:
+    with replacing(tmp_path / "other.csv", PICTURES[".png"]) as partial:
         partial.write_text("a table")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["other.csv", "script.py"]
 
@@ -109,11 +111,12 @@ def test_a_folder_killed_while_it_is_replaced_is_put_in_place_by_the_next_file(t
         import os, signal
         from pathlib import Path
         from softreach import atomic
+        from softreach.file_kinds import PICTURES
 
         def killed(*_):
             os.kill(os.getpid(), signal.SIGKILL)
 
-        with atomic.replacing("cloud.zarr") as partial:
+        with atomic.replacing("cloud.zarr", PICTURES[".png"]) as partial:
             partial.mkdir()
             (partial / "new").touch()
             os.rename("cloud.zarr", partial.parent / atomic.REPLACED)
@@ -122,7 +125,7 @@ def test_a_folder_killed_while_it_is_replaced_is_put_in_place_by_the_next_file(t
     )
     process.communicate(timeout=60)
     assert not (tmp_path / "cloud.zarr").exists()
-    with replacing(tmp_path / "other.csv") as partial:
+    with replacing(tmp_path / "other.csv", PICTURES[".png"]) as partial:
         partial.write_text("a table")
     assert (tmp_path / "cloud.zarr" / "new").exists()
     assert not list(tmp_path.glob(".*"))
@@ -133,8 +136,9 @@ def test_a_file_that_another_process_is_writing_is_left_alone(tmp_path):
         tmp_path,
         """
         from softreach.atomic import replacing
+        from softreach.file_kinds import PICTURES
 
-        with replacing("table.csv") as partial:
+        with replacing("table.csv", PICTURES[".png"]) as partial:
             partial.write_text("a table")
             print("writing", flush=True)
             input()
@@ -142,7 +146,7 @@ def test_a_file_that_another_process_is_writing_is_left_alone(tmp_path):
     )
     assert process.stdout is not None
     assert process.stdout.readline() == "writing\n"
-    with replacing(tmp_path / "other.csv") as partial:
+    with replacing(tmp_path / "other.csv", PICTURES[".png"]) as partial:
         partial.write_text("another")
     assert process.communicate(timeout=60) == ("", "")
     assert (tmp_path / "table.csv").read_text() == "a table"

@@ -89,7 +89,7 @@ rings[2].inner_ratio: required key is missing
 rings[2].material = 'nothing': must be a material of this file (lce, a b), or of the library;
 section.core = 'ecoflex_00_31': must be a material of this file (lce, a b), or of the library;
 actuators[0].bundles = 1.5: must be a valid integer
-actuators[0].offset_deg = nan: must be a finite number deg
+actuators[0].offset_deg = nan: must be a finite number in deg
 actuators[0].extent_deg = 400: must be a finite number > 0 and <= 360 deg
 actuators[0].helical_angle_deg = 95: must be a finite number > -90 and < 90 deg
 actuators[1].extent_deg: required key is missing

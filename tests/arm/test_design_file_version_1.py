@@ -90,7 +90,7 @@ def test_every_fault_of_a_file_is_reported_with_its_key_value_and_what_is_allowe
         "inner_radius_m = 0.02: must be below outer_radius = 0.01 m",
         "activation_bounds = [1, 0]: must have lower <= upper",
         "fibers[0].helical_angle_deg = 95: must be a finite number > -90 and < 90 deg",
-        "fibers[0].offset_deg = nan: must be a finite number deg",
+        "fibers[0].offset_deg = nan: must be a finite number in deg",
         "fibers[0].extent_deg = 400: must be a finite number > 0 and <= 360 deg",
         "fibers[0].bundles = 1.5: must be a valid integer",
         'fibers[1].extent = 3: unknown key; did you mean "extent_deg"?',

@@ -262,7 +262,7 @@ def test_a_tendon_is_measured_in_newtons():
         ),
         ({"revolution": None}, "revolution: must be a finite number >= -628"),
         ({"revolution": math.inf}, "revolution = inf"),
-        ({"offset": None}, "offset: must be a finite number rad"),
+        ({"offset": None}, "offset: must be a finite number in rad"),
         ({"activation_bounds": (-1, 5)}, "must be at least 0 N: a tendon pulls and cannot push"),
         ({"activation_bounds": ((0, 5), (0, 6))}, "must be one pair"),
         ({"activation_bounds": (5, 1)}, "must have lower <= upper"),

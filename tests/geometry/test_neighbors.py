@@ -163,7 +163,7 @@ def test_other_radii_are_refused(radius):
 def test_rows_that_are_not_finite_are_refused():
     points, values = uneven(50, 3)
     points[7, 1] = np.nan
-    with pytest.raises(InvalidInput, match=r"points = 1 rows .* first at index 7"):
+    with pytest.raises(InvalidInput, match=r"points\[7\] = .*must be finite numbers"):
         mean_value_distance(points, values, 0.1)
     with pytest.raises(InvalidInput, match=r"values = 1 rows .* first at index 7"):
         mean_value_distance(values, points, 0.1)

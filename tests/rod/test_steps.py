@@ -82,7 +82,7 @@ def test_a_grid_with_given_stations_has_no_longer_steps(arm):
 
 @pytest.mark.parametrize("tol", [0, 1e-13, -1.0, np.nan, np.inf, None, "1e-6", True])
 def test_a_tolerance_that_cannot_be_met_is_refused(trunk, tol):
-    with pytest.raises(InvalidInput, match=r"tol = .*must be at least 1e-12 \(in L\)"):
+    with pytest.raises(InvalidInput, match=r"tol = .*must be a finite number >= 1e-12 \(in L\)"):
         FreeRod(trunk, tol)
 
 

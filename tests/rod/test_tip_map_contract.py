@@ -306,7 +306,7 @@ def test_frames_take_stations_upwards_and_strains_in_any_order(make, trunk):
 
 @pytest.mark.parametrize("tol", [0.0, 1e-13, np.nan, np.inf, "1e-6", None])
 def test_tolerances_are_checked(make, tol, trunk):
-    with pytest.raises(InvalidInput, match=r"tol = .*at least 1e-12 \(in L\)"):
+    with pytest.raises(InvalidInput, match=r"tol = .*must be a finite number >= 1e-12 \(in L\)"):
         make(trunk, tol)
 
 

@@ -56,7 +56,7 @@ def test_the_arm_is_seen_through_the_cloud_from_the_first_picture_on(tab):
     show(tab, cloud=False)
     alone = like(pixels(tab), BLUE)
     assert seen > 0.9 * alone
-    assert hidden < 0.5 * alone
+    assert hidden < 0.75 * seen
 
 
 @pytest.mark.parametrize("view", VIEWS)
@@ -96,6 +96,10 @@ def test_the_target_is_seen_through_the_cloud(tab):
     assert mark[1] < 0.75 * mark[0]
 
 
+def _alike(near: float, far: float) -> bool:
+    return near == pytest.approx(far, rel=0.02)
+
+
 def test_parallels_stay_parallel_for_the_orthographic_camera(tab):
     def widths():
         """Of two lines along x, the far one behind the near one."""
@@ -110,8 +114,7 @@ def test_parallels_stay_parallel_for_the_orthographic_camera(tab):
     tab.page.get_by_label("orthographic").check()
     tab.wait(lambda: tab.session.client.camera.fov < FOV / 10, "the lens is long")
     tab.settle()
-    near, far = widths()
-    assert near == pytest.approx(far, rel=0.02)
+    tab.wait(lambda: _alike(*widths()), "parallels stay parallel")
     assert like(pixels(tab), BLUE) > 100  # neither cut off nor out of sight
     tab.press("Reset the view")
     tab.wait(lambda: tab.session.client.camera.fov == pytest.approx(FOV, rel=1e-3), "it is reset")
