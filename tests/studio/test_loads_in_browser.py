@@ -71,8 +71,8 @@ def test_a_payload_makes_samples_unstable_and_the_legend_says_how_many(loads_tab
     assert reach.arm == tab.session.state.design
     share = f"{100 * reach.share(TipStatus.UNSTABLE):.2g}"
     tab.page.get_by_text(f"unstable: {share} % of the samples").wait_for()
-    marked = tab.drawn("/unstable")
-    assert len(marked.points) == (reach.status == TipStatus.UNSTABLE).sum()
+    unstable = (reach.status == TipStatus.UNSTABLE).sum()
+    tab.wait(lambda: len(tab.drawn("/unstable").points) == unstable, "they are marked")
 
 
 def test_the_arm_takes_its_loaded_shape_and_says_whether_it_rests(loads_tab):

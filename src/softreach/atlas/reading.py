@@ -103,7 +103,9 @@ def _opened(store: StoreLike, *, metrics: bool) -> xr.Dataset:
         raw = xr.open_zarr(held.opened.place, drop_variables=_READ_HERE, **READING)
         coordinates = _coordinates(held, raw)
     variables = _variables(held, found) | (_metrics(held.command, found) if metrics else {})
-    return raw.assign(variables).assign_coords(coordinates)
+    whole = raw.assign(variables).assign_coords(coordinates)
+    whole.encoding["source"] = str(held.location)
+    return whole
 
 
 _READ_HERE = ("metrics", "metric", "curvature", "quantity", "status", "message")
