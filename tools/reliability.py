@@ -1,6 +1,6 @@
 """Runs the tests of abuse and writes their numbers into docs/reliability.md.
 
-To run it: `python -m tools.reliability`.
+To run it: `python -m tools.reliability`, with options of pytest if need be.
 
 A promise is the first line of a file of `tests/abuse`; its cases are the tests of that file.
 """
@@ -17,7 +17,6 @@ from pathlib import Path
 
 import pytest
 
-from softreach.atomic import replacing
 
 __all__ = ["CaseRecord", "promise_of", "table"]
 
@@ -64,15 +63,14 @@ def table(record: CaseRecord, folder: Path = CASES) -> str:
 def main() -> int:
     """Run the cases and write the page; returns the exit code of the tests."""
     record = CaseRecord()
-    code = pytest.main(["-q", str(CASES)], plugins=[record])
+    code = pytest.main(["-q", str(CASES), *sys.argv[1:]], plugins=[record])
     cases, failed = sum(map(len, record.seconds.values())), sum(record.failed.values())
     said = (
         f"\n{datetime.now(UTC).date()}, softreach {version('softreach')}, Python "
         f"{platform.python_version()}: {cases:,} cases, {failed} failed.\n\n"
     )
     text = PAGE.read_text(encoding="utf-8")
-    with replacing(PAGE) as partial:
-        partial.write_text(text.partition(MARK)[0] + MARK + said + table(record), encoding="utf-8")
+    PAGE.write_text(text.partition(MARK)[0] + MARK + said + table(record), encoding="utf-8")
     return int(code)
 
 

@@ -53,6 +53,8 @@ def test_the_volume_against_alpha_is_that_of_the_cloud(tab):
 def test_the_volume_against_a_parameter_is_computed_while_one_looks(tab):
     tab.open("Plots")
     tab.page.get_by_label("V against parameter").check()
+    tab.wait(lambda: tab.session.state.appearance.plots.sweep, "it is wanted")
+    tab.settle()
     tab.choose("parameter", "taper φ [deg]")
     tab.wait(lambda: tab.session.state.appearance.plots.parameter == "taper", "it is chosen")
     tab.page.get_by_text("here V =").wait_for()
