@@ -17,7 +17,6 @@ from pathlib import Path
 
 import pytest
 
-
 __all__ = ["CaseRecord", "promise_of", "table"]
 
 ROOT = Path(__file__).parent.parent
