@@ -32,7 +32,7 @@ demo: setup
 
 # Files of tests side by side, up to four on as many cores.
 test: check browser
-	$(BIN)/python -m pytest -q --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest -q --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 
 # The studio is tested in a real browser. Only root installs one; whoever has none is told at the end
 # of the tests what to type.

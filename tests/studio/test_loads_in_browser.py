@@ -15,7 +15,7 @@ from tests.studio.tab import Tab
 
 @pytest.fixture(scope="module")
 def loads_tab(browser):
-    state = StudioState(design=designs.lce_arm()).showing(level=14)
+    state = StudioState(design=designs.lce_arm()).showing(level=14, cut="none")
     with Studio(Start(state=state, quality=SMALL)) as studio:
         tab = Tab(browser, studio)
         tab.open("Loads")
