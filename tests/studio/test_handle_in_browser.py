@@ -59,11 +59,14 @@ def test_the_arm_follows_a_drag_of_its_tip_on_its_branch(inverse_tab):
     tab.settle()
     middle = tab.session.tip_pull
     assert middle.pulled.gap == 0.0
+    tab.wait(lambda: len(tab.drawn("/cloud").points) <= 1 << 13, "the cloud is thin")
     assert np.linalg.norm(tip_of(tab) - middle.wanted) < 1e-5
     tab.page.mouse.up()
     tab.wait(lambda: tab.session.state.target is not None, "the drag rests")
     tab.settle()
     state = tab.session.state
+    tab.wait(lambda: len(tab.drawn("/cloud").points) > 1 << 13, "the cloud is whole")
+    assert tab.drawn("/target").radius < tab.drawn("/grip/ball").radius
     np.testing.assert_allclose(tip_of(tab), state.target, atol=1e-5)
     # The pointer moves in the plane of the picture, and so does the tip.
     np.testing.assert_allclose(screen(tab, np.array(state.target)), screen(tab, end), atol=3)

@@ -1,4 +1,4 @@
-"""The clouds of a scene, without the points that hide the arm."""
+"""The clouds of a scene, without the points that hide the arm, and thin while it is dragged."""
 
 from __future__ import annotations
 
@@ -45,6 +45,7 @@ class Clouds:
         self._known: dict[str, tuple[Dots, NDArray[np.bool_]]] = {}
         self._sight: Sight | None = None
         self._cut = "none"
+        self._most: int | None = None
 
     def draw(self, path: str, dots: Dots) -> None:
         """All but the points in the way of what the last `look` wanted to see."""
@@ -52,14 +53,15 @@ class Clouds:
         self._known[path] = dots, kept
         self._send(path, dots.where(kept))
 
-    def look(self, sight: Sight | None, cut: str) -> None:
+    def look(self, sight: Sight | None, cut: str, most: int | None = None) -> None:
         """Cut away what hides the arm; nothing is sent of a cloud that keeps its points.
 
         Args:
             sight: Who looks at what; None for nobody.
             cut: One of `sight.CUTS`.
+            most: How many points to draw of a cloud, the first of it; None for all.
         """
-        self._sight, self._cut = sight, cut
+        self._sight, self._cut, self._most = sight, cut, most
         for path, (dots, before) in list(self._known.items()):
             kept = self._kept(dots)
             if not np.array_equal(kept, before):
@@ -77,7 +79,10 @@ class Clouds:
         return in_the_way(points, self._sight, self._cut)
 
     def _kept(self, dots: Dots) -> NDArray[np.bool_]:
-        return ~self.hidden(dots.points)
+        kept = ~self.hidden(dots.points)
+        if self._most is not None:
+            kept[self._most :] = False
+        return kept
 
     def _send(self, path: str, dots: Dots) -> None:
         if not len(dots.points):

@@ -44,6 +44,7 @@ _MARK: Color = (235, 90, 0)
 _ASKED: Color = (240, 175, 205)  # of a path, where the arm does not follow it
 _BLOCKED: Color = (30, 30, 30)
 _FREE_LEVEL, _FREE_SIZE = 15, 0.6
+_TARGET = 0.012  # [L]: less than the ball on the tip, which is grabbed there
 _UNSTABLE_SIZE = 2.0  # times that of other points: they are few, and not to be overlooked
 
 
@@ -189,7 +190,7 @@ class Scene:
         self.remove("/target", "/gap")
         if target is None:
             return
-        self._api.add_icosphere("/target", 0.018, _MARK, position=target)
+        self._api.add_icosphere("/target", _TARGET, _MARK, position=target)
         if nearest is not None:
             gap = np.stack([target, nearest])[None].astype(np.float32)
             self._api.add_line_segments("/gap", gap, _MARK, thickness=0.004)

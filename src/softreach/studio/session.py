@@ -156,9 +156,7 @@ class Session:
         Raises:
             SoftreachError: The target is no point.
         """
-        inverse = self._jobs[SolveInverse]
-        assert isinstance(inverse, SolveInverse)
-        inverse.take_nearest = True
+        self.job(SolveInverse).take_nearest = True
         with self._changing:
             old = self.state
             self.state = old.replace(target=vector(target))
@@ -173,10 +171,15 @@ class Session:
             phase: "start", "update" or "end".
             wanted: Where the tip should be [L].
         """
-        pull = self._jobs[PullTip]
-        assert isinstance(pull, PullTip)
-        pull.order = PullOrder(wanted, rests=phase == "end")
+        self.job(PullTip).order = PullOrder(wanted, rests=phase == "end")
         self.follow(PullTip)
+        self.look_again()
+
+    @property
+    def is_dragged(self) -> bool:
+        """Whether a drag of the tip is under way."""
+        order = self.job(PullTip).order
+        return order is not None and not order.rests
 
     def restore(self, state: StudioState) -> None:
         """Take up a state that was saved, and its view."""

@@ -15,6 +15,7 @@ __all__ = ["FollowEye"]
 
 _PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
 _TARGET = 0.02  # [L]
+_DRAGGED = 1 << 13  # points while the tip is dragged: they are sent and drawn again at each step
 
 
 class FollowEye(Job):
@@ -34,7 +35,8 @@ class FollowEye(Job):
         session.eye.focus()
         with session.drawing, session.client.atomic():
             sight = self._sight()
-            session.scene.clouds.look(sight, session.state.appearance.cut)
+            most = _DRAGGED if session.is_dragged else None
+            session.scene.clouds.look(sight, session.state.appearance.cut, most)
             session.scene.turn_axes(sight.eye)
 
     def _sight(self) -> Sight:
