@@ -112,6 +112,10 @@ SOME = {"arm": ARM, "activations": GAMMA}
 DRAWN = {"ax": AX, "view": VIEW, "box": BOX}
 POINTS = {"arm": ANY_ARM, "activations": ARRAY, "tol": TOL}
 
+TRUNK = {name: NUMBER for name in ("revolution", "taper", "length", "radius_ratio")} | {
+    "material": bad("arm", "none")
+}
+
 CALLS: dict[str, Call] = {
     "arm.describe": Call(sr.describe, lambda: {"arm": ARM}, {"arm": ANY_ARM}),
     "arm.named_material": Call(
@@ -120,24 +124,12 @@ CALLS: dict[str, Call] = {
     "arm.designs.minimal_trunk": Call(
         sr.designs.minimal_trunk,
         dict,
-        {
-            "revolution": NUMBER,
-            "taper": NUMBER,
-            "length": NUMBER,
-            "radius_ratio": NUMBER,
-            "material": bad("arm", "none"),
-        },
+        TRUNK,
     ),
     "arm.designs.redundant_trunk": Call(
         sr.designs.redundant_trunk,
         dict,
-        {
-            "revolution": NUMBER,
-            "taper": NUMBER,
-            "length": NUMBER,
-            "radius_ratio": NUMBER,
-            "material": bad("arm", "none"),
-        },
+        TRUNK,
     ),
     "arm.designs.three_tendon_robot": Call(
         sr.designs.three_tendon_robot, dict, {"segments": WHOLE}

@@ -23,7 +23,7 @@ def studio(
     ] = "minimal_trunk",
     *,
     host: Annotated[
-        str, Parameter(help="Address to listen on; anyone who can reach it may use the page.")
+        str, Parameter(help="Address to listen on; beyond this machine the page asks for a token.")
     ] = "127.0.0.1",
     port: Annotated[int | None, WHOLE, Parameter(help="A free port by default.")] = None,
     fresh: Annotated[

@@ -7,25 +7,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arguments import as_number, as_whole_number
+from softreach.arguments import as_number
 from softreach.arrays import as_floats, as_rows, check_finite
 from softreach.errors import InvalidInput, Range
+from softreach.inverse.target_table import FARTHEST
 from softreach.rod.activation_box import ActivationBox
 
 __all__ = [
     "Request",
     "checked_activations",
     "checked_direction",
-    "checked_number",
     "checked_residual",
     "checked_targets",
-    "checked_whole_number",
 ]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-_FARTHEST = 1e100  # [m]; squares of larger distances leave the range of numbers
 _RESIDUALS = (1e-13, 1e-2)  # in L; below, rounding of the tips decides
 
 
@@ -63,8 +61,8 @@ def checked_targets(name: str, targets: ArrayLike) -> Array:
         InvalidInput: Another shape, or values that are not finite or beyond 1e100 m.
     """
     points = as_rows(name, targets, 3, "of shape (t, 3), positions in m")
-    if points.size and (far := np.abs(points).max()) > _FARTHEST:
-        raise InvalidInput(name, f"up to {far:g} m", f"within {_FARTHEST:g} m")
+    if points.size and (far := np.abs(points).max()) > FARTHEST:
+        raise InvalidInput(name, f"up to {far:g} m", f"within {FARTHEST:g} m")
     return points
 
 
@@ -103,14 +101,4 @@ def checked_direction(direction: ArrayLike | None, count: int) -> Array | None:
 
 def checked_residual(residual_over_length: float) -> float:
     """The largest |tip - target| in L, if that can be asked for."""
-    return checked_number("residual_over_length", residual_over_length, *_RESIDUALS)
-
-
-def checked_number(name: str, value: float, low: float, high: float) -> float:
-    """The number itself, if it lies within the limits."""
-    return as_number(name, value, Range(low, high))
-
-
-def checked_whole_number(name: str, value: int, low: int, high: int) -> int:
-    """The whole number itself, if it lies within the limits."""
-    return as_whole_number(name, value, low, high)
+    return as_number("residual_over_length", residual_over_length, Range(*_RESIDUALS))

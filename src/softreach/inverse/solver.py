@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import parallel
-from softreach.arguments import checked, flag
+from softreach.arguments import as_number, as_whole_number, checked, flag
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import InvalidInput
+from softreach.errors import InvalidInput, Range
 from softreach.inverse.branches import distinct, every_branch
 from softreach.inverse.exclusion import gap_bounds
 from softreach.inverse.least_bound import SLACK, change_bounds
@@ -22,10 +22,8 @@ from softreach.inverse.request import (
     Request,
     checked_activations,
     checked_direction,
-    checked_number,
     checked_residual,
     checked_targets,
-    checked_whole_number,
 )
 from softreach.inverse.roots import Roots, conditions, no_roots, roots_at
 from softreach.inverse.solutions import Solutions, Status
@@ -107,9 +105,9 @@ def solve_inverse(
         residual=checked_residual(residual_over_length) * prepared.whole.length,
         near=checked_activations("near", rest, box, len(points)) / prepared.measures[box.free],
         direction=checked_direction(direction, len(points)),
-        direction_weight=checked_number("direction_weight", direction_weight, 0.0, 1e6),
-        family=checked_whole_number("family", family, 1, 10_000),
-        seed=checked_whole_number("seed", seed, 0, 2**63),
+        direction_weight=as_number("direction_weight", direction_weight, Range(0.0, 1e6)),
+        family=as_whole_number("family", family, 1, 10_000),
+        seed=as_whole_number("seed", seed, 0, 2**63),
         prove_least=bool(prove_least),
     )
     solve, size = _by_distance, _BLOCK

@@ -5,9 +5,10 @@ from __future__ import annotations
 from softreach.errors import InvalidInput
 from softreach.quantity import numbers_in, shortened
 
-__all__ = ["position_in", "positions_in"]
+__all__ = ["FARTHEST", "position_in", "positions_in"]
 
-_FARTHEST = 1e100  # m; squares of larger numbers leave the range of floats
+FARTHEST = 1e100
+"""How far a target may lie [m]: squares of larger distances leave the range of numbers."""
 
 
 def positions_in(text: str, source: str) -> list[list[float]]:
@@ -34,8 +35,8 @@ def position_in(name: str, text: str) -> list[float]:
         InvalidInput: The text, called `name`, is not three numbers.
     """
     values = numbers_in(text, 3)
-    if values is None or max(map(abs, values)) > _FARTHEST:
-        allowed = f"three comma-separated numbers x,y,z in m, up to {_FARTHEST:g}"
+    if values is None or max(map(abs, values)) > FARTHEST:
+        allowed = f"three comma-separated numbers x,y,z in m, up to {FARTHEST:g}"
         raise InvalidInput(name, shortened(text) or "''", allowed)
     return values
 

@@ -1,10 +1,12 @@
-"""How many activations reach the places of samples, as the inverse finds them.
+"""How many activations reach a place, as the inverse finds them.
 
 The grid of the exact set counts as well, but not near its folds, which in a folded set is where
 half of the samples are.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +18,9 @@ from softreach.studio.rod import solvable_rod
 from softreach.studio.worker import StaleCheck, all_cores
 from softreach.workspace import ReachableSolid
 
-__all__ = ["count_activations", "uncounted"]
+__all__ = ["count_activations", "counts_at", "uncounted"]
+
+Array = NDArray[np.float64]
 
 _BLOCK = 1 << 13
 """Targets solved at a time: a tenth of a second, after which others have their turn."""
@@ -46,11 +50,25 @@ def count_activations(
     if _reached_once(reach):
         return np.ones(len(rows))
     missing = uncounted(reach, rows)
-    for block in parallel.blocks(len(missing), _BLOCK):
-        check()
-        _count(reach, missing[block])
-        progress(block.stop - block.start)
+    for block, found in _counted(reach, reach.cloud.tip.values[missing], check):
+        reach.counts[missing[block]] = found
+        progress(len(found))
     return reach.counts[rows]
+
+
+def counts_at(reach: Reach, targets: Array, check: StaleCheck = lambda: None) -> NDArray[np.int64]:
+    """How many stable activations put the tip at each target [m], shape (t,).
+
+    Args:
+        reach: Of an arm with three free bundles.
+        targets: Within the reachable set, shape (t, 3).
+        check: Called between blocks; raises to stop.
+    """
+    counts = np.ones(len(targets), np.int64)
+    if not _reached_once(reach):
+        for block, found in _counted(reach, targets, check):
+            counts[block] = found
+    return counts
 
 
 def _reached_once(reach: Reach) -> bool:
@@ -58,9 +76,14 @@ def _reached_once(reach: Reach) -> bool:
     return isinstance(reach.exact, ReachableSolid) and reach.exact.route == "flux"
 
 
-def _count(reach: Reach, rows: NDArray[np.int64]) -> None:
+def _counted(
+    reach: Reach, targets: Array, check: StaleCheck
+) -> Iterator[tuple[slice, NDArray[np.int64]]]:
+    """Blocks of the targets with what was found there."""
     from softreach.inverse import solve_inverse
 
-    with all_cores:
-        found = solve_inverse(solvable_rod(reach.arm), reach.cloud.tip.values[rows])
-    reach.counts[rows] = found.counts
+    for block in parallel.blocks(len(targets), _BLOCK):
+        check()
+        with all_cores:
+            found = solve_inverse(solvable_rod(reach.arm), targets[block]).counts
+        yield block, found

@@ -16,19 +16,16 @@ __all__ = ["minimal_trunk", "redundant_trunk"]
 
 _EXTENT = math.radians(48)
 
-_TURNS = within(FIBER_RANGES["revolution"])
-_TAPER = within(PROFILE_RANGES["taper"])
-_LENGTH = within(PROFILE_RANGES["length"])
-_RATIO = within(RING_RANGES["inner_ratio"])
-
-
-@checked(
-    revolution=_TURNS,
-    taper=_TAPER,
-    length=_LENGTH,
-    radius_ratio=_RATIO,
+_checked_trunk = checked(
+    revolution=within(FIBER_RANGES["revolution"]),
+    taper=within(PROFILE_RANGES["taper"]),
+    length=within(PROFILE_RANGES["length"]),
+    radius_ratio=within(RING_RANGES["inner_ratio"]),
     material=optional(instance(Material, "a Material, or None")),
 )
+
+
+@_checked_trunk
 def minimal_trunk(
     revolution: float = math.radians(108),
     taper: float = math.radians(2),
@@ -62,13 +59,7 @@ def minimal_trunk(
     return _trunk((*helices, _longitudinal(270)), taper, length, radius_ratio, material)
 
 
-@checked(
-    revolution=_TURNS,
-    taper=_TAPER,
-    length=_LENGTH,
-    radius_ratio=_RATIO,
-    material=optional(instance(Material, "a Material, or None")),
-)
+@_checked_trunk
 def redundant_trunk(
     revolution: float = math.radians(108),
     taper: float = math.radians(2),

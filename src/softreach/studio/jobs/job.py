@@ -11,7 +11,7 @@ from softreach.studio.worker import StaleCheck
 if TYPE_CHECKING:
     from softreach.studio.session import Session
 
-__all__ = ["Job"]
+__all__ = ["AskedJob", "Job"]
 
 
 class Job(ABC):
@@ -33,3 +33,25 @@ class Job(ABC):
         Args:
             check: To be called between stages; raises if the work is no longer wanted.
         """
+
+
+class AskedJob(Job):
+    """Work that no state asks for, but a person who presses a button."""
+
+    wanted = False
+    """Whether somebody pressed it since the work was last done."""
+
+    @staticmethod
+    def depends_on(state: StudioState) -> object:
+        """Nothing."""
+        del state
+
+    def run(self, check: StaleCheck) -> None:
+        """Do the work once for each time it was asked for."""
+        wanted, self.wanted = self.wanted, False
+        if wanted:
+            self.do(check)
+
+    @abstractmethod
+    def do(self, check: StaleCheck) -> None:
+        """Do the work; as `run`."""

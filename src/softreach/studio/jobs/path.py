@@ -9,7 +9,7 @@ import numpy as np
 
 from softreach.errors import InvalidInput
 from softreach.path import PathStatus, track_path
-from softreach.studio.jobs.job import Job
+from softreach.studio.jobs.job import AskedJob, Job
 from softreach.studio.movie import path_movie
 from softreach.studio.reach import cloud_points
 from softreach.studio.rod import solvable_rod
@@ -61,22 +61,13 @@ class FollowPath(Job):
         session.scene.draw_path(points / state.design.length, done / state.design.length)
 
 
-class PlayPath(Job):
+class PlayPath(AskedJob):
     """Moves the arm along the path."""
 
-    wanted = False
-    """Whether somebody pressed the button since it last ran."""
-
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """Nothing: it is asked for."""
-        del state
-
-    def run(self, check: StaleCheck) -> None:
+    def do(self, check: StaleCheck) -> None:
         """From where the arm is, or from the first point, to the last that is followed."""
-        wanted, self.wanted = self.wanted, False
         found, path = self.session.figures.track, self.session.state.path
-        if not wanted or found is None or path is None:
+        if found is None or path is None:
             return
         count = int((found.status == PathStatus.FOLLOWED).sum())
         first = path.at if path.at < count - 1 else 0
@@ -86,24 +77,13 @@ class PlayPath(Job):
             time.sleep(_STEP)
 
 
-class WriteMovie(Job):
+class WriteMovie(AskedJob):
     """The arm along its path as a GIF."""
 
-    wanted = False
-    """Whether somebody pressed the button since it last ran."""
-
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """Nothing: it is asked for."""
-        del state
-
-    def run(self, check: StaleCheck) -> None:
+    def do(self, check: StaleCheck) -> None:
         """Draw and send it; says how far it is, and can be canceled."""
-        wanted, self.wanted = self.wanted, False
         session, path = self.session, self.session.state.path
         found, reach = session.figures.track, session.reach
-        if not wanted:
-            return
         if found is None or path is None or reach is None:
             raise InvalidInput("path", "none yet", "followed before it is animated")
 

@@ -124,7 +124,9 @@ def _draw_cloud(session: Session) -> None:
 def _count_shown(session: Session, check: StaleCheck) -> None:
     """Count the activations of the points that are shown, where their colors tell it."""
     reach, look = session.reach, session.state.appearance
-    if reach is None or not reach.fine or shown_color(reach.arm, look.color) != "multiplicity":
+    if reach is None or not reach.fine or not look.cloud:
+        return
+    if shown_color(reach.arm, look.color) != "multiplicity":
         return
     missing, done = uncounted(reach, shown_rows(reach, look.level)), 0
 

@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach import parallel
+from softreach.studio.multiplicity import counts_at
 from softreach.studio.reach import Reach
 from softreach.studio.rod import solvable_rod
-from softreach.studio.worker import StaleCheck, all_cores
-from softreach.workspace import ReachableSolid
+from softreach.studio.worker import StaleCheck
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,7 +24,6 @@ __all__ = ["plane_counts", "within"]
 Array = NDArray[np.float64]
 
 _CELLS, _CELLS_LOADED = 120, 40  # along the longer side: under loads each place costs much
-_BLOCK = 2048  # targets between two checks
 
 
 def within(curves: Sequence[Array], points: Array, axis: int) -> NDArray[np.bool_]:
@@ -63,26 +61,9 @@ def plane_counts(
     name, values = "occupied", inside
     if solvable_rod(reach.arm).box.dimension == 3:
         name, values = "count", inside.astype(np.int64)
-        if not _reached_once(reach):
-            values[inside] = _counted(reach, places[inside] * length, check)
+        values[inside] = counts_at(reach, places[inside] * length, check)
     coordinates = {
         each: (each, at * length, {"units": "m"}) for each, at in zip("xyz", middles, strict=True)
     }
     attrs = {"cell": cell * length, "length": length}
     return xr.Dataset({name: (tuple("xyz"), values)}, coordinates, attrs)
-
-
-def _reached_once(reach: Reach) -> bool:
-    """Whether it is proved that no place is reached by two activations."""
-    return isinstance(reach.exact, ReachableSolid) and reach.exact.route == "flux"
-
-
-def _counted(reach: Reach, targets: Array, check: StaleCheck) -> NDArray[np.int64]:
-    from softreach.inverse import solve_inverse
-
-    rod, found = solvable_rod(reach.arm), np.zeros(len(targets), np.int64)
-    for block in parallel.blocks(len(targets), _BLOCK):
-        check()
-        with all_cores:
-            found[block] = solve_inverse(rod, targets[block]).counts
-    return found
