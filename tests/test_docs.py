@@ -5,7 +5,8 @@ A fence in `README.md` or `docs/` is one of these, or the test fails:
 - `python`: executed, in order, in one namespace per page and an empty folder. One that cannot be
   says why in its first line: `# not executed: REASON`.
 - `bash`: lines that begin with `softreach` are executed in the same folder; a line ending in
-  `# exit code 2` must fail so. Other lines set up a machine and are not executed.
+  `# exit code 2` must fail so, and `softreach studio` is ended once it serves its page. Other lines
+  set up a machine and are not executed.
 - `toml`: read as a design.
 - `text` right after one of these: what it printed. Numbers may differ by 0.1 %; `...` stands for
   anything up to the end of the line.
@@ -18,6 +19,9 @@ import io
 import math
 import re
 import shlex
+import signal
+import subprocess
+import sys
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 
@@ -118,11 +122,23 @@ def _run_lines(example, *, small):
     with printed_into(example):
         for line in example.parsed.replace("\\\n", " ").splitlines():
             words = shlex.split(line, comments=True)
-            if words and words[0] == "softreach":
+            if words[:2] == ["softreach", "studio"]:
+                serve_and_end(words[1:])
+            elif words and words[0] == "softreach":
                 expected = 2 if line.rstrip().endswith("# exit code 2") else 0
                 assert run(_few(words[1:]) if small else words[1:]) == expected, line
             else:
                 assert not words or words[0] in SETUP, f"neither softreach nor set-up: {line}"
+
+
+def serve_and_end(arguments):
+    """Start the studio as a person does, and end it once it says where its page is."""
+    command = [sys.executable, "-m", "softreach", *arguments, "--no-open"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as studio:
+        line = studio.stdout.readline()
+        studio.terminate()
+    assert line.startswith("http://127.0.0.1:"), line
+    assert studio.returncode == 128 + signal.SIGTERM
 
 
 def _few(arguments):
