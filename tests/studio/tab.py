@@ -32,11 +32,14 @@ class Tab:
         self.page.goto(studio.url)
         self.wait(lambda: set(studio.sessions) - known, "the page connects")
         self.session: Session = studio.sessions[max(studio.sessions)]
+        self.wait(lambda: self.session.panels, "the tab is furnished")
         self.page.get_by_text("taper φ [deg]").wait_for()
         self.settle()
 
     def _console(self, message) -> None:
-        if message.type == "error":
+        # Of what was removed before the page heard that it was there: harmless, and viser's.
+        late = message.text.startswith("Tried to update non-existent component")
+        if message.type == "error" and not late:
             self.errors.append(message.text)
 
     def close(self) -> None:

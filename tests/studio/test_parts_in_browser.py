@@ -23,8 +23,12 @@ def become(tab, condition, what):
     tab.settle()
 
 
+def field_of(tab, label):
+    return tab.page.locator(f"xpath=//label[normalize-space()='{label}']/following::input[1]")
+
+
 def typed(tab, label, text):
-    field = tab.page.locator(f"xpath=//label[normalize-space()='{label}']/following::input[1]")
+    field = field_of(tab, label)
     field.scroll_into_view_if_needed()
     field.fill(text)
     field.press("Enter")
@@ -51,8 +55,10 @@ def test_an_actuator_is_added_renamed_changed_and_removed(parts_tab):
     parts_tab.press("Add")
     become(parts_tab, lambda arm: len(arm.actuators) == len(start.actuators) + 1, "one more")
     typed(parts_tab, "name", "<b>rib</b>")
+    old = field_of(parts_tab, "σ [deg]").element_handle()
     parts_tab.press("Rename")
     become(parts_tab, lambda arm: arm.actuators[-1].name == "<b>rib</b>", "it is renamed")
+    old.wait_for_element_state("hidden")  # its fields are made anew
     assert parts_tab.page.locator("b", has_text="rib").count() == 0  # a name is no markup
     typed(parts_tab, "σ [deg]", "25")
     become(

@@ -115,7 +115,7 @@ def test_parallels_stay_parallel_for_the_orthographic_camera(tab):
     tab.wait(lambda: tab.session.client.camera.fov < FOV / 10, "the lens is long")
     tab.settle()
     tab.wait(lambda: _alike(*widths()), "parallels stay parallel")
-    assert like(pixels(tab), BLUE) > 100  # neither cut off nor out of sight
+    tab.wait(lambda: like(pixels(tab), BLUE) > 100, "the arm is neither cut off nor out of sight")
     tab.press("Reset the view")
     tab.wait(lambda: tab.session.client.camera.fov == pytest.approx(FOV, rel=1e-3), "it is reset")
     assert not tab.session.state.appearance.orthographic

@@ -147,7 +147,7 @@ class Session:
             self._remember(old, goes_on=goes_on or by_widget)
             self.revision += not by_widget
             self.canceled = False
-        self.follow(*what_follows(old, new))
+            self.follow(*what_follows(old, new))
         self.show()
 
     def aim(self, target: Array) -> None:
@@ -161,7 +161,7 @@ class Session:
             old = self.state
             self.state = old.replace(target=vector(target))
             self._remember(old, goes_on=False)
-        self.follow(SolveInverse)
+            self.follow(SolveInverse)
         self.show()
 
     def pull_tip(self, phase: str, wanted: Array) -> None:
@@ -200,7 +200,7 @@ class Session:
             stays = self.state is old
             self.note = f"There is nothing to {'undo' if back else 'redo'}." if stays else ""
             self.revision += 1
-        self.follow(*what_follows(old, self.state))
+            self.follow(*what_follows(old, self.state))
         self.show()
 
     def reset(self) -> None:
@@ -294,7 +294,9 @@ class Session:
         return found
 
     def settle(self, timeout: float = 60.0) -> bool:
-        """Wait until all that was asked for is done; return whether it is."""
+        """Wait until all that follows from the state is done; return whether it is."""
+        with self._changing:  # what changes it also asks for what follows
+            pass
         # Work of one kind may order work of another.
         return all(worker.join(timeout) for _ in range(2) for worker in self._workers.values())
 

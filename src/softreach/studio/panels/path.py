@@ -62,17 +62,19 @@ class PathPanel:
         self._size = gui.add_number(
             "size / L", 0.1, min=-2.0, max=2.0, step=0.01, hint="extent; < 0 for the other side"
         )
-        self._draw = gui.add_button("Draw the path")
+        self._draw = gui.add_button("Draw the path", hint="the shape of this size, from the tip on")
         self._load = gui.add_upload_button(
             "Load a path (CSV)", mime_type=".csv,text/csv", hint="columns x, y, z [m]"
         )
         self._clicks = gui.add_checkbox(
             "clicks add points", False, hint="a click on a point of the cloud leads the path there"
         )
-        self._clear = gui.add_button("Remove the path")
+        self._clear = gui.add_button("Remove the path", hint="and what was found along it")
 
     def _walk_widgets(self, gui: GuiApi) -> None:
-        self._play = gui.add_button_group("", ("Play", "Stop"))
+        self._play = gui.add_button_group(
+            "", ("Play", "Stop"), hint="the arm along the path, from the point that is chosen"
+        )
         self._at = gui.add_slider("point", 0, 1, 1, 0, hint="point of the path where the arm is")
         graph = gui.add_folder("activations along the path")
         self._timeline = Chart(gui, graph, "way / L", "activation")
