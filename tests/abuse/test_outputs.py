@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import resource
 import sys
@@ -382,3 +383,14 @@ def test_a_command_says_first_what_the_disk_cannot_hold(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("softreach.memory.free_disk", lambda path: 2e7)
     assert expected in refusal_of(words.split(), capsys, tmp_path)
+
+
+def test_cells_of_a_reachable_set_that_memory_cannot_hold_are_told_by_their_number(
+    trunk, monkeypatch
+):
+    image = dataclasses.replace(sr.reachable_set(trunk, accuracy=0.05).image)  # nothing counted
+    monkeypatch.setattr("softreach.memory._NOTICED", 0)
+    monkeypatch.setattr("softreach.memory.free_memory", lambda: 100.0)
+    error = raised_by(lambda: image.counts)
+    assert "cells of the lattice = " in str(error)
+    assert "of memory, of which 100 bytes are free" in str(error)
