@@ -144,7 +144,8 @@ class DesignSpace:
 
     def place(self, index: int) -> tuple[int, ...]:
         """Where the design with this number is, along each dimension."""
-        return tuple(map(int, np.unravel_index(index, self.shape)))
+        number = as_whole_number("number of the design", index, 0, self.size - 1)
+        return tuple(map(int, np.unravel_index(number, self.shape)))
 
     def values(self, index: int) -> dict[str, float]:
         """Parameters of the design with this number, counted in C order over `shape`."""
@@ -242,9 +243,10 @@ def _plain(values: Mapping[str, ArrayLike]) -> tuple[tuple[str, tuple[float, ...
 
 def _ends(name: str, ends: ArrayLike) -> np.ndarray:
     """The lower and the upper end of a parameter."""
-    floats = check_finite(name, as_floats(name, ends, "two numbers, (lower, upper)"))
-    if floats.shape != (2,):
-        raise InvalidInput(name, ends, "two numbers, (lower, upper)")
+    allowed = "two numbers, the lower one first"
+    floats = check_finite(name, as_floats(name, ends, allowed))
+    if floats.shape != (2,) or not floats[0] < floats[1]:
+        raise InvalidInput(name, ends, allowed)
     return floats
 
 
