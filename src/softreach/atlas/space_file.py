@@ -88,7 +88,7 @@ def _document(text: str) -> dict[str, Any]:
     try:
         document = document_of(text, "space", float)
     except InvalidDesign as error:
-        raise InvalidInput("space", error.faults[0].value, error.faults[0].allowed) from None
+        raise InvalidInput("space", error.faults[0].value, str(error.faults[0].allowed)) from None
     for key in document:
         if key not in _KEYS:
             raise InvalidInput("key", key, f"one of {', '.join(_KEYS)}")
