@@ -16,6 +16,7 @@ from softreach.durable import sync_file, sync_folder, sync_tree
 from softreach.errors import InvalidInput, NotWritten
 from softreach.file_kinds import FileKind
 from softreach.interruption import as_a_whole
+from softreach.memory import check_disk
 from softreach.scratch import REPLACED, scratch_folder
 
 __all__ = ["check_place", "replacing", "writing"]
@@ -24,13 +25,19 @@ StrPath = str | os.PathLike[str]
 
 
 def check_place(
-    path: StrPath, kind: FileKind, *, overwrite: bool = False, name: str = "path"
+    path: StrPath,
+    kind: FileKind,
+    *,
+    takes: float = 0.0,
+    overwrite: bool = False,
+    name: str = "path",
 ) -> Path:
     """Where a file or folder of that kind can be written, by trying it.
 
     Args:
         path: The place.
         kind: What will be written: it may replace nothing, an empty file or folder, and its kind.
+        takes: What it will take of the disk, if that may be much [bytes].
         overwrite: Whether it may replace any file, and a Zarr store of any kind.
         name: What errors call the path.
 
@@ -38,8 +45,11 @@ def check_place(
         The place, absolute and without links.
 
     Raises:
-        InvalidInput: Something else is there.
+        InvalidInput: Something else is there, or the disk cannot hold it.
         NotWritten: Nothing can be written there.
+
+    Warns:
+        SoftreachWarning: It takes more than half of what is free.
     """
     with _one_line(path):
         target = _resolved(path, name)
@@ -54,6 +64,7 @@ def check_place(
                 raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         with as_a_whole():
             os.rmdir(tempfile.mkdtemp(prefix=".softreach-", dir=_nearest_folder(target)))
+    check_disk(name, os.fspath(path), takes, target)
     return target
 
 
@@ -62,6 +73,7 @@ def replacing(
     path: StrPath,
     kind: FileKind,
     *,
+    takes: float = 0.0,
     overwrite: bool = False,
     durable: bool = True,
     name: str = "path",
@@ -73,6 +85,7 @@ def replacing(
     Args:
         path: The place.
         kind: What will be written.
+        takes: As for `check_place`.
         overwrite: As for `check_place`.
         durable: Whether what was written is on the disk before it takes its place.
         name: What errors call the path.
@@ -81,7 +94,7 @@ def replacing(
         InvalidInput: What is there is not of that kind; see `check_place`.
         NotWritten: It cannot be written.
     """
-    target = check_place(path, kind, overwrite=overwrite, name=name)
+    target = check_place(path, kind, takes=takes, overwrite=overwrite, name=name)
     with _one_line(path), _with_parents(target), scratch_folder(target.parent) as scratch:
         # The suffix stays, because writers choose their format by it.
         partial = scratch / target.name
@@ -116,7 +129,12 @@ class _WatchedFile(io.BufferedWriter):
 
 @contextmanager
 def writing(
-    path: StrPath, kind: FileKind, *, overwrite: bool = False, name: str = "path"
+    path: StrPath,
+    kind: FileKind,
+    *,
+    takes: float = 0.0,
+    overwrite: bool = False,
+    name: str = "path",
 ) -> Iterator[io.BufferedWriter]:
     """A file to write to, which takes the place of `path` on success; as `replacing`.
 
@@ -124,7 +142,7 @@ def writing(
     closing can get lost.
     """
     with (
-        replacing(path, kind, overwrite=overwrite, name=name) as partial,
+        replacing(path, kind, takes=takes, overwrite=overwrite, name=name) as partial,
         _WatchedFile(io.FileIO(partial, "xb")) as file,
     ):
         yield file

@@ -146,7 +146,9 @@ def save_cloud(
     schema.check_stored_cloud(cloud)
     kind = CLOUD_STORE[".zarr"]
     with (
-        replacing(path, kind, overwrite=overwrite, durable=durable) as partial_path,
+        replacing(
+            path, kind, takes=cloud.nbytes, overwrite=overwrite, durable=durable
+        ) as partial_path,
         _few_chunks_at_a_time(),
     ):
         _write(schema.storable(cloud), partial_path)

@@ -157,6 +157,23 @@ def test_points_near_any_curve_are_triangulated_within_the_budget_or_not_at_all(
         assert sr.concave_hull(points, 0.01).volume == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize("jitter", [1e-8, 3e-9, 1e-9, 1e-12])
+def test_many_points_that_crowd_near_a_curve_are_told_before_they_cost(jitter):
+    tip = sr.compute_cloud(frozen(1, 2), 20_000).tip.values
+    points = tip + jitter * np.random.default_rng(1).standard_normal(tip.shape)
+    with within_budget():
+        assert sr.concave_hull(points, 0.05).volume == pytest.approx(0.0, abs=1e-15)
+
+
+def test_a_hundred_copies_of_each_tip_but_for_rounding_have_its_volume():
+    tip = sr.compute_cloud(TRUNK, 200).tip.values
+    crowd = np.repeat(tip, 100, axis=0)
+    crowd = crowd + 1e-12 * np.random.default_rng(1).standard_normal(crowd.shape)
+    alone = sr.concave_hull(tip, 0.5).volume
+    with within_budget():
+        assert sr.concave_hull(crowd, 0.5).volume == pytest.approx(alone, rel=1e-6)
+
+
 def test_the_surface_of_a_ball_is_no_curve_and_keeps_its_volume():
     points = np.random.default_rng(0).standard_normal((5_000, 3))
     points /= np.linalg.norm(points, axis=1, keepdims=True)

@@ -61,6 +61,14 @@ WRONG = [
     case(f"show {TRUNK} --n=1e18", "it takes 48 EB of memory"),
     case("demo --n=1e18", "it takes 700 EB of memory"),
     case("atlas build a.zarr --vary taper_deg=0:3:4 --n 1e15", "of memory"),
+    *(
+        case(f"atlas build a.zarr --vary taper_deg=0:3:{a} --vary revolution_deg=0:9:{b}", said)
+        for a, b, said in (
+            ("300", "300 --n 1e9", "it takes 700 GB of memory"),
+            ("100000", "100000", "designs = 10,000,000,000: must be 1,000,000 at most"),
+            ("1001", "1000", "designs = 1,001,000: must be 1,000,000 at most"),
+        )
+    ),
     # other whole numbers
     case(f"solve {TRUNK} --target 0,0,1 --family 1.5", f"family = 1.5: {WHOLE_NUMBER}"),
     case(f"solve {TRUNK} --target 0,0,1 --family 0", "family = 0: must be a whole number"),
@@ -166,12 +174,13 @@ def test_a_decimal_number_is_what_python_reads(text):
 
 
 def test_an_atlas_that_the_disk_cannot_hold_is_not_begun(tmp_path, monkeypatch, capsys):
+    """Nor is any of its designs made, which would take minutes here."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("softreach.memory.free_disk", lambda path: 1e6)
-    arguments = ["atlas", "build", "a.zarr", "--vary", "taper_deg=0:3:4", "--n", "1e5"]
-    said = refusal_of(arguments, capsys, tmp_path)
-    assert "n = 100000 samples of 4 designs" in said
-    assert "it takes 2.48 MB of disk space, of which 1 MB are free" in said
+    monkeypatch.setattr("softreach.memory.free_disk", lambda path: 1e9)
+    many = ["--vary", "taper_deg=0:3:300", "--vary", "revolution_deg=0:108:300"]
+    said = refusal_of(["atlas", "build", "a.zarr", *many, "--n", "1e5"], capsys, tmp_path)
+    assert "n = 100000 samples of 90000 designs" in said
+    assert "it takes 57.3 GB of disk space, of which 1 GB are free" in said
 
 
 FILES = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import resource
 import sys
@@ -12,7 +13,7 @@ import pytest
 
 import softreach as sr
 from softreach.atomic import writing
-from softreach.errors import InvalidInput, NotWritten
+from softreach.errors import InvalidInput, NotWritten, SoftreachWarning
 from softreach.exchange.activefilaments import write_cloud, write_design
 from softreach.export import export_arm, export_cloud, export_mesh
 from softreach.file_kinds import PICTURES
@@ -331,7 +332,6 @@ def test_a_missing_extra_is_named_before_the_work(
 
 
 def test_more_than_half_of_the_memory_is_announced(monkeypatch):
-    from softreach.errors import SoftreachWarning
     from softreach.memory import check_memory
 
     monkeypatch.setattr("softreach.memory.free_memory", lambda: 1e9)
@@ -340,3 +340,57 @@ def test_more_than_half_of_the_memory_is_announced(monkeypatch):
         check_memory("n", 6, 6e8)
     with pytest.raises(InvalidInput, match="n = 7: must be smaller: it takes 2 GB of memory"):
         check_memory("n", 7, 2e9)
+
+
+LARGE = [name for name in WRITERS if name.startswith(("cloud.", "mesh.", "arm.", "pair."))]
+
+
+@pytest.mark.parametrize("name", LARGE)
+def test_an_output_that_the_disk_cannot_hold_is_not_begun(name, things, tmp_path, monkeypatch):
+    monkeypatch.setattr("softreach.memory._NOTICED", 0)
+    monkeypatch.setattr("softreach.memory.free_disk", lambda path: 100.0)
+    error = raised_by(lambda: WRITERS[name](things, tmp_path / "new" / name))
+    assert "of disk space, of which 100 bytes are free" in str(error)
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", LARGE)
+def test_an_output_that_takes_most_of_the_disk_is_announced_and_written(
+    name, things, tmp_path, monkeypatch
+):
+    def free(path):
+        """Half as much again as is asked for, which the frame above knows."""
+        return 1.5 * sys._getframe(1).f_locals["needed"]
+
+    monkeypatch.setattr("softreach.memory._NOTICED", 0)
+    monkeypatch.setattr("softreach.memory.free_disk", free)
+    with pytest.warns(SoftreachWarning, match="of disk space, of which"):
+        WRITERS[name](things, tmp_path / name)
+    assert (tmp_path / name).exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (f"cloud {TRUNK} --n 1e6", "n = 1000000: must be smaller: it takes 49 MB of disk"),
+        ("demo --n 1e6", "n = 1000000: must be smaller: it takes 100 MB of disk space"),
+        ("paper", "out = paper/report.html: must be smaller: it takes 685 MB of disk space"),
+    ],
+)
+def test_a_command_says_first_what_the_disk_cannot_hold(
+    words, expected, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("softreach.memory.free_disk", lambda path: 2e7)
+    assert expected in refusal_of(words.split(), capsys, tmp_path)
+
+
+def test_cells_of_a_reachable_set_that_memory_cannot_hold_are_told_by_their_number(
+    trunk, monkeypatch
+):
+    image = dataclasses.replace(sr.reachable_set(trunk, accuracy=0.05).image)  # nothing counted
+    monkeypatch.setattr("softreach.memory._NOTICED", 0)
+    monkeypatch.setattr("softreach.memory.free_memory", lambda: 100.0)
+    error = raised_by(lambda: image.counts)
+    assert "cells of the lattice = " in str(error)
+    assert "of memory, of which 100 bytes are free" in str(error)

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 
 import softreach as sr
+import softreach.arm.tables
 from softreach.arm import (
     Chamber,
     LinearTaper,
@@ -147,3 +148,22 @@ def test_a_summary_is_that_of_the_parts(arm):
 def test_a_design_beyond_the_theory_has_no_summary(trunk):
     with pytest.raises(sr.InvalidDesign, match="must keep ζ > 0"):
         describe(trunk.with_bounds((-9.0, 0.0)))
+
+
+def test_the_summary_of_twice_as_many_bundles_costs_twice_as_much(trunk, monkeypatch):
+    """Each bundle alone is asked about without the others."""
+    asked = []
+    plain = softreach.arm.tables._resultants
+    monkeypatch.setattr(
+        softreach.arm.tables, "_resultants", lambda *a: asked.append(1) or plain(*a)
+    )
+
+    def calls(count: int) -> int:
+        arm = trunk.split("longitudinal", count)
+        arm = arm.with_bounds((-0.01, 0.0))
+        asked.clear()
+        describe(arm)
+        return len(asked)
+
+    ten, twenty, forty = map(calls, (10, 20, 40))
+    assert forty - twenty == 2 * (twenty - ten)

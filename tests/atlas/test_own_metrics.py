@@ -145,9 +145,9 @@ def test_nan_is_an_answer_where_the_metric_says_when(tmp_path):
 @pytest.mark.parametrize(
     ("metrics", "message"),
     [
-        (("extend",), "metrics = extend: must be some of extent, convex"),
+        (("extend",), "metrics = 'extend': must be some of extent, convex"),
         ((), "metrics = none: must be some of extent"),
-        ("extent", "metrics = extent: must be some of"),
+        ("extent", "metrics = 'extent': must be some of"),
         ((MEAN_HEIGHT, replace(MEAN_HEIGHT, unit="1")), "name of a metric = mean_height"),
         ((replace(MEAN_HEIGHT, name="volume"),), "name of a metric = volume: must be of one"),
         (

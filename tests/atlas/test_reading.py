@@ -133,6 +133,25 @@ def test_every_question_takes_a_store_or_what_was_opened_of_it(some):
                 assert answer == answers[0]
 
 
+def test_reading_an_atlas_makes_none_of_its_designs(tmp_path, monkeypatch):
+    build_atlas(small_space(), tmp_path / "a.zarr", **SMALL)
+
+    def made(*_):
+        raise AssertionError("a design was made")
+
+    monkeypatch.setattr(DesignSpace, "design", made)
+    assert atlas_status(tmp_path / "a.zarr").done == 4
+    assert len(best_designs(tmp_path / "a.zarr", "volume", count=4).volume) == 4
+
+
+def test_building_an_atlas_makes_each_design_once_before_any_is_computed(tmp_path, monkeypatch):
+    made = []
+    plain = DesignSpace.design
+    monkeypatch.setattr(DesignSpace, "design", lambda *a: made.append(a[1]) or plain(*a))
+    build_atlas(small_space(), tmp_path / "a.zarr", shard=(3, 4), **SMALL)
+    assert made == [0, 1, 2, 3, 3]
+
+
 def test_what_is_no_atlas_is_refused_by_every_question(trunk):
     cloud = sr.compute_cloud(trunk, n=10)
     for ask in (atlas_status, partial(best_designs, metric="x"), atlas_design, atlas_cloud):

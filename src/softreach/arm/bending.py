@@ -51,19 +51,28 @@ def bending_at(arm: Manipulator, stations: ArrayLike) -> tuple[Array, Array]:
     if not arm.bundles:
         return np.zeros(len(center)), np.zeros(len(center))
     vertices = _vertices(center, halves)
-    largest = np.linalg.norm(vertices, axis=-1).max(axis=1)
     edge = _distance_to_edges(vertices)
-    return np.where(_holds_origin(center, halves), 0.0, edge), largest
+    return np.where(_holds_origin(center, halves), 0.0, edge), _farthest(vertices)
+
+
+def _largest_at(arm: Manipulator, stations: Array) -> Array:
+    """As `bending_at`, the largest alone [1/m]: with many bundles by far the cheaper half."""
+    center, halves = _zonogons(arm, stations)
+    return _farthest(_vertices(center, halves)) if arm.bundles else np.zeros(len(center))
+
+
+def _farthest(vertices: Array) -> Array:
+    return np.linalg.norm(vertices, axis=-1).max(axis=1)
 
 
 def largest_bending(arm: Manipulator) -> Extreme:
     """The largest bending [1/m] in the box and along the arm, to 1e-9 of it."""
-    return _largest(arm, lambda z: bending_at(arm, z)[1])
+    return _largest(arm, lambda z: _largest_at(arm, z))
 
 
 def sharpest_bending(arm: Manipulator) -> Extreme:
     """The largest bending times R2(Z) [-]: the inner side folds where it is 1 or more."""
-    return _largest(arm, lambda z: bending_at(arm, z)[1] * arm.profile.radius(z))
+    return _largest(arm, lambda z: _largest_at(arm, z) * arm.profile.radius(z))
 
 
 def smallest_bending(arm: Manipulator) -> Extreme:

@@ -135,11 +135,13 @@ def _validity(actuator: Actuator) -> str:
 
 
 def _alone(arm: Manipulator) -> Iterator[Manipulator]:
-    """For each activation, the arm whose other activations stay zero."""
-    for bundle in range(arm.bundles):
-        bounds = np.zeros_like(arm.bounds)
-        bounds[bundle] = arm.bounds[bundle]
-        yield arm.with_bounds(bounds)
+    """For each activation, the arm whose other activations stay zero, without their actuators."""
+    for actuator in arm.actuators:
+        bare = arm.replace(actuators=(actuator,))
+        for bundle in range(bare.bundles):
+            bounds = np.zeros_like(bare.bounds)
+            bounds[bundle] = bare.bounds[bundle]
+            yield bare.with_bounds(bounds)
 
 
 def _slender_bending(arm: Manipulator) -> tuple[float, float]:

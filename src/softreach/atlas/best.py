@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softreach.arguments import checked, flag, mapping_of, optional, text, whole
+from softreach.atlas.arguments import an_atlas, an_interval
 from softreach.atlas.reading import opened_atlas
 from softreach.errors import InvalidInput
 
@@ -20,6 +22,13 @@ __all__ = ["Interval", "best_designs"]
 Interval = tuple[float | None, float | None]
 
 
+@checked(
+    atlas=an_atlas,
+    metric=text,
+    smallest=flag,
+    where=optional(mapping_of(an_interval)),
+    count=whole(1),
+)
 def best_designs(
     atlas: AtlasLike,
     metric: str,
@@ -41,7 +50,7 @@ def best_designs(
         All metrics and parameters over `rank`, the best first; empty if no design qualifies.
 
     Raises:
-        InvalidInput: No such metric or parameter.
+        InvalidInput: No such metric or parameter, or an argument of another kind.
     """
     opened = opened_atlas(atlas)
     dims = opened["status"].dims
@@ -49,12 +58,11 @@ def best_designs(
     _check_known(metric, [str(name) for name in numbers if opened[name].dtype.kind == "f"])
     stacked = opened[[*numbers, *_parameters(opened)]].stack(rank=dims, create_index=False)
     allowed = np.isfinite(stacked[metric].values)
-    for name, (low, high) in (where or {}).items():
+    limits: Any = where or {}  # open ends are infinite by now
+    for name, (low, high) in limits.items():
         _check_known(name, [str(known) for known in stacked.variables])
         values = stacked[name].values
-        allowed &= (values >= (-np.inf if low is None else low)) & (
-            values <= (np.inf if high is None else high)
-        )
+        allowed &= (values >= low) & (values <= high)
     order = np.argsort(stacked[metric].values * (1 if smallest else -1), kind="stable")
     return stacked.isel(rank=order[allowed[order]][:count])
 

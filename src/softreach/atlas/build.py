@@ -9,17 +9,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softreach.atlas.command import Command
+from softreach.arguments import POSITIVE, checked, flag, function, instance, optional, within
+from softreach.atlas.arguments import a_store, shard_of
+from softreach.atlas.command import Command, check_names
 from softreach.atlas.contents import contents
 from softreach.atlas.demand import check_demand
-from softreach.atlas.executor import ExecutorLike, run_designs
+from softreach.atlas.executor import ExecutorLike, an_executor, run_designs
 from softreach.atlas.metric import Metric
 from softreach.atlas.metrics import METRIC_GROUPS, chosen_metrics
 from softreach.atlas.reading import open_atlas, over_length
 from softreach.atlas.space import DesignSpace
 from softreach.atlas.store import DONE, GAP, UNSTABLE, AtlasStore
-from softreach.errors import InvalidInput, SoftreachWarning, counted
+from softreach.errors import SoftreachWarning, counted
 from softreach.progress import Progress, bar
+from softreach.rod.steps import check_tol
+from softreach.sampling import check_sampler
+from softreach.workspace.reach import ACCURACIES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,6 +33,19 @@ if TYPE_CHECKING:
 __all__ = ["build_atlas"]
 
 
+@checked(
+    space=instance(DesignSpace, "a DesignSpace"),
+    store=a_store,
+    metrics=lambda name, value: chosen_metrics(value),
+    alpha_over_length=within(POSITIVE),
+    accuracy=within(ACCURACIES),
+    tol=lambda name, value: check_tol(value),
+    keep_clouds=flag,
+    executor=an_executor,
+    shard=shard_of,
+    durable=flag,
+    progress=optional(function),
+)
 def build_atlas(
     space: DesignSpace,
     store: StoreLike,
@@ -97,6 +115,13 @@ def build_atlas(
         SoftreachWarning: There are gaps, failed or damaged designs, or designs whose points are too
             sparse for the radius.
     """
+    chosen = chosen_metrics(metrics)
+    check_names(chosen, space)
+    numbers = range(shard[0], space.size, shard[1])
+    check_sampler(sampler, n, 0, seed)
+    check_demand(space, len(numbers), n, store, keep_clouds=keep_clouds)
+    with bar("looking at all designs", space.size) as shown:
+        space.survey(shown)
     command = Command(
         space=space,
         n=n,
@@ -105,11 +130,10 @@ def build_atlas(
         tol=tol,
         alpha_over_length=alpha_over_length,
         accuracy=accuracy,
-        metrics=chosen_metrics(metrics),
+        metrics=chosen,
         keep_clouds=keep_clouds,
     )
-    indices = _checked_shard(shard, space.size)
-    check_demand(command, len(indices), store)
+    indices = np.array(numbers)
     _warn_of_gaps(space)
     atlas = AtlasStore.begin(store, command, durable=durable)
     held = contents(atlas, tips_of=indices.tolist())
@@ -146,13 +170,6 @@ def _run(
     if failures:
         index, message = next(iter(failures.items()))
         _warn(f"{counted(len(failures), 'design')} failed, first number {index}: {message}")
-
-
-def _checked_shard(shard: tuple[int, int], size: int) -> np.ndarray:
-    first, count = shard
-    if not 0 <= first < count:
-        raise InvalidInput("shard", f"{first}/{count}", "i/k with 0 <= i < k")
-    return np.arange(first, size, count)
 
 
 def _warn_of_gaps(space: DesignSpace) -> None:
@@ -192,4 +209,4 @@ def _warn_of_sparse(atlas: xr.Dataset) -> None:
 
 
 def _warn(message: str) -> None:
-    warnings.warn(message, SoftreachWarning, stacklevel=4)
+    warnings.warn(message, SoftreachWarning, stacklevel=5)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from importlib.metadata import version
 from typing import Any, Self
@@ -18,7 +18,7 @@ from softreach.curvature import QUANTILES
 from softreach.errors import InvalidInput, SoftreachError, counted
 from softreach.sampling import check_sampler
 
-__all__ = ["ATLAS_VERSION", "Command"]
+__all__ = ["ATLAS_VERSION", "Command", "check_names"]
 
 ATLAS_VERSION = 3
 """Version of the layout of a store."""
@@ -71,6 +71,7 @@ class Command:
     atlas_version: int = ATLAS_VERSION
 
     def __post_init__(self) -> None:
+        check_names(self.metrics, self.space)
         for fault in _faults(self):
             raise fault
         check_sampler(self.sampler, self.n, self.space.bundles, self.seed)
@@ -135,14 +136,22 @@ class Command:
         return [*_differences(_flat(self), _flat(other)), *metrics]
 
 
+def check_names(metrics: Iterable[Metric], space: DesignSpace) -> None:
+    """Refuse metrics of the names that an atlas of these designs uses itself.
+
+    Raises:
+        InvalidInput: There is one.
+    """
+    taken = _RESERVED | {*space.names}
+    for name in (metric.name for metric in metrics if metric.name in taken):
+        raise InvalidInput("name of a metric", name, "a name that the atlas does not use itself")
+
+
 def _faults(command: Command) -> Iterator[InvalidInput]:
     space = command.space
     if not 0 < command.alpha_over_length < np.inf:
         value, allowed = command.alpha_over_length, "a radius > 0 over the length of each design"
         yield InvalidInput("alpha_over_length", value, allowed)
-    taken = _RESERVED | {*space.names}
-    for name in (metric.name for metric in command.metrics if metric.name in taken):
-        yield InvalidInput("name of a metric", name, "a name that the atlas does not use itself")
     if not space.bundles:
         why = next(iter(space.gaps.values()))
         designs = counted(space.size, "design")

@@ -11,21 +11,27 @@ from softreach.memory import check_disk, check_memory
 if TYPE_CHECKING:
     from zarr.storage import StoreLike
 
-    from softreach.atlas.command import Command
+    from softreach.atlas.space import DesignSpace
 
 __all__ = ["check_demand"]
 
 _STORED = 6.2  # bytes of a tip in a store
+_ON_DISK = 4096  # bytes that the smallest file takes
+_FILES = 4  # of a design without tips: status, message, metrics, curvature
 _HELD = 700  # bytes of memory of a sample and its share of the triangulation
 
 
-def check_demand(command: Command, designs: int, store: StoreLike) -> None:
-    """Refuse an atlas that cannot fit, and announce one that takes much.
+def check_demand(
+    space: DesignSpace, designs: int, n: int, store: StoreLike, *, keep_clouds: bool
+) -> None:
+    """Refuse an atlas that cannot fit, and announce one that takes much; no design is made for it.
 
     Args:
-        command: What is asked for.
-        designs: How many of its designs are to be computed here.
+        space: The designs.
+        designs: How many of them are to be computed here.
+        n: Samples of each design.
         store: Where it goes; of one that exists, nobody knows how much is done.
+        keep_clouds: Whether the tips are stored.
 
     Raises:
         InvalidInput: One design does not fit into memory, or all do not fit on the disk.
@@ -33,8 +39,9 @@ def check_demand(command: Command, designs: int, store: StoreLike) -> None:
     Warns:
         SoftreachWarning: It takes more than half of what is free.
     """
-    check_memory("n", command.n, _HELD * command.n)
+    check_memory("n", n, _HELD * n)
     local = isinstance(store, str | os.PathLike) and "://" not in str(store)
-    if local and command.keep_clouds and not Path(str(store)).exists():
-        tips = f"{command.n} samples of {designs} designs"
-        check_disk("n", tips, _STORED * command.n * designs, str(store))
+    if local and not Path(str(store)).exists():
+        of_each = _STORED * n * keep_clouds + _FILES * _ON_DISK
+        asked = f"{n} samples of {designs} designs"
+        check_disk("n", asked, of_each * designs + 8 * n * space.base.bundles, str(store))

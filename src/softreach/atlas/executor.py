@@ -22,6 +22,7 @@ from itertools import chain
 from typing import Any, Protocol, Self
 
 from softreach import parallel
+from softreach.arguments import as_given
 from softreach.atlas.design_task import Outcome, Remote, begin_design, run_remotely
 from softreach.atlas.metric import Metric, check_travels
 from softreach.atlas.processes import LocalProcesses, Workers
@@ -29,7 +30,7 @@ from softreach.atlas.store import AtlasStore
 from softreach.errors import InvalidInput, SoftreachError
 from softreach.interruption import undoing
 
-__all__ = ["ExecutorLike", "run_designs"]
+__all__ = ["ExecutorLike", "an_executor", "run_designs"]
 
 ATTEMPTS = 3
 """How often a design may take its worker with it before it counts as failed."""
@@ -46,6 +47,21 @@ class DaskClient(Protocol):
 OnOutcome = Callable[[Outcome], None]
 
 ExecutorLike = Executor | DaskClient | Workers | None
+
+
+_ALLOWED = "a concurrent.futures executor, a function that makes one, or a Dask client"
+
+
+def an_executor(name: str, value: Any) -> Any:
+    """Who computes designs.
+
+    Raises:
+        InvalidInput: Nobody who could.
+    """
+    known = value is None or isinstance(value, Executor) or hasattr(value, "get_executor")
+    if known or (callable(value) and not isinstance(value, type)):
+        return value
+    raise InvalidInput(name, as_given(value), _ALLOWED)
 
 
 def run_designs(
@@ -95,12 +111,9 @@ class _Pool:
         elif hasattr(executor, "get_executor"):
             # The scheduler itself tries the task of a dead worker again.
             self._now = executor.get_executor(pure=False)  # pyright: ignore
-        elif callable(executor):
-            self._start = executor
-            self._now = executor()
         else:
-            allowed = "a concurrent.futures executor, a function that makes one, or a Dask client"
-            raise InvalidInput("executor", executor, allowed)
+            self._start = start = an_executor("executor", executor)
+            self._now = start()
 
     def __enter__(self) -> Self:
         return self

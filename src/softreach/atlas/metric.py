@@ -12,6 +12,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arguments import instance, text
 from softreach.errors import InvalidInput, SoftreachError
 
 __all__ = ["Metric", "MetricFailed", "Need", "check_travels"]
@@ -63,9 +64,12 @@ class Metric:
     """When NaN is the right answer; empty if never. A design with any other NaN has failed."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "needs", tuple(self.needs))
-        if not self.name.isidentifier():
+        if not text("name of the metric", self.name).isidentifier():
             raise InvalidInput("name of the metric", self.name, "letters, digits and underscores")
+        for field in ("unit", "meaning", "nan_if"):
+            text(f"{field} of metric {self.name}", getattr(self, field))
+        instance((tuple, list), "a tuple")(f"needs of metric {self.name}", self.needs)
+        object.__setattr__(self, "needs", tuple(self.needs))
         if not all(isinstance(need, Need) for need in self.needs):
             allowed = f"some of Need.{', Need.'.join(Need.__members__)}"
             raise InvalidInput(f"needs of metric {self.name}", self.needs, allowed)

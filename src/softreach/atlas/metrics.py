@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arguments import as_given
 from softreach.atlas.metric import PROFILE, Metric, Need
 from softreach.curvature import QUANTITIES
 from softreach.errors import InvalidInput
@@ -267,8 +268,9 @@ def chosen_metrics(asked: Sequence[str | Metric]) -> tuple[Metric, ...]:
     Raises:
         InvalidInput: Nothing, an unknown group, or two metrics of one name.
     """
-    if isinstance(asked, str) or not asked:
-        raise InvalidInput("metrics", asked or "none", _ALLOWED)
+    several = isinstance(asked, list | tuple | Mapping)
+    if not several or not asked:
+        raise InvalidInput("metrics", "none" if several else as_given(asked), _ALLOWED)
     found: dict[str, Metric] = {}
     for metric in (metric for choice in asked for metric in _metrics_of(choice)):
         if found.setdefault(metric.name, metric) != metric or _taken(metric):
@@ -284,8 +286,8 @@ _ALLOWED = f"some of {', '.join(METRIC_GROUPS)}, or metrics of your own"
 def _metrics_of(choice: str | Metric) -> tuple[Metric, ...]:
     if isinstance(choice, Metric):
         return (choice,)
-    if choice not in METRIC_GROUPS:
-        raise InvalidInput("metrics", choice, _ALLOWED)
+    if not isinstance(choice, str) or choice not in METRIC_GROUPS:
+        raise InvalidInput("metrics", as_given(choice), _ALLOWED)
     return METRIC_GROUPS[choice]
 
 

@@ -11,15 +11,20 @@ from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from multiprocessing.connection import wait
 from typing import Any
 
+from softreach.arguments import checked, whole
 from softreach.interruption import PATIENCE, as_a_whole
 from softreach.lifeline import live_with_parent
 
-__all__ = ["LocalProcesses", "Workers", "worker_processes"]
+__all__ = ["WORKERS", "LocalProcesses", "Workers", "worker_processes"]
+
+WORKERS = 1, 1_024
+"""How many processes of one machine may be asked for."""
 
 Workers = Callable[[], Executor]
 """Starts a pool; called again when a dead worker has broken the one before."""
 
 
+@checked(count=whole(*WORKERS))
 def worker_processes(count: int) -> Workers:
     """Worker processes on this machine, restarted if one dies.
 
@@ -27,6 +32,9 @@ def worker_processes(count: int) -> Workers:
 
     Args:
         count: Number of processes; each uses one thread.
+
+    Raises:
+        InvalidInput: Not a whole number from 1 to 1,024.
     """
     return lambda: LocalProcesses(count)
 

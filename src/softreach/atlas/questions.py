@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softreach.arguments import as_number, as_whole_number, checked
 from softreach.arm.manipulator import Manipulator
+from softreach.atlas.arguments import a_store, an_atlas
 from softreach.atlas.contents import TOLD, contents
 from softreach.atlas.intermediates import activations_of
 from softreach.atlas.layout import array_plans
@@ -56,6 +58,7 @@ class AtlasStatus:
     """Why designs failed, cannot exist, are nowhere stable or are damaged: number -> message."""
 
 
+@checked(atlas=an_atlas)
 def atlas_status(atlas: AtlasLike) -> AtlasStatus:
     """How many designs of an atlas are done, and what is wrong with the others.
 
@@ -79,6 +82,7 @@ def atlas_status(atlas: AtlasLike) -> AtlasStatus:
     return _verified(store, tips=_is_small(store))
 
 
+@checked(store=a_store)
 def verify_atlas(store: StoreLike) -> AtlasStatus:
     """Read all of an atlas and check it: what is damaged, and how much is done.
 
@@ -128,6 +132,7 @@ def _counted(status: np.ndarray, messages: dict[int, str], tips_verified: bool) 
     )
 
 
+@checked(atlas=an_atlas)
 def atlas_design(atlas: AtlasLike, **at: float) -> Manipulator:
     """The design at, or nearest to, these parameters.
 
@@ -143,6 +148,7 @@ def atlas_design(atlas: AtlasLike, **at: float) -> Manipulator:
     return command_of(opened).design(int(_nearest(opened[["number"]], at)["number"]))
 
 
+@checked(atlas=an_atlas)
 def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
     """The cloud of the design at, or nearest to, these parameters, like those of `compute_cloud`.
 
@@ -188,5 +194,7 @@ def _nearest(atlas: xr.Dataset, at: Mapping[str, float]) -> xr.Dataset:
     if set(at) != set(dims):
         raise InvalidInput("parameters", ", ".join(at) or "none", f"all of {', '.join(dims)}")
     if "design" in at:
-        return atlas.isel(design=int(at["design"]))
-    return atlas.sel(at, method="nearest")
+        last = atlas.sizes["design"] - 1
+        return atlas.isel(design=as_whole_number("design", at["design"], 0, last))
+    place = {name: as_number(name, value) for name, value in at.items()}
+    return atlas.sel(place, method="nearest")

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from softreach.arguments import checked, dataset, text
+from softreach.atlas.arguments import a_store
 from softreach.atlas.command import Command
 from softreach.atlas.contents import Contents, contents
 from softreach.atlas.metric import Metric, Need
@@ -26,6 +28,7 @@ __all__ = ["command_of", "open_atlas", "opened_atlas", "over_length"]
 _POWERS = {"m": 1, "m2": 2, "m3": 3, "1/m": -1}
 
 
+@checked(store=a_store)
 def open_atlas(store: StoreLike) -> xr.Dataset:
     """An atlas with a dimension for each parameter, so that ``atlas.volume.sel(taper=...)`` works.
 
@@ -75,6 +78,7 @@ def command_of(atlas: xr.Dataset) -> Command:
     return Command.from_json(atlas.attrs["command"])
 
 
+@checked(atlas=dataset("length", what="an atlas"), metric=text)
 def over_length(atlas: xr.Dataset, metric: str) -> xr.DataArray:
     """A metric relative to each design's own length: V / L³, heights over L, curvatures times L.
 
@@ -82,6 +86,8 @@ def over_length(atlas: xr.Dataset, metric: str) -> xr.DataArray:
         atlas: From `open_atlas`.
         metric: Which one; without a length in its unit it stays as it is.
     """
+    if metric not in atlas:
+        raise InvalidInput("metric", metric, f"one of {', '.join(map(str, atlas.data_vars))}")
     values = atlas[metric]
     power = _POWERS.get(values.attrs.get("units", "1"), 0)
     if not power:
@@ -115,8 +121,8 @@ def _variables(store: AtlasStore, found: Contents) -> dict[str, Any]:
     """Status and message of every design."""
     space = store.command.space
     texts = np.full(space.size, "", dtype=np.dtypes.StringDType())
-    for index, text in found.messages.items():
-        texts[index] = text
+    for index, message in found.messages.items():
+        texts[index] = message
     values = {"status": found.status, "message": texts}
     return {
         name: (space.dims, column.reshape(space.shape), store.array(name).attrs.asdict())

@@ -4,21 +4,38 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.arm.manipulator import Manipulator
+from softreach.arguments import as_whole_number, checked, one_of, whole
+from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, changed, find_parameter, find_parameters, parameters
 from softreach.arm.tables import check_extension
+from softreach.arrays import as_floats, check_finite
+from softreach.atlas.arguments import column
 from softreach.errors import InvalidDesign, InvalidInput
+from softreach.progress import Progress, silent
 
 __all__ = ["DesignSpace"]
 
 Layout = Literal["grid", "list"]
+
+_MOST = 1_000_000  # designs, each of which is looked at and has files of its own
+
+
+class _Extent(NamedTuple):
+    """What all designs of a space have in common room for."""
+
+    bundles: int
+    """The largest number of bundles; 0 if there is no design."""
+    shortest: float
+    """Length of the shortest design [m]."""
+    longest: float
+    """Length of the longest design [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,8 +45,8 @@ class DesignSpace:
     Combinations that no arm can have are found when asked for (`gaps`) and have no design.
 
     Raises:
-        InvalidInput: An unknown parameter, no values, values that are not finite or come twice, or
-            lists of different length.
+        InvalidInput: An unknown parameter, no values, values that are not finite or come twice,
+            lists of different length, or more than a million designs.
     """
 
     base: Manipulator
@@ -38,12 +55,16 @@ class DesignSpace:
     """Name and values [SI units] of every parameter."""
     layout: Layout = "grid"
     """Every combination (grid), or the values taken together, one of each (list)."""
+    known: _Extent | None = field(default=None, repr=False, compare=False)
+    """What a store tells of all designs, so that reading it makes none of them."""
 
     def __post_init__(self) -> None:
+        a_manipulator("base", self.base)
         for fault in _faults(self):
             raise fault
 
     @classmethod
+    @checked(base=a_manipulator)
     def grid(cls, base: Manipulator, **values: ArrayLike) -> Self:
         """Every combination of the values.
 
@@ -56,11 +77,13 @@ class DesignSpace:
         return cls(base=base, parameters=_plain(values), layout="grid")
 
     @classmethod
+    @checked(base=a_manipulator)
     def listed(cls, base: Manipulator, **values: ArrayLike) -> Self:
         """The first values of all parameters make a design, the second ones the next, and so on."""
         return cls(base=base, parameters=_plain(values), layout="list")
 
     @classmethod
+    @checked(base=a_manipulator, count=whole(1, _MOST), method=one_of(("sobol", "latin")))
     def sampled(
         cls,
         base: Manipulator,
@@ -79,8 +102,11 @@ class DesignSpace:
             seed: Of the sampler.
             **ranges: Parameter -> lower and upper end [SI units].
         """
+        seed = as_whole_number("seed", seed)
+        if not ranges:
+            return cls(base=base, parameters=())
         cube = _spread(count, len(ranges), method, seed)
-        ends = np.array(list(ranges.values()), float).reshape(-1, 2)
+        ends = np.array([_ends(name, ends) for name, ends in ranges.items()])
         points = ends[:, 0] + cube * np.diff(ends, axis=1)[:, 0]
         if whole := [k for k, name in enumerate(ranges) if find_parameter(base, name).whole]:
             points[:, whole] = np.rint(points[:, whole])
@@ -118,7 +144,8 @@ class DesignSpace:
 
     def place(self, index: int) -> tuple[int, ...]:
         """Where the design with this number is, along each dimension."""
-        return tuple(map(int, np.unravel_index(index, self.shape)))
+        number = as_whole_number("number of the design", index, 0, self.size - 1)
+        return tuple(map(int, np.unravel_index(number, self.shape)))
 
     def values(self, index: int) -> dict[str, float]:
         """Parameters of the design with this number, counted in C order over `shape`."""
@@ -144,50 +171,83 @@ class DesignSpace:
     @property
     def bundles(self) -> int:
         """The largest number of bundles of any design; 0 if there is no design."""
-        return self._survey.bundles
+        return self._extent.bundles
 
     @property
     def length_range(self) -> tuple[float, float]:
         """Length of the shortest and of the longest design [m]."""
-        return self._survey.lengths
+        return self._extent.shortest, self._extent.longest
+
+    def survey(self, progress: Progress = silent) -> None:
+        """Make each design once, which takes about 2 ms each; what is asked later is known then.
+
+        Args:
+            progress: Called with the number of designs made since its last call.
+        """
+        if "_survey" not in self.__dict__:
+            self.__dict__["_survey"] = _surveyed(self, progress)
 
     def to_dict(self) -> dict[str, Any]:
         """The space in plain values, from which `from_dict` makes an equal one."""
         parameters = {name: [*values] for name, values in self.parameters}
-        return {"design": self.base.to_toml(), "layout": self.layout, "parameters": parameters}
+        return {
+            "design": self.base.to_toml(),
+            "layout": self.layout,
+            "parameters": parameters,
+            "extent": [*self._extent],
+        }
 
     @classmethod
     def from_dict(cls, space: Mapping[str, Any]) -> Self:
         """The space that `to_dict` described."""
         base = Manipulator.from_toml(space["design"], source="the base design")
-        return cls(base=base, parameters=_plain(space["parameters"]), layout=space["layout"])
+        bundles, shortest, longest = space["extent"]
+        known = _Extent(int(bundles), float(shortest), float(longest)) if bundles else None
+        parameters = _plain(space["parameters"])
+        return cls(base=base, parameters=parameters, layout=space["layout"], known=known)
 
     @cached_property
     def _survey(self) -> _Survey:
-        gaps: dict[int, str] = {}
-        found: list[tuple[int, float]] = []
-        for index in range(self.size):
-            try:
-                arm = self.design(index)
-            except InvalidDesign as error:
-                gaps[index] = "; ".join(str(error).splitlines())
-            else:
-                found.append((arm.bundles, arm.length))
-        bundles, lengths = zip(*found, strict=True) if found else ((0,), (math.nan,))
-        return _Survey(gaps, max(bundles), (min(lengths), max(lengths)))
+        return _surveyed(self, silent)
+
+    @property
+    def _extent(self) -> _Extent:
+        return self.known or self._survey.extent
 
 
 class _Survey(NamedTuple):
     """What is known of all designs of a space once each has been made."""
 
     gaps: dict[int, str]
-    bundles: int
-    lengths: tuple[float, float]
+    extent: _Extent
+
+
+def _surveyed(space: DesignSpace, progress: Progress) -> _Survey:
+    gaps: dict[int, str] = {}
+    found: set[tuple[int, float]] = set()
+    for index in range(space.size):
+        try:
+            arm = space.design(index)
+        except InvalidDesign as error:
+            gaps[index] = "; ".join(str(error).splitlines())
+        else:
+            found.add((arm.bundles, arm.length))
+        progress(1)
+    bundles, lengths = zip(*found, strict=True) if found else ((0,), (math.nan,))
+    return _Survey(gaps, _Extent(max(bundles), min(lengths), max(lengths)))
 
 
 def _plain(values: Mapping[str, ArrayLike]) -> tuple[tuple[str, tuple[float, ...]], ...]:
-    columns = {name: np.atleast_1d(np.asarray(column)) for name, column in values.items()}
-    return tuple((name, tuple(column.ravel().tolist())) for name, column in columns.items())
+    return tuple((name, column(name, given)) for name, given in values.items())
+
+
+def _ends(name: str, ends: ArrayLike) -> np.ndarray:
+    """The lower and the upper end of a parameter."""
+    allowed = "two numbers, the lower one first"
+    floats = check_finite(name, as_floats(name, ends, allowed))
+    if floats.shape != (2,) or not floats[0] < floats[1]:
+        raise InvalidInput(name, ends, allowed)
+    return floats
 
 
 def _faults(space: DesignSpace) -> Iterator[InvalidInput]:
@@ -207,6 +267,9 @@ def _faults(space: DesignSpace) -> Iterator[InvalidInput]:
         counts = ", ".join(f"{name}: {len(values)}" for name, values in space.parameters)
         allowed = "the same number for each parameter in a list of designs"
         yield InvalidInput("parameters", counts, allowed)
+    if space.size > _MOST:
+        allowed, hint = f"{_MOST:,} at most", "take fewer values, or build several atlases"
+        yield InvalidInput("designs", f"{space.size:,}", allowed, hint)
 
 
 def _spread(count: int, dim: int, method: str, seed: int) -> np.ndarray:
@@ -216,6 +279,4 @@ def _spread(count: int, dim: int, method: str, seed: int) -> np.ndarray:
 
     if method == "sobol":
         return sample_cube("sobol", count, dim, seed)
-    if method == "latin":
-        return qmc.LatinHypercube(dim, rng=np.random.default_rng(seed)).random(count)
-    raise InvalidInput("method", method, "sobol or latin")
+    return qmc.LatinHypercube(dim, rng=np.random.default_rng(seed)).random(count)

@@ -12,6 +12,7 @@ from softreach.arm.file.document import document_of
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters.unknown import unknown_parameter
 from softreach.arm.parameters.written import from_written, written_parameters
+from softreach.atlas.arguments import column
 from softreach.atlas.space import DesignSpace
 from softreach.errors import InvalidDesign, InvalidInput
 from softreach.quantity import read_number, read_whole_number
@@ -87,7 +88,7 @@ def _document(text: str) -> dict[str, Any]:
     try:
         document = document_of(text, "space", float)
     except InvalidDesign as error:
-        raise InvalidInput("space", error.faults[0], "valid TOML") from None
+        raise InvalidInput("space", error.faults[0].value, str(error.faults[0].allowed)) from None
     for key in document:
         if key not in _KEYS:
             raise InvalidInput("key", key, f"one of {', '.join(_KEYS)}")
@@ -115,8 +116,8 @@ def _numbers(key: str, value: Any) -> list[float]:
     try:
         if isinstance(value, str):
             return _range(value) if ":" in value else [_number(part) for part in value.split(",")]
-        return [x if isinstance(x, int) else float(x) for x in np.atleast_1d(value).tolist()]
-    except (TypeError, ValueError):
+        return list(column(key, value))
+    except (InvalidInput, ValueError):
         raise InvalidInput(key, value, allowed) from None
 
 

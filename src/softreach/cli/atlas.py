@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
+from softreach.arguments import as_whole_number
 from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import AsJson, Durable, Sampler, Seed, design_from
 from softreach.cli.numbers import WHOLE
@@ -214,11 +215,9 @@ def _executor(
     workers: int | None, scheduler: str | None, scheduler_file: Path | None
 ) -> ExecutorLike:
     if workers is not None:
-        from softreach.atlas import worker_processes
+        from softreach.atlas.processes import WORKERS, worker_processes
 
-        if workers < 1:
-            raise InvalidInput("workers", workers, "a whole number, 1 or more")
-        return worker_processes(workers)
+        return worker_processes(as_whole_number("workers", workers, *WORKERS))
     if scheduler is None and scheduler_file is None:
         return None
     try:

@@ -32,6 +32,7 @@ def demo(
     from softreach import export, parallel, plot
     from softreach.arm import designs
     from softreach.cloud import compute_cloud, save_cloud
+    from softreach.memory import check_disk
     from softreach.rod.kinematics import configuration
     from softreach.volume import Hull, concave_hull, convex_hull
 
@@ -39,6 +40,7 @@ def demo(
     arm = designs.minimal_trunk()
     _check(out, overwrite)
     check_hull_memory(n)
+    check_disk("n", n, _WRITTEN * n, out)
     cloud = compute_cloud(arm, n)
     computed = perf_counter() - start
 
@@ -62,6 +64,7 @@ def demo(
     print_rows("minimal trunk, revolution 108°, taper 2°", rows, json)
 
 
+_WRITTEN = 100  # bytes of a sample in the cloud and in the PLY
 _FILES = ("design.toml", "cloud.zarr", "cloud.ply", "hull.ply", "cloud.png")
 
 

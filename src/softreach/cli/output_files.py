@@ -20,7 +20,9 @@ Overwrite = Annotated[
 ]
 
 
-def check_output(name: str, path: Path | None, formats: Formats, overwrite: bool) -> None:
+def check_output(
+    name: str, path: Path | None, formats: Formats, overwrite: bool, *, takes: float = 0.0
+) -> None:
     """Refuse what could not be written in the end; nothing to do for an option that is not given.
 
     Args:
@@ -28,9 +30,10 @@ def check_output(name: str, path: Path | None, formats: Formats, overwrite: bool
         path: Its value.
         formats: What can be written there, by suffix.
         overwrite: Whether it may replace anything else.
+        takes: What it will take of the disk, where that is known and may be much [bytes].
 
     Raises:
-        InvalidInput: Another suffix, or something else is there.
+        InvalidInput: Another suffix, something else is there, or the disk cannot hold it.
         MissingExtra: A library that writes it is not installed.
         NotWritten: Nothing can be written there.
     """
@@ -38,7 +41,8 @@ def check_output(name: str, path: Path | None, formats: Formats, overwrite: bool
     from softreach.file_kinds import format_of
 
     if path is not None:
-        check_place(path, format_of(path, formats, name), overwrite=overwrite, name=name)
+        kind = format_of(path, formats, name)
+        check_place(path, kind, takes=takes, overwrite=overwrite, name=name)
 
 
 def check_picture(name: str, path: Path | None, overwrite: bool) -> None:

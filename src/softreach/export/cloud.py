@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CLOUD_FILES", "export_cloud"]
 
+_BYTES = 12  # of a number in a file: 8, or about 18 in text, which few formats are
 _MAT_LIMIT = 2**31  # bytes of one variable in a version 5 file
 
 
@@ -45,7 +46,9 @@ def export_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: boo
         MissingExtra: The format needs a library that is not installed.
         NotWritten: It cannot be written.
     """
-    write_by_suffix(path, CLOUD_FILES, _WRITERS, cloud_table(cloud), overwrite)
+    table = cloud_table(cloud)
+    takes = _BYTES * (table.tip.size + table.activation.size)
+    write_by_suffix(path, CLOUD_FILES, _WRITERS, table, overwrite, takes=takes)
 
 
 def _write_ply(table: CloudTable, file: BufferedWriter) -> None:

@@ -22,9 +22,23 @@ Writers = Mapping[str, Callable[[Any, BufferedWriter], None]]
 
 
 def write_by_suffix(
-    path: str | PathLike[str], formats: Formats, writers: Writers, content: Any, overwrite: bool
+    path: str | PathLike[str],
+    formats: Formats,
+    writers: Writers,
+    content: Any,
+    overwrite: bool,
+    *,
+    takes: float,
 ) -> None:
     """Write the content whole, or leave what was there.
+
+    Args:
+        path: The file.
+        formats: What can be written, by suffix.
+        writers: What writes it, by suffix.
+        content: What they write.
+        overwrite: Whether it may replace anything.
+        takes: What the file will take of the disk, roughly [bytes].
 
     Raises:
         InvalidInput: No writer for the suffix (the error lists those there are), or something else
@@ -33,7 +47,7 @@ def write_by_suffix(
         NotWritten: It cannot be written.
     """
     kind = format_of(path, formats)
-    with writing(path, kind, overwrite=overwrite) as file:
+    with writing(path, kind, takes=takes, overwrite=overwrite) as file:
         writers[Path(path).suffix.lower()](content, file)
 
 

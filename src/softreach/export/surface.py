@@ -22,6 +22,7 @@ from softreach.palette import BODY, Color
 
 __all__ = ["SURFACE_FILES", "Part", "export_mesh", "write_parts"]
 
+_BYTES = 50  # of a triangle and its share of the vertices
 _Z_UP_TO_Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
 
 
@@ -96,7 +97,8 @@ def write_parts(
         MissingExtra: The format needs a library that is not installed.
         NotWritten: It cannot be written.
     """
-    write_by_suffix(path, SURFACE_FILES, _WRITERS, parts, overwrite)
+    takes = _BYTES * sum(len(part.faces) for part in parts)
+    write_by_suffix(path, SURFACE_FILES, _WRITERS, parts, overwrite, takes=takes)
 
 
 def _write_ply(parts: Sequence[Part], file: BufferedWriter) -> None:

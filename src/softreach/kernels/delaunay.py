@@ -47,14 +47,17 @@ from softreach.kernels.triangulation import (
 __all__ = ["triangulate"]
 
 CROWDED = 50_000  # cells beside those that are usual
+USUAL = 16  # cells of a point, at most
+REMADE = 3  # times that a cell is made and dug out again, at most
 INSIDE, UNSURE = np.intp(-1), np.intp(-2)
 
 
 def triangulate(points, lies_on_curve):
     """Insert points in the given order.
 
-    Points in space and on surfaces have four to eight cells each, those on a curve as many as there
-    are points. Such crowding shows after some hundred points.
+    Points in space and on surfaces have four to eight cells each, of some thirty that are made;
+    those on a curve have as many as there are points, and near one as many are made. Such crowding
+    shows after some hundred points.
 
     Args:
         points: Coordinates in [-1, 1], multiples of 2^-200 (see `predicates`), shape (n, 3).
@@ -79,7 +82,7 @@ def triangulate(points, lies_on_curve):
         elif lies_on_curve():
             return mesh.cells[:0], mesh.neighbors[:0], same
         else:
-            crowded = np.iinfo(np.int64).max // 2
+            crowded = np.iinfo(np.int64).max // (2 * REMADE)
         at, walls, used, free, last = _insert(
             points, mesh, start, same, table, w, at, used, free, last, crowded
         )
@@ -94,15 +97,17 @@ def _insert(points, mesh, start, same, table, w, at, used, free, last, crowded):
 
     Returns:
         The first point that was not inserted, and the walls of its cavity, or 0 if there are more
-        than `crowded` cells beside 16 for each point; slots used, the head of
-        the freed slots and the last cell, to go on with. Once all are: slots used by finite cells.
+        than `crowded` cells beside 16 for each point, or three times as many were made; slots used,
+        the head of the freed slots and the last cell, to go on with. Once all are: slots used by
+        finite cells.
     """
     if at == 0:
         used = first_cell(points, mesh, start, w)
         if used == 0:
             return len(points), 0, used, free, last
+    made = 0
     for p in range(at, len(points)):
-        if used > crowded + 16 * p:
+        if used > crowded + USUAL * p or made > REMADE * (crowded + USUAL * (p - at)):
             return p, 0, used, free, last
         if p == start[0] or p == start[1] or p == start[2] or p == start[3]:
             continue
@@ -115,6 +120,7 @@ def _insert(points, mesh, start, same, table, w, at, used, free, last, crowded):
         if used + walls > len(mesh.mark) or 8 * walls > table.shape[1]:
             return p, walls, used, free, last
         used, free, last = fill(mesh, p, dug, walls, used, free, table)
+        made += walls
     return len(points), 0, compact(mesh, used), free, last
 
 

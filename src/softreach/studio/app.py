@@ -29,6 +29,7 @@ __all__ = ["Studio"]
 
 _EYE = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
 _EYE_ON_MAP = Camera(position=(1.9, -6.3, 2.0), look_at=(-0.95, -0.5, 0.3))
+_MOST_LEFT = 20  # closed tabs whose work is held
 _GOES_ON = "This goes on where the last work on it ended; Reset leads back to the beginning."
 
 
@@ -142,6 +143,8 @@ class Studio:
         if session.atlas is not None and session.board is None:
             session.say("There is no map: the atlas is no grid of two parameters or more.")
         attempt(session, lambda: self._follow_link(session))
+        if client.client_id not in self.server.get_clients():  # closed before it was furnished
+            self._disconnected(client)
 
     def _follow_link(self, session: Session) -> None:
         """Bring a tab that was opened by a link into its state."""
@@ -157,6 +160,7 @@ class Studio:
             if self.work is not None:
                 session.keep()
                 self._left.append((session.state_now(), session.history))
+                del self._left[:-_MOST_LEFT]
 
     def _work_left(self) -> tuple[StudioState, History] | None:
         """What a new tab goes on with: nothing beside tabs that are open, as it is theirs."""

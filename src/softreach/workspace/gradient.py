@@ -140,6 +140,8 @@ def volume_gradient(
     asked = tuple(parameters)
     if not asked:
         raise InvalidInput("parameters", "none", "the name of one or more")
+    if twice := [name for name in asked if asked.count(name) > 1]:
+        raise InvalidInput("parameters", twice[0], "given once")
     found = find_parameters(arm, asked)
     solid = _solid(arm, accuracy)
     base = _Base(solid, accuracy)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import NamedTuple
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from softreach import parallel
 from softreach.kernels import contour, point_cover, raster
+from softreach.memory import check_memory
 from softreach.progress import Progress, silent
 
 __all__ = ["Image", "Lattice", "Spans", "image_of"]
@@ -19,6 +21,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _STRETCH_BITS = 50  # of the largest det J: sums of four are exact in any order
+_BYTES = 16  # of a cell: two counts, and what questions make of them
 _MARGIN = 3  # empty cells around the image
 _ROWS = 1 << 20  # triangles a task may have to judge
 _POINTS = 1 << 14
@@ -101,8 +104,13 @@ class Image:
         """Cover counts and degrees at the cell centers, exactly; both of the lattice's shape.
 
         Counts may be below zero where a fold is rough.
+
+        Raises:
+            InvalidInput: The lattice has more cells than fit into memory.
         """
         shape = self.lattice.shape
+        cells = math.prod(shape)
+        check_memory("cells of the lattice", f"{cells:,}", _BYTES * cells)
         counts, degrees = np.zeros((2, shape[0] * shape[1], shape[2]), np.int32)
         raster.add_counts(self._crossings(2), counts, degrees)
         return counts.reshape(shape), degrees.reshape(shape)

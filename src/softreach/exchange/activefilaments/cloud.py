@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 
 _SAME = 1e-5  # of L; their fixed 100 steps of order five err by less
 _BLOCK = 1 << 16
+_BYTES = 20  # of a number in text
 _ENDING = "_gamma"
 _NO_NUMBER = re.compile(r"could not convert string (.*) to float64 at row (\d+), column (\d+)")
 
@@ -105,7 +106,8 @@ def write_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool
     """
     filament = filament_of(design_of(schema.check_cloud(cloud)))
     kind = CLOUD_PAIR[".csv"]
-    check_place(path, kind, overwrite=overwrite)
+    takes = _BYTES * (cloud["tip"].size + cloud["activation"].size)
+    check_place(path, kind, takes=takes, overwrite=overwrite)
     with writing(gamma_path(path), kind, overwrite=overwrite) as file:
         _write(file, cloud["activation"].values, filament)
     with writing(path, kind, overwrite=overwrite) as file:

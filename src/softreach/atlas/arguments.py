@@ -1,0 +1,105 @@
+"""What the functions of an atlas are given: converters for `softreach.arguments.checked`."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from softreach.arguments import as_given, as_number, path, plain
+from softreach.arrays import as_floats
+from softreach.errors import InvalidInput
+
+__all__ = ["a_store", "an_atlas", "an_interval", "column", "shard_of"]
+
+_PLACE = "a path, a URL or a Zarr store"
+
+
+def a_store(name: str, value: object) -> Any:
+    """A place where an atlas may be.
+
+    Raises:
+        InvalidInput: Neither text nor a path nor a Zarr store.
+    """
+    if isinstance(value, str | os.PathLike):
+        return path(name, value)
+    if any(isinstance(value, kind) for kind in _zarr_stores()):
+        return value
+    if isinstance(value, dict) and all(hasattr(one, "to_bytes") for one in value.values()):
+        return value  # a store in memory
+    raise InvalidInput(name, as_given(value), _PLACE)
+
+
+def _zarr_stores() -> Iterator[Any]:
+    """Zarr's classes of stores, if it is imported: who has a store has imported it."""
+    for module, name in (("zarr.abc.store", "Store"), ("zarr.storage", "StorePath")):
+        if module in sys.modules:
+            yield getattr(sys.modules[module], name)
+
+
+def an_atlas(name: str, value: Any) -> Any:
+    """A store, or a dataset from `open_atlas` or a part of one.
+
+    Raises:
+        InvalidInput: Anything else.
+    """
+    allowed = "a store, or a dataset from open_atlas"
+    xarray = sys.modules.get("xarray")
+    if xarray is not None and isinstance(value, xarray.Dataset):
+        if "command" in value.attrs and "status" in value:
+            return value
+        raise InvalidInput(name, "another Dataset", allowed)
+    try:
+        return a_store(name, value)
+    except InvalidInput:
+        raise InvalidInput(name, as_given(value), allowed) from None
+
+
+def column(name: str, values: ArrayLike) -> tuple[float, ...]:
+    """Values of a parameter; whole numbers stay whole.
+
+    Raises:
+        InvalidInput: No numbers.
+    """
+    floats = as_floats(name, values, "one finite value or more")
+    if floats.ndim > 1:
+        raise InvalidInput(f"{name}.shape", floats.shape, "of one dimension")
+    given = np.asarray(values)
+    return tuple(np.atleast_1d(given if given.dtype.kind in "iu" else floats).tolist())
+
+
+def shard_of(name: str, value: object) -> tuple[int, int]:
+    """Part i of k.
+
+    Raises:
+        InvalidInput: Anything but two whole numbers, 0 <= i < k.
+    """
+    if isinstance(value, tuple | list) and len(value) == 2:
+        first, count = map(plain, value)
+        if {type(first), type(count)} == {int} and 0 <= first < count:
+            return first, count
+        raise InvalidInput(name, "/".join(map(str, (first, count))), "i/k with 0 <= i < k")
+    raise InvalidInput(name, as_given(value), "(i, k) with 0 <= i < k")
+
+
+def an_interval(name: str, value: object) -> tuple[float, float]:
+    """The lowest and the highest number allowed; None leaves an end open.
+
+    Raises:
+        InvalidInput: Anything else.
+    """
+    if isinstance(value, tuple | list) and len(value) == 2:
+        ends = zip(value, (-math.inf, math.inf), strict=True)
+        low, high = (open_end if end is None else _limit(name, end) for end, open_end in ends)
+        return low, high
+    raise InvalidInput(name, as_given(value), "(lowest, highest), of which one may be None")
+
+
+def _limit(name: str, value: object) -> float:
+    found = plain(value)
+    return found if found in (math.inf, -math.inf) else as_number(name, found)

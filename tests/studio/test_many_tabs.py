@@ -1,0 +1,180 @@
+"""Many tabs, tabs that are shaken, and tabs that are gone: without a browser, as sockets."""
+
+from __future__ import annotations
+
+import gc
+import threading
+import time
+import warnings
+import weakref
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+
+import pytest
+
+import softreach.studio.app
+import softreach.studio.stages as stages
+from softreach.arm.parameters import changed
+from softreach.studio import Studio
+from softreach.studio.session import Session
+
+pytestmark = pytest.mark.slow
+
+PATIENCE = 60.0  # [s] on a loaded machine
+
+
+def until(condition: Callable[[], object]) -> None:
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+@contextmanager
+def connected(studio: Studio) -> Iterator[None]:
+    """What a tab is to the server: a socket that reads all it is sent and has told its camera."""
+    import msgspec
+    import viser
+    from websockets.exceptions import ConnectionClosed
+    from websockets.sync.client import connect
+
+    camera = {
+        "type": "ViewerCameraMessage",
+        "wxyz": (1.0, 0.0, 0.0, 0.0),
+        "position": (2.0, -4.0, 1.0),
+        "fov": 0.8,
+        "near": 0.1,
+        "far": 100.0,
+        "image_height": 500,
+        "image_width": 800,
+        "look_at": (0.0, 0.0, 0.3),
+        "up_direction": (0.0, 0.0, 1.0),
+    }
+    address = studio.url.replace("http", "ws", 1)
+    version = [f"viser-v{viser.__version__}"]
+    with connect(address, subprotocols=version, max_size=None) as socket:
+
+        def read() -> None:
+            with suppress(ConnectionClosed):
+                for _ in socket:
+                    pass
+
+        reader = threading.Thread(target=read, daemon=True)
+        reader.start()
+        socket.send(msgspec.msgpack.encode(camera))
+        yield
+    reader.join(PATIENCE)
+
+
+@contextmanager
+def page(studio: Studio) -> Iterator[Session]:
+    """A tab that shows what it has to."""
+    known = set(studio.sessions)
+    with connected(studio):
+        until(lambda: set(studio.sessions) - known)
+        session = studio.sessions[max(studio.sessions)]
+        until(lambda: session.panels and session.reach is not None and not session.busy)
+        yield session
+
+
+def shake(session: Session, times: int, pause: float = 0.0) -> None:
+    """Move the sliders of a design and of its activation."""
+    for k in range(times):
+        taper = 0.01 + 0.02 * (k % 17) / 17
+        session.update(
+            lambda s, taper=taper: s.replace(design=changed(s.design, {"taper": taper})),
+            by_widget=True,
+        )
+        time.sleep(pause)
+
+
+def test_of_ten_tabs_that_were_closed_nothing_stays(studio):
+    with page(studio):
+        pass  # what is made once
+    until(lambda: not studio.sessions)
+    before = threading.active_count()
+    gone = []
+    for _ in range(10):
+        with page(studio) as session:
+            gone.append(weakref.ref(session.reach.cloud))
+            del session
+    until(lambda: not studio.sessions)
+    until(lambda: threading.active_count() <= before)
+
+    def clouds() -> int:
+        gc.collect()
+        return len({id(one()) for one in gone if one() is not None})
+
+    until(lambda: clouds() <= 1)  # the one that all tabs begin with
+
+
+def test_a_shaken_tab_computes_the_last_place_of_its_sliders_and_no_other_in_full(
+    studio, monkeypatch
+):
+    computed = []
+    plain = stages.compute_cloud
+    monkeypatch.setattr(
+        stages, "compute_cloud", lambda *a, **o: computed.append(a[0]) or plain(*a, **o)
+    )
+    with page(studio) as session:
+        computed.clear()
+        threads = threading.active_count()
+        shake(session, 100, 0.01)
+        assert session.settle(PATIENCE)
+        assert session.reach is not None
+        assert session.reach.arm == session.state.design
+        assert computed[-1] == session.state.design
+        assert len(computed) < 120  # each in two or three stages, of which the later are dropped
+        assert len(session.history.past) < 50
+        until(lambda: threading.active_count() <= threads)
+
+
+def test_a_tab_that_is_shaken_lets_another_have_its_turn(studio):
+    """The other settles while the first is still shaken."""
+    with page(studio) as shaken, page(studio) as calm:
+        stop = threading.Event()
+
+        def go_on() -> None:
+            while not stop.is_set():
+                shake(shaken, 1, 0.02)
+
+        shaking = threading.Thread(target=go_on)
+        shaking.start()
+        try:
+            calm.update(lambda s: s.replace(design=changed(s.design, {"taper": 0.021})))
+            assert calm.settle(PATIENCE)
+            assert calm.reach is not None
+            assert calm.reach.arm == calm.state.design
+        finally:
+            stop.set()
+            shaking.join(PATIENCE)
+        assert shaken.settle(PATIENCE)
+
+
+def test_a_tab_that_is_closed_before_it_is_furnished_leaves_no_session(studio, monkeypatch):
+    go, furnish = threading.Event(), softreach.studio.app._furnish
+    entered = threading.Event()
+
+    def waits(*given):
+        entered.set()
+        assert go.wait(PATIENCE)
+        furnish(*given)
+
+    monkeypatch.setattr(softreach.studio.app, "_furnish", waits)
+    with connected(studio):
+        assert entered.wait(PATIENCE)
+    until(lambda: not studio.server.get_clients())
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # viser's, of messages to a page that is gone
+        go.set()
+        until(lambda: not studio.sessions)
+
+
+def test_a_tab_that_is_closed_while_it_is_shaken_leaves_no_work(studio):
+    with page(studio) as session:
+        shake(session, 20)
+    until(lambda: not studio.sessions)
+    assert session.settle(PATIENCE)
+    assert session.reach is None
+    shake(session, 5)  # what a widget still had to say
+    assert not session.busy
