@@ -58,6 +58,7 @@ class Scene:
         self.box = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
         """Lowest and highest corner around everything [L]."""
         self._eye: Array = np.array([50.0, -80.0, 30.0])
+        self._focal = np.inf
         self.spine: tuple[Array, Array] = np.empty((0, 3)), np.empty(0)
         """Centers and radii along the arm [L], as it is drawn."""
         self._arms: dict[str, tuple[Manipulator, list[Any]]] = {}
@@ -142,16 +143,17 @@ class Scene:
         self.box = round_box(*around, np.array([[0, 0, 0], [0, 0, 1.0]]))
         self.remove("/axes")
         if look.axes:
-            self._draw_box(axes_box(*self._corners, eye=self._eye))
+            self._draw_box(axes_box(*self._corners, eye=self._eye, focal=self._focal))
 
-    def turn_axes(self, eye: Array) -> None:
-        """Number the edges that are the outer ones from where the eye is [L]."""
-        before, self._eye = self._eye, eye
-        if seen_from(eye, *self.box) == seen_from(before, *self.box):
+    def turn_axes(self, eye: Array, focal: float = np.inf) -> None:
+        """Number the edges that are the outer ones for an eye [L] of a focal length [pixel]."""
+        before = seen_from(self._eye, *self.box, self._focal)
+        self._eye, self._focal = eye, focal
+        if seen_from(eye, *self.box, focal) == before:
             return
         if self._api.get_handle_by_name("/axes/lines") is not None:
             self.remove("/axes")
-            self._draw_box(axes_box(*self._corners, eye=eye))
+            self._draw_box(axes_box(*self._corners, eye=eye, focal=focal))
 
     @property
     def _corners(self) -> tuple[Array, Array]:

@@ -32,12 +32,13 @@ class FollowEye(Job):
         time.sleep(_PAUSE)
         session = self.session
         session.eye.project(orthographic=session.state.appearance.orthographic)
+        session.eye.keep_width()
         session.eye.focus()
         with session.drawing, session.client.atomic():
             sight = self._sight()
             most = _DRAGGED if session.is_dragged else None
             session.scene.clouds.look(sight, session.state.appearance.cut, most)
-            session.scene.turn_axes(sight.eye)
+            session.scene.turn_axes(sight.eye, session.eye.focal)
 
     def _sight(self) -> Sight:
         session, state = self.session, self.session.state
