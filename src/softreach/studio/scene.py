@@ -39,6 +39,7 @@ Color = tuple[int, int, int]
 _STATIONS, _SIDES, _ACROSS = 51, 24, np.pi / 12
 _LIFT = 0.02  # of the fibers above the body, in R2
 _CLEAR = 0.45  # opacity of a body that has something inside
+_HIDING = 0.6  # opacity of an arm that is in front of its own tip
 _GHOST, _REFERENCE, _SURFACE, _HULL = 0.35, (150, 150, 158), (90, 140, 200), (220, 150, 60)
 _MARK: Color = (235, 90, 0)
 _ASKED: Color = (240, 175, 205)  # of a path, where the arm does not follow it
@@ -111,8 +112,7 @@ class Scene:
         else:
             self.remove(path)
             ghost = path.startswith("/ghosts")
-            body = _CLEAR if any(inside(arm)) else None
-            opacity = [_GHOST] * len(meshes) if ghost else [body] + [None] * (len(meshes) - 1)
+            opacity = [_GHOST] * len(meshes) if ghost else _opacities(arm, len(meshes))
             self._arms[path] = (
                 arm,
                 [
@@ -121,6 +121,15 @@ class Scene:
                 ],
             )
         return shape["position"].values[-1] / arm.length
+
+    def see_through_arm(self, clear: bool) -> None:
+        """Let what is behind the arm be seen through it, or not."""
+        arm, handles = self._arms.get("/arm", (None, []))
+        usual = _opacities(arm, len(handles)) if arm is not None else []
+        for handle, opacity in zip(handles, usual, strict=True):
+            wanted = _HIDING if clear else opacity
+            if handle.opacity != wanted:
+                handle.opacity = wanted
 
     def draw_ghosts(self, arm: Manipulator, activations: Array) -> None:
         """Many shapes at once, transparent."""
@@ -322,6 +331,11 @@ def _arm_meshes(arm: Manipulator, shape: Any) -> list[tuple[Array, NDArray[Any],
     for k, skin in enumerate(bundle_skins(arm, shape, lift=_LIFT, step=_ACROSS)):
         meshes.append((skin.vertices / arm.length, skin.faces, _rgb(bundle_color(k))))
     return meshes
+
+
+def _opacities(arm: Manipulator, meshes: int) -> list[float | None]:
+    """Of the body and of every bundle."""
+    return [_CLEAR if any(inside(arm)) else None, *[None] * (meshes - 1)]
 
 
 def _rgb(color: Sequence[float]) -> Color:
