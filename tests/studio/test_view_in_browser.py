@@ -206,7 +206,7 @@ def test_tabs_stand_in_one_line_and_the_arm_is_in_sight(browser, width, height):
 
 def test_numbers_are_dark_on_light_and_light_on_dark(tab):
     show(tab, cloud=False, arm=False, handle=False)
-    name = next(one for k in range(60) if (one := tab.drawn(f"/axes/label {k}")).text == "z / L")
+    name = next(one for k in range(60) if (one := tab.drawn(f"/axes/label {k}")).text == "x / L")
     right, down = tab.projected(name.position)
 
     def around() -> np.ndarray:

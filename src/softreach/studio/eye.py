@@ -31,6 +31,7 @@ _STEP_BACK = 1.4  # times the distance, for two clouds side by side
 _AWAY = 40.0  # times the distance from which parallels stay parallel, to 1 %
 _PATIENCE = 30.0  # [s] for a picture
 _UPRIGHT = 0.6  # aspect below which a window is that of a phone
+_NARROWEST = 0.3  # aspect of a window to be looked at
 _ROOM = 1.12  # times what would just fill the picture
 
 
@@ -90,6 +91,7 @@ class Eye:
         self._client = client
         self._orthographic = False
         self._aspect: float | None = None
+        self._latest: float | None = None
 
     def on_move(self, moved: Callable[[], None]) -> None:
         """Call this whenever the eye has moved."""
@@ -149,15 +151,25 @@ class Eye:
             if not 0.7 < shown.far / found.far < 1.4:
                 shown.near, shown.far = found.near, found.far
 
-    def keep_width(self) -> None:
-        """Step back as the picture gets narrower, and forth again: what was in sight stays so."""
-        before, now = self._aspect, self.aspect
-        self._aspect = now
-        if before is not None and (stretch := _half_sine(before) / _half_sine(now)) != 1.0:
+    def keep_width(self) -> bool:
+        """Step back as the picture gets narrower, and forth again: what was in sight stays so.
+
+        Returns:
+            Whether the window is changing, so that one has to look again: a layout passes through
+            widths that are gone before the page has heard of a step.
+        """
+        now = max(_NARROWEST, self.aspect)
+        rests, self._latest = now == self._latest, now
+        if not rests:
+            return True
+        before, self._aspect = self._aspect or now, now
+        if before != now:
             camera = self.camera()
+            stretch = _half_sine(before) / _half_sine(now)
             offset = stretch * np.subtract(camera.position, camera.look_at)
             position = vector(camera.look_at + offset)
             self.look_from(Camera(position=position, look_at=camera.look_at))
+        return False
 
     def picture(self) -> NDArray[np.uint8]:
         """What it sees now, RGBA on a transparent ground, shape (height, width, 4).

@@ -35,7 +35,8 @@ class FollowEye(Job):
         time.sleep(_PAUSE)
         session = self.session
         session.eye.project(orthographic=session.state.appearance.orthographic)
-        session.eye.keep_width()
+        if session.eye.keep_width():
+            session.look_again()
         session.eye.focus()
         with session.drawing, session.client.atomic():
             sight = self._sight()
