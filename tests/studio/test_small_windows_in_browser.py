@@ -151,3 +151,23 @@ def test_numbers_at_the_axes_stay_in_sight_when_plots_stand_beside_the_scene(ope
         lambda: np.allclose(tab.session.eye.camera().position, before.position, rtol=1e-2),
         "the eye steps forth again",
     )
+
+
+def test_the_arm_stays_in_sight_in_a_window_that_gets_narrow_and_wide_again(opened):
+    tab = opened("laptop")
+    tab.session.look_from("oblique")
+    tab.settle()
+    before = tab.session.eye.camera()
+    distance = np.linalg.norm(np.subtract(before.position, before.look_at))
+    tab.page.set_viewport_size({"width": 390, "height": 844})
+    tab.wait(lambda: tab.session.eye.aspect < 0.5, "the window is narrow")
+
+    def stretch() -> float:
+        now = tab.session.eye.camera()
+        return float(np.linalg.norm(np.subtract(now.position, now.look_at)) / distance)
+
+    tab.wait(lambda: 1.5 < stretch() < 3.0, "the eye steps back")
+    right = in_canvas(tab, [(0, 0, 0), (0, 0, 1.0)])[:, 0]
+    assert ((right > 0) & (right < 390)).all()
+    tab.page.set_viewport_size({"width": 1366, "height": 768})
+    tab.wait(lambda: 0.98 < stretch() < 1.02, "the eye steps forth")

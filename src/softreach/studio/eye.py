@@ -31,7 +31,7 @@ _STEP_BACK = 1.4  # times the distance, for two clouds side by side
 _AWAY = 40.0  # times the distance from which parallels stay parallel, to 1 %
 _PATIENCE = 30.0  # [s] for a picture
 _UPRIGHT = 0.6  # aspect below which a window is that of a phone
-_NARROWEST = 0.3  # aspect of a window to be looked at
+_NARROWEST = 0.3  # aspect below which a page is only being laid out
 _ROOM = 1.12  # times what would just fill the picture
 
 
@@ -158,7 +158,9 @@ class Eye:
             Whether the window is changing, so that one has to look again: a layout passes through
             widths that are gone before the page has heard of a step.
         """
-        now = max(_NARROWEST, self.aspect)
+        now = self.aspect
+        if now < _NARROWEST:
+            return False
         rests, self._latest = now == self._latest, now
         if not rests:
             return True
