@@ -165,9 +165,8 @@ class Eye:
         if not rests:
             return True
         before, self._aspect = self._aspect or now, now
-        if before != now:
+        if (stretch := _half_sine(before) / _half_sine(now)) != 1.0:
             camera = self.camera()
-            stretch = _half_sine(before) / _half_sine(now)
             offset = stretch * np.subtract(camera.position, camera.look_at)
             position = vector(camera.look_at + offset)
             self.look_from(Camera(position=position, look_at=camera.look_at))
