@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import pytest
 
@@ -43,10 +45,21 @@ def drag_tip(tab, begin, end, steps=12):
         tab.page.wait_for_timeout(30)
 
 
+def around(tab, point):
+    """What the page shows where a point of the scene [L] is, RGB from 0 to 1."""
+    from matplotlib.image import imread
+
+    x, y = screen(tab, point)
+    clip = {"x": x - 4, "y": y - 4, "width": 8, "height": 8}
+    return imread(io.BytesIO(tab.page.screenshot(clip=clip)))[..., :3]
+
+
 def tip_of(tab):
     return sr.tip_positions(tab.session.state.design, [tab.session.state.activation])[0]
 
 
+FOLDED = (-0.48, -0.16, -1.23)
+"""The oblique eye sees the tip behind the body."""
 START = (-0.7, -0.4, -0.9)
 
 
@@ -117,6 +130,45 @@ def test_the_arm_comes_back_from_the_boundary_on_its_branch(inverse_tab):
     tab.wait(lambda: tab.session.state.target is not None, "the drag rests")
     tab.settle()
     np.testing.assert_allclose(tab.session.state.activation, START, atol=0.02)
+
+
+def test_a_handle_behind_the_arm_is_seen_through_it_and_can_be_grabbed(inverse_tab):
+    tab = inverse_tab
+    tab.session.look_from("oblique")
+    pose(tab, START)
+    tab.wait(lambda: tab.drawn("/arm/0").opacity is None, "an arm beside its tip is solid")
+    begin = pose(tab, FOLDED)
+    tab.wait(lambda: tab.drawn("/arm/0").opacity == 0.6, "an arm before its tip is not")
+    tab.wait(
+        lambda: around(tab, begin).min() < 0.55, "the ball is seen"
+    )  # the body is nearly white
+    drag_tip(tab, begin, begin + [0.0, 0.0, 0.02])
+    tab.wait(lambda: tab.session.tip_pull, "the arm follows")
+    tab.page.mouse.up()
+    tab.wait(lambda: tab.session.state.target is not None, "the drag rests")
+    tab.settle()
+
+
+def test_the_handle_is_dark_on_a_light_page_and_light_on_a_dark_one(inverse_tab):
+    tab = inverse_tab
+    begin = pose(tab, START)
+    tab.wait(lambda: around(tab, begin).max() < 0.4, "it is dark")
+    tab.session.update(lambda s: s.showing(dark=True))
+    tab.wait(lambda: around(tab, begin)[..., 0].min() > 0.4, "it is light")
+    tab.session.update(lambda s: s.showing(dark=False))
+    tab.wait(lambda: around(tab, begin).max() < 0.4, "it is dark again")
+
+
+def test_the_cloud_is_whole_again_after_a_drag_that_ends_outside_of_the_window(inverse_tab):
+    tab = inverse_tab
+    begin = pose(tab, START)
+    drag_tip(tab, begin, begin + [0.0, 0.0, 0.1])
+    tab.wait(lambda: len(tab.drawn("/cloud").points) <= 1 << 13, "the cloud is thin")
+    tab.page.mouse.move(screen(tab, begin)[0], -40, steps=4)
+    tab.page.mouse.up()
+    tab.wait(lambda: not tab.session.is_dragged, "the drag rests")
+    tab.wait(lambda: len(tab.drawn("/cloud").points) > 1 << 13, "the cloud is whole")
+    assert tab.session.state.target is not None
 
 
 def test_a_click_on_the_cloud_sets_a_target_only_where_the_tab_says_so(inverse_tab):

@@ -9,10 +9,11 @@ from softreach.arm import designs
 from softreach.cloud import compute_cloud
 from softreach.plot.coloring import ScalarKey
 from softreach.rod.kinematics import tip_positions
-from softreach.studio.axes import axes_box
+from softreach.studio.axes import axes_box, seen_from
 from softreach.studio.colors import color_names, key_html, manipulability, sample_colors
 from softreach.studio.picking import picked_point, plane_crossing
 from softreach.studio.reach import Quality, Reach, shown_samples
+from softreach.studio.sight import is_behind
 from softreach.studio.slicing import in_slice, sliced_faces
 from softreach.studio.stages import reached, stages
 from softreach.studio.state import Slice
@@ -131,3 +132,27 @@ def test_the_volume_of_the_alpha_shape_is_known_once_it_is_there(trunk):
     assert fine.alpha_volume is None
     assert len(fine.alpha_shape.faces)
     assert fine.alpha_volume == pytest.approx(fine.volume, rel=0.2)
+
+
+def test_a_ball_hides_what_is_behind_it_and_nothing_that_it_touches():
+    eye, balls, radii = np.zeros(3), np.array([[0, 0, 2.0], [0, 0, -2.0]]), np.array([0.1, 0.1])
+    assert is_behind(np.array([0, 0, 3.0]), eye, balls, radii)
+    assert is_behind(np.array([0, 0.09, 3.0]), eye, balls, radii)
+    assert not is_behind(np.array([0, 0.2, 3.0]), eye, balls, radii)
+    assert not is_behind(np.array([0, 0, 2.1]), eye, balls, radii)
+    assert not is_behind(np.array([0, 0, 1.0]), eye, balls, radii)
+
+
+@pytest.mark.parametrize("eye", [(2.1, -3.85, 1.45), (-3, 3, 1), (3, 2, -2), (1.5, -5, 0.9)])
+def test_numbers_of_an_edge_keep_their_distance_in_a_small_picture(eye):
+    low, high = np.full(3, -0.6), np.array([0.6, 0.6, 1.0])
+    wide = seen_from(eye, low, high)
+    for focal in (300.0, 600.0, 1200.0):
+        small = seen_from(eye, low, high, focal)
+        assert small.edges == wide.edges
+        for usual, step in zip(wide.steps, small.steps, strict=True):
+            assert step >= usual
+            digit = step / 10 ** np.floor(np.log10(step) + 1e-9)
+            assert np.isclose(digit, (1, 2, 5)).any()
+    far = np.asarray(eye) * 20
+    assert min(seen_from(far, low, high, 300.0).steps) > max(wide.steps)

@@ -49,6 +49,24 @@ def test_the_section_follows_the_slice_and_the_design(tab):
     tab.page.get_by_text(f"{changed:.4f} L²").wait_for()
 
 
+def test_the_section_is_drawn_for_a_dark_page_too(tab):
+    tab.session.update(lambda s: s.showing(slice=Slice(), plots=PlotView(section=True)))
+    tab.settle()
+    light = tab.session.figures.section.image
+    tab.session.update(lambda s: s.showing(dark=True))
+    tab.settle()
+    dark = tab.session.figures.section.image
+    assert np.median(light) > 200
+    assert (light.min(axis=-1) < 60).any()
+    assert dark[0].max() < 60
+    assert not (dark == 255).all(axis=-1).any()
+    shown = tab.page.locator("img:visible").first
+    wide = dark.shape[1]
+    tab.wait(lambda: shown.evaluate("image => image.naturalWidth") == wide, "it is shown")
+    tab.session.update(lambda s: s.showing(dark=False, plots=PlotView()))
+    tab.settle()
+
+
 def test_beside_the_set_nothing_is_reached(tab):
     cut = Slice(axis="x", center=1.4, thickness=0.1)
     tab.session.update(lambda s: s.showing(slice=cut, plots=PlotView(section=True)))

@@ -202,3 +202,23 @@ def test_tabs_stand_in_one_line_and_the_arm_is_in_sight(browser, width, height):
             assert 0 < right < 1
             assert 0 < canvas["y"] + down * canvas["height"] < sheet
         tab.close()
+
+
+def test_numbers_are_dark_on_light_and_light_on_dark(tab):
+    show(tab, cloud=False, arm=False, handle=False)
+    name = next(one for k in range(60) if (one := tab.drawn(f"/axes/label {k}")).text == "x / L")
+    right, down = tab.projected(name.position)
+
+    def around() -> np.ndarray:
+        image = pixels(tab)
+        row, column = round(down * len(image)), round(right * image.shape[1])
+        return image[row - 6 : row + 6, column - 10 : column + 10].mean(axis=-1)
+
+    tab.wait(lambda: around().min() < 0.4, "there is text")
+    assert np.median(around()) > 0.9
+    show(tab, dark=True)
+    tab.wait(lambda: np.median(around()) < 0.2, "it gets dark")
+    tab.wait(lambda: around().max() > 0.5, "the text gets light")
+    show(tab, dark=False)
+    tab.wait(lambda: np.median(around()) > 0.9, "it gets light")
+    assert not tab.errors

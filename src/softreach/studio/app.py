@@ -7,9 +7,13 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
+import numpy as np
+
 from softreach.studio.addresses import LOOPBACK, page_address, reachable_hosts
+from softreach.studio.axes import round_box
 from softreach.studio.compiling import CompilationWatch
 from softreach.studio.connections import asked_path, close_all
+from softreach.studio.eye import framing
 from softreach.studio.history import History
 from softreach.studio.kept_work import KeptWork
 from softreach.studio.link import state_in_request
@@ -134,8 +138,8 @@ class Studio:
             session.take_up(*left)
         _furnish(session, page_url(self.server))
         session.begin()
-        if session.eye.is_upright and session.board is None:
-            session.look_from("oblique")
+        if session.eye.is_upright:
+            _look_at_all(session)
         if self.work is not None and self.work.complaint:
             session.say(self.work.complaint)
         elif left is not None and not left[1].past:
@@ -179,6 +183,16 @@ class Studio:
 def _ignored(error: Exception) -> None:
     """A tab that is told may be gone."""
     del error
+
+
+def _look_at_all(session: Session) -> None:
+    """See arm and map in the upper half of a phone."""
+    if session.board is None:
+        session.look_from("oblique")
+        return
+    low, high = round_box(np.vstack([*session.scene.box, session.board.corners]))
+    toward = np.subtract(_EYE_ON_MAP.position, _EYE_ON_MAP.look_at)
+    session.eye.look_from(framing(low, high, toward, session.eye.aspect))
 
 
 def _furnish(session: Session, url: str) -> None:

@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 
 _TICK = 0.02  # length of a tick, of the largest side
 _MOST = 8  # ticks along the longest edge
+_WIDE, _HIGH = 32.0, 16.0  # pixels from one number to the next, beside or above each other
 _END_ON = 0.97  # cosine of the angle to an axis below which its numbers would hide each other
 _FLAT = 0.25  # of its length, that a tick along the floor has at least in the picture
 
@@ -33,6 +34,8 @@ class Side(NamedTuple):
     """Which of the faces across x, y and z is seen from outside: 1 the high one, -1 the low one."""
     edges: tuple[Edge | None, Edge | None, Edge | None]
     """With the numbers of x, y and z; None of an axis that is seen end on."""
+    steps: tuple[float, float, float]
+    """From one number to the next [L]."""
 
 
 class AxesBox(NamedTuple):
@@ -44,15 +47,47 @@ class AxesBox(NamedTuple):
     """Text and where it stands."""
 
 
-def seen_from(eye: ArrayLike, low: Array, high: Array) -> Side:
-    """The side of a box that an eye sees [L]."""
+def seen_from(eye: ArrayLike, low: Array, high: Array, focal: float = np.inf) -> Side:
+    """The side of a box that an eye sees.
+
+    Args:
+        eye: Where it is [L].
+        low: Lowest corner of the box [L].
+        high: Highest [L].
+        focal: Focal length of the eye [pixel]: numbers have room between each other.
+    """
     place = np.asarray(eye, float)
     x, y, z = ((place > high).astype(int) - (place < low)).tolist()
     toward = place - (low + high) / 2
     toward /= max(float(np.linalg.norm(toward)), 1e-12)
     picture = _picture(toward)
     edges = [_outer_edge(axis, (x, y, z), toward, picture) for axis in range(3)]
-    return Side((x, y, z), (edges[0], edges[1], edges[2]))
+    usual = _round_step(float((high - low).max()))
+    steps = [usual] * 3
+    for axis, edge in enumerate(edges):
+        if edge is not None:
+            ends = np.tile(np.where(edge.high, high, low), (2, 1))
+            ends[:, axis] = low[axis], high[axis]
+            seen = _seen(ends - place, toward, picture) / (high - low)[axis]
+            steps[axis] = max(usual, _round_up(_room(seen, focal)))
+    return Side((x, y, z), (edges[0], edges[1], edges[2]), (steps[0], steps[1], steps[2]))
+
+
+def _seen(ends: Array, toward: Array, picture: Array) -> Array:
+    """How far from each other two points are to the right and up, in focal lengths, shape (2,)."""
+    depth = np.maximum(-ends @ toward, 1e-3)
+    first, last = ends @ picture.T / depth[:, None]
+    return np.abs(last - first)
+
+
+def _room(seen: Array, focal: float) -> float:
+    """The least step of numbers [L] that neither touch beside nor above each other.
+
+    Args:
+        seen: How far 1 L leads to the right and up, in focal lengths, shape (2,).
+        focal: Focal length [pixel].
+    """
+    return float((np.array([_WIDE, _HIGH]) / ((seen + 1e-9) * focal)).min())
 
 
 def _picture(toward: Array) -> Array:
@@ -83,15 +118,18 @@ def _outer_edge(
     return Edge((high[0], high[1], high[2]), b if first else c)
 
 
-def axes_box(*points: Array, eye: ArrayLike = (50.0, -80.0, 30.0)) -> AxesBox:
+def axes_box(
+    *points: Array, eye: ArrayLike = (50.0, -80.0, 30.0), focal: float = np.inf
+) -> AxesBox:
     """The box around points, shapes (n, 3), without the edges that would run across them.
 
     Args:
         points: What is in the box [L].
         eye: From where it is seen [L].
+        focal: As `seen_from` takes it.
     """
     low, high = round_box(*points)
-    side, step = seen_from(eye, low, high), _round_step(float((high - low).max()))
+    side = seen_from(eye, low, high, focal)
     lines, labels = [*_edges(low, high, side)], []
     size = _TICK * float((high - low).max())
     for axis, edge in enumerate(side.edges):
@@ -99,7 +137,7 @@ def axes_box(*points: Array, eye: ArrayLike = (50.0, -80.0, 30.0)) -> AxesBox:
             continue
         corner, away = np.where(edge.high, high, low), np.zeros(3)
         away[edge.outward] = size if edge.high[edge.outward] else -size
-        for value in _ticks(low[axis], high[axis], step):
+        for value in _ticks(low[axis], high[axis], side.steps[axis]):
             at = np.where(np.arange(3) == axis, value, corner)
             lines.append(np.stack([at, at + away]))
             labels.append((_number(value), at + 2.5 * away))
@@ -128,8 +166,15 @@ def round_box(*points: Array) -> tuple[Array, Array]:
 
 def _round_step(span: float) -> float:
     """A round number of which few fit into the span."""
-    power = 10.0 ** np.floor(np.log10(max(span, 1e-9) / _MOST))
-    return float(next(f * power for f in (1, 2, 5, 10) if span / (f * power) <= _MOST))
+    return _round_up(max(span, 1e-9) / _MOST)
+
+
+def _round_up(value: float) -> float:
+    """The next round number; 0 stays 0."""
+    if value == 0.0:
+        return 0.0
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(next(f * power for f in (1, 2, 5, 10) if value <= f * power))
 
 
 def _edges(low: Array, high: Array, side: Side) -> list[Array]:

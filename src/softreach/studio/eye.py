@@ -30,7 +30,8 @@ VIEWS: dict[str, Array] = {
 _STEP_BACK = 1.4  # times the distance, for two clouds side by side
 _AWAY = 40.0  # times the distance from which parallels stay parallel, to 1 %
 _PATIENCE = 30.0  # [s] for a picture
-_UPRIGHT = 0.75  # aspect below which a window is that of a phone
+_UPRIGHT = 0.6  # aspect below which a window is that of a phone
+_NARROWEST = 0.3  # aspect below which a page is only being laid out
 _ROOM = 1.12  # times what would just fill the picture
 
 
@@ -69,13 +70,17 @@ def framing(low: Array, high: Array, direction: Array, aspect: float) -> Camera:
         aspect: Width of the picture over its height.
     """
     middle, radius = (low + high) / 2, _ROOM * float(np.linalg.norm(high - low)) / 2
-    half = np.arctan(np.tan(FOV / 2) * min(1.0, aspect))
-    distance = radius / np.sin(half)
+    distance = radius / _half_sine(aspect)
     toward = direction / np.linalg.norm(direction)
     if aspect < _UPRIGHT:  # the sheet of a phone covers the lower half
         up = np.cross(toward, (-toward[1], toward[0], 0.0))
         middle = middle - 0.45 * distance * np.tan(FOV / 2) * up / np.linalg.norm(up)
     return Camera(position=vector(middle + distance * toward), look_at=vector(middle))
+
+
+def _half_sine(aspect: float) -> float:
+    """Sine of half of the smaller angle of a picture."""
+    return float(np.sin(np.arctan(np.tan(FOV / 2) * min(1.0, aspect))))
 
 
 class Eye:
@@ -85,6 +90,8 @@ class Eye:
         """Follow the camera of a client."""
         self._client = client
         self._orthographic = False
+        self._aspect: float | None = None
+        self._latest: float | None = None
 
     def on_move(self, moved: Callable[[], None]) -> None:
         """Call this whenever the eye has moved."""
@@ -104,6 +111,12 @@ class Eye:
     def narrowness(self) -> float:
         """How much smaller angles are than through the usual lens [-]."""
         return float(np.tan(self._client.camera.fov / 2) / np.tan(FOV / 2))
+
+    @property
+    def focal(self) -> float:
+        """Focal length [pixel]: what is as far away as it is long is so long in the picture."""
+        camera = self._client.camera
+        return camera.image_height / (2 * float(np.tan(camera.fov / 2)))
 
     def place(self) -> Camera:
         """Where it really is; with an orthographic lens far away."""
@@ -137,6 +150,27 @@ class Eye:
             shown = self._client.camera
             if not 0.7 < shown.far / found.far < 1.4:
                 shown.near, shown.far = found.near, found.far
+
+    def keep_width(self) -> bool:
+        """Step back as the picture gets narrower, and forth again: what was in sight stays so.
+
+        Returns:
+            Whether the window is changing, so that one has to look again: a layout passes through
+            widths that are gone before the page has heard of a step.
+        """
+        now = self.aspect
+        if now < _NARROWEST:
+            return False
+        rests, self._latest = now == self._latest, now
+        if not rests:
+            return True
+        before, self._aspect = self._aspect or now, now
+        if (stretch := _half_sine(before) / _half_sine(now)) != 1.0:
+            camera = self.camera()
+            offset = stretch * np.subtract(camera.position, camera.look_at)
+            position = vector(camera.look_at + offset)
+            self.look_from(Camera(position=position, look_at=camera.look_at))
+        return False
 
     def picture(self) -> NDArray[np.uint8]:
         """What it sees now, RGBA on a transparent ground, shape (height, width, 4).

@@ -18,7 +18,7 @@ Dragged = Callable[[str, Array], None]
 """(phase "start", "update" or "end"; where the ball should be [L])."""
 
 _HALO, _SMALLEST, _POINTER = 0.035, 0.016, 0.009  # radii [L]
-_COLOR, _LAG = (25, 25, 30), (220, 30, 120)
+_COLOR, _LIGHT, _LAG = (25, 25, 30), (255, 225, 90), (220, 30, 120)
 
 
 class Grip:
@@ -35,9 +35,16 @@ class Grip:
         self._nodes: tuple[Any, Any] | None = None
         self._lag: tuple[Any, Any, Any] | None = None
         self._offset = np.zeros(3)
+        self._dark = False
 
-    def move(self, tip: Array | None, radius: float = 0.0) -> None:
-        """Put the ball on the tip [L], around an arm of this radius [L]; None hides it."""
+    def move(self, tip: Array | None, radius: float = 0.0, *, dark: bool = False) -> None:
+        """Put the ball on the tip [L], around an arm of this radius [L]; None hides it.
+
+        Args:
+            tip: Where the ball is.
+            radius: Of the arm there.
+            dark: Whether the page is dark, and the ball light.
+        """
         if tip is None:
             if self._nodes is not None:
                 self._nodes[0].visible = False
@@ -48,6 +55,9 @@ class Grip:
         ball.radius = max(1.2 * radius, _SMALLEST)
         halo.radius = max(1.6 * radius, _HALO)
         halo.position = tip
+        if dark != self._dark:
+            self._dark = dark
+            halo.color = ball.color = _LIGHT if dark else _COLOR
         halo.visible = True
 
     def show_lag(self, wanted: Array | None, tip: Array | None, gap: float = 0.0) -> None:

@@ -77,6 +77,12 @@ class MapBoard:
         right, up = self.map.place_of(**at)
         return _CENTER + _SIZE * ((right - 0.5) * _RIGHT + (up - 0.5) * _UP)
 
+    @property
+    def corners(self) -> Array:
+        """Where it stands in the scene [L], shape (4, 3)."""
+        ends = (-_SIZE / 2, _SIZE / 2)
+        return np.array([_CENTER + right * _RIGHT + up * _UP for right in ends for up in ends])
+
     def _mark(self, design: Manipulator) -> None:
         self._scene.remove("/atlas/here")
         at = None if self.map is None else self.map.values_of(design)

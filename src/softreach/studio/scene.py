@@ -39,6 +39,7 @@ Color = tuple[int, int, int]
 _STATIONS, _SIDES, _ACROSS = 51, 24, np.pi / 12
 _LIFT = 0.02  # of the fibers above the body, in R2
 _CLEAR = 0.45  # opacity of a body that has something inside
+_HIDING = 0.6  # opacity of an arm that is in front of its own tip
 _GHOST, _REFERENCE, _SURFACE, _HULL = 0.35, (150, 150, 158), (90, 140, 200), (220, 150, 60)
 _MARK: Color = (235, 90, 0)
 _ASKED: Color = (240, 175, 205)  # of a path, where the arm does not follow it
@@ -58,6 +59,7 @@ class Scene:
         self.box = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
         """Lowest and highest corner around everything [L]."""
         self._eye: Array = np.array([50.0, -80.0, 30.0])
+        self._focal = np.inf
         self.spine: tuple[Array, Array] = np.empty((0, 3)), np.empty(0)
         """Centers and radii along the arm [L], as it is drawn."""
         self._arms: dict[str, tuple[Manipulator, list[Any]]] = {}
@@ -110,8 +112,7 @@ class Scene:
         else:
             self.remove(path)
             ghost = path.startswith("/ghosts")
-            body = _CLEAR if any(inside(arm)) else None
-            opacity = [_GHOST] * len(meshes) if ghost else [body] + [None] * (len(meshes) - 1)
+            opacity = [_GHOST] * len(meshes) if ghost else _opacities(arm, len(meshes))
             self._arms[path] = (
                 arm,
                 [
@@ -120,6 +121,15 @@ class Scene:
                 ],
             )
         return shape["position"].values[-1] / arm.length
+
+    def see_through_arm(self, clear: bool) -> None:
+        """Let what is behind the arm be seen through it, or not."""
+        arm, handles = self._arms.get("/arm", (None, []))
+        usual = _opacities(arm, len(handles)) if arm is not None else []
+        for handle, opacity in zip(handles, usual, strict=True):
+            wanted = _HIDING if clear else opacity
+            if handle.opacity != wanted:
+                handle.opacity = wanted
 
     def draw_ghosts(self, arm: Manipulator, activations: Array) -> None:
         """Many shapes at once, transparent."""
@@ -142,16 +152,17 @@ class Scene:
         self.box = round_box(*around, np.array([[0, 0, 0], [0, 0, 1.0]]))
         self.remove("/axes")
         if look.axes:
-            self._draw_box(axes_box(*self._corners, eye=self._eye))
+            self._draw_box(axes_box(*self._corners, eye=self._eye, focal=self._focal))
 
-    def turn_axes(self, eye: Array) -> None:
-        """Number the edges that are the outer ones from where the eye is [L]."""
-        before, self._eye = self._eye, eye
-        if seen_from(eye, *self.box) == seen_from(before, *self.box):
+    def turn_axes(self, eye: Array, focal: float = np.inf) -> None:
+        """Number the edges that are the outer ones for an eye [L] of a focal length [pixel]."""
+        before = seen_from(self._eye, *self.box, self._focal)
+        self._eye, self._focal = eye, focal
+        if seen_from(eye, *self.box, focal) == before:
             return
         if self._api.get_handle_by_name("/axes/lines") is not None:
             self.remove("/axes")
-            self._draw_box(axes_box(*self._corners, eye=eye))
+            self._draw_box(axes_box(*self._corners, eye=eye, focal=focal))
 
     @property
     def _corners(self) -> tuple[Array, Array]:
@@ -320,6 +331,11 @@ def _arm_meshes(arm: Manipulator, shape: Any) -> list[tuple[Array, NDArray[Any],
     for k, skin in enumerate(bundle_skins(arm, shape, lift=_LIFT, step=_ACROSS)):
         meshes.append((skin.vertices / arm.length, skin.faces, _rgb(bundle_color(k))))
     return meshes
+
+
+def _opacities(arm: Manipulator, meshes: int) -> list[float | None]:
+    """Of the body and of every bundle."""
+    return [_CLEAR if any(inside(arm)) else None, *[None] * (meshes - 1)]
 
 
 def _rgb(color: Sequence[float]) -> Color:

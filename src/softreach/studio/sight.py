@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["CUTS", "Sight", "in_the_way"]
+__all__ = ["CUTS", "Sight", "in_the_way", "is_behind"]
 
 Array = NDArray[np.float64]
 
@@ -20,6 +20,7 @@ CUTS = {
 
 _CELLS = 192  # of the picture, along each side
 _MARGIN = 0.02  # [L] around what is to be seen
+_TOUCHING = 3.0  # radii: what is nearer belongs to the same piece of the arm
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +58,22 @@ def in_the_way(points: Array, sight: Sight, cut: str) -> NDArray[np.bool_]:
         ahead = (sight.look_at - sight.eye) * (1.0, 1.0, 0.0)
         hides |= points @ ahead < 0.0
     return hides
+
+
+def is_behind(point: Array, eye: Array, centers: Array, radii: Array) -> bool:
+    """Whether a ball stands between an eye and a point [L]; balls that touch the point do not.
+
+    Args:
+        point: Shape (3,).
+        eye: Shape (3,).
+        centers: Of the balls, shape (n, 3).
+        radii: Shape (n,).
+    """
+    distance = float(np.linalg.norm(point - eye))
+    way = (point - eye) / distance
+    ahead = (centers - eye) @ way
+    aside = np.linalg.norm(centers - eye - ahead[:, None] * way, axis=1)
+    return bool(((aside < radii) & (ahead > 0) & (ahead < distance - _TOUCHING * radii)).any())
 
 
 def _hides(seen: Array, sight: Sight) -> NDArray[np.bool_]:

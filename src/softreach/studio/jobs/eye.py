@@ -5,13 +5,16 @@ from __future__ import annotations
 import time
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softreach.studio.jobs.job import Job
-from softreach.studio.sight import Sight
+from softreach.studio.sight import Sight, is_behind
 from softreach.studio.state import StudioState
 from softreach.studio.worker import StaleCheck
 
 __all__ = ["FollowEye"]
+
+Array = NDArray[np.float64]
 
 _PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
 _TARGET = 0.02  # [L]
@@ -25,19 +28,29 @@ class FollowEye(Job):
     def depends_on(state: StudioState) -> object:
         """What is cut and what is to be seen; arm and eye report when they have moved."""
         look = state.appearance
-        return look.cut, look.arm, look.orthographic, state.target
+        return look.cut, look.arm, look.handle, look.orthographic, state.target
 
     def run(self, check: StaleCheck) -> None:
         """Look from where the eye is by now."""
         time.sleep(_PAUSE)
         session = self.session
         session.eye.project(orthographic=session.state.appearance.orthographic)
+        if session.eye.keep_width():
+            session.look_again()
         session.eye.focus()
         with session.drawing, session.client.atomic():
             sight = self._sight()
             most = _DRAGGED if session.is_dragged else None
             session.scene.clouds.look(sight, session.state.appearance.cut, most)
-            session.scene.turn_axes(sight.eye)
+            session.scene.turn_axes(sight.eye, session.eye.focal)
+            session.scene.see_through_arm(self._hides_handle(sight.eye))
+
+    def _hides_handle(self, eye: Array) -> bool:
+        """Whether the arm is between the eye [L] and the handle on its own tip."""
+        session = self.session
+        tip, look = session.tip, session.state.appearance
+        shown = look.handle and look.arm
+        return shown and tip is not None and is_behind(tip, eye, *session.scene.spine)
 
     def _sight(self) -> Sight:
         session, state = self.session, self.session.state

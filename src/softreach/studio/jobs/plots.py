@@ -99,9 +99,10 @@ class CountActivations(Job):
 
     @staticmethod
     def depends_on(state: StudioState) -> object:
-        """Which samples are shown, the present activation and the target."""
+        """Which samples are shown, the present activation, the target, and the page's light."""
         look = state.appearance
-        return look.plots.histogram and (look.level, look.slice, state.activation, state.target)
+        shown = look.level, look.slice, look.dark
+        return look.plots.histogram and (*shown, state.activation, state.target)
 
     def run(self, check: StaleCheck) -> None:
         """Draw them, once the cloud is complete."""
@@ -111,7 +112,7 @@ class CountActivations(Job):
         if look.plots.histogram and reach is not None:
             solutions = None if session.answer is None else session.answer.activations
             session.figures.histogram = histogram_picture(
-                reach, look.level, look.slice, state.activation, solutions
+                reach, look.level, look.slice, state.activation, solutions, dark=look.dark
             )
             session.show()
 
@@ -121,9 +122,9 @@ class CutSection(Job):
 
     @staticmethod
     def depends_on(state: StudioState) -> object:
-        """The plane; the set itself is told by `ComputeReach`."""
-        cut = state.appearance.slice
-        return state.appearance.plots.section and (cut.axis, cut.center)
+        """The plane and the page's light; the set itself is told by `ComputeReach`."""
+        look = state.appearance
+        return look.plots.section and (look.slice.axis, look.slice.center, look.dark)
 
     def run(self, check: StaleCheck) -> None:
         """Cut and draw it, once the exact set is complete."""
@@ -132,7 +133,7 @@ class CutSection(Job):
         reach = _complete_reach(self)
         if look.plots.section and reach is not None:
             with session.working("cutting the reachable set"):
-                session.figures.section = section_picture(reach, look.slice, check)
+                session.figures.section = section_picture(reach, look.slice, check, dark=look.dark)
             session.show()
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["HandlePanel"]
 
-_HINT = "Drag the dark ball on the tip: the arm follows on its branch of solutions."
+_HINT = "Drag the ball on the tip: the arm follows on its branch of solutions."
 
 
 class HandlePanel:
@@ -43,7 +43,7 @@ class HandlePanel:
         grasped = state.appearance.handle and state.appearance.arm and movable
         arm = state.design
         radius = float(arm.profile.radius(arm.length)) / arm.length
-        self._grip.move(session.tip if grasped else None, radius)
+        self._grip.move(session.tip if grasped else None, radius, dark=state.appearance.dark)
         if pull is None:
             self._text.say(_HINT)
             self._grip.show_lag(None, None)

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 __all__ = ["PlotsPanel"]
 
 _HINT = (
-    "Plots stand in a window of their own beside the scene and follow the arm, the design and the "
-    "slice. What is not checked is not computed."
+    "Plots stand in a window of their own beside the scene (on a phone in Figures, at the end of "
+    "this sheet) and follow the arm, the design and the slice. What is not checked is not computed."
 )
 _WIDTH = 380  # pixels
 _BLUE, _ORANGE, _GREEN, _GRAY = "#2f6db5", "#e8590c", "#2b8a3e", "#868e96"

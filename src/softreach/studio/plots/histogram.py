@@ -49,6 +49,8 @@ def histogram_picture(
     cut: Slice,
     present: Sequence[float],
     solutions: Array | None = None,
+    *,
+    dark: bool = False,
 ) -> Picture:
     """Draw a histogram for each bundle, of the samples that the slice leaves.
 
@@ -58,6 +60,7 @@ def histogram_picture(
         cut: The slice.
         present: Activation of the arm, drawn as a line.
         solutions: Of the inverse problem, drawn as marks; shape (n, bundles).
+        dark: Whether the page is.
     """
     kept = in_slice(cloud_points(reach, level), cut)
     activation = reach.cloud.activation.values[shown_samples(reach, level)][kept]
@@ -73,7 +76,9 @@ def histogram_picture(
             ax.plot(solutions[:, k], height, "v", color="0.15", ms=6, clip_on=False)
         ax.set_xlabel(_label(reach.arm, k), labelpad=1)
     figure.supylabel("share of the samples [%]", fontsize=10)
-    return Picture(reach.arm, pixels(figure), _described(len(activation), cut, solutions))
+    return Picture(
+        reach.arm, pixels(figure, dark=dark), _described(len(activation), cut, solutions)
+    )
 
 
 def _draw(ax: Axes, share: Array, limits: Array, color: tuple[float, float, float]) -> None:

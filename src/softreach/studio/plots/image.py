@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["Picture", "blank_figure", "pixels"]
 
 _WIDTH = 4.3  # [inch], about as wide as a panel
+_PAPER, _INK = (36, 36, 36), "#c9c9c9"  # of a dark page
 _DPI = 200  # sharp where a page has two pixels per point
 
 
@@ -35,10 +36,36 @@ def blank_figure(height: float, width: float = _WIDTH, dpi: int = _DPI) -> Figur
     return Figure(figsize=(width, height), dpi=dpi, layout="constrained")
 
 
-def pixels(figure: Figure) -> NDArray[np.uint8]:
-    """The figure as RGB."""
+def pixels(figure: Figure, *, dark: bool = False) -> NDArray[np.uint8]:
+    """The figure as RGB; for a dark page its paper is dark, and what is written and drawn light."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+    if dark:
+        _darken(figure)
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
-    return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+    shown = np.asarray(canvas.buffer_rgba())[..., :3].copy()
+    if dark:
+        shown[(shown == 255).all(axis=-1)] = _PAPER  # of pictures within the figure
+    return shown
+
+
+def _darken(figure: Figure) -> None:
+    """Areas keep their colors."""
+    from matplotlib.legend import Legend
+    from matplotlib.lines import Line2D
+    from matplotlib.spines import Spine
+    from matplotlib.text import Text
+
+    paper = tuple(value / 255 for value in _PAPER)
+    figure.set_facecolor(paper)
+    for ax in figure.axes:
+        ax.set_facecolor(paper)
+        ax.tick_params(which="both", colors=_INK)
+    for legend in figure.findobj(Legend):
+        legend.get_frame().set(facecolor=paper, edgecolor=_INK)
+    for spine in figure.findobj(Spine):
+        spine.set_edgecolor(_INK)
+    for kind in (Text, Line2D):
+        for one in figure.findobj(kind):
+            one.set_color(_INK)

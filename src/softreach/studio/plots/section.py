@@ -42,13 +42,16 @@ def section_curves(reach: Reach, cut: Slice) -> list[Array]:
     return [curve / length for curve in curves]
 
 
-def section_picture(reach: Reach, cut: Slice, check: StaleCheck = lambda: None) -> Picture:
+def section_picture(
+    reach: Reach, cut: Slice, check: StaleCheck = lambda: None, *, dark: bool = False
+) -> Picture:
     """Draw the section, in L; without a slice that of the plane y = 0.
 
     Args:
         reach: Of the design.
         cut: The slice, of which the middle plane is cut.
         check: Called all the time; raises to stop.
+        dark: Whether the page is.
 
     Raises:
         InvalidInput: As `section_curves`.
@@ -67,7 +70,7 @@ def section_picture(reach: Reach, cut: Slice, check: StaleCheck = lambda: None) 
     _draw_boundary(ax, curves, view)
     where = f"{plane.axis} = {plane.center:.3g} L"
     ax.set_title(f"section {where}")
-    return Picture(reach.arm, pixels(figure), _described(curves, plane, where))
+    return Picture(reach.arm, pixels(figure, dark=dark), _described(curves, plane, where))
 
 
 def enclosed_area(curves: list[Array], axis: int) -> float:

@@ -1,0 +1,173 @@
+"""Everything can be reached and read in the window of a phone, and beside docked plots."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from softreach.arm import designs
+from softreach.atlas import DesignSpace, build_atlas
+from softreach.studio import Quality, Studio
+from softreach.studio.source import start_on_store
+from tests.studio.tab import Tab
+
+COARSE = Quality(coarse_level=12, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.1)
+SHEET = "[style*='max-height: 60%']"
+SIZES = {"laptop": (1366, 768), "phone": (390, 844)}
+
+
+@pytest.fixture(scope="module")
+def opened(browser, tmp_path_factory):
+    """Tabs on an atlas, which have the most to show, by the kind of their window."""
+    store = tmp_path_factory.mktemp("atlas") / "a.zarr"
+    space = DesignSpace.grid(designs.minimal_trunk(), revolution=[1.0, 2.0], taper=[0.01, 0.03])
+    build_atlas(space, store, n=200, metrics=("convex",), progress=lambda _: None)
+    with Studio(start_on_store(store, COARSE)) as studio:
+        tabs: dict[str, Tab] = {}
+
+        def opened(kind: str) -> Tab:
+            if kind not in tabs:
+                width, height = SIZES[kind]
+                tabs[kind] = Tab(browser, studio, width=width, height=height)
+                tabs[kind].session.update(lambda s: s.showing(level=14))
+            return tabs[kind]
+
+        yield opened
+        for tab in tabs.values():
+            tab.close()
+
+
+def in_canvas(tab, points) -> np.ndarray:
+    """Places of points [L] in the page, pixels to the right and down, shape (n, 2)."""
+    canvas = tab.page.locator("canvas").first.bounding_box()
+    places = np.array([tab.projected(np.asarray(point)) for point in points])
+    return places * (canvas["width"], canvas["height"]) + (canvas["x"], canvas["y"])
+
+
+def labels(tab) -> list:
+    found = [tab.drawn(f"/axes/label {k}") for k in range(60)]
+    return [label for label in found if label is not None]
+
+
+@pytest.mark.parametrize("kind", SIZES)
+def test_all_eleven_tabs_stand_in_one_line_within_the_window(opened, kind):
+    tab = opened(kind)
+    places = [one.bounding_box() for one in tab.page.get_by_role("tab").all()]
+    assert len(places) >= 11
+    assert len({round(place["y"]) for place in places}) == 1
+    assert max(place["x"] + place["width"] for place in places) <= SIZES[kind][0] + 0.5
+
+
+def test_arm_and_map_are_in_sight_above_the_sheet_of_a_phone(opened):
+    tab = opened("phone")
+    tab.settle()
+    sheet = tab.page.locator(SHEET).bounding_box()["y"]
+    board = tab.session.board.corners
+    tab.wait(lambda: (in_canvas(tab, board)[:, 0] > 0).all(), "the map is in sight")
+    places = in_canvas(tab, [*board, np.zeros(3), np.array([0, 0, 1.0])])
+    assert (places > 0).all()
+    assert (places < (390, sheet)).all()
+
+
+def test_numbers_at_the_axes_of_a_phone_have_room(opened):
+    tab = opened("phone")
+    tab.session.look_from("oblique")
+    tab.settle()
+    numbers = [one for one in labels(tab) if "L" not in one.text]
+    assert len(numbers) > 6
+    places = in_canvas(tab, [one.position for one in numbers])
+    edges = np.array([one.position for one in numbers])
+    for k in range(1, len(places)):
+        if (edges[k] == edges[k - 1]).sum() == 2:  # next to each other at one edge
+            beside, above = np.abs(places[k] - places[k - 1])
+            assert beside > 24 or above > 12
+
+
+def test_figures_are_as_wide_as_the_sheet_of_a_phone(opened):
+    tab = opened("phone")
+    tab.open("Plots")
+    plots = "along the arm", "section"
+    for plot in plots:
+        tab.page.get_by_label(plot, exact=True).check()
+    tab.page.locator(SHEET).get_by_text("Figures", exact=True).click()
+    tab.settle()
+    for kind in (".uplot", "img:visible"):
+        drawn = tab.page.locator(f"{SHEET} {kind}").first
+        drawn.scroll_into_view_if_needed()
+        tab.wait(lambda drawn=drawn: _right(drawn) <= 390, f"{kind} is within the sheet")
+    view = tab.page.locator(f"{SHEET} .mantine-ScrollArea-viewport").first
+    assert view.evaluate("e => e.scrollWidth <= e.clientWidth")
+    for plot in plots:
+        tab.page.get_by_label(plot, exact=True).uncheck()
+
+
+def _right(drawn) -> float:
+    place = drawn.bounding_box()
+    return place["x"] + place["width"]
+
+
+def test_a_wide_table_of_designs_moves_within_the_sheet_of_a_phone(opened):
+    tab = opened("phone")
+    tab.open("Compare")
+    tab.press("Take snapshot")
+    for revolution, taper in ((1.0, 0.03), (2.0, 0.01)):
+        tab.session.update(
+            lambda s, r=revolution, t=taper: s.replace(
+                design=designs.minimal_trunk(revolution=r, taper=t)
+            )
+        )
+        tab.settle()
+        tab.press("Take snapshot")
+    tab.page.get_by_role("cell", name="design 3").wait_for()
+    assert tab.page.evaluate("document.documentElement.scrollWidth") <= 390
+    view = tab.page.locator(f"{SHEET} .mantine-ScrollArea-viewport")
+    assert view.evaluate("e => e.scrollWidth <= e.clientWidth")
+    last = tab.page.get_by_role("button", name="Save table (CSV)")
+    last.scroll_into_view_if_needed()
+    place = last.bounding_box()
+    assert place["x"] >= 0
+    assert place["x"] + place["width"] <= 390
+    assert place["y"] + place["height"] <= 844
+
+
+def test_numbers_at_the_axes_stay_in_sight_when_plots_stand_beside_the_scene(opened):
+    tab = opened("laptop")
+    tab.session.look_from("oblique")
+    tab.settle()
+    wide = tab.page.locator("canvas").first.bounding_box()["width"]
+    before = tab.session.eye.camera()
+    tab.open("Plots")
+    tab.page.get_by_label("along the arm", exact=True).check()
+    tab.wait(lambda: tab.page.locator("canvas").first.bounding_box()["width"] < wide, "it docks")
+
+    def in_sight() -> bool:
+        canvas = tab.page.locator("canvas").first.bounding_box()
+        right = in_canvas(tab, [one.position for one in labels(tab)])[:, 0] - canvas["x"]
+        return bool(((right > 0) & (right < canvas["width"])).all())
+
+    tab.wait(in_sight, "all numbers are in sight")
+    tab.page.get_by_label("along the arm", exact=True).uncheck()
+    tab.wait(
+        lambda: np.allclose(tab.session.eye.camera().position, before.position, rtol=1e-2),
+        "the eye steps forth again",
+    )
+
+
+def test_the_arm_stays_in_sight_in_a_window_that_gets_narrow_and_wide_again(opened):
+    tab = opened("laptop")
+    tab.session.look_from("oblique")
+    tab.settle()
+    before = tab.session.eye.camera()
+    distance = np.linalg.norm(np.subtract(before.position, before.look_at))
+    tab.page.set_viewport_size({"width": 390, "height": 844})
+    tab.wait(lambda: tab.session.eye.aspect < 0.5, "the window is narrow")
+
+    def stretch() -> float:
+        now = tab.session.eye.camera()
+        return float(np.linalg.norm(np.subtract(now.position, now.look_at)) / distance)
+
+    tab.wait(lambda: 1.5 < stretch() < 3.0, "the eye steps back")
+    right = in_canvas(tab, [(0, 0, 0), (0, 0, 1.0)])[:, 0]
+    assert ((right > 0) & (right < 390)).all()
+    tab.page.set_viewport_size({"width": 1366, "height": 768})
+    tab.wait(lambda: 0.98 < stretch() < 1.02, "the eye steps forth")
