@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 __all__ = ["Picture", "blank_figure", "pixels"]
 
 _WIDTH = 4.3  # [inch], about as wide as a panel
-_PAPER, _INK = (36, 36, 36), "#c9c9c9"  # of a dark page
+_PAPER, _INK = "#242424", "#c9c9c9"  # of a dark page
 _DPI = 200  # sharp where a page has two pixels per point
 
 
@@ -46,7 +46,8 @@ def pixels(figure: Figure, *, dark: bool = False) -> NDArray[np.uint8]:
     canvas.draw()
     shown = np.asarray(canvas.buffer_rgba())[..., :3].copy()
     if dark:
-        shown[(shown == 255).all(axis=-1)] = _PAPER  # of pictures within the figure
+        white = (shown == 255).all(axis=-1)  # of pictures within the figure
+        shown[white] = list(bytes.fromhex(_PAPER[1:]))
     return shown
 
 
@@ -57,13 +58,12 @@ def _darken(figure: Figure) -> None:
     from matplotlib.spines import Spine
     from matplotlib.text import Text
 
-    paper = tuple(value / 255 for value in _PAPER)
-    figure.set_facecolor(paper)
+    figure.set_facecolor(_PAPER)
     for ax in figure.axes:
-        ax.set_facecolor(paper)
+        ax.set_facecolor(_PAPER)
         ax.tick_params(which="both", colors=_INK)
     for legend in figure.findobj(Legend):
-        legend.get_frame().set(facecolor=paper, edgecolor=_INK)
+        legend.get_frame().set(facecolor=_PAPER, edgecolor=_INK)
     for spine in figure.findobj(Spine):
         spine.set_edgecolor(_INK)
     for kind in (Text, Line2D):
