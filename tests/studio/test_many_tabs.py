@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 import threading
 import time
-import warnings
 import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -164,10 +163,8 @@ def test_a_tab_that_is_closed_before_it_is_furnished_leaves_no_session(studio, m
     with connected(studio):
         assert entered.wait(PATIENCE)
     until(lambda: not studio.server.get_clients())
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # viser's, of messages to a page that is gone
-        go.set()
-        until(lambda: not studio.sessions)
+    go.set()
+    until(lambda: not studio.sessions)
 
 
 def test_a_tab_that_is_closed_while_it_is_shaken_leaves_no_work(studio):

@@ -46,12 +46,15 @@ def studio(
     """
     import sys
     import threading
+    import warnings
     import webbrowser
 
     from softreach.studio import Studio
     from softreach.studio.addresses import check_port, is_local
     from softreach.studio.token import new_token
 
+    # viser's, of what is drawn for a page that was closed a moment ago
+    warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
     check_port(port or 0)
     asked = not is_local(host) if token is None else token
     start = _start(source)
