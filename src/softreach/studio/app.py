@@ -190,7 +190,7 @@ def _look_at_all(session: Session) -> None:
     if session.board is None:
         session.look_from("oblique")
         return
-    low, high = round_box(np.vstack([*session.scene.box, session.board.corners]))
+    low, high = round_box(np.vstack([*session.scene.axes.corners, session.board.corners]))
     toward = np.subtract(_EYE_ON_MAP.position, _EYE_ON_MAP.look_at)
     session.eye.look_from(framing(low, high, toward, session.eye.aspect))
 

@@ -38,24 +38,25 @@ _ROOM = 1.12  # times what would just fill the picture
 class Lens:
     """How a camera shows what is around the place it looks at."""
 
-    def __init__(self, *, orthographic: bool, distance: float) -> None:
-        """A lens for an eye at this distance [L], were it not orthographic.
+    def __init__(self, *, orthographic: bool) -> None:
+        """The usual lens, or an orthographic one.
 
-        An orthographic one is a very long lens from very far away: viser has no other.
+        That is a very long lens from very far away: viser has no other. What is in sight does not
+        follow a zoom, as a page tells where its eye is only later, and half of it at a time. Depths
+        are whole numbers to the graphics card: these tell 0.0005 L apart at the usual distance.
         """
         self.stretch = _AWAY if orthographic else 1.0
         """Times the distance at which the eye is with this lens."""
         self.fov = 2.0 * float(np.arctan(np.tan(FOV / 2) / self.stretch))
         """Vertical angle [rad]."""
-        far = self.stretch * distance
-        # Depths are whole numbers to the graphics card, and finest where near and far are close.
-        self.near, self.far = (far / 2, 2 * far) if orthographic else (0.01, 1000.0)
+        self.near, self.far = (4.0, 4000.0) if orthographic else (0.01, 1000.0)
+        """What is nearer or farther is not drawn [L]."""
 
 
 def lens(camera: Camera, *, orthographic: bool) -> tuple[Lens, Camera]:
     """The lens for a camera, and where it has to be moved to show the same."""
     offset = np.subtract(camera.position, camera.look_at)
-    found = Lens(orthographic=orthographic, distance=float(np.linalg.norm(offset)))
+    found = Lens(orthographic=orthographic)
     position = np.asarray(camera.look_at) + found.stretch * offset
     return found, Camera(position=vector(position), look_at=camera.look_at)
 
@@ -142,14 +143,6 @@ class Eye:
         if orthographic != self._orthographic:
             camera, self._orthographic = self.camera(), orthographic
             self.look_from(camera)
-
-    def focus(self) -> None:
-        """See to it that nothing in sight is cut off by the lens, after a zoom."""
-        if self._orthographic:
-            found, _ = lens(self.camera(), orthographic=True)
-            shown = self._client.camera
-            if not 0.7 < shown.far / found.far < 1.4:
-                shown.near, shown.far = found.near, found.far
 
     def keep_width(self) -> bool:
         """Step back as the picture gets narrower, and forth again: what was in sight stays so.

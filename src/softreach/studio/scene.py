@@ -13,9 +13,9 @@ from softreach.arm.skin import inside
 from softreach.arm_shape import arm_surface, bundle_skins
 from softreach.palette import BODY, bundle_color
 from softreach.rod.kinematics import configuration
-from softreach.studio.axes import AxesBox, axes_box, round_box, seen_from
 from softreach.studio.clouds import Clouds, Dots
 from softreach.studio.colors import FAINT, UNSTABLE, sample_colors
+from softreach.studio.numbered_box import NumberedBox, add_label
 from softreach.studio.reach import Reach, cloud_points, unstable_samples
 from softreach.studio.rod import solvable_rod
 from softreach.studio.shading import lit
@@ -56,10 +56,7 @@ class Scene:
         """Draw into the scene of a client, or of a server for a page that is saved."""
         self._api = api
         self.clouds = Clouds(api)
-        self.box = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
-        """Lowest and highest corner around everything [L]."""
-        self._eye: Array = np.array([50.0, -80.0, 30.0])
-        self._focal = np.inf
+        self.axes = NumberedBox(api)
         self.spine: tuple[Array, Array] = np.empty((0, 3)), np.empty(0)
         """Centers and radii along the arm [L], as it is drawn."""
         self._arms: dict[str, tuple[Manipulator, list[Any]]] = {}
@@ -149,31 +146,7 @@ class Scene:
         """The box with numbers around cloud and arm, and the cloud without loads."""
         clouds = [reach] if free is None or not look.free else [reach, free]
         around = (cloud_points(one, 14) for one in clouds)
-        self.box = round_box(*around, np.array([[0, 0, 0], [0, 0, 1.0]]))
-        self.remove("/axes")
-        if look.axes:
-            self._draw_box(axes_box(*self._corners, eye=self._eye, focal=self._focal))
-
-    def turn_axes(self, eye: Array, focal: float = np.inf) -> None:
-        """Number the edges that are the outer ones for an eye [L] of a focal length [pixel]."""
-        before = seen_from(self._eye, *self.box, self._focal)
-        self._eye, self._focal = eye, focal
-        if seen_from(eye, *self.box, focal) == before:
-            return
-        if self._api.get_handle_by_name("/axes/lines") is not None:
-            self.remove("/axes")
-            self._draw_box(axes_box(*self._corners, eye=eye, focal=focal))
-
-    @property
-    def _corners(self) -> tuple[Array, Array]:
-        return self.box[0][None], self.box[1][None]
-
-    def _draw_box(self, box: AxesBox) -> None:
-        self._api.add_line_segments(
-            "/axes/lines", box.lines.astype(np.float32), (170, 170, 175), thickness=0.003
-        )
-        for k, (text, at) in enumerate(box.labels):
-            self._label(f"/axes/label {k}", text, at)
+        self.axes.draw(*around, np.array([[0, 0, 0], [0, 0, 1.0]]), shown=look.axes)
 
     def draw_trail(self, tips: Array) -> None:
         """A line through the places where the tip has been [L], shape (n, 3)."""
@@ -236,8 +209,8 @@ class Scene:
         kept = in_slice(points, look.slice)
         self._points("/reference/cloud", points[kept] + shift, coloring.rgb[kept], look.point_size)
         above = np.array([0, 0, points[:, 2].max(initial=0.0) + 0.12])
-        self._label("/reference/name", "reference", above + shift)
-        self._label("/reference/other", "this design", above)
+        add_label(self._api, "/reference/name", "reference", above + shift)
+        add_label(self._api, "/reference/other", "this design", above)
 
     def draw_reference_arm(
         self, arm: Manipulator, activation: Sequence[float], shift: Array
@@ -293,9 +266,6 @@ class Scene:
         faces = sliced_faces(vertices, surface.faces, cut)
         if len(faces):
             self._mesh(path, vertices, faces, color, opacity)
-
-    def _label(self, path: str, text: str, at: Array) -> None:
-        self._api.add_label(path, text, position=at, font_screen_scale=0.8, anchor="center-center")
 
     def _slab(self, cut: Slice, points: Array) -> None:
         """The middle plane of the slice, as wide as the cloud."""

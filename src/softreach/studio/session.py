@@ -189,7 +189,7 @@ class Session:
 
     def look_from(self, view: str) -> None:
         """See everything from one of `eye.VIEWS`."""
-        self.eye.look_from(framing(*self.scene.box, VIEWS[view], self.eye.aspect))
+        self.eye.look_from(framing(*self.scene.axes.corners, VIEWS[view], self.eye.aspect))
 
     def step(self, *, back: bool) -> None:
         """Undo the latest step of the work, or do again what was undone last."""

@@ -37,12 +37,11 @@ class FollowEye(Job):
         session.eye.project(orthographic=session.state.appearance.orthographic)
         if session.eye.keep_width():
             session.look_again()
-        session.eye.focus()
         with session.drawing, session.client.atomic():
             sight = self._sight()
             most = _DRAGGED if session.is_dragged else None
             session.scene.clouds.look(sight, session.state.appearance.cut, most)
-            session.scene.turn_axes(sight.eye, session.eye.focal)
+            session.scene.axes.turn(sight.eye, session.eye.focal)
             session.scene.see_through_arm(self._hides_handle(sight.eye))
 
     def _hides_handle(self, eye: Array) -> bool:
