@@ -43,6 +43,7 @@ Index = NDArray[np.int64]
 
 _ROUNDING = 1e-13  # of a tip, in L, with room to spare
 _LARGEST, _SMALLEST = 8192, 1024  # targets solved together on a thread
+_NEIGHBORS = 1024  # targets near to each other in a set
 _LARGEST_LOADED = 32_768  # with loads, on all threads
 _SHARES = 6  # of the targets for each thread, because some are harder than others
 _MOST_ITERATIONS = 40
@@ -58,7 +59,7 @@ _PARTNER_RANGE = 1.5  # widths of a cell within which a fold's other root is loo
 def every_branch(prepared: PreparedMap, request: Request) -> Roots:
     """All roots inside the bounds, sorted by target; those of loaded arms stable or not.
 
-    Targets that are near to each other are solved together, each set on a thread of its own.
+    Sets of targets are solved together, each on a thread of its own.
 
     Args:
         prepared: A tip map of three free bundles.
@@ -68,13 +69,22 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
     if not count:
         return no_roots(prepared.rod)
     prepared.prepare_branches()
-    order = spatial_order(request.targets)
-    sets = [order[block] for block in parallel.blocks(count, _set_size(prepared, count))]
+    sets = _sets(spatial_order(request.targets), _set_size(prepared, count))
     if prepared.branch_map.supports_unstable or len(sets) == 1:
         parts = [_branches_of(prepared, request, rows) for rows in sets]
     else:
         parts = list(parallel.in_order(partial(_alone, prepared, request, rows) for rows in sets))
     return Roots.sorted_by_target(parts)
+
+
+def _sets(order: Index, size: int) -> list[Index]:
+    """Sets of about this size, each of groups of neighbors from everywhere.
+
+    Neighbors share candidates, and near a place that is reached in many ways all of them are hard.
+    """
+    groups = [order[block] for block in parallel.blocks(len(order), _NEIGHBORS)]
+    number = -(-len(order) // size)
+    return [np.concatenate(groups[k::number]) for k in range(min(number, len(groups)))]
 
 
 def _set_size(prepared: PreparedMap, count: int) -> int:
