@@ -69,10 +69,23 @@ def test_arm_and_map_are_in_sight_above_the_sheet_of_a_phone(opened):
     assert (places < (390, sheet)).all()
 
 
-def test_numbers_at_the_axes_of_a_phone_have_room(opened):
-    tab = opened("phone")
+def see_all(tab):
+    """Look at everything, once the page has come to rest in its window."""
+
+    def told() -> bool:
+        box = tab.page.locator("canvas").first.bounding_box()
+        return np.isclose(tab.session.eye.aspect, box["width"] / box["height"], rtol=0.01)
+
+    tab.wait(told, "the page has told how wide it is")
+    tab.page.wait_for_timeout(500)  # the eye looks twice before it moves
+    tab.settle()
     tab.session.look_from("oblique")
     tab.settle()
+
+
+def test_numbers_at_the_axes_of_a_phone_have_room(opened):
+    tab = opened("phone")
+    see_all(tab)
     numbers = [one for one in labels(tab) if "L" not in one.text]
     assert len(numbers) > 6
     places = in_canvas(tab, [one.position for one in numbers])
@@ -132,8 +145,7 @@ def test_a_wide_table_of_designs_moves_within_the_sheet_of_a_phone(opened):
 
 def test_numbers_at_the_axes_stay_in_sight_when_plots_stand_beside_the_scene(opened):
     tab = opened("laptop")
-    tab.session.look_from("oblique")
-    tab.settle()
+    see_all(tab)
     wide = tab.page.locator("canvas").first.bounding_box()["width"]
     before = tab.session.eye.camera()
     tab.open("Plots")
@@ -155,8 +167,7 @@ def test_numbers_at_the_axes_stay_in_sight_when_plots_stand_beside_the_scene(ope
 
 def test_the_arm_stays_in_sight_in_a_window_that_gets_narrow_and_wide_again(opened):
     tab = opened("laptop")
-    tab.session.look_from("oblique")
-    tab.settle()
+    see_all(tab)
     before = tab.session.eye.camera()
     distance = np.linalg.norm(np.subtract(before.position, before.look_at))
     tab.page.set_viewport_size({"width": 390, "height": 844})

@@ -59,9 +59,13 @@ class Clouds:
         Args:
             sight: Who looks at what; None for nobody.
             cut: One of `sight.CUTS`.
-            most: How many points to draw of a cloud, the first of it; None for all.
+            most: How many points to draw of a cloud, the first of it, which then stay the same
+                until others are asked for; None for all.
         """
+        is_thin = most is not None and most == self._most
         self._sight, self._cut, self._most = sight, cut, most
+        if is_thin:  # it hides little, and the page draws no frame while it takes up another
+            return
         for path, (dots, before) in list(self._known.items()):
             kept = self._kept(dots)
             if not np.array_equal(kept, before):
