@@ -52,10 +52,15 @@ def labels(tab) -> list:
 @pytest.mark.parametrize("kind", SIZES)
 def test_all_eleven_tabs_stand_in_one_line_within_the_window(opened, kind):
     tab = opened(kind)
-    places = [one.bounding_box() for one in tab.page.get_by_role("tab").all()]
-    assert len(places) >= 11
-    assert len({round(place["y"]) for place in places}) == 1
-    assert max(place["x"] + place["width"] for place in places) <= SIZES[kind][0] + 0.5
+    tab.page.get_by_role("tab", name="Atlas").wait_for()
+
+    def fit() -> bool:
+        places = [one.bounding_box() for one in tab.page.get_by_role("tab").all()]
+        right = max(place["x"] + place["width"] for place in places)
+        one_line = len({round(place["y"]) for place in places}) == 1
+        return len(places) >= 11 and one_line and right <= SIZES[kind][0] + 0.5
+
+    tab.wait(fit, "the page is laid out, all tabs in one line")
 
 
 def test_arm_and_map_are_in_sight_above_the_sheet_of_a_phone(opened):
