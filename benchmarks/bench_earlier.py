@@ -72,12 +72,11 @@ def print_cold(source: Path) -> None:
 def compilation(name: str, source: Path) -> float:
     """CPU seconds of compilation of a command, by the version in a folder."""
     with tempfile.TemporaryDirectory() as folder:
-        command = COMMANDS[name].format(folder=folder).split()
         result = Path(folder) / "cold.json"
         path = os.pathsep.join([str(source), str(ROOT)])
         environment = os.environ | {"PYTHONPATH": path, "NUMBA_CACHE_DIR": f"{folder}/cache"}
-        run = [sys.executable, "-m", "benchmarks.bench_cold", str(result), *command]
-        subprocess.run(run, env=environment, check=True, capture_output=True)
+        run = [sys.executable, "-m", "benchmarks.bench_cold", str(result), *COMMANDS[name].split()]
+        subprocess.run(run, env=environment, cwd=folder, check=True, capture_output=True)
         return sum(json.loads(result.read_text(encoding="utf-8"))["seconds"].values())
 
 

@@ -13,9 +13,11 @@ if TYPE_CHECKING:
 
     from softreach.atlas.space import DesignSpace
 
-__all__ = ["check_demand"]
+__all__ = ["STORED", "check_demand"]
 
-_STORED = 6.2  # bytes of a tip in a store
+STORED = 6.2
+"""What a tip takes in a store [bytes]."""
+
 _ON_DISK = 4096  # bytes that the smallest file takes
 _FILES = 4  # of a design without tips: status, message, metrics, curvature
 _HELD = 700  # bytes of memory of a sample and its share of the triangulation
@@ -42,6 +44,6 @@ def check_demand(
     check_memory("n", n, _HELD * n)
     local = isinstance(store, str | os.PathLike) and "://" not in str(store)
     if local and not Path(str(store)).exists():
-        of_each = _STORED * n * keep_clouds + _FILES * _ON_DISK
+        of_each = STORED * n * keep_clouds + _FILES * _ON_DISK
         asked = f"{n} samples of {designs} designs"
         check_disk("n", asked, of_each * designs + 8 * n * space.base.bundles, str(store))

@@ -43,7 +43,6 @@ Index = NDArray[np.int64]
 
 _ROUNDING = 1e-13  # of a tip, in L, with room to spare
 _LARGEST, _SMALLEST = 8192, 1024  # targets solved together on a thread
-_NEIGHBORS = 1024  # targets near to each other in a set
 _LARGEST_LOADED = 32_768  # with loads, on all threads
 _SHARES = 6  # of the targets for each thread, because some are harder than others
 _MOST_ITERATIONS = 40
@@ -82,9 +81,9 @@ def _sets(order: Index, size: int) -> list[Index]:
 
     Neighbors share candidates, and near a place that is reached in many ways all of them are hard.
     """
-    groups = [order[block] for block in parallel.blocks(len(order), _NEIGHBORS)]
+    groups = [order[block] for block in parallel.blocks(len(order), _SMALLEST)]
     number = -(-len(order) // size)
-    return [np.concatenate(groups[k::number]) for k in range(min(number, len(groups)))]
+    return [np.concatenate(groups[k::number]) for k in range(number)]
 
 
 def _set_size(prepared: PreparedMap, count: int) -> int:

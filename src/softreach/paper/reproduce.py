@@ -12,6 +12,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from softreach.atlas.demand import STORED
 from softreach.atomic import check_place
 from softreach.paper.notebook import Notebook
 from softreach.paper.parts.misprints import misprints
@@ -38,7 +39,6 @@ PARTS: Mapping[str, Callable[..., None]] = {
 
 
 _FIGURES = 5e7  # bytes of all figures, roughly
-_TIP = 6.2  # bytes of a stored tip of the atlas
 
 
 def reproduce_paper(
@@ -72,7 +72,7 @@ def reproduce_paper(
     folder = Path(out) / "quick" if quick else Path(out)
     report = folder / "report.html"
     begun = (folder / "figures").exists()  # of which nobody knows how much is done
-    takes = 0.0 if begun else _FIGURES + _TIP * settings.samples * settings.designs**2
+    takes = 0.0 if begun else _FIGURES + STORED * settings.samples * settings.designs**2
     check_place(report, REPORT[".html"], takes=takes, overwrite=overwrite, name="out")
     key = {**asdict(settings), "softreach": version("softreach"), "source": _source()}
     notebooks: dict[str, Notebook] = {}

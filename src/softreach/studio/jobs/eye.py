@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 _PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
 _TARGET = 0.02  # [L]
-_DRAGGED = 1 << 13  # points while the tip is dragged: they are sent and drawn again at each step
+_DRAGGED = 1 << 13  # points while the tip is dragged: the page draws all of them at each step
 
 
 class FollowEye(Job):
