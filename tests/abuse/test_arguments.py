@@ -34,6 +34,12 @@ def answer(call: Call, argument: str, value: object) -> str:
     return "accepted"
 
 
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path, monkeypatch):
+    """What is written when an argument is as it should be goes nowhere else."""
+    monkeypatch.chdir(tmp_path)
+
+
 @pytest.mark.parametrize(("call", "argument"), TRIED)
 def test_an_argument_takes_what_it_is_meant_for_or_refuses_in_one_line(call, argument):
     kind, fine = call.asked[argument]
