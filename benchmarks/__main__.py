@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
-from softreach import parallel
+from softreach.support import parallel
 
 PAGE = Path(__file__).parent.parent / "docs" / "benchmarks.md"
 PARTS = (

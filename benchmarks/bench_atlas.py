@@ -20,11 +20,11 @@ from benchmarks.memory import peak_bytes
 from softreach.arm import designs
 from softreach.atlas import DesignSpace, build_atlas
 from softreach.atlas.command import Command
-from softreach.atlas.intermediates import Intermediates
+from softreach.atlas.design_task import Intermediates
 from softreach.atlas.metric import Need
 from softreach.atlas.metrics import METRIC_GROUPS, chosen_metrics
 from softreach.atlas.store import AtlasStore, Result
-from softreach.errors import SoftreachWarning
+from softreach.support.errors import SoftreachWarning
 
 ALPHA, ACCURACY, TOL = 0.05, 3e-3, 1e-6
 PARTS = {

@@ -54,7 +54,7 @@ def ours_hull(points: np.ndarray) -> float:
 
 def ours_with_bias(points: np.ndarray) -> float:
     """The estimate for infinitely many points, at a radius that the quarter cloud bears."""
-    from softreach.volume import concave_hull
+    from softreach.cloud.volume import concave_hull
 
     return concave_hull(points, 0.05 if len(points) > 200_000 else 0.3, bias=True).volume_corrected
 
@@ -77,7 +77,7 @@ def ours_critical(points: np.ndarray) -> float:
 
 def ours_convex(points: np.ndarray) -> float:
     """Convex hull."""
-    from softreach.volume import convex_hull
+    from softreach.cloud.volume import convex_hull
 
     return convex_hull(points).volume
 

@@ -161,7 +161,7 @@ def broken_files(folder: Path, number: signal.Signals = signal.SIGINT) -> Iterab
 def _read_store(path: Path) -> None:
     """Read a cloud, or an atlas as far as it got."""
     from softreach.atlas import atlas_status
-    from softreach.cloud import open_cloud
+    from softreach.cloud.clouds import open_cloud
 
     if path.name == "cloud.zarr":
         open_cloud(path).load()

@@ -15,9 +15,10 @@ import pytest
 
 import softreach as sr
 from benchmarks import tsit5
-from softreach import designs, parallel
+from softreach import designs
 from softreach.kernels.compiler import FAST
 from softreach.rod.free import FreeRod
+from softreach.support import parallel
 
 _WIDTH = 64
 

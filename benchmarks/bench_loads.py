@@ -19,11 +19,11 @@ import pytest
 import softreach as sr
 from benchmarks import loads_peers
 from benchmarks.bench_kernels import best_time, twelve_bundles
-from softreach import parallel
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.search import Rung
 from softreach.rod.tip_map import TipMap, TipStatus
+from softreach.support import parallel
 from softreach.workspace import reachable_set
 
 GRAVITY, DENSITY = 9.81, 1000.0

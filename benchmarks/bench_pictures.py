@@ -20,10 +20,10 @@ import numpy as np
 from benchmarks.memory import peak_bytes, reset_peak
 from softreach import plot
 from softreach.arm import designs
-from softreach.cloud import compute_cloud, open_cloud, save_cloud
-from softreach.errors import SoftreachWarning
+from softreach.cloud.clouds import compute_cloud, open_cloud, save_cloud
+from softreach.cloud.volume import concave_hull
 from softreach.plot.style import pyplot
-from softreach.volume import concave_hull
+from softreach.support.errors import SoftreachWarning
 
 ALPHA = 0.05
 PANELS = 4  # columns and rows of the sheet

@@ -8,8 +8,8 @@ from __future__ import annotations
 import sys
 from typing import ClassVar
 
-from softreach.kernels.magnus import exponent
-from softreach.kernels.twist import act
+from softreach.kernels.rod.magnus import exponent
+from softreach.kernels.rod.twist import act
 
 
 class Counted:

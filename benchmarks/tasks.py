@@ -131,8 +131,8 @@ def inverse_tasks() -> dict[str, Task]:
 def redundancy_tasks() -> dict[str, Task]:
     """Questions asked of a cloud."""
     import softreach as sr
-    from softreach.curvature import curvature_statistics
-    from softreach.dexterity import dexterity
+    from softreach.cloud.curvature import curvature_statistics
+    from softreach.cloud.dexterity import dexterity
 
     cloud = sr.compute_cloud(sr.designs.redundant_trunk(), 200_000)
     large = sr.compute_cloud(sr.designs.minimal_trunk(), 2_000_000)

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.arm_shape import (
+from softreach.rod.arm_shape import (
     arm_surface,
     bundle_curves,
     bundle_skins,
     bundle_surfaces,
     rest_configuration,
 )
-from softreach.errors import InvalidInput
+from softreach.support.errors import InvalidInput
 
 trimesh = pytest.importorskip("trimesh")
 

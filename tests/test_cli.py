@@ -15,7 +15,7 @@ from softreach.arm.summary import describe
 from softreach.cli.app import app, run
 
 # Few samples make the α-shape too fine; the command line prints that and goes on.
-pytestmark = pytest.mark.filterwarnings("always::softreach.errors.SoftreachWarning")
+pytestmark = pytest.mark.filterwarnings("always::softreach.support.errors.SoftreachWarning")
 
 COMMANDS = [name for name in app if not name.startswith("-")]
 HEAVY = {"numba", "scipy", "xarray", "matplotlib", "zarr", "pandas", "pydantic"}

@@ -12,7 +12,7 @@ from softreach.arm.parameters import changed
 from softreach.cli.app import app, run
 from softreach.cli.changes import Changes
 
-pytestmark = pytest.mark.filterwarnings("always::softreach.errors.SoftreachWarning")
+pytestmark = pytest.mark.filterwarnings("always::softreach.support.errors.SoftreachWarning")
 
 OPTIONS = ("--payload", "--gravity", "--tip-force", "--set", "--taper-deg", "--revolution-deg")
 TAKE_ONE_DESIGN = ("design", "cloud", "volume", "reach", "solve", "track", "show", "export")

@@ -81,7 +81,7 @@ def test_a_path_is_tracked_into_a_file(tmp_path, trunk, capsys):
 def test_a_path_says_that_the_arm_loses_its_stability(tmp_path, capsys, monkeypatch):
     import xarray as xr
 
-    from softreach import path
+    from softreach.inverse import path
 
     ended = xr.Dataset(
         {

@@ -10,7 +10,7 @@ import pytest
 
 import softreach as sr
 from softreach.arm import designs
-from softreach.errors import InvalidInput
+from softreach.support.errors import InvalidInput
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def test_the_activations_fill_the_box(cloud, trunk):
 def test_a_cloud_depends_on_its_arguments_alone(trunk, sampler, monkeypatch):
     first = sr.compute_cloud(trunk, n=32**3, seed=1, sampler=sampler)
     monkeypatch.setenv("SOFTREACH_NUM_THREADS", "1")
-    monkeypatch.setattr("softreach.cloud.BLOCK", 1_000)
+    monkeypatch.setattr("softreach.cloud.clouds.BLOCK", 1_000)
     assert sr.compute_cloud(trunk, n=32**3, seed=1, sampler=sampler).identical(first)
 
 

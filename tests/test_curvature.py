@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 
 import softreach as sr
-from softreach.curvature import curvature_statistics, distal_stations, stream_statistics
-from softreach.errors import InvalidInput
+from softreach.cloud.curvature import curvature_statistics, distal_stations, stream_statistics
+from softreach.support.errors import InvalidInput
 
 
 @pytest.fixture(scope="module")

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from softreach.arm import designs
-from softreach.cloud import compute_cloud
-from softreach.dexterity import dexterity, solution_measure
-from softreach.errors import InvalidInput
+from softreach.cloud.clouds import compute_cloud
+from softreach.cloud.dexterity import dexterity, solution_measure
 from softreach.inverse import solve_inverse
 from softreach.rod.kinematics import tip_jacobian, tip_positions
+from softreach.support.errors import InvalidInput
 from softreach.workspace import reachable_set
 
 

@@ -44,7 +44,7 @@ def on_page(page: Path) -> str:
     return page.relative_to(ROOT).as_posix()
 
 
-@pytest.mark.filterwarnings("always::softreach.errors.SoftreachWarning")
+@pytest.mark.filterwarnings("always::softreach.support.errors.SoftreachWarning")
 @pytest.mark.parametrize("page", PAGES, ids=on_page)
 @pytest.mark.slow
 def test_everything_on_a_page_runs_and_prints_what_it_says(page, tmp_path, monkeypatch):

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from scipy.io import loadmat
 
 import softreach as sr
-from softreach.errors import InvalidInput, MissingExtra
 from softreach.export import export_arm, export_cloud, export_mesh
-from softreach.export.table import column_names
+from softreach.export.clouds import column_names
+from softreach.support.errors import InvalidInput, MissingExtra
 
 meshio = pytest.importorskip("meshio")
 trimesh = pytest.importorskip("trimesh")
@@ -113,7 +113,7 @@ class TestCloud:
     def test_blocks_do_not_show_in_the_result(self, cloud, tmp_path, monkeypatch):
         export_cloud(cloud, tmp_path / "whole.ply")
         export_cloud(cloud, tmp_path / "whole.csv")
-        monkeypatch.setattr("softreach.export.table._BLOCK", 7)
+        monkeypatch.setattr("softreach.export.clouds._BLOCK", 7)
         export_cloud(cloud, tmp_path / "blocks.ply")
         export_cloud(cloud, tmp_path / "blocks.csv")
         for suffix in ("ply", "csv"):
@@ -128,7 +128,7 @@ class TestCloud:
     def test_other_datasets_and_too_large_ones_are_refused(self, cloud, tmp_path, monkeypatch):
         with pytest.raises(InvalidInput, match="tip, activation"):
             export_cloud(cloud.drop_vars("tip"), tmp_path / "cloud.csv")
-        monkeypatch.setattr("softreach.export.cloud._MAT_LIMIT", 1000)
+        monkeypatch.setattr("softreach.export.clouds._MAT_LIMIT", 1000)
         with pytest.raises(InvalidInput, match="parquet"):
             export_cloud(cloud, tmp_path / "cloud.mat")
         assert not left_over(tmp_path)

@@ -14,7 +14,7 @@ from softreach.rod.activation_box import ActivationBox
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.workspace import ReachableSolid, reachable_set
 from softreach.workspace.flux import signed_volume
-from softreach.workspace.one_to_one import is_one_to_one
+from softreach.workspace.injective import is_one_to_one
 from softreach.workspace.reach import rasterized_set
 from tests.bodies import rubber
 

@@ -8,12 +8,12 @@ from scipy.optimize import minimize
 
 import softreach as sr
 from softreach.arm.loads import Loads
-from softreach.errors import InvalidDesign, InvalidInput
 from softreach.forces import Stop, blocked_force
 from softreach.rod.equilibrium import Solver
 from softreach.rod.load_tables import LoadTables
 from softreach.rod.tip_map import TipStatus, tip_map
 from softreach.stiffness import tip_compliance
+from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.bodies import rubber
 
 LOADED = sr.designs.lce_arm().replace(loads=Loads(gravity=(0, 0, 9.81), payload=0.002))

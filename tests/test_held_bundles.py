@@ -7,10 +7,10 @@ import pytest
 
 from softreach.arm import designs
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import InvalidInput
 from softreach.inverse import Status, prepared_map, solve_inverse
-from softreach.path import track_path
+from softreach.inverse.path import track_path
 from softreach.rod import configuration, free_bundles, tip_map, tip_positions
+from softreach.support.errors import InvalidInput
 from tests.laws import in_box
 
 FINE = 1e-9  # arms with and without a bundle have steps of their own, each within this

@@ -8,10 +8,10 @@ from scipy.optimize import least_squares, minimize
 
 from softreach.arm import designs
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import InvalidInput
 from softreach.inverse import Solutions, Status, branches, prepared_map, solve_inverse
 from softreach.rod import tip_map
 from softreach.rod.kinematics import configuration, tip_positions
+from softreach.support.errors import InvalidInput
 
 DESIGNS = [(108, 2), (75, 3), (36, 3), (0, 0)]
 
@@ -248,7 +248,7 @@ def test_blocks_of_targets_change_no_solution(folded, monkeypatch):
     targets = tip_positions(folded, random_activations(folded, 50))
     targets[::10] += [0.0, 0.0, 2.0]
     whole = solve_inverse(folded, targets)
-    monkeypatch.setattr("softreach.inverse.solver._BLOCK", 7)
+    monkeypatch.setattr("softreach.inverse.solve._BLOCK", 7)
     parts = solve_inverse(folded, targets)
     assert (whole.statuses == Status.UNREACHABLE).any()
     assert whole.to_dataset().identical(parts.to_dataset())

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from softreach.arm import Loads, designs
-from softreach.cloud import compute_cloud, open_cloud, save_cloud
-from softreach.curvature import curvature_statistics
-from softreach.dexterity import dexterity, solution_measure
+from softreach.cloud.clouds import compute_cloud, open_cloud, save_cloud
+from softreach.cloud.curvature import curvature_statistics
+from softreach.cloud.dexterity import dexterity, solution_measure
+from softreach.cloud.redundancy import activation_distance, redundancy_summary, tip_density
+from softreach.cloud.volume import concave_hull, convex_hull, unreachability
 from softreach.export import export_cloud
 from softreach.plot.coloring import color_samples
-from softreach.redundancy import activation_distance, redundancy_summary, tip_density
 from softreach.rod import configuration, tip_map
 from softreach.rod.free_bundles import free_bundles
-from softreach.volume import concave_hull, convex_hull, unreachability
 
 SAMPLES = 3000
 LOADS = Loads(gravity=(0.0, 0.0, 9.81), payload=0.020)

@@ -8,11 +8,11 @@ import pytest
 import softreach as sr
 from softreach.arm import Chamber, FiberArchitecture, LinearTaper, ObliqueMuscle, Tendon
 from softreach.arm.skin import Centerline, body_skin, bundle_skins, bundle_solids, inside
-from softreach.arm_shape import arm_surface, bundle_surfaces, rest_configuration
 from softreach.export import export_arm
-from softreach.palette import material_fill
-from softreach.picture.see_through import faces_to_eye, seen_through
+from softreach.picture.shading import faces_to_eye, seen_through
 from softreach.plot import DesignPanel, plot_arm, plot_cross_section, plot_designs
+from softreach.rod.arm_shape import arm_surface, bundle_surfaces, rest_configuration
+from softreach.support.palette import material_fill
 from tests.cable import Cable
 from tests.made_arms import FIRM, MADE_ARMS, SOFT, STIFF, Ring, mixed_arm, one_ring_arm
 
@@ -24,7 +24,7 @@ SUFFIXES = ("ply", "stl", "obj", "glb", "vtu", "vtk")
 
 @pytest.fixture(autouse=True)
 def close_figures(monkeypatch):
-    monkeypatch.setattr("softreach.plot.frame.DPI", 60)
+    monkeypatch.setattr("softreach.plot.axes.DPI", 60)
     yield
     plt.close("all")
 

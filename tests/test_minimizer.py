@@ -7,8 +7,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from softreach.arm import designs
-from softreach.inverse.minimizer import minimize
-from softreach.inverse.objective import Objective
+from softreach.inverse.descent import Objective, minimize
 from softreach.rod import ActivationBox, configuration, tip_map
 from tests.laws import in_box
 

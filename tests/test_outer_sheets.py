@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.workspace.face_image import face_image
+from softreach.workspace.flux import face_image
 from tests.test_flux import Mapped, mirrored, twisted
 
 

@@ -13,13 +13,11 @@ from hypothesis import strategies as st
 
 from softreach.arm.actuators.ring_integrals import ring_integrals
 from softreach.cli.app import run
-from softreach.errors import InvalidInput
 from softreach.paper import printed, reproduce, reproduce_paper
-from softreach.paper.claims import CLAIMS
-from softreach.paper.notebook import Notebook
-from softreach.paper.parts.uniqueness import uniqueness
-from softreach.paper.settings import QUICK
-from softreach.paper.verdict import Verdict
+from softreach.paper.claims import CLAIMS, Verdict
+from softreach.paper.notebook import QUICK, Notebook
+from softreach.paper.sections.uniqueness import uniqueness
+from softreach.support.errors import InvalidInput
 
 TINY = replace(
     QUICK, designs=3, samples=5_000, alpha=0.2, panels=2, redundant_samples=30_000, queries=500

@@ -8,7 +8,7 @@ from functools import partial
 
 import pytest
 
-from softreach import parallel
+from softreach.support import parallel
 
 
 @pytest.fixture(params=["1", "3"], autouse=True)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from softreach.arm import designs
-from softreach.errors import InvalidInput
 from softreach.inverse import Status, solve_inverse
-from softreach.path import PathStatus, track_path
+from softreach.inverse.path import PathStatus, track_path
 from softreach.rod import tip_map
 from softreach.rod.kinematics import tip_positions
+from softreach.support.errors import InvalidInput
 
 BEGIN, END = np.array([-0.3, -0.9, -0.4]), np.array([-1.2, -0.2, -1.1])
 

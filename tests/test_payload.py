@@ -11,8 +11,8 @@ import softreach as sr
 from softreach import plot
 from softreach.arm.loads import Loads
 from softreach.cli.app import run
-from softreach.errors import InvalidDesign, InvalidInput
-from softreach.payload import payload_curve
+from softreach.support.errors import InvalidDesign, InvalidInput
+from softreach.workspace.payload import payload_curve
 
 pytestmark = pytest.mark.slow
 

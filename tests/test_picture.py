@@ -11,13 +11,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softreach.errors import InvalidInput
 from softreach.geometry.hull import convex_hull
 from softreach.picture import Dots, Skin, html_card, thumbnail
-from softreach.picture.png import png_bytes
 from softreach.picture.projection import VIEWS, is_mirrored, project, sight_axis, view_axes
 from softreach.picture.shading import shade
+from softreach.picture.thumbnail import png_bytes
 from softreach.picture.zbuffer import Extent, ZBuffer
+from softreach.support.errors import InvalidInput
 
 UNIT = Extent(0.0, 1.0, 0.0, 1.0)
 RED, BLUE = (255, 0, 0), (0, 0, 255)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.errors import InvalidInput
-from softreach.palette import activation_colors, bundle_color
 from softreach.picture.projection import VIEWS, project
 from softreach.plot import plot_arm, plot_cloud, plot_hull, plot_views, save_figure
 from softreach.plot.coloring import BundleKey, ScalarKey, color_samples
+from softreach.support.errors import InvalidInput
+from softreach.support.palette import activation_colors, bundle_color
 
 plt = pytest.importorskip("matplotlib.pyplot")
 
@@ -24,7 +24,7 @@ def close_figures():
 @pytest.fixture
 def coarse(monkeypatch):
     """Few pixels, for laws that do not depend on their number."""
-    monkeypatch.setattr("softreach.plot.frame.DPI", 60)
+    monkeypatch.setattr("softreach.plot.axes.DPI", 60)
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from softreach.arm import designs
-from softreach.errors import InvalidInput
-from softreach.palette import bundle_color
 from softreach.plot import DesignPanel, plot_cross_section, plot_designs, plot_volume_curve
+from softreach.support.errors import InvalidInput
+from softreach.support.palette import bundle_color
 
 plt = pytest.importorskip("matplotlib.pyplot")
 

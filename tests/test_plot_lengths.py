@@ -11,10 +11,10 @@ import pytest
 
 import softreach as sr
 from softreach import plot
-from softreach.arm_shape import arm_surface, rest_configuration
-from softreach.errors import InvalidInput
+from softreach.cloud.redundancy import activation_distance
 from softreach.picture.projection import project, view_axes
-from softreach.redundancy import activation_distance
+from softreach.rod.arm_shape import arm_surface, rest_configuration
+from softreach.support.errors import InvalidInput
 
 plt = pytest.importorskip("matplotlib.pyplot")
 pytestmark = pytest.mark.slow
@@ -119,7 +119,7 @@ def ignorant(everything) -> SimpleNamespace:
 
 @pytest.fixture(autouse=True)
 def few_pixels(monkeypatch):
-    monkeypatch.setattr("softreach.plot.frame.DPI", 60)
+    monkeypatch.setattr("softreach.plot.axes.DPI", 60)
     monkeypatch.setattr("softreach.plot.sheet.DPI", 60)
     yield
     plt.close("all")

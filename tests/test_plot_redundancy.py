@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from softreach import designs
-from softreach.cloud import compute_cloud
-from softreach.errors import InvalidInput
+from softreach.cloud.clouds import compute_cloud
+from softreach.cloud.redundancy import activation_distance
 from softreach.plot import (
     plot_distance,
     plot_distance_histograms,
     plot_redundancy,
     plot_slab,
 )
-from softreach.redundancy import activation_distance
+from softreach.support.errors import InvalidInput
 from tests.test_redundancy import made_up
 
 plt = pytest.importorskip("matplotlib.pyplot")
@@ -29,7 +29,7 @@ def drawn():
 @pytest.fixture(autouse=True)
 def few_pixels(monkeypatch):
     """No law here depends on their number."""
-    monkeypatch.setattr("softreach.plot.frame.DPI", 60)
+    monkeypatch.setattr("softreach.plot.axes.DPI", 60)
     yield
     plt.close("all")
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softreach.quantity import quantity, read_quantity, unit_names
+from softreach.support.quantity import quantity, read_quantity, unit_names
 
 
 @pytest.mark.parametrize(

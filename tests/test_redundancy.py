@@ -7,15 +7,15 @@ import pytest
 import xarray as xr
 
 from softreach.arm import designs
-from softreach.cloud import compute_cloud
-from softreach.errors import InvalidInput
-from softreach.redundancy import (
+from softreach.cloud.clouds import compute_cloud
+from softreach.cloud.redundancy import (
     activation_distance,
     distance_map,
     redundancy_summary,
     tip_density,
 )
 from softreach.schema import cloud_dataset
+from softreach.support.errors import InvalidInput
 from tests.geometry.test_neighbors import by_all_pairs
 
 

@@ -9,9 +9,9 @@ import pytest
 
 import softreach as sr
 from softreach.arm.weight import load_number
-from softreach.errors import SoftreachWarning
 from softreach.rest import rest
 from softreach.rod.tip_map import TipStatus, tip_map
+from softreach.support.errors import SoftreachWarning
 from tests.bodies import rubber
 
 SIDEWAYS = (9.81, 0.0, 0.0)

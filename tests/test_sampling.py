@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softreach.errors import InvalidInput
 from softreach.sampling import SAMPLERS, cube_blocks, sample_cube
+from softreach.support.errors import InvalidInput
 
 
 @given(sampler=st.sampled_from(sorted(SAMPLERS)), dim=st.integers(1, 5), size=st.integers(1, 300))

@@ -8,7 +8,6 @@ from scipy.integrate import quad
 
 import softreach as sr
 from softreach.arm.loads import Loads
-from softreach.errors import InvalidDesign, InvalidInput
 from softreach.rod.free import FreeRod
 from softreach.rod.free_bundles import free_bundles
 from softreach.rod.tip_map import tip_map
@@ -18,6 +17,7 @@ from softreach.stiffness import (
     stiffness_along,
     tip_compliance,
 )
+from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.bodies import rubber
 
 TRUNK = sr.designs.minimal_trunk()

@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 
 from softreach.arm import Loads, Manipulator, designs
-from softreach.cloud import compute_cloud
-from softreach.errors import InvalidInput
+from softreach.cloud.clouds import compute_cloud
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap, TipStatus, tip_map
+from softreach.support.errors import InvalidInput
 from softreach.workspace import (
     ReachableCurve,
     ReachableSolid,
     ReachableSurface,
     reachable_set,
 )
-from softreach.workspace.projection import nearest_tips
-from softreach.workspace.tears import left_out_cells
+from softreach.workspace.discontinuities import left_out_cells
+from softreach.workspace.search import nearest_tips
 from tests.bodies import rubber
 
 Moved = Callable[[np.ndarray], np.ndarray]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from softreach.errors import InvalidInput
 from softreach.geometry.surface import Surface
 from softreach.geometry.tube import grid_faces, ribbon_surface, tube_surface
+from softreach.support.errors import InvalidInput
 
 trimesh = pytest.importorskip("trimesh")
 

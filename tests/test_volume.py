@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from softreach.errors import InvalidInput, SoftreachWarning
-from softreach.volume import concave_hull, convex_hull, unreachability, volume_curve
+from softreach.cloud.volume import concave_hull, convex_hull, unreachability, volume_curve
+from softreach.support.errors import InvalidInput, SoftreachWarning
 from tests.geometry.clouds import FLAT, arc_tips, random_points
 
 BALL = 4.0 / 3.0 * np.pi

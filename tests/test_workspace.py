@@ -12,11 +12,11 @@ from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
-from softreach.cloud import compute_cloud
-from softreach.errors import InvalidInput, SoftreachWarning
+from softreach.cloud.clouds import compute_cloud
 from softreach.geometry.hull import convex_hull
 from softreach.inverse import solve_inverse
 from softreach.rod import configuration, tip_map, tip_positions
+from softreach.support.errors import InvalidInput, SoftreachWarning
 from softreach.workspace import (
     ReachableCurve,
     ReachablePoint,

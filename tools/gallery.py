@@ -18,7 +18,7 @@ import numpy as np
 import softreach as sr
 from softreach import plot
 from softreach.arm import designs
-from softreach.quantity import quantity
+from softreach.support.quantity import quantity
 
 DOCS = Path(__file__).parent.parent / "docs"
 PAGE, PICTURES = DOCS / "gallery.md", DOCS / "images" / "gallery"

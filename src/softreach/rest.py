@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arguments import checked
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.errors import InvalidInput
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.tip_map import TipStatus
+from softreach.support.arguments import checked
+from softreach.support.errors import InvalidInput
 
 __all__ = ["Rest", "rest"]
 

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arguments import as_whole_number, one_of
-from softreach.errors import InvalidInput
-from softreach.memory import check_room
+from softreach.support.arguments import as_whole_number, one_of
+from softreach.support.errors import InvalidInput
+from softreach.support.memory import check_room
 
 __all__ = ["SAMPLERS", "check_sampler", "cube_blocks", "sample_cube"]
 

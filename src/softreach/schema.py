@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arguments import dataset
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import InvalidInput
-from softreach.versions import SCHEMA_VERSION, versions
+from softreach.support.arguments import dataset
+from softreach.support.errors import InvalidInput
+from softreach.support.versions import SCHEMA_VERSION, versions
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from softreach.geometry.cell_grid import CellGrid
+    from softreach.geometry.lattice import CellGrid
 
 __all__ = [
     "AXES",
@@ -269,7 +269,7 @@ def tip_cells(cloud: xr.Dataset, edge: float | None = None) -> CellGrid:
     Raises:
         InvalidInput: No cloud, or an edge that is not positive or gives too many cubes.
     """
-    from softreach.geometry.cell_grid import CellGrid
+    from softreach.geometry.lattice import CellGrid
 
     tip = check_cloud(cloud)["tip"]
     points = tip.values

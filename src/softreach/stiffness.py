@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach import parallel
-from softreach.arguments import checked
 from softreach.arm.manipulator import Manipulator
-from softreach.arrays import as_floats
-from softreach.cloud import tip_map_of
-from softreach.errors import InvalidDesign, InvalidInput
+from softreach.cloud.clouds import tip_map_of
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.tip_map import BLOCK, TipMap, tip_map
 from softreach.schema import AXES, a_cloud, check_cloud
+from softreach.support import parallel
+from softreach.support.arguments import checked
+from softreach.support.arrays import as_floats
+from softreach.support.errors import InvalidDesign, InvalidInput
 
 if TYPE_CHECKING:
     import xarray as xr

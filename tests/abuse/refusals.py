@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from softreach.cli.app import run
-from softreach.errors import SoftreachError
+from softreach.support.errors import SoftreachError
 
 __all__ = ["files_in", "raised_by", "refusal_of", "within_budget"]
 

@@ -7,7 +7,7 @@ from contextlib import suppress
 
 import pytest
 
-from softreach.errors import SoftreachError
+from softreach.support.errors import SoftreachError
 from tests.abuse.bad_values import BAD, without
 from tests.abuse.public_calls import CALLS, UNTRIED, Call
 from tests.abuse.refusals import within_budget

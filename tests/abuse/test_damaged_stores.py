@@ -22,8 +22,8 @@ import softreach as sr
 from softreach import schema
 from softreach.atlas import DamagedStore, atlas_cloud, build_atlas, open_atlas, verify_atlas
 from softreach.cli.app import run
-from softreach.errors import SoftreachError, SoftreachWarning
-from softreach.stores.seal import SEAL, sealed
+from softreach.support.errors import SoftreachError, SoftreachWarning
+from softreach.support.files.sealed_store import SEAL, sealed
 from tests.abuse.refusals import files_in, raised_by, refusal_of
 from tests.atlas.families import TINY, gapped_space
 

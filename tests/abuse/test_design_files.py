@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import softreach as sr
 from softreach.arm.file.json_schema import json_schema
-from softreach.errors import InvalidDesign, SoftreachError
+from softreach.support.errors import InvalidDesign, SoftreachError
 from tests.abuse.refusals import raised_by, refusal_of, within_budget
 
 TRUNK = sr.designs.minimal_trunk().to_toml()

@@ -10,7 +10,7 @@ import pytest
 from softreach.cli.app import app
 from softreach.cli.changes import Changes
 from softreach.cli.numbers import NUMBER, WHOLE
-from softreach.quantity import read_number, read_whole_number
+from softreach.support.quantity import read_number, read_whole_number
 from tests.abuse.refusals import refusal_of
 
 WHOLE_NUMBER = "must be a whole number such as 20000 or 2e4"
@@ -176,7 +176,7 @@ def test_a_decimal_number_is_what_python_reads(text):
 def test_an_atlas_that_the_disk_cannot_hold_is_not_begun(tmp_path, monkeypatch, capsys):
     """Nor is any of its designs made, which would take minutes here."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("softreach.memory.free_disk", lambda path: 1e9)
+    monkeypatch.setattr("softreach.support.memory.free_disk", lambda path: 1e9)
     many = ["--vary", "taper_deg=0:3:300", "--vary", "revolution_deg=0:108:300"]
     said = refusal_of(["atlas", "build", "a.zarr", *many, "--n", "1e5"], capsys, tmp_path)
     assert "n = 100000 samples of 90000 designs" in said

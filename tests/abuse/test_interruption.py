@@ -24,8 +24,8 @@ from benchmarks.bench_interruption import (
     survivors_of,
 )
 
-from softreach.atomic import replacing
-from softreach.file_kinds import PICTURES
+from softreach.support.files.atomic import replacing
+from softreach.support.files.kinds import PICTURES
 
 pytestmark = [
     pytest.mark.slow,
@@ -88,8 +88,8 @@ def test_what_a_kill_leaves_of_a_file_goes_with_the_next_file_in_that_folder(tmp
         tmp_path,
         """
         import os, signal
-        from softreach.atomic import replacing
-        from softreach.file_kinds import PICTURES
+        from softreach.support.files.atomic import replacing
+        from softreach.support.files.kinds import PICTURES
 
         with replacing("table.csv", PICTURES[".png"]) as partial:
             partial.write_text("half a ta")
@@ -110,8 +110,8 @@ def test_a_folder_killed_while_it_is_replaced_is_put_in_place_by_the_next_file(t
         """
         import os, signal
         from pathlib import Path
-        from softreach import atomic
-        from softreach.file_kinds import PICTURES
+        from softreach.support.files import atomic
+        from softreach.support.files.kinds import PICTURES
 
         def killed(*_):
             os.kill(os.getpid(), signal.SIGKILL)
@@ -135,8 +135,8 @@ def test_a_file_that_another_process_is_writing_is_left_alone(tmp_path):
     process = _run(
         tmp_path,
         """
-        from softreach.atomic import replacing
-        from softreach.file_kinds import PICTURES
+        from softreach.support.files.atomic import replacing
+        from softreach.support.files.kinds import PICTURES
 
         with replacing("table.csv", PICTURES[".png"]) as partial:
             partial.write_text("a table")
@@ -159,7 +159,7 @@ def test_a_block_done_as_a_whole_ends_before_the_process_and_none_begins_after(t
         import os, signal, threading, time
         from pathlib import Path
         from softreach.cli.signals import end_on_signals
-        from softreach.interruption import as_a_whole
+        from softreach.support.files.interruption import as_a_whole
 
         end_on_signals()
         with as_a_whole():

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.atomic import writing
-from softreach.errors import InvalidInput, NotWritten, SoftreachWarning
 from softreach.exchange.activefilaments import write_cloud, write_design
 from softreach.export import export_arm, export_cloud, export_mesh
-from softreach.file_kinds import PICTURES
 from softreach.plot import save_figure
+from softreach.support.errors import InvalidInput, NotWritten, SoftreachWarning
+from softreach.support.files.atomic import writing
+from softreach.support.files.kinds import PICTURES
 from tests.abuse.refusals import files_in, raised_by, refusal_of
 
 pytest.importorskip("pyarrow")
@@ -332,9 +332,9 @@ def test_a_missing_extra_is_named_before_the_work(
 
 
 def test_more_than_half_of_the_memory_is_announced(monkeypatch):
-    from softreach.memory import check_memory
+    from softreach.support.memory import check_memory
 
-    monkeypatch.setattr("softreach.memory.free_memory", lambda: 1e9)
+    monkeypatch.setattr("softreach.support.memory.free_memory", lambda: 1e9)
     check_memory("n", 5, 4e8)
     with pytest.warns(SoftreachWarning, match="n = 6 takes 600 MB of memory, of which 1 GB are"):
         check_memory("n", 6, 6e8)
@@ -347,8 +347,8 @@ LARGE = [name for name in WRITERS if name.startswith(("cloud.", "mesh.", "arm.",
 
 @pytest.mark.parametrize("name", LARGE)
 def test_an_output_that_the_disk_cannot_hold_is_not_begun(name, things, tmp_path, monkeypatch):
-    monkeypatch.setattr("softreach.memory._NOTICED", 0)
-    monkeypatch.setattr("softreach.memory.free_disk", lambda path: 100.0)
+    monkeypatch.setattr("softreach.support.memory._NOTICED", 0)
+    monkeypatch.setattr("softreach.support.memory.free_disk", lambda path: 100.0)
     error = raised_by(lambda: WRITERS[name](things, tmp_path / "new" / name))
     assert "of disk space, of which 100 bytes are free" in str(error)
     assert not any(tmp_path.iterdir())
@@ -362,8 +362,8 @@ def test_an_output_that_takes_most_of_the_disk_is_announced_and_written(
         """Half as much again as is asked for, which the frame above knows."""
         return 1.5 * sys._getframe(1).f_locals["needed"]
 
-    monkeypatch.setattr("softreach.memory._NOTICED", 0)
-    monkeypatch.setattr("softreach.memory.free_disk", free)
+    monkeypatch.setattr("softreach.support.memory._NOTICED", 0)
+    monkeypatch.setattr("softreach.support.memory.free_disk", free)
     with pytest.warns(SoftreachWarning, match="of disk space, of which"):
         WRITERS[name](things, tmp_path / name)
     assert (tmp_path / name).exists()
@@ -381,7 +381,7 @@ def test_a_command_says_first_what_the_disk_cannot_hold(
     words, expected, tmp_path, monkeypatch, capsys
 ):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("softreach.memory.free_disk", lambda path: 2e7)
+    monkeypatch.setattr("softreach.support.memory.free_disk", lambda path: 2e7)
     assert expected in refusal_of(words.split(), capsys, tmp_path)
 
 
@@ -389,8 +389,8 @@ def test_cells_of_a_reachable_set_that_memory_cannot_hold_are_told_by_their_numb
     trunk, monkeypatch
 ):
     image = dataclasses.replace(sr.reachable_set(trunk, accuracy=0.05).image)  # nothing counted
-    monkeypatch.setattr("softreach.memory._NOTICED", 0)
-    monkeypatch.setattr("softreach.memory.free_memory", lambda: 100.0)
+    monkeypatch.setattr("softreach.support.memory._NOTICED", 0)
+    monkeypatch.setattr("softreach.support.memory.free_memory", lambda: 100.0)
     error = raised_by(lambda: image.counts)
     assert "cells of the lattice = " in str(error)
     assert "of memory, of which 100 bytes are free" in str(error)

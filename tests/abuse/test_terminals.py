@@ -145,8 +145,8 @@ def test_colors_and_terminals_that_are_asked_for_change_no_word(variable, stream
 
 
 def test_a_backend_that_does_not_exist_is_named(monkeypatch):
-    from softreach.errors import InvalidInput
     from softreach.plot.style import pyplot
+    from softreach.support.errors import InvalidInput
 
     monkeypatch.setenv("MPLBACKEND", "nonsense")
     for name in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"]:

@@ -23,7 +23,7 @@ from softreach.arm import (
 )
 from softreach.arm.along import AlongArm
 from softreach.arm.tables import tables
-from softreach.errors import InvalidDesign
+from softreach.support.errors import InvalidDesign
 from tests.kinds import angles_along, profiles, stations, values_at
 
 SECTION = Section(

@@ -13,7 +13,7 @@ import softreach as sr
 from softreach.arm import Chamber, LinearTaper, Manipulator, Material, Ring, Section, Tendon
 from softreach.arm.summary import design_warnings
 from softreach.arm.tables import tables
-from softreach.errors import InvalidDesign
+from softreach.support.errors import InvalidDesign
 from tests.kinds import any_arms, layers_at
 from tests.oracles.sections import disc, pressure_load, stiffness
 

@@ -13,8 +13,8 @@ import softreach as sr
 from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.summary import describe
-from softreach.errors import InvalidInput
 from softreach.rod.kinematics import tip_positions
+from softreach.support.errors import InvalidInput
 from tests.laws import arm_of, arms, in_box
 
 

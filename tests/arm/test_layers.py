@@ -19,7 +19,7 @@ from softreach.arm import (
     Tendon,
 )
 from softreach.arm.tables import compliance, tables
-from softreach.errors import InvalidDesign
+from softreach.support.errors import InvalidDesign
 from tests.kinds import any_arms, layers_at, materials, profiles, sections
 from tests.laws import arm_of
 from tests.oracles.sections import stiffness

@@ -12,7 +12,7 @@ from softreach.arm import PointLoad
 from softreach.arm.file.load_table import LoadTable
 from softreach.arm.parameters import changed, find_parameter
 from softreach.arm.parameters.written import written_parameters
-from softreach.errors import InvalidDesign
+from softreach.support.errors import InvalidDesign
 from tests.bodies import rubber
 
 number = st.floats(-1e3, 1e3)

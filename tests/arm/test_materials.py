@@ -9,7 +9,7 @@ import pytest
 from tools.materials import page_with_table
 
 from softreach.arm.materials import material_names, material_record, named_material
-from softreach.errors import InvalidInput
+from softreach.support.errors import InvalidInput
 
 DOCS = Path(__file__).parents[2] / "docs"
 NAMES = material_names()

@@ -23,7 +23,7 @@ from softreach.arm import (
 )
 from softreach.arm.along import AlongArm
 from softreach.arm.tables import tables
-from softreach.errors import InvalidDesign
+from softreach.support.errors import InvalidDesign
 from tests.kinds import any_arms, layers_at
 from tests.oracles.sections import (
     Drive,

@@ -28,8 +28,8 @@ from softreach.arm.parameters.written import written_parameters
 from softreach.arm.sampled_profiles import PiecewiseTaper
 from softreach.arm.section import Ring, Section
 from softreach.arm.variable import Variable
-from softreach.errors import InvalidDesign, InvalidInput, Range
 from softreach.rod.kinematics import tip_positions
+from softreach.support.errors import InvalidDesign, InvalidInput, Range
 from tests.laws import arm_of, arms, in_box
 
 SAMPLED = Samples(stations_over_length=(0.0, 0.3, 1.0), values=(0.0, 0.1, 0.3))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from softreach.arm import LinearTaper
-from softreach.errors import InvalidDesign
+from softreach.support.errors import InvalidDesign
 
 
 @st.composite

@@ -13,7 +13,7 @@ from scipy.integrate import quad
 
 import softreach as sr
 from softreach.arm import LinearTaper, PiecewiseTaper, SampledTaper, designs
-from softreach.errors import InvalidDesign
+from softreach.support.errors import InvalidDesign
 from tests.kinds import profiles, stations
 from tests.laws import in_box
 

@@ -28,7 +28,7 @@ from softreach.arm import (
     Tendon,
 )
 from softreach.arm.tables import tables
-from softreach.errors import InvalidDesign, InvalidInput
+from softreach.support.errors import InvalidDesign, InvalidInput
 
 RUBBER = Material(young_modulus=1e6)
 RING = Ring(inner_ratio=0.5, material=RUBBER)

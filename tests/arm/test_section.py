@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import dblquad
 
 from softreach.arm import Material, Ring, Section
-from softreach.errors import InvalidDesign
+from softreach.support.errors import InvalidDesign
 
 
 def section(poisson_ratio: float = 0.5, inner_ratio: float = 0.75) -> Section:

@@ -12,7 +12,7 @@ from hypothesis import given
 from softreach.arm import designs
 from softreach.arm.actuators.ring_integrals import ring_integrals
 from softreach.arm.tables import check_extension, extension_range, tables
-from softreach.errors import InvalidDesign
+from softreach.support.errors import InvalidDesign
 from tests.laws import arms, in_box, single
 
 

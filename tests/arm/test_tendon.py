@@ -22,7 +22,7 @@ from softreach.arm import (
     Tendon,
 )
 from softreach.arm.tables import tables
-from softreach.errors import InvalidDesign
+from softreach.support.errors import InvalidDesign
 from tests.oracles import tendon_rod
 from tests.oracles.tendon_law import linear_shape
 from tests.oracles.tendon_rod import follower_shape

@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from softreach.atlas import StoreFailed, atlas_status, build_atlas, open_atlas, worker_processes
-from softreach.errors import InvalidInput
+from softreach.support.errors import InvalidInput
 from tests.atlas.families import SMALL, assert_same, small_space
 from tests.atlas.scripts import build16, ended, run_script
 

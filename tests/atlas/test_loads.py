@@ -15,11 +15,11 @@ from softreach.atlas import (
     best_designs,
     build_atlas,
 )
-from softreach.cloud import compute_cloud
-from softreach.errors import SoftreachWarning
+from softreach.cloud.clouds import compute_cloud
+from softreach.cloud.volume import concave_hull
 from softreach.rod import load_phase
 from softreach.rod.tip_map import TipStatus
-from softreach.volume import concave_hull
+from softreach.support.errors import SoftreachWarning
 
 PAYLOADS = [0.005, 0.015, 2.0]  # stable, in part, nowhere [kg]
 N = 2_000

@@ -15,7 +15,7 @@ from softreach.atlas import (
     over_length,
 )
 from softreach.atlas.metrics import chosen_metrics
-from softreach.errors import SoftreachWarning
+from softreach.support.errors import SoftreachWarning
 from tests.atlas.families import SMALL, similar_designs, small_space
 from tests.laws import of_length
 

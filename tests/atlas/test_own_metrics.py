@@ -24,8 +24,8 @@ from softreach.atlas import (
 )
 from softreach.atlas.metrics import chosen_metrics
 from softreach.atlas.store import AtlasStore
-from softreach.errors import InvalidInput, SoftreachWarning
 from softreach.rod.tip_map import TipMap
+from softreach.support.errors import InvalidInput, SoftreachWarning
 from tests.atlas.families import SMALL, assert_same, command, similar_designs, small_space
 
 
@@ -106,7 +106,7 @@ def test_what_metrics_share_is_computed_once_for_each_design(tmp_path, monkeypat
 
     shared = ("delaunay", "stream_statistics")
     for name in shared:
-        counting(import_module("softreach.atlas.intermediates"), name)
+        counting(import_module("softreach.atlas.design_task"), name)
     counting(import_module("softreach.workspace"), "reachable_set")
     counting(TipMap, "tips_and_status")
     options = SMALL | {"metrics": tuple(METRIC_GROUPS), "accuracy": 0.1}

@@ -17,7 +17,7 @@ from softreach.atlas import DesignSpace, atlas_cloud, atlas_design, best_designs
 from softreach.atlas.space_file import parse_space
 from softreach.atlas.store import AtlasStore
 from softreach.cli.app import run
-from softreach.errors import InvalidInput
+from softreach.support.errors import InvalidInput
 from tests.atlas.families import TINY, assert_same, command
 
 MODULUS, END = "rings[0].material.young_modulus", "left.end_over_length"

@@ -22,11 +22,11 @@ from softreach.atlas import (
 )
 from softreach.atlas.design_task import begin_design
 from softreach.atlas.store import AtlasStore
-from softreach.errors import InvalidInput
 from softreach.paper.atlas_figures import hulls_of
 from softreach.picture.projection import view_axes
 from softreach.plot import box_over_length, plot_metric_map
 from softreach.plot.sheet import panel_extent
+from softreach.support.errors import InvalidInput
 from tests.atlas.families import (
     SMALL,
     assert_same,

@@ -11,8 +11,8 @@ import softreach as sr
 from softreach.atlas import DesignSpace, StoreFailed, atlas_status, build_atlas
 from softreach.atlas.design_task import Intermediates
 from softreach.atlas.store import AtlasStore
-from softreach.errors import InvalidInput, SoftreachWarning
 from softreach.rod import TipMap
+from softreach.support.errors import InvalidInput, SoftreachWarning
 from tests.atlas.families import SMALL, assert_same, command, small_space
 from tests.atlas.scripts import build16, ended, run_script
 from tests.laws import of_length
@@ -135,7 +135,7 @@ def test_a_full_disk_costs_one_line_and_the_rest_can_be_resumed(tmp_path):
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (8_000, -1))
         shard = (0, 1) if len(sys.argv) > 2 else (0, 8)
-        from softreach.errors import SoftreachError
+        from softreach.support.errors import SoftreachError
         try:
             build(store, shard=shard)
         except SoftreachError as error:

@@ -9,7 +9,7 @@ import softreach as sr
 from softreach.arm.parameters import changed
 from softreach.atlas import DesignSpace
 from softreach.atlas.space_file import parse_space
-from softreach.errors import InvalidInput
+from softreach.support.errors import InvalidInput
 from tests.atlas.families import small_space
 
 

@@ -22,7 +22,7 @@ from softreach.atlas import (
     open_atlas,
 )
 from softreach.atlas.store import AtlasStore, Result
-from softreach.errors import InvalidInput, SoftreachError, SoftreachWarning
+from softreach.support.errors import InvalidInput, SoftreachError, SoftreachWarning
 from tests.atlas.families import SMALL, TINY, assert_same, command, gapped_space, small_space
 from tests.laws import of_length
 

@@ -8,13 +8,13 @@ import pytest
 import softreach as sr
 from softreach.arm import designs
 from softreach.cli.app import run
-from softreach.errors import SoftreachWarning
 from softreach.exchange.activefilaments import (
     gamma_path,
     read_cloud,
     write_cloud,
     write_design,
 )
+from softreach.support.errors import SoftreachWarning
 
 ROWS = 200
 

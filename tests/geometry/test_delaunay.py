@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softreach.errors import InvalidInput
 from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.geometry.delaunay import Delaunay, delaunay, unit_scale
 from softreach.geometry.hull import convex_hull
-from softreach.kernels.expansions import scratch
-from softreach.kernels.predicates import insphere, orient
-from softreach.kernels.triangulation import FACES
+from softreach.kernels.points.expansions import scratch
+from softreach.kernels.points.predicates import insphere, orient
+from softreach.kernels.points.triangulation import FACES
+from softreach.support.errors import InvalidInput
 from tests.geometry.clouds import DEGENERATE, FLAT, arc_tips, random_points
 from tests.geometry.exact import exact_insphere, exact_orient, rational
 

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softreach import parallel
-from softreach.errors import InvalidInput
 from softreach.geometry import neighbors
 from softreach.geometry.neighbors import mean_value_distance
-from softreach.kernels.neighbors import stable_order
+from softreach.kernels.points.neighbor_sums import stable_order
+from softreach.support import parallel
+from softreach.support.errors import InvalidInput
 
 
 def by_all_pairs(points, values, radius, queries=None):

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from softreach.geometry.plane_cut import plane_cut
-from softreach.geometry.surface import Surface
+from softreach.geometry.surface import Surface, plane_cut
 
 SIDES = 96
 

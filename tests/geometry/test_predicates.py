@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from softreach.kernels.expansions import scratch
-from softreach.kernels.predicates import (
+from softreach.kernels.points.expansions import scratch
+from softreach.kernels.points.predicates import (
     collinear,
     insphere,
     insphere_exact,

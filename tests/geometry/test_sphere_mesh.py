@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from softreach.geometry.sphere_mesh import icosphere, quartered
+from softreach.geometry.sphere_maps import icosphere, quartered
 
 
 def solid_angle(corners):

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from softreach.geometry.sphere_rings import is_axisymmetric, pole_rings
-from softreach.geometry.sphere_roots import sphere_roots
+from softreach.geometry.sphere_maps import is_axisymmetric, pole_rings, sphere_roots
 
 POLE = np.array([0.0, 0.0, 1.0])
 NOWHERE = np.empty((0, 3))

@@ -9,9 +9,9 @@ from scipy.optimize import minimize
 
 from softreach.arm import designs
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import InvalidInput
 from softreach.inverse import Status, solve_inverse
 from softreach.rod import TipMap, tip_map, tip_positions
+from softreach.support.errors import InvalidInput
 from tests.inverse.test_many_bundles import changes, six_bundles
 
 OVERLOOKED = np.array([-0.6582, -0.8974, -1.036, -1.4149])
@@ -96,7 +96,8 @@ def test_no_activation_that_reaches_a_target_changes_less_than_the_bound(design)
 
 
 def test_a_larger_activation_is_never_proved_to_be_least(monkeypatch):
-    from softreach.inverse import least_bound, prepared_map
+    from softreach.inverse import prepared_map
+    from softreach.inverse import proofs as least_bound
 
     arm = designs.redundant_trunk()
     prepared = prepared_map(arm)

@@ -7,12 +7,12 @@ import pytest
 
 from softreach.arm import Loads, designs
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import InvalidInput
 from softreach.inverse import PathStatus, Status, solve_inverse
-from softreach.path import track_path
+from softreach.inverse.path import track_path
 from softreach.rod import tip_map
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.tip_map import TipStatus
+from softreach.support.errors import InvalidInput
 from tests.bodies import oracle_rod
 from tests.oracles import loaded_rod
 

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.kernels.activation_mesh import ActivationMesh, interpolation_errors
-from softreach.kernels.simplices import corner_bits, kuhn_simplices
+from softreach.kernels.box.simplices import corner_bits, kuhn_simplices
+from softreach.kernels.image.activation_mesh import ActivationMesh, interpolation_errors
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

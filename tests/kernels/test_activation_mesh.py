@@ -12,7 +12,7 @@ from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import extension_range
 from softreach.inverse.cells import activation_cells
-from softreach.kernels.activation_mesh import ActivationMesh, face_planes
+from softreach.kernels.image.activation_mesh import ActivationMesh, face_planes
 from softreach.rod import tip_map, tip_positions
 from tests.kernels.maps import Quadratic, mesh_of, random_quadratic, sampled
 from tests.laws import arm_of

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
-from softreach.kernels.box_newton import box_steps
+from softreach.kernels.box.box_newton import box_steps
 
 SEEDS = st.integers(0, 2**32 - 1)
 SIZES = st.integers(1, 6)

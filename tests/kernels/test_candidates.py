@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softreach.inverse.image_tree import image_tree
-from softreach.kernels import candidates
-from softreach.kernels.candidates import MOST_STARTS, find_starts
+from softreach.inverse.cells import image_tree
+from softreach.kernels.branches import candidates
+from softreach.kernels.branches.candidates import MOST_STARTS, find_starts
 from tests.kernels.maps import Quadratic, mesh_of, random_fold, random_quadratic
 
 SEEDS = st.integers(0, 2**32 - 1)

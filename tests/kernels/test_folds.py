@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softreach.kernels import folds
+from softreach.kernels.branches import folds
 from tests.kernels.maps import mesh_of, random_fold
 
 FAR = np.full(3, 100.0)

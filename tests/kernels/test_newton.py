@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softreach.kernels.newton import (
+from softreach.kernels.branches.newton import (
     CONVERGED,
     RUNNING,
     STAGNATED,

@@ -10,8 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softreach.kernels import contour, point_cover, raster
-from softreach.kernels.simplices import chains, corner_bits, corner_steps, kuhn_simplices, strides
+from softreach.kernels.box.simplices import (
+    chains,
+    corner_bits,
+    corner_steps,
+    kuhn_simplices,
+    strides,
+)
+from softreach.kernels.image import contour, point_cover, raster
 
 UNIT = 64.0
 

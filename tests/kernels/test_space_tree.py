@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from softreach.inverse.image_tree import image_tree
-from softreach.kernels.space_tree import SpaceTree, leaf_at
+from softreach.inverse.cells import image_tree
+from softreach.kernels.branches.space_tree import SpaceTree, leaf_at
 from tests.kernels.maps import mesh_of, random_quadratic, sampled
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -11,8 +11,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from softreach.errors import InvalidInput
 from softreach.rod.activation_box import ActivationBox
+from softreach.support.errors import InvalidInput
 
 # Differences of these do not overflow; subnormal numbers and zeros of both signs are among them.
 ends = st.floats(-1e150, 1e150)

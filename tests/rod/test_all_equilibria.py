@@ -223,7 +223,7 @@ def test_what_may_be_missing_is_said(monkeypatch):
 
 
 def _without_the_last(*args, **options):
-    from softreach.geometry import sphere_roots
+    from softreach.geometry import sphere_maps as sphere_roots
 
     roots, cut = sphere_roots.sphere_roots(*args, **options)
     kept = np.sort(np.argsort(roots.determinants)[1:])

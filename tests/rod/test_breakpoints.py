@@ -26,7 +26,7 @@ from softreach.arm import (
     Tendon,
 )
 from softreach.arm.tables import tables
-from softreach.kernels import rod
+from softreach.kernels.rod import tips as rod
 from softreach.rod.free import FreeRod
 from tests.kinds import any_arms, driven
 from tests.laws import in_box

@@ -7,7 +7,6 @@ import pytest
 
 from softreach.arm import designs
 from softreach.arm.loads import Loads, PointLoad
-from softreach.errors import InvalidInput
 from softreach.rod import loaded_steps
 from softreach.rod.equilibrium import Solver
 from softreach.rod.free import FreeRod
@@ -15,6 +14,7 @@ from softreach.rod.load_tables import LoadTables
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.search import Rung
 from softreach.rod.tip_map import TipStatus
+from softreach.support.errors import InvalidInput
 from tests.bodies import Uniform, rubber, uniform
 from tests.oracles import elastica
 

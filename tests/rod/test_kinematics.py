@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 import softreach as sr
 from softreach.arm import describe, designs
 from softreach.arm.tables import tables
-from softreach.errors import InvalidInput
-from softreach.kernels import reference
+from softreach.kernels.rod import reference
 from softreach.rod.free import FreeRod
 from softreach.rod.tip_map import tip_map
+from softreach.support.errors import InvalidInput
 from tests.laws import arm_of, arms, in_box, integrated_tip, single
 
 

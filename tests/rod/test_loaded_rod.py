@@ -10,9 +10,8 @@ import pytest
 from softreach.arm import designs
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.tables import tables
-from softreach.curvature import stream_statistics
-from softreach.errors import InvalidDesign
-from softreach.kernels import loaded_reference
+from softreach.cloud.curvature import stream_statistics
+from softreach.kernels.loaded import loaded_reference
 from softreach.rod import equilibrium
 from softreach.rod import loaded as loaded_module
 from softreach.rod.equilibrium import Solver
@@ -21,6 +20,7 @@ from softreach.rod.load_tables import LoadTables
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.search import Rung
 from softreach.rod.tip_map import TipStatus
+from softreach.support.errors import InvalidDesign
 from tests.bodies import oracle_rod, rubber, uniform
 from tests.oracles import column, elastica, loaded_rod
 

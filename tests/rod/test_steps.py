@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 import softreach as sr
 from softreach.arm import FiberArchitecture, designs
-from softreach.errors import InvalidInput
-from softreach.kernels import rod
+from softreach.kernels.rod import tips as rod
 from softreach.rod.free import FreeRod
+from softreach.support.errors import InvalidInput
 from tests.laws import arm_of, arms, in_box
 
 

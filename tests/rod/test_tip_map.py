@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from softreach.arm import designs
-from softreach.errors import InvalidDesign, InvalidInput
 from softreach.rod import tip_positions
 from softreach.rod.free import FreeRod
 from softreach.rod.tip_map import tip_map
+from softreach.support.errors import InvalidDesign, InvalidInput
 
 
 def test_an_arm_without_loads_is_a_free_rod(trunk):

@@ -17,10 +17,10 @@ from hypothesis import strategies as st
 
 from softreach.arm import Manipulator, designs
 from softreach.arm.loads import Loads
-from softreach.errors import InvalidDesign, InvalidInput
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.tip_map import BLOCK, TipMap, TipStatus, tip_map
+from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.bodies import rubber
 from tests.laws import arms, in_box, integrated_tip
 

@@ -10,8 +10,8 @@ import pytest
 from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.atlas import DesignSpace, build_atlas, open_atlas
-from softreach.errors import SoftreachWarning
 from softreach.studio.atlas_numbers import nearest_numbers
+from softreach.support.errors import SoftreachWarning
 
 
 def atlas_of(path, n, metrics):

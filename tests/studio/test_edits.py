@@ -9,8 +9,8 @@ import pytest
 
 import softreach as sr
 from softreach.arm import Material
-from softreach.errors import InvalidDesign, InvalidInput
 from softreach.studio import edits
+from softreach.support.errors import InvalidDesign, InvalidInput
 
 SOFT = "dragon_skin_30"
 

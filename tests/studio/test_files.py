@@ -12,8 +12,7 @@ import pytest
 from softreach.arm import designs
 from softreach.arm.parameters import changed, find_parameter
 from softreach.atlas import DesignSpace, build_atlas, open_atlas
-from softreach.cloud import compute_cloud, save_cloud
-from softreach.errors import InvalidDesign, InvalidInput
+from softreach.cloud.clouds import compute_cloud, save_cloud
 from softreach.export import export_cloud
 from softreach.plot.style import pyplot
 from softreach.studio.atlas_map import atlas_map, held_places, map_choices, metric_names
@@ -25,6 +24,7 @@ from softreach.studio.slicing import in_slice
 from softreach.studio.source import start_on_design, start_on_state, start_on_store
 from softreach.studio.stages import stages
 from softreach.studio.state import MapView, Slice, StudioState
+from softreach.support.errors import InvalidDesign, InvalidInput
 
 SMALL = Quality(coarse_level=8, fine_level=10, coarse_accuracy=0.1, fine_accuracy=0.05)
 

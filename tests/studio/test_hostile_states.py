@@ -7,10 +7,10 @@ import json
 import pytest
 
 from softreach.arm import designs
-from softreach.errors import SoftreachError
 from softreach.studio import StudioState
 from softreach.studio.files import state_from
 from softreach.studio.source import start_on_state
+from softreach.support.errors import SoftreachError
 
 STATE = StudioState(design=designs.minimal_trunk())
 

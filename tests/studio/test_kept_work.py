@@ -10,11 +10,11 @@ import pytest
 from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.cli.studio import _start, _work
-from softreach.errors import InvalidInput
 from softreach.studio.kept_work import KeptWork, work_on
 from softreach.studio.reach import Size
 from softreach.studio.snapshots import Numbers, Snapshot, Snapshots
 from softreach.studio.state import StudioState
+from softreach.support.errors import InvalidInput
 
 TRUNK = designs.minimal_trunk()
 STATE = StudioState(design=TRUNK)

@@ -7,9 +7,9 @@ from urllib.parse import parse_qs, urlsplit
 import pytest
 from hypothesis import given
 
-from softreach.errors import InvalidInput
 from softreach.studio.link import state_in_request, state_link
 from softreach.studio.state import StudioState
+from softreach.support.errors import InvalidInput
 from tests.studio.test_state import states
 
 URL = "http://127.0.0.1:8080"

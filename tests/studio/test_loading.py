@@ -9,7 +9,6 @@ import pytest
 
 import softreach as sr
 from softreach.arm import designs
-from softreach.errors import InvalidDesign, InvalidInput
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.effort import affordable_level
 from softreach.studio.loading import (
@@ -24,6 +23,7 @@ from softreach.studio.reach import Quality, Reach, cloud_points, unstable_sample
 from softreach.studio.rod import solvable_rod
 from softreach.studio.stages import stages
 from softreach.studio.state import StudioState
+from softreach.support.errors import InvalidDesign, InvalidInput
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
 HANGING = GRAVITIES["hanging"]

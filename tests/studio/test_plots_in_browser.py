@@ -7,9 +7,9 @@ import pytest
 
 import softreach as sr
 from softreach.arm.parameters import changed
+from softreach.cloud.volume import volume_curve
 from softreach.studio.state import Slice
 from softreach.studio.wishes import PlotView
-from softreach.volume import volume_curve
 
 
 @pytest.fixture(autouse=True)

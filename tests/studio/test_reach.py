@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from softreach.arm import designs
-from softreach.cloud import compute_cloud
+from softreach.cloud.clouds import compute_cloud
 from softreach.plot.coloring import ScalarKey
 from softreach.rod.kinematics import tip_positions
 from softreach.studio.axes import axes_box, seen_from

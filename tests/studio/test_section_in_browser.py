@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from softreach.arm import designs
-from softreach.geometry.plane_cut import plane_cut
+from softreach.geometry.surface import plane_cut
 from softreach.inverse import solve_inverse
 from softreach.studio.plots.plane_counts import plane_counts, within
 from softreach.studio.plots.section import enclosed_area, section_curves

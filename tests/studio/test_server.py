@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 import softreach.studio
-from softreach.errors import InvalidInput
 from softreach.studio.addresses import page_address, reachable_hosts
 from softreach.studio.server import page_headers, page_url, same_origin, start_server, stop_server
+from softreach.support.errors import InvalidInput
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
-from softreach.errors import InvalidDesign, InvalidInput
 from softreach.studio.state import (
     LEVELS,
     Appearance,
@@ -20,6 +19,7 @@ from softreach.studio.state import (
     Slice,
     StudioState,
 )
+from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.laws import arm_of, arms
 
 numbers = st.floats(-3, 3)

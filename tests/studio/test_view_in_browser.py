@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from softreach.arm import designs
-from softreach.palette import bundle_color
 from softreach.studio import Quality, Start, Studio, StudioState
 from softreach.studio.eye import FOV, VIEWS
+from softreach.support.palette import bundle_color
 from tests.studio.tab import Tab
 
 BUNDLES = [bundle_color(k) for k in range(3)]

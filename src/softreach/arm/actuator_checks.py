@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from softreach.arguments import plain
 from softreach.arm.value_checks import (
     as_numbers,
     range_faults,
@@ -16,7 +15,8 @@ from softreach.arm.value_checks import (
     text_faults,
     values_along,
 )
-from softreach.errors import Fault, Range
+from softreach.support.arguments import plain
+from softreach.support.errors import Fault, Range
 
 __all__ = [
     "FIBER_RANGES",

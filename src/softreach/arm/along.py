@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.value_checks import series_faults
-from softreach.errors import Fault, InvalidDesign
+from softreach.support.errors import Fault, InvalidDesign
 
 __all__ = ["AlongArm", "Pieces", "Samples", "monotone_cubic"]
 

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from softreach.arguments import plain
 from softreach.arm.actuator_checks import bounds_faults
 from softreach.arm.value_checks import range_faults, sound_values, text_faults
-from softreach.errors import Fault, Range
+from softreach.support.arguments import plain
+from softreach.support.errors import Fault, Range
 
 __all__ = [
     "MATERIAL_RANGES",

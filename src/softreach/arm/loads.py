@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
-from softreach.arguments import plain
 from softreach.arm.variable import Variable
-from softreach.arrays import as_floats
-from softreach.errors import Fault, InvalidDesign, Range
+from softreach.support.arguments import plain
+from softreach.support.arrays import as_floats
+from softreach.support.errors import Fault, InvalidDesign, Range
 
 if TYPE_CHECKING:
     from softreach.arm.section import Section

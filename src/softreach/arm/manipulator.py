@@ -11,7 +11,6 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arguments import as_given, checked, flag, instance, path, text, whole
 from softreach.arm import file
 from softreach.arm.actuator_checks import bounds_faults
 from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
@@ -21,9 +20,10 @@ from softreach.arm.material import Material
 from softreach.arm.part_checks import fit_faults, kind_faults, named, part_faults, shared_names
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.section import Ring, Section
-from softreach.arrays import as_stations
-from softreach.atomic import writing
-from softreach.errors import InvalidDesign, InvalidInput
+from softreach.support.arguments import as_given, checked, flag, instance, path, text, whole
+from softreach.support.arrays import as_stations
+from softreach.support.errors import InvalidDesign, InvalidInput
+from softreach.support.files.atomic import writing
 
 __all__ = ["Manipulator", "a_manipulator"]
 

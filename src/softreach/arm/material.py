@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Self
 
-from softreach.arguments import plain
 from softreach.arm.checks import MATERIAL_RANGES, material_faults
 from softreach.arm.variable import Variable
-from softreach.errors import InvalidDesign
+from softreach.support.arguments import plain
+from softreach.support.errors import InvalidDesign
 
 __all__ = ["Material"]
 

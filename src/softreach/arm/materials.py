@@ -11,9 +11,9 @@ from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
-from softreach.arguments import checked, text
 from softreach.arm.material import Material
-from softreach.errors import InvalidInput
+from softreach.support.arguments import checked, text
+from softreach.support.errors import InvalidInput
 
 __all__ = [
     "LISTED",

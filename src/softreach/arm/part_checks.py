@@ -12,7 +12,7 @@ from softreach.arm.checks import name_faults
 from softreach.arm.loads import Loads
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
-from softreach.errors import Fault
+from softreach.support.errors import Fault
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator

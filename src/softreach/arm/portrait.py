@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softreach.arm.skin import Centerline, body_skin, bundle_skins, inside
-from softreach.palette import BODY, bundle_color
 from softreach.picture import Skin, html_card
+from softreach.support.palette import BODY, bundle_color
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator

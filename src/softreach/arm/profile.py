@@ -12,11 +12,11 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arguments import plain
 from softreach.arm.checks import PROFILE_RANGES, profile_faults
 from softreach.arm.variable import Variable
-from softreach.arrays import as_floats
-from softreach.errors import InvalidDesign
+from softreach.support.arguments import plain
+from softreach.support.arrays import as_floats
+from softreach.support.errors import InvalidDesign
 
 __all__ = ["LinearTaper", "Profile", "relative_expm1", "relative_log"]
 

@@ -10,14 +10,14 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arguments import plain
 from softreach.arm.along import monotone_cubic
 from softreach.arm.checks import PROFILE_RANGES
 from softreach.arm.profile import Profile, relative_expm1, relative_log
 from softreach.arm.value_checks import INSIDE_RANGE, range_faults, series_faults
 from softreach.arm.variable import Variable
-from softreach.arrays import as_floats
-from softreach.errors import Fault, InvalidDesign
+from softreach.support.arguments import plain
+from softreach.support.arrays import as_floats
+from softreach.support.errors import Fault, InvalidDesign
 
 __all__ = ["PiecewiseTaper", "SampledTaper"]
 

@@ -10,11 +10,11 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arguments import plain
 from softreach.arm.checks import RING_RANGES, ring_faults, section_faults
 from softreach.arm.material import Material
 from softreach.arm.variable import Variable
-from softreach.errors import Fault, InvalidDesign
+from softreach.support.arguments import plain
+from softreach.support.errors import Fault, InvalidDesign
 
 __all__ = ["Layer", "Ring", "Section", "Stiffness"]
 

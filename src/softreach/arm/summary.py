@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arguments import checked
 from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
 from softreach.arm.along import AlongArm
 from softreach.arm.bending import bending_at, largest_bending, sharpest_bending, smallest_bending
@@ -24,7 +23,8 @@ from softreach.arm.weight import (
     load_number_faults,
     mass,
 )
-from softreach.errors import Fault
+from softreach.support.arguments import checked
+from softreach.support.errors import Fault
 
 __all__ = ["DesignSummary", "describe", "design_warnings"]
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.actuator_checks import MOST_TURN
 from softreach.arm.actuators import Actuator, Resultants
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import Fault, InvalidDesign
+from softreach.support.errors import Fault, InvalidDesign
 
 __all__ = [
     "Compliance",

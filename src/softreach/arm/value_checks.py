@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from softreach.arguments import plain
-from softreach.arrays import as_floats
-from softreach.errors import Fault, InvalidInput, Range
+from softreach.support.arguments import plain
+from softreach.support.arrays import as_floats
+from softreach.support.errors import Fault, InvalidInput, Range
 
 __all__ = [
     "INSIDE_RANGE",

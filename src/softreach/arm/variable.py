@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from softreach.errors import Range
+from softreach.support.errors import Range
 
 __all__ = ["Variable"]
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import Fault, InvalidDesign
+from softreach.support.errors import Fault, InvalidDesign
 
 __all__ = [
     "GRAVITY",

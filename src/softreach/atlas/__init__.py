@@ -1,6 +1,5 @@
 """Reachability clouds of whole families of designs: build, resume, open, query."""
 
-from softreach.atlas.best import best_designs
 from softreach.atlas.build import build_atlas
 from softreach.atlas.metric import Metric, MetricFailed, Need
 from softreach.atlas.metrics import METRIC_GROUPS
@@ -10,11 +9,12 @@ from softreach.atlas.questions import (
     atlas_cloud,
     atlas_design,
     atlas_status,
+    best_designs,
     verify_atlas,
 )
 from softreach.atlas.reading import open_atlas, over_length
 from softreach.atlas.space import DesignSpace
-from softreach.stores.damage import DamagedStore, StoreFailed
+from softreach.support.files.sealed_store import DamagedStore, StoreFailed
 
 __all__ = [
     "METRIC_GROUPS",

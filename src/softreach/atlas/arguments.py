@@ -1,4 +1,4 @@
-"""What the functions of an atlas are given: converters for `softreach.arguments.checked`."""
+"""Arguments of the functions of an atlas: converters for `checked`."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.arguments import as_given, as_number, path, plain
-from softreach.arrays import as_floats
-from softreach.errors import InvalidInput
+from softreach.support.arguments import as_given, as_number, path, plain
+from softreach.support.arrays import as_floats
+from softreach.support.errors import InvalidInput
 
 __all__ = ["a_store", "an_atlas", "an_interval", "column", "shard_of"]
 

@@ -1,36 +1,81 @@
-"""Build an atlas: every design of a space, stored as it comes, resumed where it stopped."""
+"""What an atlas takes of memory and disk, told before it is begun."""
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Sequence
+from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softreach.arguments import POSITIVE, checked, flag, function, instance, optional, within
 from softreach.atlas.arguments import a_store, shard_of
 from softreach.atlas.command import Command, check_names
-from softreach.atlas.contents import contents
-from softreach.atlas.demand import check_demand
 from softreach.atlas.executor import ExecutorLike, an_executor, run_designs
 from softreach.atlas.metric import Metric
 from softreach.atlas.metrics import METRIC_GROUPS, chosen_metrics
-from softreach.atlas.reading import open_atlas, over_length
+from softreach.atlas.reading import contents, open_atlas, over_length
 from softreach.atlas.space import DesignSpace
 from softreach.atlas.store import DONE, GAP, UNSTABLE, AtlasStore
-from softreach.errors import SoftreachWarning, counted
-from softreach.progress import Progress, bar
 from softreach.rod.steps import check_tol
 from softreach.sampling import check_sampler
+from softreach.support.arguments import (
+    POSITIVE,
+    checked,
+    flag,
+    function,
+    instance,
+    optional,
+    within,
+)
+from softreach.support.errors import SoftreachWarning, counted
+from softreach.support.memory import check_disk, check_memory
+from softreach.support.progress import Progress, bar
 from softreach.workspace.reach import ACCURACIES
 
 if TYPE_CHECKING:
     import xarray as xr
     from zarr.storage import StoreLike
 
-__all__ = ["build_atlas"]
+    from softreach.atlas.space import DesignSpace
+
+STORED = 6.2
+"""What a tip takes in a store [bytes]."""
+
+_ON_DISK = 4096  # bytes that the smallest file takes
+_FILES = 4  # of a design without tips: status, message, metrics, curvature
+_HELD = 700  # bytes of memory of a sample and its share of the triangulation
+
+
+def check_demand(
+    space: DesignSpace, designs: int, n: int, store: StoreLike, *, keep_clouds: bool
+) -> None:
+    """Refuse an atlas that cannot fit, and announce one that takes much; no design is made for it.
+
+    Args:
+        space: The designs.
+        designs: How many of them are to be computed here.
+        n: Samples of each design.
+        store: Where it goes; of one that exists, nobody knows how much is done.
+        keep_clouds: Whether the tips are stored.
+
+    Raises:
+        InvalidInput: One design does not fit into memory, or all do not fit on the disk.
+
+    Warns:
+        SoftreachWarning: It takes more than half of what is free.
+    """
+    check_memory("n", n, _HELD * n)
+    local = isinstance(store, str | os.PathLike) and "://" not in str(store)
+    if local and not Path(str(store)).exists():
+        of_each = STORED * n * keep_clouds + _FILES * _ON_DISK
+        asked = f"{n} samples of {designs} designs"
+        check_disk("n", asked, of_each * designs + 8 * n * space.base.bundles, str(store))
+
+
+# Build an atlas: every design of a space, stored as it comes, resumed where it stopped.
 
 
 @checked(

@@ -14,9 +14,9 @@ from softreach.arm.manipulator import Manipulator
 from softreach.atlas.metric import Metric
 from softreach.atlas.metrics import known_metric
 from softreach.atlas.space import DesignSpace
-from softreach.curvature import QUANTILES
-from softreach.errors import InvalidInput, SoftreachError, counted
+from softreach.cloud.curvature import QUANTILES
 from softreach.sampling import check_sampler
+from softreach.support.errors import InvalidInput, SoftreachError, counted
 
 __all__ = ["ATLAS_VERSION", "Command", "check_names"]
 

@@ -5,22 +5,135 @@ from __future__ import annotations
 import os
 import socket
 import warnings
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.atlas.intermediates import Intermediates
+from softreach.arm.manipulator import Manipulator
+from softreach.atlas.command import Command
 from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import UNSTABLE, AtlasStore, Result
-from softreach.errors import SoftreachError, SoftreachWarning
+from softreach.cloud.curvature import stream_statistics
+from softreach.geometry.alpha_shape import AlphaComplex
+from softreach.geometry.delaunay import delaunay
+from softreach.geometry.hull import convex_hull
 from softreach.rod.never_at_rest import none_of
-from softreach.stores.damage import StoreFailed
+from softreach.rod.tip_map import TipMap, TipStatus, tip_map
+from softreach.support.errors import SoftreachError, SoftreachWarning
+from softreach.support.files.sealed_store import StoreFailed
 
-__all__ = ["Outcome", "Remote", "begin_design", "run_remotely"]
+# What the metrics of one design are computed from; each result is found once and shared.
 
+
+Array = NDArray[np.float64]
+
+_BLOCK = 65_536  # samples at a time, where not all of them are needed at once
+
+
+class Intermediates(Mapping[Need, Any]):
+    """Need -> its value for one design, computed at first use.
+
+    Args:
+        arm: The design.
+        cube: Unit activations that all designs share, shape (n, bundles).
+        command: Radius, accuracy, tolerance, stations and quantiles.
+        metrics: The metrics that will be computed.
+    """
+
+    def __init__(
+        self, arm: Manipulator, cube: Array, command: Command, metrics: Sequence[Metric]
+    ) -> None:
+        self.arm, self.cube, self.command = arm, cube, command
+        self.wanted = frozenset(need for metric in metrics for need in metric.needs)
+        self._found: dict[Need, Any] = {}
+
+    @cached_property
+    def rod(self) -> TipMap:
+        """The tip map of the design, to the tolerance of the command."""
+        return tip_map(self.arm, self.command.tol)
+
+    @cached_property
+    def tips(self) -> Array:
+        """Tips of all samples [m], shape (n, 3); NaN where there is no equilibrium."""
+        return self._samples[0]
+
+    @cached_property
+    def stable(self) -> NDArray[np.bool_]:
+        """Which samples have a stable equilibrium, shape (n,)."""
+        return self._samples[1] == TipStatus.STABLE
+
+    @cached_property
+    def _samples(self) -> tuple[Array, NDArray[np.int8]]:
+        return self.rod.tips_and_status(activations_of(self.rod, self.cube))
+
+    def __getitem__(self, need: Need) -> Any:
+        if need not in self._found:
+            self._found[need] = _COMPUTE[need](self)
+        return self._found[need]
+
+    def __iter__(self) -> Iterator[Need]:
+        return iter(_COMPUTE)
+
+    def __len__(self) -> int:
+        return len(_COMPUTE)
+
+    def forget(self, *needs: Need) -> None:
+        """Free the memory of results that are no longer needed."""
+        for need in needs:
+            self._found.pop(need, None)
+
+
+def activations_of(rod: TipMap, cube: Array) -> Array:
+    """The shared unit activations in the bounds of a tip map, shape (n, bundles)."""
+    return rod.box.from_cube(cube[:, : rod.box.bundles])
+
+
+def _stable(of: Intermediates, values: Array) -> Array:
+    """Those of the samples that have a stable equilibrium; not copied if all have."""
+    return values if of.stable.all() else values[of.stable]
+
+
+def _alpha_complex(of: Intermediates) -> AlphaComplex:
+    return AlphaComplex(triangulation=delaunay(of[Need.TIPS]))
+
+
+def _convex_volume(of: Intermediates) -> float:
+    """From the triangulation, if one is needed anyway."""
+    if Need.ALPHA_COMPLEX in of.wanted:
+        return float(of[Need.ALPHA_COMPLEX].volumes.sum())
+    return convex_hull(of[Need.TIPS]).volume
+
+
+def _reachable_set(of: Intermediates) -> Any:
+    from softreach.workspace import reachable_set
+
+    return reachable_set(of.rod, accuracy=of.command.accuracy)
+
+
+def _strain_statistics(of: Intermediates) -> Any:
+    rod, cube = of.rod, of.cube
+    if rod.supports_unstable:
+        cube = cube[of.stable]
+    blocks = (activations_of(rod, cube[k : k + _BLOCK]) for k in range(0, len(cube), _BLOCK))
+    stations = np.array(of.command.stations) * rod.length
+    return stream_statistics(rod, blocks, stations, quantiles=of.command.quantiles)
+
+
+_COMPUTE: dict[Need, Callable[[Intermediates], Any]] = {
+    Need.ARM: lambda of: of.arm,
+    Need.LENGTH: lambda of: of.arm.length,
+    Need.ACTIVATIONS: lambda of: _stable(of, activations_of(of.rod, of.cube)),
+    Need.TIPS: lambda of: _stable(of, of.tips),
+    Need.LOST_SHARE: lambda of: float((~of.stable).mean()),
+    Need.ALPHA: lambda of: of.command.alpha_over_length * of.arm.length,
+    Need.ALPHA_COMPLEX: _alpha_complex,
+    Need.CONVEX_VOLUME: _convex_volume,
+    Need.REACHABLE_SET: _reachable_set,
+    Need.STRAIN_STATISTICS: _strain_statistics,
+}
 Values = dict[str, NDArray[np.float64]]
 Outcome = tuple[int, str]
 """Number of a design, and why it failed; empty if it did not."""

@@ -21,14 +21,14 @@ from concurrent.futures import (
 from itertools import chain
 from typing import Any, Protocol, Self
 
-from softreach import parallel
-from softreach.arguments import as_given
 from softreach.atlas.design_task import Outcome, Remote, begin_design, run_remotely
 from softreach.atlas.metric import Metric, check_travels
 from softreach.atlas.processes import LocalProcesses, Workers
 from softreach.atlas.store import AtlasStore
-from softreach.errors import InvalidInput, SoftreachError
-from softreach.interruption import undoing
+from softreach.support import parallel
+from softreach.support.arguments import as_given
+from softreach.support.errors import InvalidInput, SoftreachError
+from softreach.support.files.interruption import undoing
 
 __all__ = ["ExecutorLike", "an_executor", "run_designs"]
 

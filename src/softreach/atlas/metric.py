@@ -12,8 +12,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arguments import instance, text
-from softreach.errors import InvalidInput, SoftreachError
+from softreach.support.arguments import instance, text
+from softreach.support.errors import InvalidInput, SoftreachError
 
 __all__ = ["Metric", "MetricFailed", "Need", "check_travels"]
 

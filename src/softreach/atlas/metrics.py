@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arguments import as_given
 from softreach.atlas.metric import PROFILE, Metric, Need
-from softreach.curvature import QUANTITIES
-from softreach.errors import InvalidInput
+from softreach.cloud.curvature import QUANTITIES
 from softreach.geometry.alpha_shape import AlphaComplex
+from softreach.support.arguments import as_given
+from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,9 +11,8 @@ from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from multiprocessing.connection import wait
 from typing import Any
 
-from softreach.arguments import checked, whole
-from softreach.interruption import PATIENCE, as_a_whole
-from softreach.lifeline import live_with_parent
+from softreach.support.arguments import checked, whole
+from softreach.support.files.interruption import PATIENCE, as_a_whole, live_with_parent
 
 __all__ = ["WORKERS", "LocalProcesses", "Workers", "worker_processes"]
 

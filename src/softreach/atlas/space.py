@@ -11,14 +11,14 @@ from typing import Any, Literal, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.arguments import as_whole_number, checked, one_of, whole
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, changed, find_parameter, find_parameters, parameters
 from softreach.arm.tables import check_extension
-from softreach.arrays import as_floats, check_finite
 from softreach.atlas.arguments import column
-from softreach.errors import InvalidDesign, InvalidInput
-from softreach.progress import Progress, silent
+from softreach.support.arguments import as_whole_number, checked, one_of, whole
+from softreach.support.arrays import as_floats, check_finite
+from softreach.support.errors import InvalidDesign, InvalidInput
+from softreach.support.progress import Progress, silent
 
 __all__ = ["DesignSpace"]
 

@@ -14,8 +14,8 @@ from softreach.arm.parameters.unknown import unknown_parameter
 from softreach.arm.parameters.written import from_written, written_parameters
 from softreach.atlas.arguments import column
 from softreach.atlas.space import DesignSpace
-from softreach.errors import InvalidDesign, InvalidInput
-from softreach.quantity import read_number, read_whole_number
+from softreach.support.errors import InvalidDesign, InvalidInput
+from softreach.support.quantity import read_number, read_whole_number
 
 __all__ = ["parse_parameter", "parse_space"]
 

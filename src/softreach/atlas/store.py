@@ -1,20 +1,10 @@
-"""The Zarr v3 store of an atlas: one chunk is one design, and its status is written last.
-
-No two tasks ever write to the same chunk. Zarr's local store writes every chunk beside its place
-and renames it, so a killed writer leaves chunks whole or absent; a design whose status is missing
-is computed again, whatever else of it exists.
-
-A store is created in three steps, so that the tasks of a job array may all do it at once and be
-killed anywhere: its root, which holds the command, appears at once and is never written again, so
-that everybody knows whose store it is; then come the arrays, whose bytes are the same whoever
-writes them, so that a late creator changes nothing; the last of them is the seal, and nobody reads
-a store or adds designs without it.
-"""
+"""The root of a store, claimed by whoever comes first."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
@@ -24,31 +14,70 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.atlas.command import Command
-from softreach.atlas.layout import CUBE, MISSING, SEAL, array_plans
-from softreach.atlas.store_root import claim
-from softreach.errors import InvalidInput
+from softreach.atlas.layout import CUBE, MISSING, SEAL, Plan, array_plans
 from softreach.sampling import sample_cube
-from softreach.stores.damage import Chunk, Watch, storage_errors, writing
-from softreach.stores.place import Opened, absolute, opened_root
+from softreach.support.errors import InvalidInput
+from softreach.support.files.sealed_store import Chunk, StoreFailed, Watch, storage_errors, writing
+from softreach.support.files.store_place import REMEDY, Opened, absolute, checked_place, opened_root
 
 if TYPE_CHECKING:
     import zarr
+    from zarr.abc.store import Store
     from zarr.storage import StoreLike
 
-__all__ = [
-    "DAMAGED",
-    "DONE",
-    "FAILED",
-    "GAP",
-    "KNOWN",
-    "PER_DESIGN",
-    "TODO",
-    "UNSTABLE",
-    "AtlasStore",
-    "Result",
-    "digest",
-    "drawn_cube",
-]
+
+def claim(location: StoreLike, attributes: Mapping[str, Any], *, durable: bool = False) -> None:
+    """Write the root of a store, whole and only once: of several who try, the first succeeds.
+
+    Raises:
+        InvalidInput: The place holds something else.
+    """
+    import zarr
+    from zarr.errors import ContainsGroupError
+
+    watch = Watch(location=location, remedy=REMEDY["atlas"])
+    place = checked_place(location, watch, mode="r+", durable=durable)
+    store = _first_wins(place.store, location)
+    with suppress(ContainsGroupError):
+        zarr.create_group(store, path=place.path, zarr_format=3, attributes=dict(attributes))
+
+
+def _first_wins(store: Store, location: StoreLike) -> Store:
+    """The same store, to which only what is missing is written, and nothing beside other files.
+
+    Zarr's groups have no exclusive mode, but its stores do: a key is set only if it is missing.
+    """
+    from zarr.storage import WrapperStore
+
+    class FirstWins(WrapperStore):
+        async def set(self, key: str, value: Any) -> None:
+            folder = key.rpartition("/")[0]
+            names = [name async for name in self.list_dir(folder)]
+            # In this order: files of a claim made in between are not foreign.
+            if any(map(_is_foreign, names)) and not await self.exists(key):
+                raise InvalidInput("store", location, "a new folder, or an atlas")
+            await self.set_if_not_exists(key, value)
+
+    return FirstWins(store)
+
+
+def _is_foreign(name: str) -> bool:
+    """Whether a file is anything but what a killed writer leaves behind."""
+    return not name.endswith(".partial")
+
+
+# The Zarr v3 store of an atlas: one chunk is one design, and its status is written last.
+#
+# No two tasks ever write to the same chunk. Zarr's local store writes every chunk beside its place
+# and renames it, so a killed writer leaves chunks whole or absent; a design whose status is missing
+# is computed again, whatever else of it exists.
+#
+# A store is created in three steps, so that the tasks of a job array may all do it at once and be
+# killed anywhere: its root, which holds the command, appears at once and is never written again, so
+# that everybody knows whose store it is; then come the arrays, whose bytes are the same whoever
+# writes them, so that a late creator changes nothing; the last of them is the seal, and nobody
+# reads a store or adds designs without it.
+
 
 TODO, DONE, FAILED, GAP, UNSTABLE, DAMAGED = range(6)
 
@@ -91,8 +120,6 @@ class AtlasStore:
             DamagedStore: Its root is damaged, so that nobody knows whose store it is.
             StoreFailed: It cannot be written to.
         """
-        from softreach.atlas.creation import complete
-
         location = absolute(location)
         with writing(location):
             if opened_root(location, "atlas", "r+") is None:
@@ -306,3 +333,75 @@ def _kind(dtype: Any) -> str:
     """Name of a type of numbers, or str."""
     kind = np.dtype(dtype)
     return "str" if kind.kind in "UTO" else kind.name
+
+
+# Everything of an atlas but its designs, written where it is missing or damaged.
+
+
+def complete(store: AtlasStore) -> None:
+    """Write what all designs share, the gaps, and the seal last, as far as they lack or err.
+
+    Raises:
+        InvalidInput: Arrays of another command.
+        StoreFailed: This machine draws other activations than the one that began the store.
+    """
+    *plans, seal = array_plans(store.command)
+    with store.watch.noting():  # what is damaged counts as missing
+        for plan in plans:
+            if not _is_stored(store, plan):
+                _create_array(store, plan)
+        _write_gaps(store)
+        if SEAL not in store.group:
+            _create_array(store, seal)
+
+
+def _is_stored(store: AtlasStore, plan: Plan) -> bool:
+    """Whether an array is there, with the values that all designs share."""
+    if plan.name not in store.group:
+        return False
+    if plan.name == CUBE:
+        return digest(np.asarray(store.array(CUBE)[...])) == store.cube_digest
+    return plan.data is None or bool(np.array_equal(store.array(plan.name)[...], plan.data))
+
+
+def _create_array(store: AtlasStore, plan: Plan) -> None:
+    from zarr.errors import ContainsArrayError
+
+    data = _drawn(store) if plan.name == CUBE else plan.data
+    try:
+        array: Any = store.group.create_array(
+            plan.name,
+            shape=plan.shape,
+            dtype=plan.dtype,
+            chunks=plan.chunks,
+            fill_value=plan.fill,
+            compressors=plan.compressors(),
+            dimension_names=plan.dims,
+            attributes=plan.attrs,
+            config={"write_empty_chunks": True},
+        )
+    except ContainsArrayError:  # begun by another task, or by a run that was killed
+        array = store.array(plan.name)
+        if array.shape != plan.shape or array.attrs.asdict() != plan.attrs:
+            allowed = "a new folder, or an atlas; it holds one that was never finished: remove it"
+            raise InvalidInput("store", store.location, allowed) from None
+    if data is not None:
+        array[...] = data
+
+
+def _drawn(store: AtlasStore) -> NDArray[np.float64]:
+    cube = drawn_cube(store.command)
+    if digest(cube) != store.cube_digest:
+        raise StoreFailed(
+            f"{store.location}: this machine draws other activations than the one that began it"
+        )
+    return cube
+
+
+def _write_gaps(store: AtlasStore) -> None:
+    """Write which designs cannot exist, and why."""
+    gaps = store.command.space.gaps
+    status = store.status() if gaps else np.empty(0)
+    for index, reason in gaps.items():
+        if status[index] != GAP or store.message(index) != reason:
+            store.write_status(index, reason, GAP)

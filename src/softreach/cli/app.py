@@ -20,7 +20,7 @@ from softreach.cli.terminal import (
     readable_width,
     spelling_out,
 )
-from softreach.errors import NotWritten, SoftreachError, SoftreachWarning
+from softreach.support.errors import NotWritten, SoftreachError, SoftreachWarning
 
 __all__ = ["app", "run"]
 

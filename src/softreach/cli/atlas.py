@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
-from softreach.arguments import as_whole_number
 from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import AsJson, Durable, Sampler, Seed, design_from
 from softreach.cli.numbers import WHOLE
 from softreach.cli.output import print_rows
 from softreach.cli.output_files import Overwrite, check_picture
-from softreach.errors import InvalidInput, MissingExtra
-from softreach.quantity import numbers_in, shortened
+from softreach.support.arguments import as_whole_number
+from softreach.support.errors import InvalidInput, MissingExtra
+from softreach.support.quantity import numbers_in, shortened
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -192,7 +192,7 @@ def _space_of(
     from softreach.arm.file.document import LONGEST
     from softreach.atlas.space import DesignSpace
     from softreach.atlas.space_file import parse_parameter, parse_space
-    from softreach.text_file import read_text
+    from softreach.support.files.text import read_text
 
     if (path is None) == (vary is None):
         raise InvalidInput("space", path, "given, or --vary, and not both")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from softreach.cli.numbers import NUMBER
-from softreach.errors import InvalidInput
+from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     from softreach.arm.loads import Loads
@@ -191,7 +191,7 @@ def read_mass(name: str, text: str) -> float:
     Raises:
         InvalidInput: Anything else.
     """
-    from softreach.quantity import read_quantity, unit_names
+    from softreach.support.quantity import read_quantity, unit_names
 
     try:
         mass = read_quantity(text, "kg")
@@ -205,7 +205,7 @@ def read_mass(name: str, text: str) -> float:
 
 def _triple(name: str, text: str, unit: str, others: str = "") -> tuple[float, ...]:
     """Three numbers, in the SI unit if none follows them."""
-    from softreach.quantity import read_quantity, unit_names
+    from softreach.support.quantity import read_quantity, unit_names
 
     *first, last = text.split(",")
     try:
@@ -221,7 +221,7 @@ def _triple(name: str, text: str, unit: str, others: str = "") -> tuple[float, .
 
 def _number_and_unit(text: str, unit: str) -> tuple[float, str]:
     """The value of the last of three numbers, and the unit that follows all of them."""
-    from softreach.quantity import read_quantity, unit_names
+    from softreach.support.quantity import read_quantity, unit_names
 
     plain = text.strip()
     written = next(
@@ -259,7 +259,7 @@ def _given_twice(name: str) -> InvalidInput:
 def _of_value(parameter: DesignParameter, name: str, text: str) -> float:
     """A value with its unit."""
     from softreach.arm.parameters.written import written_name
-    from softreach.quantity import read_quantity, unit_names
+    from softreach.support.quantity import read_quantity, unit_names
 
     try:
         return read_quantity(text, parameter.unit)
@@ -276,7 +276,7 @@ def _of_value(parameter: DesignParameter, name: str, text: str) -> float:
 def _of_name(parameter: DesignParameter, name: str, text: str) -> float:
     """A value whose unit the name holds."""
     from softreach.arm.parameters.written import from_written
-    from softreach.quantity import read_quantity
+    from softreach.support.quantity import read_quantity
 
     try:
         return from_written(read_quantity(text, "1"), parameter.unit)

@@ -39,9 +39,9 @@ def cloud(
     """
     from time import perf_counter
 
-    from softreach.cloud import CLOUD_STORE, compute_cloud, sample_bytes, save_cloud
-    from softreach.memory import check_disk
+    from softreach.cloud.clouds import CLOUD_STORE, compute_cloud, sample_bytes, save_cloud
     from softreach.rod.tip_map import tip_map
+    from softreach.support.memory import check_disk
 
     arm = design_from(design, changes)
     check_output("out", out, CLOUD_STORE, overwrite)

@@ -29,12 +29,13 @@ def demo(
     """
     from time import perf_counter
 
-    from softreach import export, parallel, plot
+    from softreach import export, plot
     from softreach.arm import designs
-    from softreach.cloud import compute_cloud, save_cloud
-    from softreach.memory import check_disk
+    from softreach.cloud.clouds import compute_cloud, save_cloud
+    from softreach.cloud.volume import Hull, concave_hull, convex_hull
     from softreach.rod.kinematics import configuration
-    from softreach.volume import Hull, concave_hull, convex_hull
+    from softreach.support import parallel
+    from softreach.support.memory import check_disk
 
     start = perf_counter()
     arm = designs.minimal_trunk()
@@ -71,9 +72,9 @@ _FILES = ("design.toml", "cloud.zarr", "cloud.ply", "hull.ply", "cloud.png")
 def _check(folder: Path, overwrite: bool) -> None:
     """Look at every place before anything is written to one of them."""
     from softreach.arm.file import DESIGN_FILE
-    from softreach.cloud import CLOUD_STORE
-    from softreach.export.cloud import CLOUD_FILES
-    from softreach.file_kinds import PICTURES
+    from softreach.cloud.clouds import CLOUD_STORE
+    from softreach.export.clouds import CLOUD_FILES
+    from softreach.support.files.kinds import PICTURES
 
     for name, formats in zip(
         _FILES, (DESIGN_FILE, CLOUD_STORE, CLOUD_FILES, CLOUD_FILES, PICTURES), strict=True

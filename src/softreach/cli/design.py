@@ -44,7 +44,7 @@ def design(
 
     from softreach.arm.file import DESIGN_FILE
     from softreach.arm.summary import describe
-    from softreach.errors import InvalidInput
+    from softreach.support.errors import InvalidInput
 
     if schema:
         sys.stdout.write(_schema_text())

@@ -19,7 +19,7 @@ from softreach.cli.inputs import (
     design_from,
 )
 from softreach.cli.output_files import Overwrite, check_picture
-from softreach.errors import counted
+from softreach.support.errors import counted
 
 if TYPE_CHECKING:
     from softreach.rod import AllEquilibria

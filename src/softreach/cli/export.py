@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import Activation, Source, design_from, is_stored, shape_of
 from softreach.cli.output_files import Overwrite, check_output, check_surface
-from softreach.errors import InvalidInput
+from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -57,10 +57,10 @@ def export(
 
 
 def _cloud(source: str, out: Path, format: str | None, overwrite: bool) -> list[Path]:
-    from softreach.cloud import open_cloud
+    from softreach.cloud.clouds import open_cloud
 
     if format is None:
-        from softreach.export.cloud import CLOUD_FILES, export_cloud
+        from softreach.export.clouds import CLOUD_FILES, export_cloud
 
         check_output("out", out, CLOUD_FILES, overwrite)
         export_cloud(open_cloud(source), out, overwrite=overwrite)

@@ -34,7 +34,7 @@ def gradient(
 
     Example: softreach gradient lce_arm taper upper --set lower=-3 --set upper=-1
     """
-    from softreach import progress
+    from softreach.support import progress
     from softreach.workspace import volume_gradient
 
     arm = design_from(design, changes)

@@ -11,7 +11,7 @@ from softreach.cli.inputs import AsJson, design_from
 from softreach.cli.numbers import NUMBER
 from softreach.cli.output import print_rows
 from softreach.cli.output_files import Overwrite, check_output
-from softreach.errors import InvalidInput
+from softreach.support.errors import InvalidInput
 
 __all__ = ["import_file"]
 
@@ -65,7 +65,7 @@ def _design(source: Path, out: Path, overwrite: bool, json: bool) -> None:
 def _cloud(
     source: Path, out: Path, design: str | None, tol: float, overwrite: bool, json: bool
 ) -> None:
-    from softreach.cloud import CLOUD_STORE, save_cloud
+    from softreach.cloud.clouds import CLOUD_STORE, save_cloud
     from softreach.exchange.activefilaments import read_cloud, read_design
 
     _check_suffix(out, ".zarr", "a cloud")

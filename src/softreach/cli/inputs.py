@@ -10,9 +10,9 @@ from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.numbers import WHOLE
-from softreach.errors import InvalidDesign, InvalidInput
-from softreach.quantity import numbers_in, shortened
-from softreach.text_file import MEGABYTE, read_text
+from softreach.support.errors import InvalidDesign, InvalidInput
+from softreach.support.files.text import MEGABYTE, read_text
+from softreach.support.quantity import numbers_in, shortened
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -101,7 +101,7 @@ def cloud_of(
     source: str, n: int, seed: int, sampler: str, changes: Changes = UNCHANGED
 ) -> xr.Dataset:
     """The stored cloud, or one computed from the design."""
-    from softreach.cloud import compute_cloud, open_cloud
+    from softreach.cloud.clouds import compute_cloud, open_cloud
 
     if is_stored(source):
         changes.refuse("left out for a stored cloud: give the design instead")
@@ -136,7 +136,7 @@ def shape_of(text: str | None, arm: Manipulator) -> xr.Dataset:
 
 def points_of(text: str | None, file: Path | None) -> list[list[float]]:
     """Positions [m] from `x,y,z`, or from a CSV file with such columns (a header is skipped)."""
-    from softreach.inverse.target_table import position_in, positions_in
+    from softreach.inverse.request import position_in, positions_in
 
     if text is not None:
         return [position_in("target", text)]

@@ -72,8 +72,8 @@ def rest_rows(arm: Manipulator) -> Rows:
 
 def _rest(arm: Manipulator) -> Rest | None:
     """The arm at rest; None under loads that cannot be followed along it."""
-    from softreach.errors import InvalidInput
     from softreach.rest import rest
+    from softreach.support.errors import InvalidInput
 
     try:
         return rest(arm)

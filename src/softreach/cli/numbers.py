@@ -7,8 +7,8 @@ from typing import Any
 
 from cyclopts import Parameter, Token
 
-from softreach.errors import InvalidInput
-from softreach.quantity import read_number, read_whole_number, shortened
+from softreach.support.errors import InvalidInput
+from softreach.support.quantity import read_number, read_whole_number, shortened
 
 __all__ = ["NUMBER", "WHOLE"]
 

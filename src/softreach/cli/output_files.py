@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 if TYPE_CHECKING:
-    from softreach.file_kinds import Formats
+    from softreach.support.files.kinds import Formats
 
 __all__ = ["Overwrite", "check_output", "check_picture", "check_surface"]
 
@@ -37,8 +37,8 @@ def check_output(
         MissingExtra: A library that writes it is not installed.
         NotWritten: Nothing can be written there.
     """
-    from softreach.atomic import check_place
-    from softreach.file_kinds import format_of
+    from softreach.support.files.atomic import check_place
+    from softreach.support.files.kinds import format_of
 
     if path is not None:
         kind = format_of(path, formats, name)
@@ -47,7 +47,7 @@ def check_output(
 
 def check_picture(name: str, path: Path | None, overwrite: bool) -> None:
     """Refuse a place for a picture, as `check_output`."""
-    from softreach.file_kinds import PICTURES
+    from softreach.support.files.kinds import PICTURES
 
     check_output(name, path, PICTURES, overwrite)
 
@@ -55,6 +55,6 @@ def check_picture(name: str, path: Path | None, overwrite: bool) -> None:
 def check_surface(name: str, path: Path | None, overwrite: bool) -> None:
     """Refuse a place for a surface, as `check_output`."""
     if path is not None:
-        from softreach.export.surface import SURFACE_FILES
+        from softreach.export.surfaces import SURFACE_FILES
 
         check_output(name, path, SURFACE_FILES, overwrite)

@@ -12,7 +12,7 @@ from softreach.cli.inputs import AsJson, Design, design_from
 from softreach.cli.numbers import NUMBER
 from softreach.cli.output import print_rows
 from softreach.cli.output_files import Overwrite, check_picture
-from softreach.errors import InvalidInput
+from softreach.support.errors import InvalidInput
 
 __all__ = ["payload"]
 
@@ -35,8 +35,8 @@ def payload(
     json: AsJson = False,
 ) -> None:
     """The reachable volume under payloads, and the largest one that keeps a share of it."""
-    from softreach import progress
-    from softreach.payload import payload_curve
+    from softreach.support import progress
+    from softreach.workspace.payload import payload_curve
 
     arm = design_from(design, changes)
     check_picture("figure", figure, overwrite)

@@ -13,7 +13,7 @@ from softreach.cli.load_rows import load_rows
 from softreach.cli.numbers import NUMBER
 from softreach.cli.output import print_rows
 from softreach.cli.output_files import Overwrite, check_picture, check_surface
-from softreach.errors import InvalidInput
+from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -41,7 +41,7 @@ def reach(
     json: AsJson = False,
 ) -> None:
     """The exact reachable set: volume with its error, blind share, multiplicity, folds."""
-    from softreach import progress
+    from softreach.support import progress
     from softreach.workspace import reachable_set
 
     arm = design_from(design, changes)

@@ -38,7 +38,7 @@ def show(
     import sys
 
     from softreach import plot
-    from softreach.cloud import design_of
+    from softreach.cloud.clouds import design_of
 
     check_picture("out", out, overwrite)
     cloud = cloud_of(source, n, seed, sampler, changes)

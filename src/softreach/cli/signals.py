@@ -6,7 +6,7 @@ import os
 import signal
 import threading
 
-from softreach.interruption import end_process, stop_here
+from softreach.support.files.interruption import end_process, stop_here
 
 __all__ = ["INTERRUPTED", "end_on_signals"]
 

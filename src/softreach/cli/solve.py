@@ -13,7 +13,7 @@ from cyclopts import Parameter
 from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import AsJson, Design, design_from, points_of
 from softreach.cli.numbers import WHOLE
-from softreach.errors import InvalidInput, counted
+from softreach.support.errors import InvalidInput, counted
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator

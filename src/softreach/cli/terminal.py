@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from io import TextIOWrapper
 
-from softreach.errors import NotWritten
+from softreach.support.errors import NotWritten
 
 __all__ = [
     "discard_output",

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from softreach.cli.changes import UNCHANGED, Changes
 from softreach.cli.inputs import Design, activation_of, design_from, points_of
 from softreach.cli.output_files import Overwrite, check_output
-from softreach.file_kinds import FileKind, text_with
+from softreach.support.files.kinds import FileKind, text_with
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,9 +34,9 @@ def track(
     changes: Changes = UNCHANGED,
 ) -> None:
     """Follow a path of tip positions on one branch of activations, and say where it ends."""
-    from softreach.atomic import writing
-    from softreach.export.path_table import path_csv
-    from softreach.path import track_path
+    from softreach.export.clouds import path_csv
+    from softreach.inverse.path import track_path
+    from softreach.support.files.atomic import writing
 
     arm = design_from(design, changes)
     check_output("out", out, _TABLE, overwrite)

@@ -47,7 +47,7 @@ def volume(
 
     Example: softreach volume trunk.zarr --alpha 0.03L --hull hull.ply
     """
-    from softreach.volume import concave_hull, convex_hull
+    from softreach.cloud.volume import concave_hull, convex_hull
 
     check_surface("hull", hull, overwrite)
     if not is_stored(source):
@@ -71,7 +71,7 @@ _BYTES = 700  # of memory that a sample and its share of the triangulation take 
 
 def check_hull_memory(n: int) -> None:
     """Refuse more samples than can be computed and triangulated in the free memory."""
-    from softreach.memory import check_memory
+    from softreach.support.memory import check_memory
 
     check_memory("n", n, _BYTES * n)
 

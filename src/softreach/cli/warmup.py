@@ -23,7 +23,7 @@ def warmup(
 
     Example: softreach warmup
     """
-    from softreach.progress import bar
+    from softreach.support.progress import bar
 
     jobs = [*_free(), *(_loaded() if loads else ())]
     with bar("compiling", len(jobs)) as done, warnings.catch_warnings():
@@ -39,7 +39,7 @@ def _free() -> list[Callable[[], object]]:
     from softreach import workspace
     from softreach.arm import designs
     from softreach.inverse import solve_inverse
-    from softreach.path import track_path
+    from softreach.inverse.path import track_path
     from softreach.rod.kinematics import configuration, tip_jacobian
 
     arm, redundant = designs.minimal_trunk(), designs.redundant_trunk()
@@ -63,10 +63,10 @@ def _free() -> list[Callable[[], object]]:
 def _hulls() -> None:
     """What is computed from a cloud."""
     from softreach.arm import designs
-    from softreach.cloud import compute_cloud
+    from softreach.cloud.clouds import compute_cloud
+    from softreach.cloud.redundancy import activation_distance
+    from softreach.cloud.volume import concave_hull
     from softreach.geometry.surface import Surface
-    from softreach.redundancy import activation_distance
-    from softreach.volume import concave_hull
 
     cloud = compute_cloud(designs.minimal_trunk(), 2000)
     concave_hull(cloud.tip, alpha=0.2)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from softreach.export.arm import export_arm
-from softreach.export.cloud import export_cloud
-from softreach.export.surface import export_mesh
+from softreach.export.clouds import export_cloud
+from softreach.export.surfaces import export_arm, export_mesh
 
 __all__ = ["export_arm", "export_cloud", "export_mesh"]

@@ -11,9 +11,9 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from softreach.atomic import writing
-from softreach.errors import MissingExtra
-from softreach.file_kinds import Formats, format_of
+from softreach.support.errors import MissingExtra
+from softreach.support.files.atomic import writing
+from softreach.support.files.kinds import Formats, format_of
 
 __all__ = ["Writers", "load_library", "write_by_suffix", "write_vtk", "write_vtu"]
 

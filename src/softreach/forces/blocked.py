@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arguments import checked, function, optional, whole
 from softreach.arm.manipulator import Manipulator
-from softreach.arrays import as_floats
-from softreach.errors import InvalidInput
 from softreach.forces.growth import Grown, Growth
 from softreach.forces.stop import Stop
 from softreach.inverse import solve_inverse
 from softreach.inverse.request import checked_activations, checked_targets
-from softreach.progress import Progress, silent
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.pushing_tip import PushingTip
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 from softreach.stiffness import a_direction, unit_directions, yielding_rod
+from softreach.support.arguments import checked, function, optional, whole
+from softreach.support.arrays import as_floats
+from softreach.support.errors import InvalidInput
+from softreach.support.progress import Progress, silent
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,12 +8,12 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from softreach import parallel
 from softreach.geometry.delaunay import Delaunay, unit_scale
 from softreach.geometry.hull import Hull
 from softreach.geometry.surface import compact_surface, surface_area
-from softreach.kernels import alpha as kernels
-from softreach.kernels.expansions import scratch
+from softreach.kernels.points import alpha as kernels
+from softreach.kernels.points.expansions import scratch
+from softreach.support import parallel
 
 __all__ = ["AlphaComplex"]
 

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.arrays import Faces, Points, as_points
 from softreach.geometry.delaunay import unit_scale
 from softreach.geometry.surface import compact_surface, enclosed_volume, surface_area
-from softreach.quantity import quantity
-from softreach.versions import versions
+from softreach.support.arrays import Faces, Points, as_points
+from softreach.support.quantity import quantity
+from softreach.support.versions import versions
 
 if TYPE_CHECKING:
     import xarray as xr

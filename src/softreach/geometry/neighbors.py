@@ -9,10 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach import parallel
-from softreach.arrays import as_points
-from softreach.errors import InvalidInput
-from softreach.kernels.neighbors import (
+from softreach.kernels.points.neighbor_sums import (
     PLACE_BITS,
     SHIFTS,
     find_windows,
@@ -21,6 +18,9 @@ from softreach.kernels.neighbors import (
     stable_order,
     window_keys,
 )
+from softreach.support import parallel
+from softreach.support.arrays import as_points
+from softreach.support.errors import InvalidInput
 
 __all__ = ["mean_value_distance"]
 

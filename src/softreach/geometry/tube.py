@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.errors import InvalidInput
 from softreach.geometry.surface import Surface
+from softreach.support.errors import InvalidInput
 
 __all__ = ["grid_faces", "joined", "ribbon_surface", "tube_surface"]
 

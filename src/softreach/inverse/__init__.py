@@ -1,9 +1,9 @@
 """The inverse problem: which activations put the tip where it should be."""
 
-from softreach.inverse.continuation import PathStatus
-from softreach.inverse.prepared_map import PreparedMap, prepared_map
+from softreach.inverse.path import PathStatus
+from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.solutions import Solution, Solutions, Status
-from softreach.inverse.solver import solve_inverse
+from softreach.inverse.solve import solve_inverse
 
 __all__ = [
     "PathStatus",

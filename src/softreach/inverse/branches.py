@@ -26,15 +26,15 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach import parallel
 from softreach.inverse.nearest import local_minima
-from softreach.inverse.prepared_map import PreparedMap
+from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.roots import Roots, no_roots, placed, roots_at, smallest_singular_values
 from softreach.inverse.starts import Starts, spatial_order, starts_from_cells, with_torn_cells
-from softreach.kernels import folds, newton
-from softreach.kernels.newton import CONVERGED, RUNNING, STAGNATED, Search
+from softreach.kernels.branches import folds, newton
+from softreach.kernels.branches.newton import CONVERGED, RUNNING, STAGNATED, Search
 from softreach.rod.tip_map import TipMap
+from softreach.support import parallel
 
 __all__ = ["distinct", "every_branch"]
 

@@ -12,12 +12,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.inverse.constrained import constrained_minima
 from softreach.inverse.descent import descend
-from softreach.inverse.prepared_map import PreparedMap
-from softreach.inverse.reach import Reached, first_of_each, reach
+from softreach.inverse.nearest import Reached, first_of_each, reach
+from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
-from softreach.inverse.sequential import sequential_minima, survey
+from softreach.inverse.sqp import constrained_minima, sequential_minima, survey
 from softreach.rod.tip_map import TipMap
 
 __all__ = ["least_changes"]

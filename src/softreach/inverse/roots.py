@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach import parallel
-from softreach.kernels import newton
+from softreach.inverse.prepared import PreparedMap
+from softreach.inverse.request import Request
+from softreach.kernels.branches import newton
 from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
-
-__all__ = ["Roots", "conditions", "no_roots", "placed", "roots_at", "smallest_singular_values"]
+from softreach.support import parallel
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -122,3 +122,122 @@ def _closed_form(slope: Array) -> tuple[Array, Array]:
     smallest, condition = np.empty(len(slope)), np.empty(len(slope))
     newton.conditions(slope, smallest, condition)
     return smallest, condition
+
+
+# Newton's method where ∂r/∂γ is nearly singular, for three free bundles.
+#
+# Near a full circle two singular values of J vanish together. The residual then says little about
+# the distance from a root: on the way it has to rise, and a search that never lets it does not
+# arrive. Steps are judged by the natural test instead, |J⁻¹ F(trial)| < |J⁻¹ F(γ)|, which is
+# invariant under any linear change of the residual.
+#
+# The roots lie in a curved valley: along one direction the tip moves millions of times as far as
+# along the others, and a straight step leaves the valley's floor. So each step ends with a few of
+# Newton's method along that direction alone.
+
+
+_EFFORTS = ((500, 20, 0.1), (2000, 100, 0.08))
+"""Landmarks near the target, most starts from them, their least distance in ranges."""
+_BLOCK = 500  # targets at once
+
+_MOST_ITERATIONS = 60
+_LONGEST_STEP = 0.3  # in ranges
+_OUTSIDE = 0.05  # how far a search may leave the bounds, in ranges
+_LEAST_DAMPING = 1e-3
+_CONVERGED = 1e-9  # step, in ranges
+_FIRST_RETURNS, _RETURNS = 4, 2  # steps down to the floor of the valley
+
+
+def nearly_singular_roots(prepared: PreparedMap, request: Request, rows: Index) -> Roots:
+    """Roots for some of the targets, those that no other search found, sorted by target."""
+    roots = no_roots(prepared.rod)
+    for neighbors, most, apart in _EFFORTS:
+        left = np.setdiff1d(rows, roots.target)
+        for first in range(0, len(left), _BLOCK):
+            part = left[first : first + _BLOCK]
+            near = prepared.landmarks.nearest(request.targets[part], neighbors)
+            owner, start = prepared.landmarks.starts(near, most, apart)
+            roots = roots.joined(_from_starts(prepared.rod, request, part[owner], start))
+    return roots
+
+
+def _from_starts(rod: TipMap, request: Request, owner: Index, start: Array) -> Roots:
+    """Roots from starts."""
+    gamma = natural_newton(rod, request.targets[owner], start, request.residual)
+    found = roots_at(rod, request.targets, owner, gamma)
+    return found.where(found.residual <= request.residual)
+
+
+def natural_newton(rod: TipMap, targets: Array, start: Array, residual: float) -> Array:
+    """Where each search ends, inside the bounds; whether at a root is for the caller to see.
+
+    Args:
+        rod: The tip map of three free bundles.
+        targets: One for each start [m], shape (n, 3).
+        start: Shape (n, 3).
+        residual: |tip - target| at which a search may end [m].
+    """
+    box, scales = rod.box, rod.box.scales
+    low, high = box.low - _OUTSIDE * scales, box.high + _OUTSIDE * scales
+    valley = _Valley(rod, low, high)
+    gamma, miss, slope = valley.floor(targets, start, _FIRST_RETURNS)
+    damping, active = np.ones(len(start)), np.flatnonzero(np.isfinite(miss[:, 0]))
+    for _ in range(_MOST_ITERATIONS):
+        if not len(active):
+            break
+        inverse = _inverses(slope[active] * scales)
+        step = np.einsum("nij,nj->ni", inverse, miss[active])
+        size = np.linalg.norm(step, axis=1)
+        factor = np.minimum(damping[active], _LONGEST_STEP / np.maximum(size, 1e-300))
+        trial = np.clip(gamma[active] + factor[:, None] * step * scales, low, high)
+        trial, away, new_slope = valley.floor(targets[active], trial, _RETURNS)
+        left = np.linalg.norm(np.einsum("nij,nj->ni", inverse, away), axis=1)
+        accepted = left <= (1.0 - 0.25 * factor) * size
+        taken = active[accepted]
+        gamma[taken], slope[taken], miss[taken] = (
+            trial[accepted],
+            new_slope[accepted],
+            away[accepted],
+        )
+        damping[active] = np.where(accepted, np.minimum(1.0, 3.0 * factor), 0.3 * factor)
+        near = np.linalg.norm(miss[active], axis=1) <= residual
+        end = (size <= _CONVERGED) | (near & ~accepted) | (damping[active] < _LEAST_DAMPING)
+        active = active[~end]
+    return box.clip(gamma)
+
+
+class _Valley(NamedTuple):
+    """Where the tip has the right place along the direction in which it moves most."""
+
+    rod: TipMap
+    low: Array
+    high: Array
+
+    def floor(self, targets: Array, gamma: Array, steps: int) -> tuple[Array, Array, Array]:
+        """Activations after some steps along that direction, target - tip and ∂r/∂γ [m] there."""
+        tip, slope = self.rod.tips_and_slopes(gamma)
+        for _ in range(steps):
+            gamma = self._stepped(targets, gamma, tip, slope)
+            tip, slope = self.rod.tips_and_slopes(gamma)
+        return gamma, targets - tip, slope
+
+    def _stepped(self, targets: Array, gamma: Array, tip: Array, slope: Array) -> Array:
+        """Activations a step nearer to the floor; those without a tip stay."""
+        scales = self.rod.box.scales
+        lost = np.isnan(tip[:, 0]) if self.rod.supports_unstable else np.zeros(len(tip), bool)
+        known = np.where(lost[:, None, None], np.eye(3), slope * scales)
+        left, sizes, right = np.linalg.svd(known)
+        step = np.einsum("ni,ni->n", left[:, :, 0], targets - tip) / sizes[:, 0]
+        ahead = np.clip(gamma + scales * step[:, None] * right[:, 0], self.low, self.high)
+        return np.where(lost[:, None], gamma, ahead)
+
+
+def _inverses(matrices: Array) -> Array:
+    """Inverses of 3x3 matrices, of those that are singular next to them."""
+    det = np.linalg.det(matrices)
+    size = np.linalg.norm(matrices, axis=(1, 2))
+    flat = np.abs(det) <= 1e-30 * size**3
+    shift = np.where(flat, 1e-12 * size, 0.0)[:, None, None] * np.eye(3)
+    inverses = np.empty_like(matrices)
+    inverses[:] = np.linalg.inv(matrices + shift)
+    return inverses

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import counted
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
+from softreach.support.errors import counted
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.inverse.prepared_map import PreparedMap
+from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
-from softreach.kernels import candidates
+from softreach.kernels.branches import candidates
 
 __all__ = ["Starts", "spatial_order", "starts_from_cells", "with_torn_cells"]
 

@@ -17,8 +17,8 @@ from numba.core import event
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
 
-from softreach.interruption import as_a_whole
 from softreach.kernels.parts import KernelDispatcher, PartedDispatcher
+from softreach.support.files.interruption import as_a_whole
 
 __all__ = ["FAST", "inline", "kernel", "pasted", "strict"]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from softreach.kernels.compiler import inline
-from softreach.kernels.rod import LANES, load
+from softreach.kernels.rod.tips import LANES, load
 
 __all__ = ["copy", "get", "get_four", "load_all", "put", "put_four", "turn_at"]
 

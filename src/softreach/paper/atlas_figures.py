@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.errors import SoftreachWarning
+from softreach.support.errors import SoftreachWarning
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -77,8 +77,8 @@ def _clouds(atlas: xr.Dataset) -> Callable[[int, int], xr.Dataset | None]:
 
 def hulls_of(atlas: xr.Dataset) -> Callable[[int, int], Hull | None]:
     """(column, row) -> the hull of the design there in lengths of its own, if it is done."""
+    from softreach.cloud.volume import concave_hull
     from softreach.rod.tip_map import TipStatus
-    from softreach.volume import concave_hull
 
     cloud_at, alpha_over_length = _clouds(atlas), _alpha_over_length(atlas)
 
@@ -123,7 +123,7 @@ def _curvature(atlas: xr.Dataset) -> Any:
 
     None if neither design is done.
     """
-    from softreach.curvature import curvature_statistics
+    from softreach.cloud.curvature import curvature_statistics
     from softreach.plot import plot_curvature, sheet_axes
 
     ends = _thinned(atlas, 2)

@@ -1,16 +1,43 @@
-"""What the paper says, statement by statement: `claims.toml`, and the check of each."""
+"""Verdicts on the statements of the paper."""
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from importlib import import_module
 from importlib.resources import files
+from typing import Any, NamedTuple
 
-from softreach.paper.verdict import Finding, Numbers
+Numbers = Mapping[str, Any]
+"""What a part of the report computed, by name."""
 
-__all__ = ["CLAIMS", "Claim"]
+
+class Verdict(StrEnum):
+    """Whether a statement holds."""
+
+    AGREES = "agrees"
+    NEARLY = "nearly"
+    DIFFERS = "differs"
+    MISPRINT = "misprint"
+    OPEN = "open"
+
+
+class Finding(NamedTuple):
+    """What was found."""
+
+    text: str
+    verdict: Verdict
+
+
+def judged(text: str, agrees: bool, nearly: bool = False) -> Finding:
+    """What was found, and whether that agrees, or nearly does."""
+    verdict = Verdict.AGREES if agrees else Verdict.NEARLY if nearly else Verdict.DIFFERS
+    return Finding(text, verdict)
+
+
+# What the paper says, statement by statement: `claims.toml`, and the check of each.
 
 
 @dataclass(frozen=True)
@@ -33,7 +60,7 @@ def _claims() -> Iterator[Claim]:
     text = files("softreach.paper").joinpath("claims.toml").read_text(encoding="utf-8")
     for row in tomllib.loads(text)["claim"]:
         part, function = row.pop("check").split(".")
-        check = getattr(import_module(f"softreach.paper.checks.{part}"), function)
+        check = getattr(import_module(f"softreach.paper.sections.{part}"), function)
         yield Claim(**row, part=part, check=check)
 
 

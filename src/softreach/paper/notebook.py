@@ -8,15 +8,12 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from softreach.atomic import writing
-from softreach.file_kinds import FileKind, text_with
+from softreach.support.files.atomic import writing
+from softreach.support.files.kinds import FileKind, text_with
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-__all__ = ["Notebook", "Picture"]
-
 
 _NOTES = FileKind("what a part of the report found", text_with('"folder": null,\n "part": '))
 
@@ -87,3 +84,51 @@ class Notebook:
     @property
     def _file(self) -> Path:
         return self.folder / f"{self.part}.json"
+
+
+# Sizes of the clouds with which the paper is recomputed.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Sizes of the paper's clouds and sweeps, or smaller ones."""
+
+    designs: int
+    """Designs along each edge of the atlas."""
+    samples: int
+    """Activations of each design of the atlas."""
+    alpha: float
+    """Radius of the α-shapes, in L; the paper states none."""
+    panels: int
+    """Designs along each edge of the sheets."""
+    accuracy: float
+    """Relative error asked of exact volumes."""
+    redundant_samples: int
+    """Activations of the clouds that are compared for redundancy."""
+    queries: int
+    """Points at which D̄ is evaluated."""
+    seed: int = 0
+    """Seed of every cloud."""
+
+
+FULL = Settings(
+    designs=16,
+    samples=400_000,
+    alpha=0.05,
+    panels=7,
+    accuracy=3e-3,
+    redundant_samples=2_000_000,
+    queries=10_000,
+)
+"""The sizes that the paper states (sections 3 and 5)."""
+
+QUICK = Settings(
+    designs=4,
+    samples=10_000,
+    alpha=0.13,
+    panels=2,
+    accuracy=5e-2,
+    redundant_samples=50_000,
+    queries=1_000,
+)
+"""The same in under a minute; its numbers are coarse."""

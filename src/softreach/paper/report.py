@@ -12,13 +12,11 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from softreach.atomic import writing
-from softreach.errors import MissingExtra
-from softreach.file_kinds import FileKind, Formats, text_with
-from softreach.paper.claims import CLAIMS
-from softreach.paper.notebook import Notebook
-from softreach.paper.settings import Settings
-from softreach.paper.verdict import Verdict
+from softreach.paper.claims import CLAIMS, Verdict
+from softreach.paper.notebook import Notebook, Settings
+from softreach.support.errors import MissingExtra
+from softreach.support.files.atomic import writing
+from softreach.support.files.kinds import FileKind, Formats, text_with
 
 __all__ = ["REPORT", "report_template", "write_report"]
 

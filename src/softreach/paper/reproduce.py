@@ -12,18 +12,17 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from softreach.atlas.demand import STORED
-from softreach.atomic import check_place
-from softreach.paper.notebook import Notebook
-from softreach.paper.parts.misprints import misprints
-from softreach.paper.parts.model import model
-from softreach.paper.parts.redundancy import redundancy
-from softreach.paper.parts.sweep import sweep
-from softreach.paper.parts.uniqueness import uniqueness
-from softreach.paper.parts.volume import volume
+from softreach.atlas.build import STORED
+from softreach.paper.notebook import FULL, QUICK, Notebook
 from softreach.paper.report import REPORT, report_template, write_report
-from softreach.paper.settings import FULL, QUICK
+from softreach.paper.sections.misprints import misprints
+from softreach.paper.sections.model import model
+from softreach.paper.sections.redundancy import redundancy
+from softreach.paper.sections.sweep import sweep
+from softreach.paper.sections.uniqueness import uniqueness
+from softreach.paper.sections.volume import volume
 from softreach.plot.style import pyplot
+from softreach.support.files.atomic import check_place
 
 __all__ = ["PARTS", "reproduce_paper"]
 

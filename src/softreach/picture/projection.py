@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.errors import InvalidInput
+from softreach.support.errors import InvalidInput
 
 __all__ = [
     "VIEWS",

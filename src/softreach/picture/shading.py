@@ -8,8 +8,6 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.picture.projection import View, project
 from softreach.picture.zbuffer import ZBuffer
 
-__all__ = ["draw_mesh", "shade"]
-
 Array = NDArray[np.float64]
 
 _LAMP = np.array([-0.45, 0.60, 0.66])  # over the left shoulder: right, up, toward the eye
@@ -63,3 +61,38 @@ def vertex_normals(points: Array, faces: NDArray[np.integer]) -> Array:
         np.add.at(total, faces[:, k], normals)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.divide(total, length, out=np.zeros_like(total), where=length > 0)
+
+
+# What lies inside of something, seen through it.
+
+
+_SHARE = 0.55  # of what is inside, in the color of a pixel
+
+
+def seen_through(image: NDArray[np.uint8], within: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """An image through which another shows.
+
+    Args:
+        image: What is outside, RGBA from 0 to 255, shape (rows, columns, 4).
+        within: What is inside, as large.
+    """
+    front, back = image.astype(float), within.astype(float)
+    cover = front[..., 3:] / 255
+    weight = back[..., 3:] / 255 * (1.0 - (1.0 - _SHARE) * cover)
+    mixed = np.where(cover > 0, (1.0 - weight) * front + weight * back, back)
+    mixed[..., 3:] = np.maximum(front[..., 3:], back[..., 3:])
+    return np.rint(mixed).astype(np.uint8)
+
+
+def faces_to_eye(vertices: ArrayLike, faces: ArrayLike, view: View) -> NDArray[np.int64]:
+    """Those of the faces that are seen from outside, shape (n, 3).
+
+    Args:
+        vertices: Shape (v, 3).
+        faces: Turning outwards, shape (f, 3).
+        view: The direction of the eye.
+    """
+    points, faces = project(vertices, view)[:, :2], np.asarray(faces)
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    (ux, uy), (vx, vy) = (b - a).T, (c - a).T
+    return faces[ux * vy > uy * vx]

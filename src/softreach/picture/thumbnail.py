@@ -4,19 +4,48 @@ from __future__ import annotations
 
 import base64
 import html
+import struct
+import zlib
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.palette import STEEL, Color
-from softreach.picture.png import png_bytes
 from softreach.picture.projection import View, project
-from softreach.picture.see_through import faces_to_eye, seen_through
-from softreach.picture.shading import draw_mesh
+from softreach.picture.shading import draw_mesh, faces_to_eye, seen_through
 from softreach.picture.zbuffer import Extent, ZBuffer
+from softreach.support.errors import InvalidInput
+from softreach.support.palette import STEEL, Color
 
-__all__ = ["Dots", "Skin", "html_card", "thumbnail"]
+# An image as a PNG file, without an image library.
+
+
+_COLOR_TYPES = {3: 2, 4: 6}  # channels -> RGB or RGBA
+
+
+def png_bytes(image: NDArray[np.uint8]) -> bytes:
+    """The content of a PNG file.
+
+    Args:
+        image: RGB or RGBA from 0 to 255, from top to bottom, shape (rows, columns, 3 or 4).
+
+    Raises:
+        InvalidInput: An image of another shape.
+    """
+    if image.ndim != 3 or image.shape[2] not in _COLOR_TYPES or not image.size:
+        raise InvalidInput("image.shape", image.shape, "(rows, columns, 3 or 4)")
+    rows, columns, channels = image.shape
+    header = struct.pack(">2I5B", columns, rows, 8, _COLOR_TYPES[channels], 0, 0, 0)
+    # each row begins with its filter: 0, none
+    lines = np.pad(image.astype(np.uint8).reshape(rows, -1), ((0, 0), (1, 0)))
+    content = zlib.compress(lines.tobytes(), 9)
+    parts = ((b"IHDR", header), (b"IDAT", content), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(kind, data) for kind, data in parts)
+
+
+def _chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
 
 _WIDTH = 220  # pixels
 _MARGIN = 0.03

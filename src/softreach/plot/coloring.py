@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arrays import as_floats
-from softreach.errors import InvalidInput
-from softreach.palette import activation_colors
 from softreach.schema import activation_symbols, activation_units
+from softreach.support.arrays import as_floats
+from softreach.support.errors import InvalidInput
+from softreach.support.palette import activation_colors
 
 if TYPE_CHECKING:
     import xarray as xr

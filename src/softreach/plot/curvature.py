@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arguments import checked, dataset, mapping_of, one_of
-from softreach.errors import InvalidInput
-from softreach.plot.arguments import AX
 from softreach.plot.lengths import LengthUnit, common_unit, unit_of
-from softreach.plot.style import figure_style, small_axes
+from softreach.plot.style import AX, figure_style, small_axes
+from softreach.support.arguments import checked, dataset, mapping_of, one_of
+from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.errors import InvalidInput
+from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softreach.arguments import checked, dataset, flag
-from softreach.arrays import as_floats
-from softreach.errors import InvalidInput
 from softreach.picture.projection import View, is_mirrored, plane_of, sight_axis
-from softreach.plot.arguments import AX, PLACE, WIDTH, a_view
 from softreach.plot.lengths import LengthUnit, unit_of
-from softreach.plot.style import figure_style, pyplot, small_axes
+from softreach.plot.style import AX, PLACE, WIDTH, a_view, figure_style, pyplot, small_axes
+from softreach.support.arguments import checked, dataset, flag
+from softreach.support.arrays import as_floats
+from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     import xarray as xr

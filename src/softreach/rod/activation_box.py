@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arrays import as_rows
-from softreach.errors import InvalidInput
+from softreach.support.arrays import as_rows
+from softreach.support.errors import InvalidInput
 
 __all__ = ["ActivationBox"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.kernels.box_projection import project
+from softreach.kernels.box.box_projection import project
 from softreach.rod.activation_box import ActivationBox
 
 __all__ = ["damped_steps"]

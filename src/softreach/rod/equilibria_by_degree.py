@@ -17,17 +17,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
-from softreach.arrays import as_floats
-from softreach.errors import InvalidInput, SoftreachWarning
-from softreach.geometry.sphere_mesh import icosphere
-from softreach.geometry.sphere_rings import is_axisymmetric, pole_rings
-from softreach.geometry.sphere_roots import Map, Roots, polished_roots, sphere_roots
+from softreach.geometry.sphere_maps import (
+    Map,
+    Roots,
+    icosphere,
+    is_axisymmetric,
+    pole_rings,
+    polished_roots,
+    sphere_roots,
+)
 from softreach.rod.all_equilibria import AllEquilibria
 from softreach.rod.equilibrium import Solver
 from softreach.rod.free import FreeRod
 from softreach.rod.load_tables import LoadTables
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.tip_map import TipMap, TipStatus, tip_map
+from softreach.support.arrays import as_floats
+from softreach.support.errors import InvalidInput, SoftreachWarning
 
 __all__ = ["equilibria"]
 

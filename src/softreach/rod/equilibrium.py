@@ -8,8 +8,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach import parallel
-from softreach.kernels.loaded_general import TRACE
+from softreach.kernels.loaded.any_loads import TRACE
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.found_equilibria import Equilibria, Response
 from softreach.rod.load_tables import LoadTables, StepTables
@@ -25,6 +24,7 @@ from softreach.rod.shooting import (
 )
 from softreach.rod.start_grid import StartGrid, grid_sizes
 from softreach.rod.tip_map import TipStatus
+from softreach.support import parallel
 
 __all__ = ["LATER_RUNGS", "Solver"]
 

@@ -9,15 +9,16 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach import parallel
 from softreach.arm.tables import tables
-from softreach.kernels import frames, jacobian, rod
+from softreach.kernels.rod import frames, jacobian
+from softreach.kernels.rod import tips as rod
 from softreach.rod.arm_rod import ArmRod
 from softreach.rod.frames import Frames, StrainRange, Strains
 from softreach.rod.linear_strains import linear_strains, strain_range
 from softreach.rod.linearization import Linearization
 from softreach.rod.steps import StepRule
 from softreach.rod.tip_map import BLOCK
+from softreach.support import parallel
 
 __all__ = ["FreeRod"]
 

@@ -8,11 +8,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arguments import checked
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.affine_coordinates import AffineCoordinates
 from softreach.rod.steps import check_tol
 from softreach.rod.tip_map import TipMap, a_tip_map
+from softreach.support.arguments import checked
 
 __all__ = ["FreeBundles", "free_bundles"]
 

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach import schema
-from softreach.arguments import as_given, plain
 from softreach.arm.manipulator import Manipulator
-from softreach.arrays import as_floats
-from softreach.errors import InvalidInput
-from softreach.memory import check_room
 from softreach.rod.frames import Frames, Strains
 from softreach.rod.tip_map import TipMap, tip_map
+from softreach.support.arguments import as_given, plain
+from softreach.support.arrays import as_floats
+from softreach.support.errors import InvalidInput
+from softreach.support.memory import check_room
 
 if TYPE_CHECKING:
     import xarray as xr

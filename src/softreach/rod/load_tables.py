@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import compliance, tables
-from softreach.kernels import magnus, rest_frames, rod
-from softreach.kernels.explicit_rk8 import NODES
+from softreach.kernels.loaded import unloaded_frames as rest_frames
+from softreach.kernels.loaded.explicit_rk8 import NODES
+from softreach.kernels.rod import magnus
+from softreach.kernels.rod import tips as rod
 from softreach.rod.load_phase import LoadPhase, load_phase, phase_stations
 from softreach.rod.steps import edges_between
 

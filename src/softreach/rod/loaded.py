@@ -9,11 +9,9 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach import parallel
 from softreach.arm.loads import Loads
 from softreach.arm.tables import tables
-from softreach.errors import InvalidInput
-from softreach.kernels.rod import LANES
+from softreach.kernels.rod.tips import LANES
 from softreach.rod.arm_rod import ArmRod
 from softreach.rod.equilibrium import LATER_RUNGS, Solver
 from softreach.rod.found_equilibria import Equilibria, Response
@@ -32,6 +30,8 @@ from softreach.rod.loaded_steps import (
 from softreach.rod.never_at_rest import none_of, too_heavy
 from softreach.rod.pilot import pilot_activations
 from softreach.rod.tip_map import BLOCK
+from softreach.support import parallel
+from softreach.support.errors import InvalidInput
 
 __all__ = ["LoadedRod"]
 

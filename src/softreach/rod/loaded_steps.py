@@ -15,10 +15,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.errors import InvalidInput
 from softreach.rod.equilibrium import Solver
 from softreach.rod.found_equilibria import Equilibria
 from softreach.rod.tip_map import TipStatus
+from softreach.support.errors import InvalidInput
 
 __all__ = ["Differences", "checked", "fewest_steps", "shape_differences", "tip_differences"]
 

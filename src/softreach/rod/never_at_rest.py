@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from softreach.errors import InvalidInput
+from softreach.support.errors import InvalidInput
 
 __all__ = ["none_of", "none_stable", "too_heavy"]
 

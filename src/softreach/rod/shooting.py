@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.kernels import loaded, loaded_general
+from softreach.kernels.loaded import any_loads as loaded_general
+from softreach.kernels.loaded import shooting as loaded
 from softreach.rod.load_tables import LoadTables, StepTables
 
 __all__ = ["Shots", "Walked", "base_directions", "shoot", "shoot_along_one", "with_across"]

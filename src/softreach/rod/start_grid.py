@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.kernels.grid_values import interpolate
+from softreach.kernels.loaded.grid_values import interpolate
 from softreach.rod.activation_box import ActivationBox
 
 __all__ = ["StartGrid", "grid_sizes"]

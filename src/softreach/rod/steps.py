@@ -13,15 +13,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach import parallel
-from softreach.arguments import as_number
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.profile import Profile
 from softreach.arm.tables import both_sides, tables
-from softreach.errors import InvalidInput, Range
-from softreach.kernels import frames, magnus, rod
+from softreach.kernels.rod import frames, magnus
+from softreach.kernels.rod import tips as rod
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.pilot import pilot_activations, worsened
+from softreach.support import parallel
+from softreach.support.arguments import as_number
+from softreach.support.errors import InvalidInput, Range
 
 __all__ = ["Nodes", "StepRule", "check_tol", "edges_between", "step_counts"]
 

@@ -15,15 +15,15 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach import parallel
-from softreach.arguments import as_given, flag, instance
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.weight import VERIFIED_LOAD_NUMBER, is_overloaded
-from softreach.arrays import as_floats
-from softreach.errors import InvalidInput, SoftreachWarning, counted
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.frames import Frames, StrainRange, Strains, TipMotions, position_slopes
 from softreach.rod.steps import check_tol
+from softreach.support import parallel
+from softreach.support.arguments import as_given, flag, instance
+from softreach.support.arrays import as_floats
+from softreach.support.errors import InvalidInput, SoftreachWarning, counted
 
 __all__ = [
     "BLOCK",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import socket
 
-from softreach.errors import InvalidInput
+from softreach.support.errors import InvalidInput
 
 __all__ = ["ANYWHERE", "LOOPBACK", "check_port", "is_local", "page_address", "reachable_hosts"]
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import find_parameter
-from softreach.errors import InvalidInput
 from softreach.plot.metric_map import metric_label, plot_metric_map
 from softreach.studio.state import MapView
+from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from softreach.memory import free_memory
 from softreach.studio.worker import StaleCheck
+from softreach.support.memory import free_memory
 
 __all__ = ["Budget", "OverBudget", "memory_share"]
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
+from softreach.cloud.redundancy import activation_distance
 from softreach.plot.coloring import UNSTABLE, BundleKey, Coloring, ScalarKey, color_samples
-from softreach.redundancy import activation_distance
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import activation_symbols
 from softreach.studio import markup

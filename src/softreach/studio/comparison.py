@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed, parameters
-from softreach.errors import SoftreachError
 from softreach.studio.controls import controls
 from softreach.studio.markup import Part, Strong, paragraph, table
 from softreach.studio.snapshots import Numbers
+from softreach.support.errors import SoftreachError
 
 __all__ = ["Candidate", "Comparison", "compared", "comparison_csv", "comparison_html"]
 

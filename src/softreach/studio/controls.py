@@ -9,7 +9,7 @@ from typing import NamedTuple
 from softreach.arm.file import in_file_terms
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import Parameter, parameters
-from softreach.errors import Fault, InvalidDesign, Range
+from softreach.support.errors import Fault, InvalidDesign, Range
 
 __all__ = ["Control", "Shown", "controls", "hint", "refusal"]
 

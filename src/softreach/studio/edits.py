@@ -19,7 +19,7 @@ from softreach.arm.actuators import (
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.materials import named_material
 from softreach.arm.section import Ring
-from softreach.errors import InvalidInput
+from softreach.support.errors import InvalidInput
 
 __all__ = [
     "ACTUATOR_KINDS",

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.errors import InvalidInput
 from softreach.studio.state import Camera, vector
+from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     from viser import ClientHandle

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.errors import InvalidInput
 from softreach.export import export_cloud, export_mesh
 from softreach.rod.kinematics import configuration
 from softreach.studio.colors import sample_values
@@ -18,6 +17,7 @@ from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.rod import design_of_text
 from softreach.studio.slicing import in_slice
 from softreach.studio.state import Appearance, StudioState
+from softreach.support.errors import InvalidInput
 from softreach.workspace import ReachableSolid, ReachableSurface, Surface
 
 if TYPE_CHECKING:

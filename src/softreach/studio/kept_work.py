@@ -13,12 +13,12 @@ import threading
 from pathlib import Path
 
 from softreach.arm.manipulator import Manipulator
-from softreach.atomic import replacing
-from softreach.errors import InvalidInput, SoftreachError
-from softreach.file_kinds import FileKind, text_with
 from softreach.studio.snapshots import Snapshot
 from softreach.studio.state import StudioState
 from softreach.studio.user_folder import user_folder
+from softreach.support.errors import InvalidInput, SoftreachError
+from softreach.support.files.atomic import replacing
+from softreach.support.files.kinds import FileKind, text_with
 
 __all__ = ["KeptWork", "work_on"]
 

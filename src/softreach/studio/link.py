@@ -6,8 +6,8 @@ import base64
 import zlib
 from urllib.parse import parse_qs, quote, urlsplit
 
-from softreach.errors import InvalidInput
 from softreach.studio.state import StudioState
+from softreach.support.errors import InvalidInput
 
 __all__ = ["state_in_request", "state_link"]
 

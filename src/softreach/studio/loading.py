@@ -11,8 +11,8 @@ from softreach.arm.file import in_file_terms
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.weight import GRAVITY
-from softreach.errors import Fault, InvalidDesign, InvalidInput
 from softreach.studio.state import Vector, vector
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput
 
 __all__ = ["GRAVITIES", "TypedLoads", "gravity_name", "other_loads", "typed_loads", "with_loads"]
 

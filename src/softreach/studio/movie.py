@@ -12,16 +12,15 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.skin import inside
-from softreach.arm_shape import arm_surface, bundle_skins
-from softreach.errors import MissingExtra
 from softreach.geometry.surface import Surface
-from softreach.palette import BODY, bundle_color
 from softreach.picture.projection import View, project
-from softreach.picture.see_through import faces_to_eye, seen_through
-from softreach.picture.shading import draw_mesh
+from softreach.picture.shading import draw_mesh, faces_to_eye, seen_through
 from softreach.picture.zbuffer import Extent, ZBuffer
+from softreach.rod.arm_shape import arm_surface, bundle_skins
 from softreach.rod.kinematics import configuration
 from softreach.studio.rod import solvable_rod
+from softreach.support.errors import MissingExtra
+from softreach.support.palette import BODY, bundle_color
 
 __all__ = ["frames_along", "path_movie"]
 

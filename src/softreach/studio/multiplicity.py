@@ -11,11 +11,11 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach import parallel
-from softreach.progress import Progress, silent
 from softreach.studio.reach import Reach
 from softreach.studio.rod import solvable_rod
 from softreach.studio.worker import StaleCheck, all_cores
+from softreach.support import parallel
+from softreach.support.progress import Progress, silent
 from softreach.workspace import ReachableSolid
 
 __all__ = ["count_activations", "counts_at", "uncounted"]

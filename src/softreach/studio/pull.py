@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse import PathStatus, PreparedMap, prepared_map
-from softreach.inverse.continuation import Continuation
 from softreach.inverse.nearest import local_minima
+from softreach.inverse.path import Continuation
 from softreach.inverse.request import Request
 
 __all__ = ["Pull", "Pulled"]

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import SoftreachWarning
+from softreach.cloud.volume import concave_hull
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.budget import memory_share
 from softreach.studio.effort import level_in_memory
 from softreach.studio.rod import TOL
 from softreach.studio.worker import all_cores
-from softreach.volume import concave_hull
+from softreach.support.errors import SoftreachWarning
 from softreach.workspace import (
     ReachableCurve,
     ReachableSet,

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.skin import inside
-from softreach.arm_shape import arm_surface, bundle_skins
-from softreach.palette import BODY, bundle_color
+from softreach.rod.arm_shape import arm_surface, bundle_skins
 from softreach.rod.kinematics import configuration
 from softreach.studio.clouds import Clouds, Dots
 from softreach.studio.colors import FAINT, UNSTABLE, sample_colors
@@ -21,6 +20,7 @@ from softreach.studio.rod import solvable_rod
 from softreach.studio.shading import lit
 from softreach.studio.slicing import in_slice, sliced_faces
 from softreach.studio.state import Appearance, Slice
+from softreach.support.palette import BODY, bundle_color
 from softreach.workspace import ReachableSolid, ReachableSurface, Surface
 
 if TYPE_CHECKING:

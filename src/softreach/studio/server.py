@@ -10,10 +10,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
-from softreach.errors import InvalidInput, MissingExtra
 from softreach.studio.addresses import LOOPBACK, check_port, page_address
 from softreach.studio.connections import refuse_unless, sending_headers
 from softreach.studio.eye import FOV
+from softreach.support.errors import InvalidInput, MissingExtra
 
 if TYPE_CHECKING:
     from viser import GuiApi, ViserServer

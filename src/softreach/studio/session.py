@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.errors import SoftreachError
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.eye import VIEWS, Eye, framing
 from softreach.studio.history import History
@@ -25,6 +24,7 @@ from softreach.studio.snapshots import Snapshots
 from softreach.studio.source import Start
 from softreach.studio.state import StudioState, vector
 from softreach.studio.worker import Latest
+from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
     import xarray as xr

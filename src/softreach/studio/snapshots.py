@@ -8,9 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol, Self
 
-from softreach.errors import InvalidInput
 from softreach.studio.reach import Reach, Size
 from softreach.studio.state import StudioState
+from softreach.support.errors import InvalidInput
 
 __all__ = ["Numbers", "Snapshot", "SnapshotStore", "Snapshots", "numbers_of"]
 

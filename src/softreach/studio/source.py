@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import InvalidInput
-from softreach.stores.place import kind_of
 from softreach.studio.atlas_map import metric_names
 from softreach.studio.files import LARGEST
 from softreach.studio.reach import Quality, Reach
 from softreach.studio.stages import reached
 from softreach.studio.state import StudioState
+from softreach.support.errors import InvalidInput
+from softreach.support.files.store_place import kind_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,7 +62,7 @@ def start_on_store(path: str | PathLike[str], quality: Quality | None = None) ->
     """
     quality = quality or Quality()
     if kind_of(path) == "cloud":
-        from softreach.cloud import open_cloud
+        from softreach.cloud.clouds import open_cloud
 
         reach = reached(open_cloud(path), quality)
         return Start(state=StudioState(design=reach.arm), quality=quality, reach=reach)

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.cloud import compute_cloud, design_of
-from softreach.errors import InvalidInput, SoftreachWarning
+from softreach.cloud.clouds import compute_cloud, design_of
 from softreach.rod.tip_map import TipMap
 from softreach.studio.budget import Budget, OverBudget
 from softreach.studio.effort import affordable_level, level_in_memory
 from softreach.studio.reach import Quality, Reach
 from softreach.studio.rod import solvable_rod
 from softreach.studio.worker import StaleCheck, all_cores
+from softreach.support.errors import InvalidInput, SoftreachWarning
 from softreach.workspace import ReachableSet, reachable_set
 
 if TYPE_CHECKING:

@@ -10,11 +10,11 @@ from typing import Any, Self
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import InvalidInput, Range
 from softreach.rod.activation_box import ActivationBox
 from softreach.studio.rod import design_of_text, rod_of
 from softreach.studio.sight import CUTS
 from softreach.studio.wishes import PlotView, TipPath
+from softreach.support.errors import InvalidInput, Range
 
 __all__ = [
     "LEVELS",

@@ -8,8 +8,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from softreach.arrays import as_floats
-from softreach.errors import InvalidInput
+from softreach.support.arrays import as_floats
+from softreach.support.errors import InvalidInput
 
 __all__ = ["MOST_POINTS", "PlotView", "TipPath"]
 

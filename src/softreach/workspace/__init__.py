@@ -1,11 +1,11 @@
 """The reachable set as the image of the activation box: volume, multiplicity, folds, surface."""
 
 from softreach.geometry.surface import Surface
+from softreach.workspace.abstract_set import ReachableSet
 from softreach.workspace.directions import direction_spread
 from softreach.workspace.gradient import VolumeGradient, volume_gradient
 from softreach.workspace.image import Image, Lattice
 from softreach.workspace.reach import reachable_set
-from softreach.workspace.reachable import ReachableSet
 from softreach.workspace.solid import ReachableSolid
 from softreach.workspace.thin import ReachableCurve, ReachablePoint, ReachableSurface
 

@@ -2,17 +2,111 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.errors import MissingExtra
 from softreach.geometry.surface import Surface, compact_surface
-from softreach.workspace.image import Image
-from softreach.workspace.reached_cells import ReachedCells
+from softreach.rod.stable_tips import stable_tips
+from softreach.rod.tip_map import TipMap
+from softreach.support import parallel
+from softreach.support.errors import MissingExtra
+from softreach.workspace.crossings import Crossings
+from softreach.workspace.image import Image, Lattice
+from softreach.workspace.search import ENOUGH, nearest_tips
 
-__all__ = ["boundary_surface", "critical_surface", "signed_field"]
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
+
+
+# A solid as cells that are reached, and where its boundary cuts the edges between them.
+
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_STARTS = 4  # crossings nearby from which places are searched
+_CORNERS = np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+_CHUNK = 1 << 16
+
+
+@dataclass(frozen=True, eq=False)
+class ReachedCells:
+    """What `Image` is for three free bundles, for more of them: asked by search."""
+
+    rod: TipMap
+    lattice: Lattice
+    reached: NDArray[np.bool_]
+    """Whether the centers of the cells are reached."""
+    gamma: Array
+    """Activations that reach them, meaningless elsewhere, shape (cells, bundles)."""
+    crossings: Crossings
+
+    @property
+    def counts(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """1 at centers that are reached and 0 elsewhere; no orientation, 0."""
+        return self.reached.astype(np.int32), np.zeros(self.reached.shape, np.int32)
+
+    def counts_at(self, points: Array) -> NDArray[np.int64]:
+        """1 for points that are reached [m], 0 for others, shape (n,)."""
+        return (self.distance(points) <= ENOUGH * self.lattice.cell).astype(np.int64)
+
+    def distance(self, points: Array) -> Array:
+        """Distance from points to the nearest tip that searches find [m], shape (n,)."""
+        out = np.full(len(points), np.inf)
+        if not len(self.crossings.edges.cell):
+            return out
+        for block in parallel.blocks(len(points), _CHUNK):
+            self._search(points[block], out[block])
+        return out
+
+    def _search(self, points: Array, out: Array) -> None:
+        """Lower distances by what searches find, until they are 0 or there is no other start."""
+        enough = ENOUGH * self.lattice.cell
+        near = self._tree.query(points, k=_STARTS)[1]
+        near = np.minimum(near, len(self.crossings.edges.cell) - 1)  # where there are fewer
+        starts = [self.crossings.beyond[near[:, k]] for k in range(_STARTS)]
+        for known, start in [*self._starts_inside(points), *((None, start) for start in starts)]:
+            left = np.flatnonzero((out > enough) & (True if known is None else known))
+            found = nearest_tips(self.rod, start[left], points[left], enough)
+            out[left] = np.minimum(out[left], found.distance)
+
+    def _starts_inside(self, points: Array) -> Iterator[tuple[NDArray[np.bool_], Array]]:
+        """Which points have a reached center at a corner of their cube, and where to start."""
+        at = self.lattice.coordinates(points)
+        for corner in (np.rint(at), *(np.floor(at) + corner for corner in _CORNERS)):
+            index = corner.astype(np.int64)
+            within = ((index >= 0) & (index < self.lattice.shape)).all(axis=1)
+            cells = np.ravel_multi_index(
+                tuple(np.where(within, i, 0) for i in index.T), self.reached.shape
+            )
+            yield within & self.reached.ravel()[cells], self.gamma[cells]
+
+    def boundary_crossings(self, axis: int) -> tuple[tuple[Ints, Ints, Ints], Array]:
+        """Where the boundary cuts the edges between cell centers along an axis.
+
+        Returns:
+            The centers just before the boundary, as an index of arrays of the lattice's shape, and
+            how far behind them it lies, in cells, 0 to 1, shape (n,).
+        """
+        edges = self.crossings.edges
+        which = np.flatnonzero(edges.axis == axis)
+        place, up = self.crossings.place[which], edges.sense[which] > 0
+        index = [np.array(i) for i in np.unravel_index(edges.cell[which], self.lattice.shape)]
+        index[axis] = np.where(up, index[axis], index[axis] - 1)
+        return (index[0], index[1], index[2]), np.where(up, place, 1.0 - place)
+
+    @cached_property
+    def _tree(self) -> KDTree:
+        from scipy.spatial import KDTree
+
+        every = np.arange(len(self.crossings.edges.cell))
+        return KDTree(self.crossings.points(every, self.crossings.place))
+
 
 _BAND = 2.5  # cells from the boundary beyond which the field is constant
 _CLOSEST = 1e-3  # cells: a center on the boundary itself would make triangles without area
@@ -85,3 +179,97 @@ def _level_set(image: Image | ReachedCells, field: Array, level: float) -> Surfa
     )
     lattice = image.lattice
     return Surface(vertices=lattice.origin + lattice.cell * vertices.astype(float), faces=faces)
+
+
+# The boundary of a rasterized image as the sheets it consists of: faces of the box, and folds.
+
+
+_ASIDE = 0.02  # cells beside a triangle where is looked for the inside
+_PARTS = 4  # into which each edge of a triangle of the grid is divided
+# Barycentric, of the places on a triangle that are looked at: where sheets cross, one is outside.
+_PLACES = np.array([[1, 1, 1], [8, 1, 1], [1, 8, 1], [1, 1, 8]], float)
+_PLACES /= _PLACES.sum(axis=1, keepdims=True)
+
+
+def _small_triangles() -> tuple[Ints, Ints]:
+    """Barycentric places of the corners, times `_PARTS`, and the triangles between them."""
+    steps = [(i, j) for i in range(_PARTS + 1) for j in range(_PARTS + 1 - i)]
+    number = {step: k for k, step in enumerate(steps)}
+    inner = [(i, j) for i, j in steps if i + j < _PARTS]
+    up = [(number[i, j], number[i + 1, j], number[i, j + 1]) for i, j in inner]
+    down = [
+        (number[i + 1, j], number[i + 1, j + 1], number[i, j + 1])
+        for i, j in inner
+        if i + j < _PARTS - 1
+    ]
+    return np.array([(_PARTS - i - j, i, j) for i, j in steps]), np.array(up + down)
+
+
+_STEPS, _SMALL = _small_triangles()
+
+
+def outer_sheets(rod: TipMap, image: Image) -> Surface:
+    """The critical triangles of which some place has the image on one side only, made finer.
+
+    Their corners lie where the map puts them, so on faces of the box they are on the boundary to
+    the tolerance of the tips: rims are sharp, and parts of any thinness whole. Where sheets cross,
+    some triangles reach a little into the inside: the surface is not a closed one.
+
+    Args:
+        rod: The tip map, of three free bundles.
+        image: Of the grid of cubes over its activation box.
+
+    Returns:
+        Triangles whose normals point outwards.
+    """
+    cells = round(len(image.vertices) ** (1 / 3)) - 1
+    triangles = _outer_triangles(image)
+    nodes = np.stack(np.unravel_index(triangles, (cells + 1,) * 3), axis=-1)
+    keys, faces = _divided(nodes * _PARTS, cells * _PARTS + 1)
+    tips = stable_tips(rod).tips(rod.box.from_free_cube(keys / (cells * _PARTS)))
+    known = np.asarray(np.isfinite(tips).all(axis=1))
+    vertices, faces = compact_surface(tips, faces[known[faces].all(axis=1)])
+    return Surface(vertices=vertices, faces=faces)
+
+
+def _outer_triangles(image: Image) -> Ints:
+    """Vertices of the triangles at the boundary, with the inside behind them, shape (n, 3)."""
+    lattice, triangles = image.lattice, image.triangles[:, :3]
+    corners = lattice.origin + image.vertices[triangles] * (lattice.cell / image.unit)
+    size = np.linalg.norm(_cross(corners), axis=1)
+    some = np.flatnonzero(size)
+    triangles, corners = triangles[some], corners[some]
+    senses = np.stack([_senses(image, corners, place) for place in _PLACES], axis=1)
+    turned = np.where(senses.sum(axis=1)[:, None] < 0, triangles[:, ::-1], triangles)
+    return turned[(senses != 0).any(axis=1)]
+
+
+def _senses(image: Image, corners: Array, place: Array) -> Ints:
+    """1 where only what is behind a triangle is reached, -1 before it; 0 inside and outside."""
+    normals = _cross(corners)
+    away = _ASIDE * image.lattice.cell * normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    at = np.einsum("k,tki->ti", place, corners)
+    before, behind = (image.counts_at(at + side * away) > 0 for side in (1, -1))
+    return behind.astype(np.int64) - before
+
+
+def _cross(corners: Array) -> Array:
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def _divided(corners: Ints, width: int) -> tuple[Ints, NDArray[np.int32]]:
+    """Triangles cut into as many along each edge as `_PARTS`.
+
+    Args:
+        corners: On a grid of integers, multiples of `_PARTS`, shape (n, 3, 3).
+        width: Of that grid along each axis.
+
+    Returns:
+        Places on the grid, each once, and the triangles between them.
+    """
+    places = np.einsum("sk,tki->tsi", _STEPS, corners) // _PARTS
+    keys, flat = np.unique(
+        np.ravel_multi_index(tuple(places.reshape(-1, 3).T), (width,) * 3), return_inverse=True
+    )
+    faces = flat.reshape(len(corners), -1)[:, _SMALL].reshape(-1, 3)
+    return np.stack(np.unravel_index(keys, (width,) * 3), axis=1), faces.astype(np.int32)

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.rod.tip_map import TipMap
-from softreach.workspace.flood import ENOUGH, Flood
 from softreach.workspace.image import Lattice
-from softreach.workspace.projection import nearest_tips
+from softreach.workspace.search import ENOUGH, Flood, nearest_tips
 
 __all__ = ["Crossings", "Edges", "boundary_edges"]
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach import parallel
-from softreach.arguments import POSITIVE, checked, optional, within
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import InvalidInput
 from softreach.rod.tip_map import TipMap, TipStatus, tip_map
 from softreach.sampling import cube_blocks, sample_cube
 from softreach.schema import provenance
+from softreach.support import parallel
+from softreach.support.arguments import POSITIVE, checked, optional, within
+from softreach.support.errors import InvalidInput
 from softreach.workspace.image import Lattice
 
 if TYPE_CHECKING:

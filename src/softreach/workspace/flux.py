@@ -2,17 +2,89 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.geometry.surface import Surface
+from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap
-from softreach.workspace.faces import FaceNodes, box_slopes, gauss_faces
 
-__all__ = ["Flux", "flux_tol", "signed_volume"]
+# The six faces of the box of three free bundles: nodes, tips, and what flows through them.
+
 
 Array = NDArray[np.float64]
+
+
+class FaceNodes(NamedTuple):
+    """Nodes of a rule of integration on the faces of the unit cube, each face in one block."""
+
+    cube: Array
+    """Places, shape (n, 3)."""
+    weights: Array
+    """Of each node, shape (n,); they add up to 1 on each face."""
+    sense: Array
+    """1 on faces at 1, -1 on those at 0: where the cross product of sides points, shape (n,)."""
+    axis: NDArray[np.int64]
+    """Which axis the face is normal to, shape (n,)."""
+
+    def area_vectors(self, slopes: Array) -> Array:
+        """∂r/∂a × ∂r/∂b outwards, times the weights [m²], shape (n, 3).
+
+        The map is taken to keep the orientation.
+
+        Args:
+            slopes: ∂r/∂x of the unit cube at the nodes [m], shape (n, 3, 3).
+        """
+        rows = np.arange(len(slopes))
+        first = slopes[rows, :, (self.axis + 1) % 3]
+        second = slopes[rows, :, (self.axis + 2) % 3]
+        return (self.sense * self.weights)[:, None] * np.cross(first, second)
+
+
+@lru_cache(maxsize=8)
+def gauss_faces(nodes: int) -> FaceNodes:
+    """Gauss and Legendre's nodes on all six faces, as many along each side."""
+    x, w = np.polynomial.legendre.leggauss(nodes)
+    return _on_faces((1.0 + x) / 2.0, w / 2.0)
+
+
+def grid_faces(cells: int) -> Array:
+    """Vertices of a grid of cells^3 boxes that lie on the faces of the unit cube, each once."""
+    inside = np.indices((cells + 1,) * 3).reshape(3, -1).T
+    outer = ((inside == 0) | (inside == cells)).any(axis=1)
+    return inside[outer] / cells
+
+
+def box_slopes(rod: TipMap, cube: Array) -> tuple[Array, Array]:
+    """Tips [m] and their derivatives by places in the unit cube of the free bundles.
+
+    Args:
+        rod: The tip map.
+        cube: Places in [0, 1], shape (n, dimension).
+
+    Returns:
+        Shapes (n, 3) and (n, 3, dimension); NaN where there is no stable equilibrium.
+    """
+    tips, slopes = stable_tips(rod).tips_and_slopes(rod.box.from_free_cube(cube))
+    free = rod.box.free
+    return tips, slopes[:, :, free] * rod.box.widths[free]
+
+
+def _on_faces(ticks: Array, weights: Array) -> FaceNodes:
+    a, b = (each.ravel() for each in np.meshgrid(ticks, ticks, indexing="ij"))
+    both = np.outer(weights, weights).ravel()
+    blocks = []
+    for axis in range(3):
+        for side in (0.0, 1.0):
+            cube = np.empty((len(a), 3))
+            cube[:, axis], cube[:, (axis + 1) % 3], cube[:, (axis + 2) % 3] = side, a, b
+            blocks.append((cube, both, np.full(len(a), 2 * side - 1), np.full(len(a), axis)))
+    cube, all_weights, sense, axis = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+    return FaceNodes(cube, all_weights, sense, axis)
+
 
 _TOL = 1e-11  # in L: there are few nodes, so that steps may be short
 _ROUGH_TOL = 1e-9  # where a raster decides the error, and under loads, where each tip costs much
@@ -71,3 +143,48 @@ def _flux(rod: TipMap, nodes: int) -> Flux:
     value = float(((tips - tips.mean(axis=0)) * area).sum()) / 3.0
     moved = rod.tol * rod.length * float(np.linalg.norm(area, axis=1).sum())
     return Flux(value, moved, faces, area)
+
+
+# The boundary of what a one-to-one map fills: the image of the six faces of the activation box.
+
+
+_CELLS = 96  # along each edge of the box: an arm that bends by half a turn moves 2 degrees a cell
+
+
+def face_image(rod: TipMap, cells: int = _CELLS) -> Surface | None:
+    """The closed image of the surface of the box of three free bundles, oriented outwards.
+
+    Its vertices lie on the boundary to the tolerance of the tips, and so do its edges where the box
+    has edges: sharp rims stay sharp, and parts of any thinness stay whole.
+
+    Args:
+        rod: A tip map that is one to one inside the box.
+        cells: Of the grid along each edge of the box.
+
+    Returns:
+        None if some activation on the faces has no stable equilibrium.
+    """
+    cube = grid_faces(cells)
+    tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
+    if not np.isfinite(tips).all():
+        return None
+    found = Surface(vertices=tips, faces=_face_triangles(cube, cells))
+    if found.volume < 0:  # the map turns the box over
+        found = Surface(vertices=tips, faces=found.faces[:, ::-1].copy())
+    return found
+
+
+def _face_triangles(cube: NDArray[np.float64], cells: int) -> NDArray[np.int32]:
+    """Two triangles for every square of the grid on the faces, oriented outwards."""
+    number = np.full((cells + 1,) * 3, -1, np.int32)
+    number[tuple(np.rint(cube * cells).astype(int).T)] = np.arange(len(cube))
+    parts = []
+    for axis in range(3):
+        for side in (0, cells):
+            # Axes in cyclic order: the square's first side times its second points along the axis.
+            face = np.moveaxis(number, [axis, (axis + 1) % 3, (axis + 2) % 3], [0, 1, 2])[side]
+            a, b, c, d = face[:-1, :-1], face[1:, :-1], face[1:, 1:], face[:-1, 1:]
+            squares = (a, b, c, d) if side else (a, d, c, b)
+            p, q, r, s = (corner.ravel() for corner in squares)
+            parts += [np.stack([p, q, r], axis=1), np.stack([p, r, s], axis=1)]
+    return np.concatenate(parts)

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach import parallel
-from softreach.kernels import contour, point_cover, raster
-from softreach.memory import check_memory
-from softreach.progress import Progress, silent
+from softreach.kernels.image import contour, point_cover, raster
+from softreach.support import parallel
+from softreach.support.memory import check_memory
+from softreach.support.progress import Progress, silent
 
 __all__ = ["Image", "Lattice", "Spans", "image_of"]
 

@@ -14,20 +14,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach import parallel
-from softreach.errors import InvalidInput
 from softreach.geometry.hull import convex_hull
-from softreach.progress import Progress
 from softreach.rod.never_at_rest import none_stable
 from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap
 from softreach.sampling import cube_blocks
+from softreach.support import parallel
+from softreach.support.errors import InvalidInput
+from softreach.support.progress import Progress
+from softreach.workspace.boundary import ReachedCells
 from softreach.workspace.crossings import Crossings
-from softreach.workspace.flood import ENOUGH, Flood
 from softreach.workspace.image import Lattice
-from softreach.workspace.lines import line_volume
-from softreach.workspace.measure import Estimate
-from softreach.workspace.reached_cells import ReachedCells
+from softreach.workspace.measure import Estimate, line_volume
+from softreach.workspace.search import ENOUGH, Flood
 
 __all__ = ["Searched", "lost_share", "searched_set", "smallest_memory"]
 

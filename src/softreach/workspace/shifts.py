@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import Parameter, changed
 from softreach.arm.tables import check_extension
-from softreach.errors import InvalidDesign, InvalidInput
+from softreach.support.errors import InvalidDesign, InvalidInput
 
 __all__ = ["Shifts", "shifts_along"]
 

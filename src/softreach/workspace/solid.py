@@ -10,18 +10,22 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arrays import as_points
-from softreach.errors import MissingExtra
 from softreach.geometry.surface import Surface
-from softreach.quantity import quantity
 from softreach.rod.tip_map import TipMap
 from softreach.schema import provenance
-from softreach.workspace.boundary import boundary_surface, critical_surface, signed_field
-from softreach.workspace.face_image import face_image
+from softreach.support.arrays import as_points
+from softreach.support.errors import MissingExtra
+from softreach.support.quantity import quantity
+from softreach.workspace.abstract_set import Number, ReachableSet
+from softreach.workspace.boundary import (
+    ReachedCells,
+    boundary_surface,
+    critical_surface,
+    outer_sheets,
+    signed_field,
+)
+from softreach.workspace.flux import face_image
 from softreach.workspace.image import Image
-from softreach.workspace.outer_sheets import outer_sheets
-from softreach.workspace.reachable import Number, ReachableSet
-from softreach.workspace.reached_cells import ReachedCells
 
 if TYPE_CHECKING:
     import xarray as xr

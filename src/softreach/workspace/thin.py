@@ -9,16 +9,16 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arrays import as_points
 from softreach.geometry.hull import convex_hull
 from softreach.geometry.surface import Surface, compact_surface
-from softreach.kernels.simplices import chains, corner_steps
-from softreach.quantity import quantity
+from softreach.kernels.box.simplices import chains, corner_steps
 from softreach.rod.tip_map import TipMap
-from softreach.workspace.box_grid import every_second, grid_tips, image_measure
+from softreach.support.arrays import as_points
+from softreach.support.quantity import quantity
+from softreach.workspace.abstract_set import Number, ReachableSet
+from softreach.workspace.discontinuities import coarser, corner_values, finer, left_out_cells
+from softreach.workspace.grid import every_second, grid_tips, image_measure
 from softreach.workspace.measure import Estimate
-from softreach.workspace.reachable import Number, ReachableSet
-from softreach.workspace.tears import coarser, corner_values, finer, left_out_cells
 
 __all__ = ["ReachableCurve", "ReachablePoint", "ReachableSurface", "thin_set"]
 

@@ -9,12 +9,12 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arguments import plain
 from softreach.arm.actuator_checks import actuator_faults
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.arm.variable import Variable
-from softreach.errors import Fault, InvalidDesign, Range
+from softreach.support.arguments import plain
+from softreach.support.errors import Fault, InvalidDesign, Range
 
 __all__ = ["STRETCH", "Actuator", "Bounds", "Outline", "Resultants", "actuator_kinds"]
 

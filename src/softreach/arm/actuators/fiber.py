@@ -19,7 +19,7 @@ from softreach.arm.along import AlongArm
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.arm.variable import Variable
-from softreach.errors import Fault
+from softreach.support.errors import Fault
 
 __all__ = ["FiberArchitecture"]
 

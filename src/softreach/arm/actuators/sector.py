@@ -15,7 +15,7 @@ from softreach.arm.actuators.actuator import Actuator, Bounds, Outline, Resultan
 from softreach.arm.actuators.ring_integrals import RingIntegrals
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
-from softreach.errors import Fault, InvalidDesign, InvalidInput
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput
 
 __all__ = ["SectorActuator"]
 

@@ -15,7 +15,7 @@ from softreach.arm.along import AlongArm, Samples
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.arm.variable import Variable
-from softreach.errors import Fault, Range
+from softreach.support.errors import Fault, Range
 
 __all__ = ["Tendon"]
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from softreach.arguments import checked, instance, optional, within
 from softreach.arm.actuator_checks import FIBER_RANGES
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.checks import PROFILE_RANGES, RING_RANGES
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import Material
 from softreach.arm.section import Section
+from softreach.support.arguments import checked, instance, optional, within
 
 __all__ = ["minimal_trunk", "redundant_trunk"]
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from softreach.arguments import checked, whole
 from softreach.arm.actuators import Tendon
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import Material
 from softreach.arm.materials import named_material
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring, Section
+from softreach.support.arguments import checked, whole
 
 __all__ = ["helical_tendon_robot", "three_tendon_robot"]
 

@@ -17,7 +17,7 @@ from softreach.arm.actuators import (
 from softreach.arm.file.along import AngleAlong, DistanceAlong, RoutingAlong, either
 from softreach.arm.file.quantities import Bounds, Quantity, RingName
 from softreach.arm.file.table import Table
-from softreach.errors import Range
+from softreach.support.errors import Range
 
 __all__ = ["ACTUATORS", "ActuatorTable", "kind_of"]
 

@@ -13,9 +13,9 @@ from softreach.arm.file.degrees import Written
 from softreach.arm.loads import Loads
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
-from softreach.errors import Fault, InvalidDesign
-from softreach.file_kinds import FileKind, Formats, text_with
-from softreach.text_file import read_text
+from softreach.support.errors import Fault, InvalidDesign
+from softreach.support.files.kinds import FileKind, Formats, text_with
+from softreach.support.files.text import read_text
 
 __all__ = ["DESIGN_FILE", "LONGEST", "Parts", "document_of", "text_of"]
 

@@ -9,7 +9,7 @@ from pydantic import Field
 from softreach.arm.file.quantities import Quantity
 from softreach.arm.file.table import Table
 from softreach.arm.loads import Loads, PointLoad
-from softreach.errors import Range
+from softreach.support.errors import Range
 
 __all__ = ["LoadTable", "PointLoadTable"]
 

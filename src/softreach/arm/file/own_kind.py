@@ -14,7 +14,7 @@ from softreach.arm.along import AlongArm
 from softreach.arm.file.along import AlongTable, along_text
 from softreach.arm.file.degrees import Written
 from softreach.arm.file.toml_text import value_text
-from softreach.errors import Fault, InvalidDesign
+from softreach.support.errors import Fault, InvalidDesign
 
 __all__ = ["made_own_kind", "own_kind_lines", "own_kinds"]
 

@@ -15,7 +15,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 from softreach.arm.actuator_checks import bounds_faults, which_ring_faults
 from softreach.arm.file.degrees import radians
 from softreach.arm.variable import Variable
-from softreach.errors import Fault, Range
+from softreach.support.errors import Fault, Range
 
 __all__ = ["Bounds", "Quantity", "RingName", "refused"]
 

@@ -30,7 +30,7 @@ from softreach.arm.material import Material
 from softreach.arm.materials import LISTED, material_names, named_material
 from softreach.arm.profile import Profile
 from softreach.arm.section import Ring, Section
-from softreach.errors import Fault, InvalidDesign
+from softreach.support.errors import Fault, InvalidDesign
 
 __all__ = ["parse"]
 

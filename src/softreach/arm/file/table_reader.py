@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from softreach.arm.file.layout import unknown_key
 from softreach.arm.file.table import Table
 from softreach.arm.file.terms import dotted, pydantic_fault
-from softreach.errors import Fault, InvalidDesign, Range
+from softreach.support.errors import Fault, InvalidDesign, Range
 
 __all__ = ["TableReader"]
 

@@ -8,7 +8,7 @@ from typing import Any
 from softreach.arm.file.actuator_tables import ACTUATORS
 from softreach.arm.file.body_tables import PROFILES, MaterialTable, RingTable, SectionTable
 from softreach.arm.file.load_table import LoadTable
-from softreach.errors import Fault, InvalidDesign, Range
+from softreach.support.errors import Fault, InvalidDesign, Range
 
 __all__ = ["dotted", "in_file_terms", "in_keys", "pydantic_fault"]
 

@@ -20,7 +20,7 @@ from softreach.arm.file.terms import in_keys, pydantic_fault
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring, Section
-from softreach.errors import Fault, InvalidDesign
+from softreach.support.errors import Fault, InvalidDesign
 
 __all__ = ["ROOT_KEYS", "parts_of_version_1"]
 

@@ -24,7 +24,7 @@ from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.sampled_profiles import PiecewiseTaper, SampledTaper
 from softreach.arm.section import Section
-from softreach.errors import Fault, InvalidDesign
+from softreach.support.errors import Fault, InvalidDesign
 
 __all__ = ["render"]
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from softreach.arguments import checked, instance, plain, text
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.of_arm import by_ring_name, parameters
 from softreach.arm.parameters.parameter import Parameter
 from softreach.arm.parameters.unknown import unknown_parameter
-from softreach.errors import Fault, InvalidInput, in_short
+from softreach.support.arguments import checked, instance, plain, text
+from softreach.support.errors import Fault, InvalidInput, in_short
 
 __all__ = ["changed", "find_parameter", "find_parameters", "parameters_by_every_name"]
 

@@ -14,7 +14,7 @@ from softreach.arm.along import AlongArm
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters.parts import WHOLE, actuator_key, parts, prefix_of
 from softreach.arm.section import Section
-from softreach.errors import Fault, InvalidDesign
+from softreach.support.errors import Fault, InvalidDesign
 
 __all__ = ["ActuatorDraft", "Draft", "PartDraft"]
 

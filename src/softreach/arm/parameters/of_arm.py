@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from softreach.arguments import checked
 from softreach.arm.actuator_checks import FIBER_RANGES
 from softreach.arm.actuators import Actuator
 from softreach.arm.checks import MATERIAL_RANGES, PROFILE_RANGES, RING_RANGES
@@ -20,7 +19,8 @@ from softreach.arm.parameters.parameter import (
 from softreach.arm.parameters.parts import parts, prefix_of, series_of
 from softreach.arm.parameters.whole import OuterRadius, Revolution, Taper
 from softreach.arm.variable import Variable
-from softreach.errors import Range
+from softreach.support.arguments import checked
+from softreach.support.errors import Range
 
 __all__ = ["by_ring_name", "parameters"]
 

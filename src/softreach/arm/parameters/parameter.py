@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from softreach.arguments import plain
 from softreach.arm.actuators import Actuator
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.parts import part_of
 from softreach.arm.variable import Variable
-from softreach.errors import Fault
+from softreach.support.arguments import plain
+from softreach.support.errors import Fault
 
 __all__ = [
     "BoundParameter",

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping
 
 from softreach.arm.parameters.parameter import Parameter
-from softreach.errors import InvalidInput
+from softreach.support.errors import InvalidInput
 
 __all__ = ["unknown_parameter"]
 

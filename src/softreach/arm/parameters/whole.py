@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from softreach.arguments import plain
 from softreach.arm.actuators import Actuator
 from softreach.arm.along import AlongArm
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.parameter import FieldParameter, Parameter
 from softreach.arm.parameters.parts import actuator_key
-from softreach.errors import Fault
+from softreach.support.arguments import plain
+from softreach.support.errors import Fault
 
 __all__ = ["OuterRadius", "Revolution", "Taper"]
 

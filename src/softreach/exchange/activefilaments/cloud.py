@@ -15,16 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach import schema
-from softreach.arguments import checked, flag, path
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.atomic import check_place, writing
-from softreach.cloud import design_of
-from softreach.errors import InvalidInput, SoftreachWarning, counted
+from softreach.cloud.clouds import design_of
 from softreach.exchange.activefilaments.filament import Filament, filament_of
-from softreach.file_kinds import FileKind, Formats
-from softreach.memory import free_memory
 from softreach.rod.kinematics import tip_positions
 from softreach.schema import a_cloud
+from softreach.support.arguments import checked, flag, path
+from softreach.support.errors import InvalidInput, SoftreachWarning, counted
+from softreach.support.files.atomic import check_place, writing
+from softreach.support.files.kinds import FileKind, Formats
+from softreach.support.memory import free_memory
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softreach.arm.along import Pieces
-from softreach.errors import InvalidDesign, InvalidInput
 from softreach.exchange.activefilaments.expressions import Call, Unreadable
 from softreach.exchange.activefilaments.filament import (
     Angle,
@@ -18,6 +17,7 @@ from softreach.exchange.activefilaments.filament import (
     FilamentRing,
     is_from_inside_out,
 )
+from softreach.support.errors import InvalidDesign, InvalidInput
 
 __all__ = ["filament_from"]
 

@@ -10,14 +10,14 @@ from collections.abc import Iterator, Sequence
 from os import PathLike, fspath
 from typing import Any
 
-from softreach.arguments import checked, path
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import InvalidDesign, InvalidInput
 from softreach.exchange.activefilaments.constructors import filament_from
 from softreach.exchange.activefilaments.expressions import Call, Unreadable, value_of
 from softreach.exchange.activefilaments.filament import arm_of
 from softreach.exchange.activefilaments.tokens import Token, refused, statements
-from softreach.text_file import read_text
+from softreach.support.arguments import checked, path
+from softreach.support.errors import InvalidDesign, InvalidInput
+from softreach.support.files.text import read_text
 
 __all__ = ["read_design"]
 

@@ -11,8 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from softreach.errors import InvalidInput
 from softreach.exchange.activefilaments.tokens import Token, refused
+from softreach.support.errors import InvalidInput
 
 __all__ = ["CONSTRUCTORS", "Call", "Unreadable", "value_of"]
 

@@ -16,7 +16,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring, Section
-from softreach.errors import InvalidInput
+from softreach.support.errors import InvalidInput
 
 __all__ = ["Angle", "Filament", "FilamentRing", "arm_of", "filament_of", "is_from_inside_out"]
 

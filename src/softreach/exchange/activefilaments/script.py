@@ -6,17 +6,17 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from os import PathLike
 
-from softreach.arguments import checked, flag, path
 from softreach.arm.along import Pieces
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.atomic import writing
 from softreach.exchange.activefilaments.filament import (
     Angle,
     Filament,
     FilamentRing,
     filament_of,
 )
-from softreach.file_kinds import FileKind, Formats, text_with
+from softreach.support.arguments import checked, flag, path
+from softreach.support.files.atomic import writing
+from softreach.support.files.kinds import FileKind, Formats, text_with
 
 __all__ = ["FILAMENT_SCRIPT", "design_script", "write_design"]
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from softreach.errors import InvalidInput
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.jobs.job import Job
 from softreach.studio.jobs.reference import draw_reference_arm
 from softreach.studio.rod import solvable_rod
 from softreach.studio.state import StudioState
 from softreach.studio.worker import StaleCheck
+from softreach.support.errors import InvalidInput
 
 __all__ = ["DrawArm"]
 

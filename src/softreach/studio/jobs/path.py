@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from softreach.errors import InvalidInput
-from softreach.path import PathStatus, track_path
+from softreach.inverse.path import PathStatus, track_path
 from softreach.studio.jobs.job import AskedJob, Job
 from softreach.studio.movie import path_movie
 from softreach.studio.reach import cloud_points
@@ -16,6 +15,7 @@ from softreach.studio.rod import solvable_rod
 from softreach.studio.state import Camera, StudioState
 from softreach.studio.wishes import TipPath
 from softreach.studio.worker import StaleCheck
+from softreach.support.errors import InvalidInput
 
 __all__ = ["FollowPath", "PlayPath", "WriteMovie", "at_point"]
 

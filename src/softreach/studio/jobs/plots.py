@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from softreach.errors import InvalidInput
 from softreach.studio.jobs.job import Job
 from softreach.studio.plots.along_arm import along_arm
 from softreach.studio.plots.histogram import histogram_picture
@@ -12,6 +11,7 @@ from softreach.studio.plots.volumes import volume_curve_of
 from softreach.studio.reach import Reach
 from softreach.studio.state import StudioState
 from softreach.studio.worker import StaleCheck
+from softreach.support.errors import InvalidInput
 
 __all__ = [
     "CountActivations",

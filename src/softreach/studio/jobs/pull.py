@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.errors import InvalidInput
 from softreach.studio.jobs.job import Job
 from softreach.studio.pull import Pull, Pulled
 from softreach.studio.rod import solvable_rod
 from softreach.studio.state import StudioState, vector
 from softreach.studio.worker import StaleCheck
+from softreach.support.errors import InvalidInput
 
 __all__ = ["PullOrder", "PullTip", "TipPull"]
 

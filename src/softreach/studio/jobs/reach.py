@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from softreach.errors import InvalidInput
 from softreach.studio.budget import OverBudget
 from softreach.studio.colors import shown_color
 from softreach.studio.jobs.job import Job
@@ -14,6 +13,7 @@ from softreach.studio.reach import Reach, shown_rows
 from softreach.studio.stages import stages
 from softreach.studio.state import StudioState
 from softreach.studio.worker import StaleCheck
+from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     from softreach.studio.session import Session

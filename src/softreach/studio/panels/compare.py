@@ -6,7 +6,6 @@ import threading
 import time
 from typing import TYPE_CHECKING, Any
 
-from softreach.errors import InvalidInput
 from softreach.studio.comparison import (
     Candidate,
     Comparison,
@@ -17,6 +16,7 @@ from softreach.studio.comparison import (
 from softreach.studio.panels.binding import bind_button
 from softreach.studio.panels.line import Line
 from softreach.studio.snapshots import Snapshot, numbers_of
+from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     from viser import GuiApi

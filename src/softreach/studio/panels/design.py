@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed
-from softreach.errors import InvalidDesign
 from softreach.studio.controls import Control, Shown, controls, refusal
 from softreach.studio.markup import Part
 from softreach.studio.panels.binding import bind, bind_button
@@ -16,6 +15,7 @@ from softreach.studio.panels.status import reach_text
 from softreach.studio.panels.typed import SliderField
 from softreach.studio.reach import beside
 from softreach.studio.rod import rod_of
+from softreach.support.errors import InvalidDesign
 
 if TYPE_CHECKING:
     from viser import GuiApi

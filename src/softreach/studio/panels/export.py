@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from softreach.errors import InvalidInput
 from softreach.studio import markup
 from softreach.studio.files import (
     CLOUD_FORMATS,
@@ -20,6 +19,7 @@ from softreach.studio.page import static_page
 from softreach.studio.panels.binding import attempt, bind_button
 from softreach.studio.panels.line import Line
 from softreach.studio.picture import picture_file
+from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     from viser import GuiApi, UploadedFile

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from softreach.arm.manipulator import Manipulator
-from softreach.errors import SoftreachError
 from softreach.studio.loading import (
     GRAVITIES,
     TypedLoads,
@@ -22,6 +21,7 @@ from softreach.studio.panels.status import tip_text
 from softreach.studio.panels.typed import NumberField, VectorField
 from softreach.studio.rod import rod_of
 from softreach.studio.state import vector
+from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
     from viser import GuiApi

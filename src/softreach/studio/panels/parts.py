@@ -11,13 +11,13 @@ from softreach.arm import designs
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.materials import material_names
 from softreach.arm.parameters import changed
-from softreach.errors import InvalidDesign, SoftreachError
 from softreach.studio import edits
 from softreach.studio.controls import Shown, refusal
 from softreach.studio.panels.line import Line
 from softreach.studio.panels.typed import NumberField
 from softreach.studio.parts import Number, Part, numbers, parts
 from softreach.studio.rod import rod_of
+from softreach.support.errors import InvalidDesign, SoftreachError
 
 if TYPE_CHECKING:
     from viser import GuiApi

@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.errors import InvalidInput
-from softreach.export.path_table import path_csv
-from softreach.inverse.target_table import positions_in
-from softreach.palette import bundle_color
-from softreach.path import PathStatus
+from softreach.export.clouds import path_csv
+from softreach.inverse.path import PathStatus
+from softreach.inverse.request import positions_in
 from softreach.studio.drawn_paths import PATH_SHAPES, PLANES, drawn_path, straight_path
 from softreach.studio.jobs.path import PlayPath, WriteMovie, at_point
 from softreach.studio.panels.binding import attempt, bind_button
@@ -23,6 +21,8 @@ from softreach.studio.rod import solvable_rod
 from softreach.studio.slicing import in_slice
 from softreach.studio.state import StudioState
 from softreach.studio.wishes import MOST_POINTS, TipPath
+from softreach.support.errors import InvalidInput
+from softreach.support.palette import bundle_color
 
 if TYPE_CHECKING:
     import xarray as xr

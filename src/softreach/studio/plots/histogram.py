@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.palette import bundle_color
 from softreach.schema import activation_symbols
 from softreach.studio.plots.image import Picture, blank_figure, pixels
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.rod import rod_of
 from softreach.studio.slicing import in_slice
 from softreach.studio.state import Slice
+from softreach.support.palette import bundle_color
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.errors import InvalidInput
-from softreach.geometry.plane_cut import plane_cut
+from softreach.geometry.surface import plane_cut
 from softreach.picture.projection import View, is_mirrored, plane_of
 from softreach.plot.slice import plot_slice
 from softreach.studio.plots.image import Picture, blank_figure, pixels
@@ -16,6 +15,7 @@ from softreach.studio.plots.plane_counts import plane_counts
 from softreach.studio.reach import Reach
 from softreach.studio.state import Slice
 from softreach.studio.worker import StaleCheck, all_cores
+from softreach.support.errors import InvalidInput
 from softreach.workspace import ReachableSolid, ReachableSurface
 
 if TYPE_CHECKING:

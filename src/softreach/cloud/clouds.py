@@ -1,0 +1,273 @@
+"""Reachability clouds: sampled activations, their tips, and how both were made (section 3)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Hashable, Iterator
+from contextlib import AbstractContextManager, nullcontext
+from functools import partial
+from os import PathLike, fspath
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach import schema
+from softreach.arm.manipulator import Manipulator
+from softreach.rod.free_bundles import FreeBundles
+from softreach.rod.measured_bundles import MeasuredBundles
+from softreach.rod.stable_tips import StableTips
+from softreach.rod.tip_map import BLOCK, TipMap, tip_map
+from softreach.sampling import check_sampler, cube_blocks
+from softreach.schema import a_cloud
+from softreach.support import parallel
+from softreach.support.arguments import checked, dataset, flag, function, optional, path
+from softreach.support.errors import InvalidInput
+from softreach.support.files.atomic import replacing
+from softreach.support.files.kinds import FileKind, Formats
+from softreach.support.files.sealed_store import Watch, storage_errors
+from softreach.support.files.store_place import (
+    ARRAYS,
+    READING,
+    REMEDY,
+    check_arrays,
+    checked_place,
+    opened_root,
+)
+from softreach.support.memory import check_room
+from softreach.support.progress import Progress, bar, silent
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "compute_cloud",
+    "design_of",
+    "open_cloud",
+    "save_cloud",
+    "tip_map_of",
+]
+
+Array = NDArray[np.float64]
+
+
+@checked(progress=optional(function))
+def compute_cloud(
+    arm: Manipulator | TipMap,
+    n: int = 400_000,
+    seed: int = 0,
+    sampler: str = "uniform",
+    *,
+    tol: float = 1e-6,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Sample the activation box and compute the tip of each sample (section 3).
+
+    The result depends on the design, n, seed, sampler and tol alone: not on threads or blocks.
+    Memory is the result's own, (3 + bundles) 8 bytes a sample, and a few blocks.
+
+    Args:
+        arm: The design, or its tip map; of one restricted to some bundles or in other measures,
+            the whole.
+        n: Number of samples.
+        seed: Seed of the sampler.
+        sampler: `uniform` (the paper's), `boundary`, `sobol` or `grid`; see `sampling.sample_cube`.
+        tol: Largest tip error, in L.
+        progress: Called with the number of samples done since its last call; by default a bar is
+            shown on a terminal when the cloud is large.
+
+    Returns:
+        Dataset with `tip` (sample, axis) [m] and `activation` (sample, bundle) [its unit]; its
+        attributes hold the design, seed, sampler, tol and versions. For an arm under loads also
+        the coordinate `status` (sample), a `TipStatus`; a tip without equilibrium is NaN.
+
+    Raises:
+        InvalidInput: An argument out of range, or more samples than fit into memory; the message
+            says what to use instead.
+
+    Warns:
+        SoftreachWarning: The samples take more than half of the free memory.
+    """
+    rod = _of_all_bundles(tip_map(arm, tol))
+    if rod.supports_unstable:
+        rod.tips(rod.box.low[None])  # what all samples need, once and not on every thread
+    bundles = rod.box.bundles
+    check_sampler(sampler, n, bundles, seed)
+    check_room("n", int(n), bundles + 3)
+    activation, tip = np.empty((n, bundles)), np.empty((n, 3))
+    status = np.empty(n if rod.supports_unstable else 0, np.int8)
+    with _shown(progress, n) as shown:
+        _fill(rod, activation, tip, status, sampler, seed, shown)
+    cloud = schema.cloud_dataset(
+        rod.arm, activation, tip, seed=int(seed), sampler=sampler, tol=rod.tol
+    )
+    return schema.with_status(cloud, status) if rod.supports_unstable else cloud
+
+
+def _is_cloud(path: Path) -> bool:
+    """Whether a folder holds a stored cloud and nothing else."""
+    try:
+        about = json.loads((path / "zarr.json").read_bytes())["attributes"]
+        names = {entry.name for entry in path.iterdir()} - {"zarr.json"}
+        inside = (entry.name for name in names for entry in (path / name).iterdir())
+        only = set(inside) <= {"zarr.json", "c"}
+        return only and {"tip", "activation"} <= names and {"sampler", "tol"} <= about.keys()
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return False
+
+
+CLOUD_STORE: Formats = {".zarr": FileKind("a stored cloud", _is_cloud)}
+"""What `save_cloud` writes, and replaces."""
+
+
+@checked(cloud=a_cloud, path=path, overwrite=flag, durable=flag)
+def save_cloud(
+    cloud: xr.Dataset,
+    path: str | PathLike[str],
+    *,
+    durable: bool = False,
+    overwrite: bool = False,
+) -> None:
+    """Write a cloud as a Zarr v3 store; it appears whole, in place of an older one, or not at all.
+
+    Every file carries a checksum, so that `open_cloud` notices damage.
+
+    Args:
+        cloud: From `compute_cloud`, or a part of its samples.
+        path: The folder to write.
+        durable: Whether to return only when not even a power cut can lose it, which takes longer.
+        overwrite: Whether it may replace any file and any Zarr store, and not only a cloud.
+
+    Raises:
+        InvalidInput: The dataset is no cloud, its design, bundles and length do not agree, or
+            something else is there.
+        NotWritten: It cannot be written.
+    """
+    schema.check_stored_cloud(cloud)
+    kind = CLOUD_STORE[".zarr"]
+    with (
+        replacing(
+            path, kind, takes=cloud.nbytes, overwrite=overwrite, durable=durable
+        ) as partial_path,
+        _few_chunks_at_a_time(),
+    ):
+        _write(schema.storable(cloud), partial_path)
+
+
+def _write(cloud: xr.Dataset, path: Path) -> None:
+    """Write all variables, with a checksum for each chunk, also for those of NaN alone."""
+    from zarr.codecs import Crc32cCodec, ZstdCodec
+
+    encoding: dict[Hashable, Any] = {
+        name: {"compressors": (ZstdCodec(level=0), Crc32cCodec())} for name in cloud.variables
+    }
+    chunk = min(cloud.sizes["sample"], _CHUNK)
+    for name in ("tip", "activation"):
+        encoding[name]["chunks"] = (chunk, cloud[name].shape[1])
+    place = checked_place(path, Watch(location=path, remedy=REMEDY["cloud"]), mode="r+")
+    cloud.assign_attrs({ARRAYS: sorted(map(str, cloud.variables))}).to_zarr(
+        place,
+        mode="w",
+        zarr_format=3,
+        consolidated=False,
+        encoding=encoding,
+        write_empty_chunks=True,
+    )
+
+
+@checked(path=path)
+def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
+    """Read a cloud that `save_cloud` wrote.
+
+    Raises:
+        InvalidInput: There is no such store, or it holds something else.
+        DamagedStore: It is not what was written; which array and chunk, and what to do.
+        StoreFailed: It cannot be read.
+    """
+    import xarray as xr
+
+    location = fspath(path)
+    opened = opened_root(location, "cloud")
+    if opened is None or "command" in opened.group.attrs:
+        hint = "" if opened is None else "this is an atlas"
+        raise InvalidInput("cloud", location, "a Zarr store written by softreach", hint)
+    opened.watch.required = lambda _: True
+    with _few_chunks_at_a_time(), storage_errors(f"{location} cannot be read"):
+        check_arrays(opened)
+        with xr.open_zarr(opened.place, **READING) as stored:
+            cloud = stored.load()
+        cloud.attrs.pop(ARRAYS, None)
+        return schema.check_stored_cloud(cloud)
+
+
+def _few_chunks_at_a_time() -> AbstractContextManager[object]:
+    """Zarr holds three copies of each chunk in flight, and has ten in flight by default."""
+    import zarr
+
+    return zarr.config.set({"async.concurrency": min(4, parallel.thread_count())})
+
+
+@checked(cloud=dataset())
+def design_of(cloud: xr.Dataset) -> Manipulator:
+    """The design that a cloud or configuration was computed from."""
+    return Manipulator.from_toml(cloud.attrs["design"], source="the cloud's design")
+
+
+@checked(cloud=dataset())
+def tip_map_of(cloud: xr.Dataset) -> TipMap:
+    """The tip map that a cloud was computed with."""
+    return tip_map(design_of(cloud), float(cloud.attrs["tol"]))
+
+
+def sample_bytes(bundles: int) -> int:
+    """What a sample takes: its tip, its activation and its status."""
+    return 8 * (3 + bundles) + 1
+
+
+def _of_all_bundles(rod: TipMap) -> TipMap:
+    """The map of every bundle, in its own unit, of which this one may be a restriction."""
+    while isinstance(rod, FreeBundles | MeasuredBundles | StableTips):
+        rod = rod.whole
+    return rod
+
+
+_CHUNK = 1 << 19  # samples of a stored array that are held at once
+_LONG = 5_000_000  # samples from which a bar is worth showing
+
+
+def _fill(
+    rod: TipMap,
+    activation: Array,
+    tip: Array,
+    status: NDArray[np.int8],
+    sampler: str,
+    seed: int,
+    progress: Progress,
+) -> None:
+    """Draw activations block by block and let the threads turn them into tips meanwhile."""
+
+    def tasks() -> Iterator[Callable[[], object]]:
+        first = 0
+        for cube in cube_blocks(sampler, len(tip), rod.box.bundles, seed, BLOCK):
+            block = slice(first, first := first + len(cube))
+            rod.box.from_cube(cube, out=activation[block])
+            task = rod.tip_task(activation[block], tip[block])
+            if len(status):
+                asked = activation[block], tip[block], status[block]
+                task = partial(rod.fill_tips_and_status, *asked)
+            yield partial(_reported, task, progress, len(cube))
+
+    parallel.run(tasks())
+
+
+def _reported(task: Callable[[], object], progress: Progress, count: int) -> None:
+    task()
+    progress(count)
+
+
+def _shown(progress: Progress | None, n: int) -> AbstractContextManager[Progress]:
+    """The caller's callback, or a bar if the cloud is large enough to wait for."""
+    if progress is None and n > _LONG:
+        return bar("computing tips", n)
+    return nullcontext(progress or silent)

@@ -1,0 +1,244 @@
+"""How much an arm bends, twists and stretches over a whole cloud, station by station (section 4).
+
+The statistics are streamed: blocks of samples fill histograms whose bins span what the activation
+box allows, and no array of all samples by stations ever exists.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.arm.manipulator import Manipulator
+from softreach.cloud.clouds import tip_map_of
+from softreach.rod.frames import Strains
+from softreach.rod.stable_tips import stable_tips
+from softreach.rod.tip_map import TipMap, an_arm, tip_map
+from softreach.schema import a_cloud, provenance
+from softreach.support import parallel
+from softreach.support.arguments import as_given, checked, whole
+from softreach.support.arrays import as_floats, as_shares
+from softreach.support.errors import InvalidInput
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "QUANTILES",
+    "QUANTITIES",
+    "curvature_statistics",
+    "distal_stations",
+    "stream_statistics",
+]
+
+Array = NDArray[np.float64]
+
+QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+"""Minimum, quartiles, maximum and the middle nine tenths."""
+
+QUANTITIES = {
+    "bending": ("1/m", "bending curvature κ = √(u1² + u2²)"),
+    "torsion": ("1/m", "torsion u3"),
+    "extension": ("1", "axial extension ζ"),
+}
+"""Quantity -> unit and meaning."""
+
+_AT_A_TIME = 1 << 19  # samples times stations whose strains stay in the cache
+
+
+def _blocks(name: str, value: object) -> object:
+    """Arrays that come one after the other."""
+    if isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping | Set | type):
+        return value
+    raise InvalidInput(name, as_given(value), "an iterable of arrays of shape (n, bundles)")
+
+
+@checked(cloud=a_cloud, bins=whole(1, 1 << 24), quantiles=as_shares)
+def curvature_statistics(
+    cloud: xr.Dataset,
+    stations: ArrayLike | None = None,
+    *,
+    bins: int = 2048,
+    quantiles: Sequence[float] = QUANTILES,
+) -> xr.Dataset:
+    """Distributions of bending κ, torsion u3 and extension ζ over a cloud (section 4).
+
+    Curvatures are per unit of activated arclength, in the directors. Memory does not grow with the
+    number of stations times samples.
+
+    Two things limit the numbers: quantiles are accurate to one bin, and all of them are those of a
+    sample, whose mean is off by about `..._std` / √n, with n in the attribute `samples`. Of an arm
+    under loads only stable equilibria count, and bins span the strains of a pilot of activations:
+    what is beyond counts in the last bin, with exact extremes and moments.
+
+    Args:
+        cloud: A cloud; its design and activations are used.
+        stations: Z [m], shape (station,); None for six even stations of the distal half.
+        bins: Bins of each histogram.
+        quantiles: Which quantiles, each in [0, 1].
+
+    Returns:
+        For each quantity over `station` (coordinate Z [m]): `..._count` over `bin` with the bins'
+        ends `..._edge`, and `..._quantile`, `..._mean`, `..._std`.
+
+    Raises:
+        InvalidInput: Stations off the arm, or bins or quantiles out of range.
+    """
+    activation = cloud["activation"].transpose("sample", "bundle").values
+    return stream_statistics(
+        tip_map_of(cloud), [activation], stations, bins=bins, quantiles=quantiles
+    )
+
+
+@checked(activations=_blocks, bins=whole(1, 1 << 24), quantiles=as_shares)
+def stream_statistics(
+    arm: Manipulator | TipMap,
+    activations: Iterable[Array],
+    stations: ArrayLike | None = None,
+    *,
+    bins: int = 2048,
+    quantiles: Sequence[float] = QUANTILES,
+) -> xr.Dataset:
+    """`curvature_statistics` of activations that arrive in blocks, inside the arm's bounds.
+
+    Args:
+        arm: The design, or its tip map.
+        activations: Blocks of γ [-], shape (n, bundles) each.
+        stations: As for `curvature_statistics`.
+        bins: As for `curvature_statistics`.
+        quantiles: As for `curvature_statistics`.
+
+    Raises:
+        InvalidInput: As for `curvature_statistics`; also no activations at all.
+    """
+    rod = stable_tips(tip_map(arm))
+    asked = distal_stations(rod) if stations is None else stations
+    z = rod.check_stations(np.atleast_1d(as_floats("stations", asked)), ascending=False)
+    ranges = rod.strain_range(z)._asdict()
+    tallies = {name: _Tally.between(ranges[name], bins) for name in QUANTITIES}
+    for strains in _strains(rod, activations, z):
+        for k in range(len(z)):
+            for name, values in _at_station(strains, k).items():
+                tallies[name].add(k, values)
+    if not tallies["bending"].count.any():
+        raise InvalidInput("activations", "none", "at least one sample")
+    return _dataset(rod, z, tallies, quantiles)
+
+
+@checked(arm=an_arm, count=whole(1, 1 << 24))
+def distal_stations(arm: Manipulator | TipMap, count: int = 6) -> Array:
+    """Even stations from the middle of the arm to its tip, both included, Z [m] (figure 3c)."""
+    return np.linspace(0.5, 1.0, count) * arm.length
+
+
+def _strains(rod: TipMap, activations: Iterable[Array], z: Array) -> Iterator[Strains]:
+    """Strains, a few samples at a time."""
+    strains = rod.strains_at(z)
+    for given in activations:
+        block = rod.box.check(given)
+        for rows in parallel.blocks(len(block), max(1, _AT_A_TIME // len(z))):
+            found = strains(block[rows])
+            yield _in_equilibrium(found) if rod.supports_unstable else found
+
+
+def _in_equilibrium(strains: Strains) -> Strains:
+    """Those of the samples that have a stable equilibrium; the others are NaN."""
+    settled = np.isfinite(strains.extension).all(axis=1)
+    return Strains(strains.curvature[settled], strains.extension[settled])
+
+
+def _at_station(strains: Strains, k: int) -> dict[str, Array]:
+    """The values of each quantity at station k, shape (n,)."""
+    u1, u2, u3 = (strains.curvature[:, k, axis] for axis in range(3))
+    # theory (7), (45)
+    return {"bending": np.hypot(u1, u2), "torsion": u3, "extension": strains.extension[:, k]}
+
+
+@dataclass(frozen=True, eq=False)
+class _Tally:
+    """Histogram, extremes and moments of one quantity at every station."""
+
+    low: Array
+    width: Array
+    count: NDArray[np.int64]
+    extremes: Array
+    moments: Array
+
+    @classmethod
+    def between(cls, ends: Array, bins: int) -> _Tally:
+        """No values yet, in bins from the lower to the upper end of each row."""
+        low, high = ends.T
+        stations = len(low)
+        # A quantity that cannot vary still needs bins of some width.
+        width = np.maximum(high - low, 1e-12 * np.maximum(np.abs(high), 1.0)) / bins
+        count = np.zeros((stations, bins), np.int64)
+        extremes = np.tile([np.inf, -np.inf], (stations, 1))
+        return cls(low, width, count, extremes, np.zeros((stations, 2)))
+
+    def add(self, k: int, values: Array) -> None:
+        """Count the values of a block at station k."""
+        if not len(values):
+            return
+        bins = self.count.shape[1]
+        # About the lower end, so that a narrow range far from zero loses no digits.
+        shifted = values - self.low[k]
+        place = (shifted / self.width[k]).astype(np.int64)
+        self.count[k] += np.bincount(np.clip(place, 0, bins - 1, out=place), minlength=bins)
+        low, high = self.extremes[k]
+        self.extremes[k] = min(low, values.min()), max(high, values.max())
+        self.moments[k] += shifted.sum(), np.square(shifted, out=shifted).sum()
+
+    @property
+    def edges(self) -> Array:
+        """Ends of the bins, shape (station, bin + 1)."""
+        return self.low[:, None] + self.width[:, None] * np.arange(self.count.shape[1] + 1)
+
+    def quantiles(self, shares: Sequence[float]) -> Array:
+        """Quantiles, linear within a bin and inside the extremes, shape (station, quantile)."""
+        rows = zip(self.count, self.edges, self.extremes, strict=True)
+        return np.array([_quantiles(*row, shares) for row in rows])
+
+    def mean_and_std(self) -> tuple[Array, Array]:
+        """Mean and standard deviation, shape (station,) each."""
+        first, second = (self.moments / self.count.sum(axis=1, keepdims=True)).T
+        return self.low + first, np.sqrt(np.maximum(second - first**2, 0.0))
+
+
+def _quantiles(
+    count: NDArray[np.int64], edges: Array, extremes: Array, shares: Sequence[float]
+) -> Array:
+    below = np.concatenate([[0], np.cumsum(count)]) / count.sum()
+    # Empty bins make flat pieces of the distribution; its inverse jumps over them.
+    rises = np.flatnonzero(np.diff(below) > 0)
+    corners = np.unique(np.concatenate([rises, rises + 1]))
+    return np.clip(np.interp(shares, below[corners], edges[corners]), *extremes)
+
+
+def _dataset(
+    rod: TipMap, z: Array, tallies: dict[str, _Tally], quantiles: Sequence[float]
+) -> xr.Dataset:
+    import xarray as xr
+
+    variables = {}
+    for name, tally in tallies.items():
+        unit, meaning = QUANTITIES[name]
+        mean, std = tally.mean_and_std()
+        of = {"units": unit, "long_name": meaning}
+        variables |= {
+            f"{name}_count": (("station", "bin"), tally.count, {"units": "1"}),
+            f"{name}_edge": (("station", "edge"), tally.edges, of),
+            f"{name}_quantile": (("station", "quantile"), tally.quantiles(quantiles), of),
+            f"{name}_mean": ("station", mean, of),
+            f"{name}_std": ("station", std, of),
+        }
+    coordinates = {
+        "Z": ("station", z, {"units": "m", "long_name": "station before activation"}),
+        "quantile": np.asarray(quantiles, float),
+    }
+    samples = int(tallies["bending"].count[0].sum())
+    attrs = {**provenance(rod.arm), "length": rod.length, "samples": samples}
+    return xr.Dataset(variables, coordinates, attrs)

@@ -1,0 +1,136 @@
+"""How well the tip can be moved from each sample of a cloud, and how many activations reach it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.cloud.clouds import tip_map_of
+from softreach.rod.stable_tips import stable_tips
+from softreach.rod.tip_map import BLOCK
+from softreach.schema import a_cloud, cell_dataset, check_cloud, tip_cells
+from softreach.support import parallel
+from softreach.support.arguments import POSITIVE, checked, optional, within
+from softreach.support.errors import InvalidInput
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["dexterity", "solution_measure"]
+
+Array = NDArray[np.float64]
+Signs = NDArray[np.int8]
+
+_EVEN = ("uniform", "sobol")  # a grid has too many points on its faces
+
+
+@checked(cloud=a_cloud)
+def dexterity(cloud: xr.Dataset) -> xr.Dataset:
+    """Manipulability, condition number and orientation of the tip map at each sample.
+
+    With J = ∂r/∂γ, of shape (3, m): manipulability is √det(J Jᵀ) [Yoshikawa1985], for three
+    bundles |det J|, the volume that the tip sweeps per unit of activations; with fewer bundles
+    √det(Jᵀ J), the area or length. It vanishes, and the condition number is infinite, on a fold.
+    Under loads J is that of the equilibrium; of samples without a stable one all is NaN
+    and the orientation 0.
+
+    Args:
+        cloud: A cloud; its design and tolerance are in its attributes. It is read in blocks.
+
+    Returns:
+        Dataset over `sample`: `manipulability` [m³] (m² or m for two bundles or one),
+        `condition` [-] and, for three bundles, `orientation`, the sign of det J.
+
+    Raises:
+        InvalidInput: The dataset is no cloud.
+    """
+    import xarray as xr
+
+    check_cloud(cloud)
+    rod, n = stable_tips(tip_map_of(cloud)), cloud.sizes["sample"]
+    measure, condition = np.empty(n), np.empty(n)
+    sign = np.empty(n, np.int8)
+    for rows in parallel.blocks(n, 8 * BLOCK):
+        _, slope = rod.tips_and_slopes(cloud.activation[rows].values)
+        parallel.run(_tasks(slope, measure[rows], condition[rows], sign[rows]))
+    unit = {1: "m", 2: "m2"}.get(rod.box.bundles, "m3")
+    status = {"status": cloud.coords["status"]} if "status" in cloud.coords else {}
+    result = xr.Dataset(coords=status, attrs=cloud.attrs)
+    result["manipulability"] = ("sample", measure, {"units": unit, "long_name": "√det(J Jᵀ)"})
+    result["condition"] = (
+        "sample",
+        condition,
+        {"units": "1", "long_name": "condition of J"},
+    )
+    if rod.box.bundles == 3:
+        result["orientation"] = ("sample", sign, {"units": "1", "long_name": "sign of det J"})
+    return result
+
+
+@checked(cloud=a_cloud, cell=optional(within(POSITIVE._replace(unit="m"))))
+def solution_measure(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Dataset:
+    """How many activations reach each place: a number, or the size of the family of solutions.
+
+    For three bundles it is the number of activations that reach a place; with four they form
+    curves in the activation box, whose length this is; with five surfaces, whose area; and so on.
+    No inverse problem is solved: by the coarea formula ([Federer1969], 3.2.12) the integral of that
+    measure over a cell is ∫ √det(J Jᵀ) dγ over the activations that lead into it, here the mean
+    over a cloud that fills the activation box evenly. Values are means over a cell; a cell that
+    the border of the reachable set cuts has a mean over its empty part too. Activations without a
+    stable equilibrium reach nothing.
+
+    Args:
+        cloud: A cloud of three bundles or more, sampled evenly: uniform or sobol.
+        cell: Edge of the cells [m]; None for L/20.
+
+    Returns:
+        Dataset over the centers x, y, z [m] of cells: `solution_measure` [-], 0 where no tip is,
+        and `solution_measure_error`, its standard error for independent samples; those of a Sobol
+        sequence are better.
+
+    Raises:
+        InvalidInput: The dataset is no cloud, of fewer bundles, of one that cannot be activated, or
+            sampled unevenly; cells that are not positive or too many.
+    """
+    check_cloud(cloud)
+    space, n = tip_map_of(cloud).box, cloud.sizes["sample"]
+    if space.bundles < 3:
+        raise InvalidInput("bundles", space.bundles, "3 or more: fewer fill no cell")
+    if (sampler := cloud.attrs.get("sampler")) not in _EVEN:
+        raise InvalidInput("sampler", sampler, f"one of {', '.join(_EVEN)}")
+    if not (box := float(np.prod(space.widths))):
+        raise InvalidInput("activation_bounds", space.bounds, "lower < upper for every bundle")
+    grid = tip_cells(cloud, cell)
+    # theory (43)
+    weight = dexterity(cloud)["manipulability"].values
+    total, squares = grid.sum(weight), grid.sum(weight * weight)
+    scale, scatter = box / n / grid.volume, np.sqrt((squares - total**2 / n).clip(0.0))
+    name = {"units": "1", "long_name": "activations that reach a place: number, length, area, ..."}
+    error = {"units": "1", "long_name": "standard error of solution_measure"}
+    return cell_dataset(
+        grid,
+        solution_measure=(scale * total, name),
+        solution_measure_error=(scale * scatter, error),
+    ).assign_attrs(cloud.attrs)
+
+
+def _tasks(slope: Array, measure: Array, condition: Array, sign: Signs) -> Iterator[partial[None]]:
+    for rows in parallel.blocks(len(slope), 4096):
+        yield partial(_measure, slope[rows], measure[rows], condition[rows], sign[rows])
+
+
+def _measure(slope: Array, measure: Array, condition: Array, sign: Signs) -> None:
+    known = np.asarray(np.isfinite(slope).all(axis=(1, 2)))
+    if not known.all():
+        slope = np.where(known[:, None, None], slope, 0.0)
+    sigma = np.linalg.svd(slope, compute_uv=False)
+    sigma[~known] = np.nan
+    measure[:] = sigma.prod(axis=1)  # theory (41)
+    with np.errstate(divide="ignore", invalid="ignore"):  # no motion at all: 0/0 is NaN
+        condition[:] = sigma[:, 0] / sigma[:, -1]
+    if slope.shape[2] == 3:
+        sign[:] = np.sign(np.linalg.det(slope))

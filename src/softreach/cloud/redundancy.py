@@ -1,0 +1,343 @@
+"""How differently an arm must be activated to reach nearly the same place (section 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.arm.manipulator import Manipulator
+from softreach.geometry.neighbors import mean_value_distance
+from softreach.rod.measured_bundles import activation_measures
+from softreach.schema import a_cloud, cell_dataset, check_cloud, is_stable, tip_cells
+from softreach.support.arguments import POSITIVE, checked, dataset, optional, plain, within
+from softreach.support.arrays import as_indices, as_shares
+from softreach.support.errors import InvalidInput, Range
+from softreach.support.quantity import quantity
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+
+@checked(cloud=a_cloud, radius=within(Range(0.0, unit="m")))
+def activation_distance(
+    cloud: xr.Dataset, radius: float, *, queries: int | ArrayLike | None = None
+) -> xr.DataArray:
+    """Mean activation-space distance of tips to their neighbors (section 5; theory (44)).
+
+    D̄(p_i, r) = Σ_j ‖Γ_j - Γ_i‖₂ / K over the K *other* points j with |p_j - p_i| <= r. Point i
+    itself is not counted; another point at the same place is. Where K = 0 the point is isolated
+    and D̄ is NaN. Neighbors always come from the full cloud, whatever is evaluated. Where bundles
+    have different units, the activation of each counts in its own range. Of an arm under loads the
+    tips that are no stable equilibria are nobody's neighbors, and D̄ there is NaN.
+
+    Memory is a sorted copy of the cloud and a few blocks, however many neighbors there are; the
+    result does not depend on the number of threads.
+
+    Args:
+        cloud: tip(sample, axis) [m] and activation(sample, bundle) [-].
+        radius: r [m]; the paper's is L/60. 0 leaves the tips at the same place.
+        queries: How many samples are evaluated, one from each of as many equal parts of the
+            cloud, always the same ones; or their indices; None for all.
+
+    Returns:
+        D̄ [unit of the activations] over `sample`, whose coordinate is the index in the cloud;
+        `neighbors` is K. D̄ of one point scatters by about 1/√K of the spread among its neighbors.
+
+    Raises:
+        InvalidInput: No cloud, tips or activations that are not finite, a radius below zero, or
+            queries that are no samples of the cloud.
+    """
+    import xarray as xr
+
+    check_cloud(cloud)
+    chosen = _chosen(queries, cloud.sizes["sample"])
+    tip, activation = cloud["tip"].values, cloud["activation"].values
+    if "unit" in cloud.coords:
+        activation = activation / activation_measures(Manipulator.from_toml(cloud.attrs["design"]))
+    sample = np.arange(cloud.sizes["sample"]) if chosen is None else chosen
+    if (stable := is_stable(cloud)).all():
+        mean, others = mean_value_distance(tip, activation, radius, chosen)
+    else:
+        mean, others = _among(stable, tip, activation, radius, sample)
+    counted = {"long_name": "other tips within the radius", "units": "1"}
+    return xr.DataArray(
+        mean,
+        {"sample": sample, "neighbors": ("sample", others, counted)},
+        ("sample",),
+        name="activation_distance",
+        attrs={
+            **cloud.attrs,
+            "long_name": "mean activation-space distance D̄",
+            "units": cloud["activation"].attrs.get("units", "1"),
+            "radius": float(radius),
+        },
+    )
+
+
+def _among(
+    stable: NDArray[np.bool_], tip: Array, activation: Array, radius: float, sample: Index
+) -> tuple[Array, Index]:
+    """D̄ and K of some samples among the stable ones; NaN and 0 of those that are not."""
+    mean, others = np.full(len(sample), np.nan), np.zeros(len(sample), np.intp)
+    asked, number = stable[sample], np.cumsum(stable) - 1
+    found = mean_value_distance(tip[stable], activation[stable], radius, number[sample[asked]])
+    mean[asked], others[asked] = found
+    return mean, others
+
+
+def evaluated_samples(distance: xr.DataArray, cloud: xr.Dataset) -> Index:
+    """Which samples of the cloud were evaluated."""
+    n = cloud.sizes["sample"]
+    if distance.dims != ("sample",) or "sample" not in distance.coords:
+        raise InvalidInput("distance", distance.dims, "made by activation_distance")
+    return as_indices("distance.sample", distance["sample"].values, n, "samples of the cloud")
+
+
+def _chosen(queries: int | ArrayLike | None, n: int) -> Index | None:
+    """Indices of the samples to be evaluated; None for all."""
+    if queries is None:
+        return None
+    count = plain(queries)
+    if isinstance(count, int) and not isinstance(count, bool):
+        return _strided(count, n)
+    return as_indices("queries", queries, n, "samples of the cloud")
+
+
+def _strided(count: int, n: int) -> Index:
+    """One sample of each of `count` equal parts, at a random but fixed place in it.
+
+    Every k-th one would do for independent samples, but in a Sobol sequence those share leading
+    bits, that is a corner of the activation box.
+    """
+    if not 0 <= count <= n:
+        raise InvalidInput("queries", count, f"from 0 to the cloud's {n} samples, or their indices")
+    place = np.random.default_rng(0).random(count)
+    return np.minimum((np.arange(count) + place) * (n / max(count, 1)), n - 1).astype(np.intp)
+
+
+# Where an arm is redundant, and where its tips gather: means over the cells of a grid.
+
+
+@checked(
+    cloud=a_cloud,
+    distance=dataset(kind="DataArray"),
+    cell=optional(within(POSITIVE._replace(unit="m"))),
+)
+def distance_map(
+    cloud: xr.Dataset, distance: xr.DataArray, *, cell: float | None = None
+) -> xr.Dataset:
+    """Mean D̄ of the evaluated points in each cell of a grid.
+
+    Args:
+        cloud: The cloud that D̄ was computed from.
+        distance: D̄ from `activation_distance`.
+        cell: Edge of the cells [m]; None for L/20.
+
+    Returns:
+        Dataset over the centers x, y, z [m] of cells: `activation_distance` [-], NaN where no point
+        with neighbors was evaluated; `activation_distance_error`, the standard error of that mean,
+        NaN for fewer than two points; and `evaluated`, the number of points.
+
+    Raises:
+        InvalidInput: D̄ of another cloud, or cells that are not positive or too many.
+    """
+    grid, evaluated = tip_cells(cloud, cell), evaluated_samples(distance, cloud)
+    count = grid.count(evaluated[np.isfinite(distance.values)])
+    name = {"long_name": "mean activation-space distance D̄ in the cell", "units": "1"}
+    number = {"long_name": "evaluated points with neighbors", "units": "1"}
+    error = {"long_name": "standard error of activation_distance", "units": "1"}
+    mean = grid.mean(distance.values, evaluated)
+    squares = grid.mean(distance.values**2, evaluated)
+    several = np.where(count > 1, count - 1.0, np.nan)
+    scatter = np.sqrt((squares - mean**2).clip(0.0) / several)
+    return cell_dataset(
+        grid,
+        activation_distance=(mean, name),
+        activation_distance_error=(scatter, error),
+        evaluated=(count, number),
+    ).assign_attrs(cloud.attrs)
+
+
+@checked(cloud=a_cloud, cell=optional(within(POSITIVE._replace(unit="m"))))
+def tip_density(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Dataset:
+    """Local density of tips, and how uneven it is.
+
+    The attribute `coefficient_of_variation` is that of the counts in occupied cells; `chance` is
+    what it would be for points spread evenly over them, 1 / sqrt(mean count), and `heterogeneity`
+    what chance leaves of it: sqrt(coefficient_of_variation² - chance²), 0 at least. Cells that the
+    cloud's border cuts count as they are.
+
+    Args:
+        cloud: tip(sample, axis) [m].
+        cell: Edge of the cells [m]; None for L/20.
+
+    Returns:
+        Dataset over the centers x, y, z [m] of cells: `density` [1/m³], 0 where there is no tip,
+        and `density_error`, its standard error for independent samples.
+
+    Raises:
+        InvalidInput: No cloud, or cells that are not positive or too many.
+    """
+    grid = tip_cells(cloud, cell)
+    count = grid.count()
+    name = {"long_name": "tips per volume", "units": "m-3"}
+    error = {"long_name": "standard error of density", "units": "m-3"}
+    return cell_dataset(
+        grid,
+        density=(count / grid.volume, name),
+        density_error=(np.sqrt(count) / grid.volume, error),
+    ).assign_attrs({**cloud.attrs, **_unevenness(count)})
+
+
+def _unevenness(count: NDArray[np.intp]) -> dict[str, float]:
+    occupied = count[count > 0]
+    variation, chance = occupied.std() / occupied.mean(), occupied.mean() ** -0.5
+    return {
+        "coefficient_of_variation": float(variation),
+        "chance": float(chance),
+        "heterogeneity": float(np.sqrt(max(variation**2 - chance**2, 0.0))),
+    }
+
+
+# Redundancy in numbers: how far activations differ, and for what share of the places.
+
+
+THRESHOLD = 0.25  # between a minimal arm's D̄ of some 0.05 and a redundant one's of order 1
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class RedundancySummary:
+    """D̄ of a cloud in numbers; isolated points count in `isolated` alone.
+
+    Errors are standard errors for points that are drawn independently. The shares of volume have
+    none: they depend on the size of the cells, and on how much of what is occupied is measured.
+    """
+
+    evaluated: int
+    """Number of points evaluated, stable equilibria all of them."""
+    isolated: float
+    """Share of them without a neighbor [-]."""
+    median: float
+    """Median of D̄ [-]."""
+    median_error: float
+    """Half the distance of the quantiles that a median of so many points scatters between [-]."""
+    quantiles: dict[float, float]
+    """Quantiles of D̄ [-] by probability."""
+    threshold: float
+    """The D̄ [-] above which a place counts as redundant."""
+    redundant_points: float
+    """Share of the points whose D̄ exceeds the threshold [-]."""
+    redundant_points_error: float
+    """√(p (1 - p) / points) of that share p [-]."""
+    redundant_volume: float
+    """Share of the measured volume in whose cells the mean D̄ exceeds the threshold [-]."""
+    measured_volume: float
+    """Volume of the cells that hold an evaluated point with neighbors [m³]."""
+    occupied_volume: float
+    """Volume of the cells that hold a tip of the cloud [m³]."""
+
+    def to_dataset(self) -> xr.Dataset:
+        """All numbers with their units, `quantiles` over `quantile`."""
+        import xarray as xr
+
+        numbers = {name: value for name, value in vars(self).items() if name != "quantiles"}
+        units = {name: "m3" if name in _VOLUMES else "1" for name in numbers}
+        return xr.Dataset(
+            {
+                **{name: ((), value, {"units": units[name]}) for name, value in numbers.items()},
+                "quantiles": ("quantile", list(self.quantiles.values()), {"units": "1"}),
+            },
+            {"quantile": list(self.quantiles)},
+        )
+
+    def __repr__(self) -> str:
+        shares = ", ".join(f"{100 * p:g} % below {d:.3g}" for p, d in self.quantiles.items())
+        points = quantity(100 * self.redundant_points, "%", 100 * self.redundant_points_error)
+        measured = self.measured_volume / self.occupied_volume
+        return (
+            f"RedundancySummary: median D̄ {quantity(self.median, error=self.median_error)}, "
+            f"{shares}\n"
+            f"  D̄ > {self.threshold:g} for {points} of the points, "
+            f"{100 * self.redundant_volume:.3g} % of the volume\n"
+            f"  {self.evaluated:,} points evaluated, {100 * self.isolated:.3g} % isolated; "
+            f"{100 * measured:.3g} % of the volume measured"
+        )
+
+
+_VOLUMES = ("measured_volume", "occupied_volume")
+
+
+@checked(
+    cloud=a_cloud,
+    distance=dataset(kind="DataArray"),
+    threshold=within(Range()),
+    cell=optional(within(POSITIVE._replace(unit="m"))),
+    quantiles=as_shares,
+)
+def redundancy_summary(
+    cloud: xr.Dataset,
+    distance: xr.DataArray,
+    *,
+    threshold: float = THRESHOLD,
+    cell: float | None = None,
+    quantiles: Sequence[float] = (0.05, 0.25, 0.75, 0.95),
+) -> RedundancySummary:
+    """Median and quantiles of D̄, isolated points, and where it exceeds a threshold.
+
+    Points gather where the arm goes often, so shares of points and of volume differ. The volume is
+    that of grid cells: evaluate enough points that `measured_volume` is near `occupied_volume`.
+
+    Args:
+        cloud: The cloud that D̄ was computed from.
+        distance: D̄ from `activation_distance`.
+        threshold: The D̄ [-] above which a place counts as redundant.
+        cell: Edge of the grid cells [m]; None for L/20.
+        quantiles: Probabilities.
+
+    Raises:
+        InvalidInput: D̄ of another cloud, or cells that are not positive or too many.
+    """
+    values = distance.values[np.isfinite(distance.values)]
+    grid, evaluated = tip_cells(cloud, cell), evaluated_samples(distance, cloud)
+    stable = is_stable(cloud)[evaluated]
+    mean = grid.mean(distance.values, evaluated)
+    known = np.isfinite(mean)
+    found = np.quantile(values, quantiles) if len(values) else np.full(len(quantiles), np.nan)
+    return RedundancySummary(
+        evaluated=int(stable.sum()),
+        isolated=_share(np.isnan(distance.values[stable])),
+        median=float(np.median(values)) if len(values) else np.nan,
+        median_error=_median_error(values),
+        quantiles=dict(zip(map(float, quantiles), found.tolist(), strict=True)),
+        threshold=float(threshold),
+        redundant_points=_share(values > threshold),
+        redundant_points_error=_share_error(values > threshold),
+        redundant_volume=_share(mean[known] > threshold),
+        measured_volume=int(known.sum()) * grid.volume,
+        occupied_volume=int(np.count_nonzero(grid.count())) * grid.volume,
+    )
+
+
+def _share(which: NDArray[np.bool_]) -> float:
+    return float(which.mean()) if which.size else np.nan
+
+
+def _share_error(which: NDArray[np.bool_]) -> float:
+    share = _share(which)
+    return float(np.sqrt(share * (1.0 - share) / which.size)) if which.size else np.nan
+
+
+def _median_error(values: Array) -> float:
+    """Half the distance of the quantiles 1/2 ± 1/(2√n), between which a median scatters."""
+    if not len(values):
+        return np.nan
+    reach = min(0.5, 0.5 / np.sqrt(len(values)))
+    low, high = np.quantile(values, [0.5 - reach, 0.5 + reach])
+    return float(high - low) / 2.0

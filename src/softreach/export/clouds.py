@@ -1,0 +1,291 @@
+"""A cloud as a table: x, y, z and one activation column per bundle, with what describes it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from io import BufferedWriter
+from itertools import chain, count
+from os import PathLike
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.export import ply
+from softreach.export.formats import Writers, load_library, write_by_suffix, write_vtk, write_vtu
+from softreach.support.arguments import checked, dataset, flag, path
+from softreach.support.errors import InvalidInput
+from softreach.support.files.kinds import FileKind, Formats, Recognizes, beginning_with, text_with
+from softreach.support.palette import activation_colors
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+
+_BLOCK = 1 << 18
+
+
+class CloudTable(NamedTuple):
+    """Tips and activations as plain arrays."""
+
+    tip: Array
+    """[m], shape (sample, 3)."""
+    activation: Array
+    """γ, shape (sample, bundle)."""
+    bundles: tuple[str, ...]
+    """Names of the bundles as the cloud has them."""
+    units: tuple[str, ...]
+    """Unit of the activation of each bundle."""
+    status: NDArray[np.uint8] | None
+    """0 stable, 1 unstable, 2 no equilibrium, of an arm under loads, shape (sample,)."""
+    metadata: dict[str, str | int | float]
+    """Design (TOML), seed, tolerance, versions and units."""
+
+    @property
+    def gammas(self) -> list[str]:
+        """Names of the activation columns."""
+        return column_names(self.bundles)
+
+    def columns(self, rows: slice = slice(None)) -> dict[str, NDArray[Any]]:
+        """Contiguous columns by name: x, y, z, the activations, and the status if there is one."""
+        arrays = [*self.tip[rows].T, *self.activation[rows].T]
+        names = ["x", "y", "z", *self.gammas]
+        if self.status is not None:
+            arrays.append(self.status[rows])
+            names.append("status")
+        return {name: np.ascontiguousarray(a) for name, a in zip(names, arrays, strict=True)}
+
+    def blocks(self) -> Iterator[dict[str, NDArray[Any]]]:
+        """The columns, a bounded number of rows at a time."""
+        for start in range(0, len(self.tip), _BLOCK) or [0]:
+            yield self.columns(slice(start, start + _BLOCK))
+
+
+def cloud_table(cloud: xr.Dataset) -> CloudTable:
+    """The arrays and the description of a cloud.
+
+    Args:
+        cloud: tip(sample, axis) [m] and activation(sample, bundle), each in its unit.
+
+    Raises:
+        InvalidInput: The dataset is not a cloud.
+    """
+    missing = {"tip", "activation"} - set(map(str, cloud.data_vars))
+    if missing:
+        found = ", ".join(map(str, cloud.data_vars)) or "nothing"
+        raise InvalidInput("cloud", found, "a dataset with tip and activation")
+    tip, activation = cloud["tip"], cloud["activation"]
+    return CloudTable(
+        tip.transpose("sample", "axis").values.astype(float, copy=False),
+        activation.transpose("sample", "bundle").values.astype(float, copy=False),
+        _bundle_names(activation),
+        _bundle_units(activation),
+        cloud["status"].values.astype(np.uint8) if "status" in cloud else None,
+        _metadata(cloud),
+    )
+
+
+def column_names(bundles: Sequence[str]) -> list[str]:
+    """Column names that every format and language can hold, all different.
+
+    >>> column_names(["left", "fiber 1 2", "left"])
+    ['gamma_left', 'gamma_fiber_1_2', 'gamma_left_2']
+    """
+    names: list[str] = []
+    for k, bundle in enumerate(bundles):
+        safe = re.sub(r"[^0-9A-Za-z]+", "_", bundle).strip("_") or str(k + 1)
+        plain = f"gamma_{safe}"
+        numbered = (f"{plain}_{number}" for number in count(k))
+        names.append(next(name for name in chain([plain], numbered) if name not in names))
+    return names
+
+
+def _bundle_names(activation: xr.DataArray) -> tuple[str, ...]:
+    if "bundle" in activation.coords:
+        return tuple(map(str, activation["bundle"].values))
+    return tuple(str(k + 1) for k in range(activation.sizes["bundle"]))
+
+
+def _bundle_units(activation: xr.DataArray) -> tuple[str, ...]:
+    if "unit" in activation.coords:
+        return tuple(map(str, activation["unit"].values))
+    return (activation.attrs.get("units", "1"),) * activation.sizes["bundle"]
+
+
+def _metadata(cloud: xr.Dataset) -> dict[str, str | int | float]:
+    each = _bundle_units(cloud["activation"])
+    units = {
+        "tip_units": cloud["tip"].attrs.get("units", "m"),
+        "activation_units": ", ".join(each if len(set(each)) > 1 else each[:1]),
+    }
+    length = cloud["tip"].attrs.get("length")
+    known = cloud.attrs | units | ({} if length is None else {"length_m": length})
+    return {str(key): _plain(value) for key, value in known.items()}
+
+
+def _plain(value: Any) -> str | int | float:
+    value = value.item() if isinstance(value, np.generic) else value
+    return value if isinstance(value, str | int | float) else str(value)
+
+
+# Clouds for other programs: every format holds the tips and the activations of all samples.
+
+
+_BYTES = 12  # of a number in a file: 8, or about 18 in text, which few formats are
+_MAT_LIMIT = 2**31  # bytes of one variable in a version 5 file
+
+
+@checked(cloud=dataset("tip", "activation", what="a cloud"), path=path, overwrite=flag)
+def export_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+    """Write a cloud as .ply, .csv, .parquet, .npz, .mat, .vtu or .vtk, chosen by the suffix.
+
+    Tables have the columns x, y, z [m] and one activation per bundle, such as ``gamma_left``;
+    NPZ and MAT hold the arrays tip, activation and bundle. Clouds of arms under loads have the
+    column or array status too: 0 stable, 1 unstable, 2 no equilibrium, whose tip is NaN. Design,
+    seed, tolerance, version and units go along, except in CSV, VTU and VTK, which have no place for
+    them. PLY carries the picture's colors too.
+
+    Args:
+        cloud: tip(sample, axis) [m] and activation(sample, bundle), each in its unit.
+        path: The file; it is replaced only when the new one is complete.
+        overwrite: Whether it may replace any file, and not only a table of that format.
+
+    Raises:
+        InvalidInput: Unknown suffix, not a cloud, more than the format can hold, or something else
+            is there.
+        MissingExtra: The format needs a library that is not installed.
+        NotWritten: It cannot be written.
+    """
+    table = cloud_table(cloud)
+    takes = _BYTES * (table.tip.size + table.activation.size)
+    write_by_suffix(path, CLOUD_FILES, _WRITERS, table, overwrite, takes=takes)
+
+
+def _write_ply(table: CloudTable, file: BufferedWriter) -> None:
+    colors = activation_colors(table.activation)
+
+    def blocks():
+        start = 0
+        for block in table.blocks():
+            stop = start + len(block["x"])
+            rgb = dict(zip(("red", "green", "blue"), colors[start:stop].T, strict=True))
+            yield {**block, **rgb}
+            start = stop
+
+    ply.write_points(file, len(table.tip), blocks(), table.metadata)
+
+
+def _write_csv(table: CloudTable, file: BufferedWriter) -> None:
+    pa, csv = load_library("pyarrow"), load_library("pyarrow.csv")
+    fields = [(name, pa.float64()) for name in ("x", "y", "z", *table.gammas)]
+    if table.status is not None:
+        fields.append(("status", pa.uint8()))
+    schema = pa.schema(fields)
+    with csv.CSVWriter(file, schema) as writer:
+        for block in table.blocks():
+            writer.write_batch(pa.record_batch(block, schema=schema))
+
+
+def _write_parquet(table: CloudTable, file: BufferedWriter) -> None:
+    pa, parquet = load_library("pyarrow"), load_library("pyarrow.parquet")
+    fields = [pa.field(name, pa.float64(), metadata={"units": "m"}) for name in "xyz"]
+    fields += [
+        pa.field(name, pa.float64(), metadata={"units": unit})
+        for name, unit in zip(table.gammas, table.units, strict=True)
+    ]
+    if table.status is not None:
+        fields.append(pa.field("status", pa.uint8(), metadata={"units": "1"}))
+    schema = pa.schema(fields, metadata={key: str(v) for key, v in table.metadata.items()})
+    with parquet.ParquetWriter(file, schema, compression="zstd") as writer:
+        for block in table.blocks():
+            writer.write_batch(pa.record_batch(block, schema=schema))
+
+
+def _write_npz(table: CloudTable, file: BufferedWriter) -> None:
+    described = {key: np.array(value) for key, value in table.metadata.items()}
+    arrays = {"tip": table.tip, "activation": table.activation, "bundle": np.array(table.bundles)}
+    if table.status is not None:
+        arrays["status"] = table.status
+    np.savez(file, **{**described, **arrays})
+
+
+def _write_mat(table: CloudTable, file: BufferedWriter) -> None:
+    from scipy.io import savemat
+
+    size = max(table.tip.nbytes, table.activation.nbytes)
+    if size >= _MAT_LIMIT:
+        raise InvalidInput("cloud", f"{size} bytes", "below 2 GiB for MAT", "use .parquet or .npz")
+    status = {} if table.status is None else {"status": table.status}
+    savemat(
+        file,
+        {
+            **status,
+            "tip": table.tip,
+            "activation": table.activation,
+            "bundle": np.array(table.bundles, dtype=object),
+            "metadata": table.metadata,
+        },
+        oned_as="row",
+    )
+
+
+def _write_vtu(table: CloudTable, file: BufferedWriter) -> None:
+    # compressed it takes five times as long for a file two thirds as large
+    options = {"compression": None, "header_type": "UInt64"}
+    write_vtu(_point_mesh(table), file, **options)
+
+
+def _write_vtk(table: CloudTable, file: BufferedWriter) -> None:
+    write_vtk(_point_mesh(table), file)
+
+
+def _point_mesh(table: CloudTable) -> Any:
+    meshio = load_library("meshio")
+    columns = table.columns()
+    data = {name: values for name, values in columns.items() if name not in ("x", "y", "z")}
+    cells = [("vertex", np.arange(len(table.tip))[:, None])]
+    return meshio.Mesh(table.tip, cells, point_data=data)
+
+
+def _file(name: str, recognizes: Recognizes, *libraries: str) -> FileKind:
+    return FileKind(f"{name} file", recognizes, libraries, "export")
+
+
+CLOUD_FILES: Formats = {
+    ".ply": _file("a PLY", beginning_with(b"ply\n", b"ply\r")),
+    ".csv": _file("a cloud's CSV", beginning_with(b'"x","y","z",', b"x,y,z,gamma_"), "pyarrow"),
+    ".parquet": _file("a Parquet", beginning_with(b"PAR1"), "pyarrow"),
+    ".npz": _file("an NPZ", beginning_with(b"PK")),
+    ".mat": _file("a MAT", beginning_with(b"MATLAB ")),
+    ".vtu": _file("a VTU", text_with("<VTKFile", "UnstructuredGrid"), "meshio"),
+    ".vtk": _file("a VTK", beginning_with(b"# vtk DataFile"), "meshio"),
+}
+"""What clouds can be exported as."""
+
+_WRITERS: Writers = {
+    ".ply": _write_ply,
+    ".csv": _write_csv,
+    ".parquet": _write_parquet,
+    ".npz": _write_npz,
+    ".mat": _write_mat,
+    ".vtu": _write_vtu,
+    ".vtk": _write_vtk,
+}
+
+
+# The activations along a path as a table.
+
+
+def path_csv(found: xr.Dataset) -> str:
+    """Activations and tip errors [m] at the points of a path, one line each, as CSV.
+
+    Args:
+        found: From `track_path`; what is beyond the end of the branch is nan.
+    """
+    names = [str(name) for name in found["bundle"].values]
+    rows = zip(found.activation.values.tolist(), found.tip_error.values.tolist(), strict=True)
+    header = ",".join([*column_names(names), "tip_error_m"])
+    lines = [header, *(",".join(f"{x:.12g}" for x in (*g, error)) for g, error in rows)]
+    return "\n".join([*lines, ""])

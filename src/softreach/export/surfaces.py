@@ -1,0 +1,281 @@
+"""Surfaces for other programs: parts with a name and a color, in the formats that have them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from io import BufferedWriter
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.arm.manipulator import a_manipulator
+from softreach.arm.skin import inside
+from softreach.export import ply
+from softreach.export.formats import Writers, load_library, write_by_suffix, write_vtk, write_vtu
+from softreach.geometry.surface import SurfaceMesh
+from softreach.rod.arm_shape import arm_surface, bundle_surfaces
+from softreach.support.arguments import as_given, checked, dataset, flag, path, whole
+from softreach.support.arrays import Faces, as_faces, as_points
+from softreach.support.errors import InvalidInput
+from softreach.support.files.kinds import FileKind, Formats, Recognizes, beginning_with, text_with
+from softreach.support.palette import BODY, Color, bundle_color
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from softreach.arm.manipulator import Manipulator
+
+_BYTES = 50  # of a triangle and its share of the vertices
+_Z_UP_TO_Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
+
+
+class Part(NamedTuple):
+    """One surface of a scene."""
+
+    name: str
+    vertices: NDArray[np.float64]
+    """[m], shape (v, 3)."""
+    faces: Faces
+    """Shape (f, 3)."""
+    color: Color = BODY
+    opacity: float = 1.0
+
+
+def _parts_of(value: Any) -> tuple[Any, Any] | None:
+    """Vertices and faces of an object that has them."""
+    if isinstance(value, type) or not (hasattr(value, "vertices") and hasattr(value, "faces")):
+        return None
+    return value.vertices, value.faces
+
+
+def _a_mesh(name: str, value: Any) -> tuple[NDArray[np.float64], Faces]:
+    """Vertices and faces of a surface, or the pair of them."""
+    allowed = "an object with vertices [m] and faces, or the pair of them"
+    pair = value if isinstance(value, tuple) else _parts_of(value)
+    if pair is None or len(pair) != 2:
+        raise InvalidInput(name, as_given(value), allowed)
+    vertices, faces = pair
+    points = as_points(f"{name}.vertices", vertices)
+    return points, as_faces(f"{name}.faces", faces, len(points))
+
+
+@checked(mesh_or_hull=_a_mesh, path=path, overwrite=flag)
+def export_mesh(
+    mesh_or_hull: SurfaceMesh | tuple[ArrayLike, ArrayLike],
+    path: str | PathLike[str],
+    *,
+    overwrite: bool = False,
+) -> None:
+    """Write a triangle mesh as .ply, .stl, .obj, .glb, .vtu or .vtk, chosen by the suffix.
+
+    Lengths are in meters. STL and GLB keep single precision. glTF has y up: a GLB holds our
+    coordinates under one node that turns z up into y up.
+
+    Args:
+        mesh_or_hull: An object with vertices [m] and faces, or the pair of them.
+        path: The file; it is replaced only when the new one is complete.
+        overwrite: Whether it may replace any file, and not only a surface of that format.
+
+    Raises:
+        InvalidInput: Unknown suffix, no triangles to write, or something else is there.
+        MissingExtra: The format needs a library that is not installed.
+        NotWritten: It cannot be written.
+    """
+    vertices, faces = cast("tuple[NDArray[np.float64], Faces]", mesh_or_hull)
+    if not len(faces):
+        raise InvalidInput("mesh.faces", "none", "at least one triangle")
+    write_parts([Part("surface", vertices, faces)], path, overwrite=overwrite)
+
+
+def write_parts(
+    parts: Sequence[Part], path: str | PathLike[str], *, overwrite: bool = False
+) -> None:
+    """Write surfaces that belong together.
+
+    Names survive in OBJ (objects), GLB (nodes) and VTK (a number per triangle, in order); colors in
+    PLY, OBJ and GLB.
+
+    Raises:
+        InvalidInput: Unknown suffix, or something else is there.
+        MissingExtra: The format needs a library that is not installed.
+        NotWritten: It cannot be written.
+    """
+    takes = _BYTES * sum(len(part.faces) for part in parts)
+    write_by_suffix(path, SURFACE_FILES, _WRITERS, parts, overwrite, takes=takes)
+
+
+def _write_ply(parts: Sequence[Part], file: BufferedWriter) -> None:
+    vertices, faces = _joined(parts)
+    colors = np.concatenate([np.tile(_rgba(part), (len(part.vertices), 1)) for part in parts])
+    columns = dict(zip("xyz", vertices.T, strict=True))
+    columns |= dict(zip(("red", "green", "blue", "alpha"), colors.T, strict=True))
+    ply.write_mesh(file, columns, faces)
+
+
+def _write_stl(parts: Sequence[Part], file: BufferedWriter) -> None:
+    trimesh = load_library("trimesh")
+    mesh = trimesh.util.concatenate([_colored(part) for part in parts])
+    file.write(mesh.export(file_type="stl"))
+
+
+def _write_obj(parts: Sequence[Part], file: BufferedWriter) -> None:
+    trimesh = load_library("trimesh")
+    scene = trimesh.Scene([_colored(part) for part in parts])
+    # exact enough for an arm of a millimeter; a name of ours, not an address, in the first line
+    options = {"include_normals": False, "digits": 12, "header": "softreach, lengths in m"}
+    file.write(trimesh.exchange.obj.export_obj(scene, **options).encode())
+
+
+def _write_glb(parts: Sequence[Part], file: BufferedWriter) -> None:
+    trimesh = load_library("trimesh")
+    scene = trimesh.Scene(base_frame="world")
+    # as a node and not in the numbers, so that a reader gets back the vertices we have
+    scene.graph.update(frame_to="z_up", frame_from="world", matrix=_Z_UP_TO_Y_UP)
+    for part in parts:
+        names = {"node_name": part.name, "geom_name": part.name}
+        scene.add_geometry(_shiny(part), parent_node_name="z_up", **names)
+    file.write(scene.export(file_type="glb"))
+
+
+def _write_vtu(parts: Sequence[Part], file: BufferedWriter) -> None:
+    write_vtu(_mesh(parts), file)
+
+
+def _write_vtk(parts: Sequence[Part], file: BufferedWriter) -> None:
+    write_vtk(_mesh(parts), file)
+
+
+def _mesh(parts: Sequence[Part]) -> Any:
+    meshio = load_library("meshio")
+    vertices, faces = _joined(parts)
+    number = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])
+    return meshio.Mesh(vertices, [("triangle", faces)], cell_data={"part": [number]})
+
+
+def _joined(parts: Sequence[Part]) -> tuple[NDArray[np.float64], Faces]:
+    """Vertices and faces of all parts as one mesh."""
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
+    return np.concatenate([part.vertices for part in parts]), np.concatenate(faces)
+
+
+def _colored(part: Part) -> Any:
+    trimesh = load_library("trimesh")
+    colors = np.tile(_rgba(part), (len(part.vertices), 1))
+    return trimesh.Trimesh(
+        part.vertices,
+        part.faces,
+        vertex_colors=colors,
+        metadata={"name": part.name},
+        process=False,
+    )
+
+
+def _rgba(part: Part) -> NDArray[np.uint8]:
+    return np.rint(255 * np.array([*part.color, part.opacity])).astype(np.uint8)
+
+
+def _shiny(part: Part) -> Any:
+    trimesh = load_library("trimesh")
+    visual = load_library("trimesh.visual")
+    material = visual.material.PBRMaterial(
+        name=part.name,
+        baseColorFactor=[*part.color, part.opacity],
+        alphaMode="BLEND" if part.opacity < 1 else None,
+        metallicFactor=0.0,
+        roughnessFactor=0.6,
+        doubleSided=True,
+    )
+    return trimesh.Trimesh(
+        part.vertices, part.faces, visual=visual.TextureVisuals(material=material), process=False
+    )
+
+
+def _is_stl(path: Path) -> bool:
+    """A binary STL has no signature: its number of triangles, after 80 bytes, tells its size."""
+    with path.open("rb") as file:
+        head = file.read(84)
+    size = 84 + 50 * int.from_bytes(head[80:], "little")
+    return head.startswith(b"solid ") or (len(head) == 84 and path.stat().st_size == size)
+
+
+def _file(name: str, recognizes: Recognizes, library: str = "") -> FileKind:
+    return FileKind(f"{name} file", recognizes, (library,) if library else (), "export")
+
+
+SURFACE_FILES: Formats = {
+    ".ply": _file("a PLY", beginning_with(b"ply\n", b"ply\r")),
+    ".stl": _file("an STL", _is_stl, "trimesh"),
+    ".obj": _file("an OBJ", text_with("\nv "), "trimesh"),
+    ".glb": _file("a GLB", beginning_with(b"glTF"), "trimesh"),
+    ".vtu": _file("a VTU", text_with("<VTKFile", "UnstructuredGrid"), "meshio"),
+    ".vtk": _file("a VTK", beginning_with(b"# vtk DataFile"), "meshio"),
+}
+"""What surfaces and arms can be written as."""
+
+_WRITERS: Writers = {
+    ".ply": _write_ply,
+    ".stl": _write_stl,
+    ".obj": _write_obj,
+    ".glb": _write_glb,
+    ".vtu": _write_vtu,
+    ".vtk": _write_vtk,
+}
+
+
+# An arm for other programs: its body and every bundle as closed surfaces with names and colors.
+
+
+_CLEAR = 0.45  # opacity of a body that has something inside
+
+
+@checked(
+    arm=a_manipulator,
+    configuration=dataset("position", "directors", "extension", "Z", what="a configuration"),
+    path=path,
+    sides=whole(3, 10_000),
+    overwrite=flag,
+)
+def export_arm(
+    arm: Manipulator,
+    configuration: xr.Dataset,
+    path: str | PathLike[str],
+    *,
+    sides: int = 64,
+    overwrite: bool = False,
+) -> None:
+    """Write a deformed arm as .ply, .stl, .obj, .glb, .vtu or .vtk, chosen by the suffix.
+
+    The body is a closed tube, translucent in .glb and .ply where something lies inside. A bundle
+    that fills a sector is a closed skin as wide as its extent, half sunk into the outside of its
+    ring; a tendon is a thin tube, a chamber a tube of its radius. Parts are called ``body`` and by
+    the names of the bundles.
+
+    Args:
+        arm: The design.
+        configuration: One configuration of that arm [m].
+        path: The file; it is replaced only when the new one is complete.
+        sides: Corners of each section of the body.
+        overwrite: Whether it may replace any file, and not only a surface of that format.
+
+    Raises:
+        InvalidInput: Unknown suffix, several configurations, or something else is there.
+        MissingExtra: The format needs a library that is not installed.
+        NotWritten: It cannot be written.
+    """
+    body = arm_surface(arm, configuration, sides)
+    opacity = _CLEAR if any(inside(arm)) else 1.0
+    parts = [Part("body", body.vertices, body.faces, opacity=opacity)]
+    for index, skin in enumerate(bundle_surfaces(arm, configuration)):
+        name = _part_name(arm.bundle_names, index)
+        parts.append(Part(name, skin.vertices, skin.faces, bundle_color(index)))
+    write_parts(parts, path, overwrite=overwrite)
+
+
+def _part_name(names: tuple[str, ...], index: int) -> str:
+    """The bundle's name, with its number where another part has that name."""
+    taken = ("body", *names[:index])
+    return names[index] if names[index] not in taken else f"{names[index]} ({index + 1})"

@@ -1,0 +1,309 @@
+"""Maps of the unit sphere to itself that turning about an axis does not change.
+
+A meridian goes into its own plane, so that one angle tells all: where the image of the meridian
+passes the pole, a whole circle of latitude goes there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Triangles on the unit sphere, and their subdivision.
+
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+def icosphere(levels: int) -> tuple[Array, Indices]:
+    """An icosahedron whose triangles are quartered some times.
+
+    Returns:
+        Points (n, 3), and triangles (20 · 4^levels, 3), counterclockwise from outside.
+    """
+    golden = 0.5 * (1.0 + np.sqrt(5.0))
+    pairs = np.array([[-1, golden], [1, golden], [-1, -golden], [1, -golden]])
+    points = np.zeros((12, 3))
+    for axis in range(3):
+        points[4 * axis : 4 * axis + 4, axis] = pairs[:, 0]
+        points[4 * axis : 4 * axis + 4, (axis + 1) % 3] = pairs[:, 1]
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    triangles = np.array(
+        [
+            [i, j, k]
+            for i in range(12)
+            for j in range(i + 1, 12)
+            for k in range(j + 1, 12)
+            if min(points[i] @ points[j], points[j] @ points[k], points[k] @ points[i]) > 0.4
+        ]
+    )
+    inward = np.linalg.det(points[triangles]) < 0
+    triangles[inward] = triangles[inward][:, ::-1]
+    for _ in range(levels):
+        points, triangles = quartered(points, triangles)
+    return points, triangles
+
+
+def quartered(points: Array, triangles: Indices) -> tuple[Array, Indices]:
+    """Every triangle cut in four at the middles of its sides, which are put onto the sphere.
+
+    Returns:
+        All points, the old ones first, and the new triangles only.
+    """
+    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    keys, which = np.unique(sides @ [len(points), 1], return_inverse=True)
+    middles = points[keys // len(points)] + points[keys % len(points)]
+    middles /= np.linalg.norm(middles, axis=1, keepdims=True)
+    a, b, c = triangles.T
+    ab, bc, ca = (len(points) + which.reshape(-1, 3)).T
+    cut = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+    return np.concatenate([points, middles]), np.concatenate([np.stack(t, axis=1) for t in cut])
+
+
+# Where a map of the unit sphere to itself takes a given value: all places, by subdivision.
+#
+# Triangles are quartered until their images are nearly flat or keep clear of the value. How far an
+# image is from flat is measured where a side is halved. What is left is the start of Newton's
+# method.
+
+
+Map = Callable[[Array], Array]
+"""Images of unit vectors (n, 3), unit vectors of the same shape."""
+
+_MOST_LEVELS = 16
+_MOST_TRIANGLES = 200_000
+_MOST_STARTS = 1000  # of triangles that are not flat
+_FLAT = 2.5
+"""Least altitude of a flat image, in sags of the one that it was cut from, of which it has 1/4."""
+_TURNS = 30
+_WIDEST = 0.3  # Newton step [rad]
+_DIFFERENCE = 3e-6  # of numerical derivatives [rad]
+_SETTLED = 1e-9  # Newton step [rad] of a root that was reached, if the map is well conditioned
+_RESIDUAL = 1e-11
+_SAME = 1e-6  # [rad]
+
+
+class Roots(NamedTuple):
+    """Where a map takes a value."""
+
+    points: Array
+    """Unit vectors, shape (n, 3)."""
+    determinants: Array
+    """Of the derivative, positive where the map keeps the sense of rotation; shape (n,)."""
+
+
+def sphere_roots(
+    image: Map, value: Array, *, levels: int, caution: float, starts: Array
+) -> tuple[Roots, bool]:
+    """All places where a smooth map takes a value.
+
+    Args:
+        image: The map.
+        value: A unit vector, shape (3,).
+        levels: How often the triangles of the first mesh are quartered.
+        caution: How near an image must come to the value to be cut further, in its sags.
+        starts: Where to look too, shape (n, 3).
+
+    Returns:
+        The places, and whether the triangles were few enough to be cut until they were flat, or
+        smaller than a millionth.
+    """
+    frame = np.array([*tangents_at(value[None])[:, 0], value])
+
+    def seen(points: Array) -> Array:
+        return image(points) @ frame.T
+
+    centers, settled = _candidates(seen, levels, caution)
+    return polished_roots(image, value, np.concatenate([starts, centers])), settled
+
+
+def _candidates(seen: Map, levels: int, caution: float) -> tuple[Array, bool]:
+    """Centers of the triangles that may hold a root, and whether they were not too many."""
+    points, triangles = icosphere(levels)
+    images, centers = seen(points), [np.empty((0, 3))]
+    for _ in range(_MOST_LEVELS):
+        before, parents = len(points), triangles
+        points, triangles = quartered(points, triangles)
+        images = np.concatenate([images, seen(points[before:])])
+        sag = np.tile(_sags(images, parents, triangles[3 * len(parents) :]), 4)
+        corners = images[triangles]
+        near = _distances(corners[..., :2]) <= caution * sag + 1e-12
+        near &= corners[..., 2].max(axis=1) + sag > 0
+        flat = _altitudes(corners[..., :2]) >= _FLAT * sag
+        centers.append(points[triangles[near & flat]].mean(axis=1))
+        triangles = triangles[near & ~flat]
+        if not 0 < len(triangles) < _MOST_TRIANGLES:
+            break
+    few = triangles[:: 1 + len(triangles) // _MOST_STARTS]
+    starts = _unit(np.concatenate([*centers, points[few].mean(axis=1)]))
+    return starts, len(triangles) < _MOST_TRIANGLES
+
+
+def _sags(images: Array, triangles: NDArray[np.intp], middles: NDArray[np.intp]) -> Array:
+    """How far the images of the middles of sides are from the middles of their images."""
+    corners = images[triangles]
+    halfway = 0.5 * (corners + np.roll(corners, -1, axis=1))
+    return np.linalg.norm(images[middles] - halfway, axis=2).max(axis=1)
+
+
+def _distances(corners: Array) -> Array:
+    """Of the origin from triangles in the plane, shape (n, 3, 2); 0 inside."""
+    sides = np.roll(corners, -1, axis=1) - corners
+    size = np.maximum((sides**2).sum(axis=2), 1e-300)
+    along = np.clip(-(corners * sides).sum(axis=2) / size, 0.0, 1.0)
+    apart = np.linalg.norm(corners + along[..., None] * sides, axis=2).min(axis=1)
+    turns = corners[..., 0] * sides[..., 1] - corners[..., 1] * sides[..., 0]
+    inside = (turns > 0).all(axis=1) | (turns < 0).all(axis=1)
+    return np.where(inside, 0.0, apart)
+
+
+def _altitudes(corners: Array) -> Array:
+    """Smallest ones of triangles in the plane, shape (n, 3, 2)."""
+    sides = np.roll(corners, -1, axis=1) - corners
+    doubled = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
+    return np.abs(doubled) / np.maximum(np.linalg.norm(sides, axis=2).max(axis=1), 1e-300)
+
+
+def polished_roots(image: Map, value: Array, starts: Array) -> Roots:
+    """The different roots to which Newton's method comes, in the order of the first starts."""
+    across = tangents_at(value[None])[:, 0]
+    points, last = _unit(starts), np.full(len(starts), np.inf)
+    slopes, missing = np.empty((len(points), 2, 2)), np.full(len(points), np.inf)
+    working = np.arange(len(points))
+    for _ in range(_TURNS):
+        ahead, slopes[working] = _linearized(image, points[working], across)
+        missing[working] = np.linalg.norm(ahead - value, axis=1)
+        step = _newton(slopes[working], -(ahead @ across.T))
+        points[working] = _moved(points[working], step)
+        last[working] = np.linalg.norm(step, axis=1)
+        working = working[last[working] > 1e-14]
+        if not len(working):
+            break
+    good = (last < _SETTLED) | (missing < _RESIDUAL)
+    kept = _first_of_equals(points, good & (missing < 1e-6))
+    return Roots(points[kept], np.linalg.det(slopes[kept]))
+
+
+def _linearized(image: Map, points: Array, across: Array) -> tuple[Array, Array]:
+    """Images, and the derivatives between the tangent planes, shape (n, 2, 2)."""
+    turned = _DIFFERENCE * tangents_at(points)
+    places = np.concatenate([points[None], points + turned, points - turned])
+    images = image(_unit(places.reshape(-1, 3))).reshape(places.shape)
+    slopes = (images[1:3] - images[3:]) @ across.T / (2 * _DIFFERENCE)
+    return images[0], np.moveaxis(slopes, 0, 2)
+
+
+def _newton(slopes: Array, missing: Array) -> Array:
+    """Newton's steps, no longer than what is trusted, shape (n, 2)."""
+    (a, b), (c, d) = np.moveaxis(slopes, 0, 2)
+    determinant = a * d - b * c
+    determinant = np.copysign(np.maximum(np.abs(determinant), 1e-300), determinant)
+    x, y = missing.T
+    step = np.stack([d * x - b * y, a * y - c * x], axis=1) / determinant[:, None]
+    size = np.linalg.norm(step, axis=1, keepdims=True)
+    return step * np.minimum(1.0, _WIDEST / np.maximum(size, 1e-300))
+
+
+def _moved(points: Array, step: Array) -> Array:
+    first, second = tangents_at(points)
+    return _unit(points + step[:, :1] * first + step[:, 1:] * second)
+
+
+def tangents_at(points: Array) -> Array:
+    """Two orthonormal tangents t1, t2 with t1 × t2 pointing outward, shape (2, n, 3)."""
+    x, y, z = points.T
+    s = np.copysign(1.0, z)
+    a = -1.0 / (s + z)
+    b = x * y * a
+    return np.array(
+        [np.stack([1 + s * x * x * a, s * b, -s * x], 1), np.stack([b, s + y * y * a, -y], 1)]
+    )
+
+
+def _unit(vectors: Array) -> Array:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def _first_of_equals(points: Array, good: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """The first of each group of equal points."""
+    kept: list[int] = []
+    for k in np.flatnonzero(good):
+        if all(np.linalg.norm(points[k] - points[j]) > _SAME for j in kept):
+            kept.append(int(k))
+    return np.array(kept, np.intp)
+
+
+_POLAR, _AROUND = 24, 5
+_SAMPLES = 8192
+_BISECTIONS = 60
+_OFF_AXIS = 1e-6
+
+
+class Rings(NamedTuple):
+    """Circles of latitude that go to the pole."""
+
+    points: Array
+    """One of each, all on one meridian, shape (n, 3)."""
+    signs: NDArray[np.int8]
+    """1 where the image moves away from the pole as the place does, else -1; shape (n,)."""
+    pole_sign: int
+    """The same of the pole itself, which goes to itself."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether the image of the meridian, which ends opposite, passes the pole that often."""
+        return self.pole_sign + 2 * int(self.signs.sum()) == 1
+
+
+def is_axisymmetric(image: Map, axis: Array, tolerance: float) -> bool:
+    """Whether turning about an axis, and mirroring in a plane through it, changes nothing.
+
+    Args:
+        image: The map.
+        axis: Unit vector, shape (3,).
+        tolerance: By which images may miss [rad].
+    """
+    polar = np.pi * (np.arange(_POLAR) + 0.5) / _POLAR
+    around = 2 * np.pi * np.arange(_AROUND) / _AROUND + 0.1
+    first, second = tangents_at(axis[None])[:, 0]
+    outward = np.cos(around)[:, None] * first + np.sin(around)[:, None] * second
+    points = np.cos(polar)[:, None] * axis + np.sin(polar)[:, None] * outward[:, None]
+    images = image(points.reshape(-1, 3)).reshape(points.shape)
+    sideways = (images * np.cross(axis, outward)[:, None]).sum(axis=2)
+    ahead = np.stack([images @ axis, (images * outward[:, None]).sum(axis=2)])
+    return bool(max(np.abs(sideways).max(), np.ptp(ahead, axis=1).max()) <= tolerance)
+
+
+def pole_rings(image: Map, axis: Array, near: Array) -> Rings:
+    """All circles of latitude that an axisymmetric map takes to its pole.
+
+    Args:
+        image: The map.
+        axis: Unit vector, shape (3,); the pole.
+        near: A point on the meridian that is asked, shape (3,); any meridian for the pole.
+    """
+    aside = near - (near @ axis) * axis
+    size = float(np.linalg.norm(aside))
+    outward = aside / size if size > _OFF_AXIS else tangents_at(axis[None])[0, 0]
+
+    def meridian(angle: Array) -> Array:
+        return np.cos(angle)[:, None] * axis + np.sin(angle)[:, None] * outward
+
+    def seen(angle: Array) -> tuple[Array, Array]:
+        images = image(meridian(angle))
+        return images @ outward, images @ axis
+
+    angles = np.pi * (np.arange(_SAMPLES) + 0.5) / _SAMPLES
+    away, ahead = seen(angles)
+    crossing = np.flatnonzero((away[1:] * away[:-1] <= 0) & (ahead[1:] + ahead[:-1] > 0))
+    low, high, sign = angles[crossing], angles[crossing + 1], np.sign(away[crossing + 1])
+    for _ in range(_BISECTIONS if len(low) else 0):
+        middle = 0.5 * (low + high)
+        above = seen(middle)[0] * sign > 0
+        low, high = np.where(above, low, middle), np.where(above, middle, high)
+    points = meridian(0.5 * (low + high))
+    return Rings(points, sign.astype(np.int8), int(np.sign(away[0])))

@@ -1,0 +1,356 @@
+"""Predictor and corrector: how activations move when the tip moves straight to a point."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.arm.manipulator import Manipulator
+from softreach.inverse.request import checked_activations, checked_residual, checked_targets
+from softreach.inverse.roots import placed
+from softreach.inverse.solve import solve_inverse
+from softreach.rod.free_bundles import free_bundles
+from softreach.rod.measured_bundles import bundle_measures, measured_bundles
+from softreach.rod.stable_tips import stable_tips
+from softreach.rod.tip_map import TipMap, tip_map
+from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
+from softreach.support.errors import InvalidInput
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_LONGEST = 0.1  # predicted change of activation in one substep, in ranges
+_SHORTEST = 1e-10  # substep at which a branch is at its end, in L
+_SHORTEST_TORN = 1e-7  # the same where stability is lost: there the tip moves without limit
+_CORRECTION = 0.25  # against the prediction, beyond which the branch may have been left
+_FOLDED = 1e-3  # smallest singular value at the end of a branch that is a fold, in L
+_AT_BOUND = 1e-9  # in ranges
+_MOST_CORRECTIONS = 10
+_SINGULAR = 1e-10  # singular values below this part of the largest do not count
+
+
+class PathStatus(IntEnum):
+    """Outcome for a point of the path."""
+
+    FOLLOWED = 0
+    """The tip is there, on the branch of the start."""
+    FOLD = 1
+    """Beyond a fold: the branch turns back before this point."""
+    BOUND = 2
+    """Beyond a bound: too few bundles could move on within theirs."""
+    NO_START = 3
+    """The first point cannot be reached, or not from the start given."""
+    UNSTABLE = 4
+    """Beyond a loss of stability: there the arm leaps to another equilibrium as the load grows."""
+
+
+class BranchPoint(NamedTuple):
+    """An activation with the tip map linearized there."""
+
+    gamma: Array
+    """Activation of the free bundles [-], shape (m,)."""
+    tip: Array
+    """Tip [m], shape (3,)."""
+    slope: Array
+    """∂r/∂γ [m], shape (3, m)."""
+
+
+class BranchEnd(NamedTuple):
+    """How far a branch was followed."""
+
+    status: PathStatus
+    point: BranchPoint
+    """The last point on it."""
+    bundle: int = -1
+    """The bundle at its bound."""
+    upper: bool = False
+    """Which bound that is."""
+    done: float = 0.0
+    """The part of the way to the next point that was followed [-]."""
+    error: float = 0.0
+    """How much farther the branch may go [m]."""
+
+
+class _Substep(NamedTuple):
+    """A substep: where it led, or by how much to shorten it, or the end of the branch."""
+
+    point: BranchPoint | None = None
+    shorten: float = 1.0
+    end: BranchEnd | None = None
+    torn: bool = False
+    """Whether it met a place without a stable equilibrium."""
+
+
+class Continuation:
+    """Following branches of solutions of one tip map, all of whose bundles are free."""
+
+    def __init__(self, rod: TipMap, residual: float) -> None:
+        """Set up for tips within `residual` [m] of their points."""
+        self.rod, self.box, self.residual = rod, rod.box, residual
+        self._torn = False  # whether the last correction met a place without a stable equilibrium
+
+    def at(self, gamma: Array) -> BranchPoint:
+        """The tip map linearized at an activation (m,)."""
+        tips, slopes = self.rod.tips_and_slopes(gamma[None])
+        return BranchPoint(gamma, tips[0], slopes[0])
+
+    def corrected_start(self, gamma: Array, target: Array) -> BranchPoint | None:
+        """The activation corrected to a first target, if it can be within the bounds."""
+        found = self._corrected(gamma, target, self.box.is_free)
+        if found is None or (self.box.excess(found.gamma) > _AT_BOUND).any():
+            return None
+        return self._clipped(found)
+
+    def follow(self, point: BranchPoint, begin: Array, end: Array) -> BranchEnd:
+        """Move the tip from one place straight to another, as far as the branch goes."""
+        done, part, torn = 0.0, 1.0, False
+        distance = float(np.linalg.norm(end - begin))
+        if distance == 0.0:
+            return BranchEnd(PathStatus.FOLLOWED, point, done=1.0)
+        shortest = _SHORTEST * self.rod.length / distance
+        shortest_torn = _SHORTEST_TORN * self.rod.length / distance
+        while done < 1.0:
+            part = min(part, 1.0 - done)
+            last = part >= 1.0 - done
+            substep = self._substep(point, end if last else begin + (done + part) * (end - begin))
+            if substep.end is not None:
+                return substep.end._replace(done=done, error=shortest * distance)
+            torn = torn or substep.torn
+            if substep.point is not None:
+                point, done, part = substep.point, 1.0 if last else done + part, 2 * part
+                torn = False
+            elif part * substep.shorten < (shortest_torn if torn else shortest):
+                why = PathStatus.UNSTABLE if torn or self._leaps(point) else PathStatus.FOLD
+                return BranchEnd(why, point, done=done, error=part * distance)
+            else:
+                part *= substep.shorten
+        return BranchEnd(PathStatus.FOLLOWED, point, done=1.0)
+
+    def _substep(self, point: BranchPoint, target: Array) -> _Substep:
+        """Predict and correct; bundles that would leave their bounds are held there."""
+        gamma, bundle, upper = point.gamma, -1, False
+        moving = self.box.is_free
+        while moving.sum() >= 3:
+            step = _least_norm(point.slope, moving) @ (target - point.tip)
+            size = np.abs(step / self.box.scales).max()
+            ahead = gamma + step
+            blocked = moving & self._at_bound(gamma) & (self.box.excess(ahead) > _AT_BOUND)
+            if not blocked.any():
+                if size > _LONGEST:
+                    return _Substep(shorten=0.9 * _LONGEST / size)
+                found = self._corrected(ahead, target, moving)
+                if found is None:
+                    return _Substep(shorten=0.5, torn=self._torn)
+                if self._left_branch(point, ahead, found):
+                    return _Substep(shorten=0.5)
+                over = self.box.excess(found.gamma) > _AT_BOUND
+                if not over.any():
+                    return _Substep(point=self._clipped(found))
+                blocked = over & self._at_bound(gamma)
+                if not blocked.any():
+                    return _Substep(shorten=self._part_within(gamma, found.gamma, over))
+                ahead = found.gamma
+            bundle = int(np.flatnonzero(blocked)[0])
+            upper = bool(ahead[bundle] > self.box.high[bundle])
+            moving = moving & ~blocked
+        return _Substep(end=BranchEnd(PathStatus.BOUND, point, bundle, upper))
+
+    def _corrected(self, gamma: Array, target: Array, moving: Mask) -> BranchPoint | None:
+        """Newton's method with the least-norm step of the moving bundles; None if it fails."""
+        least, self._torn = np.inf, False
+        for _ in range(_MOST_CORRECTIONS):
+            point = self.at(gamma)
+            if not np.isfinite(point.slope).all():
+                self._torn = True
+                return None
+            error = target - point.tip
+            residual = float(np.linalg.norm(error))
+            if residual <= 0.1 * self.residual:
+                return point
+            if residual > 2 * least:
+                return None
+            least = min(least, residual)
+            gamma = gamma + _least_norm(point.slope, moving) @ error
+            if (self.box.excess(gamma) > 0.1).any():
+                return None
+        return None
+
+    def _left_branch(self, point: BranchPoint, ahead: Array, found: BranchPoint) -> bool:
+        """Whether the correction was large, or passed a fold."""
+        predicted = np.linalg.norm((ahead - point.gamma) / self.box.scales)
+        correction = np.linalg.norm((found.gamma - ahead) / self.box.scales)
+        if correction > _CORRECTION * predicted + 1e-9:
+            return True
+        if point.slope.shape[1] > 3:
+            return False
+        return bool(np.linalg.det(point.slope) * np.linalg.det(found.slope) <= 0)
+
+    def _leaps(self, point: BranchPoint) -> bool:
+        """Whether a branch ends here though no fold is near: an arm under loads leaps."""
+        if not self.rod.supports_unstable:
+            return False
+        sizes = np.linalg.svd(point.slope * self.box.scales, compute_uv=False)
+        return bool(sizes[2] > _FOLDED * self.rod.length)
+
+    def _clipped(self, point: BranchPoint) -> BranchPoint:
+        """The point moved inside the bounds."""
+        gamma = self.box.clip(point.gamma)
+        return point if np.array_equal(gamma, point.gamma) else self.at(gamma)
+
+    def _at_bound(self, gamma: Array) -> Mask:
+        return self.box.excess(gamma) >= -2 * _AT_BOUND
+
+    def _part_within(self, gamma: Array, found: Array, over: Mask) -> float:
+        """The part of a substep that ends just inside the bounds."""
+        bound = np.where(found > self.box.high, self.box.high, self.box.low)
+        inside = 1.0 - 0.5 * _AT_BOUND * self.box.scales / np.abs(found - gamma).clip(1e-300)
+        part = (bound - gamma)[over] / (found - gamma)[over] * np.minimum(inside[over], 1 - 1e-6)
+        return float(np.clip(part.min(), 1e-6, 0.9999))
+
+
+def _least_norm(slope: Array, moving: Mask) -> Array:
+    """Pseudoinverse of the Jacobian of the moving bundles, shape (m, 3): theory (39)."""
+    return np.asarray(np.linalg.pinv(slope * moving, rcond=_SINGULAR), np.float64)
+
+
+# Activations that follow a path of tip positions continuously, on one branch of solutions.
+
+
+_MEANINGS = " ".join(f"{status.value}={status.name.lower()}" for status in PathStatus)
+
+
+def track_path(
+    arm: Manipulator | TipMap,
+    path: ArrayLike,
+    start: ArrayLike | None = None,
+    *,
+    residual_over_length: float = 1e-10,
+    tol: float = 1e-6,
+) -> xr.Dataset:
+    """Follow a path of tip positions, straight between its points, on one branch.
+
+    Each substep is predicted by the Jacobian and corrected by Newton's method; it is halved while
+    the correction is large, while det J changes sign (three free bundles), while a bound is
+    overstepped or while there is no stable equilibrium. With more free bundles the change of
+    activation is least in every substep, and bundles wait at their bounds.
+
+    Args:
+        arm: A design with three free bundles or more, or its tip map.
+        path: Tip positions in order [m], shape (k, 3).
+        start: Activation to begin with [-], shape (bundles,); it is corrected to the first point.
+            By default the best-conditioned of all solutions there.
+        residual_over_length: Largest |tip - point|, in L.
+        tol: Largest error of the tips themselves, in L. A tip map keeps its own.
+
+    Returns:
+        Dataset over `point` with `activation` [-] and `tip_error` [m], NaN beyond the end of the
+        branch, and `status` (`PathStatus`); `end_activation` and `end_position` are the last on
+        the branch, `end_length` the length of path up to there and `end_length_error` how much
+        farther the branch may go [m]; the attributes name how it ended: `end` ("" if the whole
+        path is followed, else `fold`, `bound`, `unstable` or `no_start`), `end_bundle` and
+        `end_bound`.
+
+    Raises:
+        InvalidInput: Arguments of another shape or not finite, or fewer than three free bundles.
+    """
+    points = checked_targets("path", path)
+    rod = measured_bundles(tip_map(arm, tol))
+    if rod.box.dimension < 3:
+        raise InvalidInput("free bundles", rod.box.dimension, "3 or more to follow a path in space")
+    if not len(points):
+        raise InvalidInput("path.shape", points.shape, "of shape (k, 3) with one point or more")
+    residual = checked_residual(residual_over_length)
+    tracker = Continuation(free_bundles(stable_tips(rod)), residual * rod.length)
+    if start is not None:
+        gamma = checked_activations("start", start, rod.box, 1)[0]
+        gamma = gamma / bundle_measures(rod)[rod.box.free]
+        first = tracker.corrected_start(tracker.box.clip(gamma), points[0])
+    else:
+        first = _best_start(rod, tracker, points[0], residual)
+    followed, end = ([], None) if first is None else _followed(tracker, first, points)
+    asked = {"tol": rod.tol, "residual_over_length": residual}
+    return _dataset(rod, points, followed, end).assign_attrs(asked)
+
+
+def _best_start(
+    rod: TipMap, tracker: Continuation, target: Array, residual: float
+) -> BranchPoint | None:
+    """The best-conditioned solution for the first target, if there is one."""
+    solution = solve_inverse(rod, target[None], residual_over_length=residual)[0]
+    if not len(solution):
+        return None
+    best = solution.activations[solution.conditions.argmin()] / bundle_measures(rod)
+    return tracker.at(best[rod.box.free])
+
+
+def _followed(
+    tracker: Continuation, first: BranchPoint, points: Array
+) -> tuple[list[Array], BranchEnd]:
+    """Activations of the free bundles at the points that the branch leads to, and its end."""
+    end = BranchEnd(PathStatus.FOLLOWED, first)
+    followed = [first.gamma]
+    for k in range(1, len(points)):
+        end = tracker.follow(end.point, points[k - 1], points[k])
+        if end.status != PathStatus.FOLLOWED:
+            break
+        followed.append(end.point.gamma)
+    return followed, end
+
+
+def _dataset(
+    rod: TipMap, points: Array, followed: list[Array], end: BranchEnd | None
+) -> xr.Dataset:
+    """The result; `end` is None if there was nothing to begin with."""
+    import xarray as xr
+
+    box, n, units = rod.box, len(followed), activation_attributes(rod.arm)
+    outcome = PathStatus.NO_START if end is None else end.status
+    status = np.full(len(points), int(outcome), np.int8)
+    status[:n] = PathStatus.FOLLOWED
+    activation, measures = np.full((len(points), box.bundles), np.nan), bundle_measures(rod)
+    length, length_error = _end_length(points, n, end)
+    error = np.full(len(points), np.nan)
+    end_activation, end_position = np.full(box.bundles, np.nan), np.full(3, np.nan)
+    bundle = bound = ""
+    if end is not None:
+        activation[:n] = box.with_held(np.array(followed))
+        error[:n] = np.linalg.norm(placed(rod, activation[:n])[0] - points[:n], axis=1)
+        end_activation, end_position = box.with_held(end.point.gamma[None])[0], end.point.tip
+        if end.status == PathStatus.BOUND:
+            bundle, bound = box.names[box.free[end.bundle]], "upper" if end.upper else "lower"
+    return xr.Dataset(
+        {
+            "position": (("point", "axis"), points, {"units": "m"}),
+            "activation": (("point", "bundle"), activation * measures, units),
+            "tip_error": ("point", error, {"units": "m"}),
+            "status": ("point", status, {"units": "1", "meanings": _MEANINGS}),
+            "end_activation": ("bundle", end_activation * measures, units),
+            "end_position": ("axis", end_position, {"units": "m"}),
+            "end_length": ((), length, {"units": "m"}),
+            "end_length_error": ((), length_error, {"units": "m"}),
+        },
+        {"axis": list(AXES), **bundle_coordinates(rod.arm)},
+        {
+            **provenance(rod.arm),
+            "end": "" if outcome == PathStatus.FOLLOWED else outcome.name.lower(),
+            "end_bundle": bundle,
+            "end_bound": bound,
+        },
+    )
+
+
+def _end_length(points: Array, followed: int, end: BranchEnd | None) -> tuple[float, float]:
+    """The length of path up to the end of the branch [m], and its error."""
+    if end is None:
+        return np.nan, np.nan
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    length = float(lengths[: followed - 1].sum())
+    if end.status != PathStatus.FOLLOWED:
+        length += end.done * float(lengths[followed - 1])
+    return length, end.error

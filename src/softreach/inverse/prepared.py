@@ -1,0 +1,138 @@
+"""A tip map prepared for the inverse problem: what is computed once and serves all targets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.manipulator import Manipulator
+from softreach.inverse.cells import TornCells, activation_cells, image_tree
+from softreach.inverse.proofs import CoarseCells
+from softreach.inverse.seeds import Landmarks, face_landmarks, landmarks
+from softreach.kernels.branches.space_tree import SpaceTree
+from softreach.kernels.image.activation_mesh import ActivationMesh
+from softreach.rod.free_bundles import free_bundles
+from softreach.rod.measured_bundles import bundle_measures, measured_bundles
+from softreach.rod.stable_tips import stable_tips
+from softreach.rod.tip_map import TipMap, tip_map
+from softreach.support.arguments import checked, whole
+
+__all__ = ["PreparedMap", "prepared_map"]
+
+Array = NDArray[np.float64]
+
+_CELLS = 32
+
+
+@dataclass(frozen=True)
+class PreparedMap:
+    """A tip map with cells, tree and landmarks, each computed when first needed.
+
+    Changes of activation are compared throughout, so that it counts them in their measures.
+    """
+
+    whole: TipMap
+    """The tip map of all bundles, whose activations are in `measures`."""
+    cells: int = _CELLS
+    """With three free bundles: cells along each axis of the activation box."""
+    depth: int = 0
+    """How often a cell may be halved where det ∂r/∂γ changes sign or is uneven."""
+
+    @cached_property
+    def measures(self) -> Array:
+        """What one unit of each activation is in its own unit, shape (bundles,)."""
+        return bundle_measures(self.whole)
+
+    @cached_property
+    def rod(self) -> TipMap:
+        """The tip map of the free bundles; held ones are no variables of any search.
+
+        Where an arm under loads has no stable equilibrium, it is NaN.
+        """
+        return free_bundles(stable_tips(self.whole))
+
+    @cached_property
+    def branch_map(self) -> TipMap:
+        """The same with unstable equilibria, to say which activations end in one."""
+        return free_bundles(self.whole)
+
+    @cached_property
+    def proves(self) -> bool:
+        """Whether what a cell of activations reaches is bounded; of loaded arms it is not."""
+        return bool(np.isfinite(self.whole.farthest()))
+
+    @property
+    def dimension(self) -> int:
+        """Number of free bundles."""
+        return self.whole.box.dimension
+
+    @cached_property
+    def _cut(self) -> tuple[ActivationMesh, TornCells]:
+        return activation_cells(self.branch_map, self.cells, self.depth)
+
+    def prepare_branches(self) -> None:
+        """Compute what every search from the cells needs, once for all threads."""
+        for name in ("rod", "branch_map", "_cut", "tree")[: 4 if len(self.mesh.corner) else 3]:
+            getattr(self, name)
+
+    @property
+    def mesh(self) -> ActivationMesh:
+        """The cells of the activation box of three free bundles."""
+        return self._cut[0]
+
+    @property
+    def torn_cells(self) -> TornCells:
+        """Where roots are searched that lie in cells without an image."""
+        return self._cut[1]
+
+    @cached_property
+    def tree(self) -> SpaceTree:
+        """The tetrahedra of the cells whose images may cover a place."""
+        return image_tree(self.mesh)
+
+    @cached_property
+    def landmarks(self) -> Landmarks:
+        """Where searches for a minimum begin."""
+        return landmarks(self.rod)
+
+    @cached_property
+    def coarse_cells(self) -> CoarseCells:
+        """Where proofs that a target is out of reach begin."""
+        return CoarseCells(self.rod)
+
+    @cached_property
+    def face_landmarks(self) -> Landmarks:
+        """Where searches begin for places on the boundary of the reachable set."""
+        return face_landmarks(self.rod)
+
+
+@checked(cells=whole(2, 256), depth=whole(0, 20))
+def prepared_map(
+    arm: Manipulator | TipMap | PreparedMap,
+    tol: float = 1e-6,
+    *,
+    cells: int = _CELLS,
+    depth: int = 0,
+) -> PreparedMap:
+    """Prepare an arm for `solve_inverse`; the last four are remembered.
+
+    Args:
+        arm: The design, or its tip map; what is prepared already is returned as it is.
+        tol: Largest tip error, in L.
+        cells: With three free bundles: cells along each axis of the activation box.
+        depth: How often a cell is halved where det ∂r/∂γ changes sign or is uneven; once at least
+            for an arm under loads.
+    """
+    if isinstance(arm, PreparedMap):
+        return arm
+    rod = measured_bundles(tip_map(arm, tol))
+    # Loads make the map steep before an equilibrium is lost.
+    return _of_map(rod, cells, max(depth, 1) if rod.supports_unstable else depth)
+
+
+@lru_cache(maxsize=4)
+def _of_map(rod: TipMap, cells: int, depth: int) -> PreparedMap:
+    return PreparedMap(rod, cells, depth)

@@ -1,0 +1,285 @@
+"""Branch and bound: cells of the activation box, halved until a bound on each says enough.
+
+On a cell with center c and half widths h the tip lies within an error of its linearization at c,
+`TipMap.linearization_errors`. What that says of a cell is for the caller to bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.kernels.box import change_bounds as dual
+from softreach.kernels.box.box_projection import project
+from softreach.kernels.box.cell_cover import near_cells
+from softreach.rod.tip_map import TipMap
+from softreach.support import parallel
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+MOST_BUNDLES = 6  # with more, halving cells proves nothing that can be afforded
+_COARSE = 70_000  # cells that all targets share
+_ROUNDING = 1e-12  # of tips, in L
+_BLOCK = 16_384  # cells at once
+
+
+class Cells(NamedTuple):
+    """Cells of equal shape, each of interest for one target."""
+
+    owner: Index
+    """Number of the target, ascending, shape (n,)."""
+    center: Array
+    """Activation [-], shape (n, m)."""
+
+    def where(self, chosen: NDArray[np.bool_] | slice) -> Cells:
+        """Some of them."""
+        return Cells(self.owner[chosen], self.center[chosen])
+
+
+class Linearized(NamedTuple):
+    """The tip map in cells."""
+
+    half: Array
+    """Half widths of all cells [-], shape (m,)."""
+    tips: Array
+    """At the centers [m], shape (n, 3)."""
+    slopes: Array
+    """∂r/∂γ there [m], shape (n, 3, m)."""
+    errors: Array
+    """How far a tip may lie from its linearization [m], shape (n,)."""
+
+
+Bound = Callable[[Cells, Linearized], Array]
+"""A lower bound of what a cell holds for its target, shape (n,)."""
+
+
+class CoarseCells:
+    """The box in even cells with what all targets ask of them."""
+
+    def __init__(self, rod: TipMap) -> None:
+        box, m = rod.box, rod.box.dimension
+        side = max(1, int(_COARSE ** (1 / max(m, 1)) + 1e-9))
+        places = np.indices((side,) * m).reshape(m, side**m).T
+        cube = (places + 0.5) / side
+        self.center, self.half = box.from_cube(cube), 0.5 * box.widths / side
+        self.tips, slopes = rod.tips_and_slopes(self.center)
+        self.errors = _errors(rod, self.center, self.half)
+        self.slopes = slopes * self.half
+        self.radii = np.linalg.norm(self.slopes, axis=1).sum(axis=1)
+
+    def near(self, target: Array, distance: float) -> Index:
+        """Numbers of the cells whose tips may come so near to a target."""
+        room = np.empty(len(self.center), np.int64)
+        count = near_cells(self.tips, self.slopes, self.radii, self.errors, target, distance, room)
+        return room[:count]
+
+
+def least_of_cells(
+    rod: TipMap, half: Array, cells: Cells, enough: Array, bound: Bound, most: int
+) -> Array:
+    """A lower bound for each target over all of its cells.
+
+    Args:
+        rod: The tip map.
+        half: Half widths of the cells [-], shape (m,).
+        cells: Where to begin.
+        enough: Bounds at which a cell is done and which the result does not exceed, shape (t,).
+        bound: What is bounded.
+        most: Cells that one target is worth.
+
+    Returns:
+        Shape (t,): `enough` where all cells reach it, else the least bound of those left.
+    """
+    least, count = enough.copy(), len(enough)
+    spent = np.zeros(count, np.int64)
+    while len(cells.owner):
+        owner = cells.owner
+        found = np.concatenate(
+            [
+                bound(part, linearized(rod, half, part.center))
+                for first in range(0, len(owner), _BLOCK)
+                for part in (cells.where(slice(first, first + _BLOCK)),)
+            ]
+        )
+        spent += np.bincount(owner, minlength=count)
+        open_cells = found < enough[owner]
+        left = np.bincount(owner[open_cells], minlength=count)
+        hopeless = open_cells & (spent + 2 * left > most)[owner]
+        np.minimum.at(least, owner[hopeless], found[hopeless])
+        half, cells = _halved(rod, half, cells.where(open_cells & ~hopeless))
+    return least
+
+
+def linearized(rod: TipMap, half: Array, center: Array) -> Linearized:
+    """The tip map in cells of equal shape; on the calling thread."""
+    tips, slopes = np.empty((len(center), 3)), np.empty((len(center), 3, center.shape[1]))
+    rod.fill_slopes(center, tips, slopes)
+    return Linearized(half, tips, slopes, _errors(rod, center, half))
+
+
+def _errors(rod: TipMap, center: Array, half: Array) -> Array:
+    return rod.linearization_errors(center, half) + _ROUNDING * rod.length
+
+
+def _halved(rod: TipMap, half: Array, cells: Cells) -> tuple[Array, Cells]:
+    """Both halves of every cell, along the axis that leaves least error."""
+    thinner = np.where(np.eye(len(half), dtype=bool), 0.5 * half, half)
+    axis = int(np.argmin([rod.linearization_error(widths) for widths in thinner]))
+    half = thinner[axis]
+    center = np.repeat(cells.center, 2, axis=0)
+    center[0::2, axis] -= half[axis]
+    center[1::2, axis] += half[axis]
+    return half, Cells(np.repeat(cells.owner, 2), center)
+
+
+# Proof that a target is out of reach: a lower bound of its distance from the reachable set.
+#
+# The distance of a target p from the linear image of a cell with center c and half widths h is n·(p
+# - r(c)) - Σ hj |n·Jj| at least, for any unit vector n, and its distance from the image no smaller
+# than that by more than the error of the linearization.
+
+
+_ENOUGH = 0.2  # of the gap of the best place: a bound that large ends the search
+_MOST_EXCLUSION_CELLS = 20_000  # examined for one target
+_MOST_OF_THREE = 4_000  # the same with three bundles or fewer, where a proof needs far fewer
+_TARGET_BLOCK = 10  # targets at once
+_SOFTNESS = 1e-6  # of the linear problem that says in which direction the target lies
+
+
+def gap_bounds(rod: TipMap, coarse: CoarseCells, targets: Array, gap: Array) -> Array:
+    """A lower bound of the distance of each target from everything that the box reaches.
+
+    Args:
+        rod: The tip map.
+        coarse: Its cells.
+        targets: Shape (t, 3) [m].
+        gap: How near to each the best place known is [m], shape (t,).
+
+    Returns:
+        Bounds [m], shape (t,); 0 where nothing is proved.
+    """
+    if rod.box.dimension == 0:
+        return gap.copy()  # one place is reached
+    bounds = np.maximum(np.linalg.norm(targets, axis=1) - rod.farthest(), 0.0)
+
+    def prove(rows: slice) -> None:
+        proved = _exclusion_of_block(rod, coarse, targets[rows], gap[rows])
+        bounds[rows] = np.maximum(bounds[rows], proved)
+
+    parallel.run(partial(prove, rows) for rows in parallel.blocks(len(targets), _TARGET_BLOCK))
+    return np.minimum(bounds, gap)
+
+
+def _exclusion_of_block(rod: TipMap, coarse: CoarseCells, targets: Array, gap: Array) -> Array:
+    """Halve the cells of some targets until they are far enough away or too many."""
+    near = [coarse.near(p, _ENOUGH * g) for p, g in zip(targets, gap, strict=True)]
+    counts = np.array([len(rows) for rows in near])
+    most = _most_cells(rod.box.dimension)
+    few = counts <= most
+    chosen = np.concatenate([rows[: len(rows) * ok] for rows, ok in zip(near, few, strict=True)])
+    cells = Cells(np.repeat(np.arange(len(gap)), counts * few), coarse.center[chosen])
+    enough = np.where(few, _ENOUGH * gap, 0.0)
+
+    def bound(part: Cells, at: Linearized) -> Array:
+        return _distances(targets[part.owner], at)
+
+    return np.maximum(least_of_cells(rod, coarse.half, cells, enough, bound, most), 0.0)
+
+
+def _most_cells(bundles: int) -> int:
+    """How many cells may be examined for one target."""
+    if bundles <= 3:
+        return _MOST_OF_THREE
+    return _MOST_EXCLUSION_CELLS if bundles <= MOST_BUNDLES else 0
+
+
+def _distances(targets: Array, at: Linearized) -> Array:
+    """How far each target is at least from the image of its cell, negative if it may be in it."""
+    n, _, m = at.slopes.shape
+    away, slopes = targets - at.tips, at.slopes * at.half
+    softness = _SOFTNESS * (slopes**2).sum(axis=(1, 2)) + 1e-30
+    inside, force = np.empty((n, m)), np.empty((n, 3))
+    side = np.ones((n, m))
+    project(np.zeros((n, m)), slopes, away, softness, -side, side, inside, force)
+    size = np.linalg.norm(force, axis=1)
+    normal = -force / np.where(size > 0, size, 1.0)[:, None]
+    linear = np.einsum("ni,ni->n", normal, away)
+    linear -= np.abs(np.einsum("ni,nij->nj", normal, slopes)).sum(axis=1)
+    return linear - at.errors
+
+
+# Proof that no activation changes less: a lower bound of |γ - near| over all that reach a target.
+#
+# Where tips lie within e of their linearization at the center c of a cell, every activation x of
+# the cell that reaches p has |A x - b| <= e with A = J(c) and b = p - r(c) + A c. The least change
+# under this condition alone is bounded from below by its dual of three unknowns,
+# `kernels.change_bounds`.
+
+
+SLACK = 1e-6  # by which a bound may fall short of the change that it proves to be least
+_AIM = 0.9 * SLACK  # where a search ends: rounding is not to decide
+_MOST_LEAST_CELLS = 100_000  # examined for one target
+_REQUEST_BLOCK = 16  # targets at once
+
+
+def change_bounds(
+    rod: TipMap, coarse: CoarseCells, targets: Array, near: Array, change: Array
+) -> Array:
+    """A lower bound of |γ - near| over all activations that reach each target.
+
+    Args:
+        rod: The tip map.
+        coarse: Its cells.
+        targets: Shape (t, 3) [m].
+        near: Shape (t, m) [-].
+        change: |γ - near| of the best activation known [-], shape (t,).
+
+    Returns:
+        Shape (t,) [-]: at least `change - SLACK` where that one is proved to be the least.
+    """
+    # No activation within the bounds is nearer than the one nearest to `near`, wherever its tip.
+    bounds = np.linalg.norm(near - rod.box.clip(near), axis=1)
+    if rod.box.dimension <= MOST_BUNDLES and np.isfinite(rod.linearization_error(coarse.half)):
+        enough = np.maximum(change - _AIM, 0.0)
+
+        def prove(rows: slice) -> None:
+            proved = _least_of_block(rod, coarse, targets[rows], near[rows], enough[rows])
+            bounds[rows] = np.maximum(bounds[rows], proved)
+
+        parallel.run(partial(prove, rows) for rows in parallel.blocks(len(targets), _REQUEST_BLOCK))
+    return np.minimum(bounds, change)
+
+
+def _least_of_block(
+    rod: TipMap, coarse: CoarseCells, targets: Array, near: Array, enough: Array
+) -> Array:
+    """Halve the cells of some targets until none may change less, or there are too many."""
+    rows = [_within(coarse, *case) for case in zip(targets, near, enough, strict=True)]
+    owner = np.repeat(np.arange(len(targets)), [len(numbers) for numbers in rows])
+    cells = Cells(owner, coarse.center[np.concatenate(rows)])
+
+    def bound(part: Cells, at: Linearized) -> Array:
+        one = part.owner
+        return _of_cells(targets[one], near[one], enough[one], part.center, at)
+
+    return least_of_cells(rod, coarse.half, cells, enough, bound, _MOST_LEAST_CELLS)
+
+
+def _within(coarse: CoarseCells, target: Array, near: Array, change: float) -> Index:
+    """Numbers of the cells that may reach a target by less than a change."""
+    rows = coarse.near(target, 0.0)
+    away = np.maximum(np.abs(coarse.center[rows] - near) - coarse.half, 0.0)
+    return rows[np.linalg.norm(away, axis=1) < change]
+
+
+def _of_cells(targets: Array, near: Array, enough: Array, center: Array, at: Linearized) -> Array:
+    """The bound for each cell, `enough` at most, shape (n,)."""
+    wanted = targets - at.tips + np.einsum("nij,nj->ni", at.slopes, center)
+    low, high, found = center - at.half, center + at.half, np.empty(len(center))
+    dual.change_bounds(near, at.slopes, wanted, at.errors, low, high, enough, found)
+    return found

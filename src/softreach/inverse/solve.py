@@ -1,0 +1,248 @@
+"""Solving for activations: an arm is prepared once, then any number of targets."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.arm.manipulator import Manipulator
+from softreach.inverse.branches import distinct, every_branch
+from softreach.inverse.least_change import least_changes
+from softreach.inverse.nearest import Nearest, nearest, nearest_from
+from softreach.inverse.prepared import PreparedMap, prepared_map
+from softreach.inverse.proofs import SLACK, change_bounds, gap_bounds
+from softreach.inverse.request import (
+    Request,
+    checked_activations,
+    checked_direction,
+    checked_residual,
+    checked_targets,
+)
+from softreach.inverse.roots import Roots, conditions, nearly_singular_roots, no_roots, roots_at
+from softreach.inverse.solutions import Solutions, Status
+from softreach.rod.tip_map import TipMap
+from softreach.support import parallel
+from softreach.support.arguments import as_number, as_whole_number, checked, flag
+from softreach.support.errors import InvalidInput, Range
+
+__all__ = ["solve_inverse"]
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_NEARLY = 1e-2  # gap in L at which a target may have a root where ∂r/∂γ is nearly singular
+_BLOCK = 32_768  # targets at once: bounds the memory of a call
+_BRANCH_BLOCK = 131_072  # where all roots are searched, which is done in smaller sets
+
+
+@checked(prove_least=flag)
+def solve_inverse(
+    arm: Manipulator | TipMap | PreparedMap,
+    targets: ArrayLike,
+    *,
+    residual_over_length: float = 1e-10,
+    near: ArrayLike | None = None,
+    direction: ArrayLike | None = None,
+    direction_weight: float = 0.1,
+    family: int = 1,
+    prove_least: bool = False,
+    seed: int = 0,
+    tol: float = 1e-6,
+) -> Solutions:
+    """The activations that put the tip at each target, or as near to it as the arm can reach.
+
+    Bundles with equal bounds are held there; the others are free. With three free bundles: every
+    activation within the bounds, by Newton's method from every cell of the activation box whose
+    image covers the target. With more: the one of least |γ - near|, and `family - 1` others on
+    request. With fewer, or out of reach: the nearest reachable point found, and whether a bound
+    proves the target to be out of reach. The arm is prepared at the
+    first call and remembered.
+
+    Of an arm under loads every activation given holds the arm in a stable equilibrium, the one that
+    follows from the unloaded arm as the load grows; nothing is proved, so that a target that no
+    search reaches is `NOT_FOUND`.
+
+    Args:
+        arm: The design, its tip map, or what `prepared_map` made of it.
+        targets: Tip positions to reach [m], shape (t, 3).
+        residual_over_length: Largest |tip - target| of a solution, in L.
+        near: With more than three free bundles: the activation to stay near to [unit of each],
+            shape (bundles,) or (t, bundles); by default rest. Where units differ, the change of
+            each activation counts in its own range.
+        direction: Wanted tip tangents d3, shape (3,) or (t, 3), of any length. With more than
+            three free bundles the freedom left by the position goes to least
+            |γ - near|² + w² |d3 - direction|²; with three or fewer the position yields too:
+            least |tip - target|²/L² + w² |d3 - direction|².
+        direction_weight: w [-].
+        family: With more than three free bundles: how many activations to give for each target,
+            the others being those nearest to random activations.
+        prove_least: With more than three free bundles: bound |γ - near| from below, over all
+            activations that reach a target, and say whether the one found is the least. Takes
+            some ten milliseconds for a target with four, up to half a second with five or six,
+            where it may not succeed; with more nothing is proved.
+        seed: Seed of these.
+        tol: Largest error of the tips themselves, in L; residuals refer to `tip_positions` with
+            this tolerance. A tip map keeps its own.
+
+    Returns:
+        One `Solution` for each target; failures are its status, never an exception.
+
+    Raises:
+        InvalidInput: Arguments of another shape, not finite, or out of range; a proof where a
+            direction is traded against the change.
+    """
+    if prove_least and direction is not None:
+        raise InvalidInput("prove_least", prove_least, "False where a direction is wanted")
+    prepared = prepared_map(arm, tol)
+    points, box = checked_targets("targets", targets), prepared.whole.box
+    rest = np.zeros(box.bundles) if near is None else near
+    request = Request(
+        targets=points,
+        residual=checked_residual(residual_over_length) * prepared.whole.length,
+        near=checked_activations("near", rest, box, len(points)) / prepared.measures[box.free],
+        direction=checked_direction(direction, len(points)),
+        direction_weight=as_number("direction_weight", direction_weight, Range(0.0, 1e6)),
+        family=as_whole_number("family", family, 1, 10_000),
+        seed=as_whole_number("seed", seed, 0, 2**63),
+        prove_least=bool(prove_least),
+    )
+    solve, size = _by_distance, _BLOCK
+    if prepared.dimension > 3:
+        solve = _by_least_change
+    elif prepared.dimension == 3 and request.direction is None:
+        solve, size = _by_branches, _BRANCH_BLOCK
+    blocks = list(parallel.blocks(len(points), size)) or [slice(0)]
+    solutions = Solutions.joined([solve(prepared, request.of(rows)) for rows in blocks])
+    return solutions.in_units_of(prepared.measures)
+
+
+def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
+    """All roots, and the nearest points to the targets that have none."""
+    found = every_branch(prepared, request)
+    count = len(request.targets)
+    unstable = np.bincount(found.target[~found.stable], minlength=count)
+    roots = found.where(found.stable)
+    missing = roots.missing(count)
+    blocks = list(parallel.blocks(len(missing), _BLOCK)) or [slice(0)]
+    closest = Nearest.joined([nearest(prepared, request.of(missing[rows])) for rows in blocks])
+    solutions = _solutions(prepared, request, roots, missing, closest)
+    left = np.flatnonzero(_perhaps_singular(prepared, solutions))
+    if len(left):
+        late = distinct(prepared, request, nearly_singular_roots(prepared, request, left))
+        if len(late.target):
+            roots = roots.joined(late)
+            again = roots.missing(count)
+            closest = closest.of(np.flatnonzero(np.isin(missing, again)))
+            bounds = solutions.gap_bounds
+            solutions = _solutions(prepared, request, roots, again, closest, bounds)
+    return replace(solutions, unstable=unstable)
+
+
+def _perhaps_singular(prepared: PreparedMap, solutions: Solutions) -> NDArray[np.bool_]:
+    """Which targets may have roots that only a search of nearly singular ones finds.
+
+    Those not proved to be out of reach; where nothing is proved, those that are nearly reached.
+    """
+    left = solutions.statuses == Status.NOT_FOUND
+    if prepared.proves:
+        return left
+    return left & (solutions.gaps <= _NEARLY * prepared.whole.length)
+
+
+def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
+    """Nearest points, or compromises between distance and direction."""
+    roots = _stable_roots(prepared, request) if prepared.dimension == 3 else None
+    everything = np.arange(len(request.targets))
+    closest = nearest(prepared, request, roots)
+    return _solutions(prepared, request, no_roots(prepared.rod), everything, closest)
+
+
+def _stable_roots(prepared: PreparedMap, request: Request) -> Roots:
+    found = every_branch(prepared, request)
+    return found.where(found.stable)
+
+
+def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
+    """Least changes where the target is reached, nearest places where it is not."""
+    target, gamma, best = least_changes(prepared, request)
+    roots = roots_at(prepared.rod, request.targets, target, gamma)
+    missing = roots.missing(len(request.targets))
+    closest = nearest_from(prepared.rod, request.of(missing), best.gamma[missing])
+    solutions = _solutions(prepared, request, roots, missing, closest)
+    provable = request.prove_least and prepared.proves
+    return _with_proofs(prepared, request, solutions) if provable else solutions
+
+
+def _with_proofs(prepared: PreparedMap, request: Request, solutions: Solutions) -> Solutions:
+    """The solutions, with bounds of the change where targets are reached."""
+    reached = np.flatnonzero(solutions.statuses == Status.REACHED)
+    first = solutions.activations[solutions.offsets[reached]][:, prepared.whole.box.free]
+    asked = request.of(reached)
+    change = np.linalg.norm(first - asked.near, axis=1)
+    found = change_bounds(prepared.rod, prepared.coarse_cells, asked.targets, asked.near, change)
+    bounds, proved = np.zeros(len(request.targets)), np.zeros(len(request.targets), bool)
+    bounds[reached], proved[reached] = found, found >= change - SLACK
+    return replace(solutions, change_bounds=bounds, least_proved=proved)
+
+
+def _solutions(
+    prepared: PreparedMap,
+    request: Request,
+    roots: Roots,
+    missing: Index,
+    closest: Nearest,
+    proved_gaps: Array | None = None,
+) -> Solutions:
+    """Put together the roots and, for targets without one, the nearest points.
+
+    Args:
+        prepared: The tip map.
+        request: What was asked.
+        roots: The roots found, sorted by target.
+        missing: Numbers of the targets without a root.
+        closest: The nearest points to these; some may prove to be roots.
+        proved_gaps: Lower bounds of the gaps of all targets, if they are known already.
+    """
+    rod, count = prepared.rod, len(request.targets)
+    at_closest = roots_at(rod, request.targets, missing, closest.gamma)
+    hit = at_closest.residual <= request.residual
+    roots = roots.joined(at_closest.where(hit))
+    statuses = np.full(count, Status.REACHED, np.int8)
+    out, far = missing[~hit], at_closest.residual[~hit]
+    bounds = np.zeros(count)
+    # Where the position yields to a direction, the gap says nothing of what can be reached.
+    yielding = request.direction is not None and prepared.dimension <= 3
+    if proved_gaps is not None:
+        bounds[out] = proved_gaps[out]
+    elif len(out) and not yielding and (prepared.proves or not prepared.dimension):
+        bounds[out] = gap_bounds(rod, prepared.coarse_cells, request.targets[out], far)
+    proved = bounds[out] > request.residual
+    statuses[out] = np.where(proved, Status.UNREACHABLE, Status.NOT_FOUND)
+    gamma, gaps = np.empty((count, rod.box.bundles)), np.empty(count)
+    reached, first = np.unique(roots.target, return_index=True)
+    gamma[reached], gaps[reached] = roots.gamma[first], roots.residual[first]
+    points = request.targets.copy()
+    points[missing], gamma[missing], gaps[missing] = (
+        closest.tip,
+        closest.gamma,
+        at_closest.residual,
+    )
+    return Solutions(
+        arm=prepared.whole.arm,
+        targets=request.targets,
+        offsets=np.searchsorted(roots.target, np.arange(count + 1)),
+        activations=prepared.whole.box.with_held(roots.gamma),
+        residuals=roots.residual,
+        conditions=conditions(roots.slope),
+        margins=rod.box.margin(roots.gamma),
+        statuses=statuses,
+        nearest=points,
+        nearest_activations=prepared.whole.box.with_held(gamma),
+        gaps=gaps,
+        gap_bounds=bounds,
+        change_bounds=np.zeros(count),
+        least_proved=np.zeros(count, bool),
+        unstable=np.zeros(count, np.int64),
+    )

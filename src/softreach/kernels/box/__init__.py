@@ -1,0 +1,1 @@
+"""Boxes of activations: bounds, projections and descents inside them."""

@@ -1,0 +1,92 @@
+"""Lower bounds of changes that meet three linear equations nearly, for many boxes at a time.
+
+min ½ |x - c|² for low <= x <= high and |A x - b| <= e is no less, for any y of three numbers, than
+min ½ |x - c|² + y·(A x - b) - e |y| over the box alone, and as much for the best y. The norm lies
+below the parabola through it at any |y|, so that steps of `box_projection` with the softness e/|y|
+never lead down.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from softreach.kernels.box.box_projection import climbs, dual, newton
+from softreach.kernels.compiler import inline, kernel
+
+__all__ = ["change_bounds"]
+
+_MOST_ITERATIONS = 20
+_CONVERGED = 1e-14  # of the bound that is wanted
+
+
+@kernel
+def change_bounds(center, slope, wanted, error, low, high, enough, out):
+    """Write a lower bound of |x - c| for each box into `out`, shape (n,).
+
+    Args:
+        center: c, shape (n, m).
+        slope: A, shape (n, 3, m).
+        wanted: b, shape (n, 3).
+        error: e > 0, shape (n,).
+        low: Lower bounds, shape (n, m).
+        high: Upper bounds, shape (n, m).
+        enough: Bounds at which a search ends, shape (n,).
+        out: Result, shape (n,).
+    """
+    y, miss, step, trial = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+    gram, x = np.zeros((3, 3)), np.empty_like(center)
+    softness = np.empty(center.shape[0])
+    for n in range(center.shape[0]):
+        goal, most = 0.5 * enough[n] ** 2, 0.0
+        softness[n] = error[n] / _usual_size(center, slope, low, high, n)
+        y[:] = 0.0
+        for _ in range(_MOST_ITERATIONS):
+            best = dual(center, slope, wanted, softness, low, high, n, y, x, miss, gram)
+            size = math.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
+            most = max(most, best + 0.5 * softness[n] * size * size - error[n] * size)
+            if most >= goal or _meets(center, x, n, miss, softness, y, error, goal):
+                break
+            best += _soften(
+                softness, n, error[n] / size if size > 0.0 else softness[n], y, miss, gram
+            )
+            ascent = newton(gram, miss, step)
+            ends = center, slope, wanted, softness, low, high, n, y, step, trial
+            if not ascent > _CONVERGED * goal or not climbs(ends, best, ascent):
+                break
+            y[:] = trial
+        out[n] = math.sqrt(2.0 * most)
+
+
+@inline
+def _usual_size(center, slope, low, high, n):
+    """What |y| would be if all of A had a part in the change to the middle of the box."""
+    square, change = 0.0, 0.0
+    for j in range(center.shape[1]):
+        change += (0.5 * (low[n, j] + high[n, j]) - center[n, j]) ** 2
+        for i in range(3):
+            square += slope[n, i, j] ** 2
+    return math.sqrt((change + 1e-30) / (square + 1e-30))
+
+
+@inline
+def _meets(center, x, n, miss, softness, y, error, goal):
+    """Whether x meets the equations by too small a change: then no bound is large enough."""
+    square, change = 0.0, 0.0
+    for i in range(3):
+        square += (miss[i] + softness[n] * y[i]) ** 2
+    for j in range(center.shape[1]):
+        change += (x[n, j] - center[n, j]) ** 2
+    return square <= error[n] ** 2 and 0.5 * change < goal
+
+
+@inline
+def _soften(softness, n, now, y, miss, gram):
+    """Change the softness with what depends on it; how much the dual function grows by that."""
+    less = softness[n] - now
+    softness[n] = now
+    for i in range(3):
+        miss[i] += less * y[i]
+        gram[i, i] -= less
+    return 0.5 * less * (y[0] * y[0] + y[1] * y[1] + y[2] * y[2])

@@ -1,0 +1,1 @@
+"""Branches of the inverse: starting points, Newton's method, folds."""

@@ -1,0 +1,1 @@
+"""Image of the activation box: its cells, its critical triangles, what they cover."""

@@ -1,0 +1,215 @@
+"""The activation box in cells of six tetrahedra each, whose images are known at their corners.
+
+Within a tetrahedron the map is replaced by its linear interpolant; the second differences of the
+Jacobians at the corners tell how far the true image may lie from the linear one.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from softreach.kernels.box.simplices import kuhn_simplices
+from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.vector import cross, difference, dot, matrix, minus, row, times
+
+__all__ = [
+    "ActivationMesh",
+    "axes_of",
+    "face_planes",
+    "image_faces",
+    "interpolation_errors",
+    "orientation",
+    "tetrahedron",
+]
+
+# Each tetrahedron of a cell walks from corner 0 to corner 7 by these two, along axes in some order.
+_PATHS = tuple((int(second), int(third)) for _, second, third, _ in kuhn_simplices(3))
+_AXES = tuple(
+    (second >> 1, (third ^ second) >> 1, (7 ^ third) >> 1) for second, third in _PATHS
+)  # bits 1, 2 and 4 are axes 0, 1 and 2
+_EVEN_ORDERS = tuple((b - a) % 3 == 1 for a, b, _ in _AXES)
+
+_EDGES = tuple((a, b) for a in range(8) for b in range(a + 1, 8) if a & b == a)
+_SAFETY = 1.25  # for derivatives of higher order
+_SHARE = _SAFETY * 3.0 / 16.0  # of a second difference
+_PAIRS = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
+_CUBIC_SHARE = 0.25  # of the largest cubic difference: twice the worst that was measured
+_QUARTIC_SHARE = 0.005  # of the linear error, where cubic differences vanish by chance
+
+
+class ActivationMesh(NamedTuple):
+    """Cells of the activation box and their images."""
+
+    gamma: np.ndarray
+    """Vertices [-], shape (vertex, 3)."""
+    tip: np.ndarray
+    """Their tips [m], shape (vertex, 3)."""
+    slope: np.ndarray
+    """Their position Jacobians [m], shape (vertex, 3, 3)."""
+    corner: np.ndarray
+    """Vertices of each cell, bit j of a corner along axis j, shape (cell, 8)."""
+    interpolation_error: np.ndarray
+    """How far the true image may lie from the linear one [m], shape (cell,)."""
+    remainder: np.ndarray
+    """How far it may lie from the quadratic through tips and Jacobians [m], shape (cell,)."""
+    slope_change: np.ndarray
+    """How much the Jacobian changes across the cell at most [m], shape (cell,)."""
+
+
+@kernel
+def interpolation_errors(gamma, tip, slope, corner, error, remainder):
+    """Estimate the largest linear and quadratic interpolation errors of every cell.
+
+    On a simplex a quadratic differs from its linear interpolant by ½ Σ λi λj f''[eij, eij], i < j,
+    with Σ λi λj <= 3/8, hence by at most 3/16 of the largest |f''[e, e]| = |ΔJ e| of its edges.
+    For quadratics the result is therefore a bound, 1.25 times the sharp one. For other maps ΔJ e is
+    the mean of f''[e, e] along the edge and the result is an estimate, not a bound: it fails where
+    f'' changes across one cell by more than its own size, as at an inflection of x³, where ΔJ = 0.
+    `design/inverse.md` has what was measured on arms.
+
+    Of cubics the quadratic Σ λi (fi + ½ Ji (x - xi)) is off by Σ λi f'''[di, di, di]/12 with
+    di = xi - x; what the trapezoidal rule leaves of an edge, |Δf - ½ (Ja + Jb) e|, is
+    |f'''[e, e, e]|/12.
+    """
+    for c in range(corner.shape[0]):
+        worst, rest = 0.0, 0.0
+        for a, b in _EDGES:
+            i, j = corner[c, a], corner[c, b]
+            bend = _second_difference(gamma, slope, i, j)
+            worst = max(worst, dot(bend, bend))
+            twist = _cubic_difference(gamma, tip, slope, i, j)
+            rest = max(rest, dot(twist, twist))
+        error[c] = _SHARE * math.sqrt(worst)
+        remainder[c] = _CUBIC_SHARE * math.sqrt(rest) + _QUARTIC_SHARE * error[c]
+
+
+@kernel
+def face_planes(mesh, rounding, planes):
+    """Planes round the inflated images: n·p >= d for unit normals n, shape (6 cells, 4, 4).
+
+    Those of the largest faces come first: an image is thinnest across them, so they miss most.
+    """
+    for c in range(mesh.corner.shape[0]):
+        for which in range(6):
+            v = tetrahedron(mesh.corner, c, which)
+            base, det, normals = image_faces(mesh.tip, v)
+            bends = _bends(mesh.gamma, mesh.slope, v)
+            for i in range(4):
+                n = normals[i]
+                size = math.sqrt(dot(n, n))
+                scale = 1.0 / size if size > 0 else 0.0
+                offset = -det if i == 0 else 0.0
+                place = _larger_faces(normals, i)
+                for k in range(3):
+                    planes[6 * c + which, place, k] = scale * n[k]
+                unit = times(scale, n)
+                error = _bulge(bends, unit, i, scale * det) + mesh.remainder[c] + rounding
+                planes[6 * c + which, place, 3] = dot(base, unit) + scale * offset - error
+
+
+@inline
+def _larger_faces(normals, i):
+    """How many faces are larger than face i, or as large and before it."""
+    size, larger = dot(normals[i], normals[i]), 0
+    for j in range(4):
+        other = dot(normals[j], normals[j])
+        larger += int(other > size or (other == size and j < i))
+    return larger
+
+
+@inline
+def _bends(gamma, slope, v):
+    """The second differences along the six edges of a tetrahedron."""
+    return (
+        _second_difference(gamma, slope, v[0], v[1]),
+        _second_difference(gamma, slope, v[0], v[2]),
+        _second_difference(gamma, slope, v[0], v[3]),
+        _second_difference(gamma, slope, v[1], v[2]),
+        _second_difference(gamma, slope, v[1], v[3]),
+        _second_difference(gamma, slope, v[2], v[3]),
+    )
+
+
+@inline
+def _bulge(bends, n, i, height):
+    """How far the quadratic image may lie beyond face i along its inward unit normal n.
+
+    Where λi = t it lies at t height - ½ Σ λj λk n·bend. Only edges along which n·bend > 0 bulge
+    outward: of the face by g each, with Σ λj λk g <= (1 - t)² min(max g / 3, Σ g / 4), and those to
+    vertex i by at most h.
+    """
+    most, total, h = 0.0, 0.0, 0.0
+    for k in range(6):
+        g = max(dot(n, bends[k]), 0.0)
+        if _PAIRS[k][0] == i or _PAIRS[k][1] == i:
+            h = max(h, g)
+        else:
+            most, total = max(most, g), total + g
+    f = min(most / 3.0, 0.25 * total)
+    # The largest f (1 - t)²/2 + h t (1 - t)/2 - height t within 0 <= t <= 1.
+    slope = 0.5 * h - f - height
+    if slope <= 0.0:
+        return 0.5 * f
+    t = min(slope / (h - f), 1.0)
+    return 0.5 * f + t * (slope - 0.5 * t * (h - f))
+
+
+@inline
+def _second_difference(gamma, slope, i, j):
+    """f''[e, e] ≈ ΔJ e along the edge e from vertex i to vertex j."""
+    e, at_i, at_j = difference(gamma, j, i), matrix(slope, i), matrix(slope, j)
+    return (
+        dot(minus(at_j[0], at_i[0]), e),
+        dot(minus(at_j[1], at_i[1]), e),
+        dot(minus(at_j[2], at_i[2]), e),
+    )
+
+
+@inline
+def _cubic_difference(gamma, tip, slope, i, j):
+    """-f'''[e, e, e]/12 ≈ Δf - ½ (Ji + Jj) e along the edge e from vertex i to vertex j."""
+    e, d, at_i, at_j = (
+        difference(gamma, j, i),
+        difference(tip, j, i),
+        matrix(slope, i),
+        matrix(slope, j),
+    )
+    return (
+        d[0] - 0.5 * (dot(at_i[0], e) + dot(at_j[0], e)),
+        d[1] - 0.5 * (dot(at_i[1], e) + dot(at_j[1], e)),
+        d[2] - 0.5 * (dot(at_i[2], e) + dot(at_j[2], e)),
+    )
+
+
+@inline
+def tetrahedron(corner, c, which):
+    """The four vertices of one of the tetrahedra of cell c."""
+    second, third = _PATHS[which]
+    return corner[c, 0], corner[c, second], corner[c, third], corner[c, 7]
+
+
+@inline
+def axes_of(which):
+    """The axes of the walk of a tetrahedron from its first vertex to its last."""
+    return _AXES[which]
+
+
+@inline
+def orientation(which):
+    """The sign of the order of these axes."""
+    return 1.0 if _EVEN_ORDERS[which] else -1.0
+
+
+@inline
+def image_faces(tip, v):
+    """A tetrahedron's image: a corner, det >= 0, inward normals as long as the faces are large."""
+    base = row(tip, v[0])
+    d1, d2 = difference(tip, v[1], v[0]), difference(tip, v[2], v[0])
+    d3 = difference(tip, v[3], v[0])
+    side = 1.0 if dot(d1, cross(d2, d3)) >= 0 else -1.0
+    n1, n2, n3 = times(side, cross(d2, d3)), times(side, cross(d3, d1)), times(side, cross(d1, d2))
+    n0 = (-n1[0] - n2[0] - n3[0], -n1[1] - n2[1] - n3[1], -n1[2] - n2[2] - n3[2])
+    return base, dot(d1, n1), (n0, n1, n2, n3)

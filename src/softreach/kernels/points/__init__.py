@@ -1,0 +1,1 @@
+"""Clouds of points: triangulation, alpha shapes, neighbors."""

@@ -1,0 +1,185 @@
+"""Alpha shapes from a Delaunay triangulation: radii, volumes, boundary, regions, critical radius.
+
+The alpha shape of radius α is the union of the cells whose circumscribed sphere has radius R <= α.
+A region is a set of such cells that are connected through faces.
+
+References:
+    Edelsbrunner, Mücke (1994), Three-dimensional alpha shapes, ACM Trans. Graphics 13, 43-72.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from softreach.kernels.compiler import strict
+from softreach.kernels.points.expansions import BOTTOM, value
+from softreach.kernels.points.predicates import EPS, ORIENT_BOUND, dot3, edge, end, minor
+from softreach.kernels.points.triangulation import FACES, corners
+from softreach.kernels.strict_vector import cross, difference, dot
+
+__all__ = [
+    "boundary_faces",
+    "join_regions",
+    "least_radii",
+    "measure_cells",
+    "radius_of_one_region",
+]
+
+DIGITS = 2.0**26  # a value this many times its rounding error is good to eight digits
+LENGTH_BOUND = 48 * EPS  # three products of a square and a minor of two products
+
+
+@strict
+def measure_cells(points, cells, w, radii, volumes):
+    """Write the radius of the circumscribed sphere and the volume of every cell.
+
+    With edges a, b, c from the fourth vertex, 6V = a · (b × c) and
+    R = |a² b × c + b² c × a + c² a × b| / 12V.
+
+    Args:
+        points: Coordinates in [-1, 1], shape (n, 3).
+        cells: Vertices, shape (m, 4).
+        w: Work array of the predicates.
+        radii: Result, shape (m,); inf where a cell has no volume.
+        volumes: Result, shape (m,).
+    """
+    for t in range(len(cells)):
+        i, j, k, m = corners(cells, t)
+        length, det, sure = sphere(points, i, j, k, m)
+        if not sure:
+            length, det = sphere_exact(points, i, j, k, m, w)
+        volumes[t] = abs(det) / 6.0
+        radii[t] = length / (2.0 * abs(det)) if det != 0.0 else np.inf
+
+
+@strict
+def sphere(points, i, j, k, m):
+    """The numerator |...| of R and 6V, and whether rounding left them good to eight digits."""
+    a, b, c = difference(points, i, m), difference(points, j, m), difference(points, k, m)
+    a2, b2, c2 = dot(a, a), dot(b, b), dot(c, c)
+    bc, ca, ab = cross(b, c), cross(c, a), cross(a, b)
+    x = a2 * bc[0] + b2 * ca[0] + c2 * ab[0]
+    y = a2 * bc[1] + b2 * ca[1] + c2 * ab[1]
+    z = a2 * bc[2] + b2 * ca[2] + c2 * ab[2]
+    det = dot(a, bc)
+    length = np.sqrt(x * x + y * y + z * z)
+    u = max(abs(a[0]), abs(b[0]), abs(c[0]))
+    v = max(abs(a[1]), abs(b[1]), abs(c[1]))
+    w = max(abs(a[2]), abs(b[2]), abs(c[2]))
+    length_size = max(a2, b2, c2) * (u * v + v * w + w * u)
+    sure = (
+        abs(det) > DIGITS * ORIENT_BOUND * u * v * w
+        and length > DIGITS * LENGTH_BOUND * length_size
+    )
+    return length, det, sure
+
+
+@strict
+def sphere_exact(points, i, j, k, m, w):
+    """`sphere` with each sum exact until its last rounding: a flat cell cancels most digits."""
+    a = edge(w, BOTTOM, points, i, m)
+    b = edge(w, end(a[2]), points, j, m)
+    c = edge(w, end(b[2]), points, k, m)
+    a2 = dot3(w, end(c[2]), a[0], a[0], a[1], a[1], a[2], a[2])
+    b2 = dot3(w, end(a2), b[0], b[0], b[1], b[1], b[2], b[2])
+    c2 = dot3(w, end(b2), c[0], c[0], c[1], c[1], c[2], c[2])
+    square, det = 0.0, 0.0
+    for z in range(3):
+        x, y = (z + 1) % 3, (z + 2) % 3
+        bc = minor(w, end(c2), b[x], b[y], c[x], c[y])
+        ca = minor(w, end(bc), c[x], c[y], a[x], a[y])
+        ab = minor(w, end(ca), a[x], a[y], b[x], b[y])
+        square += value(w, dot3(w, end(ab), a2, bc, b2, ca, c2, ab)) ** 2
+        det = value(w, dot3(w, end(ab), a[z], bc, b[z], ca, c[z], ab))
+    return np.sqrt(square), det
+
+
+@strict
+def boundary_faces(cells, neighbors, kept, faces):
+    """Write the faces between kept cells and the rest, normals outwards; return how many.
+
+    Args:
+        cells: Vertices, shape (m, 4).
+        neighbors: Neighbors, -1 for none, shape (m, 4).
+        kept: Which cells belong to the shape, shape (m,).
+        faces: Result, shape (f, 3); empty to count only.
+    """
+    count = 0
+    for t in range(len(cells)):
+        for i in range(4):
+            if is_boundary(neighbors, kept, t, i):
+                if len(faces):
+                    for k in range(3):
+                        faces[count, k] = cells[t, FACES[i, k]]
+                count += 1
+    return count
+
+
+@strict
+def is_boundary(neighbors, kept, t, i):
+    """Whether cell t is kept and its neighbor i is not."""
+    return kept[t] and (neighbors[t, i] < 0 or not kept[neighbors[t, i]])
+
+
+@strict
+def merges(neighbors, parent, t):
+    """Join cell t, new, to the cells around it that have a region; how many regions that cost.
+
+    ``parent`` leads from each cell towards the one that names its region (union-find).
+    """
+    merged = 0
+    here = t
+    for i in range(4):
+        there = neighbors[t, i]
+        if there < 0 or parent[there] < 0:
+            continue
+        while parent[there] != there:
+            parent[there] = parent[parent[there]]
+            there = parent[there]
+        if there != here:
+            parent[here] = there
+            here = there
+            merged += 1
+    return merged
+
+
+@strict
+def join_regions(neighbors, kept, parent):
+    """The number of regions of the kept cells; `merges`' parent of every cell, -1 at the start."""
+    regions = 0
+    for t in range(len(neighbors)):
+        if kept[t]:
+            parent[t] = t
+            regions += 1 - merges(neighbors, parent, t)
+    return regions
+
+
+@strict
+def least_radii(cells, radii, least):
+    """Write the least radius of the cells at each vertex into ``least``, which is -1 before."""
+    for t in range(len(cells)):
+        for i in range(4):
+            v = cells[t, i]
+            if least[v] < 0.0 or radii[t] < least[v]:
+                least[v] = radii[t]
+
+
+@strict
+def radius_of_one_region(neighbors, radii, parent, regions, order):
+    """The first radius at which one region is left, adding further cells one after the other.
+
+    Args:
+        neighbors: Neighbors, -1 for none, shape (m, 4).
+        radii: Circumscribed radii, shape (m,).
+        parent: Regions so far, from `join_regions`; changed.
+        regions: How many they are.
+        order: The cells still to come, by increasing radius.
+    """
+    for k in range(len(order)):
+        t = order[k]
+        parent[t] = t
+        regions += 1 - merges(neighbors, parent, t)
+        last = k + 1 == len(order) or radii[order[k + 1]] > radii[t]
+        if last and regions == 1:
+            return radii[t]
+    return np.inf

@@ -1,0 +1,273 @@
+"""Delaunay triangulation of points in space, one point at a time (Bowyer 1981, Watson 1981).
+
+Each new point digs out every cell whose circumscribed sphere holds it and fills the cavity with
+cells that join its walls to the point. One ghost vertex beyond the convex hull closes the
+mesh: every hull face is the base of a ghost cell, whose "sphere" is the half-space outside.
+
+Ties. A cell is dug out only if the point lies *strictly* inside its sphere; a ghost cell if the
+point lies strictly beyond its base, or in the plane of its base and in the sphere of the finite
+cell behind it. With exact signs this is the placing ("pushing") triangulation of the lifted points:
+always a valid Delaunay triangulation, whatever is cospherical or coplanar. The cavity is
+star-shaped: a wall in one plane with the point would have the point inside the circle of that wall,
+hence inside the spheres on both its sides, and would not be a wall. So every cell has volume.
+
+The arrays and their conventions are in `kernels.triangulation`.
+
+References:
+    Bowyer (1981), Computing Dirichlet tessellations, The Computer Journal 24, 162-166.
+    Devillers, Pion, Teillaud (2002), Walking in a triangulation, Int. J. Found. Comput. Sci. 13.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from softreach.kernels.compiler import strict
+from softreach.kernels.points.expansions import scratch
+from softreach.kernels.points.predicates import (
+    collinear,
+    insphere,
+    insphere_filter,
+    orient,
+    orient_filter,
+)
+from softreach.kernels.points.triangulation import (
+    DEAD,
+    GHOST,
+    compact,
+    corners,
+    empty_triangulation,
+    enlarged,
+    face,
+    fill,
+    ghost_slot,
+    set_first_cell,
+)
+
+__all__ = ["triangulate"]
+
+CROWDED = 50_000  # cells beside those that are usual
+USUAL = 16  # cells of a point, at most
+REMADE = 3  # times that a cell is made and dug out again, at most
+INSIDE, UNSURE = np.intp(-1), np.intp(-2)
+
+
+def triangulate(points, lies_on_curve):
+    """Insert points in the given order.
+
+    Points in space and on surfaces have four to eight cells each, of some thirty that are made;
+    those on a curve have as many as there are points, and near one as many are made. Such crowding
+    shows after some hundred points.
+
+    Args:
+        points: Coordinates in [-1, 1], multiples of 2^-200 (see `predicates`), shape (n, 3).
+        lies_on_curve: Called without arguments when cells crowd; True gives up.
+
+    Returns:
+        Cells (m, 4), neighbors (m, 4) with -1 outside the hull, and for every point itself or the
+        equal point inserted before it, shape (n,). No cells if the points lie in one plane, or
+        where it was given up.
+    """
+    crowded = CROWDED
+    w, start, same = scratch(), np.zeros(4, np.int64), np.arange(len(points))
+    mesh = empty_triangulation(8 * len(points) + 64)
+    table = np.empty((2, 2048), np.int64)
+    at, walls, used, free, last = _insert(
+        points, mesh, start, same, table, w, 0, 0, DEAD, 0, crowded
+    )
+    while at < len(points):
+        if walls > 0:
+            mesh = enlarged(mesh, used, walls)
+            table = np.empty((2, max(2048, 32 * walls)), np.int64)
+        elif lies_on_curve():
+            return mesh.cells[:0], mesh.neighbors[:0], same
+        else:
+            crowded = np.iinfo(np.int64).max // (2 * REMADE)
+        at, walls, used, free, last = _insert(
+            points, mesh, start, same, table, w, at, used, free, last, crowded
+        )
+    return mesh.cells[:used], mesh.neighbors[:used], same
+
+
+@strict
+def _insert(points, mesh, start, same, table, w, at, used, free, last, crowded):
+    """Insert points from number `at` on while there is room; no cells yet if that is 0.
+
+    Memory is left to the caller: a kernel that asks for it takes longer to compile.
+
+    Returns:
+        The first point that was not inserted, and the walls of its cavity, or 0 if there are more
+        than `crowded` cells beside 16 for each point, or three times as many were made; slots used,
+        the head of the freed slots and the last cell, to go on with. Once all are: slots used by
+        finite cells.
+    """
+    if at == 0:
+        used = first_cell(points, mesh, start, w)
+        if used == 0:
+            return len(points), 0, used, free, last
+    made = 0
+    for p in range(at, len(points)):
+        if used > crowded + USUAL * p or made > REMADE * (crowded + USUAL * (p - at)):
+            return p, 0, used, free, last
+        if p == start[0] or p == start[1] or p == start[2] or p == start[3]:
+            continue
+        found = locate(points, mesh, p, last, w)
+        twin = twin_in(points, mesh, p, found)
+        if twin >= 0:
+            same[p] = twin
+            continue
+        dug, walls = dig(points, mesh, p, found, w)
+        if used + walls > len(mesh.mark) or 8 * walls > table.shape[1]:
+            return p, walls, used, free, last
+        used, free, last = fill(mesh, p, dug, walls, used, free, table)
+        made += walls
+    return len(points), 0, compact(mesh, used), free, last
+
+
+@strict
+def first_cell(points, mesh, start, w):
+    """Start from four points that span space; return the slots used, 0 if there are none."""
+    n = len(points)
+    a, b = np.intp(0), np.intp(1)
+    while b < n and equal(points, a, b):
+        b += 1
+    c = b + 1
+    while c < n and collinear(points, a, b, c, w):
+        c += 1
+    d, side = c + 1, 0.0
+    while d < n:
+        side = orient(points, a, b, c, d, w)
+        if side != 0.0:
+            break
+        d += 1
+    if d >= n:
+        return 0
+    if side < 0.0:
+        b, c = c, b
+    start[0], start[1], start[2], start[3] = a, b, c, d
+    return set_first_cell(mesh, start)
+
+
+@strict
+def equal(points, a, b):
+    """Whether two points are the same."""
+    return (
+        points[a, 0] == points[b, 0]
+        and points[a, 1] == points[b, 1]
+        and points[a, 2] == points[b, 2]
+    )
+
+
+@strict
+def locate(points, mesh, p, t, w):
+    """Walk from cell t to the finite cell that holds p, or a ghost cell whose base p is beyond.
+
+    At every cell step through a face that has p on its other side. The face looked at first
+    changes from step to step, so that no walk runs in circles among cospherical points.
+    """
+    cells, neighbors = mesh.cells, mesh.neighbors
+    slot = ghost_slot(cells, t)
+    if slot >= 0:
+        t = np.intp(neighbors[t, slot])
+    came_from, turn = GHOST, np.uint32(p)
+    while ghost_slot(cells, t) < 0:
+        turn = turn * np.uint32(1664525) + np.uint32(1013904223)
+        first = np.int64(turn >> np.uint32(30))
+        onward = sure_exit(points, cells, neighbors, p, t, came_from, first)
+        if onward == UNSURE:
+            onward = exact_exit(points, cells, p, t, first, w)
+        if onward == INSIDE:
+            return t
+        came_from, t = t, np.intp(neighbors[t, onward])
+    return t
+
+
+@strict
+def sure_exit(points, cells, neighbors, p, t, came_from, first):
+    """A face of finite cell t with p beyond it, INSIDE, or UNSURE because of rounding."""
+    answer = INSIDE
+    for k in range(4):
+        i = (first + k) & 3
+        if neighbors[t, i] != came_from:
+            a, b, c = face(cells, t, i)
+            beyond = orient_filter(points, a, b, c, p)
+            if beyond > 0.0:
+                return i
+            if beyond == 0.0:
+                answer = UNSURE
+    return answer
+
+
+@strict
+def exact_exit(points, cells, p, t, first, w):
+    """A face of finite cell t with p strictly beyond it, or INSIDE."""
+    for k in range(4):
+        i = (first + k) & 3
+        if beyond(points, cells, p, t, i, w) > 0.0:
+            return i
+    return INSIDE
+
+
+@strict
+def beyond(points, cells, p, t, i, w):
+    """+1 if p lies beyond face i of cell t, 0 in its plane, -1 on the side of the cell."""
+    a, b, c = face(cells, t, i)
+    return orient(points, a, b, c, p, w)
+
+
+@strict
+def twin_in(points, mesh, p, t):
+    """The vertex of cell t that equals p; -1 if none."""
+    for i in range(4):
+        v = np.intp(mesh.cells[t, i])
+        if v >= 0 and equal(points, v, p):
+            return v
+    return -1
+
+
+@strict
+def sure_conflict(points, cells, p, t):
+    """+1 if p lies inside the sphere of cell t, -1 if outside, 0 if unsure or a ghost cell."""
+    a, b, c, d = corners(cells, t)
+    return insphere_filter(points, a, b, c, d, p) if (a | b | c | d) >= 0 else 0.0
+
+
+@strict
+def exact_conflict(points, cells, neighbors, p, t, w):
+    """+1 if p lies strictly inside the sphere of cell t (see the module on ghosts and ties)."""
+    slot = ghost_slot(cells, t)
+    if slot >= 0:
+        # the base of a ghost cell, seen from the ghost, faces the hull
+        within = -beyond(points, cells, p, t, slot, w)
+        if within != 0.0:
+            return within
+        t = np.intp(neighbors[t, slot])
+    a, b, c, d = corners(cells, t)
+    return insphere(points, a, b, c, d, p, w)
+
+
+@strict
+def dig(points, mesh, p, start, w):
+    """Find the cells in conflict with p, from one of them outwards; return how many, and walls."""
+    cells, neighbors, mark, dug, walls = mesh
+    inside, outside = 2 * p + 1, 2 * p
+    dug[0], mark[start] = start, inside
+    n_dug, n_walls, at = 1, 0, 0
+    while at < n_dug:
+        t = np.intp(dug[at])
+        at += 1
+        for i in range(4):
+            u = np.intp(neighbors[t, i])
+            if mark[u] != inside and mark[u] != outside:
+                within = sure_conflict(points, cells, p, u)
+                if within == 0.0:
+                    within = exact_conflict(points, cells, neighbors, p, u, w)
+                if within > 0.0:
+                    mark[u], dug[n_dug] = inside, u
+                    n_dug += 1
+                else:
+                    mark[u] = outside
+            if mark[u] == outside:
+                walls[n_walls] = 4 * t + i
+                n_walls += 1
+    return n_dug, n_walls

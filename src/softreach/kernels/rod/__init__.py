@@ -1,0 +1,1 @@
+"""Free rods: tips, Jacobians and frames of many activations at a time."""

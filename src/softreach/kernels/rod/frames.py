@@ -1,0 +1,94 @@
+"""Whole configurations: frames along the rod, walked from base to tip, theory (26)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.rod.magnus import exponent
+from softreach.kernels.rod.twist import act, exp_coefficients
+from softreach.kernels.vector import combination, cross
+
+__all__ = ["frames"]
+
+
+_BASE, _MIDDLE, _TIP = np.intp(0), np.intp(1), np.intp(2)
+# typed: a literal would compile the function of a node once more
+
+
+@inline
+def _node(table, k, node, gamma):
+    """A = (ζu, e3 ζ) dZ at one node of step k."""
+    row = 4 * node
+    length, x, y, z = table[k, row, -1], 0.0, 0.0, 0.0
+    for j in range(gamma.shape[0]):
+        length += table[k, row, j] * gamma[j]
+        x += table[k, row + 1, j] * gamma[j]
+        y += table[k, row + 2, j] * gamma[j]
+        z += table[k, row + 3, j] * gamma[j]
+    return length * x, length * y, length * z, 0.0, 0.0, length
+
+
+@inline
+def _turned(omega, p, s, c):
+    """exp(ω) p for a direction p."""
+    inner = cross(omega, p)
+    outer = cross(omega, inner)
+    return (
+        p[0] + s * inner[0] + c * outer[0],
+        p[1] + s * inner[1] + c * outer[1],
+        p[2] + s * inner[2] + c * outer[2],
+    )
+
+
+@kernel
+def frames(table, ends, gamma, position, directors):
+    """Centerline and directors of n rods at stations.
+
+    Args:
+        table: Packed node tables, (step, 12, bundle + 1).
+        ends: Number of steps from the base to each station, ascending, (station,).
+        gamma: Activations, (n, bundle).
+        position: Filled with r, (n, station, 3).
+        directors: Filled with d1, d2, d3 as rows, (n, station, 3, 3).
+    """
+    for sample in range(gamma.shape[0]):
+        r = (0.0, 0.0, 0.0)
+        d1, d2, d3 = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+        k, activation = _BASE, gamma[sample]
+        for station in range(ends.shape[0]):
+            while k < ends[station]:
+                base, middle = (
+                    _node(table, k, _BASE, activation),
+                    _node(table, k, _MIDDLE, activation),
+                )
+                omega = exponent(base, middle, _node(table, k, _TIP, activation))
+                step = act(omega, (0.0, 0.0, 0.0))
+                r = _moved(r, d1, d2, d3, step)
+                d1, d2, d3 = _rotated(d1, d2, d3, omega)
+                k += 1
+            _store(position, directors, sample, station, r, d1, d2, d3)
+
+
+@inline
+def _moved(r, d1, d2, d3, step):
+    """r + step, the step given in the directors."""
+    x, y, z = combination(step, (d1, d2, d3))
+    return r[0] + x, r[1] + y, r[2] + z
+
+
+@inline
+def _rotated(d1, d2, d3, omega):
+    """The directors after the rotation exp(ω), ω given in the directors themselves."""
+    w = combination(omega, (d1, d2, d3))
+    s, c, _ = exp_coefficients(omega)
+    return _turned(w, d1, s, c), _turned(w, d2, s, c), _turned(w, d3, s, c)
+
+
+@inline
+def _store(position, directors, sample, station, r, d1, d2, d3):
+    for axis in range(3):
+        position[sample, station, axis] = r[axis]
+        directors[sample, station, 0, axis] = d1[axis]
+        directors[sample, station, 1, axis] = d2[axis]
+        directors[sample, station, 2, axis] = d3[axis]

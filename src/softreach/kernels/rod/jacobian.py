@@ -1,0 +1,138 @@
+"""Tip Jacobians of many rods: the exact derivative of `rod.tips`, in the same walk.
+
+With g = exp(Ω1) ... exp(ΩK), the spatial twist dg g⁻¹ of the part of the rod beyond a step obeys
+ξ <- dexp(dΩ) + Ad(exp Ω) ξ = ξ + dexp(dΩ + [Ω, ξ]): one column per bundle, theory (29).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.rod.magnus import exponent, exponent_derivative
+from softreach.kernels.rod.tips import (
+    LANES,
+    TIP,
+    clear_tips,
+    load,
+    node_values,
+    nodes_at,
+    room,
+    walk,
+)
+from softreach.kernels.rod.twist import add, bracket, dexp
+
+__all__ = ["jacobians"]
+
+_TOGETHER = 16  # lanes: the last searches of many ask for a few rods at a time
+
+
+@inline
+def _change(length, weights, a):
+    """Change of A = (ζu, e3 ζ) dZ per unit of one activation, from its column of the table.
+
+    Product rule on ω = ℓu, with u = ω/ℓ, theory (28).
+    """
+    d_length, ratio = weights[0], weights[0] / length
+    return (
+        ratio * a[0] + length * weights[1],
+        ratio * a[1] + length * weights[2],
+        ratio * a[2] + length * weights[3],
+        0.0,
+        0.0,
+        d_length,
+    )
+
+
+@inline
+def _walk_column(work, column, table, k, j, groups):
+    """Carry one column of the Jacobian across step k, in groups of lanes of which one is in use."""
+    t = table[k, :, j]
+    at_base, at_middle, at_tip = (
+        (t[0], t[1], t[2], t[3]),
+        (t[4], t[5], t[6], t[7]),
+        (t[8], t[9], t[10], t[11]),
+    )
+    for group in range(groups):
+        for lane in range(_TOGETHER):
+            i = group * _TOGETHER + lane
+            base, middle, tip = nodes_at(work, i)
+            omega = exponent(base, middle, tip)
+            d_omega = exponent_derivative(
+                base,
+                middle,
+                tip,
+                _change(base[5], at_base, base),
+                _change(middle[5], at_middle, middle),
+                _change(tip[5], at_tip, tip),
+            )
+            xi = (
+                column[i],
+                column[LANES + i],
+                column[2 * LANES + i],
+                column[3 * LANES + i],
+                column[4 * LANES + i],
+                column[5 * LANES + i],
+            )
+            xi = add(xi, dexp(omega, add(d_omega, bracket(omega, xi))))
+            for row in range(6):
+                column[row * LANES + i] = xi[row]
+
+
+def jacobians(table, gamma, tips, out):
+    """Tips (n, 3) and spatial Jacobians (n, 6, bundle), linear rows first, of n activations.
+
+    With room for three rows, (n, 3, bundle), the derivatives of the tip positions instead.
+    """
+    columns = np.empty((gamma.shape[1], 6 * LANES))
+    _jacobians(table, gamma, *room(table), columns, tips, out)
+
+
+@kernel
+def _jacobians(table, gamma, work, lanes, columns, tips, out):
+    bundles = gamma.shape[1]
+    for first in range(0, gamma.shape[0], LANES):
+        count = min(LANES, gamma.shape[0] - first)
+        groups = -(-count // _TOGETHER)
+        load(lanes, gamma, first, count)
+        clear_tips(work)
+        for j in range(bundles):
+            for i in range(6 * LANES):
+                columns[j, i] = 0.0
+        for k in range(table.shape[0] - 1, -1, -1):
+            node_values(work, lanes, table, k)
+            for j in range(bundles):
+                _walk_column(work, columns[j], table, k, j, groups)
+            walk(work)
+        _store(work, columns, first, count, tips, out)
+
+
+@inline
+def _store(work, columns, first, count, tips, out):
+    for i in range(count):
+        tip = work[TIP + i], work[TIP + LANES + i], work[TIP + 2 * LANES + i]
+        for axis in range(3):
+            tips[first + i, axis] = tip[axis]
+        if out.shape[1] == 3:
+            _store_slopes(columns, i, tip, out, first + i)
+        else:
+            _store_twists(columns, i, out, first + i)
+
+
+@inline
+def _store_twists(columns, i, out, n):
+    """Columns hold (ω, v); the Jacobian has its linear rows first."""
+    for j in range(out.shape[2]):
+        for row in range(6):
+            out[n, row, j] = columns[j, (row + 3) % 6 * LANES + i]
+
+
+@inline
+def _store_slopes(columns, i, tip, out, n):
+    """How the tip moves: v + ω × r."""
+    for j in range(out.shape[2]):
+        a, b, c = columns[j, i], columns[j, LANES + i], columns[j, 2 * LANES + i]
+        x, y, z = tip
+        out[n, 0, j] = columns[j, 3 * LANES + i] + (b * z - c * y)
+        out[n, 1, j] = columns[j, 4 * LANES + i] + (c * x - a * z)
+        out[n, 2, j] = columns[j, 5 * LANES + i] + (a * y - b * x)

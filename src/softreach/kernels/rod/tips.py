@@ -1,0 +1,151 @@
+"""Tips of many rods: the product of exponentials, applied to a point from the tip to the base.
+
+r(L) = exp(Ω1) exp(Ω2) ... exp(ΩK) 0 needs no rotation matrices when read from the right: each step
+moves one point. Samples lie innermost, LANES at a time, so that every loop over them vectorizes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from softreach.kernels.compiler import inline, kernel
+from softreach.kernels.rod.magnus import exponent
+from softreach.kernels.rod.twist import act
+
+__all__ = [
+    "LANES",
+    "TIP",
+    "WORK",
+    "clear_tips",
+    "load",
+    "node_values",
+    "nodes_at",
+    "pack",
+    "room",
+    "tips",
+    "walk",
+]
+
+LANES = 128
+"""Samples side by side: whole blocks only, so a sample's result never depends on its neighbors."""
+
+# A workspace is a flat array of rows of LANES numbers: 12 node values, then 3 coordinates of the
+# point. Rows at constant distances in one array are what the compiler can prove disjoint.
+NODE_ROWS = 12
+TIP = NODE_ROWS * LANES
+WORK = TIP + 3 * LANES
+_GROUP = 4  # bundles added at once
+
+
+def pack(measure, stretch, curvature):
+    """Node tables as one array (step, 12, bundle + 1): rows ℓ, u1, u2, u3 of each node.
+
+    The last column is the value at rest; bundles are padded with zeros to a multiple
+    of four, and at least four.
+
+    Args:
+        measure: Length of the step as each node sees it [m], shape (step, 3).
+        stretch: z [-], shape (step, 3, bundle).
+        curvature: U [1/m], shape (step, 3, 3, bundle).
+    """
+    steps, _, bundles = stretch.shape
+    table = np.zeros((steps, 3, 4, -(-max(bundles, 1) // _GROUP) * _GROUP + 1))
+    table[:, :, 0, :bundles] = measure[..., None] * stretch
+    table[:, :, 0, -1] = measure
+    table[:, :, 1:, :bundles] = curvature
+    return table.reshape(steps, NODE_ROWS, table.shape[-1])
+
+
+@inline
+def load(lanes, gamma, first, count):
+    """Lay the activations of `count` samples side by side, one row for each bundle."""
+    for j in range(gamma.shape[1]):
+        for i in range(count):
+            lanes[j, i] = gamma[first + i, j]
+
+
+@inline
+def node_values(work, lanes, table, k):
+    """ℓ = dZ (1 + z·γ) and u = Uγ at the nodes of step k, for every lane."""
+    for row in range(NODE_ROWS):
+        values = work[row * LANES : (row + 1) * LANES]
+        _first_group(values, lanes[0], lanes[1], lanes[2], lanes[3], table[k, row])
+        for j in range(_GROUP, lanes.shape[0], _GROUP):
+            weights = table[k, row, j:]
+            _next_group(values, lanes[j], lanes[j + 1], lanes[j + 2], lanes[j + 3], weights)
+
+
+@inline
+def _first_group(values, g0, g1, g2, g3, weights):
+    a, b, c, d, rest = weights[0], weights[1], weights[2], weights[3], weights[-1]
+    for i in range(LANES):
+        values[i] = (rest + a * g0[i] + b * g1[i]) + (c * g2[i] + d * g3[i])
+
+
+@inline
+def _next_group(values, g0, g1, g2, g3, weights):
+    a, b, c, d = weights[0], weights[1], weights[2], weights[3]
+    for i in range(LANES):
+        values[i] += (a * g0[i] + b * g1[i]) + (c * g2[i] + d * g3[i])
+
+
+@inline
+def nodes_at(work, i):
+    """A = (ζu, e3 ζ) dZ of lane i at the three nodes, base first."""
+    base, middle, tip = work[i], work[4 * LANES + i], work[8 * LANES + i]
+    return (
+        _twist(base, work[LANES + i], work[2 * LANES + i], work[3 * LANES + i]),
+        _twist(middle, work[5 * LANES + i], work[6 * LANES + i], work[7 * LANES + i]),
+        _twist(tip, work[9 * LANES + i], work[10 * LANES + i], work[11 * LANES + i]),
+    )
+
+
+@inline
+def _twist(length, u1, u2, u3):
+    return length * u1, length * u2, length * u3, 0.0, 0.0, length
+
+
+@inline
+def clear_tips(work):
+    """Put the point of every lane at the origin."""
+    for i in range(TIP, WORK):
+        work[i] = 0.0
+
+
+@inline
+def walk(work):
+    """Carry the point of every lane across one step, toward the base."""
+    for i in range(LANES):
+        base, middle, tip = nodes_at(work, i)
+        point = work[TIP + i], work[TIP + LANES + i], work[TIP + 2 * LANES + i]
+        x, y, z = act(exponent(base, middle, tip), point)
+        work[TIP + i] = x
+        work[TIP + LANES + i] = y
+        work[TIP + 2 * LANES + i] = z
+
+
+def room(table):
+    """Scratch of one call: a workspace and the lanes of activations.
+
+    Made here, as a kernel that makes its own takes longer to compile.
+    """
+    return np.zeros(WORK), np.zeros((table.shape[2] - 1, LANES))
+
+
+def tips(table, gamma, out):
+    """Tip positions: (n, bundle) activations into (n, 3) `out`, in the units of `table`."""
+    _tips(table, gamma, *room(table), out)
+
+
+@kernel
+def _tips(table, gamma, work, lanes, out):
+    for first in range(0, gamma.shape[0], LANES):
+        count = min(LANES, gamma.shape[0] - first)
+        load(lanes, gamma, first, count)
+        clear_tips(work)
+        for k in range(table.shape[0] - 1, -1, -1):
+            node_values(work, lanes, table, k)
+            walk(work)
+        for i in range(count):
+            for axis in range(3):
+                out[first + i, axis] = work[TIP + axis * LANES + i]

@@ -1,0 +1,1 @@
+"""Sections of the report: each computes its numbers and judges the statements about them."""

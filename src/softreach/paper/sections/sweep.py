@@ -1,0 +1,329 @@
+"""How the reachable sets of the sweep extend: from the plane of symmetry, behind, in thickness."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.designs import minimal_trunk
+from softreach.atlas import DesignSpace, build_atlas, open_atlas
+from softreach.paper.atlas_figures import atlas_figures
+from softreach.paper.claims import Finding, Numbers, judged
+from softreach.paper.notebook import Notebook, Settings
+from softreach.support.errors import InvalidInput
+from softreach.workspace import ReachableSolid, reachable_set
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+
+ASIDE = 0.3
+"""From where on a place lies far from the plane of symmetry [L]."""
+_ACCURACY = 2e-2  # finer is not needed for what is shown
+
+
+class Shape(NamedTuple):
+    """Of one design, in L."""
+
+    aside: float
+    """Volume farther than `ASIDE` from the plane of symmetry [L³]."""
+    behind: float
+    """Volume on the helical fibers' side, y > 0 [L³]."""
+    thickness: float
+    """Mean thickness 2 V / A [L]."""
+
+
+def shapes(revolutions: Array, tapers: Array, accuracy: float) -> dict[str, list[list[float]]]:
+    """The shapes of exact reachable sets over (revolution, taper) [rad], by name."""
+    accuracy = max(accuracy, _ACCURACY)
+    found = np.array([[_shape(o, p, accuracy) for p in tapers] for o in revolutions])
+    return {name: found[..., k].tolist() for k, name in enumerate(Shape._fields)}
+
+
+def _shape(revolution: float, taper: float, accuracy: float) -> Shape:
+    reached = reachable_set(minimal_trunk(revolution, taper), accuracy=accuracy)
+    assert isinstance(reached, ReachableSolid)
+    grid, length = reached.grid, reached.arm.length
+    occupied, cell = grid["occupied"], (grid.attrs["cell"] / length) ** 3
+    return Shape(
+        aside=float((occupied & (abs(grid.x) > ASIDE * length)).sum()) * cell,
+        behind=float((occupied & (grid.y > 0)).sum()) * cell,
+        thickness=2 * reached.volume / reached.surface().area / length,
+    )
+
+
+# Sections 3 and 4: the atlas of designs, its clouds and its volumes (figures 2a to 3c).
+
+
+_STORE = "atlas.zarr"
+_SCALARS = (
+    "volume",
+    "unreachability",
+    "convex_volume",
+    "exact_volume",
+    "exact_unreachability",
+    "multiple_volume",
+    "fold_volume",
+)
+_CAPTIONS = {
+    "clouds": ("2a", "Reachability clouds, colored by the activations of the three bundles."),
+    "corners": ("2b", "The corners of the atlas from two opposing sides, the arm drawn in front."),
+    "hulls": ("3a", "Concave hulls (α-shapes) of the clouds."),
+    "map_volume": ("3b", "Volume of the concave hulls."),
+    "map_exact_volume": ("3b", "Exact volume of the reachable sets, for comparison."),
+    "map_unreachability": ("3b", "Unreachability of the clouds: 1 - concave / convex volume."),
+    "map_exact_unreachability": ("3b", "Exact unreachability, for comparison."),
+    "curvature": ("3c", "Curvature at six stations of the distal half, without and with taper."),
+}
+
+
+def swept_atlas(folder: Path) -> xr.Dataset:
+    """The atlas that the sweep left in the folder of all results.
+
+    Raises:
+        InvalidInput: It was removed.
+    """
+    try:
+        return open_atlas(folder / _STORE)
+    except InvalidInput as error:
+        notes = folder / "figures" / "sweep.json"
+        raise InvalidInput("atlas", error.value, error.allowed, f"remove {notes} too") from None
+
+
+def _swept(settings: Settings, folder: Path) -> xr.Dataset:
+    """The atlas of section 3, computed or continued: revolution from 0 to 108°, taper to 3°."""
+    turns = np.radians(np.linspace(0, 108, settings.designs))
+    tapers = np.radians(np.linspace(0, 3, settings.designs))
+    space = DesignSpace.grid(minimal_trunk(), revolution=turns, taper=tapers)
+    return build_atlas(
+        space,
+        folder / _STORE,
+        settings.samples,
+        settings.seed,
+        alpha_over_length=settings.alpha,
+        accuracy=settings.accuracy,
+    )
+
+
+def sweep(settings: Settings, folder: Path, notes: Notebook) -> None:
+    """Volumes, unreachability, widths and curvatures of every design."""
+    atlas = _swept(settings, folder)
+    curvature = atlas["bending_quantile"].isel(revolution=-1, taper=[0, -1])
+    notes.note(
+        designs=int(atlas["volume"].notnull().sum()),
+        samples=settings.samples,
+        revolution_deg=np.degrees(atlas["revolution"].values).round(6).tolist(),
+        taper_deg=np.degrees(atlas["taper"].values).round(6).tolist(),
+        alpha=atlas["volume"].attrs["alpha_over_length"],
+        **shapes(atlas["revolution"].values, atlas["taper"].values, settings.accuracy),
+        aside_from=ASIDE,
+        quantiles=curvature["quantile"].values.tolist(),
+        curvature=curvature.transpose("taper", "station", "quantile").values.tolist(),
+        **{name: _rows(atlas[name]) for name in _SCALARS},
+    )
+    for name, figure in atlas_figures(atlas, settings.panels):
+        if name in _CAPTIONS:
+            label, words = _CAPTIONS[name]
+            notes.draw(label, f"figure_{label}_{name}", words, figure)
+
+
+def _rows(values: xr.DataArray) -> Any:
+    """Numbers over (revolution, taper)."""
+    return values.transpose("revolution", "taper").values.tolist()
+
+
+# The atlas: its volumes, unreachability, shapes and curvatures.
+
+
+class _Sweep:
+    """The atlas's numbers over (revolution, taper), and where they rise."""
+
+    def __init__(self, numbers: Numbers) -> None:
+        self.numbers = numbers
+        self.revolution = numbers["revolution_deg"]
+        self.taper = numbers["taper_deg"]
+
+    def __getitem__(self, name: str) -> Array:
+        return np.array(self.numbers[name], float)
+
+    def place(self, flat: int | np.intp) -> str:
+        """A design by its number."""
+        i, j = divmod(int(flat), len(self.taper))
+        return f"Ω = {self.revolution[i]:.4g}°, φ = {self.taper[j]:.4g}°"
+
+
+def _rises(values: Array, axis: int) -> str:
+    """How many steps along an axis go up."""
+    step = np.diff(values, axis=axis)
+    return f"{int((step > 0).sum())} of {step.size}"
+
+
+def _share(values: Array, axis: int) -> float:
+    """The share of steps along an axis that go up."""
+    return float((np.diff(values, axis=axis) > 0).mean())
+
+
+def size(n: Numbers) -> Finding:
+    """How many designs and points."""
+    words = f"{n['designs']} clouds of {n['samples']:,} points, and the volume of each"
+    return judged(words, n["designs"] == 256 and n["samples"] == 400_000)
+
+
+def widening(n: Numbers) -> Finding:
+    """Volume far from the plane of symmetry."""
+    sweep = _Sweep(n)
+    aside = sweep["aside"]
+    best = sweep.taper[int(aside[-1].argmax())]
+    words = (
+        f"the volume beyond {n['aside_from']:g} L from that plane grows in {_rises(aside, 0)} "
+        f"steps of Ω and {_rises(aside, 1)} of φ: without helicity from {aside[0, 0]:.3f} to "
+        f"{aside[0, -1]:.3f} L³, at the largest Ω from {aside[-1, 0]:.3f} to "
+        f"{aside[-1].max():.3f} at φ = {best:.2g}°, and then down to {aside[-1, -1]:.3f}"
+    )
+    helicity, taper = _share(aside, 0), _share(aside, 1)
+    return judged(words, min(helicity, taper) > 0.95, helicity > 0.95)
+
+
+def thickness(n: Numbers) -> Finding:
+    """Mean thickness of the reachable sets."""
+    sweep = _Sweep(n)
+    thick = sweep["thickness"]
+    words = (
+        f"the mean thickness 2 V/A of the reachable set is {thick[0].min():.2f} to "
+        f"{thick[0].max():.2f} L at Ω = {sweep.revolution[0]:.3g}° and {thick[-1].min():.2f} to "
+        f"{thick[-1].max():.2f} L at Ω = {sweep.revolution[-1]:.4g}°; it grows in "
+        f"{_rises(thick, 0)} steps of Ω"
+    )
+    return judged(words, _share(thick, 0) > 0.95, bool(thick[0].max() < thick[-1].min()))
+
+
+def behind(n: Numbers) -> Finding:
+    """Volume on the helical side."""
+    sweep = _Sweep(n)
+    volume = sweep["behind"]
+    best = sweep.taper[int(volume[-1].argmax())]
+    words = (
+        f"the volume behind the arm (y > 0) grows in {_rises(volume, 1)} steps of φ; at the "
+        f"largest Ω from {volume[-1, 0]:.3f} to {volume[-1].max():.3f} L³ at φ = {best:.2g}° and "
+        f"{volume[-1, -1]:.3f} at the largest, without helicity from {volume[0, 0]:.3f} to "
+        f"{volume[0, -1]:.3f}"
+    )
+    return judged(words, _share(volume, 1) > 0.95, volume[-1, -1] > volume[-1, 0])
+
+
+def hulls(n: Numbers) -> Finding:
+    """α-shapes against exact volumes."""
+    sweep = _Sweep(n)
+    off = sweep["volume"] / sweep["exact_volume"] - 1
+    words = f"α-shapes are {off.min():+.1%} to {off.max():+.1%} off the exact volume"
+    return judged(words, bool(np.abs(off).max() < 0.1), bool(np.abs(np.median(off)) < 0.1))
+
+
+def growth(n: Numbers) -> Finding:
+    """Volume over Ω."""
+    sweep = _Sweep(n)
+    cloud, exact = sweep["volume"], sweep["exact_volume"]
+    words = (
+        f"the volume of the α-shapes grows in {_rises(cloud, 0)} steps of Ω, the exact one in "
+        f"{_rises(exact, 0)}"
+    )
+    return judged(words, _share(cloud, 0) > 0.95, bool((cloud[-1] > cloud[0]).all()))
+
+
+def maximum(n: Numbers) -> Finding:
+    """The largest volume and its place."""
+    sweep = _Sweep(n)
+    cloud, exact = sweep["volume"], sweep["exact_volume"]
+    words = (
+        f"α-shapes of radius {n['alpha']:g} L: {cloud.max():.3f} at {sweep.place(cloud.argmax())}; "
+        f"exact: {exact.max():.3f} at {sweep.place(exact.argmax())}. The radii ratio, misprinted "
+        "in the paper, was read so as to fit this very number, so it confirms little; the place "
+        "of the maximum does"
+    )
+    best = sweep.taper[int(cloud.argmax()) % len(sweep.taper)]
+    off, aside = abs(cloud.max() - 0.67), abs(best - 2)
+    return judged(words, off <= 0.005 and aside < 0.05, off < 0.03 and aside < 0.5)
+
+
+def optimum(n: Numbers) -> Finding:
+    """The best φ for each Ω."""
+    sweep = _Sweep(n)
+    best = np.array(sweep.taper)[sweep["volume"].argmax(axis=1)]
+    exact = np.array(sweep.taper)[sweep["exact_volume"].argmax(axis=1)]
+    words = (
+        f"the best φ lies between {best.min():.3g}° and {best.max():.3g}°, depending on Ω; by "
+        f"exact volumes between {exact.min():.3g}° and {exact.max():.3g}°"
+    )
+    return judged(words, best.max() - best.min() > 1.5 * (sweep.taper[1] - sweep.taper[0]))
+
+
+def overtapered(n: Numbers) -> Finding:
+    """Volume beyond the best φ."""
+    sweep = _Sweep(n)
+    lost = [1 - sweep[name][:, -1] / sweep[name].max(axis=1) for name in ("volume", "exact_volume")]
+    words = (
+        f"φ = {sweep.taper[-1]:g}° has {lost[0].min():.0%} to {lost[0].max():.0%} less volume "
+        f"than the best φ (exact volumes: {lost[1].min():.0%} to {lost[1].max():.0%})"
+    )
+    return judged(words, lost[0].min() > 0)
+
+
+def decline(n: Numbers) -> Finding:
+    """UNR over Ω and φ."""
+    sweep = _Sweep(n)
+    unr, exact = sweep["unreachability"], sweep["exact_unreachability"]
+    rise = max(0.0, *(float(np.diff(exact, axis=k).max()) for k in (0, 1)))
+    words = (
+        f"UNR rises in {_rises(unr, 0)} steps of Ω and {_rises(unr, 1)} of φ; exactly in "
+        f"{_rises(exact, 0)} and {_rises(exact, 1)}, by {rise:.4f} at most. It falls from "
+        f"{exact[0, 0]:.3f} to {exact[-1, -1]:.3f} (exact)"
+    )
+    worst = max(_share(unr, axis) for axis in (0, 1))
+    return judged(words, worst == 0, worst < 0.05)
+
+
+def _curvatures(n: Numbers) -> tuple[Array, Array, dict[float, int]]:
+    plain, tapered = np.array(n["curvature"])
+    return plain, tapered, {q: k for k, q in enumerate(n["quantiles"])}
+
+
+def curling(n: Numbers) -> Finding:
+    """Curvature toward the tip."""
+    plain, tapered, at = _curvatures(n)
+    ratio = tapered[:, at[0.5]] / plain[:, at[0.5]]
+    words = (
+        f"median κL of the tapered design rises from {tapered[0, at[0.5]]:.1f} at midlength to "
+        f"{tapered[-1, at[0.5]]:.1f} at the tip, {ratio[0]:.1f} and {ratio[-1]:.1f} times that of "
+        "the untapered one"
+    )
+    return judged(words, bool(ratio.min() > 1 and ratio[-1] == ratio.max()), bool(ratio[-1] > 1))
+
+
+def spread(n: Numbers) -> Finding:
+    """Range of curvature."""
+    plain, tapered, at = _curvatures(n)
+    plain_range, tapered_range = (c[:, at[0.95]] - c[:, at[0.05]] for c in (plain, tapered))
+    ratio = tapered_range / plain_range
+    words = (
+        f"the middle 90 % of κL spans {ratio[0]:.1f} times as much at midlength and "
+        f"{ratio[-1]:.1f} times at the tip"
+    )
+    return judged(words, bool(ratio.min() > 1))
+
+
+def cover(n: Numbers) -> Finding:
+    """Whose curvatures hold the other's."""
+    plain, tapered, at = _curvatures(n)
+    most_plain, most = plain[:, at[1.0]], tapered[:, at[1.0]]
+    beyond = [q for q in at if tapered[-1, at[q]] > most_plain[-1]]
+    words = (
+        f"at rest both have κ = 0; at the six stations the untapered design reaches κL of at most "
+        f"{most_plain.min():.3g} to {most_plain.max():.3g}, the tapered one {most.min():.3g} to "
+        f"{most.max():.3g}. At the tip the tapered one exceeds all of the other's in at least "
+        f"{1 - min(beyond, default=1.0):.0%} of its configurations"
+    )
+    return judged(words, bool((most >= most_plain).all() and beyond))

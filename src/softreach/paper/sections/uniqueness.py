@@ -1,0 +1,138 @@
+"""Sections 5 and 6: whether three fibers reach every place with one activation only."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.designs import minimal_trunk
+from softreach.arm.manipulator import Manipulator
+from softreach.inverse import solve_inverse
+from softreach.paper.claims import Finding, Numbers, judged
+from softreach.paper.notebook import Notebook, Settings
+from softreach.paper.sections.sweep import swept_atlas
+from softreach.rod.kinematics import configuration
+from softreach.workspace import ReachableCurve, ReachableSolid, ReachableSurface, reachable_set
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+
+_TARGETS = 2_000
+_LABEL = "reached more than once / %"
+
+
+class Pair(NamedTuple):
+    """Activations that share a tip."""
+
+    tip: Array
+    activations: Array
+
+
+def uniqueness(settings: Settings, folder: Path, notes: Notebook) -> None:
+    """The share of the volume that several activations reach, and the clearest example."""
+    atlas = swept_atlas(folder)
+    share = atlas["multiple_volume"] / atlas["exact_volume"]
+    worst = share.isel(share.argmax(...))  # pyright: ignore[reportArgumentType]
+    turn, taper = float(worst["revolution"]), float(worst["taper"])
+    arm = minimal_trunk(turn, taper)
+    paper, clearest = (
+        reachable_set(one, accuracy=settings.accuracy) for one in (minimal_trunk(), arm)
+    )
+    assert isinstance(paper, ReachableSolid)
+    assert isinstance(clearest, ReachableSolid)
+    pair = _clearest_pair(clearest)
+    notes.note(
+        share=share.transpose("revolution", "taper").values.tolist(),
+        worst=float(worst),
+        revolution_deg=float(np.degrees(turn)),
+        taper_deg=float(np.degrees(taper)),
+        paper_share=1 - paper.multiplicity[1] / paper.volume,
+        tip=pair.tip.tolist(),
+        activations=pair.activations.tolist(),
+        **_fewer_fibers(),
+    )
+    _draw(atlas.assign({_LABEL: 100 * share.assign_attrs(units="1")}), arm, pair, notes)
+
+
+def _clearest_pair(reached: ReachableSolid) -> Pair:
+    """Of places in the middle of what several activations reach, where these differ most."""
+    grid = reached.grid
+    count = grid["count"].values
+    places = np.argwhere(count > 1)
+    every = max(1, len(places) // _TARGETS)
+    axes = [grid[axis].values for axis in "xyz"]
+    tips = np.stack([axes[k][places[::every, k]] for k in range(3)], axis=1)
+    found = [s for s in solve_inverse(reached.arm, tips) if len(s) > 1]
+    best = max(found, key=lambda s: _apart(s.activations), default=None)
+    return (
+        Pair(np.zeros(3), np.empty((0, 3))) if best is None else Pair(best.target, best.activations)
+    )
+
+
+def _apart(activations: Array) -> float:
+    """How different the first and the last activation are [-]."""
+    return float(np.linalg.norm(activations[0] - activations[-1]))
+
+
+def _fewer_fibers() -> dict[str, float]:
+    """Area of what two fibers reach and length of what one does, for L = 1 m."""
+    arm = minimal_trunk()
+    two, one = (reachable_set(arm.replace(actuators=arm.actuators[:count])) for count in (2, 1))
+    assert isinstance(two, ReachableSurface)
+    assert isinstance(one, ReachableCurve)
+    return {"area": two.area, "curve": one.curve_length}
+
+
+def _draw(atlas: xr.Dataset, arm: Manipulator, pair: Pair, notes: Notebook) -> None:
+    from softreach.plot import plot_arm, plot_metric_map
+
+    ax = plot_metric_map(atlas, _LABEL)
+    words = (
+        "Share of the reachable volume that more than one activation reaches, over revolution and "
+        "taper: where it is 0, three fibers are single-valued."
+    )
+    notes.draw("", "uniqueness", words, ax)
+    if not len(pair.activations):
+        return
+    shapes = configuration(arm, pair.activations)
+    ax = plot_arm(arm, shapes, view="oblique", rest=False)
+    words = f"{len(pair.activations)} activations of one three-fiber arm with the same tip."
+    notes.draw("", "same_tip", words, ax)
+
+
+# How many activations reach a place.
+
+
+def unique(n: Numbers) -> Finding:
+    """The share of the volume that several activations reach, and an example."""
+    share = np.array(n["share"], float)
+    words = (
+        f"{n['paper_share']:.2%} of the volume is reached by more than one activation at Ω = 108°, "
+        f"φ = 2°, up to {n['worst']:.1%} at Ω = {n['revolution_deg']:.4g}°, "
+        f"φ = {n['taper_deg']:.3g}°; less than 0.1 % in {int((share < 1e-3).sum())} of "
+        f"{share.size} designs. {_example(n)}"
+    )
+    alone = len(n["activations"]) < 2
+    return judged(words, alone, n["worst"] < 0.1)
+
+
+def _example(n: Numbers) -> str:
+    if len(n["activations"]) < 2:
+        return "No place with two activations was found"
+    rows = [", ".join(f"{g:.3f}" for g in row) for row in n["activations"]]
+    tip = ", ".join(f"{x:.3f}" for x in n["tip"])
+    return f"In the latter design γ = ({'); ('.join(rows)}) all reach ({tip}) m"
+
+
+def dimension(n: Numbers) -> Finding:
+    """What two fibers and one reach."""
+    words = (
+        f"two fibers sweep a surface of {n['area']:.3f} L², one fiber a curve of "
+        f"{n['curve']:.3f} L (of the minimal design, in the order of its fibers)"
+    )
+    return judged(words, min(n["area"], n["curve"]) > 1e-6)

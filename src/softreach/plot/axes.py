@@ -1,0 +1,284 @@
+"""The axes around an image: labeled coordinates of a view along an axis, or a box in space."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.picture.projection import View, is_mirrored, plane_of, project, view_axes
+from softreach.picture.shading import seen_through
+from softreach.picture.zbuffer import Extent, ZBuffer
+from softreach.plot.lengths import LengthUnit
+from softreach.plot.style import DPI, pyplot
+from softreach.support.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+# A box in space behind an oblique view: three far walls with a grid, and coordinates on edges.
+
+
+Array = NDArray[np.float64]
+
+_TICK_GAP = 4.0  # points between an edge and its numbers
+_LABEL_GAP = np.array([23.0, 15.0])  # points between an edge beside or above its label and that
+
+
+def draw_box(ax: Axes, box: Array, view: View, unit: LengthUnit) -> None:
+    """Draw the walls of a box that lie behind what it holds, and label its edges.
+
+    Args:
+        ax: Axes with an orthographic image of the inside; their own frame is hidden.
+        box: Lower and upper corner, shape (2, 3).
+        view: The direction of the eye.
+        unit: What coordinates are counted in.
+    """
+    from matplotlib.collections import LineCollection
+
+    edges = [_outer_edge(box, view, axis) for axis in range(3)]
+    ticks = _ticks(box, [project(edge, view)[:, :2] for edge in edges])
+    eye = view_axes(view)[2]
+    far = np.where(eye > 0, box[0], box[1])
+    lines = [project(line, view)[:, :2] for line in _wall_lines(box, ticks, far)]
+    walls = LineCollection(lines, colors="0.85", linewidths=0.5, zorder=1, clip_on=False)
+    ax.add_collection(walls)
+    for axis in range(3):
+        _label_edge(ax, box, view, edges[axis], ticks[axis], unit.label("xyz"[axis]))
+    ax.set_axis_off()
+
+
+def _ticks(box: Array, edges: list[Array]) -> list[Array]:
+    """Round numbers along each axis, as many as its edge has room for on paper."""
+    from matplotlib.ticker import MaxNLocator
+
+    lengths = np.array([np.linalg.norm(edge[1] - edge[0]) for edge in edges])
+    counts = np.maximum(2, np.rint(6 * lengths / lengths.max())).astype(int)
+    ticks = []
+    for (low, high), count in zip(box.T, counts.tolist(), strict=True):
+        locator = MaxNLocator(count, steps=[1, 2, 5, 10], min_n_ticks=1)
+        values = np.asarray(locator.tick_values(low, high))
+        ticks.append(values[(values >= low) & (values <= high)])
+    return ticks
+
+
+def _wall_lines(box: Array, ticks: list[Array], far: Array) -> Iterator[Array]:
+    """Grid lines and edges: for each pair of axes, lines along one at the ticks of the other."""
+    for along in range(3):
+        for across in {0, 1, 2} - {along}:
+            for value in (*ticks[across], *box[:, across]):
+                line = np.tile(far, (2, 1))
+                line[:, along] = box[:, along]
+                line[:, across] = value
+                yield line
+
+
+def _label_edge(ax: Axes, box: Array, view: View, edge: Array, ticks: Array, label: str) -> None:
+    ends = project(edge, view)[:, :2]
+    outward = _outward(ends, project(box.mean(axis=0), view)[:2])
+    axis = int(np.argmax(np.ptp(edge, axis=0)))
+    low, high = edge[:, axis]
+    for value in ticks:
+        place = ends[0] + (value - low) / (high - low) * (ends[1] - ends[0])
+        _text(ax, place, f"{value:g}".replace("-", "\N{MINUS SIGN}"), outward, _TICK_GAP, 7)
+    gap = float(np.abs(outward) @ _LABEL_GAP)
+    _text(ax, ends.mean(axis=0), label, outward, gap, 8)
+
+
+def _outer_edge(box: Array, view: View, axis: int) -> Array:
+    """The edge along an axis on the outline of the box, lowest on paper (z: farthest left)."""
+    others = [k for k in range(3) if k != axis]
+    edges = []
+    for pick in np.ndindex(2, 2):
+        edge = np.zeros((2, 3))
+        edge[:, axis] = box[:, axis]
+        edge[:, others] = box[pick, others]
+        edges.append(edge)
+    place = 0 if axis == 2 else 1
+    return min(edges, key=lambda edge: project(edge, view)[:, place].mean())
+
+
+def _outward(ends: Array, center: Array) -> Array:
+    along = ends[1] - ends[0]
+    normal = np.array([-along[1], along[0]])
+    size = np.linalg.norm(normal)
+    if size == 0:  # the edge points at the eye
+        return np.array([0.0, -1.0])
+    return normal / size * np.sign((ends.mean(axis=0) - center) @ normal or 1.0)
+
+
+def _text(ax: Axes, place: Array, text: str, outward: Array, gap: float, size: float) -> None:
+    """Write beside an edge, on the side away from the box."""
+    sideways, upward = (np.sign(outward) * (np.abs(outward) > 0.4)).astype(int)
+    ax.annotate(
+        text,
+        tuple(place),
+        xytext=tuple(gap * outward),
+        textcoords="offset points",
+        ha={-1: "right", 0: "center", 1: "left"}[sideways],
+        va={-1: "top", 0: "center", 1: "bottom"}[upward],
+        fontsize=size,
+        color="0.25",
+    )
+
+
+_MARGIN = 0.04
+_ROOM = np.array([2.8, 3.2])  # inches for the image
+_AROUND = np.array([0.6, 0.7])  # inches for labels and key
+_TICK_ROOM = 0.42  # inches between ticks at least
+_UNIT_MARK = "_counted in "  # the label of an image, which no legend shows
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Axes that show a box in space from one side, at print resolution."""
+
+    ax: Axes
+    box: Array
+    """What they show: lower and upper corner in the units of the axes, shape (2, 3)."""
+    view: View
+    unit: LengthUnit
+
+    @classmethod
+    def opened(
+        cls, points: ArrayLike, unit: LengthUnit, ax: Axes | None, view: View, box: ArrayLike | None
+    ) -> Self:
+        """Axes for points.
+
+        Args:
+            points: What is going to be shown, in the units of the axes, shape (..., 3).
+            unit: The units of the axes.
+            ax: Axes to draw in; None for a new figure.
+            view: The direction of sight.
+            box: What to show, lower and upper corner [m], shape (2, 3); None for all points.
+
+        Raises:
+            InvalidInput: Unknown view, a box of another shape, or no finite point to show.
+        """
+        shown = bounding_box(points) if box is None else unit.of(box)
+        return cls(_framed_axes(shown, view) if ax is None else ax, shown, view, unit)
+
+    @property
+    def extent(self) -> Extent:
+        """The part of the projection plane that the box fills."""
+        return view_extent(self.box, self.view)
+
+    @property
+    def pixels_per_unit(self) -> float:
+        """At print resolution."""
+        return self._columns() / (self.extent.right - self.extent.left)
+
+    def buffer(self, oversample: int, color_step: int = 1) -> ZBuffer:
+        """An empty image of the panel; see `ZBuffer`."""
+        return ZBuffer(self.extent, self._columns(), oversample, color_step)
+
+    def show(self, buffer: ZBuffer, within: ZBuffer | None = None) -> None:
+        """Place the finished image in the axes and label them; what is there stays in view.
+
+        Args:
+            buffer: The image.
+            within: What shows through it; None for nothing.
+
+        Raises:
+            InvalidInput: What is there is counted in another unit.
+        """
+        _check_unit(self.ax, self.unit)
+        ax, first, plane = self.ax, not self.ax.images, plane_of(self.view)
+        mirror = -1 if is_mirrored(self.view) else 1
+        left, right, bottom, top = buffer.extent
+        extent, order = (mirror * left, mirror * right, bottom, top), 2 + len(ax.images) / 100
+        pixels = buffer.rgba() if within is None else seen_through(buffer.rgba(), within.rgba())
+        # "none": vector files get the pixels as they are
+        image = ax.imshow(pixels, extent=extent, interpolation="none", zorder=order)
+        image.set_label(_UNIT_MARK + self.unit.symbol)
+        _widen(ax, extent, first, mirror)
+        if plane:
+            ax.set(xlabel=self.unit.label(plane[0]), ylabel=self.unit.label(plane[1]))
+            _set_ticks(ax, _inches(ax, buffer.extent))
+        elif first:
+            draw_box(ax, self.box, self.view, self.unit)
+
+    def _columns(self) -> int:
+        return max(16, round(_inches(self.ax, self.extent)[0] * DPI))
+
+
+def bounding_box(*points: ArrayLike) -> Array:
+    """Lower and upper corner around all finite points, with a margin, shape (2, 3).
+
+    Raises:
+        InvalidInput: No finite point to show.
+    """
+    corners = [corner for cloud in points for corner in _corners(np.asarray(cloud, float))]
+    if not corners:
+        raise InvalidInput("points", "none", "at least one finite point")
+    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    margin = _MARGIN * max((high - low).max(), 1e-9)
+    return np.array([low - margin, high + margin])
+
+
+def view_extent(box: Array, view: View) -> Extent:
+    """The part of the projection plane that a box fills."""
+    seen = project(_box_corners(box), view)
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    return Extent(low[0], high[0], low[1], high[1])
+
+
+def _box_corners(box: Array) -> Array:
+    """The eight corners, shape (8, 3)."""
+    return np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def _framed_axes(box: Array, view: View) -> Axes:
+    """Axes in a new figure of the shape of what they show, about a journal's column wide."""
+    span = _span(view_extent(box, view))
+    inches = span * (_ROOM / span).min() + _AROUND
+    return pyplot().subplots(figsize=tuple(inches), layout="constrained")[1]
+
+
+def _check_unit(ax: Axes, unit: LengthUnit) -> None:
+    marks = (str(image.get_label()) for image in ax.images)
+    found = {mark.removeprefix(_UNIT_MARK) for mark in marks if mark.startswith(_UNIT_MARK)}
+    if found - {unit.symbol}:
+        hint = "give length= or data with attrs['length'] to all that shares axes, or to none"
+        raise InvalidInput("ax", f"counted in {', '.join(found)}", f"in {unit.symbol}", hint)
+
+
+def _span(extent: Extent) -> Array:
+    return np.array([extent.right - extent.left, extent.top - extent.bottom])
+
+
+def _inches(ax: Axes, extent: Extent) -> Array:
+    """Width and height of an extent on paper, as it fits into the axes."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    room = np.array(ax.get_position().size) * figure.get_size_inches()
+    span = _span(extent)
+    return span * (room / span).min()
+
+
+def _set_ticks(ax: Axes, inches: Array) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    for axis, length in zip((ax.xaxis, ax.yaxis), inches, strict=True):
+        bins = int(np.clip(length / _TICK_ROOM, 1, 6))
+        axis.set_major_locator(MaxNLocator(bins, steps=[1, 2, 5, 10], min_n_ticks=1))
+
+
+def _corners(points: Array) -> list[Array]:
+    finite = points.reshape(-1, 3)
+    if not np.isfinite(finite).all():
+        finite = finite[np.isfinite(finite).all(axis=1)]
+    return [finite.min(axis=0), finite.max(axis=0)] if len(finite) else []
+
+
+def _widen(ax: Axes, extent: tuple[float, float, float, float], first: bool, mirror: int) -> None:
+    x, y = sorted(extent[:2]), sorted(extent[2:])
+    if not first:
+        x = [min(x[0], *ax.get_xlim()), max(x[1], *ax.get_xlim())]
+        y = [min(y[0], *ax.get_ylim()), max(y[1], *ax.get_ylim())]
+    ax.set_xlim(*x[::mirror])
+    ax.set_ylim(*y)

@@ -1,0 +1,311 @@
+"""The picture of all equilibria of an arm: what it could do under its loads, and what it does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.picture.projection import View, is_mirrored, project, view_axes
+from softreach.plot.arm import arm_points, draw_arms, plot_arm, shapes_of
+from softreach.plot.axes import Panel, bounding_box
+from softreach.plot.lengths import in_lengths
+from softreach.plot.style import DRAWN, MANIPULATOR, SHAPE, figure_style, small_axes
+from softreach.rod.tip_map import TipStatus
+from softreach.support.arguments import POSITIVE, as_given, checked, flag, optional, within
+from softreach.support.arrays import as_floats
+from softreach.support.errors import InvalidInput
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+    from softreach.arm.manipulator import Manipulator
+    from softreach.rod.all_equilibria import AllEquilibria
+    from softreach.workspace.payload import LargestPayload, PayloadCurve
+
+Array = NDArray[np.float64]
+
+_STATIONS = 121
+_PALE = 0.7  # how far the colors of other stable arms go toward white
+_FOLLOWED, _STABLE, _UNSTABLE = "0.05", "#1f4e9e", "0.55"
+_BASE = 1.7  # radius of the disk that the arm stands on, in R2(0)
+_ARROW = 26  # length of the arrow of gravity [points]
+_ALONG_SIGHT = 0.1  # part of a direction in the paper, below which an arrow says nothing
+_LEAST_WIDTH, _ENTRY = 2.6, 0.18  # of figures, and the height of an entry of the legend [inch]
+_ABOVE = 4  # the order of lines over images
+
+
+def _equilibria(name: str, value: Any) -> Any:
+    """What `softreach.equilibria` returned, whose class need not be loaded."""
+    if type(value).__name__ == "AllEquilibria":
+        return value
+    raise InvalidInput(name, as_given(value), "what `softreach.equilibria` returned")
+
+
+@checked(**DRAWN, equilibria=_equilibria)
+def plot_equilibria(
+    equilibria: AllEquilibria,
+    *,
+    ax: Axes | None = None,
+    view: View = "front",
+    box: ArrayLike | None = None,
+) -> Axes:
+    """Draw every equilibrium of an arm: stable ones solid, unstable ones dashed.
+
+    The one that follows from the unloaded arm, which the tip map reports, is drawn as a body with
+    its bundles, other stable ones pale; of a ring one arm, and a dotted circle where its tip may
+    be. An arrow shows the direction of gravity, or of the force that stands for it.
+
+    Args:
+        equilibria: What `softreach.equilibria` returned.
+        ax: Axes to draw in; None for a new figure.
+        view: As in `plot_cloud`.
+        box: What to show, lower and upper corner [m], shape (2, 3); None for all that is drawn.
+
+    Returns:
+        The axes, in L.
+
+    Raises:
+        InvalidInput: Unknown view.
+        MissingExtra: matplotlib is not installed.
+    """
+    arm = equilibria.rod.arm
+    shapes = shapes_of(equilibria.configuration(_STATIONS))
+    stable = equilibria.status == TipStatus.STABLE
+    pale = [shapes[k] for k in np.flatnonzero(stable) if k != equilibria.followed]
+    followed = [] if equilibria.followed is None else [shapes[equilibria.followed]]
+    circles = {k: _circle(equilibria, k) for k, ring in enumerate(equilibria.is_ring) if ring}
+    with figure_style(ax):
+        rim = _rim(float(arm.profile.radius(0.0)) / arm.length)
+        points = [rim, *(arm_points(arm, shape) for shape in shapes), *circles.values()]
+        panel = Panel.opened(np.concatenate(points), in_lengths(arm.length), ax, view, box)
+        draw_arms(panel, arm, pale, range(arm.bundles), _PALE)
+        draw_arms(panel, arm, followed, range(arm.bundles))
+        for k, circle in circles.items():
+            color = _STABLE if stable[k] else _UNSTABLE
+            _line(panel, circle, color=color, linestyle=":", linewidth=0.8)
+        for k, shape in enumerate(shapes):
+            _line(panel, shape["position"].values / arm.length, **_style(equilibria, k))
+        _line(panel, rim, color="0.2", linewidth=2.0)
+        _gravity_arrow(panel, equilibria)
+        _add_legend(panel.ax, own_figure=ax is None)
+    return panel.ax
+
+
+def _style(equilibria: AllEquilibria, k: int) -> dict[str, Any]:
+    """How the centerline of one is drawn."""
+    stable = equilibria.status[k] == TipStatus.STABLE
+    follows = k == equilibria.followed
+    kind = ("stable" if stable else "unstable") + (" ring" if equilibria.is_ring[k] else "")
+    return {
+        "color": _FOLLOWED if follows else _STABLE if stable else _UNSTABLE,
+        "linestyle": "-" if stable else "--",
+        "linewidth": 1.4 if stable or follows else 1.0,
+        "label": f"{kind}, from the unloaded arm" if follows else kind,
+    }
+
+
+def _line(panel: Panel, points: Array, **style: Any) -> None:
+    """A curve in space, over the images."""
+    right, up, _ = project(points, panel.view).T
+    mirror = -1 if is_mirrored(panel.view) else 1
+    panel.ax.plot(mirror * right, up, zorder=_ABOVE, solid_capstyle="round", **style)
+
+
+def _circle(equilibria: AllEquilibria, k: int) -> Array:
+    """Where the tip of a ring may be [L]."""
+    assert equilibria.solver is not None
+    axis, tip = equilibria.solver.tables.axes[0], equilibria.tips[k]
+    angle = np.linspace(0.0, 2.0 * np.pi, 97)[:, None]
+    along, across = (tip @ axis) * axis, np.cross(axis, tip)
+    turned = along + np.cos(angle) * (tip - along) + np.sin(angle) * across
+    return turned / equilibria.rod.length
+
+
+def _rim(radius: float) -> Array:
+    """Of the disk that an arm of this radius is clamped to."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 65)
+    return _BASE * radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+
+
+def _gravity_arrow(panel: Panel, equilibria: AllEquilibria) -> None:
+    """Where gravity pulls, or along which line the forces act that there are."""
+    if equilibria.solver is None:
+        return
+    tables = equilibria.solver.tables
+    right, up, _ = view_axes(panel.view) @ tables.axes[0]
+    if np.hypot(right, up) < _ALONG_SIGHT:
+        return
+    mirror = -1 if is_mirrored(panel.view) else 1
+    panel.ax.annotate(
+        "g" if any(tables.loads.gravity) else "force",
+        xy=(0.09, 0.86),
+        xycoords="axes fraction",
+        xytext=(-_ARROW * mirror * right, -_ARROW * up),
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        fontsize=8,
+        arrowprops={"arrowstyle": "-|>", "color": "0.25", "linewidth": 1.0},
+        zorder=_ABOVE,
+    )
+
+
+def _add_legend(ax: Axes, *, own_figure: bool) -> None:
+    """One entry for each kind: under the picture where the figure is ours."""
+    handles, labels = ax.get_legend_handles_labels()
+    kinds = dict(zip(labels, handles, strict=True))
+    if not own_figure:
+        ax.legend(kinds.values(), kinds.keys())
+        return
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    width, height = figure.get_size_inches()
+    figure.set_size_inches(max(width, _LEAST_WIDTH), height + _ENTRY * len(kinds))
+    figure.legend(kinds.values(), kinds.keys(), loc="outside lower center")
+
+
+# The picture of how an arm yields at its tip: where a force of one size can push it.
+
+
+_LARGEST = 0.2  # L, the longest half axis if the force is not given
+_CORNERS = 120
+_COLOR = "tab:orange"
+
+
+@checked(
+    **DRAWN,
+    arm=MANIPULATOR,
+    configuration=SHAPE,
+    compliance=as_floats,
+    force=optional(within(POSITIVE)),
+    rest=flag,
+)
+def plot_compliance(
+    arm: Manipulator,
+    configuration: xr.Dataset,
+    compliance: ArrayLike,
+    *,
+    ax: Axes | None = None,
+    view: View = "front",
+    force: float | None = None,
+    rest: bool = False,
+    box: ArrayLike | None = None,
+) -> Axes:
+    """Draw an arm with the ellipsoids over which a small force in any direction moves its tip.
+
+    They are to scale, as far as the tip yields in proportion to the force.
+
+    Args:
+        arm: The design.
+        configuration: One configuration of that arm or several along `sample`.
+        compliance: That of each, from `tip_compliance` [m/N], shape (3, 3) or (n, 3, 3).
+        ax: Axes to draw in; None for a new figure.
+        view: As in `plot_cloud`.
+        force: Size of the force [N]; None for a round one.
+        rest: Whether to draw the arm at rest too.
+        box: What to show, lower and upper corner [m], shape (2, 3); None for all that is drawn.
+
+    Returns:
+        The axes, in L.
+
+    Raises:
+        InvalidInput: Unknown view, a force that is not positive, or another number of compliances.
+        MissingExtra: matplotlib is not installed.
+    """
+    shapes = shapes_of(configuration)
+    given = np.asarray(compliance, float)
+    matrices = given if given.ndim == 3 else given[None]
+    if matrices.shape[1:] != (3, 3):
+        raise InvalidInput("compliance.shape", np.shape(compliance), "(3, 3) or (n, 3, 3)")
+    if len(matrices) != len(shapes):
+        raise InvalidInput("compliance", f"{len(matrices)} of them", f"one each of {len(shapes)}")
+    force = _round_force(matrices, arm.length) if force is None else force
+    if not 0 < force < np.inf:
+        raise InvalidInput("force", force, "> 0 N")
+    tips = np.array([shape["position"].values[-1] for shape in shapes]) / arm.length
+    axes = force * matrices / arm.length
+    with figure_style(ax):
+        if box is None:
+            surfaces = [arm_points(arm, shape) for shape in shapes]
+            box = arm.length * bounding_box(*surfaces, *_ends(tips, axes))
+        ax = plot_arm(arm, configuration, ax=ax, view=view, rest=rest, box=box)
+        for outline in _outlines(tips, axes, view):
+            ax.fill(*outline, facecolor=_COLOR, alpha=0.3, zorder=3)
+            ax.plot(*outline, color=_COLOR, linewidth=0.8, zorder=3)
+        ax.set_title(f"tip under {force:g} N in any direction")
+    return ax
+
+
+def _ends(tips: Array, axes: Array) -> list[Array]:
+    """The corners of the boxes around the ellipsoids."""
+    half = np.linalg.norm(axes, axis=2)
+    return [tips - half, tips + half]
+
+
+def _outlines(tips: Array, axes: Array, view: View) -> list[Array]:
+    """What one sees of the ellipsoids {tip + A f, |f| = 1}: ellipses, shape (2, corner) each."""
+    turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS)
+    circle = np.array([np.cos(turn), np.sin(turn)])
+    mirror = np.array([-1.0 if is_mirrored(view) else 1.0, 1.0])[:, None]
+    centers = project(tips, view)[:, :2, None]
+    outlines = []
+    for center, matrix in zip(centers, axes, strict=True):
+        left, half, _ = np.linalg.svd(project(matrix.T, view).T[:2], full_matrices=False)
+        outlines.append(mirror * (center + (left * half) @ circle))
+    return outlines
+
+
+def _round_force(matrices: Array, length: float) -> float:
+    """The largest of 1, 2, 5, 10, ... [N] that keeps the ellipsoids small."""
+    softest = np.linalg.norm(matrices, ord=2, axis=(1, 2)).max()
+    most = _LARGEST * length / softest
+    power = 10.0 ** math.floor(math.log10(most))
+    return max(power * digit for digit in (1.0, 2.0, 5.0) if power * digit <= most * (1 + 1e-9))
+
+
+# How much of its reachable volume an arm keeps under a payload.
+
+
+def plot_payload_curve(
+    curve: PayloadCurve,
+    *,
+    ax: Axes | None = None,
+    largest: Sequence[LargestPayload] = (),
+    label: str | None = None,
+) -> Axes:
+    """Draw the share of the reachable volume against the payload, with its errors.
+
+    Args:
+        curve: What `payload_curve` gives.
+        ax: Axes to draw in; None for a new figure.
+        largest: Payloads to mark, from `PayloadCurve.largest_payload`.
+        label: What a legend calls the curve.
+
+    Returns:
+        The axes, payloads in kg.
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+    """
+    points = [(0.0, 1.0), *((one.payload, one.share) for one in largest)]
+    points += zip(curve.payloads[1:], curve.shares[1:], strict=True)
+    mass, share = zip(*sorted(points), strict=True)
+    with figure_style(ax):
+        ax = small_axes(3.4, 2.6) if ax is None else ax
+        (line,) = ax.plot(mass, share, linewidth=1.2, label=label)
+        style = {"fmt": "o", "markersize": 3, "color": line.get_color(), "linewidth": 0.8}
+        ax.errorbar(curve.payloads, curve.shares, yerr=curve.share_errors, **style)
+        for one in largest:
+            ax.vlines(one.payload, 0.0, one.share, color="0.3", linewidth=0.8, linestyle=":")
+            ax.hlines(one.share, 0.0, one.payload, color="0.3", linewidth=0.8, linestyle=":")
+            ax.plot(one.payload, one.share, "o", markersize=4, mfc="white", color="0.3")
+        ax.set(xlabel="payload [kg]", ylabel="share of the volume without payload")
+        ax.set(xlim=(0.0, None), ylim=(0.0, None))
+        if label is not None:
+            ax.legend(loc="upper right")
+    return ax

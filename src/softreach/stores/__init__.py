@@ -1,1 +1,0 @@
-"""Zarr stores that notice damage: checksums of every file, and one way in and out."""

@@ -1,0 +1,1 @@
+"""Errors, arguments, arrays, threads, files: what every room rests on."""

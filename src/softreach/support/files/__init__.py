@@ -1,0 +1,1 @@
+"""Files that appear whole, are recognized, and notice damage."""

@@ -1,0 +1,140 @@
+"""Kinds of files: what they are called, how one is recognized, and what writing it needs."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable, Mapping
+from os import PathLike, fspath
+from pathlib import Path
+from typing import NamedTuple
+
+from softreach.support.errors import InvalidInput, MissingExtra
+
+__all__ = [
+    "PICTURES",
+    "FileKind",
+    "Formats",
+    "Recognizes",
+    "beginning_with",
+    "check_installed",
+    "format_of",
+    "text_with",
+]
+
+Recognizes = Callable[[Path], bool]
+"""Whether what is at a path, which exists, is of some kind."""
+
+_HEAD = 4096  # bytes in which a file says what it is
+
+
+class FileKind(NamedTuple):
+    """What a writer writes, and therefore may replace."""
+
+    name: str
+    """In a sentence: "a PNG picture"."""
+    recognizes: Recognizes
+    """Whether what exists at a path is of this kind."""
+    libraries: tuple[str, ...] = ()
+    """What is imported to write it."""
+    extra: str = ""
+    """The extra of softreach that brings these."""
+
+
+Formats = Mapping[str, FileKind]
+"""Suffix, in lower case, -> kind."""
+
+
+def format_of(path: str | PathLike[str], formats: Formats, name: str = "path") -> FileKind:
+    """The kind of file that a path names by its suffix.
+
+    Args:
+        path: The path.
+        formats: What can be written there.
+        name: What errors call the path.
+
+    Raises:
+        InvalidInput: Another suffix; the error lists those there are.
+        MissingExtra: The format needs a library that is not installed.
+    """
+    kind = formats.get(Path(path).suffix.lower())
+    if kind is None:
+        raise InvalidInput(name, fspath(path), "a file name ending in " + ", ".join(formats))
+    for library in kind.libraries:
+        check_installed(library, kind.extra)
+    return kind
+
+
+def check_installed(library: str, extra: str) -> None:
+    """Say that a library is missing, without the time that importing it takes.
+
+    Raises:
+        MissingExtra: It is not installed.
+    """
+    try:
+        missing = importlib.util.find_spec(library) is None
+    except ValueError:  # of modules without a specification
+        missing = sys.modules.get(library) is None
+    if missing:
+        raise MissingExtra(library, extra)
+
+
+def beginning_with(*heads: bytes, at: int = 0) -> Recognizes:
+    """Recognize files that have one of these bytes at a place near their beginning."""
+
+    def recognizes(path: Path) -> bool:
+        return _head(path)[at:].startswith(heads)
+
+    return recognizes
+
+
+def text_with(*parts: str) -> Recognizes:
+    """Recognize text that has all of these parts near its beginning."""
+    wanted = [part.encode() for part in parts]
+
+    def recognizes(path: Path) -> bool:
+        head = _head(path)
+        return b"\0" not in head and all(part in head for part in wanted)
+
+    return recognizes
+
+
+def _head(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(_HEAD)
+
+
+def _never(path: Path) -> bool:
+    """Nothing tells a file of bare pixels from any other."""
+    del path
+    return False
+
+
+def _picture(name: str, recognizes: Recognizes) -> FileKind:
+    return FileKind(f"{name} picture", recognizes, ("matplotlib",), "plot")
+
+
+_POSTSCRIPT = _picture("a PostScript", beginning_with(b"%!PS"))
+_JPEG = _picture("a JPEG", beginning_with(b"\xff\xd8\xff"))
+_TIFF = _picture("a TIFF", beginning_with(b"II*\0", b"MM\0*"))
+_PIXELS = _picture("a raw", _never)
+
+PICTURES: Formats = {
+    ".png": _picture("a PNG", beginning_with(b"\x89PNG\r\n\x1a\n")),
+    ".pdf": _picture("a PDF", beginning_with(b"%PDF-")),
+    ".svg": _picture("an SVG", text_with("<svg")),
+    ".svgz": _picture("a compressed SVG", beginning_with(b"\x1f\x8b")),
+    ".eps": _POSTSCRIPT,
+    ".ps": _POSTSCRIPT,
+    ".jpg": _JPEG,
+    ".jpeg": _JPEG,
+    ".tif": _TIFF,
+    ".tiff": _TIFF,
+    ".webp": _picture("a WebP", beginning_with(b"WEBP", at=8)),
+    ".gif": _picture("a GIF", beginning_with(b"GIF8")),
+    ".avif": _picture("an AVIF", beginning_with(b"ftypavi", at=4)),
+    ".pgf": _picture("a PGF", text_with("%% Creator: Matplotlib")),
+    ".raw": _PIXELS,
+    ".rgba": _PIXELS,
+}
+"""What figures can be saved as."""

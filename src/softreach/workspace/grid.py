@@ -1,0 +1,134 @@
+"""Grids of the activation box, and integrals over it, asked of a tip map."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.kernels.image.contour import stretches
+from softreach.rod.never_at_rest import none_stable
+from softreach.rod.stable_tips import stable_tips
+from softreach.rod.tip_map import TipMap
+from softreach.support.parallel import blocks
+from softreach.support.progress import Progress, silent
+
+__all__ = ["corners_of", "every_second", "grid_stretches", "grid_tips", "image_measure"]
+
+Array = NDArray[np.float64]
+
+_BLOCK = 1 << 16  # vertices
+_TOL = 1e-9  # far fewer evaluations than on the grids: their steps may be short
+_NEARLY_ALL = 0.9
+_DIFFERENCES = 200.0  # over n², more than differences on n cells err by, of the largest det J
+
+
+def grid_tips(rod: TipMap, cells: int, progress: Progress = silent) -> Array:
+    """Tips [m] of the grid of cells^m boxes over the free bundles, in C order.
+
+    Args:
+        rod: The tip map.
+        cells: Along each axis.
+        progress: Called with 0 now and then, so that it can raise.
+
+    Returns:
+        Shape ((cells + 1)^m, 3), the last free bundle varying fastest; NaN where there is no stable
+        equilibrium.
+
+    Raises:
+        InvalidInput: There is none anywhere.
+    """
+    ticks = [np.linspace(0.0, 1.0, cells + 1)] * rod.box.dimension
+    places, stable = _product(ticks), stable_tips(rod)
+    tips = np.empty((len(places), 3))
+    for rows in blocks(len(places), _BLOCK):
+        tips[rows] = stable.tips(rod.box.from_free_cube(places[rows]))
+        progress(0)
+    if rod.supports_unstable and np.isnan(tips[:, 0]).all():
+        raise none_stable(len(tips))
+    return tips
+
+
+def grid_stretches(rod: TipMap, tips: Array, cells: int, left_out: NDArray[np.bool_]) -> Array:
+    """det J of three free bundles at the vertices of a grid, for tips in m per unit of activation.
+
+    From differences of the tips, and by J itself where these might have the wrong sign, as well as
+    at the corners of cells that are left out.
+
+    Args:
+        rod: The tip map.
+        tips: From `grid_tips`.
+        cells: Number of cells along each axis.
+        left_out: Cells over which no differences can be taken, shape (cells, cells, cells).
+
+    Returns:
+        Shape ((cells + 1)³,); 0 where there is no stable equilibrium.
+    """
+    found = stretches(tips, np.array([cells] * 3))
+    found *= cells**3 / (8.0 * rod.box.volume)
+    unsure = corners_of(left_out).ravel()
+    largest = _largest(rod, np.abs(found[~unsure]))
+    small = np.flatnonzero(unsure | (np.abs(found) <= _DIFFERENCES / cells**2 * largest))
+    small = small[np.isfinite(tips[small, 0])]
+    places = np.stack(np.unravel_index(small, (cells + 1,) * 3), axis=1) / cells
+    found[small] = _stretch(rod, rod.box.from_free_cube(places))
+    found[~np.isfinite(found)] = 0.0
+    return found
+
+
+def _largest(rod: TipMap, stretch: Array) -> float:
+    """The largest |det J|; nearly so where it has no bound, as it grows toward instability."""
+    if rod.supports_unstable and len(stretch):
+        return float(np.quantile(stretch, _NEARLY_ALL))
+    return float(stretch.max(initial=0.0))
+
+
+def corners_of(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Vertices of a grid that are corners of some of its cells."""
+    for axis in range(cells.ndim):
+        none = np.zeros_like(np.take(cells, [0], axis))
+        cells = np.concatenate([cells, none], axis) | np.concatenate([none, cells], axis)
+    return cells
+
+
+def every_second(values: Array, cells: int, m: int) -> Array:
+    """Values at the vertices of the grid of half as many cells."""
+    fields = values.shape[1:]
+    every = values.reshape(*(cells + 1,) * m, *fields)[(slice(None, None, 2),) * m]
+    return np.ascontiguousarray(every).reshape(-1, *fields)
+
+
+def image_measure(rod: TipMap, nodes: int) -> float:
+    """Length or area of the image of one or two free bundles, ∫ √det(JᵀJ) dγ.
+
+    By Gauss and Legendre's rule, as the map is smooth: its error falls faster than any power of the
+    number of nodes. Places reached more than once count as often.
+
+    Args:
+        rod: The tip map, with one or two free bundles.
+        nodes: Nodes along each axis of the box.
+
+    Returns:
+        Length [m] or area [m²]; NaN if a node has no stable equilibrium.
+    """
+    x, w = np.polynomial.legendre.leggauss(nodes)
+    m = rod.box.dimension
+    gamma = rod.box.from_free_cube(_product([(1.0 + x) / 2.0] * m))
+    weights = np.prod(_product([w / 2.0] * m), axis=1) * rod.box.volume
+    # Not a BLAS product, whose rounding would depend on its threads.
+    return float((weights * _stretch(rod.refined(_TOL), gamma)).sum())
+
+
+def _stretch(rod: TipMap, gamma: Array) -> Array:
+    """The change of measure of the map at each activation: det J where J is square."""
+    slopes = stable_tips(rod).tips_and_slopes(gamma)[1][:, :, rod.box.free]
+    with np.errstate(invalid="ignore"):  # NaN where there is no stable equilibrium
+        if rod.box.dimension == 3:
+            return np.linalg.det(slopes)
+        return np.sqrt(np.linalg.det(np.swapaxes(slopes, 1, 2) @ slopes).clip(0.0))
+
+
+def _product(ticks: list[Array]) -> Array:
+    """All combinations of the values, the last varying fastest, shape (n, len(ticks))."""
+    if not ticks:
+        return np.zeros((1, 0))
+    return np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, len(ticks))

@@ -1,0 +1,276 @@
+"""How much of its reachable volume an arm keeps under a payload, and how much it may carry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.schema import provenance
+from softreach.support.arguments import as_number, checked, function, optional
+from softreach.support.arrays import as_floats
+from softreach.support.errors import InvalidDesign, InvalidInput
+from softreach.support.progress import Progress, silent
+from softreach.support.quantity import quantity
+from softreach.workspace.reach import ACCURACIES, reachable_set
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["LargestPayload", "PayloadCurve", "payload_curve"]
+
+Array = NDArray[np.float64]
+
+_USUAL = (0.0, 0.5, 1.0, 2.0, 4.0)  # payloads over the one that bends the arm by about a third
+_DOUBLINGS = 6  # of the largest payload, in search of one that is too heavy
+
+
+@checked(arm=a_manipulator, progress=optional(function))
+def payload_curve(
+    arm: Manipulator,
+    payloads: ArrayLike | None = None,
+    *,
+    accuracy: float = 0.01,
+    tol: float = 1e-6,
+    progress: Progress | None = None,
+) -> PayloadCurve:
+    """The volume of the exact reachable set under each payload.
+
+    All other loads stay as they are: the reference without payload is the arm under its own weight.
+
+    Args:
+        arm: A design with gravity among its loads and three free bundles or more.
+        payloads: Masses at the tip [kg], in any order, shape (n,); 0 is added. None for four that
+            fit the stiffness of the arm.
+        accuracy: Relative error allowed in each volume, as for `reachable_set`.
+        tol: Largest tip error, in L.
+        progress: Called with the number of volumes done since its last call.
+
+    Raises:
+        InvalidInput: No gravity, fewer than three free bundles, or payloads that are not finite
+            masses of 0 or more.
+        InvalidDesign: A material has no Young's modulus or no density.
+
+    Warns:
+        SoftreachWarning: The estimated error of a volume is larger than asked.
+    """
+    _check(arm)
+    given = _usual_payloads(arm) if payloads is None else as_floats("payloads", payloads).ravel()
+    if not (np.isfinite(given) & (given >= 0)).all():
+        raise InvalidInput("payloads", given, "finite masses of 0 or more [kg]")
+    as_number("accuracy", accuracy, ACCURACIES)
+    masses = np.unique(np.append(given, 0.0))
+    done, volumes = progress or silent, []
+    for mass in masses:
+        volumes.append(_volume(arm, float(mass), accuracy, tol))
+        done(1)
+    value, error, lost = np.array(volumes).T
+    return PayloadCurve(arm, masses, value, error, lost, accuracy, tol)
+
+
+class LargestPayload(NamedTuple):
+    """The payload up to which an arm keeps a share of its reachable volume."""
+
+    payload: float
+    """[kg]"""
+    payload_error: float
+    """How far off it may be, by the search and by the errors of the volumes [kg]."""
+    share: float
+    """Of the volume without payload that is kept [-]."""
+
+    def __repr__(self) -> str:
+        mass = quantity(self.payload, "kg", self.payload_error)
+        return f"<LargestPayload: {mass} keep {self.share:.0%} of the reachable volume>"
+
+
+class _Volume(NamedTuple):
+    """Of a reachable set."""
+
+    value: float
+    error: float
+    lost_share: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PayloadCurve:
+    """Reachable volume against payload."""
+
+    arm: Manipulator
+    """The design; its own payload does not count."""
+    payloads: Array
+    """[kg], ascending from 0, shape (n,)."""
+    volumes: Array
+    """Of the exact reachable set [m³], shape (n,)."""
+    volume_errors: Array
+    """How far off each may be [m³], shape (n,)."""
+    lost_shares: Array
+    """Share of the activation box that is left out for want of stability [-], shape (n,)."""
+    accuracy: float
+    """Relative error allowed in each volume."""
+    tol: float
+    """Largest tip error, in L."""
+    _known: dict[float, _Volume] = field(default_factory=dict)
+
+    @property
+    def shares(self) -> Array:
+        """Of the volume without payload that is left [-], shape (n,)."""
+        return self.volumes / self.volumes[0]
+
+    @property
+    def share_errors(self) -> Array:
+        """How far off each share may be; that of the first is 0 [-], shape (n,)."""
+        first = self.volume_errors[0] * self.shares
+        errors = (self.volume_errors + first) / self.volumes[0]
+        return np.where(self.payloads > 0, errors, 0.0)
+
+    def largest_payload(self, share: float, *, accuracy: float = 0.01) -> LargestPayload:
+        """The payload up to which the arm keeps a share of the volume without payload.
+
+        Found by further volumes, not by interpolation: the first payload on the curve that leaves
+        less than the share is bracketed, beyond the curve's end if need be, and the bracket made
+        smaller.
+
+        Args:
+            share: Of the volume without payload, between 0 and 1.
+            accuracy: Relative error allowed in the search for the payload.
+
+        Raises:
+            InvalidInput: A share or accuracy out of range, or one that no payload undercuts.
+        """
+        if not 0 < share < 1:
+            raise InvalidInput("share", share, "between 0 and 1")
+        if not 1e-4 <= accuracy <= 0.5:
+            raise InvalidInput("accuracy", accuracy, "1e-4 to 0.5")
+        low, high = self._bracket(share)
+        low, high = _narrowed(lambda mass: self._share(mass) - share, low, high, accuracy)
+        below, above = self._at(low), self._at(high)
+        drop = (below.value - above.value) / (high - low)
+        # where the curve crosses the share between the two, and how far the volumes let it move
+        mass = low + (below.value - share * self.volumes[0]) / drop
+        scatter = max(below.error, above.error) + share * self.volume_errors[0]
+        off = max(mass - low, high - mass) + scatter / drop
+        return LargestPayload(float(mass), float(off), share)
+
+    def to_dataset(self) -> xr.Dataset:
+        """Volumes and shares with their errors over `payload` [kg]."""
+        import xarray as xr
+
+        numbers = {
+            "volume": (self.volumes, "m3", "reachable volume"),
+            "volume_error": (self.volume_errors, "m3", "error of the reachable volume"),
+            "share": (self.shares, "1", "share of the volume without payload"),
+            "share_error": (self.share_errors, "1", "error of the share"),
+            "lost_share": (self.lost_shares, "1", "share of the activation box left out"),
+        }
+        return xr.Dataset(
+            {
+                name: ("payload", values, {"units": unit, "long_name": meaning})
+                for name, (values, unit, meaning) in numbers.items()
+            },
+            {"payload": ("payload", self.payloads, {"units": "kg", "long_name": "payload"})},
+            {**provenance(self.arm), "tol": self.tol, "accuracy": self.accuracy},
+        )
+
+    def __repr__(self) -> str:
+        first = quantity(self.volumes[0], "m³", self.volume_errors[0])
+        rows = [
+            f"  {mass:g} kg: {quantity(100 * share, '%', 100 * error)}"
+            for mass, share, error in zip(
+                self.payloads[1:], self.shares[1:], self.share_errors[1:], strict=True
+            )
+        ]
+        return "\n".join([f"PayloadCurve: {first} without payload", *rows])
+
+    def _at(self, mass: float) -> _Volume:
+        """The volume under a payload, known or computed now."""
+        rows = zip(self.payloads, self.volumes, self.volume_errors, self.lost_shares, strict=True)
+        for one, *volume in rows:
+            if one == mass:
+                return _Volume(*volume)
+        if mass not in self._known:
+            self._known[mass] = _volume(self.arm, mass, self.accuracy, self.tol)
+        return self._known[mass]
+
+    def _share(self, mass: float) -> float:
+        return self._at(mass).value / float(self.volumes[0])
+
+    def _bracket(self, share: float) -> tuple[float, float]:
+        """Neighbors on the curve of which the heavier is the first to leave less than the share."""
+        light = 0.0
+        for mass in self.payloads[1:].tolist():
+            if self._share(mass) < share:
+                return light, mass
+            light = mass
+        heavy = 2.0 * light or float(_usual_payloads(self.arm)[1])
+        for _ in range(_DOUBLINGS):
+            if self._share(heavy) < share:
+                return light, heavy
+            light, heavy = heavy, 2.0 * heavy
+        left = f"{self._share(light):.3g} of the volume is left under {light:g} kg"
+        raise InvalidInput("share", share, "one that a payload undercuts", left)
+
+
+def _narrowed(
+    function: Callable[[float], float], low: float, high: float, accuracy: float
+) -> tuple[float, float]:
+    """A smaller bracket of a falling function's root, at most a relative accuracy wide.
+
+    Secants between the ends, moved past the root by a fraction of the accuracy so that both ends
+    come near to it, and halves where the bracket shrinks too slowly.
+    """
+    at_low, at_high = function(low), function(high)
+    while high - low > accuracy * high:
+        root = low + (high - low) * at_low / (at_low - at_high)
+        nearer_low = root - low < high - root
+        mass = root + (0.4 if nearer_low else -0.4) * accuracy * high
+        if not low < mass < high:
+            mass = 0.5 * (low + high)
+        wide, value = high - low, function(mass)
+        if value < 0:
+            high, at_high = mass, value
+        else:
+            low, at_low = mass, value
+        if high - low > 0.5 * wide and high - low > accuracy * high:
+            mass = 0.5 * (low + high)
+            value = function(mass)
+            if value < 0:
+                high, at_high = mass, value
+            else:
+                low, at_low = mass, value
+    return low, high
+
+
+def _volume(arm: Manipulator, mass: float, accuracy: float, tol: float) -> _Volume:
+    assert arm.loads is not None
+    carrying = arm.replace(loads=arm.loads.replace(payload=mass))
+    found = reachable_set(carrying, accuracy=accuracy, tol=tol)
+    return _Volume(found.volume, found.volume_error, float(getattr(found, "lost_share", 0.0)))
+
+
+def _check(arm: Manipulator) -> None:
+    if not isinstance(arm, Manipulator):
+        raise InvalidInput("arm", f"{arm!r:.80}", "a Manipulator")
+    if arm.loads is None or not any(arm.loads.gravity):
+        hint = "pass arm.replace(loads=Loads(gravity=(0, 0, -9.81)))"
+        raise InvalidInput(
+            "loads", arm.loads, "Loads with gravity, which makes a payload heavy", hint
+        )
+    if faults := arm.loads.section_faults(arm.section, arm.length):
+        raise InvalidDesign(faults)
+    free = int(sum(low < high for low, high in arm.bounds))
+    if free < 3:
+        raise InvalidInput("free bundles", free, "3 or more, which reach a volume")
+
+
+def _usual_payloads(arm: Manipulator) -> Array:
+    """Payloads between those that hardly bend the arm and those that bend it far [kg]."""
+    assert arm.loads is not None
+    stiffness = arm.section.stiffness(arm.profile.radius(np.array([0.5 * arm.length])))
+    weight = float(stiffness.bending[0]) / arm.length**2
+    mass = weight / float(np.linalg.norm(arm.loads.gravity))
+    rounded = float(f"{mass:.1g}")
+    return rounded * np.array(_USUAL)
