@@ -16,15 +16,19 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 import pytest
 from numba import njit
 from numba.core import caching
+from numba.core.codegen import CPUCodegen
 from numba.core.dispatcher import Dispatcher
 
 import softreach
+import softreach as sr
 import softreach.kernels.compiler
 from softreach import kernels
 from softreach.cli.first_run import compilation_announced
+from softreach.kernels import parts
 from softreach.kernels.compiler import FAST, kernel, strict
 
 SCRIPT = """
@@ -119,6 +123,37 @@ def test_only_the_compiler_module_asks_numba_to_compile():
     asks = re.compile(r"\b(n?jit|vectorize|guvectorize|cfunc|stencil|\w*Dispatcher)\b")
     found = [p for p in root.rglob("*.py") if asks.search(p.read_text(encoding="utf-8"))]
     assert sorted(found) == [root / "kernels" / name for name in ("compiler.py", "parts.py")]
+
+
+WITHOUT = """
+from numba.core import typed_passes
+del typed_passes.NativeLowering
+import numpy as np
+import softreach as sr
+from softreach.kernels import compiler
+assert compiler._LACKING, "nothing is missing"
+arm = sr.designs.minimal_trunk()
+gamma = np.random.default_rng(0).uniform(-5 / 3, 0, (5, 3))
+print(*(float(x).hex() for x in sr.tip_positions(arm, gamma).ravel()))
+"""
+
+
+@pytest.mark.slow
+def test_without_a_private_class_of_numba_kernels_are_compiled_plainly(tmp_path):
+    script = [sys.executable, "-c", WITHOUT]
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    run = subprocess.run(script, env=environment, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    tips = np.array([float.fromhex(x) for x in run.stdout.split()]).reshape(-1, 3)
+    gamma = np.random.default_rng(0).uniform(-5 / 3, 0, (5, 3))
+    assert tips == pytest.approx(sr.tip_positions(sr.designs.minimal_trunk(), gamma), rel=1e-13)
+
+
+def test_private_attributes_that_numba_lacks_are_named(monkeypatch):
+    assert parts.missing() == []
+    monkeypatch.delattr(CPUCodegen, "_module_pass_manager")
+    monkeypatch.setattr(parts, "_PRIVATE", (*parts._PRIVATE, (CPUCodegen, ("_gone",))))
+    assert parts.missing() == ["CPUCodegen._module_pass_manager", "CPUCodegen._gone"]
 
 
 def doubled(x):

@@ -12,17 +12,25 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
-from numba import config
+from numba import config, njit
 from numba.core import event
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
 
-from softreach.kernels.parts import KernelDispatcher, PartedDispatcher
 from softreach.support.files.interruption import as_a_whole
 
 __all__ = ["FAST", "inline", "kernel", "pasted", "strict"]
 
 _LOG = logging.getLogger(__name__)
+
+try:
+    from softreach.kernels import parts
+
+    _LACKING = parts.missing()
+except ImportError as error:  # a class that Numba has renamed
+    _LACKING = [str(error)]
+if _LACKING:
+    _LOG.info("kernels are compiled plainly, as Numba lacks %s", ", ".join(_LACKING))
 
 FAST = {"contract", "reassoc", "nsz", "arcp", "nnan", "ninf"}
 """Freedoms of the compiler in `kernel` and `inline`.
@@ -35,17 +43,17 @@ check.
 
 def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a loop over samples."""
-    return _cached(_dispatcher(KernelDispatcher, function, fastmath=FAST))
+    return _cached(_dispatcher(function, fastmath=FAST))
 
 
 def inline(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a small function into its callers; a call left in a loop stops vectorization."""
-    return _dispatcher(PartedDispatcher, function, forceinline=True, fastmath=FAST)
+    return _dispatcher(function, part=True, forceinline=True, fastmath=FAST)
 
 
 def pasted(function: Callable[..., Any]) -> Callable[..., Any]:
     """As `inline`, but before compilation: a large function is then not compiled by itself too."""
-    return _dispatcher(KernelDispatcher, function, inline="always", fastmath=FAST)
+    return _dispatcher(function, inline="always", fastmath=FAST)
 
 
 def strict(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -60,15 +68,18 @@ def strict(function: Callable[..., Any]) -> Callable[..., Any]:
     what is compiled on behalf of a caller inherits its flags.
     """
     source = getattr(function, "py_func", function)
-    return _cached(_dispatcher(PartedDispatcher, source, fastmath=False))
+    return _cached(_dispatcher(source, part=True, fastmath=False))
 
 
-def _dispatcher(made_by: Any, function: Callable[..., Any], **options: Any) -> Any:
+def _dispatcher(function: Callable[..., Any], *, part: bool = False, **options: Any) -> Any:
     """A function that is compiled when it is called, unless Numba is told not to compile."""
     if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
         return function
-    options |= {"nopython": True, "nogil": True, "error_model": "numpy"}
-    return made_by(function, targetoptions=options)
+    options |= {"nogil": True, "error_model": "numpy"}
+    if _LACKING:
+        return njit(**options)(function)
+    dispatcher = parts.PartedDispatcher if part else parts.KernelDispatcher
+    return dispatcher(function, targetoptions=options | {"nopython": True})
 
 
 def _cached(function: Any) -> Any:

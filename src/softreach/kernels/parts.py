@@ -4,6 +4,9 @@ Numba compiles a callee as if it were called from Python as well: it wraps it, o
 it into machine code, and then optimizes it again with each caller. A part stops after lowering, in
 a library that its callers link. What they inline is optimized with them alone; the rest once by
 itself too, as it runs slower otherwise (`design/cold_start.md`).
+
+All of this rests on names that Numba keeps to itself. `missing` says which of them this version of
+Numba lacks; then `compiler` compiles plainly: the same numbers to rounding, a slower first run.
 """
 
 from __future__ import annotations
@@ -13,13 +16,41 @@ import threading
 from collections.abc import Callable
 from typing import Any, Literal
 
-from numba.core.codegen import JITCodeLibrary
+from numba.core.codegen import CPUCodegen, JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
 
-__all__ = ["KernelDispatcher", "PartedDispatcher"]
+__all__ = ["KernelDispatcher", "PartedDispatcher", "missing"]
+
+
+_PRIVATE: tuple[tuple[type, tuple[str, ...]], ...] = (
+    (JITCodeLibrary, ("_finalize_dynamic_globals", "_get_module_for_linking", "_finalized")),
+    (JITCodeLibrary, ("_codegen", "_final_module", "_linking_libraries", "_reload_init")),
+    (CPUCodegen, ("_module_pass_manager",)),
+    (CPUDispatcher, ("add_overload", "get_call_template", "get_overload")),
+    (DefaultPassBuilder, ("define_nopython_pipeline",)),
+    (NativeLowering, ("run_pass",)),
+)
+
+
+def missing() -> list[str]:
+    """Private names of Numba that parts need and this version lacks.
+
+    An attribute counts as present if its class has it or any of its constructors sets it.
+    """
+    return [
+        f"{owner.__name__}.{name}"
+        for owner, names in _PRIVATE
+        for name in names
+        if not hasattr(owner, name)
+        and not any(name in _names_in_constructor(base) for base in owner.__mro__)
+    ]
+
+
+def _names_in_constructor(owner: type) -> tuple[str, ...]:
+    return getattr(vars(owner).get("__init__"), "__code__", missing.__code__).co_names
 
 
 class _PartLibrary(JITCodeLibrary):
