@@ -10,7 +10,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
-THEORY = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
+THEORY = "".join(
+    (ROOT / "docs" / page).read_text(encoding="utf-8") for page in ("theory.md", "theory-loads.md")
+)
 REFERENCES = (ROOT / "docs" / "references.md").read_text(encoding="utf-8")
 EQUATIONS = r"[Tt]heory\s+(\(\d+\)(?:(?:,| and| to)\s+\(\d+\))*)"
 KEY = r"\[([A-Z][A-Za-z]+(?:19|20)\d\d)\]"
