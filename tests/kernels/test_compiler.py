@@ -24,7 +24,7 @@ from numba.core.dispatcher import Dispatcher
 import softreach
 import softreach.kernels.compiler
 from softreach import kernels
-from softreach.cli.first_run import compilation_announced
+from softreach.cli.console import console
 from softreach.kernels.compiler import FAST, kernel, strict
 
 SCRIPT = """
@@ -73,7 +73,7 @@ def test_whoever_listens_hears_what_is_compiled(caplog):
 
 def test_the_command_line_announces_compilation_once(capsys):
     log = logging.getLogger("softreach.kernels.compiler")
-    with compilation_announced():
+    with console.listening():
         log.info("compiling one")
         log.info("compiling another")
     log.info("compiling after the command")

@@ -1,0 +1,111 @@
+"""`softreach list`: the names that other commands take."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cyclopts import App
+
+from softreach.cli.changes import UNCHANGED, Changes, design_from
+from softreach.cli.console import console
+from softreach.cli.options import AsJson, Design
+from softreach.cli.values import to_degrees
+
+__all__ = ["designs", "listing", "materials", "metrics", "parameters"]
+
+listing = App(
+    name="list",
+    help="""List designs, materials, metrics, or parameters of a design.
+
+Example: softreach list parameters minimal_trunk
+""",
+)
+
+
+@listing.command
+def designs(*, json: AsJson = False) -> None:
+    """List the built-in designs with what drives them.
+
+    Example: softreach list designs
+    """
+    from softreach.arm import designs
+
+    records = []
+    for name in designs.__all__:
+        make = getattr(designs, name)
+        summary = (make.__doc__ or "").partition("\n")[0]
+        arm = make()
+        records.append(
+            {
+                "design": name,
+                "bundles": arm.bundles,
+                "length_m": arm.length,
+                "description": summary.rstrip(".").replace("`", ""),
+            }
+        )
+    console.table(records, json)
+
+
+@listing.command
+def materials(*, json: AsJson = False) -> None:
+    """List the named materials from soft to stiff, with Young's modulus and density.
+
+    Example: softreach list materials
+    """
+    from softreach.arm.materials import material_names, material_record
+
+    records = []
+    for name in material_names():
+        record = material_record(name)
+        records.append(
+            {
+                "material": name,
+                "young_modulus_pa": record.material.young_modulus,
+                "poisson_ratio": record.material.poisson_ratio,
+                "density_kg_m3": record.material.density,
+                "modulus": record.modulus,
+            }
+        )
+    console.table(records, json)
+
+
+@listing.command
+def metrics(*, json: AsJson = False) -> None:
+    """List the metrics of an atlas with their groups and units.
+
+    Example: softreach list metrics
+    """
+    from softreach.atlas.metrics import METRIC_GROUPS
+
+    records = [
+        {"metric": metric.name, "group": group, "unit": metric.unit, "meaning": metric.meaning}
+        for group, members in METRIC_GROUPS.items()
+        for metric in members
+    ]
+    console.table(records, json)
+
+
+@listing.command
+def parameters(design: Design, *, changes: Changes = UNCHANGED, json: AsJson = False) -> None:
+    """List every parameter of a design with its value, as --set and --vary name it.
+
+    A dash stands where the design gives no single number; it can be set all the same.
+
+    Example: softreach list parameters minimal_trunk
+    """
+    from softreach.arm.parameters.written import written_parameters
+
+    arm = design_from(design, changes)
+    records: list[dict[str, Any]] = []
+    for name, parameter in written_parameters(arm).items():
+        value = parameter.value(arm)
+        records.append(
+            {
+                "parameter": name,
+                "value": to_degrees(value) if parameter.unit == "rad" else value,
+                "unit": "deg" if parameter.unit == "rad" else parameter.unit,
+                "symbol": parameter.symbol,
+                "meaning": parameter.meaning,
+            }
+        )
+    console.table(records, json)
