@@ -93,15 +93,16 @@ def parameters(design: Design, *, changes: Changes = UNCHANGED, json: AsJson = F
 
     Example: softreach list parameters minimal_trunk
     """
-    from softreach.arm.parameters.written import written_parameters
+    from softreach.arm.parameters import parameters as parameters_of
+    from softreach.arm.parameters.written import written_name
 
     arm = design_from(design, changes)
     records: list[dict[str, Any]] = []
-    for name, parameter in written_parameters(arm).items():
+    for name, parameter in parameters_of(arm).items():
         value = parameter.value(arm)
         records.append(
             {
-                "parameter": name,
+                "parameter": written_name(name, parameter.unit),
                 "value": to_degrees(value) if parameter.unit == "rad" else value,
                 "unit": "deg" if parameter.unit == "rad" else parameter.unit,
                 "symbol": parameter.symbol,
