@@ -16,8 +16,6 @@ from softreach.cli import INTERRUPTED
 from softreach.cli.console import HelpConsole, console
 from softreach.support.errors import InvalidInput, NotWritten, SoftreachError
 
-__all__ = ["app", "run"]
-
 _MORE = Group("More", sort_key=-1)
 _COMMANDS = (
     (Group("Design", sort_key=-6), ("design", "list", "studio")),

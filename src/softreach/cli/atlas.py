@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -32,7 +31,6 @@ if TYPE_CHECKING:
     from softreach.atlas.executor import ExecutorLike
     from softreach.atlas.space import DesignSpace
 
-__all__ = ["atlas", "best", "build", "figures", "status", "verify"]
 
 atlas = App(
     name="atlas",
@@ -51,6 +49,7 @@ Shard = Annotated[
 @atlas.command
 def build(
     store: Store,
+    /,
     *,
     vary: Annotated[
         list[str] | None,
@@ -117,7 +116,7 @@ def build(
 
 
 @atlas.command
-def status(store: Store, *, json: AsJson = False) -> None:
+def status(store: Store, /, *, json: AsJson = False) -> None:
     """Count the designs that are done, and explain the others.
 
     Example: softreach atlas status atlas.zarr
@@ -128,7 +127,7 @@ def status(store: Store, *, json: AsJson = False) -> None:
 
 
 @atlas.command
-def verify(store: Store, *, json: AsJson = False) -> None:
+def verify(store: Store, /, *, json: AsJson = False) -> None:
     """Read all of an atlas and check it.
 
     The command that built it computes again what is damaged.
@@ -160,6 +159,7 @@ def _print_status(store: str, state: AtlasStatus, json: bool) -> None:
 def best(
     store: Store,
     metric: Annotated[str, Parameter(help="A metric, as softreach list metrics names it.")],
+    /,
     *,
     smallest: Annotated[bool, Parameter(help="Prefer small values.")] = False,
     where: Annotated[
@@ -191,6 +191,7 @@ def best(
 @atlas.command
 def figures(
     store: Store,
+    /,
     *,
     panels: Annotated[
         int, WHOLE, Parameter(help="Largest number of columns and rows of a sheet.")
@@ -271,14 +272,10 @@ def _executor(
 def _over_length(text: str) -> float:
     """0.05 from `0.05L`: a length in m would not suit designs of every length."""
     values = numbers_in(text.removesuffix("L"), 1) if text.endswith("L") else None
-    radius = values[0] if values else 0.0
-    if not 0 < radius < math.inf:
-        raise InvalidInput(
-            "alpha",
-            shortened(text) or "''",
-            "a radius > 0 over the length of each design, like 0.05L",
-        )
-    return radius
+    if not values or values[0] <= 0:
+        allowed = "a radius > 0 over the length of each design, like 0.05L"
+        raise InvalidInput("alpha", shortened(text) or "''", allowed)
+    return values[0]
 
 
 def _shard(text: str) -> tuple[int, int]:

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
     from softreach.arm.parameters.parameter import Parameter as DesignParameter
 
-__all__ = ["UNCHANGED", "Changes", "design_from", "read_mass"]
 
 _GRAVITY = {
     "down": (0.0, 0.0, -9.81),
@@ -124,12 +123,7 @@ class Changes:
             yield name, value
 
     def _loaded(self, arm: Manipulator, others: bool) -> Manipulator:
-        """The arm with the loads that it has and those that are given; none where all are zero.
-
-        Args:
-            arm: The arm.
-            others: Whether settings change more of its loads.
-        """
+        """The arm with the loads it has and those given; none where all are zero and stay so."""
         from softreach.arm.loads import Loads
 
         loads = (arm.loads or Loads()).replace(**self._loads())
@@ -140,23 +134,18 @@ class Changes:
 
     def _check_matter(self, loads: Loads, arm: Manipulator) -> None:
         """Ask in one line for the moduli and densities that loads need."""
-        lacking = [
-            fault.path
-            for fault in loads.section_faults(arm.section, arm.length)
-            if fault.path.endswith(("young_modulus", "density"))
-        ]
+        examples = {"young_modulus": "1MPa", "density": "1000kg/m3"}
+        faults = loads.section_faults(arm.section, arm.length)
+        lacking = {fault.path: examples.get(fault.path.rpartition(".")[2]) for fault in faults}
+        lacking = {path: example for path, example in lacking.items() if example}
         if lacking:
-            given = {name: value for name, value in self.given.items() if "_deg" not in name}
-            examples = {"young_modulus": "1MPa", "density": "1000kg/m3"}
-            options = (f"--set {path}={examples[path.rpartition('.')[2]]}" for path in lacking)
-            weightless = any(path.endswith("density") for path in lacking)
-            raise InvalidInput(
-                ", ".join(given),
-                ", ".join(map(str, given.values())),
-                f"on an arm with {' and '.join(lacking)}",
-                f"give them in the design file, or as {' '.join(options)}"
-                + (" (no density is needed with --gravity none)" if weightless else ""),
-            )
+            given = {name: str(value) for name, value in self.given.items() if "_deg" not in name}
+            options = " ".join(f"--set {path}={example}" for path, example in lacking.items())
+            hint = f"give them in the design file, or as {options}"
+            if examples["density"] in lacking.values():
+                hint += " (no density is needed with --gravity none)"
+            allowed = f"on an arm with {' and '.join(lacking)}"
+            raise InvalidInput(", ".join(given), ", ".join(given.values()), allowed, hint)
 
     def _loads(self) -> dict[str, object]:
         loads: dict[str, object] = {}

@@ -25,11 +25,10 @@ from softreach.cli.values import NUMBER
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["cloud"]
-
 
 def cloud(
     design: Design,
+    /,
     *,
     sampling: Sampling = SAMPLING,
     tol: Annotated[float, NUMBER, Parameter(help="Largest tip error, in L.")] = 1e-6,

@@ -20,7 +20,6 @@ from softreach.support.errors import NotWritten, SoftreachWarning
 if TYPE_CHECKING:
     from rich.console import Console as RichConsole
 
-__all__ = ["Rows", "console"]
 
 Rows = dict[str, tuple[Any, str]]
 """Name -> (value, unit)."""

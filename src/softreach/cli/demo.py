@@ -12,8 +12,6 @@ from softreach.cli.options import AsJson, Overwrite, check_output, out_option
 from softreach.cli.values import WHOLE
 from softreach.cli.volume import check_hull_memory, volume_rows
 
-__all__ = ["demo"]
-
 _BYTES = 100  # of a sample in the cloud and in the PLY
 _FILES = ("design.toml", "cloud.zarr", "cloud.ply", "hull.ply", "cloud.png")
 

@@ -20,11 +20,10 @@ if TYPE_CHECKING:
     from softreach.arm.summary import DesignSummary
     from softreach.rest import Rest
 
-__all__ = ["design", "load_rows"]
-
 
 def design(
     design: Design | None = None,
+    /,
     *,
     schema: Annotated[
         bool, Parameter(help="Print the JSON schema of design files for editors, nothing else.")

@@ -25,11 +25,10 @@ from softreach.support.errors import counted
 if TYPE_CHECKING:
     from softreach.rod import AllEquilibria
 
-__all__ = ["equilibria"]
-
 
 def equilibria(
     design: Design,
+    /,
     *,
     activation: Activation = None,
     view: Annotated[

@@ -24,7 +24,6 @@ from softreach.support.errors import InvalidInput
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
 
-__all__ = ["export"]
 
 Format = Annotated[
     str | None,
@@ -35,6 +34,7 @@ Format = Annotated[
 def export(
     source: Source,
     out: Annotated[Path, Parameter(help="The file to write; its suffix chooses the format.")],
+    /,
     *,
     activation: Activation = None,
     format: Format = None,

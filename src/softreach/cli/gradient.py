@@ -14,7 +14,6 @@ from softreach.cli.values import NUMBER
 if TYPE_CHECKING:
     from softreach.workspace import VolumeGradient
 
-__all__ = ["gradient"]
 
 _UNITS = {"volume": "m³", "convex_volume": "m³", "unreachability": ""}
 
@@ -25,6 +24,7 @@ def gradient(
         list[str],
         Parameter(help="Parameters, as softreach list parameters DESIGN names them."),
     ],
+    /,
     *,
     accuracy: Annotated[
         float, NUMBER, Parameter(help="Relative error allowed in what is rasterized.")

@@ -13,12 +13,11 @@ from softreach.cli.options import AsJson, Overwrite, check_output, refuse
 from softreach.cli.values import NUMBER
 from softreach.support.errors import InvalidInput
 
-__all__ = ["import_file"]
-
 
 def import_file(
     source: Annotated[Path, Parameter(help="Filament (.jl), or cloud: NAME.csv of two files.")],
     out: Annotated[Path, Parameter(help="Design (.toml) or cloud (.zarr) to write.")],
+    /,
     *,
     design: Annotated[
         str | None, Parameter(help="Design that a cloud belongs to: .toml, .jl or built-in.")

@@ -9,9 +9,7 @@ from cyclopts import App
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
 from softreach.cli.options import AsJson, Design
-from softreach.cli.values import to_degrees
-
-__all__ = ["designs", "listing", "materials", "metrics", "parameters"]
+from softreach.cli.values import as_read
 
 listing = App(
     name="list",
@@ -30,19 +28,16 @@ def designs(*, json: AsJson = False) -> None:
     """
     from softreach.arm import designs
 
-    records = []
-    for name in designs.__all__:
-        make = getattr(designs, name)
-        summary = (make.__doc__ or "").partition("\n")[0]
-        arm = make()
-        records.append(
-            {
-                "design": name,
-                "bundles": arm.bundles,
-                "length_m": arm.length,
-                "description": summary.rstrip(".").replace("`", ""),
-            }
-        )
+    makers = {name: getattr(designs, name) for name in designs.__all__}
+    records = [
+        {
+            "design": name,
+            "bundles": (arm := make()).bundles,
+            "length_m": arm.length,
+            "description": (make.__doc__ or "").partition("\n")[0].rstrip(".").replace("`", ""),
+        }
+        for name, make in makers.items()
+    ]
     console.table(records, json)
 
 
@@ -54,18 +49,16 @@ def materials(*, json: AsJson = False) -> None:
     """
     from softreach.arm.materials import material_names, material_record
 
-    records = []
-    for name in material_names():
-        record = material_record(name)
-        records.append(
-            {
-                "material": name,
-                "young_modulus_pa": record.material.young_modulus,
-                "poisson_ratio": record.material.poisson_ratio,
-                "density_kg_m3": record.material.density,
-                "modulus": record.modulus,
-            }
-        )
+    records = [
+        {
+            "material": name,
+            "young_modulus_pa": (record := material_record(name)).material.young_modulus,
+            "poisson_ratio": record.material.poisson_ratio,
+            "density_kg_m3": record.material.density,
+            "modulus": record.modulus,
+        }
+        for name in material_names()
+    ]
     console.table(records, json)
 
 
@@ -86,7 +79,7 @@ def metrics(*, json: AsJson = False) -> None:
 
 
 @listing.command
-def parameters(design: Design, *, changes: Changes = UNCHANGED, json: AsJson = False) -> None:
+def parameters(design: Design, /, *, changes: Changes = UNCHANGED, json: AsJson = False) -> None:
     """List every parameter of a design with its value, as --set and --vary name it.
 
     A dash stands where the design gives no single number; it can be set all the same.
@@ -99,14 +92,9 @@ def parameters(design: Design, *, changes: Changes = UNCHANGED, json: AsJson = F
     arm = design_from(design, changes)
     records: list[dict[str, Any]] = []
     for name, parameter in parameters_of(arm).items():
-        value = parameter.value(arm)
-        records.append(
-            {
-                "parameter": written_name(name, parameter.unit),
-                "value": to_degrees(value) if parameter.unit == "rad" else value,
-                "unit": "deg" if parameter.unit == "rad" else parameter.unit,
-                "symbol": parameter.symbol,
-                "meaning": parameter.meaning,
-            }
-        )
+        value, unit = as_read(parameter.value(arm), parameter.unit)
+        written = written_name(name, parameter.unit)
+        row = (written, value, unit, parameter.symbol, parameter.meaning)
+        columns = ("parameter", "value", "unit", "symbol", "meaning")
+        records.append(dict(zip(columns, row, strict=True)))
     console.table(records, json)

@@ -22,27 +22,6 @@ if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
     from softreach.support.files.kinds import Formats
 
-__all__ = [
-    "OUTPUT",
-    "Activation",
-    "AsJson",
-    "Design",
-    "Durable",
-    "Overwrite",
-    "Sampling",
-    "Source",
-    "activation_of",
-    "check_output",
-    "check_picture",
-    "check_surface",
-    "cloud_of",
-    "is_stored",
-    "out_option",
-    "points_of",
-    "radius_of",
-    "refuse",
-    "shape_of",
-]
 
 OUTPUT = Group("Output options", sort_key=3)
 
@@ -128,14 +107,7 @@ def is_stored(source: str) -> bool:
 def cloud_of(
     source: str, sampling: Sampling, changes: Changes, check: Callable[[int], None] | None = None
 ) -> xr.Dataset:
-    """The stored cloud, or one computed from the design.
-
-    Args:
-        source: The store or the design.
-        sampling: How the cloud of a design is sampled.
-        changes: What is changed of a design.
-        check: Called with the number of samples before they are computed.
-    """
+    """The stored cloud, or one of the design once its number of samples is checked."""
     from softreach.cloud.clouds import compute_cloud, open_cloud
 
     if is_stored(source):
@@ -190,22 +162,18 @@ def radius_of(text: str, length: float) -> float | str:
     values = numbers_in(text.removesuffix("L"), 1)
     radius = (length if text.endswith("L") else 1.0) * (values[0] if values else 0.0)
     if not 0.0 < radius < math.inf:
-        raise InvalidInput(
-            "alpha", shortened(text) or "''", "a radius > 0 like 0.05L or 0.05 (m), or critical"
-        )
+        allowed = "a radius > 0 like 0.05L or 0.05 (m), or critical"
+        raise InvalidInput("alpha", shortened(text) or "''", allowed)
     return radius
 
 
-def check_output(
-    path: Path | None, formats: Formats, overwrite: bool, *, name: str = "out"
-) -> None:
+def check_output(path: Path | None, formats: Formats, overwrite: bool) -> None:
     """Refuse a file that could not be written in the end, before anything is computed.
 
     Args:
         path: Where it goes, if it is asked for.
         formats: What can be written there, by suffix.
         overwrite: Whether it may replace anything else.
-        name: The option.
 
     Raises:
         InvalidInput: Another suffix, something else is there, the disk cannot hold it, or there is
@@ -218,8 +186,9 @@ def check_output(
 
     if path is None:
         refuse("left out where no file is written: give --out too", overwrite=overwrite)
-        return
-    check_place(path, format_of(path, formats, name), overwrite=overwrite, name=name)
+    else:
+        kind = format_of(path, formats, "out")
+        check_place(path, kind, overwrite=overwrite, name="out")
 
 
 def check_picture(path: Path | None, overwrite: bool) -> None:

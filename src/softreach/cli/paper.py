@@ -10,8 +10,6 @@ from cyclopts import Parameter
 from softreach.cli.console import console
 from softreach.cli.options import Overwrite, out_option
 
-__all__ = ["paper"]
-
 
 def paper(
     *,

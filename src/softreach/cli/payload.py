@@ -13,11 +13,10 @@ from softreach.cli.options import AsJson, Design, Overwrite, check_picture, out_
 from softreach.cli.values import NUMBER
 from softreach.support.errors import InvalidInput
 
-__all__ = ["payload"]
-
 
 def payload(
     design: Design,
+    /,
     *,
     share: Annotated[
         float, NUMBER, Parameter(help="Share to keep of the volume without a payload.")

@@ -18,11 +18,10 @@ if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
     from softreach.workspace import ReachableSet, ReachableSolid
 
-__all__ = ["reach"]
-
 
 def reach(
     design: Design,
+    /,
     *,
     accuracy: Annotated[
         float, NUMBER, Parameter(help="Relative error allowed in the volume.")

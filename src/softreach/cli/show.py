@@ -24,11 +24,10 @@ from softreach.cli.options import (
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["show"]
-
 
 def show(
     source: Source,
+    /,
     *,
     color: Annotated[
         str, Parameter(help="rgb, the name of a bundle, or compliance: how far the tip yields.")

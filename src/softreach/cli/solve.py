@@ -17,11 +17,10 @@ if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
     from softreach.inverse import Solution
 
-__all__ = ["solve"]
-
 
 def solve(
     design: Design,
+    /,
     *,
     target: Annotated[
         str | None, Parameter(help="Tip position x,y,z [m].", allow_leading_hyphen=True)

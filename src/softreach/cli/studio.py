@@ -15,14 +15,13 @@ if TYPE_CHECKING:
     from softreach.studio import Start
     from softreach.studio.kept_work import KeptWork
 
-__all__ = ["studio"]
-
 
 def studio(
     source: Annotated[
         str,
         Parameter(help="Design or its file (.toml), saved state (.json), cloud or atlas (.zarr)."),
     ] = "minimal_trunk",
+    /,
     *,
     host: Annotated[
         str, Parameter(help="Address to listen on; beyond this machine the page asks for a token.")

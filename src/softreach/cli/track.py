@@ -21,12 +21,11 @@ from softreach.cli.options import (
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["track"]
-
 
 def track(
     design: Design,
     path: Annotated[Path, Parameter(help="CSV file with columns x, y, z [m], in order.")],
+    /,
     *,
     start: Annotated[
         str | None,

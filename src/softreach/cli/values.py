@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from cyclopts import Parameter, Token
@@ -14,49 +14,26 @@ from softreach.support.quantity import read_number, read_whole_number, shortened
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
 
-__all__ = [
-    "NUMBER",
-    "WHOLE",
-    "activation_text",
-    "as_read",
-    "finite",
-    "key",
-    "position_text",
-    "shown",
-    "to_degrees",
-]
+
+def _read_by(read: Callable[[str], float], allowed: str) -> Parameter:
+    """Options that are read by a function from text, which raises ValueError of other text."""
+
+    def convert(kind: Any, tokens: Sequence[Token]) -> float:
+        del kind
+        try:
+            return read(tokens[0].value)
+        except ValueError:
+            name = (tokens[0].keyword or "number").lstrip("-").replace("-", "_")
+            raise InvalidInput(name, shortened(tokens[0].value) or "''", allowed) from None
+
+    return Parameter(converter=convert)
 
 
-def _whole(kind: Any, tokens: Sequence[Token]) -> int:
-    """A whole number: 400000, 400_000 or 4e5."""
-    del kind
-    try:
-        return read_whole_number(tokens[0].value)
-    except ValueError:
-        allowed = "a whole number such as 20000 or 2e4"
-        raise InvalidInput(*_name_and_value(tokens[0]), allowed) from None
-
-
-def _number(kind: Any, tokens: Sequence[Token]) -> float:
-    """A finite number: 0.5, 1e-6."""
-    del kind
-    try:
-        return read_number(tokens[0].value)
-    except ValueError:
-        allowed = "a finite number such as 0.5 or 1e-3"
-        raise InvalidInput(*_name_and_value(tokens[0]), allowed) from None
-
-
-WHOLE = Parameter(converter=_whole)
+WHOLE = _read_by(read_whole_number, "a whole number such as 20000 or 2e4")
 """Of every option that is an `int`."""
 
-NUMBER = Parameter(converter=_number)
+NUMBER = _read_by(read_number, "a finite number such as 0.5 or 1e-3")
 """Of every option that is a `float`."""
-
-
-def _name_and_value(token: Token) -> tuple[str, str]:
-    name = (token.keyword or "number").lstrip("-").replace("-", "_")
-    return name, shortened(token.value) or "''"
 
 
 def to_degrees(angles: Any) -> Any:
@@ -67,17 +44,18 @@ def to_degrees(angles: Any) -> Any:
 
 
 def as_read(values: Any, unit: str) -> tuple[Any, str]:
-    """An array and its unit as people read them: degrees for radians, m³ for m3."""
+    """Numbers and their unit as people read them: degrees for radians, m³ for m3."""
     if unit == "rad":
         return to_degrees(values), "deg"
-    return values.tolist(), {"m3": "m³", "1": ""}.get(unit, unit)
+    plain = values if isinstance(values, int | float) else values.tolist()
+    return plain, {"m3": "m³", "1": ""}.get(unit, unit)
 
 
 def activation_text(arm: Manipulator, values: Iterable[float]) -> str:
     """Activations with the names and units of their bundles: "left -1, right 0.5 N"."""
     named = zip(arm.bundle_names, values, arm.bundle_units, strict=True)
     return ", ".join(
-        f"{name} {round(value, 6):.6g}" if unit == "1" else f"{name} {value:.6g} {unit}"
+        f"{name} {round(value, 6) + 0.0:.6g}" if unit == "1" else f"{name} {value:.6g} {unit}"
         for name, value, unit in named
     )
 

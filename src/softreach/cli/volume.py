@@ -24,11 +24,10 @@ from softreach.cli.options import (
 if TYPE_CHECKING:
     from softreach.geometry.hull import Hull
 
-__all__ = ["check_hull_memory", "volume", "volume_rows"]
-
 
 def volume(
     source: Source,
+    /,
     *,
     alpha: Annotated[
         str, Parameter(help="α-shape radius: 0.05L, 0.05 (m), or critical.")

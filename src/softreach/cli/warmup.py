@@ -11,8 +11,6 @@ from cyclopts import Parameter
 
 from softreach.cli.console import console
 
-__all__ = ["warmup"]
-
 
 def warmup(
     *,
