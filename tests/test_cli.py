@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import json
+import math
 import subprocess
 import sys
 
@@ -13,11 +15,13 @@ import softreach as sr
 from softreach.arm.parameters import changed
 from softreach.arm.summary import describe
 from softreach.cli.app import app, run
+from softreach.cli.console import console
 
 # Few samples make the α-shape too fine; the command line prints that and goes on.
 pytestmark = pytest.mark.filterwarnings("always::softreach.support.errors.SoftreachWarning")
 
 COMMANDS = [name for name in app if not name.startswith("-")]
+MODULES = {"import": "import_file", "list": "listing"}
 HEAVY = {"numba", "scipy", "xarray", "matplotlib", "zarr", "pandas", "pydantic"}
 
 
@@ -49,7 +53,7 @@ def test_help_of_every_command_teaches_with_an_example_that_parses(command, caps
     words = example.split()
     assert words[0] == command
     function, bound, *_ = app.parse_args(words, exit_on_error=False, print_error=False)
-    assert function.__module__.removesuffix("_file") == f"softreach.cli.{command}"
+    assert function.__module__ == f"softreach.cli.{MODULES.get(command, command)}"
     assert bound.arguments
 
 
@@ -144,7 +148,7 @@ class TestDesign:
         assert printed_json(capsys, "design", "--schema") == json_schema()
 
     def test_a_saved_design_is_the_varied_one(self, folder, capsys):
-        assert run(["design", "redundant_trunk", "--revolution-deg", "60", "--save", "a.toml"]) == 0
+        assert run(["design", "redundant_trunk", "--revolution-deg", "60", "--out", "a.toml"]) == 0
         assert sr.Manipulator.load("a.toml") == changed(
             sr.designs.redundant_trunk(), {"revolution": np.radians(60)}
         )
@@ -205,7 +209,7 @@ class TestVolume:
 
     def test_the_hull_is_written(self, stored, folder, capsys):
         trimesh = pytest.importorskip("trimesh")
-        facts = printed_json(capsys, "volume", stored, "--alpha", "0.4L", "--hull", "hull.ply")
+        facts = printed_json(capsys, "volume", stored, "--alpha", "0.4L", "--out", "hull.ply")
         assert trimesh.load("hull.ply").volume == pytest.approx(facts["volume_L3"], rel=1e-6)
 
 
@@ -367,3 +371,87 @@ def test_an_interrupt_is_exit_code_130_and_leaves_nothing(folder, capsys, monkey
     assert run(["cloud", "minimal_trunk", "--n", "10"]) == 130
     assert capsys.readouterr().err == "interrupted: nothing half-written was left behind\n"
     assert not any(folder.iterdir())
+
+
+def strict_json(text):
+    """What JSON for machines holds; NaN and Infinity are none."""
+
+    def refused(word):
+        raise AssertionError(word)
+
+    return json.loads(text, parse_constant=refused)
+
+
+def test_json_has_null_where_there_is_no_number(capsys):
+    nothing = (math.nan, math.inf, -math.inf)
+    with console.listening():
+        console.rows("", {"gap": (math.nan, "m"), "bounds": (nothing, "")}, as_json=True)
+    assert strict_json(capsys.readouterr().out) == {"gap_m": None, "bounds": [None] * 3}
+    assert run(["list", "parameters", "minimal_trunk", "--json"]) == 0
+    records = {one["parameter"]: one for one in strict_json(capsys.readouterr().out)}
+    assert records["rings[0].material.young_modulus_pa"]["value"] is None
+
+
+class TestList:
+    @pytest.mark.parametrize("kind", ["designs", "materials", "metrics"])
+    def test_the_names_are_those_of_the_library(self, kind, capsys):
+        from softreach.arm.materials import material_names
+        from softreach.atlas.metrics import METRIC_GROUPS
+
+        names = {
+            "designs": list(sr.designs.__all__),
+            "materials": list(material_names()),
+            "metrics": [metric.name for group in METRIC_GROUPS.values() for metric in group],
+        }[kind]
+        records = printed_json(capsys, "list", kind)
+        assert [next(iter(record.values())) for record in records] == names
+        assert run(["list", kind]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert [line.split()[0] for line in lines[1:]] == names
+
+    def test_every_listed_parameter_can_be_set_to_its_value(self, capsys):
+        records = printed_json(capsys, "list", "parameters", "lce_arm", "--payload", "2g")
+        words = [
+            word
+            for one in records
+            if "." in one["parameter"] and "helical_angle" not in one["parameter"]  # or revolution
+            for word in ("--set", f"{one['parameter']}={one['value']!r}")
+        ]
+        assert run(["list", "parameters", "lce_arm", "--payload", "2g"]) == 0
+        plain = capsys.readouterr().out
+        assert "loads.payload_kg" in plain
+        assert run(["list", "parameters", "lce_arm", *words]) == 0
+        assert capsys.readouterr().out == plain
+
+
+def test_a_quiet_command_prints_results_only(stored, capsys):
+    command = ["volume", stored, "--alpha", "0.08L"]
+    assert run(command) == 0
+    loud = capsys.readouterr()
+    assert "warning: " in loud.err
+    assert run([*command, "-q"]) == 0
+    quiet = capsys.readouterr()
+    assert (quiet.err, quiet.out) == ("", loud.out)
+    assert run(command) == 0
+    assert capsys.readouterr().err == loud.err
+
+
+def test_a_verbose_command_says_where_an_error_comes_from(capsys):
+    assert run(["-v", "design", "nowhere.toml"]) == 2
+    text = capsys.readouterr().err
+    assert "Traceback" in text
+    assert text.endswith("error: design = nowhere.toml: must be a file that exists\n")
+
+
+def test_every_command_calls_its_output_by_one_name():
+    written = [name for name in COMMANDS if "out" in inspect.signature(_function(name)).parameters]
+    assert set(written) >= {"cloud", "volume", "reach", "design", "track", "show", "demo"}
+    for name in set(written) - {"export", "import"}:
+        words = ["--out", "a.xyz"], ["-o", "a.xyz"]
+        least = {"track": ["x", "y"]}.get(name, [] if name in ("demo", "paper") else ["x"])
+        long, short = (app.parse_args([name, *least, *one])[1].arguments["out"] for one in words)
+        assert long == short
+
+
+def _function(name):
+    return app[name].default_command or (lambda: None)

@@ -121,7 +121,7 @@ def test_wrong_input_costs_one_line_and_exit_code_2(arguments, message, capsys):
 def test_the_reachable_set_is_reported_drawn_and_written(tmp_path, capsys):
     surface, figure = tmp_path / "reach.ply", tmp_path / "reach.png"
     arguments = ["reach", "minimal_trunk", "--accuracy", "0.02", "--json"]
-    assert run([*arguments, "--surface", str(surface), "--figure", str(figure)]) == 0
+    assert run([*arguments, "-o", str(surface), "--out", str(figure)]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["volume_L3"] == pytest.approx(0.691, abs=0.002)
     assert 0 < found["unreachability"] < 1

@@ -9,7 +9,8 @@ import pytest
 
 from softreach.cli.app import app
 from softreach.cli.changes import Changes
-from softreach.cli.numbers import NUMBER, WHOLE
+from softreach.cli.options import Sampling
+from softreach.cli.values import NUMBER, WHOLE
 from softreach.support.quantity import read_number, read_whole_number
 from tests.abuse.refusals import refusal_of
 
@@ -70,12 +71,13 @@ WRONG = [
         )
     ),
     # other whole numbers
-    case(f"solve {TRUNK} --target 0,0,1 --family 1.5", f"family = 1.5: {WHOLE_NUMBER}"),
-    case(f"solve {TRUNK} --target 0,0,1 --family 0", "family = 0: must be a whole number"),
-    case(f"solve {TRUNK} --target 0,0,1 --family 1e9", "must be a whole number, from 1 to"),
+    case("solve redundant_trunk --target 0,0,1 --family 1.5", f"family = 1.5: {WHOLE_NUMBER}"),
+    case("solve redundant_trunk --target 0,0,1 --family 0", "family = 0: must be a whole number"),
+    case("solve redundant_trunk --target 0,0,1 --family 1e9", "must be a whole number, from 1 to"),
     case("atlas build a.zarr --vary taper_deg=0,1 --workers 0", "workers = 0: must be"),
     case("atlas build a.zarr --vary taper_deg=0,1 --workers -2", "workers = -2: must be"),
     case("atlas build a.zarr --vary taper_deg=0,1 --workers 1.5", f"workers = 1.5: {WHOLE_NUMBER}"),
+    case("atlas figures a.zarr --panels 0", "panels = 0: must be a whole number, 1 or more"),
     case("atlas build a.zarr --vary taper_deg=0,1 --shard １/2", "shard = １/2: must be i/k"),
     case("atlas build a.zarr --vary taper_deg=0,1 --shard 2/2", "shard = 2/2: must be i/k"),
     case("atlas build a.zarr --vary taper_deg=0,1 --shard /", "shard = /: must be i/k"),
@@ -139,6 +141,60 @@ WRONG = [
         )
     ),
 ]
+
+
+STORED = "must be left out for a stored cloud"
+NOT_WRITTEN = "overwrite = True: must be left out where no file is written"
+
+IGNORED = [
+    case("volume a.zarr --n 5", f"n = 5: {STORED}"),
+    case("volume a.zarr --seed 0", f"seed = 0: {STORED}"),
+    case("show a.zarr --sampler uniform", f"sampler = uniform: {STORED}"),
+    case("show a.zarr --taper-deg 1", f"taper_deg = 1.0: {STORED}"),
+    case(f"cloud {TRUNK} --n 1000 --sampler grid --seed 1", "seed = 1: must be left out for the"),
+    case("design --schema --out a.toml", "out = a.toml: must be left out with --schema"),
+    case(f"design {TRUNK} --schema", f"design = {TRUNK}: must be left out with --schema"),
+    case("design --schema --taper-deg 1", "taper_deg = 1.0: must be left out with --schema"),
+    case(f"design {TRUNK} --overwrite", NOT_WRITTEN),
+    case(f"volume {TRUNK} --overwrite", NOT_WRITTEN),
+    case(f"reach {TRUNK} --overwrite", NOT_WRITTEN),
+    case(f"equilibria {TRUNK} --overwrite", NOT_WRITTEN),
+    case("payload lce_arm --gravity up --overwrite", NOT_WRITTEN),
+    case(f"equilibria {TRUNK} --view top", "view = top: must be left out without a picture"),
+    case(f"solve {TRUNK} --target 0,0,1 --family 2", "family = 2: must be left out for a design"),
+    case(f"solve {TRUNK} --target 0,0,1 --prove-least", "prove_least = True: must be left out for"),
+    case("export a.zarr a.csv --activation=0,0,0", "activation = 0,0,0: must be left out for a cl"),
+    case(
+        f"export {TRUNK} a.jl --activation=0,0,0", "activation = 0,0,0: must be left out for a fi"
+    ),
+    case("import a.jl a.toml --design b.toml", "design = b.toml: must be left out for a filament"),
+    case("import a.jl a.toml --tol 1e-6", "tol = 1e-06: must be left out for a filament"),
+    case(
+        "atlas build a.zarr --space a.toml --design lce_arm", "design = lce_arm: must be left out"
+    ),
+    case("atlas build a.zarr --space a.toml --payload 1g", "payload = 1g: must be left out with"),
+    case(
+        "atlas build a.zarr --vary taper_deg=0,1 --metrics exact --alpha 0.1L",
+        "alpha = 0.1L: must be left out without the metrics concave",
+    ),
+    case(
+        "atlas build a.zarr --vary taper_deg=0,1 --workers 2 --scheduler tcp://localhost:1",
+        "scheduler = tcp://localhost:1: must be left out with --workers",
+    ),
+    case(
+        "atlas build a.zarr --vary taper_deg=0,1 --scheduler tcp://localhost:1 --scheduler-file a",
+        "scheduler_file = a: must be left out with --scheduler",
+    ),
+    case(f"design {TRUNK} -q -v", "quiet = True: must be left out with --verbose"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "expected"), IGNORED)
+def test_an_option_that_would_be_ignored_is_refused_in_one_line(
+    arguments, expected, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    assert expected in refusal_of(arguments, capsys, tmp_path)
 
 
 @pytest.mark.parametrize(("arguments", "expected"), WRONG)
@@ -215,7 +271,7 @@ def _commands():
 
 
 def _options():
-    for function in (*_commands(), Changes):
+    for function in (*_commands(), Changes, Sampling):
         for name, hint in typing.get_type_hints(function, include_extras=True).items():
             yield pytest.param(hint, id=f"{getattr(function, '__name__', function)} {name}")
 

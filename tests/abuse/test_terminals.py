@@ -10,7 +10,7 @@ import sys
 import pytest
 
 from softreach.cli.app import run
-from softreach.cli.terminal import spelled, spelling_out
+from softreach.cli.console import console
 
 ENCODINGS = ["ascii", "latin-1", "cp1252", "cp437", "koi8-r", "utf-8"]
 
@@ -57,31 +57,12 @@ def test_every_encoding_can_show_what_is_said(arguments, code, expected, encodin
     assert expected in printed(out) + printed(err)
 
 
-@pytest.mark.parametrize(
-    ("character", "text"),
-    [
-        ("γ", "gamma"), ("Ω", "Omega"), ("φ", "phi"), ("ζ", "zeta"), ("α", "alpha"),
-        ("³", "^3"), ("²", "^2"), ("°", " deg"), ("±", "+-"), ("×", "x"), ("Å", "A"),
-        ("é", "e"), ("ﬁ", "fi"), ("中", "\\u4e2d"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_shown_is_spelled_out(character, text):
-    assert spelled(character) == text
-
-
-def test_a_terminal_that_has_a_letter_shows_the_letter(streams):
+def test_letters_that_cannot_be_shown_are_escaped(streams):
     out, _ = streams("latin-1")
-    with spelling_out():
-        out.write("L³ ± é γ")
-    assert printed(out) == "L³ ± é gamma"
-
-
-def test_a_name_of_a_file_that_is_no_text_keeps_its_bytes(streams):
-    out, _ = streams("utf-8")
-    with spelling_out():
-        out.write(os.fsdecode(b"caf\xe9.toml"))
-    out.flush()
-    assert out.buffer.getvalue() == b"caf\xe9.toml"
+    with console.listening():
+        console.line("L³ ± é γ")
+        console.line(os.fsdecode(b"caf\xe9.toml"))
+    assert printed(out) == "L³ ± é \\u03b3\ncaf\\udce9.toml\n"
 
 
 def test_the_streams_are_as_they_were_afterwards(streams):

@@ -62,3 +62,17 @@ def test_the_status_says_what_is_wrong_with_which_design(tmp_path, capsys):
     said = capsys.readouterr().out
     assert "number 3" in said
     assert "no luck" in said
+
+
+def test_an_atlas_has_all_groups_of_metrics_unless_some_are_chosen(tmp_path, monkeypatch, capsys):
+    from softreach import atlas as library
+    from softreach.atlas.metrics import METRIC_GROUPS
+
+    chosen = {}
+    monkeypatch.setattr(library, "build_atlas", lambda *_, **options: chosen.update(options))
+    monkeypatch.setattr(atlas_command, "status", lambda *_, **__: None)
+    assert run(["atlas", "build", str(tmp_path / "a.zarr"), "--vary", "taper_deg=0,2"]) == 0
+    assert chosen["metrics"] == tuple(METRIC_GROUPS)
+    assert run(["atlas", "build", "--help"]) == 0
+    text = capsys.readouterr().out
+    assert all(group in text for group in METRIC_GROUPS)

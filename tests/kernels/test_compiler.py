@@ -27,7 +27,7 @@ import softreach
 import softreach as sr
 import softreach.kernels.compiler
 from softreach import kernels
-from softreach.cli.first_run import compilation_announced
+from softreach.cli.console import console
 from softreach.kernels import parts
 from softreach.kernels.compiler import FAST, kernel, strict
 
@@ -77,7 +77,7 @@ def test_whoever_listens_hears_what_is_compiled(caplog):
 
 def test_the_command_line_announces_compilation_once(capsys):
     log = logging.getLogger("softreach.kernels.compiler")
-    with compilation_announced():
+    with console.listening():
         log.info("compiling one")
         log.info("compiling another")
     log.info("compiling after the command")

@@ -145,7 +145,7 @@ def test_the_command_line_takes_it(tmp_path, capsys):
         ["cloud", design, "--n", "10", "--out", cloud],
         ["show", cloud, "--out", str(tmp_path / "rod.png")],
         ["reach", design],
-        ["equilibria", design, "--figure", str(tmp_path / "all.png")],
+        ["equilibria", design, "--out", str(tmp_path / "all.png")],
         ["equilibria", design, "--json"],
     ):
         assert run(arguments) == 0, capsys.readouterr().err

@@ -1,20 +1,26 @@
-"""`softreach atlas`: sweeps over designs; build, status, verify, figures, best."""
+"""`softreach atlas`: sweeps over designs; build, status, verify, best, figures."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-from softreach.cli.changes import UNCHANGED, Changes
-from softreach.cli.inputs import AsJson, Durable, Sampler, Seed, design_from
-from softreach.cli.numbers import WHOLE
-from softreach.cli.output import print_rows
-from softreach.cli.output_files import Overwrite, check_picture
-from softreach.support.arguments import as_whole_number
+from softreach.cli.changes import UNCHANGED, Changes, design_from
+from softreach.cli.console import Rows, console
+from softreach.cli.options import (
+    SAMPLING,
+    AsJson,
+    Durable,
+    Overwrite,
+    Sampling,
+    check_picture,
+    out_option,
+    refuse,
+)
+from softreach.cli.values import WHOLE, as_read
 from softreach.support.errors import InvalidInput, MissingExtra
 from softreach.support.quantity import numbers_in, shortened
 
@@ -25,63 +31,82 @@ if TYPE_CHECKING:
     from softreach.atlas.executor import ExecutorLike
     from softreach.atlas.space import DesignSpace
 
-__all__ = ["atlas", "best", "build", "figures", "status", "verify"]
 
-atlas = App(name="atlas", help="Clouds and volumes of whole families of designs.")
+atlas = App(
+    name="atlas",
+    help="""Compute and compare whole families of designs, kept in one store.
+
+Example: softreach atlas build a.zarr --vary revolution_deg=0:108:4 --vary taper_deg=0:3:4
+""",
+)
 
 Store = Annotated[str, Parameter(help="The atlas: a folder (.zarr) or a URL.")]
+Shard = Annotated[
+    str, Parameter(help="Only part i of k, i from 0, as i/k; all k may share the store.")
+]
 
 
 @atlas.command
 def build(
     store: Store,
+    /,
     *,
-    space: Annotated[Path | None, Parameter(help="Design space (.toml); or use --vary.")] = None,
-    design: Annotated[str, Parameter(help="Base design for --vary.")] = "minimal_trunk",
     vary: Annotated[
         list[str] | None,
         Parameter(
             help="A parameter of the grid: taper_deg=0:3:16, left.bundles=1,2, or "
-            "rings[0].material.young_modulus_pa=1e5,1e6."
+            "rings[0].material.young_modulus_pa=1e5,1e6. May be repeated."
         ),
     ] = None,
-    changes: Changes = UNCHANGED,
-    n: Annotated[int, WHOLE, Parameter(help="Samples of each design.")] = 400_000,
-    seed: Seed = 0,
-    sampler: Sampler = "uniform",
+    design: Annotated[
+        str | None, Parameter(help="Design that --vary changes: minimal_trunk if left out.")
+    ] = None,
+    space: Annotated[
+        Path | None, Parameter(help="File of a design space (.toml), instead of --vary.")
+    ] = None,
+    sampling: Sampling = SAMPLING,
     alpha: Annotated[
-        str, Parameter(help="Radius of the α-shapes over the length of each design, as in 0.05L.")
-    ] = "0.05L",
+        str | None,
+        Parameter(help="Radius of the α-shapes over the length of each design: 0.05L if left out."),
+    ] = None,
     metrics: Annotated[
-        str, Parameter(help="Groups of metrics, comma-separated.")
-    ] = "extent,convex,concave,exact,curvature",
-    keep_clouds: Annotated[bool, Parameter(help="Store the tips.")] = True,
+        str | None,
+        Parameter(
+            help="Groups of metrics, comma-separated, if not all: extent, convex, concave, exact, "
+            "curvature, stability."
+        ),
+    ] = None,
+    keep_clouds: Annotated[
+        bool, Parameter(negative="--no-keep-clouds", help="Store the tips.")
+    ] = True,
     workers: Annotated[
         int | None, WHOLE, Parameter(help="Use this many processes instead of threads.")
     ] = None,
     scheduler: Annotated[str | None, Parameter(help="Dask scheduler: tcp://host:port")] = None,
     scheduler_file: Annotated[Path | None, Parameter(help="Dask scheduler file.")] = None,
-    shard: Annotated[
-        str, Parameter(help="Only part i of k, i from 0, as i/k; all k may share the store.")
-    ] = "0/1",
+    shard: Shard = "0/1",
+    changes: Changes = UNCHANGED,
     durable: Durable = False,
     json: AsJson = False,
 ) -> None:
-    """Compute the cloud and the metrics of every design; run again to continue, or to mend damage.
+    """Compute the clouds and the metrics of all designs.
 
-    Examples: softreach atlas build a.zarr --vary revolution_deg=0:108:16 --vary taper_deg=0:3:16
-    softreach atlas build atlas.zarr --space space.toml --shard 3/8
+    The same command continues after an interruption, and computes again what is damaged.
+
+    Example: softreach atlas build a.zarr --vary revolution_deg=0:108:16 --vary taper_deg=0:3:16
     """
     from softreach.atlas import build_atlas
+    from softreach.atlas.metrics import METRIC_GROUPS
 
+    groups = tuple(METRIC_GROUPS) if metrics is None else tuple(metrics.split(","))
+    if "concave" not in groups:
+        refuse("left out without the metrics concave", alpha=alpha)
     build_atlas(
         _space_of(space, design, vary, changes),
         store,
-        n,
-        seed,
-        sampler=sampler,
-        alpha_over_length=_over_length(alpha),
-        metrics=tuple(metrics.split(",")),
+        **sampling.arguments,
+        alpha_over_length=0.05 if alpha is None else _over_length(alpha),
+        metrics=groups,
         keep_clouds=keep_clouds,
         executor=_executor(workers, scheduler, scheduler_file),
         shard=_shard(shard),
@@ -91,8 +116,8 @@ def build(
 
 
 @atlas.command
-def status(store: Store, *, json: AsJson = False) -> None:
-    """How many designs are done, and what is wrong with the others.
+def status(store: Store, /, *, json: AsJson = False) -> None:
+    """Count the designs that are done, and explain the others.
 
     Example: softreach atlas status atlas.zarr
     """
@@ -102,46 +127,49 @@ def status(store: Store, *, json: AsJson = False) -> None:
 
 
 @atlas.command
-def verify(store: Store, *, json: AsJson = False) -> None:
-    """Read all of an atlas and check it; the command that built it computes again what is damaged.
+def verify(store: Store, /, *, json: AsJson = False) -> None:
+    """Read all of an atlas and check it.
+
+    The command that built it computes again what is damaged.
 
     Example: softreach atlas verify atlas.zarr
     """
     from softreach.atlas import verify_atlas
 
-    found = verify_atlas(store)
-    _print_status(store, found, json)
-    if found.damaged:
+    state = verify_atlas(store)
+    _print_status(store, state, json)
+    if state.damaged:
         allowed = "0; the command that built the atlas computes them again"
-        raise InvalidInput(f"damaged designs of {store}", found.damaged, allowed)
+        raise InvalidInput(f"damaged designs of {store}", state.damaged, allowed)
 
 
-def _print_status(store: str, found: AtlasStatus, json: bool) -> None:
+def _print_status(store: str, state: AtlasStatus, json: bool) -> None:
     counts = ("designs", "done", "todo", "failed", "gaps", "unstable", "damaged")
-    rows: dict[str, tuple[Any, str]] = {name: (getattr(found, name), "") for name in counts}
-    rows["tips verified"] = ("yes" if found.tips_verified else "no: softreach atlas verify", "")
+    rows: Rows = {name: (getattr(state, name), "") for name in counts}
+    rows["tips verified"] = ("yes" if state.tips_verified else "no: softreach atlas verify", "")
     if json:
-        rows["tips verified"] = (found.tips_verified, "")
-        rows["messages"] = ({str(k): text for k, text in found.messages.items()}, "")
+        rows["tips verified"] = (state.tips_verified, "")
+        rows["messages"] = ({str(k): text for k, text in state.messages.items()}, "")
     else:
-        rows |= {f"number {k}": (text, "") for k, text in list(found.messages.items())[:10]}
-    print_rows(f"atlas {store}", rows, json)
+        rows |= {f"number {k}": (text, "") for k, text in list(state.messages.items())[:10]}
+    console.rows(f"atlas {store}", rows, json)
 
 
 @atlas.command
 def best(
     store: Store,
-    metric: Annotated[str, Parameter(help="What to compare, e.g. exact_volume.")],
+    metric: Annotated[str, Parameter(help="A metric, as softreach list metrics names it.")],
+    /,
     *,
-    smallest: Annotated[bool, Parameter(negative="", help="Prefer small values.")] = False,
+    smallest: Annotated[bool, Parameter(help="Prefer small values.")] = False,
     where: Annotated[
         list[str] | None,
-        Parameter(help="A constraint: unreachability<=0.4 or taper_deg>=1."),
+        Parameter(help="A constraint, unreachability<=0.4 or taper_deg>=1. May be repeated."),
     ] = None,
-    count: Annotated[int, WHOLE, Parameter(help="How many designs.")] = 1,
+    count: Annotated[int, WHOLE, Parameter(help="Number of designs.")] = 1,
     json: AsJson = False,
 ) -> None:
-    """The designs with the largest (or smallest) metric that meet the constraints.
+    """Find the designs with the largest metric, under constraints.
 
     Example: softreach atlas best atlas.zarr exact_volume --where "taper_deg<=1" --count 3
     """
@@ -150,44 +178,53 @@ def best(
     opened = open_atlas(store)
     written = _written_coordinates(opened)
     limits = dict(_constraint(text, written) for text in where or ())
-    found = best_designs(opened, metric, smallest=smallest, where=limits, count=count)
-    names = [name for name in found.variables if found[name].dtype.kind in "fi"]
-    columns = [_written(found[name]) for name in names]
-    rows: dict[str, tuple[Any, str]] = {name: (values, unit) for name, values, unit in columns}
-    print_rows(f"best {metric} of {store}", rows, json)
+    designs = best_designs(opened, metric, smallest=smallest, where=limits, count=count)
+    columns = {str(name): column for name, column in designs.variables.items()}
+    rows: Rows = {
+        name: as_read(column.values, str(column.attrs.get("units", "1")))
+        for name, column in columns.items()
+        if column.dtype.kind in "fi"
+    }
+    console.rows(f"best {metric} of {store}", rows, json)
 
 
 @atlas.command
 def figures(
     store: Store,
+    /,
     *,
-    out: Annotated[Path, Parameter(help="Folder for the figures.")] = Path("figures"),
     panels: Annotated[
         int, WHOLE, Parameter(help="Largest number of columns and rows of a sheet.")
     ] = 7,
+    out: Annotated[Path, out_option("Folder for the figures.")] = Path("figures"),
     overwrite: Overwrite = False,
 ) -> None:
-    """Draw the atlas, each figure as PNG and PDF: sheets, corners, maps, curvature.
+    """Draw the atlas: sheets, corners, maps, curvature.
+
+    Each figure is written as PNG and PDF.
 
     Example: softreach atlas figures atlas.zarr --out figures
     """
-    import sys
-
     from softreach.atlas import open_atlas
     from softreach.paper.atlas_figures import atlas_figures
     from softreach.plot.style import pyplot, save_figure
+    from softreach.support.arguments import as_whole_number
 
+    as_whole_number("panels", panels, 1)
     for suffix in ("png", "pdf"):  # tried by a name that any of them may have
-        check_picture("out", out / f"clouds.{suffix}", overwrite)
+        check_picture(out / f"clouds.{suffix}", overwrite)
     for name, figure in atlas_figures(open_atlas(store), panels):
         for suffix in ("png", "pdf"):
             save_figure(figure, out / f"{name}.{suffix}", overwrite=overwrite)
-            sys.stdout.write(f"{out / name}.{suffix}\n")
+            console.line(f"{out / name}.{suffix}")
         pyplot().close(figure.get_figure(root=True))
 
 
+_NAMED_IN_FILE = "left out with --space, whose file names the design"
+
+
 def _space_of(
-    path: Path | None, design: str, vary: list[str] | None, changes: Changes
+    path: Path | None, design: str | None, vary: list[str] | None, changes: Changes
 ) -> DesignSpace:
     from softreach.arm.file.document import LONGEST
     from softreach.atlas.space import DesignSpace
@@ -197,9 +234,10 @@ def _space_of(
     if (path is None) == (vary is None):
         raise InvalidInput("space", path, "given, or --vary, and not both")
     if path is not None:
-        changes.refuse("left out with --space, whose file names the design")
+        refuse(_NAMED_IN_FILE, design=design)
+        changes.refuse(_NAMED_IN_FILE)
         return parse_space(read_text("space", path, LONGEST), design_from)
-    base = design_from(design, changes)
+    base = design_from(design or "minimal_trunk", changes)
     return DesignSpace.grid(
         base, **dict(parse_parameter(base, *_key_and_values(text)) for text in vary or ())
     )
@@ -215,10 +253,14 @@ def _executor(
     workers: int | None, scheduler: str | None, scheduler_file: Path | None
 ) -> ExecutorLike:
     if workers is not None:
+        refuse("left out with --workers", scheduler=scheduler, scheduler_file=scheduler_file)
         from softreach.atlas.processes import WORKERS, worker_processes
+        from softreach.support.arguments import as_whole_number
 
         return worker_processes(as_whole_number("workers", workers, *WORKERS))
-    if scheduler is None and scheduler_file is None:
+    if scheduler is not None:
+        refuse("left out with --scheduler", scheduler_file=scheduler_file)
+    elif scheduler_file is None:
         return None
     try:
         from distributed import Client
@@ -230,14 +272,10 @@ def _executor(
 def _over_length(text: str) -> float:
     """0.05 from `0.05L`: a length in m would not suit designs of every length."""
     values = numbers_in(text.removesuffix("L"), 1) if text.endswith("L") else None
-    radius = values[0] if values else 0.0
-    if not 0 < radius < math.inf:
-        raise InvalidInput(
-            "alpha",
-            shortened(text) or "''",
-            "a radius > 0 over the length of each design, like 0.05L",
-        )
-    return radius
+    if not values or values[0] <= 0:
+        allowed = "a radius > 0 over the length of each design, like 0.05L"
+        raise InvalidInput("alpha", shortened(text) or "''", allowed)
+    return values[0]
 
 
 def _shard(text: str) -> tuple[int, int]:
@@ -248,7 +286,7 @@ def _shard(text: str) -> tuple[int, int]:
 
 
 def _written_coordinates(atlas: xr.Dataset) -> dict[str, xr.DataArray]:
-    """The parameters of an atlas by their names with units."""
+    """Parameters of an atlas by their names with units."""
     from softreach.arm.parameters.written import written_name
 
     return {
@@ -277,13 +315,3 @@ def _constraint(
         name, unit = str(written[name].name), str(written[name].attrs.get("units", "1"))
         value = from_written(value, unit)
     return name, (None, value) if "<" in sign else (value, None)
-
-
-def _written(column: xr.DataArray) -> tuple[str, list[float], str]:
-    """Name, values and unit as people read them."""
-    import numpy as np
-
-    unit = str(column.attrs.get("units", "1"))
-    if unit == "rad":
-        return str(column.name), np.round(np.degrees(column.values), 9).tolist(), "deg"
-    return str(column.name), column.values.tolist(), {"m3": "m³", "1": ""}.get(unit, unit)

@@ -1,24 +1,23 @@
-"""Options that change a design before it is asked: angles, loads, any parameter."""
+"""The design that a command works on, and the options that change it first."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import Parameter
+from cyclopts import Group, Parameter
 
-from softreach.cli.numbers import NUMBER
-from softreach.support.errors import InvalidInput
+from softreach.cli.values import NUMBER
+from softreach.support.errors import InvalidDesign, InvalidInput
 
 if TYPE_CHECKING:
     from softreach.arm.loads import Loads
     from softreach.arm.manipulator import Manipulator
     from softreach.arm.parameters.parameter import Parameter as DesignParameter
 
-__all__ = ["UNCHANGED", "Changes", "read_mass"]
 
 _GRAVITY = {
     "down": (0.0, 0.0, -9.81),
@@ -28,10 +27,10 @@ _GRAVITY = {
     "sideways": (9.81, 0.0, 0.0),
     "none": (0.0, 0.0, 0.0),
 }
-"""In the base frame, where an arm at rest points along +z."""
+"""In the base frame, where a straight arm points along +z."""
 
 
-@Parameter(name="*", group="Changes of the design")
+@Parameter(name="*", group=Group("Changes of the design", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class Changes:
     """What a command changes of the design that it takes."""
@@ -39,24 +38,18 @@ class Changes:
     revolution_deg: Annotated[
         float | None,
         NUMBER,
-        Parameter(help="Give every helical fiber this revolution [deg], each in its own sense."),
+        Parameter(help="Revolution of every helical fiber [deg], each in its own sense."),
     ] = None
-    taper_deg: Annotated[
-        float | None, NUMBER, Parameter(help="Use this taper angle instead [deg].")
-    ] = None
+    taper_deg: Annotated[float | None, NUMBER, Parameter(help="Taper angle [deg].")] = None
     payload: Annotated[
         str | None,
-        Parameter(
-            help="Mass at the tip with its unit (g, kg, mg): 200g. Gravity is down unless given.",
-            allow_leading_hyphen=True,
-        ),
+        Parameter(help="Mass at the tip with its unit: 200g.", allow_leading_hyphen=True),
     ] = None
     gravity: Annotated[
         str | None,
         Parameter(
-            help="Gravity in the base frame, where the arm at rest points along +z: down "
-            "(or upright: the arm stands on its base, 0,0,-9.81), up (or hanging: it hangs from "
-            "its base, 0,0,9.81), sideways (9.81,0,0), none, or x,y,z [m/s²].",
+            help="down (with loads, if left out), up, sideways, none, or x,y,z [m/s²] in the base "
+            "frame, whose +z points along the straight arm: with up it hangs from its base.",
             allow_leading_hyphen=True,
         ),
     ] = None
@@ -71,25 +64,18 @@ class Changes:
         list[str] | None,
         Parameter(
             name="--set",
-            negative="",
-            help="PATH=VALUE of any parameter, as in atlases; the unit stands in the value or in "
-            "the name: rings[0].material.young_modulus=1MPa, left.offset_deg=30, "
-            "loads.payload_kg=0.2. May be repeated.",
+            help="PATH=VALUE of any parameter, as softreach list parameters DESIGN names them: "
+            "left.offset_deg=30, or with the unit in the value, left.offset=30deg. May be "
+            "repeated.",
         ),
     ] = None
 
     @property
     def given(self) -> dict[str, object]:
         """The options that were given, by their names."""
-        every = {
-            "revolution_deg": self.revolution_deg,
-            "taper_deg": self.taper_deg,
-            "payload": self.payload,
-            "gravity": self.gravity,
-            "tip_force": self.tip_force,
-            "set": ", ".join(self.settings) if self.settings else None,
-        }
-        return {name: value for name, value in every.items() if value is not None}
+        options = vars(self) | {"set": ", ".join(self.settings) if self.settings else None}
+        del options["settings"]
+        return {name: value for name, value in options.items() if value is not None}
 
     def applied_to(self, arm: Manipulator) -> Manipulator:
         """The changed design.
@@ -119,28 +105,25 @@ class Changes:
             raise InvalidInput(name, value, why)
 
     def _angles(self) -> dict[str, float]:
+        from softreach.arm.parameters.written import from_written
+
         angles = {"revolution": self.revolution_deg, "taper": self.taper_deg}
-        return {name: math.radians(deg) for name, deg in angles.items() if deg is not None}
+        return {name: from_written(x, "rad") for name, x in angles.items() if x is not None}
 
     def _pairs(self) -> Iterator[tuple[str, str]]:
         """Name and value of every setting; the name of an actuator may hold another =."""
-        named: set[str] = set()
+        names: set[str] = set()
         for text in self.settings or ():
             name, sign, value = (part.strip() for part in text.rpartition("="))
             if not sign or not name or not value:
                 raise InvalidInput("set", text, "PATH=VALUE, such as taper=2deg")
-            if name in named:
+            if name in names:
                 raise _given_twice(name)
-            named.add(name)
+            names.add(name)
             yield name, value
 
     def _loaded(self, arm: Manipulator, others: bool) -> Manipulator:
-        """The arm with the loads that it has and those that are given; none where all are zero.
-
-        Args:
-            arm: The arm.
-            others: Whether settings change more of its loads.
-        """
+        """The arm with the loads it has and those given; none where all are zero and stay so."""
         from softreach.arm.loads import Loads
 
         loads = (arm.loads or Loads()).replace(**self._loads())
@@ -151,38 +134,68 @@ class Changes:
 
     def _check_matter(self, loads: Loads, arm: Manipulator) -> None:
         """Ask in one line for the moduli and densities that loads need."""
-        lacking = [
-            fault.path
-            for fault in loads.section_faults(arm.section, arm.length)
-            if fault.path.endswith(("young_modulus", "density"))
-        ]
+        examples = {"young_modulus": "1MPa", "density": "1000kg/m3"}
+        faults = loads.section_faults(arm.section, arm.length)
+        lacking = {fault.path: examples.get(fault.path.rpartition(".")[2]) for fault in faults}
+        lacking = {path: example for path, example in lacking.items() if example}
         if lacking:
-            given = {name: value for name, value in self.given.items() if "_deg" not in name}
-            examples = {"young_modulus": "1MPa", "density": "1000kg/m3"}
-            options = (f"--set {path}={examples[path.rpartition('.')[2]]}" for path in lacking)
-            weightless = any(path.endswith("density") for path in lacking)
-            raise InvalidInput(
-                ", ".join(given),
-                ", ".join(map(str, given.values())),
-                f"on an arm with {' and '.join(lacking)}",
-                f"give them in the design file, or as {' '.join(options)}"
-                + (" (no density is needed with --gravity none)" if weightless else ""),
-            )
+            given = {name: str(value) for name, value in self.given.items() if "_deg" not in name}
+            options = " ".join(f"--set {path}={example}" for path, example in lacking.items())
+            hint = f"give them in the design file, or as {options}"
+            if examples["density"] in lacking.values():
+                hint += " (no density is needed with --gravity none)"
+            allowed = f"on an arm with {' and '.join(lacking)}"
+            raise InvalidInput(", ".join(given), ", ".join(given.values()), allowed, hint)
 
     def _loads(self) -> dict[str, object]:
-        found: dict[str, object] = {}
+        loads: dict[str, object] = {}
         if self.payload is not None:
-            found["payload"] = read_mass("payload", self.payload)
+            loads["payload"] = read_mass("payload", self.payload)
         if self.gravity is not None:
-            found["gravity"] = _GRAVITY.get(self.gravity) or _triple(
+            loads["gravity"] = _GRAVITY.get(self.gravity) or _vector(
                 "gravity", self.gravity, "m/s²", f"{', '.join(_GRAVITY)}, or "
             )
         if self.tip_force is not None:
-            found["tip_force"] = _triple("tip_force", self.tip_force, "N")
-        return found
+            loads["tip_force"] = _vector("tip_force", self.tip_force, "N")
+        return loads
 
 
 UNCHANGED = Changes()
+
+
+def design_from(text: str, changes: Changes = UNCHANGED) -> Manipulator:
+    """The design of that name or file, changed as asked.
+
+    Raises:
+        InvalidInput: There is no such design.
+        InvalidDesign: No such arm can exist; in the terms of files.
+    """
+    from softreach.arm import file
+    from softreach.arm.tables import check_extension
+
+    arm = _unchanged(text)
+    try:
+        changed = changes.applied_to(arm)
+        check_extension(changed)
+        return changed
+    except InvalidDesign as error:
+        one_option = len(error.faults) == 1 and changes.given
+        raise file.in_file_terms(error, "" if one_option else text) from None
+
+
+def _unchanged(text: str) -> Manipulator:
+    from softreach.arm import designs
+    from softreach.arm.manipulator import Manipulator
+
+    if text in designs.__all__:
+        return getattr(designs, text)()
+    if Path(text).is_file() and not text.endswith(".jl"):
+        return Manipulator.load(text)
+    if text.endswith(".toml"):
+        raise InvalidInput("design", text, "a file that exists")
+    hint = f"softreach import {text} {text[:-3]}.toml makes one of a filament"
+    allowed = f"a .toml file, or one of {', '.join(designs.__all__)}"
+    raise InvalidInput("design", text, allowed, hint if text.endswith(".jl") else "")
 
 
 def read_mass(name: str, text: str) -> float:
@@ -203,33 +216,21 @@ def read_mass(name: str, text: str) -> float:
     return mass
 
 
-def _triple(name: str, text: str, unit: str, others: str = "") -> tuple[float, ...]:
-    """Three numbers, in the SI unit if none follows them."""
+def _vector(name: str, text: str, unit: str, others: str = "") -> tuple[float, ...]:
+    """Three numbers x,y,z, in the SI unit if none follows the last."""
     from softreach.support.quantity import read_quantity, unit_names
 
-    *first, last = text.split(",")
+    names = unit_names(unit)
+    written = max((one for one in names if text.rstrip().endswith(one)), key=len, default="")
+    parts = text.rstrip().removesuffix(written).split(",")
     try:
-        z, written = _number_and_unit(last, unit)
-        values = [*(read_quantity(f"{one}{written}", unit) for one in first), z]
+        values = tuple(read_quantity(f"{part}{written or names[0]}", unit) for part in parts)
     except ValueError:
-        values = []
+        values = ()
     if len(values) != 3:
-        units = ", ".join(unit_names(unit))
-        raise InvalidInput(name, text, f"{others}three finite numbers x,y,z in {unit} ({units})")
-    return tuple(values)
-
-
-def _number_and_unit(text: str, unit: str) -> tuple[float, str]:
-    """The value of the last of three numbers, and the unit that follows all of them."""
-    from softreach.support.quantity import read_quantity, unit_names
-
-    plain = text.strip()
-    written = next(
-        (one for one in sorted(unit_names(unit), key=len, reverse=True) if plain.endswith(one)),
-        "",
-    )
-    shown = written or unit_names(unit)[0]
-    return read_quantity(plain.removesuffix(written) + shown, unit), shown
+        allowed = f"{others}three finite numbers x,y,z in {unit} ({', '.join(names)})"
+        raise InvalidInput(name, text, allowed)
+    return values
 
 
 def _values(
@@ -239,47 +240,38 @@ def _values(
     from softreach.arm.parameters.changes import find_parameter, parameters_by_every_name
     from softreach.arm.parameters.written import written_parameters
 
-    found = dict(angles)
+    values = dict(angles)
     if not texts:
-        return found
+        return values
     plain, written = parameters_by_every_name(arm), written_parameters(arm)
     for name, text in texts.items():
         parameter = plain.get(name) or written.get(name) or find_parameter(arm, name)
-        if parameter.name in found:
+        if parameter.name in values:
             raise _given_twice(name)
-        read = _of_value if name in plain else _of_name
-        found[parameter.name] = read(parameter, name, text)
-    return found
+        values[parameter.name] = _value(parameter, name, text, unit_in_name=name not in plain)
+    return values
 
 
 def _given_twice(name: str) -> InvalidInput:
     return InvalidInput("set", name, "given once, under one of its names")
 
 
-def _of_value(parameter: DesignParameter, name: str, text: str) -> float:
-    """A value with its unit."""
-    from softreach.arm.parameters.written import written_name
+def _value(parameter: DesignParameter, name: str, text: str, *, unit_in_name: bool) -> float:
+    """A value whose unit stands in it or in the name."""
+    from softreach.arm.parameters.written import from_written, written_name
     from softreach.support.quantity import read_quantity, unit_names
 
     try:
+        if unit_in_name:
+            return from_written(read_quantity(text, "1"), parameter.unit)
         return read_quantity(text, parameter.unit)
     except ValueError:
         pass
+    if unit_in_name:
+        raise InvalidInput(name, text, "a finite number without a unit, which the name holds")
     units = ", ".join(unit_names(parameter.unit))
     if not units:
         raise InvalidInput(name, text, "a finite number without a unit")
     allowed = f"a finite number with its unit ({units})"
-    in_name = written_name(name, parameter.unit)
-    raise InvalidInput(name, text, allowed, f"or set {in_name} to a number")
-
-
-def _of_name(parameter: DesignParameter, name: str, text: str) -> float:
-    """A value whose unit the name holds."""
-    from softreach.arm.parameters.written import from_written
-    from softreach.support.quantity import read_quantity
-
-    try:
-        return from_written(read_quantity(text, "1"), parameter.unit)
-    except ValueError:
-        allowed = "a finite number without a unit, which the name holds"
-        raise InvalidInput(name, text, allowed) from None
+    hint = f"or set {written_name(name, parameter.unit)} to a number"
+    raise InvalidInput(name, text, allowed, hint)

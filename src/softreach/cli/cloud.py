@@ -3,37 +3,42 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from softreach.cli.changes import UNCHANGED, Changes
-from softreach.cli.inputs import AsJson, Design, Durable, Sampler, Seed, design_from
-from softreach.cli.load_rows import load_rows
-from softreach.cli.numbers import NUMBER, WHOLE
-from softreach.cli.output import print_rows
-from softreach.cli.output_files import Overwrite, check_output
+from softreach.cli.changes import UNCHANGED, Changes, design_from
+from softreach.cli.console import Rows, console
+from softreach.cli.design import load_rows
+from softreach.cli.options import (
+    SAMPLING,
+    AsJson,
+    Design,
+    Durable,
+    Overwrite,
+    Sampling,
+    check_output,
+    out_option,
+)
+from softreach.cli.values import NUMBER
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["cloud"]
-
 
 def cloud(
     design: Design,
+    /,
     *,
-    out: Annotated[Path, Parameter(help="Where the cloud goes (.zarr).")] = Path("cloud.zarr"),
-    n: Annotated[int, WHOLE, Parameter(help="Number of samples.")] = 400_000,
-    seed: Seed = 0,
-    sampler: Sampler = "uniform",
+    sampling: Sampling = SAMPLING,
     tol: Annotated[float, NUMBER, Parameter(help="Largest tip error, in L.")] = 1e-6,
-    durable: Durable = False,
-    overwrite: Overwrite = False,
     changes: Changes = UNCHANGED,
+    out: Annotated[Path, out_option("Where the cloud goes (.zarr).")] = Path("cloud.zarr"),
+    overwrite: Overwrite = False,
+    durable: Durable = False,
     json: AsJson = False,
 ) -> None:
-    """Compute the reachability cloud of a design and store it as Zarr.
+    """Sample the reachability cloud of a design and store it as Zarr.
 
     Example: softreach cloud minimal_trunk --n 400000 --out trunk.zarr
     """
@@ -44,16 +49,17 @@ def cloud(
     from softreach.support.memory import check_disk
 
     arm = design_from(design, changes)
-    check_output("out", out, CLOUD_STORE, overwrite)
-    check_disk("n", n, sample_bytes(arm.bundles) * n, out)
+    check_output(out, CLOUD_STORE, overwrite)
+    arguments = sampling.arguments
+    check_disk("n", sampling.count, sample_bytes(arm.bundles) * sampling.count, out)
     start = perf_counter()
-    dataset = compute_cloud(arm, n, seed, sampler, tol=tol)
+    dataset = compute_cloud(arm, **arguments, tol=tol)
     seconds = perf_counter() - start
     save_cloud(dataset, out, durable=durable, overwrite=overwrite)
-    rows = {
-        "samples": (n, ""),
-        "sampler": (sampler, ""),
-        "seed": (seed, ""),
+    rows: Rows = {
+        "samples": (sampling.count, ""),
+        "sampler": (arguments["sampler"], ""),
+        "seed": (arguments["seed"], ""),
         "steps per arm": (tip_map(arm, tol).steps, ""),
         "time to compute": (round(seconds, 3), "s"),
         **load_rows(arm.loads),
@@ -62,11 +68,11 @@ def cloud(
         "lowest tip": (float(dataset.tip[:, 2].min()) / arm.length, "L"),
         "cloud": (str(out), ""),
     }
-    print_rows(f"cloud of {design}", rows, json)
+    console.rows(f"cloud of {design}", rows, json)
 
 
-def _status_rows(cloud: xr.Dataset) -> dict[str, tuple[Any, str]]:
-    """How many samples of a loaded arm are stable, unstable, and without equilibrium."""
+def _status_rows(cloud: xr.Dataset) -> Rows:
+    """Numbers of samples of a loaded arm that are stable, unstable, and without equilibrium."""
     if "status" not in cloud:
         return {}
     from softreach.rod.tip_map import TipStatus

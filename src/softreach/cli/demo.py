@@ -7,23 +7,25 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from softreach.cli.inputs import AsJson
-from softreach.cli.numbers import WHOLE
-from softreach.cli.output import print_rows
-from softreach.cli.output_files import Overwrite, check_output
+from softreach.cli.console import console
+from softreach.cli.options import AsJson, Overwrite, check_output, out_option
+from softreach.cli.values import WHOLE
 from softreach.cli.volume import check_hull_memory, volume_rows
 
-__all__ = ["demo"]
+_BYTES = 100  # of a sample in the cloud and in the PLY
+_FILES = ("design.toml", "cloud.zarr", "cloud.ply", "hull.ply", "cloud.png")
 
 
 def demo(
     *,
-    out: Annotated[Path, Parameter(help="Folder for the results.")] = Path("out"),
-    n: Annotated[int, WHOLE, Parameter(help="Number of samples.")] = 400_000,
+    n: Annotated[int, WHOLE, Parameter(name=("--n", "-n"), help="Number of samples.")] = 400_000,
+    out: Annotated[Path, out_option("Folder for the results.")] = Path("out"),
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """The paper's design (Ω = 108°, φ = 2°): cloud, volumes, hull and picture, into a folder.
+    """Start here: cloud, volumes and picture of the paper's design.
+
+    The design is minimal_trunk (Ω = 108°, φ = 2°); everything is written into one folder.
 
     Example: softreach demo --out out
     """
@@ -41,32 +43,28 @@ def demo(
     arm = designs.minimal_trunk()
     _check(out, overwrite)
     check_hull_memory(n)
-    check_disk("n", n, _WRITTEN * n, out)
+    check_disk("n", n, _BYTES * n, out)
     cloud = compute_cloud(arm, n)
     computed = perf_counter() - start
 
     def hulls() -> tuple[Hull, Hull]:
         return concave_hull(cloud.tip, bias=True), convex_hull(cloud.tip)
 
-    with parallel.meanwhile(hulls) as found:
+    with parallel.meanwhile(hulls) as result:
         arm.save(out / "design.toml", overwrite=overwrite)
         save_cloud(cloud, out / "cloud.zarr", overwrite=overwrite)
         export.export_cloud(cloud, out / "cloud.ply", overwrite=overwrite)
         shape = configuration(arm, [-1.0, 0.0, -0.4])
         figure = plot.plot_views(cloud, arm, shape)
         plot.save_figure(figure, out / "cloud.png", overwrite=overwrite)
-        concave, convex = found()
+        concave, convex = result()
     export.export_mesh(concave, out / "hull.ply", overwrite=overwrite)
 
     rows = volume_rows(concave, convex, arm.length)
     rows["time to compute the cloud"] = (round(computed, 3), "s")
     rows["time in all"] = (round(perf_counter() - start, 3), "s")
     rows["written"] = ([str(out / name) for name in _FILES], "")
-    print_rows("minimal trunk, revolution 108°, taper 2°", rows, json)
-
-
-_WRITTEN = 100  # bytes of a sample in the cloud and in the PLY
-_FILES = ("design.toml", "cloud.zarr", "cloud.ply", "hull.ply", "cloud.png")
+    console.rows("minimal trunk, revolution 108°, taper 2°", rows, json)
 
 
 def _check(folder: Path, overwrite: bool) -> None:
@@ -76,7 +74,6 @@ def _check(folder: Path, overwrite: bool) -> None:
     from softreach.export.clouds import CLOUD_FILES
     from softreach.support.files.kinds import PICTURES
 
-    for name, formats in zip(
-        _FILES, (DESIGN_FILE, CLOUD_STORE, CLOUD_FILES, CLOUD_FILES, PICTURES), strict=True
-    ):
-        check_output("out", folder / name, formats, overwrite)
+    formats = (DESIGN_FILE, CLOUD_STORE, CLOUD_FILES, CLOUD_FILES, PICTURES)
+    for name, kinds in zip(_FILES, formats, strict=True):
+        check_output(folder / name, kinds, overwrite)

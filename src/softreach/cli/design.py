@@ -1,84 +1,79 @@
-"""`softreach design`: what follows from a design."""
+"""`softreach design`: angles, radii, stiffness, weight and loads of a design."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from softreach.cli.changes import UNCHANGED, Changes
-from softreach.cli.inputs import AsJson, Design, design_from
-from softreach.cli.load_rows import load_rows, rest_rows
-from softreach.cli.output import print_rows
-from softreach.cli.output_files import Overwrite, check_output
+from softreach.cli.changes import UNCHANGED, Changes, design_from
+from softreach.cli.console import Rows, console
+from softreach.cli.options import AsJson, Design, Overwrite, check_output, out_option, refuse
+from softreach.cli.values import to_degrees
+from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
+    from softreach.arm.loads import Loads
     from softreach.arm.manipulator import Manipulator
     from softreach.arm.summary import DesignSummary
-
-__all__ = ["design"]
-
-Rows = dict[str, tuple[Any, str]]
+    from softreach.rest import Rest
 
 
 def design(
     design: Design | None = None,
+    /,
     *,
-    changes: Changes = UNCHANGED,
-    save: Annotated[Path | None, Parameter(help="Write the design to this TOML file.")] = None,
-    overwrite: Overwrite = False,
     schema: Annotated[
-        bool, Parameter(negative="", help="Print the JSON schema of design files for editors.")
+        bool, Parameter(help="Print the JSON schema of design files for editors, nothing else.")
     ] = False,
-    verbose: Annotated[
-        bool, Parameter(negative="", help="Say where the linear laws of the actuators end.")
-    ] = False,
+    changes: Changes = UNCHANGED,
+    out: Annotated[Path | None, out_option("Write the design to this TOML file.")] = None,
+    overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """Print what follows from a design: angles, radii, stiffness, weight, ranges, warnings.
+    """Describe a design: angles, radii, stiffness, weight, warnings.
+
+    With --verbose it also says where the linear laws of the actuators end.
 
     Example: softreach design minimal_trunk --taper-deg 3
     """
-    import sys
-
     from softreach.arm.file import DESIGN_FILE
     from softreach.arm.summary import describe
-    from softreach.support.errors import InvalidInput
 
     if schema:
-        sys.stdout.write(_schema_text())
+        changes.refuse("left out with --schema")
+        refuse("left out with --schema", design=design, out=out, overwrite=overwrite)
+        _print_schema()
         return
     if design is None:
         raise InvalidInput("design", design, "a design file or a built-in design, or use --schema")
     arm = design_from(design, changes)
-    check_output("save", save, DESIGN_FILE, overwrite)
+    check_output(out, DESIGN_FILE, overwrite)
     facts = describe(arm)
-    if save is not None:
-        arm.save(save, overwrite=overwrite)
-    if json:
-        print_rows("", {**_rows(arm, facts), **_rows_for_machines(arm, facts)}, as_json=True)
-        return
-    print_rows(f"design {design}", {**_rows(arm, facts), **_bundle_rows(arm, facts)}, as_json=False)
-    for note in (*facts.lacking, *(facts.validity if verbose else ())):
-        sys.stdout.write(f"  {note}\n")
-    for warning in facts.warnings:
-        sys.stderr.write(f"warning: {warning}\n")
+    if out is not None:
+        arm.save(out, overwrite=overwrite)
+    details = _rows_for_machines(arm, facts) if json else _bundle_rows(arm, facts)
+    console.rows(f"design {design}", _rows(arm, facts) | details, json)
+    if not json:
+        for note in (*facts.lacking, *(facts.validity if console.verbose else ())):
+            console.line(f"  {note}")
+        for warning in facts.warnings:
+            console.note(f"warning: {warning}")
 
 
-def _schema_text() -> str:
-    import json
-
+def _print_schema() -> None:
     from softreach.arm.file.json_schema import json_schema
 
-    return json.dumps(json_schema(), indent=2) + "\n"
+    console.json(json_schema(), indent=2)
 
 
 def _rows(arm: Manipulator, facts: DesignSummary) -> Rows:
     rows: Rows = {"bundles": (arm.bundles, ""), "bundle names": (list(arm.bundle_names), "")}
     if arm.fibers:
-        rows["helical angle"] = (_degrees(facts.helical_angles), "deg")
-        rows["revolution"] = (_degrees(facts.revolutions), "deg")
+        rows["helical angle"] = (to_degrees(facts.helical_angles), "deg")
+        rows["revolution"] = (to_degrees(facts.revolutions), "deg")
     rows |= {
         "length": (arm.length, "m"),
         "outer radius at base": (facts.base_radius, "m"),
@@ -88,15 +83,13 @@ def _rows(arm: Manipulator, facts: DesignSummary) -> Rows:
     }
     if facts.breakpoints:
         rows["breakpoints"] = (list(facts.breakpoints), "m")
-    rows |= {
-        "extension": (list(facts.extension), ""),
-        "curvature times L": (list(facts.curvature), ""),
-    }
-    return rows | _rows_of_matter(facts) | load_rows(arm.loads) | rest_rows(arm)
+    rows["extension"] = (list(facts.extension), "")
+    rows["curvature times L"] = (list(facts.curvature), "")
+    return rows | _rows_of_matter(facts) | load_rows(arm.loads) | _rest_rows(arm)
 
 
 def _rows_of_matter(facts: DesignSummary) -> Rows:
-    """Stiffnesses at base and tip, mass and load number: what is known of them."""
+    """Stiffnesses at base and tip, mass and load number, as far as they are known."""
     rows: Rows = {}
     if facts.stiffness is not None:
         units = {"K0": "N", "K1": "N m²", "K3": "N m²"}
@@ -110,7 +103,7 @@ def _rows_of_matter(facts: DesignSummary) -> Rows:
 
 
 def _bundle_rows(arm: Manipulator, facts: DesignSummary) -> Rows:
-    """What each activation does alone, in words."""
+    """The effect of each activation alone, in words."""
     units = ("" if unit == "1" else f" {unit}" for unit in arm.bundle_units)
     ranges = zip(arm.bounds, units, facts.bundle_extension, facts.bundle_bending, strict=True)
     return {
@@ -127,32 +120,94 @@ def _span(ends: Any) -> str:
 
 
 def _rows_for_machines(arm: Manipulator, facts: DesignSummary) -> Rows:
-    activations = [
-        {
-            "name": name,
-            "unit": unit,
-            "bounds": bounds.tolist(),
-            "extension": extension.tolist(),
-            "bending_times_R2": bending.tolist(),
-        }
-        for name, unit, bounds, extension, bending in zip(
-            arm.bundle_names,
-            arm.bundle_units,
-            arm.bounds,
-            facts.bundle_extension,
-            facts.bundle_bending,
-            strict=True,
-        )
-    ]
+    names = ("name", "unit", "bounds", "extension", "bending_times_R2")
+    columns = (
+        arm.bundle_names,
+        arm.bundle_units,
+        arm.bounds.tolist(),
+        facts.bundle_extension.tolist(),
+        facts.bundle_bending.tolist(),
+    )
     return {
-        "activations": (activations, ""),
+        "activations": (
+            [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)],
+            "",
+        ),
         "lacking": (list(facts.lacking), ""),
         "validity": (list(facts.validity), ""),
         "warnings": (list(facts.warnings), ""),
     }
 
 
-def _degrees(angles: Any) -> list[float]:
-    import numpy as np
+def load_rows(loads: Loads | None) -> Rows:
+    """Gravity with the direction that the base then has, and all other loads that are not 0."""
+    if loads is None:
+        return {}
+    rows: Rows = {}
+    if any(loads.gravity):
+        rows["gravity"] = (list(loads.gravity), "m/s²")
+        rows["base"] = (_base(loads.gravity), "")
+    for variable in (*loads.variables, *loads.series):
+        value = getattr(loads, variable.field)
+        if variable.field != "gravity" and (any(value) if isinstance(value, tuple) else value):
+            rows[variable.field.replace("_", " ")] = (value, variable.allowed.unit)
+    if loads.point_loads:
+        rows["point loads"] = (len(loads.point_loads), "")
+    return rows
 
-    return [round(float(angle), 9) for angle in np.degrees(angles)]
+
+def _base(gravity: tuple[float, float, float]) -> str:
+    """The way the base stands: a straight arm points along +z, gravity pulls downward."""
+    angle = to_degrees(math.acos(-gravity[2] / math.hypot(*gravity)))
+    names = {0: "upright", 90: "sideways", 180: "hanging"}
+    return names.get(round(angle, 6), f"tilted from upright by {angle:.4g}°")
+
+
+def _rest_rows(arm: Manipulator) -> Rows:
+    """Sag and stability of the arm without activation.
+
+    Without loads: the sag under its own weight of an arm held sideways, and whether it would stand
+    upright; nothing where moduli or densities are not known.
+    """
+    from softreach.arm.loads import Loads
+    from softreach.arm.weight import GRAVITY, load_number_faults
+
+    if load_number_faults(arm):
+        return {}
+    if arm.loads is not None:
+        rest = _rest(arm)
+        return _sag("", rest) | {"at rest": (_stability(rest), "")}
+    sideways, upright = (
+        _rest(arm.replace(loads=Loads(gravity=gravity)))
+        for gravity in ((GRAVITY, 0.0, 0.0), (0.0, 0.0, -GRAVITY))
+    )
+    return _sag(" sideways", sideways) | {"at rest upright": (_stability(upright), "")}
+
+
+def _rest(arm: Manipulator) -> Rest | None:
+    """The arm at rest; None under loads too large to compute it."""
+    from softreach.rest import rest
+
+    try:
+        return rest(arm)
+    except InvalidInput as error:
+        if error.name != "loads":
+            raise
+        return None
+
+
+_STABILITY = {
+    "STABLE": "stable",
+    "UNSTABLE": "not stable",
+    "NO_EQUILIBRIUM": "no equilibrium follows from the unloaded arm",
+}
+
+
+def _stability(rest: Rest | None) -> str:
+    return "unknown: the loads are too large" if rest is None else _STABILITY[rest.status.name]
+
+
+def _sag(how: str, rest: Rest | None) -> Rows:
+    """The distance that the tip sinks, as a share of the length and as a length."""
+    sag = (None, None) if rest is None else (rest.sag_over_length, 1e3 * rest.sag)
+    return {f"sag at rest{how}": (sag[0], "L"), f"sag of the tip at rest{how}": (sag[1], "mm")}

@@ -2,88 +2,96 @@
 
 from __future__ import annotations
 
-import json as json_format
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from softreach.cli.changes import UNCHANGED, Changes
-from softreach.cli.inputs import (
+from softreach.cli.changes import UNCHANGED, Changes, design_from
+from softreach.cli.console import console
+from softreach.cli.options import (
     Activation,
     AsJson,
     Design,
+    Overwrite,
     activation_of,
-    design_from,
+    check_picture,
+    out_option,
+    refuse,
 )
-from softreach.cli.output_files import Overwrite, check_picture
+from softreach.cli.values import activation_text, position_text
 from softreach.support.errors import counted
 
 if TYPE_CHECKING:
     from softreach.rod import AllEquilibria
 
-__all__ = ["equilibria"]
-
 
 def equilibria(
     design: Design,
+    /,
     *,
     activation: Activation = None,
-    figure: Annotated[Path | None, Parameter(help="Draw them: .png .pdf .svg")] = None,
-    view: Annotated[str, Parameter(help="front, side, top or oblique.")] = "oblique",
-    overwrite: Overwrite = False,
+    view: Annotated[
+        str | None,
+        Parameter(help="View of the picture: front, side, top or oblique (if left out)."),
+    ] = None,
     changes: Changes = UNCHANGED,
+    out: Annotated[Path | None, out_option("Draw them: .png .pdf .svg")] = None,
+    overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """Every equilibrium of a loaded arm, stable ones first, and which one the arm comes to."""
+    """Find every equilibrium of a loaded arm at given activations.
+
+    Stable ones come first; the one that the arm comes to from its unloaded shape is marked.
+
+    Example: softreach equilibria arm.toml --activation=-1,0,-0.5 --out equilibria.png
+    """
     from softreach.rod import equilibria as all_of
 
-    check_picture("figure", figure, overwrite)
+    if out is None:
+        refuse("left out without a picture: give --out too", view=view)
+    check_picture(out, overwrite)
     arm = design_from(design, changes)
-    found = all_of(arm, activation_of(activation, arm))
-    if figure is not None:
+    result = all_of(arm, activation_of(activation, arm))
+    if out is not None:
         from softreach import plot
 
-        plot.save_figure(plot.plot_equilibria(found, view=view), figure, overwrite=overwrite)
+        figure = plot.plot_equilibria(result, view=view or "oblique")
+        plot.save_figure(figure, out, overwrite=overwrite)
     if json:
-        json_format.dump(_as_json(found), sys.stdout)
-        sys.stdout.write("\n")
+        console.json(_record(result))
     else:
-        sys.stdout.write("\n".join(_lines(found)) + "\n")
+        _print(result)
 
 
-def _as_json(found: AllEquilibria) -> dict[str, object]:
-    loaded = found.solver is not None
+def _record(result: AllEquilibria) -> dict[str, object]:
+    loaded = result.solver is not None
     return {
-        "activation": found.activation.tolist(),
-        "tips_m": found.tips.tolist(),
-        "status": _statuses(found),
-        "margins": found.margin.tolist(),
-        "directions": found.directions.tolist() if loaded else None,
-        "signs": found.signs.tolist(),
-        "is_ring": found.is_ring.tolist(),
-        "followed": found.followed,
-        "degree": found.degree,
-        "complete": found.complete,
+        "activation": result.activation.tolist(),
+        "tips_m": result.tips.tolist(),
+        "status": _statuses(result),
+        "margins": result.margin.tolist(),
+        "directions": result.directions.tolist() if loaded else None,
+        "signs": result.signs.tolist(),
+        "is_ring": result.is_ring.tolist(),
+        "followed": result.followed,
+        "degree": result.degree,
+        "complete": result.complete,
     }
 
 
-def _statuses(found: AllEquilibria) -> list[str]:
+def _statuses(result: AllEquilibria) -> list[str]:
     from softreach.rod import TipStatus
 
-    return [TipStatus(one).name.lower() for one in found.status]
+    return [TipStatus(status).name.lower() for status in result.status]
 
 
-def _lines(found: AllEquilibria) -> Iterator[str]:
-    arm = found.rod.arm
-    given = zip(arm.bundle_names, found.activation, arm.bundle_units, strict=True)
-    at = ", ".join(f"{name} {x:.6g}" + (f" {u}" if u != "1" else "") for name, x, u in given)
-    many = counted(len(found), "solution")
-    yield f"equilibria{f' at {at}' if at else ''}: {many}, degree {found.degree}"
-    for k, status in enumerate(_statuses(found)):
-        tip = ", ".join(f"{x:.6g}" for x in found.tips[k])
-        kind = f"{status}, any way around" if found.is_ring[k] else status
-        which = ", from the unloaded arm" if k == found.followed else ""
-        yield f"  tip ({tip}) m: {kind}, margin {found.margin[k]:.3g}{which}"
+def _print(result: AllEquilibria) -> None:
+    at = activation_text(result.rod.arm, result.activation)
+    count = counted(len(result), "solution")
+    console.line(f"equilibria{f' at {at}' if at else ''}: {count}, degree {result.degree}")
+    for k, status in enumerate(_statuses(result)):
+        kind = f"{status}, any way around" if result.is_ring[k] else status
+        which = ", from the unloaded arm" if k == result.followed else ""
+        tip = position_text(result.tips[k])
+        console.line(f"  tip {tip}: {kind}, margin {result.margin[k]:.3g}{which}")

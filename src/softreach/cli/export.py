@@ -7,15 +7,23 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from softreach.cli.changes import UNCHANGED, Changes
-from softreach.cli.inputs import Activation, Source, design_from, is_stored, shape_of
-from softreach.cli.output_files import Overwrite, check_output, check_surface
+from softreach.cli.changes import UNCHANGED, Changes, design_from
+from softreach.cli.console import console
+from softreach.cli.options import (
+    Activation,
+    Overwrite,
+    Source,
+    check_output,
+    check_surface,
+    is_stored,
+    refuse,
+    shape_of,
+)
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
 
-__all__ = ["export"]
 
 Format = Annotated[
     str | None,
@@ -25,35 +33,33 @@ Format = Annotated[
 
 def export(
     source: Source,
-    out: Annotated[Path, Parameter(help="Target; its suffix chooses the format.")],
+    out: Annotated[Path, Parameter(help="The file to write; its suffix chooses the format.")],
+    /,
     *,
     activation: Activation = None,
     format: Format = None,
-    overwrite: Overwrite = False,
     changes: Changes = UNCHANGED,
+    overwrite: Overwrite = False,
 ) -> None:
-    """Write a cloud (.ply .csv .parquet .npz .mat .vtu .vtk), or a design's arm as a surface mesh.
+    """Convert a cloud or an arm for other programs.
 
-    A design is written as the deformed arm with its fibers (.ply .stl .obj .glb .vtu .vtk), or as
-    the source of a filament of ActiveFilaments.jl (.jl).
+    A cloud becomes a table or points (.ply .csv .parquet .npz .mat .vtu .vtk). A design becomes
+    the surface of the bent arm and its fibers (.ply .stl .obj .glb .vtu .vtk), or the source of a
+    filament of ActiveFilaments.jl (.jl).
 
-    Examples: softreach export trunk.zarr trunk.parquet;
-    softreach export minimal_trunk arm.glb --activation=-1,0,-0.5;
-    softreach export trunk.zarr trunk.csv --format activefilaments
+    Example: softreach export minimal_trunk arm.glb --activation -1,0,-0.5
     """
-    import sys
-
     if format not in (None, "activefilaments"):
         raise InvalidInput("format", format, "activefilaments, or left out")
     if is_stored(source):
-        if activation is not None:
-            raise InvalidInput("activation", activation, "left out for a cloud, which has many")
+        refuse("left out for a cloud, which has many", activation=activation)
         changes.refuse("left out for a stored cloud: give the design instead")
         written = _cloud(source, out, format, overwrite)
     else:
         arm = design_from(source, changes)
         written = _design(arm, out, activation, format, overwrite)
-    sys.stdout.writelines(f"{path}\n" for path in written)
+    for path in written:
+        console.line(path)
 
 
 def _cloud(source: str, out: Path, format: str | None, overwrite: bool) -> list[Path]:
@@ -62,7 +68,7 @@ def _cloud(source: str, out: Path, format: str | None, overwrite: bool) -> list[
     if format is None:
         from softreach.export.clouds import CLOUD_FILES, export_cloud
 
-        check_output("out", out, CLOUD_FILES, overwrite)
+        check_output(out, CLOUD_FILES, overwrite)
         export_cloud(open_cloud(source), out, overwrite=overwrite)
         return [out]
     from softreach.exchange.activefilaments.cloud import CLOUD_PAIR, gamma_path, write_cloud
@@ -73,7 +79,7 @@ def _cloud(source: str, out: Path, format: str | None, overwrite: bool) -> list[
         )
     written = [out, gamma_path(out)]
     for path in written:
-        check_output("out", path, CLOUD_PAIR, overwrite)
+        check_output(path, CLOUD_PAIR, overwrite)
     write_cloud(open_cloud(source), out, overwrite=overwrite)
     return written
 
@@ -84,13 +90,14 @@ def _design(
     if out.suffix == ".jl":
         from softreach.exchange.activefilaments.script import FILAMENT_SCRIPT, write_design
 
-        check_output("out", out, FILAMENT_SCRIPT, overwrite)
+        refuse("left out for a filament's definition, which has none", activation=activation)
+        check_output(out, FILAMENT_SCRIPT, overwrite)
         write_design(arm, out, overwrite=overwrite)
         return [out]
     if format is not None:
         raise InvalidInput("out", out, "a file name ending in .jl for a filament's definition")
     from softreach.export import export_arm
 
-    check_surface("out", out, overwrite)
+    check_surface(out, overwrite)
     export_arm(arm, shape_of(activation, arm), out, overwrite=overwrite)
     return [out]

@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from softreach.cli.changes import UNCHANGED, Changes
-from softreach.cli.inputs import AsJson, Design, design_from
-from softreach.cli.numbers import NUMBER
-from softreach.cli.output import print_rows
+from softreach.cli.changes import UNCHANGED, Changes, design_from
+from softreach.cli.console import Rows, console
+from softreach.cli.options import AsJson, Design
+from softreach.cli.values import NUMBER
 
 if TYPE_CHECKING:
     from softreach.workspace import VolumeGradient
 
-__all__ = ["gradient"]
+
+_UNITS = {"volume": "m³", "convex_volume": "m³", "unreachability": ""}
 
 
 def gradient(
     design: Design,
     parameters: Annotated[
         list[str],
-        Parameter(help="Paths of parameters, as in atlases: taper, left.offset, lower."),
+        Parameter(help="Parameters, as softreach list parameters DESIGN names them."),
     ],
+    /,
     *,
     accuracy: Annotated[
         float, NUMBER, Parameter(help="Relative error allowed in what is rasterized.")
@@ -30,7 +32,9 @@ def gradient(
     changes: Changes = UNCHANGED,
     json: AsJson = False,
 ) -> None:
-    """How the reachable volume and its convex hull change with parameters, in SI units.
+    """Differentiate the reachable volume by design parameters.
+
+    Also its convex hull and its unreachability; everything in SI units.
 
     Example: softreach gradient lce_arm taper upper --set lower=-3 --set upper=-1
     """
@@ -38,21 +42,19 @@ def gradient(
     from softreach.workspace import volume_gradient
 
     arm = design_from(design, changes)
-    with progress.bar("differentiating the volume", len(parameters)) as shown:
-        found = volume_gradient(arm, parameters, accuracy=accuracy, progress=shown)
-    print_rows(f"derivatives of what {design} reaches", _rows(found), json)
+    with progress.bar("differentiating the volume", len(parameters)) as step:
+        derivatives = volume_gradient(arm, parameters, accuracy=accuracy, progress=step)
+    console.rows(f"derivatives of what {design} reaches", _rows(derivatives), json)
 
 
-def _rows(found: VolumeGradient) -> dict[str, tuple[Any, str]]:
-    rows: dict[str, tuple[Any, str]] = {"route": (found.route, "")}
-    for k, (name, unit) in enumerate(zip(found.parameters, found.units, strict=True)):
-        for what, kind in _KINDS.items():
-            label = f"{what.replace('_', ' ')} by {name}"
-            value, error = getattr(found, what)[k], getattr(found, f"{what}_error")[k]
+def _rows(derivatives: VolumeGradient) -> Rows:
+    rows: Rows = {"route": (derivatives.route, "")}
+    for k, (name, unit) in enumerate(zip(derivatives.parameters, derivatives.units, strict=True)):
+        for quantity, kind in _UNITS.items():
+            label = f"{quantity.replace('_', ' ')} by {name}"
+            value = getattr(derivatives, quantity)[k]
+            error = getattr(derivatives, f"{quantity}_error")[k]
             per = kind if unit == "1" else f"{kind or '1'}/{unit}"
             rows[label] = (float(value), per)
             rows[f"{label} error (estimate)"] = (float(error), per)
     return rows
-
-
-_KINDS = {"volume": "m³", "convex_volume": "m³", "unreachability": ""}

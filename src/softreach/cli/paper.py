@@ -2,35 +2,29 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from softreach.cli.output_files import Overwrite
-
-__all__ = ["paper"]
+from softreach.cli.console import console
+from softreach.cli.options import Overwrite, out_option
 
 
 def paper(
     *,
-    out: Annotated[Path, Parameter(help="Folder for the report and its figures.")] = Path("paper"),
     quick: Annotated[
-        bool, Parameter(negative="", help="Small clouds: coarse numbers in under a minute.")
+        bool, Parameter(help="Small clouds: coarse numbers in under a minute.")
     ] = False,
+    out: Annotated[Path, out_option("Folder for the report and its figures.")] = Path("paper"),
     overwrite: Overwrite = False,
 ) -> None:
-    """Recompute the paper's figures and statements into a report; run again to continue.
+    """Recompute the paper's figures and statements into a report.
+
+    The same command continues after an interruption.
 
     Example: softreach paper --out paper --quick
     """
     from softreach.paper import reproduce_paper
 
-    report = reproduce_paper(
-        out,
-        quick=quick,
-        overwrite=overwrite,
-        say=lambda line: sys.stderr.write(f"{line}\n"),
-    )
-    sys.stdout.write(f"{report}\n")
+    console.line(reproduce_paper(out, quick=quick, overwrite=overwrite, say=console.note))

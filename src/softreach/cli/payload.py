@@ -7,21 +7,19 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from softreach.cli.changes import UNCHANGED, Changes, read_mass
-from softreach.cli.inputs import AsJson, Design, design_from
-from softreach.cli.numbers import NUMBER
-from softreach.cli.output import print_rows
-from softreach.cli.output_files import Overwrite, check_picture
+from softreach.cli.changes import UNCHANGED, Changes, design_from, read_mass
+from softreach.cli.console import Rows, console
+from softreach.cli.options import AsJson, Design, Overwrite, check_picture, out_option
+from softreach.cli.values import NUMBER
 from softreach.support.errors import InvalidInput
-
-__all__ = ["payload"]
 
 
 def payload(
     design: Design,
+    /,
     *,
     share: Annotated[
-        float, NUMBER, Parameter(help="Of the volume without payload, which is to be kept.")
+        float, NUMBER, Parameter(help="Share to keep of the volume without a payload.")
     ] = 0.8,
     payloads: Annotated[
         str | None, Parameter(help="Masses to compute volumes for: 2g,5g,10g")
@@ -30,24 +28,33 @@ def payload(
         float, NUMBER, Parameter(help="Relative error allowed in each volume.")
     ] = 0.01,
     changes: Changes = UNCHANGED,
-    figure: Annotated[Path | None, Parameter(help="Draw the curve: .png .pdf .svg")] = None,
+    out: Annotated[Path | None, out_option("Draw the curve: .png .pdf .svg")] = None,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """The reachable volume under payloads, and the largest one that keeps a share of it."""
+    """Compute how much of its reach a payload costs an arm.
+
+    The volumes under several payloads, and the largest payload that keeps a share of the volume.
+
+    Example: softreach payload lce_arm --gravity up --share 0.8
+    """
     from softreach.support import progress
     from softreach.workspace.payload import payload_curve
 
     arm = design_from(design, changes)
-    check_picture("figure", figure, overwrite)
+    check_picture(out, overwrite)
     if arm.loads is None:
         raise InvalidInput("gravity", None, "given for a design without loads: down, up, sideways")
     masses = None if payloads is None else [read_mass("payloads", m) for m in payloads.split(",")]
-    with progress.bar("computing volumes", None) as shown:
-        curve = payload_curve(arm, masses, accuracy=accuracy, progress=shown)
+    with progress.bar("computing volumes", None) as step:
+        curve = payload_curve(arm, masses, accuracy=accuracy, progress=step)
         largest = curve.largest_payload(share)
+    if out is not None:
+        from softreach.plot import plot_payload_curve, save_figure
+
+        save_figure(plot_payload_curve(curve, largest=[largest]), out, overwrite=overwrite)
     cube = arm.length**3
-    rows = {
+    rows: Rows = {
         "payloads": (curve.payloads.tolist(), "kg"),
         "volumes": ((curve.volumes / cube).tolist(), "L³"),
         "volume errors": ((curve.volume_errors / cube).tolist(), "L³"),
@@ -56,9 +63,4 @@ def payload(
         "largest payload": (largest.payload, "kg"),
         "largest payload error": (largest.payload_error, "kg"),
     }
-    if figure is not None:
-        from softreach.plot import plot_payload_curve, save_figure
-
-        drawn = plot_payload_curve(curve, largest=[largest])
-        save_figure(drawn, figure, overwrite=overwrite)
-    print_rows(f"payload of {design}", rows, json)
+    console.rows(f"payload of {design}", rows, json)

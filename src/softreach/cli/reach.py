@@ -3,127 +3,133 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from softreach.cli.changes import UNCHANGED, Changes
-from softreach.cli.inputs import AsJson, Design, design_from
-from softreach.cli.load_rows import load_rows
-from softreach.cli.numbers import NUMBER
-from softreach.cli.output import print_rows
-from softreach.cli.output_files import Overwrite, check_picture, check_surface
+from softreach.cli.changes import UNCHANGED, Changes, design_from
+from softreach.cli.console import Rows, console
+from softreach.cli.design import load_rows
+from softreach.cli.options import AsJson, Design, Overwrite, check_output, out_option
+from softreach.cli.values import NUMBER
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
     from softreach.workspace import ReachableSet, ReachableSolid
 
-__all__ = ["reach"]
-
-_LEFT_OUT = "left out for a design with so few free bundles"
-
 
 def reach(
     design: Design,
+    /,
     *,
     accuracy: Annotated[
         float, NUMBER, Parameter(help="Relative error allowed in the volume.")
     ] = 3e-3,
     changes: Changes = UNCHANGED,
-    surface: Annotated[
-        Path | None, Parameter(help="Write the boundary: .ply .stl .obj .glb .vtu .vtk")
-    ] = None,
-    figure: Annotated[
-        Path | None, Parameter(help="Draw slices through the base: .png .pdf .svg")
+    out: Annotated[
+        list[Path] | None,
+        out_option(
+            "Write the boundary (.ply .stl .obj .glb .vtu .vtk), or draw slices through the base "
+            "(.png .pdf .svg). May be repeated."
+        ),
     ] = None,
     overwrite: Overwrite = False,
     json: AsJson = False,
 ) -> None:
-    """The exact reachable set: volume with its error, blind share, multiplicity, folds."""
+    """Compute the exact reachable set: volume, multiplicity, folds.
+
+    Without samples: the volume with its error, the share of the convex hull that is not reached,
+    and the number of activations that reach each place.
+
+    Example: softreach reach minimal_trunk --out reach.stl --out reach.png
+    """
     from softreach.support import progress
     from softreach.workspace import reachable_set
 
     arm = design_from(design, changes)
-    _check_outputs(arm, surface, figure, overwrite)
-    with progress.bar("mapping the activation box", None) as shown:
-        found = reachable_set(arm, accuracy=accuracy, progress=shown)
-    rows = load_rows(arm.loads) | _rows(found) | _lost(found)
-    _write(found, surface, figure, overwrite)
-    print_rows(f"reachable set of {design}", rows, json)
+    outs = out or []
+    _check_outputs(arm, outs, overwrite)
+    with progress.bar("mapping the activation box", None) as step:
+        reached = reachable_set(arm, accuracy=accuracy, progress=step)
+    rows = load_rows(arm.loads) | _rows(reached)
+    if reached.lost_share > 0.0:  # not stable, or torn
+        rows["activation box left out"] = (100.0 * reached.lost_share, "%")
+    for path in outs:
+        _write(reached, path, overwrite)
+    console.rows(f"reachable set of {design}", rows, json)
 
 
-def _check_outputs(
-    arm: Manipulator, surface: Path | None, figure: Path | None, overwrite: bool
-) -> None:
-    """Refuse files that cannot be written, or that a set of so few dimensions has not."""
+def _check_outputs(arm: Manipulator, outs: list[Path], overwrite: bool) -> None:
+    """Refuse files that cannot be written, or that a set of so few dimensions does not have."""
+    from softreach.export.surfaces import SURFACE_FILES
+    from softreach.support.files.kinds import PICTURES
+
     free = int((arm.bounds[:, 0] < arm.bounds[:, 1]).sum())
-    for name, path, needed in (("surface", surface, 2), ("figure", figure, 3)):
-        if path is not None and free < needed:
-            raise InvalidInput(name, path, _LEFT_OUT)
-    check_surface("surface", surface, overwrite)
-    check_picture("figure", figure, overwrite)
+    for path in outs or [None]:
+        check_output(path, {**SURFACE_FILES, **PICTURES}, overwrite)
+        if path is not None and free < (3 if _is_picture(path) else 2):
+            raise _no_such_output(path)
 
 
-def _write(found: ReachableSet, surface: Path | None, figure: Path | None, overwrite: bool) -> None:
+def _is_picture(path: Path) -> bool:
+    from softreach.support.files.kinds import PICTURES
+
+    return path.suffix.lower() in PICTURES
+
+
+def _no_such_output(path: Path) -> InvalidInput:
+    return InvalidInput("out", path, "left out for a design with so few free bundles")
+
+
+def _write(reached: ReachableSet, path: Path, overwrite: bool) -> None:
     from softreach.workspace import ReachableSolid, ReachableSurface
 
-    if surface is not None:
-        from softreach.export import export_mesh
-
-        if not isinstance(found, ReachableSolid | ReachableSurface):
-            raise InvalidInput("surface", surface, _LEFT_OUT)
-        export_mesh(found.surface(), surface, overwrite=overwrite)
-    if figure is not None:
+    if _is_picture(path):
         from softreach.plot import plot_slices, save_figure
 
-        if not isinstance(found, ReachableSolid):
-            raise InvalidInput("figure", figure, _LEFT_OUT)
-        save_figure(plot_slices(found.grid), figure, overwrite=overwrite)
+        if not isinstance(reached, ReachableSolid):
+            raise _no_such_output(path)
+        save_figure(plot_slices(reached.grid), path, overwrite=overwrite)
+    else:
+        from softreach.export import export_mesh
+
+        if not isinstance(reached, ReachableSolid | ReachableSurface):
+            raise _no_such_output(path)
+        export_mesh(reached.surface(), path, overwrite=overwrite)
 
 
-def _rows(found: ReachableSet) -> dict[str, tuple[Any, str]]:
+def _rows(reached: ReachableSet) -> Rows:
     from softreach.workspace import ReachableCurve, ReachablePoint, ReachableSolid, ReachableSurface
 
-    length = found.arm.length
-    convex = {"convex volume": (found.convex_volume / length**3, "L³")}
-    match found:
+    length = reached.arm.length
+    convex: Rows = {"convex volume": (reached.convex_volume / length**3, "L³")}
+    match reached:
         case ReachableSolid():
-            size = _size("volume", found.volume, found.volume_error, length, 3)
-            return size | convex | _solid_rows(found)
+            size = _size("volume", reached.volume, reached.volume_error, length, 3)
+            return size | convex | _solid_rows(reached)
         case ReachableSurface():
-            return _size("area", found.area, found.area_error, length, 2) | convex
+            return _size("area", reached.area, reached.area_error, length, 2) | convex
         case ReachableCurve():
-            return _size("length", found.curve_length, found.curve_length_error, length, 1) | convex
+            size = (reached.curve_length, reached.curve_length_error)
+            return _size("length", *size, length, 1) | convex
         case ReachablePoint():
-            places = zip("xyz", found.tip, strict=True)
+            places = zip("xyz", reached.tip, strict=True)
             return {axis: (float(place) / length, "L") for axis, place in places}
-    raise AssertionError(found)
+    raise AssertionError(reached)
 
 
-def _lost(found: ReachableSet) -> dict[str, tuple[Any, str]]:
-    """What is left out, if anything is: no stable equilibrium, or torn."""
-    if not found.lost_share > 0.0:
-        return {}
-    return {"activation box left out": (100.0 * found.lost_share, "%")}
-
-
-def _size(
-    name: str, value: float, error: float, length: float, dimension: int
-) -> dict[str, tuple[Any, str]]:
+def _size(name: str, value: float, error: float, length: float, dimension: int) -> Rows:
     scale, unit = length**dimension, ("", "L", "L²", "L³")[dimension]
     return {name: (value / scale, unit), f"{name} error (estimate)": (error / scale, unit)}
 
 
-def _solid_rows(found: ReachableSolid) -> dict[str, tuple[Any, str]]:
-    cube = found.arm.length**3
-    rows: dict[str, tuple[Any, str]] = {
-        "unreachability": (found.unreachability, ""),
-        "route": (found.route, ""),
-    }
-    for times, volume in found.multiplicity.items():
-        if volume > 1e-7 * found.volume:
+def _solid_rows(reached: ReachableSolid) -> Rows:
+    cube = reached.arm.length**3
+    rows: Rows = {"unreachability": (reached.unreachability, ""), "route": (reached.route, "")}
+    for times, volume in reached.multiplicity.items():
+        if volume > 1e-7 * reached.volume:
             rows[f"reached by {times} activation{'s' * (times > 1)}"] = (volume / cube, "L³")
-    if found.multiplicity:
-        rows["behind folds"] = (found.fold_volume / cube, "L³")
+    if reached.multiplicity:
+        rows["behind folds"] = (reached.fold_volume / cube, "L³")
     return rows

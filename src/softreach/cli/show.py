@@ -8,49 +8,56 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
-from softreach.cli.inputs import Activation, Sampler, Samples, Seed, Source, cloud_of, shape_of
-from softreach.cli.output_files import Overwrite, check_picture
+from softreach.cli.console import console
+from softreach.cli.options import (
+    SAMPLING,
+    Activation,
+    Overwrite,
+    Sampling,
+    Source,
+    check_picture,
+    cloud_of,
+    out_option,
+    shape_of,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["show"]
-
 
 def show(
     source: Source,
+    /,
     *,
-    out: Annotated[Path, Parameter(help="Picture file: .png .pdf .svg")] = Path("cloud.png"),
     color: Annotated[
         str, Parameter(help="rgb, the name of a bundle, or compliance: how far the tip yields.")
     ] = "rgb",
     activation: Activation = None,
-    n: Samples = 400_000,
-    seed: Seed = 0,
-    sampler: Sampler = "uniform",
-    overwrite: Overwrite = False,
+    sampling: Sampling = SAMPLING,
     changes: Changes = UNCHANGED,
+    out: Annotated[Path, out_option("Picture file: .png .pdf .svg")] = Path("cloud.png"),
+    overwrite: Overwrite = False,
 ) -> None:
-    """Draw a cloud in three orthogonal views and an oblique one, with the arm in it.
+    """Draw a cloud and its arm from four sides.
 
-    Example: softreach show trunk.zarr --color longitudinal --activation=-1,0,-0.5 --out trunk.pdf
+    Three views are orthogonal, one is oblique; --activation bends the arm.
+
+    Example: softreach show trunk.zarr --color longitudinal --activation -1,0,-0.5 --out trunk.pdf
     """
-    import sys
-
     from softreach import plot
     from softreach.cloud.clouds import design_of
 
-    check_picture("out", out, overwrite)
-    cloud = cloud_of(source, n, seed, sampler, changes)
+    check_picture(out, overwrite)
+    cloud = cloud_of(source, sampling, changes)
     arm = design_of(cloud)
     shape = None if activation is None else shape_of(activation, arm)
     figure = plot.plot_views(cloud, arm, shape, color=_colors(cloud, color))
     plot.save_figure(figure, out, overwrite=overwrite)
-    sys.stdout.write(f"{out}\n")
+    console.line(out)
 
 
 def _colors(cloud: xr.Dataset, color: str) -> str | xr.DataArray:
-    """What colors the samples: a name that figures know, or numbers that they do not compute."""
+    """The colors of the samples: a name that figures know, or numbers that they do not compute."""
     from softreach.plot.coloring import bundle_names
     from softreach.stiffness import cloud_compliance
 

@@ -2,63 +2,67 @@
 
 from __future__ import annotations
 
-import json as json_format
-import sys
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from softreach.cli.changes import UNCHANGED, Changes
-from softreach.cli.inputs import AsJson, Design, design_from, points_of
-from softreach.cli.numbers import WHOLE
+from softreach.cli.changes import UNCHANGED, Changes, design_from
+from softreach.cli.console import console
+from softreach.cli.options import AsJson, Design, points_of, refuse
+from softreach.cli.values import WHOLE, activation_text, position_text
 from softreach.support.errors import InvalidInput, counted
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
     from softreach.inverse import Solution
 
-__all__ = ["solve"]
-
 
 def solve(
     design: Design,
+    /,
     *,
     target: Annotated[
         str | None, Parameter(help="Tip position x,y,z [m].", allow_leading_hyphen=True)
     ] = None,
     targets: Annotated[Path | None, Parameter(help="CSV file with columns x, y, z [m].")] = None,
     family: Annotated[
-        int, WHOLE, Parameter(help="With more than three free bundles: solutions for each target.")
-    ] = 1,
+        int | None,
+        WHOLE,
+        Parameter(help="With more than three free bundles: solutions for each target (1)."),
+    ] = None,
     prove_least: Annotated[
         bool,
-        Parameter(
-            negative="",
-            help="With more than three free bundles: say whether least activation is proved.",
-        ),
+        Parameter(help="With more than three free bundles: prove that the activation is least."),
     ] = False,
     changes: Changes = UNCHANGED,
     json: AsJson = False,
 ) -> None:
-    """Every activation that reaches a target, or the nearest point that can be reached."""
+    """Find every activation that puts the tip at a target.
+
+    Where none does, the nearest point that can be reached and a bound on its distance.
+
+    Example: softreach solve minimal_trunk --target 0.2,0.1,0.6
+    """
     from softreach.inverse import solve_inverse
 
     if (target is None) == (targets is None):
         raise InvalidInput("target", target, "given, or --targets, and not both")
     arm = design_from(design, changes)
+    if int((arm.bounds[:, 0] < arm.bounds[:, 1]).sum()) <= 3:
+        why = "left out for a design with three free bundles or fewer: all solutions are found"
+        refuse(why, family=family, prove_least=prove_least)
     points = points_of(target, targets)
-    solutions = solve_inverse(arm, points, family=family, prove_least=prove_least)
+    count = 1 if family is None else family
+    solutions = solve_inverse(arm, points, family=count, prove_least=prove_least)
     if json:
-        json_format.dump([_as_json(solution) for solution in solutions], sys.stdout)
-        sys.stdout.write("\n")
+        console.json([_record(solution) for solution in solutions])
         return
     for solution in solutions:
-        sys.stdout.write("\n".join(_lines(solution, arm)) + "\n")
+        _print(solution, arm)
 
 
-def _as_json(solution: Solution) -> dict[str, object]:
+def _record(solution: Solution) -> dict[str, object]:
     return {
         "target_m": solution.target.tolist(),
         "status": solution.status.name.lower(),
@@ -76,45 +80,37 @@ def _as_json(solution: Solution) -> dict[str, object]:
     }
 
 
-def _activation(arm: Manipulator, values: Iterable[float]) -> str:
-    """Activations with their names and units."""
-    return ", ".join(
-        f"{name} {value:.6f}" if unit == "1" else f"{name} {value:.6g} {unit}"
-        for name, value, unit in zip(arm.bundle_names, values, arm.bundle_units, strict=True)
-    )
-
-
-def _size_unit(arm: Manipulator) -> str:
-    """What the size of an activation is in."""
-    units = set(arm.bundle_units)
-    if len(units) > 1:
-        return " (each over its range)"
-    return "" if units == {"1"} else f" {units.pop()}"
-
-
-def _lines(solution: Solution, arm: Manipulator) -> list[str]:
-    at = ", ".join(f"{x:.6g}" for x in solution.target)
-    lines = [f"target ({at}) m: {solution.status.name.lower().replace('_', ' ')}"]
-    for gamma, residual, condition, margin in zip(
+def _print(solution: Solution, arm: Manipulator) -> None:
+    status = solution.status.name.lower().replace("_", " ")
+    console.line(f"target {position_text(solution.target)}: {status}")
+    rows = zip(
         solution.activations,
         solution.residuals,
         solution.conditions,
         solution.margins,
         strict=True,
-    ):
+    )
+    for gamma, residual, condition, margin in rows:
         quality = f"residual {residual:.1e} m, condition {condition:.3g}, margin {margin:.3g}"
-        lines.append(f"  {_activation(arm, gamma)}  ({quality})")
+        console.line(f"  {activation_text(arm, gamma)}  ({quality})")
     if solution.unstable:
-        left = counted(solution.unstable, "activation")
-        lines.append(f"  {left} left out whose equilibrium there is unstable")
+        left_out = counted(solution.unstable, "activation")
+        console.line(f"  {left_out} left out because the arm is unstable there")
     if solution.least_proved:
-        lines.append("  proved to be the least")
+        console.line("  proved to be the least")
     elif solution.change_bound:
         least = f"{solution.change_bound:.6g}{_size_unit(arm)}"
-        lines.append(f"  no activation of a size below {least} reaches it")
+        console.line(f"  no activation of a size below {least} reaches it")
     if not len(solution):
-        near = ", ".join(f"{x:.6g}" for x in solution.nearest)
         bound = f", proved to be at least {solution.gap_bound:.4g} m" if solution.gap_bound else ""
-        lines.append(f"  nearest ({near}) m, {solution.gap:.4g} m away{bound}")
-        lines.append(f"  reached by {_activation(arm, solution.nearest_activation)}")
-    return lines
+        nearest = position_text(solution.nearest)
+        console.line(f"  nearest {nearest}, {solution.gap:.4g} m away{bound}")
+        console.line(f"  reached by {activation_text(arm, solution.nearest_activation)}")
+
+
+def _size_unit(arm: Manipulator) -> str:
+    """Unit of the size of an activation."""
+    units = set(arm.bundle_units)
+    if len(units) > 1:
+        return " (each over its range)"
+    return "" if units == {"1"} else f" {units.pop()}"

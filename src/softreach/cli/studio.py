@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from softreach.cli.inputs import design_from
-from softreach.cli.numbers import WHOLE
+from softreach.cli.changes import design_from
+from softreach.cli.console import console
+from softreach.cli.options import refuse
+from softreach.cli.values import WHOLE
 
 if TYPE_CHECKING:
     from softreach.studio import Start
     from softreach.studio.kept_work import KeptWork
-
-__all__ = ["studio"]
 
 
 def studio(
@@ -21,6 +21,7 @@ def studio(
         str,
         Parameter(help="Design or its file (.toml), saved state (.json), cloud or atlas (.zarr)."),
     ] = "minimal_trunk",
+    /,
     *,
     host: Annotated[
         str, Parameter(help="Address to listen on; beyond this machine the page asks for a token.")
@@ -28,23 +29,27 @@ def studio(
     port: Annotated[int | None, WHOLE, Parameter(help="A free port by default.")] = None,
     fresh: Annotated[
         bool,
-        Parameter(help="Begin with the source itself, not where the last work on it ended."),
+        Parameter(help="Begin with the design itself, not where the last work on it ended."),
     ] = False,
     open_page: Annotated[
-        bool, Parameter(name="--open", help="Open the page in the browser.")
+        bool,
+        Parameter(name="--open", negative="--no-open", help="Open the page in the browser."),
     ] = True,
     token: Annotated[
         bool | None,
-        Parameter(help="Ask pages for a secret; by default where other machines can connect."),
+        Parameter(
+            negative="--no-token",
+            help="Ask pages for a secret; by default where other machines can connect.",
+        ),
     ] = None,
 ) -> None:
-    """Serve a page on this machine: move sliders and see what the design can reach.
+    """Open the design desk in the browser.
 
-    The work on a design and its snapshots are kept in a folder of your own, and found again.
+    Move sliders, and see at once what the design can reach. The work on a design and its snapshots
+    are kept in a folder of your own, and found again.
 
     Example: softreach studio redundant_trunk --no-open
     """
-    import sys
     import threading
     import warnings
     import webbrowser
@@ -56,35 +61,37 @@ def studio(
     # viser's, of what is drawn for a page that was closed a moment ago
     warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
     check_port(port or 0)
-    asked = not is_local(host) if token is None else token
+    with_token = not is_local(host) if token is None else token
     start = _start(source)
-    secret, work = new_token() if asked else "", _work(start, source, fresh=fresh)
+    secret, work = new_token() if with_token else "", _work(start, source, fresh=fresh)
     with Studio(start, host, port, secret, work=work) as running:
-        sys.stdout.write(f"{running.url}  (Ctrl-C ends it)\n")
+        console.line(f"{running.url}  (Ctrl-C ends it)")
         for url in running.urls_for_others:
-            sys.stdout.write(f"{url}  (for other machines)\n")
-        sys.stdout.flush()
+            console.line(f"{url}  (for other machines)")
+        console.flush()
         if not is_local(host):
-            sys.stderr.write(_warning(asked=asked))
+            console.note(_warning(with_token=with_token))
         if open_page:
             webbrowser.open(running.url)
         threading.Event().wait()
 
 
-def _warning(*, asked: bool) -> str:
-    """What everybody can do who reaches a studio that is not for this machine alone."""
-    who = "who has an address with its token" if asked else "in the network, as no token is asked,"
+def _warning(*, with_token: bool) -> str:
+    """A reminder of what everybody can do who reaches a studio that other machines see."""
+    who = "who has an address with its token" if with_token else "in the network, without a token,"
     return (
         f"warning: everyone {who} can use this studio and this machine's processor; "
-        "what is sent is not encrypted\n"
+        "what is sent is not encrypted"
     )
 
 
 def _work(start: Start, source: str, *, fresh: bool) -> KeptWork:
-    """What is kept of the work; a state or a cloud that is opened is shown as it is in its file."""
+    """The work kept of earlier sessions; a state or a cloud is shown as it is in its file."""
     from softreach.studio.kept_work import work_on
 
     as_it_is = source.lower().endswith(".json") or start.reach is not None
+    if as_it_is:
+        refuse("left out for a state or a cloud, which is always shown as it is", fresh=fresh)
     return work_on(start.state.design, goes_on=not fresh and not as_it_is)
 
 

@@ -3,67 +3,64 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
-from softreach.cli.inputs import (
+from softreach.cli.console import Rows, console
+from softreach.cli.options import (
+    SAMPLING,
     AsJson,
-    Sampler,
-    Samples,
-    Seed,
+    Overwrite,
+    Sampling,
     Source,
+    check_surface,
     cloud_of,
-    is_stored,
+    out_option,
     radius_of,
 )
-from softreach.cli.output import print_rows
-from softreach.cli.output_files import Overwrite, check_surface
 
 if TYPE_CHECKING:
     from softreach.geometry.hull import Hull
 
-__all__ = ["check_hull_memory", "volume", "volume_rows"]
-
 
 def volume(
     source: Source,
+    /,
     *,
     alpha: Annotated[
         str, Parameter(help="α-shape radius: 0.05L, 0.05 (m), or critical.")
     ] = "0.05L",
-    n: Samples = 400_000,
-    seed: Seed = 0,
-    sampler: Sampler = "uniform",
-    hull: Annotated[
-        Path | None, Parameter(help="Write the α-shape here: .ply .stl .obj .glb .vtu .vtk")
+    sampling: Sampling = SAMPLING,
+    changes: Changes = UNCHANGED,
+    out: Annotated[
+        Path | None, out_option("Write the α-shape here: .ply .stl .obj .glb .vtu .vtk")
     ] = None,
     overwrite: Overwrite = False,
-    changes: Changes = UNCHANGED,
     json: AsJson = False,
 ) -> None:
-    """Volume of a cloud's α-shape and convex hull, its unreachability, and the sampling bias.
+    """Estimate volumes and unreachability from a cloud.
 
-    Example: softreach volume trunk.zarr --alpha 0.03L --hull hull.ply
+    The volume is that of an α-shape of the samples, which limit its accuracy. The exact volume,
+    without samples and with its error, is that of softreach reach.
+
+    Example: softreach volume trunk.zarr --alpha 0.03L --out hull.ply
     """
     from softreach.cloud.volume import concave_hull, convex_hull
 
-    check_surface("hull", hull, overwrite)
-    if not is_stored(source):
-        radius_of(alpha, 1.0)  # what is wrong with it is said before the cloud is computed
-        check_hull_memory(n)
-    cloud = cloud_of(source, n, seed, sampler, changes)
+    check_surface(out, overwrite)
+    radius_of(alpha, 1.0)  # what is wrong with it is said before the cloud is computed
+    cloud = cloud_of(source, sampling, changes, check_hull_memory)
     length = float(cloud.tip.attrs["length"])
-    concave = concave_hull(
-        cloud.tip, radius_of(alpha, length), bias=cloud.attrs["sampler"] == "uniform"
-    )
+    bias = cloud.attrs["sampler"] == "uniform"
+    concave = concave_hull(cloud.tip, radius_of(alpha, length), bias=bias)
     rows = volume_rows(concave, convex_hull(cloud.tip), length)
-    if hull is not None:
+    if out is not None:
         from softreach.export import export_mesh
 
-        export_mesh(concave, hull, overwrite=overwrite)
-    print_rows(f"volume of {source}", rows, json)
+        export_mesh(concave, out, overwrite=overwrite)
+    console.rows(f"volume of {source}", rows, json)
 
 
 _BYTES = 700  # of memory that a sample and its share of the triangulation take at most
@@ -76,10 +73,11 @@ def check_hull_memory(n: int) -> None:
     check_memory("n", n, _BYTES * n)
 
 
-def volume_rows(concave: Hull, convex: Hull, length: float) -> dict[str, tuple[Any, str]]:
-    """The rows that say how large a cloud is and how far to trust it."""
+def volume_rows(concave: Hull, convex: Hull, length: float) -> Rows:
+    """The size of a cloud and the trust that it deserves."""
     cube = length**3
     corrected = concave.volume_corrected
+    unbiased = None if corrected is None else corrected / cube
     share = 1 - concave.volume / convex.volume if convex.volume else None
     return {
         "points": (concave.n, ""),
@@ -87,10 +85,7 @@ def volume_rows(concave: Hull, convex: Hull, length: float) -> dict[str, tuple[A
         "mean spacing": (concave.spacing / length, "L"),
         "regions": (concave.regions, ""),
         "volume": (concave.volume / cube, "L³"),
-        "volume without sampling bias (estimate)": (
-            None if corrected is None else corrected / cube,
-            "L³",
-        ),
+        "volume without sampling bias (estimate)": (unbiased, "L³"),
         "convex volume": (convex.volume / cube, "L³"),
         "unreachability": (share, ""),
     }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import warnings
 from collections.abc import Callable
 from functools import partial
@@ -10,7 +9,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-__all__ = ["warmup"]
+from softreach.cli.console import console
 
 
 def warmup(
@@ -19,9 +18,11 @@ def warmup(
         bool, Parameter(help="Also what arms under loads need: half a minute more.")
     ] = False,
 ) -> None:
-    """Compile every kernel into the cache on disk; with a full cache that is done in seconds.
+    """Compile all kernels now, so that no later command has to.
 
-    Example: softreach warmup
+    They are kept in a cache on disk; where it is full, this takes seconds.
+
+    Example: softreach warmup --loads
     """
     from softreach.support.progress import bar
 
@@ -31,7 +32,7 @@ def warmup(
         for job in jobs:
             job()
             done(1)
-    sys.stdout.write("all kernels are compiled\n")
+    console.line("all kernels are compiled")
 
 
 def _free() -> list[Callable[[], object]]:
@@ -61,7 +62,7 @@ def _free() -> list[Callable[[], object]]:
 
 
 def _hulls() -> None:
-    """What is computed from a cloud."""
+    """Hulls and distances of a small cloud."""
     from softreach.arm import designs
     from softreach.cloud.clouds import compute_cloud
     from softreach.cloud.redundancy import activation_distance

@@ -6,7 +6,10 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-__all__ = ["Progress", "bar", "silent"]
+__all__ = ["Progress", "bar", "hidden", "silent"]
+
+hidden = False
+"""No bars, even on a terminal; `softreach --quiet` sets it."""
 
 Progress = Callable[[int], None]
 """Called with the number of items done since the last call."""
@@ -25,7 +28,7 @@ def bar(label: str, total: int | None) -> Iterator[Progress]:
         label: What is going on.
         total: Number of items; None if it is known only in the end, for a bar that moves on.
     """
-    if not sys.stderr.isatty():
+    if hidden or not sys.stderr.isatty():
         yield silent
         return
     from rich.console import Console

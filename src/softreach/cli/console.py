@@ -1,0 +1,173 @@
+"""The console: results on standard output; errors, warnings and progress on standard error."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import shutil
+import sys
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from io import TextIOWrapper
+from typing import TYPE_CHECKING, Any
+
+from softreach.cli.values import finite, key, shown
+from softreach.support import progress
+from softreach.support.errors import NotWritten, SoftreachWarning
+
+if TYPE_CHECKING:
+    from rich.console import Console as RichConsole
+
+
+Rows = dict[str, tuple[Any, str]]
+"""Name -> (value, unit)."""
+
+_NARROWEST = 60  # columns; the tables of a help text lose words below, and lines that wrap do not
+
+
+class Console:
+    """Everything that commands print goes through here.
+
+    Attributes:
+        quiet: Results and errors only.
+        verbose: Also what is compiled, and where an error comes from.
+    """
+
+    quiet = False
+    verbose = False
+
+    def set(self, *, quiet: bool = False, verbose: bool = False) -> None:
+        """Say how much is printed."""
+        self.quiet = progress.hidden = quiet
+        self.verbose = verbose
+
+    def line(self, text: object) -> None:
+        """A result in words."""
+        sys.stdout.write(f"{text}\n")
+
+    def json(self, value: Any, indent: int | None = None) -> None:
+        """A result for machines; null where there is no number."""
+        self.line(json.dumps(finite(value), indent=indent, allow_nan=False))
+
+    def rows(self, title: str, rows: Mapping[str, tuple[Any, str]], as_json: bool) -> None:
+        """Named values with their units, one below the other.
+
+        Args:
+            title: Heading for people.
+            rows: Name -> (value, unit); JSON keys are the names with their units.
+            as_json: Print JSON.
+        """
+        if as_json:
+            self.json({key(name, unit): value for name, (value, unit) in rows.items()})
+            return
+        width = max(len(name) for name in rows)
+        texts = {name: (shown(value), unit) for name, (value, unit) in rows.items()}
+        self.line(title)
+        for name, (text, unit) in texts.items():
+            self.line(f"  {name:<{width}}  {text} {'' if text == '-' else unit}".rstrip())
+
+    def table(self, records: Sequence[Mapping[str, Any]], as_json: bool) -> None:
+        """Records with the same keys, one to a line below a heading."""
+        if as_json:
+            self.json(records)
+            return
+        lines = [list(records[0]), *([shown(value) for value in one.values()] for one in records)]
+        widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+        for cells in lines:
+            padded = (f"{cell:<{width}}" for cell, width in zip(cells, widths, strict=True))
+            self.line("  ".join(padded).rstrip())
+
+    def note(self, text: str) -> None:
+        """A remark beside the results."""
+        if not self.quiet:
+            self.error(text)
+
+    def error(self, text: str) -> None:
+        """A line on standard error."""
+        with suppress(OSError, ValueError):  # nobody reads it
+            sys.stderr.write(f"{text}\n")
+
+    @contextmanager
+    def listening(self) -> Iterator[None]:
+        """A block whose warnings and compilations are told, and whose letters can be printed."""
+        compilations, log = _Compilations(), logging.getLogger("softreach")
+        streams = [s for s in (sys.stdout, sys.stderr) if isinstance(s, TextIOWrapper)]
+        before, level = [stream.errors for stream in streams], log.level
+        log.addHandler(compilations)
+        log.setLevel(logging.INFO)
+        for stream in streams:
+            stream.reconfigure(errors="backslashreplace")
+        try:
+            with warnings.catch_warnings():
+                warnings.showwarning = _show_warning
+                yield
+        finally:
+            self.set()
+            log.removeHandler(compilations)
+            log.setLevel(level)
+            for stream, errors in zip(streams, before, strict=True):
+                with suppress(ValueError, OSError):  # closed, or full
+                    stream.reconfigure(errors=errors)
+
+    def flush(self) -> None:
+        """Hand over what was printed, so that a full disk is not found out after the last word.
+
+        Raises:
+            NotWritten: It cannot be written.
+            BrokenPipeError: Whoever read it has gone.
+        """
+        try:
+            sys.stdout.flush()
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            self.discard()
+            reason = error.strerror or str(error)
+            raise NotWritten("standard output", error.errno or 0, reason) from None
+
+    def discard(self) -> None:
+        """Send what was printed and cannot be written nowhere; Python would complain of it."""
+        with suppress(OSError, ValueError):
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, sys.stdout.fileno())
+            os.close(nowhere)
+
+
+console = Console()
+
+
+class HelpConsole:
+    """The console that help is laid out on, made when it is needed as Rich takes its time."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(_rich_console(), name)
+
+
+def _rich_console() -> RichConsole:
+    from rich.console import Console as RichConsole
+
+    class Whole(RichConsole):
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError
+
+    return Whole(width=max(_NARROWEST, shutil.get_terminal_size().columns))
+
+
+class _Compilations(logging.Handler):
+    """Tells that kernels are compiled, so that nobody takes a first run for one that hangs."""
+
+    told = False
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if console.verbose:
+            console.note(f"softreach: {record.getMessage()}")
+        elif not self.told:
+            self.told = True
+            console.note("softreach: compiling kernels (first run only, then cached on disk)")
+
+
+def _show_warning(message: Warning | str, category: type[Warning], *_: object) -> None:
+    if issubclass(category, SoftreachWarning):
+        console.note(f"warning: {message}")

@@ -1,0 +1,100 @@
+"""`softreach list`: the names that other commands take."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cyclopts import App
+
+from softreach.cli.changes import UNCHANGED, Changes, design_from
+from softreach.cli.console import console
+from softreach.cli.options import AsJson, Design
+from softreach.cli.values import as_read
+
+listing = App(
+    name="list",
+    help="""List designs, materials, metrics, or parameters of a design.
+
+Example: softreach list parameters minimal_trunk
+""",
+)
+
+
+@listing.command
+def designs(*, json: AsJson = False) -> None:
+    """List the built-in designs with what drives them.
+
+    Example: softreach list designs
+    """
+    from softreach.arm import designs
+
+    makers = {name: getattr(designs, name) for name in designs.__all__}
+    records = [
+        {
+            "design": name,
+            "bundles": (arm := make()).bundles,
+            "length_m": arm.length,
+            "description": (make.__doc__ or "").partition("\n")[0].rstrip(".").replace("`", ""),
+        }
+        for name, make in makers.items()
+    ]
+    console.table(records, json)
+
+
+@listing.command
+def materials(*, json: AsJson = False) -> None:
+    """List the named materials from soft to stiff, with Young's modulus and density.
+
+    Example: softreach list materials
+    """
+    from softreach.arm.materials import material_names, material_record
+
+    records = [
+        {
+            "material": name,
+            "young_modulus_pa": (record := material_record(name)).material.young_modulus,
+            "poisson_ratio": record.material.poisson_ratio,
+            "density_kg_m3": record.material.density,
+            "modulus": record.modulus,
+        }
+        for name in material_names()
+    ]
+    console.table(records, json)
+
+
+@listing.command
+def metrics(*, json: AsJson = False) -> None:
+    """List the metrics of an atlas with their groups and units.
+
+    Example: softreach list metrics
+    """
+    from softreach.atlas.metrics import METRIC_GROUPS
+
+    records = [
+        {"metric": metric.name, "group": group, "unit": metric.unit, "meaning": metric.meaning}
+        for group, members in METRIC_GROUPS.items()
+        for metric in members
+    ]
+    console.table(records, json)
+
+
+@listing.command
+def parameters(design: Design, /, *, changes: Changes = UNCHANGED, json: AsJson = False) -> None:
+    """List every parameter of a design with its value, as --set and --vary name it.
+
+    A dash stands where the design gives no single number; it can be set all the same.
+
+    Example: softreach list parameters minimal_trunk
+    """
+    from softreach.arm.parameters import parameters as parameters_of
+    from softreach.arm.parameters.written import written_name
+
+    arm = design_from(design, changes)
+    records: list[dict[str, Any]] = []
+    for name, parameter in parameters_of(arm).items():
+        value, unit = as_read(parameter.value(arm), parameter.unit)
+        written = written_name(name, parameter.unit)
+        row = (written, value, unit, parameter.symbol, parameter.meaning)
+        columns = ("parameter", "value", "unit", "symbol", "meaning")
+        records.append(dict(zip(columns, row, strict=True)))
+    console.table(records, json)

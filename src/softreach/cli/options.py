@@ -1,0 +1,205 @@
+"""Options that commands share: how they are called, what they mean, how they are read."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Group, Parameter
+
+from softreach.cli.changes import Changes, design_from
+from softreach.cli.values import WHOLE
+from softreach.support.errors import InvalidInput
+from softreach.support.files.text import MEGABYTE, read_text
+from softreach.support.quantity import numbers_in, shortened
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from softreach.arm.manipulator import Manipulator
+    from softreach.support.files.kinds import Formats
+
+
+OUTPUT = Group("Output options", sort_key=3)
+
+_MOST_TARGETS = 64 * MEGABYTE  # a million targets
+_STORED = "left out for a stored cloud: give the design instead"
+
+Design = Annotated[
+    str, Parameter(help="Design file (.toml), or a built-in design such as minimal_trunk.")
+]
+Source = Annotated[str, Parameter(help="Cloud (.zarr), design file (.toml) or built-in design.")]
+Activation = Annotated[
+    str | None,
+    Parameter(
+        help="Activations, one per bundle in its unit ([-], N or Pa): -1,0,-0.5",
+        allow_leading_hyphen=True,
+    ),
+]
+AsJson = Annotated[
+    bool, Parameter(name="--json", group=OUTPUT, help="Print JSON; null where there is no number.")
+]
+Durable = Annotated[
+    bool,
+    Parameter(group=OUTPUT, help="Wait until not even a power cut can lose what is written."),
+]
+Overwrite = Annotated[
+    bool,
+    Parameter(group=OUTPUT, help="Replace what is in the way, whatever it is."),
+]
+
+
+def out_option(help: str) -> Parameter:
+    """`--out`, the one name of the file or folder that a command writes."""
+    return Parameter(name=("--out", "-o"), group=OUTPUT, help=help)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Sampling:
+    """How a cloud is sampled."""
+
+    n: Annotated[
+        int | None,
+        WHOLE,
+        Parameter(name=("--n", "-n"), help="Number of samples: 400000 if left out."),
+    ] = None
+    seed: Annotated[int | None, WHOLE, Parameter(help="Seed of the sampler: 0 if left out.")] = None
+    sampler: Annotated[
+        str | None, Parameter(help="uniform (if left out), boundary, sobol or grid.")
+    ] = None
+
+    @property
+    def count(self) -> int:
+        """Number of samples."""
+        return 400_000 if self.n is None else self.n
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """What `compute_cloud` and `build_atlas` take.
+
+        Raises:
+            InvalidInput: A seed for a sampler without chance.
+        """
+        if self.sampler == "grid":
+            refuse("left out for the sampler grid, which is not random", seed=self.seed)
+        return {"n": self.count, "seed": self.seed or 0, "sampler": self.sampler or "uniform"}
+
+
+SAMPLING = Sampling()
+
+
+def refuse(why: str, **options: object) -> None:
+    """Refuse options that would be ignored, if any of them is given."""
+    for name, value in options.items():
+        if value is not None and value is not False:
+            raise InvalidInput(name, value, why)
+
+
+def is_stored(source: str) -> bool:
+    """Whether a source is a stored cloud; else it is a design."""
+    return source.rstrip("/").endswith(".zarr")
+
+
+def cloud_of(
+    source: str, sampling: Sampling, changes: Changes, check: Callable[[int], None] | None = None
+) -> xr.Dataset:
+    """The stored cloud, or one of the design once its number of samples is checked."""
+    from softreach.cloud.clouds import compute_cloud, open_cloud
+
+    if is_stored(source):
+        changes.refuse(_STORED)
+        refuse(_STORED, **vars(sampling))
+        return open_cloud(source)
+    if check is not None:
+        check(sampling.count)
+    return compute_cloud(design_from(source, changes), **sampling.arguments)
+
+
+def activation_of(text: str | None, arm: Manipulator) -> list[float]:
+    """Numbers from `-1,0,-0.5`; every bundle at its lower bound when there is none."""
+    if text is None:
+        return arm.bounds[:, 0].tolist()
+    values = numbers_in(text, arm.bundles)
+    if values is None:
+        allowed = f"{arm.bundles} comma-separated numbers ({', '.join(arm.bundle_names)})"
+        raise InvalidInput("activation", shortened(text), allowed)
+    return values
+
+
+def shape_of(text: str | None, arm: Manipulator) -> xr.Dataset:
+    """The arm as activations bend it, which must leave it a shape."""
+    import numpy as np
+
+    from softreach.rod.kinematics import configuration
+
+    shape = configuration(arm, activation_of(text, arm))
+    if not np.isfinite(shape.position.values).all():
+        lower, upper = (",".join(f"{bound:g}" for bound in ends) for ends in arm.bounds.T)
+        allowed = f"such that the arm has a shape, as from {lower} to {upper}"
+        raise InvalidInput("activation", text, allowed)
+    return shape
+
+
+def points_of(text: str | None, file: Path | None) -> list[list[float]]:
+    """Positions [m] from `x,y,z`, or from a CSV file with such columns (a header is skipped)."""
+    from softreach.inverse.request import position_in, positions_in
+
+    if text is not None:
+        return [position_in("target", text)]
+    if file is None:
+        raise InvalidInput("targets", file, "a CSV file")
+    return positions_in(read_text("targets", file, _MOST_TARGETS), str(file))
+
+
+def radius_of(text: str, length: float) -> float | str:
+    """An alpha radius in m from `0.05L`, `0.05` (m) or `critical`."""
+    if text == "critical":
+        return text
+    values = numbers_in(text.removesuffix("L"), 1)
+    radius = (length if text.endswith("L") else 1.0) * (values[0] if values else 0.0)
+    if not 0.0 < radius < math.inf:
+        allowed = "a radius > 0 like 0.05L or 0.05 (m), or critical"
+        raise InvalidInput("alpha", shortened(text) or "''", allowed)
+    return radius
+
+
+def check_output(path: Path | None, formats: Formats, overwrite: bool) -> None:
+    """Refuse a file that could not be written in the end, before anything is computed.
+
+    Args:
+        path: Where it goes, if it is asked for.
+        formats: What can be written there, by suffix.
+        overwrite: Whether it may replace anything else.
+
+    Raises:
+        InvalidInput: Another suffix, something else is there, the disk cannot hold it, or there is
+            nothing to overwrite.
+        MissingExtra: A library that writes it is not installed.
+        NotWritten: Nothing can be written there.
+    """
+    from softreach.support.files.atomic import check_place
+    from softreach.support.files.kinds import format_of
+
+    if path is None:
+        refuse("left out where no file is written: give --out too", overwrite=overwrite)
+    else:
+        kind = format_of(path, formats, "out")
+        check_place(path, kind, overwrite=overwrite, name="out")
+
+
+def check_picture(path: Path | None, overwrite: bool) -> None:
+    """Refuse a place for a picture, as `check_output`."""
+    from softreach.support.files.kinds import PICTURES
+
+    check_output(path, PICTURES, overwrite)
+
+
+def check_surface(path: Path | None, overwrite: bool) -> None:
+    """Refuse a place for a surface, as `check_output`."""
+    from softreach.export.surfaces import SURFACE_FILES
+
+    check_output(path, SURFACE_FILES, overwrite)
