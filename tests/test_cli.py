@@ -139,7 +139,7 @@ class TestDesign:
         assert "fiber: Exact to first order" in capsys.readouterr().out
 
     def test_the_schema_is_printed_for_editors(self, capsys):
-        from softreach.arm.file.json_schema import json_schema
+        from softreach.arm.design_file.schema import json_schema
 
         assert printed_json(capsys, "design", "--schema") == json_schema()
 

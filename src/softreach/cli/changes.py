@@ -237,7 +237,7 @@ def _values(
 ) -> dict[str, float]:
     """Name of a parameter -> value in its unit, from what was written, and from angles."""
     from softreach.arm.parameters.changes import find_parameter, parameters_by_every_name
-    from softreach.arm.parameters.written import written_parameters
+    from softreach.arm.parameters.shown import written_parameters
 
     found = dict(angles)
     if not texts:
@@ -258,7 +258,7 @@ def _given_twice(name: str) -> InvalidInput:
 
 def _of_value(parameter: DesignParameter, name: str, text: str) -> float:
     """A value with its unit."""
-    from softreach.arm.parameters.written import written_name
+    from softreach.arm.parameters.shown import written_name
     from softreach.support.quantity import read_quantity, unit_names
 
     try:
@@ -275,7 +275,7 @@ def _of_value(parameter: DesignParameter, name: str, text: str) -> float:
 
 def _of_name(parameter: DesignParameter, name: str, text: str) -> float:
     """A value whose unit the name holds."""
-    from softreach.arm.parameters.written import from_written
+    from softreach.arm.parameters.shown import from_written
     from softreach.support.quantity import read_quantity
 
     try:

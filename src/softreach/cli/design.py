@@ -42,7 +42,7 @@ def design(
     """
     import sys
 
-    from softreach.arm.file import DESIGN_FILE
+    from softreach.arm.design_file import DESIGN_FILE
     from softreach.arm.summary import describe
     from softreach.support.errors import InvalidInput
 
@@ -69,7 +69,7 @@ def design(
 def _schema_text() -> str:
     import json
 
-    from softreach.arm.file.json_schema import json_schema
+    from softreach.arm.design_file.schema import json_schema
 
     return json.dumps(json_schema(), indent=2) + "\n"
 

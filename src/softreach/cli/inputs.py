@@ -61,7 +61,7 @@ Activation = Annotated[
 
 def design_from(text: str, changes: Changes = UNCHANGED) -> Manipulator:
     """The design of that name or file, changed as asked."""
-    from softreach.arm import designs, file
+    from softreach.arm import design_file, designs
     from softreach.arm.tables import check_extension
 
     built_in = {name: getattr(designs, name) for name in designs.__all__}
@@ -81,7 +81,7 @@ def design_from(text: str, changes: Changes = UNCHANGED) -> Manipulator:
         return varied
     except InvalidDesign as error:
         one_option = len(error.faults) == 1 and changes.given
-        raise file.in_file_terms(error, "" if one_option else text) from None
+        raise design_file.in_file_terms(error, "" if one_option else text) from None
 
 
 def _loaded(path: str) -> Manipulator:

@@ -23,18 +23,20 @@ _STATUS = {
 
 def load_rows(loads: Loads | None) -> Rows:
     """Gravity with the way in which it makes the arm point, and all other loads that are not 0."""
+    from softreach.arm.number import fields_of
+
     if loads is None:
         return {}
     rows: Rows = {}
     if any(loads.gravity):
         rows["gravity"] = (list(loads.gravity), "m/s²")
         rows["base"] = (_base(loads.gravity), "")
-    for variable in (*loads.variables, *loads.series):
-        value = getattr(loads, variable.field)
-        given = any(value) if isinstance(value, tuple) else value
-        if given and variable.field != "gravity":
+    for field, number in fields_of(type(loads)).items():
+        value = getattr(loads, field)
+        acts = any(value) if isinstance(value, tuple) else value
+        if acts and field != "gravity":
             shown = list(value) if isinstance(value, tuple) else value
-            rows[variable.field.replace("_", " ")] = (shown, variable.allowed.unit)
+            rows[field.replace("_", " ")] = (shown, number.unit)
     if loads.point_loads:
         rows["point loads"] = (len(loads.point_loads), "")
     return rows
@@ -55,8 +57,8 @@ def rest_rows(arm: Manipulator) -> Rows:
     Without loads: how far its own weight moves a tip that is held sideways, and whether the arm
     would stand upright; nothing where moduli or densities are not known.
     """
-    from softreach.arm.loads import Loads
-    from softreach.arm.weight import GRAVITY, load_number_faults
+    from softreach.arm.loads import GRAVITY, Loads
+    from softreach.arm.summary import load_number_faults
 
     if load_number_faults(arm):
         return {}

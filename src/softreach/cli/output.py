@@ -50,7 +50,7 @@ _SUFFIX = {
 
 
 def _key(name: str, unit: str) -> str:
-    from softreach.arm.parameters.written import with_suffix
+    from softreach.arm.parameters.shown import with_suffix
 
     plain = name.replace(" ", "_").replace("/", "_per_").replace("(", "").replace(")", "")
     return with_suffix(plain, _SUFFIX.get(unit, ""))
