@@ -143,7 +143,7 @@ class TestDesign:
         assert "fiber: Exact to first order" in capsys.readouterr().out
 
     def test_the_schema_is_printed_for_editors(self, capsys):
-        from softreach.arm.file.json_schema import json_schema
+        from softreach.arm.design_file.schema import json_schema
 
         assert printed_json(capsys, "design", "--schema") == json_schema()
 
@@ -396,6 +396,7 @@ class TestList:
     @pytest.mark.parametrize("kind", ["designs", "materials", "metrics"])
     def test_the_names_are_those_of_the_library(self, kind, capsys):
         from softreach.arm.materials import material_names
+
         from softreach.atlas.metrics import METRIC_GROUPS
 
         names = {

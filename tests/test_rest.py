@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.arm.weight import load_number
+from softreach.arm.summary import load_number
 from softreach.rest import rest
 from softreach.rod.tip_map import TipStatus, tip_map
 from softreach.support.errors import SoftreachWarning

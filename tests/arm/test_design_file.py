@@ -22,7 +22,7 @@ from softreach.arm import (
     Tendon,
     designs,
 )
-from softreach.arm.materials import named_material
+from softreach.arm.material import named_material
 from tests.arm.drawn_arms import any_arms
 from tests.laws import arms
 

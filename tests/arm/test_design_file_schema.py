@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 
-from softreach.arm.file.json_schema import json_schema
+from softreach.arm.design_file.schema import json_schema
 from tests.arm.drawn_arms import any_arms
 from tests.arm.test_design_file import BODY, FIBER, FILES
 from tests.arm.test_design_file_faults import BAD_FILE

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 import softreach as sr
 from softreach.arm import PointLoad
-from softreach.arm.file.load_table import LoadTable
+from softreach.arm.design_file.keys import keys_of
 from softreach.arm.parameters import changed, find_parameter
-from softreach.arm.parameters.written import written_parameters
+from softreach.arm.parameters.shown import written_parameters
 from softreach.support.errors import InvalidDesign
 from tests.bodies import rubber
 
@@ -90,7 +90,7 @@ def test_payload_and_gravity_are_parameters(trunk):
 def test_parameters_of_loads_are_written_as_the_keys_of_files(trunk):
     written = written_parameters(rubber(trunk, sr.Loads()))
     names = {name.partition("[")[0] for name in written if name.startswith("loads.")}
-    keys = {f"loads.{key}" for key in LoadTable.keys().values()}
+    keys = {f"loads.{key}" for key in keys_of(sr.Loads)}
     assert names == keys - {"loads.point_loads"}
 
 

@@ -12,7 +12,7 @@ from tools.designs import FOLDER, design_file
 import softreach as sr
 from softreach.arm import designs
 from softreach.arm.bending import sharpest_bending
-from softreach.arm.materials import named_material
+from softreach.arm.material import named_material
 from tests.laws import in_box
 
 NAMES = designs.__all__

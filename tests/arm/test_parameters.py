@@ -23,13 +23,13 @@ from softreach.arm.actuators import (
 from softreach.arm.along import Samples
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import Material
+from softreach.arm.number import number
 from softreach.arm.parameters import changed, find_parameter, parameters
-from softreach.arm.parameters.written import written_parameters
-from softreach.arm.sampled_profiles import PiecewiseTaper
+from softreach.arm.parameters.shown import written_parameters
+from softreach.arm.profile import PiecewiseTaper
 from softreach.arm.section import Ring, Section
-from softreach.arm.variable import Variable
 from softreach.rod.kinematics import tip_positions
-from softreach.support.errors import InvalidDesign, InvalidInput, Range
+from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.laws import arm_of, arms, in_box
 
 SAMPLED = Samples(stations_over_length=(0.0, 0.3, 1.0), values=(0.0, 0.1, 0.3))
@@ -463,11 +463,8 @@ class Pull(Actuator):
     """A force along the axis: an actuator that nothing else knows of."""
 
     unit: ClassVar[str] = "N"
-    variables: ClassVar[tuple[Variable, ...]] = (
-        Variable("area", "A", "area that the force spreads over", Range(low=0.0, unit="m2")),
-    )
     name: str = "pull"
-    area: float = 1e-4
+    area: float = number("A", "m2", "area that the force spreads over", low=0.0, default=1e-4)
     activation_bounds: tuple[float, float] = (-1.0, 0.0)
 
     def resultants(self, profile, section, z):
@@ -489,6 +486,9 @@ def test_another_kind_of_actuator_has_the_parameters_that_it_declares(trunk):
     known = parameters(arm)
     assert {name for name in known if name.startswith("pull.")} == {
         "pull.area",
+        "pull.bundles",
+        "pull.start_over_length",
+        "pull.end_over_length",
         "pull.lower",
         "pull.upper",
     }

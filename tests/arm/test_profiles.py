@@ -139,8 +139,11 @@ def test_a_profile_is_a_value(kind):
         ({"radii": (0.1, 0.1)}, r"radii = .*must be 3 finite numbers, one for each station"),
         ({"radii": (0.1, math.inf, 0.1)}, "3 finite numbers"),
         ({"radii": (0.1, "0.1", 0.1)}, "3 finite numbers"),
-        ({"radii": (0.1, 0.0, 0.1)}, r"radii = \(0.1, 0.0, 0.1\): must be positive, in m"),
-        ({"radii": (0.1, -0.1, 0.1)}, "must be positive"),
+        (
+            {"radii": (0.1, 0.0, 0.1)},
+            r"radii\[1\] = 0: must be a finite number >= 1e-12 and <= 1e\+09 m",
+        ),
+        ({"radii": (0.1, -0.1, 0.1)}, r"radii\[1\] = -0.1: must be"),
         ({"radii": None}, "radii: must be 3 finite numbers"),
     ],
 )

@@ -249,9 +249,9 @@ def test_a_tendon_is_measured_in_newtons():
         ),
         (
             {"distance": Pieces(stations_over_length=(0, 1), values=(0.1,))},
-            r"distance = Pieces\(.*must be a number or Samples, which do not jump",
+            r"distance = Pieces\(.*must be a finite number >= 0 m, or Samples along the arm",
         ),
-        ({"routing": 0.3}, r"routing = 0.3: must be Samples of θ\(Z\) - θ0, or None"),
+        ({"routing": 0.3}, "routing = 0.3: must be Samples along the arm, or None"),
         (
             {"routing": Pieces(stations_over_length=(0, 1), values=(0.1,))},
             r"routing = Pieces\(.*must be Samples",

@@ -11,7 +11,7 @@ import softreach as sr
 from softreach.arm.actuators import Tendon
 from softreach.arm.material import Material
 from softreach.arm.parameters import changed
-from softreach.arm.sampled_profiles import PiecewiseTaper
+from softreach.arm.profile import PiecewiseTaper
 from softreach.arm.section import Ring, Section
 from softreach.atlas import DesignSpace, atlas_cloud, atlas_design, best_designs, open_atlas
 from softreach.atlas.space_file import parse_space

@@ -16,10 +16,8 @@ from softreach.arm.actuators.ring_integrals import RingIntegrals
 from softreach.arm.along import AlongArm, Pieces, Samples
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.material import Material
-from softreach.arm.materials import material_names, named_material
-from softreach.arm.profile import LinearTaper, Profile
-from softreach.arm.sampled_profiles import PiecewiseTaper, SampledTaper
+from softreach.arm.material import Material, material_names, named_material
+from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
 from softreach.arm.section import Layer, Ring, Section, Stiffness
 from softreach.arm.summary import DesignSummary, describe
 

@@ -7,15 +7,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.value_checks import series_faults
-from softreach.support.errors import Fault, InvalidDesign
+from softreach.arm.number import series_faults, stations
+from softreach.arm.part import Part
+from softreach.support.errors import Fault
 
 __all__ = ["AlongArm", "Pieces", "Samples", "monotone_cubic"]
 
@@ -25,20 +26,17 @@ _INTERPOLATIONS = ("cubic", "linear")
 
 
 @dataclass(frozen=True, kw_only=True)
-class AlongArm(ABC):
+class AlongArm(Part, ABC):
     """A function of Z/L."""
 
-    stations_over_length: tuple[float, ...]
+    stations_over_length: tuple[float, ...] = stations("place of a value")
     """Z/L of the samples, or of the ends of the pieces [-]: from 0 to 1, rising."""
     values: tuple[float, ...]
     """One for each station, or one for each piece between them."""
 
     def __post_init__(self) -> None:
-        if faults := self._faults():
-            raise InvalidDesign(faults)
-        for field in ("stations_over_length", "values"):
-            numbers = np.asarray(getattr(self, field), float).tolist()
-            object.__setattr__(self, field, tuple(numbers))
+        super().__post_init__()
+        object.__setattr__(self, "values", tuple(np.asarray(self.values, float).tolist()))
 
     @abstractmethod
     def __call__(self, x: ArrayLike) -> Array:
@@ -52,10 +50,6 @@ class AlongArm(ABC):
     def breaks(self) -> tuple[float, ...]:
         """Z/L inside (0, 1) where it is not smooth."""
         return self.stations_over_length[1:-1]
-
-    def replace(self, **changes: Any) -> Self:
-        """A copy with some fields changed, checked like a new one."""
-        return replace(self, **changes)
 
     def _faults(self) -> list[Fault]:
         return series_faults(vars(self), "values")
@@ -119,8 +113,8 @@ class Samples(AlongArm):
         return faults
 
 
-def monotone_cubic(stations: Sequence[float], values: Sequence[float]) -> Any:
+def monotone_cubic(places: Sequence[float], values: Sequence[float]) -> Any:
     """The monotone piecewise cubic through samples as SciPy's PCHIP [FritschCarlson1980]."""
     from scipy.interpolate import PchipInterpolator
 
-    return PchipInterpolator(stations, values)
+    return PchipInterpolator(places, values)

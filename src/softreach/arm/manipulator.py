@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike, fspath
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm import file
-from softreach.arm.actuator_checks import bounds_faults
+from softreach.arm import design_file
 from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
-from softreach.arm.checks import tube_faults
+from softreach.arm.actuators.actuator import MOST_BUNDLES, bounds_faults
 from softreach.arm.loads import Loads
 from softreach.arm.material import Material
-from softreach.arm.part_checks import fit_faults, kind_faults, named, part_faults, shared_names
 from softreach.arm.profile import LinearTaper, Profile
-from softreach.arm.section import Ring, Section
-from softreach.support.arguments import as_given, checked, flag, instance, path, text, whole
+from softreach.arm.section import Ring, Section, name_faults
+from softreach.support.arguments import as_given, checked, flag, instance, path, plain, text, whole
 from softreach.support.arrays import as_stations
-from softreach.support.errors import InvalidDesign, InvalidInput
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
 from softreach.support.files.atomic import writing
 
 __all__ = ["Manipulator", "a_manipulator"]
@@ -54,10 +53,10 @@ class Manipulator:
     """What acts on the arm beside them; None for nothing, not even its weight."""
 
     def __post_init__(self) -> None:
-        if faults := list(part_faults(self)):
+        if faults := list(_part_faults(self)):
             raise InvalidDesign(faults)
-        object.__setattr__(self, "actuators", tuple(named(self.actuators)))
-        if faults := list(shared_names(self)) or list(fit_faults(self)):
+        object.__setattr__(self, "actuators", tuple(_named(self.actuators)))
+        if faults := list(_shared_names(self)) or list(_fit_faults(self)):
             raise InvalidDesign(faults)
 
     @classmethod
@@ -93,20 +92,25 @@ class Manipulator:
         Raises:
             InvalidDesign: The arm cannot exist; the error names every fault.
         """
-        values = {name: value for name, value in locals().items() if name != "cls"}
-        faults = list(kind_faults(actuators))
+        faults = list(_kind_faults(actuators))
         bundles = None if faults else sum(actuator.bundles for actuator in actuators)
-        if faults := tube_faults(values, bundles) + faults:
+        profile = _part_or_faults(
+            faults, LinearTaper, length=length, outer_radius=outer_radius, taper=taper
+        )
+        matter = {
+            "young_modulus": young_modulus,
+            "poisson_ratio": poisson_ratio,
+            "density": density,
+        }
+        material = _part_or_faults(faults, Material, **matter)
+        faults += _inner_radius_faults(plain(inner_radius), profile)
+        if activation_bounds is not None:
+            faults += bounds_faults(activation_bounds, bundles)
+        if faults or profile is None or material is None:
             raise InvalidDesign(faults)
-        material = Material(
-            young_modulus=young_modulus, poisson_ratio=poisson_ratio, density=density
-        )
         ring = Ring(inner_ratio=inner_radius / outer_radius, material=material)
-        arm = cls(
-            profile=LinearTaper(length=length, outer_radius=outer_radius, taper=taper),
-            section=Section(rings=(ring,)),
-            actuators=tuple(actuators),
-        )
+        section = Section(rings=(ring,))
+        arm = cls(profile=profile, section=section, actuators=tuple(actuators))
         return arm if activation_bounds is None else arm.with_bounds(activation_bounds)
 
     def replace(self, **changes: Any) -> Self:
@@ -126,8 +130,8 @@ class Manipulator:
             raise InvalidDesign(faults)
         pairs = np.broadcast_to(np.asarray(activation_bounds, float), (self.bundles, 2))
         ends = np.cumsum([actuator.bundles for actuator in self.actuators], dtype=int)
-        parts = zip(self.actuators, np.split(pairs, ends)[:-1], strict=True)
-        return self.replace(actuators=tuple(one.with_bounds(part) for one, part in parts))
+        shares = zip(self.actuators, np.split(pairs, ends)[:-1], strict=True)
+        return self.replace(actuators=tuple(one.with_bounds(share) for one, share in shares))
 
     @checked(count=whole(1, 1000), keep_extent=flag)
     def split(self, fiber: str | int, count: int, *, keep_extent: bool = True) -> Self:
@@ -152,9 +156,9 @@ class Manipulator:
             InvalidInput: No such architecture, one of several bundles, or a count below 1.
         """
         index = self._fiber_index(fiber)
-        whole = self.actuators[index]
-        assert isinstance(whole, SectorActuator)
-        parts = whole.split(count, keep_extent=keep_extent)
+        original = self.actuators[index]
+        assert isinstance(original, SectorActuator)
+        parts = original.split(count, keep_extent=keep_extent)
         return self.replace(
             actuators=(*self.actuators[:index], *parts, *self.actuators[index + 1 :])
         )
@@ -167,17 +171,11 @@ class Manipulator:
         Raises:
             InvalidDesign: The text's faults, all of them, in the file's own names and units.
         """
-        parts = file.parse(text, source)
+        parts = design_file.parse(text, source)
         try:
-            arm = cls(
-                profile=parts.profile,
-                section=parts.section,
-                actuators=parts.actuators,
-                loads=parts.loads,
-            )
-            return arm if parts.bounds is None else arm.with_bounds(parts.bounds)
+            return cls(**parts._asdict())
         except InvalidDesign as error:
-            raise file.in_file_terms(error, source) from None
+            raise design_file.in_file_terms(error, source) from None
 
     def to_toml(self) -> str:
         """The design as the text of a file, from which `from_toml` makes an equal one.
@@ -185,7 +183,11 @@ class Manipulator:
         Raises:
             InvalidDesign: A profile or an actuator of one's own that no table can describe.
         """
-        return file.render(self.profile, self.section, self.actuators, self.loads)
+        return self._toml
+
+    @cached_property
+    def _toml(self) -> str:
+        return design_file.render(self.profile, self.section, self.actuators, self.loads)
 
     @classmethod
     @checked(path=path)
@@ -196,7 +198,7 @@ class Manipulator:
             InvalidDesign: The file's faults, all of them, in the file's own names and units.
             InvalidInput: No file that can be read, or no text in UTF-8.
         """
-        return cls.from_toml(file.text_of(path), source=fspath(path))
+        return cls.from_toml(design_file.text_of(path), source=fspath(path))
 
     @checked(path=path, overwrite=flag)
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
@@ -212,7 +214,7 @@ class Manipulator:
             InvalidDesign: The design has no text; see `to_toml`.
         """
         text = self.to_toml()
-        with writing(path, file.DESIGN_FILE[".toml"], overwrite=overwrite) as stream:
+        with writing(path, design_file.DESIGN_FILE[".toml"], overwrite=overwrite) as stream:
             stream.write(text.encode())
 
     @property
@@ -288,7 +290,7 @@ class Manipulator:
 
     def _repr_html_(self) -> str:
         """A small picture and the size of the arm, for notebooks."""
-        from softreach.arm.portrait import arm_card
+        from softreach.arm.skin import arm_card
 
         return arm_card(self)
 
@@ -299,11 +301,12 @@ class Manipulator:
             for k, actuator in enumerate(self.actuators)
             if isinstance(actuator, SectorActuator)
         }
-        whole = isinstance(fiber, int | np.integer) and not isinstance(fiber, bool)
-        known = whole or isinstance(fiber, str)
-        found = [k for k, name in names.items() if known and (k if whole else name) == fiber]
-        if found:
-            return found[0]
+        key = plain(fiber)
+        if isinstance(key, int) and not isinstance(key, bool) and key in names:
+            return key
+        for index, name in names.items():
+            if isinstance(key, str) and name == key:
+                return index
         listed = ", ".join(f"{k} ({name})" for k, name in names.items())
         allowed = f"the name or index of one architecture: {listed}"
         raise InvalidInput("fiber", as_given(fiber), allowed)
@@ -311,3 +314,87 @@ class Manipulator:
 
 a_manipulator = instance(Manipulator, "a Manipulator")
 """An argument that is a design."""
+
+
+Part = TypeVar("Part")
+
+
+def _part_or_faults(faults: list[Fault], kind: type[Part], **values: Any) -> Part | None:
+    """A part, or None and its faults added to a list."""
+    try:
+        return kind(**values)
+    except InvalidDesign as error:
+        faults += error.faults
+        return None
+
+
+def _inner_radius_faults(inner: Any, profile: LinearTaper | None) -> list[Fault]:
+    """Faults of the radius where the ring of fibers begins."""
+    allowed = Range(0.0, unit="m")
+    if not allowed.admits(inner):
+        return [Fault("inner_radius", inner, allowed)]
+    if profile is None or inner < profile.outer_radius:
+        return []
+    return [
+        Fault("inner_radius", inner, f"must be below outer_radius = {profile.outer_radius:g} m")
+    ]
+
+
+def _part_faults(arm: Manipulator) -> Iterator[Fault]:
+    """Parts of the wrong type."""
+    if not isinstance(arm.profile, Profile):
+        yield Fault("profile", arm.profile, "must be a Profile, such as LinearTaper")
+    if not isinstance(arm.section, Section):
+        yield Fault("section", arm.section, "must be a Section")
+    if not isinstance(arm.loads, Loads | None):
+        yield Fault("loads", arm.loads, "must be Loads or None")
+    yield from _kind_faults(arm.actuators)
+
+
+def _kind_faults(actuators: Any) -> Iterator[Fault]:
+    """What is no sequence of actuators."""
+    if not isinstance(actuators, Sequence) or isinstance(actuators, str):
+        yield Fault("actuators", actuators, "must be a sequence of actuators")
+        return
+    wrong = [k for k, part in enumerate(actuators) if not isinstance(part, Actuator)]
+    for k in wrong:
+        allowed = "must be an actuator, such as FiberArchitecture"
+        yield Fault(f"actuators[{k}]", actuators[k], allowed)
+    if not wrong and (count := sum(part.bundles for part in actuators)) > MOST_BUNDLES:
+        yield Fault("actuators", f"{count} bundles", f"must be at most {MOST_BUNDLES} in all")
+
+
+def _fit_faults(arm: Manipulator) -> Iterator[Fault]:
+    """What keeps actuators and loads from acting on this profile and section."""
+    if arm.loads is not None:
+        yield from arm.loads.section_faults(arm.section, arm.length)
+    for actuator in arm.actuators:
+        faults = actuator.section_faults(arm.profile, arm.section)
+        yield from (
+            fault
+            if fault.path.startswith(("rings", "core"))
+            else fault._replace(path=f"{actuator.name}.{fault.path}")
+            for fault in faults
+        )
+
+
+def _named(actuators: Sequence[Actuator]) -> Iterator[Actuator]:
+    """The actuators, those without a name called "fiber 1", "fiber 2", ... by their places."""
+    taken = {actuator.name for actuator in actuators}
+    for place, actuator in enumerate(actuators, start=1):
+        if actuator.name:
+            yield actuator
+            continue
+        names = (f"{actuator.default_name} {number}" for number in itertools.count(place))
+        name = next(name for name in names if name not in taken)
+        taken.add(name)
+        yield actuator.replace(name=name)
+
+
+def _shared_names(arm: Manipulator) -> Iterator[Fault]:
+    """Names that two actuators or two bundles share."""
+    yield from (faults := list(name_faults([one.name for one in arm.actuators], "actuators")))
+    names = arm.bundle_names
+    if not faults and len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        yield Fault("actuators", twice, "names two bundles: rename an actuator")

@@ -1,20 +1,38 @@
-"""What an arm is made of."""
+"""Materials of an arm, and those of the library by name: `materials.toml`."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from typing import Any, ClassVar, Self
+import difflib
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import cache
+from importlib.resources import files
+from types import MappingProxyType
+from typing import Any
 
-from softreach.arm.checks import MATERIAL_RANGES, material_faults
-from softreach.arm.variable import Variable
-from softreach.support.arguments import plain
-from softreach.support.errors import InvalidDesign
+from softreach.arm.number import number
+from softreach.arm.part import Part
+from softreach.support.arguments import checked, text
+from softreach.support.errors import InvalidInput
 
-__all__ = ["Material"]
+__all__ = [
+    "LIBRARY_HINT",
+    "Material",
+    "MaterialRecord",
+    "material_names",
+    "material_record",
+    "named_material",
+]
+
+LIBRARY_HINT = (
+    "the page Materials of the guide lists them, and so does arm.material.material_names()"
+)
+"""Where to look for the names of materials."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Material:
+class Material(Part):
     """An isotropic elastic material.
 
     While one material fills an arm that only fibers and muscles drive, Young's modulus cancels from
@@ -24,31 +42,16 @@ class Material:
         InvalidDesign: A field is out of its range.
     """
 
-    variables: ClassVar[tuple[Variable, ...]] = (
-        Variable("young_modulus", "E", "Young's modulus", MATERIAL_RANGES["young_modulus"]),
-        Variable("poisson_ratio", "ν", "Poisson's ratio", MATERIAL_RANGES["poisson_ratio"]),
-        Variable("density", "ρ", "density", MATERIAL_RANGES["density"]),
+    young_modulus: float | None = number(
+        "E", "Pa", "Young's modulus", low=0.0, open_low=True, default=None
     )
-
-    young_modulus: float | None = None
     """E, Young's modulus [Pa]; None where it cancels."""
-    poisson_ratio: float = 0.5
+    poisson_ratio: float = number("ν", "", "Poisson's ratio", low=0.0, high=0.5, default=0.5)
     """ν, Poisson's ratio [-]."""
-    density: float | None = None
+    density: float | None = number("ρ", "kg/m³", "density", low=0.0, open_low=True, default=None)
     """ρ, mass per volume [kg/m³]; None where weight plays no part."""
     name: str = ""
     """What files and pictures call it."""
-
-    def __post_init__(self) -> None:
-        if faults := material_faults(vars(self)):
-            raise InvalidDesign(faults)
-        for field in MATERIAL_RANGES:
-            if (value := getattr(self, field)) is not None:
-                object.__setattr__(self, field, float(plain(value)))
-
-    def replace(self, **changes: Any) -> Self:
-        """A copy with some fields changed, checked like a new one."""
-        return replace(self, **changes)
 
     def same_matter(self, other: Material) -> bool:
         """Whether all but the names are equal."""
@@ -57,3 +60,78 @@ class Material:
             for field in fields(self)
             if field.name != "name"
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class MaterialRecord:
+    """A material of the library and where its numbers come from."""
+
+    material: Material
+    """The material under its name."""
+    modulus: str
+    """What the number of Young's modulus is: `Young's modulus`, `stress at 100 % strain`, ..."""
+    sources: Mapping[str, str]
+    """For every number of the material, by its field, a heading of the page of references."""
+    note: str
+    """What a designer should know about it, in a line."""
+
+
+def material_names() -> tuple[str, ...]:
+    """The names of all materials of the library, from soft to stiff."""
+    return tuple(_library())
+
+
+def material_record(name: str) -> MaterialRecord:
+    """A material of the library with the sources of its numbers.
+
+    Args:
+        name: One of `material_names()`.
+
+    Raises:
+        InvalidInput: No material has this name.
+    """
+    library = _library()
+    if name not in library:
+        raise _unknown(name, tuple(library))
+    return library[name]
+
+
+@checked(name=text)
+def named_material(name: str) -> Material:
+    """A material of the library.
+
+    Args:
+        name: One of `material_names()`, such as "ecoflex_00_30".
+
+    Raises:
+        InvalidInput: No material has this name.
+    """
+    return material_record(name).material
+
+
+@cache
+def _library() -> Mapping[str, MaterialRecord]:
+    text = files("softreach.arm").joinpath("materials.toml").read_text(encoding="utf-8")
+    records = [_record(name, row) for name, row in tomllib.loads(text).items()]
+    records.sort(key=lambda record: record.material.young_modulus or 0.0)
+    return MappingProxyType({record.material.name: record for record in records})
+
+
+def _record(name: str, row: Mapping[str, Any]) -> MaterialRecord:
+    material = Material(
+        young_modulus=row["young_modulus_pa"],
+        poisson_ratio=row["poisson_ratio"],
+        density=row.get("density_kg_m3"),
+        name=name,
+    )
+    sources = MappingProxyType(row["sources"])
+    return MaterialRecord(
+        material=material, modulus=row["modulus"], sources=sources, note=row["note"]
+    )
+
+
+def _unknown(name: object, names: tuple[str, ...]) -> InvalidInput:
+    spelled = str(name).strip().lower().replace(" ", "_").replace("-", "_")
+    close = difflib.get_close_matches(spelled, names, n=3, cutoff=0.5)
+    hint = f"did you mean {' or '.join(close)}?" if close else LIBRARY_HINT
+    return InvalidInput("material", name, "a material of the library", hint)

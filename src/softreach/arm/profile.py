@@ -1,38 +1,43 @@
 """Profiles: how the outer radius changes along an arm.
 
-All that depends on the radius alone is here: R2(Z), its slope, S(Z) = ∫ dZ/R2, its inverse.
+All that depends on the radius alone is here: R2(Z), its slope, S(Z) = ∫ dZ/R2, its inverse. A
+profile is one cone, or given at stations: straight between them, or a curve through them.
 """
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.checks import PROFILE_RANGES, profile_faults
-from softreach.arm.variable import Variable
-from softreach.support.arguments import plain
+from softreach.arm.along import monotone_cubic
+from softreach.arm.number import number, series_faults, stations
+from softreach.arm.part import Part
 from softreach.support.arrays import as_floats
-from softreach.support.errors import InvalidDesign
+from softreach.support.errors import Fault, Range
 
-__all__ = ["LinearTaper", "Profile", "relative_expm1", "relative_log"]
+__all__ = ["LinearTaper", "PiecewiseTaper", "Profile", "SampledTaper"]
 
 Array = NDArray[np.float64]
 
+# Enough for machine precision while a radius changes by less than tenfold between two stations.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
+_NEWTON_STEPS = 60
 
-class Profile(ABC):
+# Ranges keep fourth powers of radii and cubes of lengths far from where doubles end.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Profile(Part, ABC):
     """The outer radius along the arm, before activation."""
 
-    variables: ClassVar[tuple[Variable, ...]] = ()
-    """Fields that a designer varies."""
-    series: ClassVar[tuple[Variable, ...]] = ()
-    """Fields that hold several numbers, each of which a designer varies."""
-
-    length: float
-    """L, from base to tip [m]."""
+    length: float = number("L", "m", "length before activation", low=1e-9, high=1e9)
+    """L, from base to tip before activation [m]."""
 
     @property
     @abstractmethod
@@ -72,10 +77,6 @@ class Profile(ABC):
         """S(L) [-]."""
         return float(self.slender_coordinate(self.length))
 
-    def replace(self, **changes: Any) -> Self:
-        """A copy with some fields changed, checked like a new one."""
-        return replace(self, **changes)  # pyright: ignore[reportArgumentType]
-
 
 @dataclass(frozen=True, kw_only=True)
 class LinearTaper(Profile):
@@ -85,26 +86,19 @@ class LinearTaper(Profile):
         InvalidDesign: A field is out of its range, or the taper leaves no tip.
     """
 
-    variables: ClassVar[tuple[Variable, ...]] = (
-        Variable("taper", "φ", "taper angle", PROFILE_RANGES["taper"]),
-        Variable(
-            "outer_radius", "R2(0)", "outer radius at the base", PROFILE_RANGES["outer_radius"]
-        ),
-        Variable("length", "L", "length before activation", PROFILE_RANGES["length"]),
+    taper: float = number(
+        "φ",
+        "rad",
+        "taper angle",
+        low=-math.pi / 2,
+        high=math.pi / 2,
+        open_low=True,
+        open_high=True,
+        default=0.0,
     )
-
-    length: float
-    """L, from base to tip before activation [m]."""
-    outer_radius: float
-    """R2(0), outer radius at the base [m]."""
-    taper: float = 0.0
     """φ, taper angle [rad]; negative widens toward the tip."""
-
-    def __post_init__(self) -> None:
-        if faults := profile_faults(vars(self)):
-            raise InvalidDesign(faults)
-        for field in PROFILE_RANGES:
-            object.__setattr__(self, field, float(plain(getattr(self, field))))
+    outer_radius: float = number("R2(0)", "m", "outer radius at the base", low=1e-12, high=1e9)
+    """R2(0), outer radius at the base [m]."""
 
     @property
     def breakpoints(self) -> tuple[float, ...]:
@@ -122,24 +116,183 @@ class LinearTaper(Profile):
     def slender_coordinate(self, z: ArrayLike) -> Array:
         """S(Z) = Z/R2(0) · log(1 - q)/(-q) [-], with q = Z tan φ/R2(0): theory (15)."""
         z = as_floats("z", z)
-        return z / self.outer_radius * relative_log(z * np.tan(self.taper) / self.outer_radius)
+        return z / self.outer_radius * _relative_log(z * np.tan(self.taper) / self.outer_radius)
 
     def station(self, s: ArrayLike) -> Array:
         """Z(S) = R2(0) S (exp(y) - 1)/y [m] with y = -S tan φ: theory (16)."""
         s = as_floats("s", s)
-        return self.outer_radius * s * relative_expm1(-s * np.tan(self.taper))
+        return self.outer_radius * s * _relative_expm1(-s * np.tan(self.taper))
 
     def surface_coordinate(self, z: ArrayLike, ratio: float = 1.0) -> Array:
         """S(Z) / (ratio cos φ) with the slope ratio · tan φ of that cone [-]: theory (17)."""
         cos = np.cos(np.arctan(ratio * np.tan(self.taper)))
         return self.slender_coordinate(z) / (ratio * cos)
 
+    def _faults(self) -> list[Fault]:
+        if faults := super()._faults():
+            return faults
+        tip = self.outer_radius - self.length * math.tan(self.taper)
+        if tip > 0:
+            return []
+        limit = math.atan(self.outer_radius / self.length)
+        why = f"leaves no tip (R2(L) = {tip:.4g} m)"
+        return [Fault("taper", self.taper, Range(high=limit, unit="rad", open_high=True, why=why))]
 
-def relative_log(q: Array) -> Array:
+
+@dataclass(frozen=True, kw_only=True)
+class _RadiiAtStations(Profile):
+    """Radii at stations."""
+
+    stations_over_length: tuple[float, ...] = stations("station of a radius")
+    """Z/L of the radii [-], from 0 to 1, rising."""
+    radii: tuple[float, ...] = number(
+        "R2", "m", "outer radius at a station", shape="series", low=1e-12, high=1e9
+    )
+    """R2 at these stations before activation [m]."""
+
+    @property
+    def breakpoints(self) -> tuple[float, ...]:
+        """The stations between base and tip [m]."""
+        return tuple(self.length * x for x in self.stations_over_length[1:-1])
+
+    @cached_property
+    def _knots(self) -> Array:
+        """The stations [m]."""
+        return np.array([0.0, *self.breakpoints, self.length])
+
+    @cached_property
+    def _slender_knots(self) -> Array:
+        """S at the stations [-]."""
+        gaps = self._slender_gap(np.arange(len(self._knots) - 1), np.diff(self._knots))
+        return np.concatenate([[0.0], np.cumsum(gaps)])
+
+    def _piece(self, z: Array) -> NDArray[np.intp]:
+        return np.searchsorted(self._knots[1:-1], z, "right")
+
+    def slender_coordinate(self, z: ArrayLike) -> Array:
+        """S(Z) [-], piece by piece: theory (15)."""
+        z = as_floats("z", z)
+        piece = self._piece(z)
+        return self._slender_knots[piece] + self._slender_gap(piece, z - self._knots[piece])
+
+    def station(self, s: ArrayLike) -> Array:
+        """Z(S) [m], the inverse of `slender_coordinate`."""
+        s = as_floats("s", s)
+        piece = np.searchsorted(self._slender_knots[1:-1], s, "right")
+        return self._knots[piece] + self._length_gap(piece, s - self._slender_knots[piece])
+
+    def _faults(self) -> list[Fault]:
+        return super()._faults() + series_faults(vars(self), "radii")
+
+    @abstractmethod
+    def _slender_gap(self, piece: NDArray[np.intp], gap: Array) -> Array:
+        """∫ dZ/R2 [-] over the first `gap` [m] of a piece."""
+
+    @abstractmethod
+    def _length_gap(self, piece: NDArray[np.intp], gap: Array) -> Array:
+        """Length [m] over which the first `gap` [-] of S in a piece extends."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PiecewiseTaper(_RadiiAtStations):
+    """R2(Z) straight between stations: cones and cylinders one after the other.
+
+    Raises:
+        InvalidDesign: Stations that do not rise from 0 to 1, or radii that are not positive.
+    """
+
+    def radius(self, z: ArrayLike) -> Array:
+        """R2(Z) [m]."""
+        return np.interp(as_floats("z", z), self._knots, self.radii)
+
+    def slope(self, z: ArrayLike) -> Array:
+        """tan φ(Z) [-]; at a station, that of the piece which begins there."""
+        return self._slopes[self._piece(as_floats("z", z))]
+
+    @cached_property
+    def _slopes(self) -> Array:
+        return -np.diff(self.radii) / np.diff(self._knots)
+
+    def surface_coordinate(self, z: ArrayLike, ratio: float = 1.0) -> Array:
+        """∫ dZ/(R cos φ) [-], piece by piece: theory (17)."""
+        z = as_floats("z", z)
+        piece, secant = self._piece(z), np.hypot(1.0, ratio * self._slopes) / ratio
+        before = np.concatenate([[0.0], np.cumsum(np.diff(self._slender_knots) * secant)])
+        last = self._slender_gap(piece, z - self._knots[piece])
+        return before[piece] + last * secant[piece]
+
+    def _slender_gap(self, piece: NDArray[np.intp], gap: Array) -> Array:
+        start, slope = np.asarray(self.radii)[piece], self._slopes[piece]
+        return gap / start * _relative_log(gap * slope / start)
+
+    def _length_gap(self, piece: NDArray[np.intp], gap: Array) -> Array:
+        return np.asarray(self.radii)[piece] * gap * _relative_expm1(-gap * self._slopes[piece])
+
+
+@dataclass(frozen=True, kw_only=True)
+class SampledTaper(_RadiiAtStations):
+    """R2(Z) as the monotone cubic through samples: no wider and no thinner than they are.
+
+    Raises:
+        InvalidDesign: Stations that do not rise from 0 to 1, or radii that are not positive.
+    """
+
+    def radius(self, z: ArrayLike) -> Array:
+        """R2(Z) [m]."""
+        return self._curve(as_floats("z", z) / self.length)
+
+    def slope(self, z: ArrayLike) -> Array:
+        """tan φ(Z) = -R2'(Z) [-]."""
+        return -self._curve_slope(as_floats("z", z) / self.length) / self.length
+
+    @cached_property
+    def _curve(self) -> Any:
+        return monotone_cubic(self.stations_over_length, self.radii)
+
+    @cached_property
+    def _curve_slope(self) -> Any:
+        return self._curve.derivative()
+
+    def surface_coordinate(self, z: ArrayLike, ratio: float = 1.0) -> Array:
+        """∫ dZ/(R cos φ) [-] by Gauss quadrature in each piece: theory (14)."""
+        z = as_floats("z", z)
+
+        def secant(station: Array) -> Array:
+            return np.hypot(1.0, ratio * self.slope(station)) / (ratio * self.radius(station))
+
+        starts, gaps = self._knots[:-1], np.diff(self._knots)
+        before = np.concatenate([[0.0], np.cumsum(_integral(secant, starts, gaps))])
+        piece = self._piece(z)
+        return before[piece] + _integral(secant, self._knots[piece], z - self._knots[piece])
+
+    def _slender_gap(self, piece: NDArray[np.intp], gap: Array) -> Array:
+        return _integral(lambda station: 1.0 / self.radius(station), self._knots[piece], gap)
+
+    def _length_gap(self, piece: NDArray[np.intp], gap: Array) -> Array:
+        """By Newton's method, within the piece."""
+        width = np.diff(self._knots)[piece]
+        length = width * gap / np.diff(self._slender_knots)[piece]
+        for _ in range(_NEWTON_STEPS):
+            residual = self._slender_gap(piece, length) - gap
+            change = residual * self.radius(self._knots[piece] + length)
+            length = np.clip(length - change, 0.0, width)
+            if np.all(np.abs(change) <= 1e-15 * self.length):
+                break
+        return length
+
+
+def _integral(function: Any, start: Array, gap: Array) -> Array:
+    """∫ over [start, start + gap], all at once."""
+    half = 0.5 * np.asarray(gap)[..., None]
+    nodes = np.asarray(start)[..., None] + half * (1.0 + _NODES)
+    return np.sum(half * _WEIGHTS * function(nodes), axis=-1)
+
+
+def _relative_log(q: Array) -> Array:
     """log(1 - q) / (-q), which is 1 at q = 0."""
     return np.divide(np.log1p(-q), -q, out=np.ones_like(q), where=q != 0)
 
 
-def relative_expm1(x: Array) -> Array:
+def _relative_expm1(x: Array) -> Array:
     """(exp(x) - 1) / x, which is 1 at x = 0."""
     return np.divide(np.expm1(x), x, out=np.ones_like(x), where=x != 0)

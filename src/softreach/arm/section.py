@@ -3,58 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.checks import RING_RANGES, ring_faults, section_faults
 from softreach.arm.material import Material
-from softreach.arm.variable import Variable
-from softreach.support.arguments import plain
+from softreach.arm.number import number
+from softreach.arm.part import Part
 from softreach.support.errors import Fault, InvalidDesign
 
-__all__ = ["Layer", "Ring", "Section", "Stiffness"]
+__all__ = ["Layer", "Ring", "Section", "Stiffness", "name_faults"]
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ring:
+class Ring(Part):
     """A layer between two radii; they keep their ratio to R2(Z).
 
     Raises:
         InvalidDesign: No ring is left between the ratios.
     """
 
-    variables: ClassVar[tuple[Variable, ...]] = (
-        Variable("inner_ratio", "R1/R2", "inner radius over R2", RING_RANGES["inner_ratio"]),
-        Variable("outer_ratio", "R/R2", "outer radius over R2", RING_RANGES["outer_ratio"]),
+    inner_ratio: float = number(
+        "R1/R2", "", "inner radius over R2", low=0.0, high=1.0, open_high=True
     )
-
-    inner_ratio: float
     """R1/R2, inner radius of the ring over the outer radius of the arm [-]."""
-    outer_ratio: float = 1.0
+    outer_ratio: float = number(
+        "R/R2", "", "outer radius over R2", low=0.0, high=1.0, open_low=True, default=1.0
+    )
     """Outer radius of the ring over the outer radius of the arm [-]."""
     material: Material = field(default_factory=Material)
     """What the ring is made of."""
     name: str = ""
     """What actuators, files and pictures call it."""
-
-    def __post_init__(self) -> None:
-        faults = ring_faults(vars(self))
-        if not isinstance(self.material, Material):
-            faults.append(Fault("material", self.material, "must be a Material"))
-        if faults:
-            raise InvalidDesign(faults)
-        for ratio in RING_RANGES:
-            object.__setattr__(self, ratio, float(plain(getattr(self, ratio))))
-
-    def replace(self, **changes: Any) -> Self:
-        """A copy with some fields changed, checked like a new one."""
-        return replace(self, **changes)
 
     @property
     def radius_ratio(self) -> float:
@@ -65,6 +50,15 @@ class Ring:
     def modulus(self) -> float:
         """E of its material [Pa], or 1 where it cancels and was left out."""
         return _modulus(self.material)
+
+    def _faults(self) -> list[Fault]:
+        faults = super()._faults()
+        if not faults and self.inner_ratio >= self.outer_ratio:
+            allowed = f"must be below outer_ratio = {self.outer_ratio:g}"
+            faults = [Fault("inner_ratio", self.inner_ratio, allowed)]
+        if not isinstance(self.material, Material):
+            faults.append(Fault("material", self.material, "must be a Material"))
+        return faults
 
 
 class Layer(NamedTuple):
@@ -93,7 +87,7 @@ class Stiffness(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Section:
+class Section(Part):
     """A core and rings around it, in proportion to R2(Z).
 
     Rings may overlap: each adds its whole stiffness. The core fills the arm from its bore to the
@@ -104,15 +98,13 @@ class Section:
             wider than the innermost ring, or different materials without Young's moduli.
     """
 
-    variables: ClassVar[tuple[Variable, ...]] = (
-        Variable("bore_ratio", "R0/R2", "radius of the bore over R2", RING_RANGES["inner_ratio"]),
-    )
-
     rings: tuple[Ring, ...]
     """Layers that actuators live in, by index or name."""
     core: Material | None = None
     """What fills the inside; None for the material of the innermost ring."""
-    bore_ratio: float = 0.0
+    bore_ratio: float = number(
+        "R0/R2", "", "radius of the bore over R2", low=0.0, high=1.0, open_high=True, default=0.0
+    )
     """Radius of the hole along the axis over R2 [-]; 0 for a solid core."""
 
     def __post_init__(self) -> None:
@@ -122,13 +114,18 @@ class Section:
         if not isinstance(self.core, Material | None):
             raise InvalidDesign([Fault("section.core", self.core, "must be a Material or None")])
         object.__setattr__(self, "rings", rings)
-        if faults := section_faults(vars(self)) or list(_modulus_faults(self)):
-            raise InvalidDesign(faults)
-        object.__setattr__(self, "bore_ratio", float(plain(self.bore_ratio)))
+        super().__post_init__()
 
-    def replace(self, **changes: Any) -> Self:
-        """A copy with some fields changed, checked like a new one."""
-        return replace(self, **changes)
+    def _faults(self) -> list[Fault]:
+        faults = super()._faults() + list(name_faults([one.name for one in self.rings], "rings"))
+        outer = [ring.outer_ratio for ring in self.rings]
+        if (reach := max(outer)) != 1.0:
+            allowed = "must be 1 for the outermost ring, which reaches the surface of the arm"
+            faults.append(Fault(f"rings[{outer.index(reach)}].outer_ratio", reach, allowed))
+        if not faults and self.bore_ratio > self.inner_ratio:
+            allowed = f"must be at most the smallest inner_ratio of the rings, {self.inner_ratio:g}"
+            faults.append(Fault("bore_ratio", self.bore_ratio, allowed))
+        return faults or list(_modulus_faults(self))
 
     def ring(self, which: int | str) -> Ring:
         """A ring by its index or name.
@@ -254,3 +251,31 @@ def _missing(section: Section, field: str, unit: str, why: str) -> Iterator[Faul
     for k, ring in enumerate(section.rings):
         if getattr(ring.material, field) is None:
             yield Fault(f"rings[{k}].material.{field}", None, allowed)
+
+
+_RESERVED = ("actuators", "core", "loads", "profile", "rings", "section")
+
+
+def name_faults(names: list[Any], path: str) -> Iterator[Fault]:
+    """Names given twice, or ambiguous in names of parameters; an empty one does not count.
+
+    Args:
+        names: Of all parts of a sequence.
+        path: The sequence: `rings` or `actuators`.
+    """
+    for k, name in enumerate(names):
+        if isinstance(name, str) and (allowed := _allowed_name(name, path)):
+            yield Fault(f"{path}[{k}].name", name, allowed)
+        if name and name in names[:k]:
+            first = names.index(name)
+            yield Fault(f"{path}[{k}].name", name, f"must differ from {path}[{first}].name")
+
+
+def _allowed_name(name: str, path: str) -> str:
+    """Requirement that the name of an actuator or a ring breaks; "" for a good one."""
+    if not name.isprintable() or name != name.strip() or set(name) & set(".[]"):
+        return "must be one line without dots and brackets, and without spaces around it"
+    if path == "actuators" and name in _RESERVED:
+        return f"must not be one of {', '.join(_RESERVED)}, by which paths name parts of the arm"
+    counts = path == "rings" and name.isdecimal()
+    return "must not be a number, by which paths count rings" if counts else ""

@@ -8,24 +8,62 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arm.actuators import Outline
+from softreach.arm.profile import Profile
 from softreach.geometry.surface import Surface
 from softreach.geometry.tube import grid_faces, joined, ribbon_surface, tube_surface
+from softreach.picture import Skin, html_card
+from softreach.support.palette import BODY, bundle_color
 
-if TYPE_CHECKING:
-    from softreach.arm.manipulator import Manipulator
-
-__all__ = ["Centerline", "body_skin", "bundle_curves", "bundle_skins", "bundle_solids", "inside"]
+__all__ = [
+    "Centerline",
+    "arm_card",
+    "body_skin",
+    "bundle_curves",
+    "bundle_skins",
+    "bundle_solids",
+    "inside",
+]
 
 Array = NDArray[np.float64]
 
 _LINE = 1 / 400  # radius of a line, in L: what shows in small pictures
 _LINE_SIDES, _LUMEN_SIDES = 8, 24
 _SAME = 1e-9  # of the length, or of R2
+_CARD_STATIONS, _CARD_STEP = 41, np.pi / 27
+
+
+class Body(Protocol):
+    """An arm as far as it can be seen."""
+
+    @property
+    def profile(self) -> Profile:
+        """Outer radius along the arm."""
+        ...
+
+    @property
+    def length(self) -> float:
+        """L [m]."""
+        ...
+
+    @property
+    def bundles(self) -> int:
+        """Number of bundles."""
+        ...
+
+    @property
+    def breakpoints(self) -> Any:
+        """Stations where profile or actuators are not smooth [m]: a tuple, also if cached."""
+        ...
+
+    def outline(self, z: ArrayLike) -> Outline:
+        """Outline of all bundles at stations Z [m]."""
+        ...
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,7 +78,7 @@ class Centerline:
     """d1, d2, d3 of each, shape (station, 3, 3)."""
 
     @classmethod
-    def at_rest(cls, z: Array) -> Self:
+    def unactivated(cls, z: Array) -> Self:
         """Straight along z, directors along x, y, z."""
         directors = np.tile(np.eye(3), (len(z), 1, 1))
         return cls(z=z, position=np.column_stack([0 * z, 0 * z, z]), directors=directors)
@@ -76,7 +114,7 @@ class Centerline:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Stretch:
+class _Span:
     """Where one bundle acts without a gap: stations along the first axis."""
 
     shape: str
@@ -117,7 +155,7 @@ class _Stretch:
         return self.points(angles, (self.outer_ratio + lift) * self.arm_radius)
 
 
-def body_skin(arm: Manipulator, line: Centerline, sides: int = 32) -> Surface:
+def body_skin(arm: Body, line: Centerline, sides: int = 32) -> Surface:
     """The body of the arm as a closed tube.
 
     Args:
@@ -132,18 +170,18 @@ def body_skin(arm: Manipulator, line: Centerline, sides: int = 32) -> Surface:
     return tube_surface(line.position, d1, d2, arm.profile.radius(line.z), sides)
 
 
-def bundle_curves(arm: Manipulator, line: Centerline) -> Array:
+def bundle_curves(arm: Body, line: Centerline) -> Array:
     """The middle of every bundle at all stations [m], shape (bundle, station, 3).
 
     For a sector it is on the outside of its ring.
     """
     every = np.ones((len(line.z) - 1, arm.bundles), bool)
-    stretches = [next(parts) for parts in _stretches(arm, line, every)]
-    return np.stack([one.curve() for one in stretches])
+    spans = [next(parts) for parts in _spans(arm, line, every)]
+    return np.stack([one.curve() for one in spans])
 
 
 def bundle_skins(
-    arm: Manipulator, line: Centerline, *, lift: float = 0.0, step: float = np.pi / 32
+    arm: Body, line: Centerline, *, lift: float = 0.0, step: float = np.pi / 32
 ) -> list[Surface]:
     """Each bundle as a surface to look at: an open band, or a closed tube, with outward faces.
 
@@ -154,7 +192,7 @@ def bundle_skins(
         step: Largest angle between neighboring points across a band [rad].
     """
 
-    def sector(one: _Stretch) -> Surface:
+    def sector(one: _Span) -> Surface:
         band = one.band(lift, step)
         # along x across is d3 x e_θ = -e_R: turned, so that faces point outwards
         return Surface(vertices=band.reshape(-1, 3), faces=grid_faces(*band.shape[:2])[:, ::-1])
@@ -163,7 +201,7 @@ def bundle_skins(
 
 
 def bundle_solids(
-    arm: Manipulator, line: Centerline, *, thickness: float, step: float = np.pi / 32
+    arm: Body, line: Centerline, *, thickness: float, step: float = np.pi / 32
 ) -> list[Surface]:
     """Each bundle as closed surfaces: bands become skins, half sunk into the outside of their ring.
 
@@ -174,14 +212,14 @@ def bundle_solids(
         step: Largest angle between neighboring points across a band [rad].
     """
 
-    def sector(one: _Stretch) -> Surface:
+    def sector(one: _Span) -> Surface:
         # along x across is d3 x e_θ = -e_R: the inner patch is the upper one
         return ribbon_surface(one.band(thickness / 2, step), one.band(-thickness / 2, step))
 
     return _skins(arm, line, sector)
 
 
-def inside(arm: Manipulator) -> tuple[bool, ...]:
+def inside(arm: Body) -> tuple[bool, ...]:
     """For each bundle, whether the body of the arm hides some of it."""
     z = np.union1d(np.linspace(0.0, arm.length, 101), arm.breakpoints)
     outline = arm.outline(z)
@@ -192,27 +230,34 @@ def inside(arm: Manipulator) -> tuple[bool, ...]:
     return tuple(bool(hidden[:, k].any()) for k in range(arm.bundles))
 
 
-def _skins(
-    arm: Manipulator, line: Centerline, sector: Callable[[_Stretch], Surface]
-) -> list[Surface]:
+def arm_card(arm: Body) -> str:
+    """HTML with a small picture of the unactivated arm above its numbers, for notebooks."""
+    line = Centerline.unactivated(np.linspace(0.0, arm.length, _CARD_STATIONS))
+    line = line.with_stations(arm.breakpoints)
+    body = body_skin(arm, line)
+    bundles = bundle_skins(arm, line, lift=0.01, step=_CARD_STEP)
+    skins = (Skin(one.vertices, one.faces, bundle_color(k)) for k, one in enumerate(bundles))
+    body_card = Skin(body.vertices, body.faces, BODY, clear=any(inside(arm)))
+    return html_card(repr(arm), body_card, *skins)
+
+
+def _skins(arm: Body, line: Centerline, sector: Callable[[_Span], Surface]) -> list[Surface]:
     middle = 0.5 * (line.z[1:] + line.z[:-1])
     width = _LINE * arm.length
     make = {"sector": sector, "line": lambda one: _line_tube(one, width), "lumen": _lumen}
     return [
-        joined([make[one.shape](one) for one in stretches])
-        for stretches in _stretches(arm, line, arm.outline(middle).acts)
+        joined([make[one.shape](one) for one in spans])
+        for spans in _spans(arm, line, arm.outline(middle).acts)
     ]
 
 
-def _stretches(
-    arm: Manipulator, line: Centerline, acts: NDArray[np.bool_]
-) -> Iterator[Iterator[_Stretch]]:
-    """The stretches of each bundle; `acts` tells of each piece between stations."""
+def _spans(arm: Body, line: Centerline, acts: NDArray[np.bool_]) -> Iterator[Iterator[_Span]]:
+    """The spans of each bundle; `acts` tells of each piece between stations."""
     outline, radius = arm.outline(line.z), arm.profile.radius(line.z)
 
-    def of(k: int) -> Iterator[_Stretch]:
+    def of(k: int) -> Iterator[_Span]:
         for part in _runs(acts[:, k]):
-            yield _Stretch(
+            yield _Span(
                 shape=outline.shape[k],
                 extent=float(outline.extent[k]),
                 position=line.position[part],
@@ -233,7 +278,7 @@ def _runs(acts: NDArray[np.bool_]) -> list[slice]:
     return [slice(int(start), int(end) + 1) for start, end in pairs]
 
 
-def _line_tube(one: _Stretch, radius: float) -> Surface:
+def _line_tube(one: _Span, radius: float) -> Surface:
     """A thin tube, round across its own direction."""
     curve = one.curve()
     along = _unit(np.gradient(curve, axis=0))
@@ -242,7 +287,7 @@ def _line_tube(one: _Stretch, radius: float) -> Surface:
     return tube_surface(curve, normal, np.cross(along, normal), radius, _LINE_SIDES)
 
 
-def _lumen(one: _Stretch) -> Surface:
+def _lumen(one: _Span) -> Surface:
     """A tube, round in the sections."""
     radius = 0.5 * (one.outer_ratio - one.inner_ratio) * one.arm_radius
     return tube_surface(one.curve(), one.directors[:, 0], one.directors[:, 1], radius, _LUMEN_SIDES)

@@ -13,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.actuator_checks import MOST_TURN
 from softreach.arm.actuators import Actuator, Resultants
+from softreach.arm.actuators.actuator import MOST_TURN
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.number import fields_of
 from softreach.support.errors import Fault, InvalidDesign
 
 __all__ = [
@@ -65,7 +66,7 @@ def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
 
 
 def _resultants(actuator: Actuator, arm: Manipulator, z: Array) -> Resultants:
-    """What an actuator puts on the sections: nothing outside the stretch on which it acts."""
+    """What an actuator puts on the sections: nothing where it does not act."""
     load, acts = actuator.resultants(arm.profile, arm.section, z), actuator.acts(arm.profile, z)
     if acts.all():
         return load
@@ -119,7 +120,7 @@ def check_extension(arm: Manipulator) -> None:
 def _winding_faults(arm: Manipulator) -> Iterator[Fault]:
     """Fibers and tendons that wind so often about the arm that no steps follow them."""
     for one in arm.actuators:
-        if any(variable.field == "revolution" for variable in one.variables):
+        if "revolution" in fields_of(type(one)):
             with np.errstate(all="ignore"):
                 turns = abs(one.value_on("revolution", arm.profile, arm.section)) / (2 * np.pi)
             if not turns <= MOST_TURN / (2 * np.pi):

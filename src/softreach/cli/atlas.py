@@ -226,7 +226,7 @@ _NAMED_IN_FILE = "left out with --space, whose file names the design"
 def _space_of(
     path: Path | None, design: str | None, vary: list[str] | None, changes: Changes
 ) -> DesignSpace:
-    from softreach.arm.file.document import LONGEST
+    from softreach.arm.design_file import LONGEST
     from softreach.atlas.space import DesignSpace
     from softreach.atlas.space_file import parse_parameter, parse_space
     from softreach.support.files.text import read_text
@@ -287,7 +287,7 @@ def _shard(text: str) -> tuple[int, int]:
 
 def _written_coordinates(atlas: xr.Dataset) -> dict[str, xr.DataArray]:
     """Parameters of an atlas by their names with units."""
-    from softreach.arm.parameters.written import written_name
+    from softreach.arm.parameters.shown import written_name
 
     return {
         written_name(str(name), values.attrs.get("units", "1")): values
@@ -299,7 +299,7 @@ def _constraint(
     text: str, written: Mapping[str, xr.DataArray]
 ) -> tuple[str, tuple[float | None, float | None]]:
     """`taper_deg<=1` -> taper between anything and 1 degree, in radians."""
-    from softreach.arm.parameters.written import from_written
+    from softreach.arm.parameters.shown import from_written
 
     for sign in ("<=", ">=", "<", ">"):
         name, found, number = text.partition(sign)

@@ -105,7 +105,7 @@ class Changes:
             raise InvalidInput(name, value, why)
 
     def _angles(self) -> dict[str, float]:
-        from softreach.arm.parameters.written import from_written
+        from softreach.arm.parameters.shown import from_written
 
         angles = {"revolution": self.revolution_deg, "taper": self.taper_deg}
         return {name: from_written(x, "rad") for name, x in angles.items() if x is not None}
@@ -170,7 +170,7 @@ def design_from(text: str, changes: Changes = UNCHANGED) -> Manipulator:
         InvalidInput: There is no such design.
         InvalidDesign: No such arm can exist; in the terms of files.
     """
-    from softreach.arm import file
+    from softreach.arm import design_file
     from softreach.arm.tables import check_extension
 
     arm = _unchanged(text)
@@ -180,7 +180,7 @@ def design_from(text: str, changes: Changes = UNCHANGED) -> Manipulator:
         return changed
     except InvalidDesign as error:
         one_option = len(error.faults) == 1 and changes.given
-        raise file.in_file_terms(error, "" if one_option else text) from None
+        raise design_file.in_file_terms(error, "" if one_option else text) from None
 
 
 def _unchanged(text: str) -> Manipulator:
@@ -238,7 +238,7 @@ def _values(
 ) -> dict[str, float]:
     """Name of a parameter -> value in its unit, from what was written, and from angles."""
     from softreach.arm.parameters.changes import find_parameter, parameters_by_every_name
-    from softreach.arm.parameters.written import written_parameters
+    from softreach.arm.parameters.shown import written_parameters
 
     values = dict(angles)
     if not texts:
@@ -258,7 +258,7 @@ def _given_twice(name: str) -> InvalidInput:
 
 def _value(parameter: DesignParameter, name: str, text: str, *, unit_in_name: bool) -> float:
     """A value whose unit stands in it or in the name."""
-    from softreach.arm.parameters.written import from_written, written_name
+    from softreach.arm.parameters.shown import from_written, written_name
     from softreach.support.quantity import read_quantity, unit_names
 
     try:

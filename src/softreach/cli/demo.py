@@ -69,7 +69,7 @@ def demo(
 
 def _check(folder: Path, overwrite: bool) -> None:
     """Look at every place before anything is written to one of them."""
-    from softreach.arm.file import DESIGN_FILE
+    from softreach.arm.design_file import DESIGN_FILE
     from softreach.cloud.clouds import CLOUD_STORE
     from softreach.export.clouds import CLOUD_FILES
     from softreach.support.files.kinds import PICTURES

@@ -39,7 +39,7 @@ def design(
 
     Example: softreach design minimal_trunk --taper-deg 3
     """
-    from softreach.arm.file import DESIGN_FILE
+    from softreach.arm.design_file import DESIGN_FILE
     from softreach.arm.summary import describe
 
     if schema:
@@ -64,7 +64,7 @@ def design(
 
 
 def _print_schema() -> None:
-    from softreach.arm.file.json_schema import json_schema
+    from softreach.arm.design_file.schema import json_schema
 
     console.json(json_schema(), indent=2)
 
@@ -141,16 +141,18 @@ def _rows_for_machines(arm: Manipulator, facts: DesignSummary) -> Rows:
 
 def load_rows(loads: Loads | None) -> Rows:
     """Gravity with the direction that the base then has, and all other loads that are not 0."""
+    from softreach.arm.number import fields_of
+
     if loads is None:
         return {}
     rows: Rows = {}
     if any(loads.gravity):
         rows["gravity"] = (list(loads.gravity), "m/s²")
         rows["base"] = (_base(loads.gravity), "")
-    for variable in (*loads.variables, *loads.series):
-        value = getattr(loads, variable.field)
-        if variable.field != "gravity" and (any(value) if isinstance(value, tuple) else value):
-            rows[variable.field.replace("_", " ")] = (value, variable.allowed.unit)
+    for field, number in fields_of(type(loads)).items():
+        value = getattr(loads, field)
+        if field != "gravity" and (any(value) if isinstance(value, tuple) else value):
+            rows[field.replace("_", " ")] = (value, number.unit)
     if loads.point_loads:
         rows["point loads"] = (len(loads.point_loads), "")
     return rows
@@ -169,8 +171,8 @@ def _rest_rows(arm: Manipulator) -> Rows:
     Without loads: the sag under its own weight of an arm held sideways, and whether it would stand
     upright; nothing where moduli or densities are not known.
     """
-    from softreach.arm.loads import Loads
-    from softreach.arm.weight import GRAVITY, load_number_faults
+    from softreach.arm.loads import GRAVITY, Loads
+    from softreach.arm.summary import load_number_faults
 
     if load_number_faults(arm):
         return {}

@@ -47,7 +47,7 @@ def import_file(
 
 
 def _design(source: Path, out: Path, overwrite: bool, json: bool) -> None:
-    from softreach.arm.file import DESIGN_FILE
+    from softreach.arm.design_file import DESIGN_FILE
     from softreach.exchange.activefilaments import read_design
 
     check_output(out, DESIGN_FILE, overwrite)

@@ -47,7 +47,7 @@ def materials(*, json: AsJson = False) -> None:
 
     Example: softreach list materials
     """
-    from softreach.arm.materials import material_names, material_record
+    from softreach.arm.material import material_names, material_record
 
     records = [
         {
@@ -87,7 +87,7 @@ def parameters(design: Design, /, *, changes: Changes = UNCHANGED, json: AsJson 
     Example: softreach list parameters minimal_trunk
     """
     from softreach.arm.parameters import parameters as parameters_of
-    from softreach.arm.parameters.written import written_name
+    from softreach.arm.parameters.shown import written_name
 
     arm = design_from(design, changes)
     records: list[dict[str, Any]] = []

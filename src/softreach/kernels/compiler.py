@@ -12,7 +12,7 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
-from numba import config, njit
+from numba import config, jit
 from numba.core import event
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
@@ -22,15 +22,6 @@ from softreach.support.files.interruption import as_a_whole
 __all__ = ["FAST", "inline", "kernel", "pasted", "strict"]
 
 _LOG = logging.getLogger(__name__)
-
-try:
-    from softreach.kernels import parts
-
-    _LACKING = parts.missing()
-except ImportError as error:  # a class that Numba has renamed
-    _LACKING = [str(error)]
-if _LACKING:
-    _LOG.info("kernels are compiled plainly, as Numba lacks %s", ", ".join(_LACKING))
 
 FAST = {"contract", "reassoc", "nsz", "arcp", "nnan", "ninf"}
 """Freedoms of the compiler in `kernel` and `inline`.
@@ -76,10 +67,29 @@ def _dispatcher(function: Callable[..., Any], *, part: bool = False, **options: 
     if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
         return function
     options |= {"nogil": True, "error_model": "numpy"}
-    if _LACKING:
-        return njit(**options)(function)
-    dispatcher = parts.PartedDispatcher if part else parts.KernelDispatcher
-    return dispatcher(function, targetoptions=options | {"nopython": True})
+    made_by = _PART if part else _KERNEL
+    return made_by(function, targetoptions=options | {"nopython": True})
+
+
+def _dispatchers() -> tuple[Any, Any]:
+    """Makers of kernels and of parts; plain ones where Numba lacks what these rest on."""
+    try:
+        from softreach.kernels import parts
+
+        if not (lacking := parts.missing()):
+            return parts.KernelDispatcher, parts.PartedDispatcher
+    except ImportError as error:  # a class that Numba has renamed
+        lacking = [str(error)]
+    _LOG.info("kernels are compiled plainly, as Numba lacks %s", ", ".join(lacking))
+    return _plain, _plain
+
+
+def _plain(function: Callable[..., Any], targetoptions: dict[str, Any]) -> Any:
+    """A function as Numba compiles it of its own accord."""
+    return jit(**targetoptions)(function)
+
+
+_KERNEL, _PART = _dispatchers()
 
 
 def _cached(function: Any) -> Any:

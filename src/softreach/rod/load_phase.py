@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.summary import load_number
 from softreach.arm.tables import both_sides, tables
-from softreach.arm.weight import load_number
 from softreach.support.errors import InvalidInput
 
 __all__ = ["LoadPhase", "check_phase", "load_phase", "phase_stations"]

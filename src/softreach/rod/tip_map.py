@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.weight import VERIFIED_LOAD_NUMBER, is_overloaded
+from softreach.arm.summary import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.frames import Frames, StrainRange, Strains, TipMotions, position_slopes
 from softreach.rod.steps import check_tol

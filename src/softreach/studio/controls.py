@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from softreach.arm.file import in_file_terms
+from softreach.arm.design_file import in_file_terms
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import Parameter, parameters
 from softreach.support.errors import Fault, InvalidDesign, Range

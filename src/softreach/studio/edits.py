@@ -17,7 +17,7 @@ from softreach.arm.actuators import (
     Tendon,
 )
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.materials import named_material
+from softreach.arm.material import named_material
 from softreach.arm.section import Ring
 from softreach.support.errors import InvalidInput
 

@@ -7,10 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softreach.arm.file import in_file_terms
-from softreach.arm.loads import Loads, PointLoad
+from softreach.arm.design_file import in_file_terms
+from softreach.arm.loads import GRAVITY, Loads, PointLoad
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.weight import GRAVITY
 from softreach.studio.state import Vector, vector
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from functools import lru_cache
 
-from softreach.arm.file import in_file_terms
+from softreach.arm.design_file import in_file_terms
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.support.errors import InvalidDesign, InvalidInput

@@ -1,30 +1,44 @@
-"""What everything that drives an arm has in common."""
+"""Base of all actuators: names, bundles, bounds, where along the arm they act."""
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.actuator_checks import actuator_faults
+from softreach.arm.number import as_numbers, number
+from softreach.arm.part import Part
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
-from softreach.arm.variable import Variable
-from softreach.support.arguments import plain
-from softreach.support.errors import Fault, InvalidDesign, Range
+from softreach.support.errors import Fault
 
-__all__ = ["STRETCH", "Actuator", "Bounds", "Outline", "Resultants", "actuator_kinds"]
+__all__ = [
+    "MOST_BUNDLES",
+    "MOST_TURN",
+    "Actuator",
+    "Bounds",
+    "Outline",
+    "PolarActuator",
+    "Resultants",
+    "actuator_kinds",
+    "bounds_faults",
+    "length_or_ratio_faults",
+]
 
 Array = NDArray[np.float64]
 Bounds = tuple[float, float] | tuple[tuple[float, float], ...]
 
-STRETCH = (
-    Variable("start_over_length", "Z0/L", "where it begins to act", Range(0, 1, open_high=True)),
-    Variable("end_over_length", "Z1/L", "where it ends to act", Range(0, 1, open_low=True)),
-)
+MOST_TURN = 200 * math.pi
+"""A hundred turns [rad]: steps along the arm grow with them, and with a thousand no tolerance is
+met."""
+
+MOST_BUNDLES = 100
+"""Of an arm in all: the time to bound its bending grows with their square."""
 
 
 class Resultants(NamedTuple):
@@ -71,7 +85,7 @@ class Outline:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Actuator(ABC):
+class Actuator(Part, ABC):
     """Something that loads the sections of an arm in proportion to its activations.
 
     A new kind is a frozen dataclass that inherits these fields and implements `resultants` and
@@ -84,11 +98,9 @@ class Actuator(ABC):
     unit: ClassVar[str] = "1"
     """Unit of an activation: "1", "N" or "Pa"."""
     symbol: ClassVar[str] = "γ"
-    """What formulas call an activation."""
-    variables: ClassVar[tuple[Variable, ...]] = STRETCH
-    """Fields that a designer varies, beside the bounds."""
-    series: ClassVar[tuple[Variable, ...]] = ()
-    """Further fields, that only functions along the arm can be given for."""
+    """Symbol of an activation in formulas."""
+    activation: ClassVar[str] = "activation"
+    """What an activation is called."""
     default_name: ClassVar[str] = "actuator"
     """Name that an arm gives to unnamed ones, followed by a number."""
     validity: ClassVar[str] = ""
@@ -96,21 +108,23 @@ class Actuator(ABC):
 
     name: str = ""
     """What summaries and pictures call it; unique within an arm, which names those without."""
-    bundles: int = 1
+    bundles: int = number(
+        "n", "", "number of bundles", low=1, high=MOST_BUNDLES, integer=True, default=1
+    )
     """n, number of independent activations [-]."""
     activation_bounds: Bounds
     """(lower, upper) activation of every bundle, or one pair per bundle [unit]."""
-    start_over_length: float = 0.0
+    start_over_length: float = number(
+        "Z0/L", "", "where it begins to act", low=0.0, high=1.0, open_high=True, default=0.0
+    )
     """Z0/L, where along the arm it begins to act [-]."""
-    end_over_length: float = 1.0
+    end_over_length: float = number(
+        "Z1/L", "", "where it ends to act", low=0.0, high=1.0, open_low=True, default=1.0
+    )
     """Z1/L, where it ends to act [-]."""
 
     def __post_init__(self) -> None:
-        if faults := self._faults():
-            raise InvalidDesign(faults)
-        for variable in self.variables:
-            number = plain(getattr(self, variable.field))
-            object.__setattr__(self, variable.field, number)
+        super().__post_init__()
         object.__setattr__(self, "activation_bounds", _plain_bounds(self.activation_bounds))
 
     @abstractmethod
@@ -151,7 +165,7 @@ class Actuator(ABC):
         return tuple(profile.length * x for x in ends if 0.0 < x < 1.0)
 
     def acts(self, profile: Profile, z: Array) -> NDArray[np.bool_]:
-        """Whether it acts at stations Z [m]; at the end of its stretch it does not, but at a tip.
+        """Stations Z [m] at which it acts: its end is not among them, but for the tip of the arm.
 
         Returns:
             Shape (station, bundle).
@@ -166,21 +180,63 @@ class Actuator(ABC):
         return []
 
     def value_on(self, field: str, profile: Profile, section: Section) -> Any:
-        """Value of a variable when this actuator drives an arm with this profile and section."""
+        """Value of a number when this actuator drives an arm with this profile and section."""
         del profile, section
         return getattr(self, field)
 
-    def replace(self, **changes: Any) -> Self:
-        """A copy with some fields changed, checked like a new one."""
-        return replace(self, **changes)
-
     def _faults(self) -> list[Fault]:
-        """Everything wrong with its fields; kinds add their own."""
-        return actuator_faults(vars(self))
+        faults = super()._faults()
+        blamed = {fault.path for fault in faults}
+        start, end = self.start_over_length, self.end_over_length
+        if not blamed & {"start_over_length", "end_over_length"} and start >= end:
+            faults.append(
+                Fault("end_over_length", end, f"must be above start_over_length = {start:g}")
+            )
+        bundles = None if "bundles" in blamed else self.bundles
+        return faults + bounds_faults(self.activation_bounds, bundles)
 
-    def _starts(self) -> Array:
-        """Angles from the first bundle to each, evenly around [rad], shape (bundle,)."""
-        return 2.0 * np.pi * np.arange(self.bundles) / self.bundles
+
+@dataclass(frozen=True, kw_only=True)
+class PolarActuator(Actuator):
+    """An actuator whose bundles stand evenly around the axis."""
+
+    offset: float = number("θ0", "rad", "polar angle of the first bundle", default=0.0)
+    """θ0, polar angle of the first bundle where it begins [rad]."""
+
+    @property
+    def start_angles(self) -> Array:
+        """θ0 + 2πj/n, polar angle of each bundle where it begins [rad], shape (bundle,)."""
+        return self.offset + 2.0 * np.pi * np.arange(self.bundles) / self.bundles
+
+
+def bounds_faults(bounds: Any, bundles: int | None) -> list[Fault]:
+    """Everything wrong with a pair (lower, upper), or one such pair for each bundle.
+
+    Args:
+        bounds: Activation bounds.
+        bundles: Number of bundles; None where that is not known.
+    """
+    pairs, allowed = as_numbers(bounds), ""
+    if pairs.shape[-1:] != (2,) or pairs.ndim > 2 or not pairs.size:
+        allowed = "must be a pair (lower, upper), or one such pair for each bundle"
+    elif not np.isfinite(pairs).all():
+        allowed = "must hold finite numbers"
+    elif (pairs[..., 0] > pairs[..., 1]).any():
+        allowed = "must have lower <= upper"
+    elif pairs.ndim == 2 and bundles is not None and len(pairs) != bundles:
+        several = f", or {bundles} pairs: one for each bundle" if bundles > 1 else ""
+        allowed = f"must be one pair{several}"
+    return [Fault("activation_bounds", bounds, allowed)] if allowed else []
+
+
+def length_or_ratio_faults(values: Mapping[str, Any], field: str) -> list[Fault]:
+    """Faults of a length that is given in m, or as a ratio to R2(Z): neither, or both."""
+    ratio = f"{field}_ratio"
+    pair = values[field], values[ratio]
+    if (pair[0] is None) != (pair[1] is None):
+        return []
+    both = None if pair[0] is None else pair
+    return [Fault(f"{field}, {ratio}", both, f"give exactly one of {field} and {ratio}")]
 
 
 def actuator_kinds() -> dict[str, type[Actuator]]:
@@ -190,7 +246,7 @@ def actuator_kinds() -> dict[str, type[Actuator]]:
 
 def _kinds(of: type[Actuator]) -> list[type[Actuator]]:
     direct = of.__subclasses__()
-    return direct + [kind for one in direct for kind in _kinds(one)]
+    return direct + [kind for child in direct for kind in _kinds(child)]
 
 
 def _plain_bounds(bounds: ArrayLike) -> Bounds:

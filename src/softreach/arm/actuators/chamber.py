@@ -8,12 +8,16 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.actuator_checks import FIBER_RANGES, chamber_faults
-from softreach.arm.actuators.actuator import STRETCH, Actuator, Outline, Resultants
+from softreach.arm.actuators.actuator import (
+    Outline,
+    PolarActuator,
+    Resultants,
+    length_or_ratio_faults,
+)
+from softreach.arm.number import number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
-from softreach.arm.variable import Variable
-from softreach.support.errors import Fault, Range
+from softreach.support.errors import Fault
 
 __all__ = ["Chamber"]
 
@@ -21,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Chamber(Actuator):
+class Chamber(PolarActuator):
     """A round channel parallel to the axis, or several evenly around it.
 
     Its activation is the pressure P [Pa] above that outside. Sizes are ratios to R2(Z), or lengths
@@ -35,20 +39,7 @@ class Chamber(Actuator):
 
     unit: ClassVar[str] = "Pa"
     symbol: ClassVar[str] = "P"
-    variables: ClassVar[tuple[Variable, ...]] = (
-        Variable("distance", "ρc", "distance of its center from the axis", Range(0.0, unit="m")),
-        Variable("distance_ratio", "ρc/R2", "distance from the axis over R2", Range(0.0)),
-        Variable("radius", "a", "radius of the channel", Range(0.0, unit="m", open_low=True)),
-        Variable(
-            "radius_ratio", "a/R2", "radius of the channel over R2", Range(0.0, 1.0, open_low=True)
-        ),
-        Variable(
-            "area_factor", "A/πa²", "effective over geometric area", Range(0.0, open_low=True)
-        ),
-        Variable("offset", "θ0", "polar angle of the first chamber", FIBER_RANGES["offset"]),
-        Variable("bundles", "n", "number of chambers", FIBER_RANGES["bundles"]),
-        *STRETCH,
-    )
+    activation: ClassVar[str] = "pressure"
     default_name: ClassVar[str] = "chamber"
     validity: ClassVar[str] = (
         "Exact for thin-walled channels that do not widen; else calibrate `area_factor`. Curvature "
@@ -56,25 +47,33 @@ class Chamber(Actuator):
         "bends less by 1/ζ where pressure lengthens it to ζ."
     )
 
-    distance: float | None = None
+    distance: float | None = number(
+        "ρc", "m", "distance of its center from the axis", low=0.0, default=None
+    )
     """ρc, of the center from the axis [m]."""
-    distance_ratio: float | None = None
+    distance_ratio: float | None = number(
+        "ρc/R2", "", "distance from the axis over R2", low=0.0, default=None
+    )
     """ρc over the outer radius R2(Z) [-]."""
-    radius: float | None = None
+    radius: float | None = number(
+        "a", "m", "radius of the channel", low=0.0, open_low=True, default=None
+    )
     """a, radius of the channel [m]."""
-    radius_ratio: float | None = None
+    radius_ratio: float | None = number(
+        "a/R2", "", "radius of the channel over R2", low=0.0, open_low=True, default=None
+    )
     """a over the outer radius R2(Z) [-]."""
-    area_factor: float = 1.0
+    area_factor: float = number(
+        "A/πa²", "", "effective over geometric area", low=0.0, open_low=True, default=1.0
+    )
     """Effective area over π a² [-], from a measurement; 1 where the channel does not widen."""
-    offset: float = 0.0
-    """θ0, polar angle of the first chamber [rad]."""
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
         """N = A and M = p × A e3 with the effective area A and the center p: theory (53)."""
         del section
         area = np.pi * self.area_factor * self._radius(profile, z) ** 2
         arm = area * self._distance(profile, z)
-        angle = self.offset + self._starts()
+        angle = self.start_angles
         along = np.zeros((len(z), self.bundles))
         moment = [arm[:, None] * np.sin(angle), -arm[:, None] * np.cos(angle), along]
         return Resultants(area[:, None] + along, np.stack(moment, axis=1))
@@ -86,7 +85,7 @@ class Chamber(Actuator):
         distance, radius = self._distance(profile, z), self._radius(profile, z)
         share = float(np.max(radius / np.maximum(distance, radius)))
         return Outline(
-            center=np.broadcast_to(self.offset + self._starts(), (len(z), self.bundles)),
+            center=np.broadcast_to(self.start_angles, (len(z), self.bundles)),
             extent=2.0 * np.arcsin(share) * each,
             inner_ratio=((distance - radius) / outer)[:, None] * each,
             outer_ratio=((distance + radius) / outer)[:, None] * each,
@@ -109,7 +108,7 @@ class Chamber(Actuator):
         return super().replace(**changes)
 
     def value_on(self, field: str, profile: Profile, section: Section) -> Any:
-        """Value of a variable; of a length and its ratio, the one not given follows at the base."""
+        """Value of a number; of a length and its ratio, the one not given follows at the base."""
         del section
         base = np.array([0.0])
         if field in ("distance", "distance_ratio"):
@@ -127,7 +126,8 @@ class Chamber(Actuator):
         return _length(self.radius, self.radius_ratio, profile, z)
 
     def _faults(self) -> list[Fault]:
-        return super()._faults() + chamber_faults(vars(self))
+        sizes = (length_or_ratio_faults(vars(self), field) for field in ("distance", "radius"))
+        return [*super()._faults(), *(fault for size in sizes for fault in size)]
 
 
 def _length(length: float | None, ratio: float | None, profile: Profile, z: Array) -> Array:

@@ -7,23 +7,23 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.actuator_checks import FIBER_RANGES, winding_faults
-from softreach.arm.actuators.actuator import STRETCH
-from softreach.arm.actuators.cone import cone_integrals
+from softreach.arm.actuators.actuator import MOST_TURN
 from softreach.arm.actuators.ring_integrals import RingIntegrals
-from softreach.arm.actuators.sector import SectorActuator
-from softreach.arm.actuators.winding import helical_rotation
-from softreach.arm.along import AlongArm
+from softreach.arm.actuators.sector import SectorActuator, cone_integrals
+from softreach.arm.along import AlongArm, Pieces
+from softreach.arm.number import number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
-from softreach.arm.variable import Variable
 from softreach.support.errors import Fault
 
-__all__ = ["FiberArchitecture"]
+__all__ = ["FiberArchitecture", "helical_rotation"]
 
 Array = NDArray[np.float64]
+
+# Enough for machine precision between two samples of an angle.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,29 +37,28 @@ class FiberArchitecture(SectorActuator):
             `revolution` are given.
     """
 
-    variables: ClassVar[tuple[Variable, ...]] = (
-        *(
-            Variable(field, symbol, meaning, FIBER_RANGES[field])
-            for field, symbol, meaning in (
-                ("revolution", "Ω", "revolution from base to tip"),
-                ("helical_angle", "α", "helical angle at the outer radius"),
-                ("offset", "θ0", "polar angle of the first bundle at the base"),
-                ("extent", "σ", "angular extent of a bundle"),
-                ("bundles", "n", "number of bundles"),
-            )
-        ),
-        *STRETCH,
-    )
     default_name: ClassVar[str] = "fiber"
     validity: ClassVar[str] = (
         "Exact to first order in the radius over the length along which shape changes; contraction "
         "below γ = -1 is a load on the matrix, not a strain of the fiber."
     )
 
-    helical_angle: float | AlongArm | None = None
-    """α, from the axis, at the outer radius of the ring [rad]; |α| < π/2; may change along Z."""
-    revolution: float | None = None
+    revolution: float | None = number(
+        "Ω", "rad", "revolution from base to tip", low=-MOST_TURN, high=MOST_TURN, default=None
+    )
     """Ω, total rotation of a fiber about the axis from where it begins to where it ends [rad]."""
+    helical_angle: float | AlongArm | None = number(
+        "α",
+        "rad",
+        "helical angle at the outer radius",
+        low=-math.pi / 2,
+        high=math.pi / 2,
+        open_low=True,
+        open_high=True,
+        along=AlongArm,
+        default=None,
+    )
+    """α, from the axis, at the outer radius of the ring [rad]; |α| < π/2; may change along Z."""
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed; a new angle takes the place of a revolution."""
@@ -91,7 +90,7 @@ class FiberArchitecture(SectorActuator):
         return float(self.rotation(profile, section, end)[0])
 
     def value_on(self, field: str, profile: Profile, section: Section) -> Any:
-        """Value of a variable on an arm; of Ω and α, the one not given follows from the other."""
+        """Value of a number on an arm; of Ω and α, the one not given follows from the other."""
         if field == "revolution" and self.revolution is None:
             return self.revolution_on(profile, section)
         if field == "helical_angle":
@@ -111,4 +110,58 @@ class FiberArchitecture(SectorActuator):
         return helical_rotation(profile, section.ring(self.ring).outer_ratio, angle, start, z)
 
     def _faults(self) -> list[Fault]:
-        return super()._faults() + winding_faults(self.helical_angle, self.revolution)
+        if (self.helical_angle is None) != (self.revolution is None):
+            return super()._faults()
+        allowed = "give exactly one of helical_angle and revolution (0 for a longitudinal fiber)"
+        both = None if self.revolution is None else (self.helical_angle, self.revolution)
+        return [*super()._faults(), Fault("helical_angle, revolution", both, allowed)]
+
+
+def helical_rotation(
+    profile: Profile, ratio: float, angle: float | AlongArm, start: float, z: ArrayLike
+) -> Array:
+    """Θ(Z) = ∫ tan α(Z)/(R cos φ) dZ from `start` to Z [rad]: theory (50).
+
+    Args:
+        profile: R2(Z).
+        ratio: R/R2 of the cone on which α is measured [-].
+        angle: α, constant or along the arm [rad].
+        start: Where the fiber begins [m].
+        z: Stations Z [m], any shape.
+    """
+    z = np.asarray(z, float)
+    if isinstance(angle, AlongArm):
+        turned = _rotation_from_base(profile, ratio, angle, np.append(z, start))
+        return turned[:-1].reshape(z.shape) - turned[-1]
+    turned = profile.surface_coordinate(z, ratio)
+    if start > 0.0:
+        turned = turned - profile.surface_coordinate(start, ratio)
+    return turned * np.tan(angle)
+
+
+def _rotation_from_base(profile: Profile, ratio: float, angle: AlongArm, z: Array) -> Array:
+    """Θ from the base, summed over the pieces on which profile and angle are smooth."""
+    breaks = [profile.length * x for x in angle.breaks]
+    knots = np.union1d([0.0, *breaks, profile.length], profile.breakpoints)
+    knots = knots[np.append(np.diff(knots) > 1e-14 * profile.length, True)]
+    gap = _constant_gap if isinstance(angle, Pieces) else _smooth_gap
+    each = gap(profile, ratio, angle, knots[:-1], knots[1:])
+    before = np.concatenate([[0.0], np.cumsum(each)])
+    piece = np.clip(np.searchsorted(knots, z, "right") - 1, 0, len(knots) - 2)
+    return before[piece] + gap(profile, ratio, angle, knots[piece], z)
+
+
+def _constant_gap(
+    profile: Profile, ratio: float, angle: AlongArm, start: Array, end: Array
+) -> Array:
+    """Over pieces of one angle each, which begin at `start`."""
+    along = profile.surface_coordinate(end, ratio) - profile.surface_coordinate(start, ratio)
+    return along * np.tan(angle((start + 1e-13 * profile.length) / profile.length))
+
+
+def _smooth_gap(profile: Profile, ratio: float, angle: AlongArm, start: Array, end: Array) -> Array:
+    """By Gauss quadrature."""
+    half = 0.5 * (end - start)[..., None]
+    z = start[..., None] + half * (1.0 + _NODES)
+    secant = np.hypot(1.0, ratio * profile.slope(z)) / (ratio * profile.radius(z))
+    return np.sum(half * _WEIGHTS * np.tan(angle(z / profile.length)) * secant, axis=-1)

@@ -5,32 +5,22 @@ Kaczmarski, Leanza, Zhao, Kuhl, Moulton and Goriely, J. Mech. Phys. Solids (2025
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.actuator_checks import FIBER_RANGES, constant_angle_faults
-from softreach.arm.actuators.actuator import STRETCH
-from softreach.arm.actuators.cone import cone_integrals
 from softreach.arm.actuators.ring_integrals import RingIntegrals
-from softreach.arm.actuators.sector import SectorActuator
+from softreach.arm.actuators.sector import SectorActuator, cone_integrals
+from softreach.arm.number import number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
-from softreach.arm.variable import Variable
-from softreach.support.errors import Fault
 
 __all__ = ["ObliqueMuscle", "RadialMuscle"]
 
 Array = NDArray[np.float64]
-
-_SECTOR = (
-    Variable("offset", "θ0", "polar angle of the first bundle", FIBER_RANGES["offset"]),
-    Variable("extent", "σ", "angular extent of a bundle", FIBER_RANGES["extent"]),
-    Variable("bundles", "n", "number of bundles", FIBER_RANGES["bundles"]),
-    *STRETCH,
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,17 +34,21 @@ class ObliqueMuscle(SectorActuator):
         InvalidDesign: A field is out of its range.
     """
 
-    variables: ClassVar[tuple[Variable, ...]] = (
-        Variable("helical_angle", "α", "angle of its fibers", FIBER_RANGES["helical_angle"]),
-        *_SECTOR,
-    )
     default_name: ClassVar[str] = "oblique muscle"
     validity: ClassVar[str] = (
         "As for fibers; the ends of those fibers that leave the sector between base and tip are "
         "taken to hang on to the matrix."
     )
 
-    helical_angle: float
+    helical_angle: float = number(
+        "α",
+        "rad",
+        "angle of its fibers",
+        low=-math.pi / 2,
+        high=math.pi / 2,
+        open_low=True,
+        open_high=True,
+    )
     """α of its fibers from the axis, at the outer radius of the ring [rad]; 0 is longitudinal."""
 
     @property
@@ -74,9 +68,6 @@ class ObliqueMuscle(SectorActuator):
         del profile, section
         return np.zeros(len(z))
 
-    def _faults(self) -> list[Fault]:
-        return super()._faults() + constant_angle_faults(self.helical_angle)
-
 
 @dataclass(frozen=True, kw_only=True)
 class RadialMuscle(SectorActuator):
@@ -90,7 +81,6 @@ class RadialMuscle(SectorActuator):
         InvalidDesign: A field is out of its range.
     """
 
-    variables: ClassVar[tuple[Variable, ...]] = _SECTOR
     default_name: ClassVar[str] = "radial muscle"
     validity: ClassVar[str] = "As for fibers; the change of radius itself is left out."
 

@@ -2,34 +2,35 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.actuator_checks import sector_faults
-from softreach.arm.actuators.actuator import Actuator, Bounds, Outline, Resultants
-from softreach.arm.actuators.ring_integrals import RingIntegrals
+from softreach.arm.actuators.actuator import Bounds, Outline, PolarActuator, Resultants
+from softreach.arm.actuators.ring_integrals import RingIntegrals, ring_integrals
+from softreach.arm.number import number
 from softreach.arm.profile import Profile
-from softreach.arm.section import Section
+from softreach.arm.section import Ring, Section
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput
 
-__all__ = ["SectorActuator"]
+__all__ = ["SectorActuator", "cone_integrals", "ring_name_faults"]
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class SectorActuator(Actuator):
+class SectorActuator(PolarActuator):
     """Equidistant bundles of one extent in one ring; γ < 0 contracts."""
 
-    extent: float
+    extent: float = number(
+        "σ", "rad", "angular extent of a bundle", low=0.0, high=2 * math.pi, open_low=True
+    )
     """σ, angular extent of every bundle [rad]; 0 < σ ≤ 2π."""
-    offset: float = 0.0
-    """θ0, polar angle of the center of the first bundle where it begins [rad]."""
     ring: int | str = 0
     """Which ring of the section it is in: index or name."""
     activation_bounds: Bounds = (-5 / 3, 0.0)
@@ -83,7 +84,7 @@ class SectorActuator(Actuator):
 
     def angles(self, profile: Profile, section: Section, z: Array) -> Array:
         """θ0 + 2πj/n + Θ(Z) [rad], shape (station, bundle): theory (11)."""
-        return self.offset + self._starts() + self.rotation(profile, section, z)[:, None]
+        return self.start_angles + self.rotation(profile, section, z)[:, None]
 
     def split(self, count: int, *, keep_extent: bool = True) -> tuple[Self, ...]:
         """Several actuators of one bundle in place of this one, evenly about its center.
@@ -115,4 +116,34 @@ class SectorActuator(Actuator):
             yield self.replace(name=name, offset=offset, extent=extent)
 
     def _faults(self) -> list[Fault]:
-        return super()._faults() + sector_faults(vars(self))
+        return super()._faults() + ring_name_faults(self.ring)
+
+
+def ring_name_faults(ring: Any) -> list[Fault]:
+    """A fault for what is neither index nor name of a ring."""
+    index = isinstance(ring, int) and not isinstance(ring, bool) and ring >= 0
+    if index or isinstance(ring, str):
+        return []
+    return [Fault("ring", ring, "must be the index, from 0, or the name of a ring")]
+
+
+def cone_integrals(ring: Ring, slope: Array, angle: Array) -> RingIntegrals:
+    """I0, I1, I3 of one ring at stations, each pair of slope and angle integrated once.
+
+    Args:
+        ring: The ring.
+        slope: tan φ of the arm's surface, shape (station,); that of the ring is in proportion.
+        angle: α at the outer radius of the ring [rad], shape (station,).
+    """
+    pairs = slope + 1j * angle
+    if not (len(pairs) and (pairs == pairs[0]).all()):
+        pairs, station = np.unique(pairs, return_inverse=True)
+        return RingIntegrals(*(integral[station] for integral in _integrals(ring, pairs)))
+    one = _integrals(ring, pairs[:1])
+    return RingIntegrals(*(np.broadcast_to(integral, pairs.shape) for integral in one))
+
+
+def _integrals(ring: Ring, pairs: NDArray[np.complex128]) -> RingIntegrals:
+    """The integrals for pairs of slope (real) and angle (imaginary)."""
+    slope = np.arctan(pairs.real * ring.outer_ratio)
+    return ring_integrals(ring.radius_ratio, slope, pairs.imag, ring.material.poisson_ratio)

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.actuator_checks import FIBER_RANGES, tendon_faults
-from softreach.arm.actuators.actuator import STRETCH, Actuator, Outline, Resultants
+from softreach.arm.actuators.actuator import (
+    MOST_TURN,
+    Outline,
+    PolarActuator,
+    Resultants,
+    length_or_ratio_faults,
+)
 from softreach.arm.along import AlongArm, Samples
+from softreach.arm.number import as_numbers, number
 from softreach.arm.profile import Profile
 from softreach.arm.section import Section
-from softreach.arm.variable import Variable
-from softreach.support.errors import Fault, Range
+from softreach.support.errors import Fault
 
 __all__ = ["Tendon"]
 
@@ -36,7 +40,7 @@ class _Route(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tendon(Actuator):
+class Tendon(PolarActuator):
     """A tendon without friction at p = ρt (cos θ, sin θ, 0) of every section, or several evenly.
 
     Its activation is the tension τ [N]. Give either the distance from the axis or its ratio to
@@ -49,17 +53,7 @@ class Tendon(Actuator):
 
     unit: ClassVar[str] = "N"
     symbol: ClassVar[str] = "τ"
-    variables: ClassVar[tuple[Variable, ...]] = (
-        Variable("distance", "ρt", "distance from the axis", Range(0.0, unit="m")),
-        Variable("distance_ratio", "ρt/R2", "distance from the axis over R2", Range(0.0)),
-        Variable("offset", "θ0", "polar angle where it begins", FIBER_RANGES["offset"]),
-        Variable("revolution", "Ω", "rotation from end to end", FIBER_RANGES["revolution"]),
-        Variable("bundles", "n", "number of tendons", FIBER_RANGES["bundles"]),
-        *STRETCH,
-    )
-    series: ClassVar[tuple[Variable, ...]] = (
-        Variable("routing", "θ", "angle along the arm", FIBER_RANGES["offset"]),
-    )
+    activation: ClassVar[str] = "tension"
     default_name: ClassVar[str] = "tendon"
     validity: ClassVar[str] = (
         "Exact for tendons parallel to the axis; others pull along their direction at rest, with a "
@@ -68,15 +62,21 @@ class Tendon(Actuator):
         "by 1/ζ, ζ = 1 - τ/K0."
     )
 
-    distance: float | Samples | None = None
-    """ρt, from the axis [m]; a number, or samples along the arm."""
-    distance_ratio: float | None = None
-    """ρt over the outer radius R2(Z) [-]."""
-    offset: float = 0.0
-    """θ0, polar angle of the first tendon where it begins [rad]."""
-    revolution: float = 0.0
+    revolution: float = number(
+        "Ω", "rad", "rotation from end to end", low=-MOST_TURN, high=MOST_TURN, default=0.0
+    )
     """Ω, rotation from where it begins to its anchor, even along Z [rad]."""
-    routing: Samples | None = None
+    distance: float | Samples | None = number(
+        "ρt", "m", "distance from the axis", low=0.0, along=Samples, default=None
+    )
+    """ρt, from the axis [m]; a number, or samples along the arm."""
+    distance_ratio: float | None = number(
+        "ρt/R2", "", "distance from the axis over R2", low=0.0, default=None
+    )
+    """ρt over the outer radius R2(Z) [-]."""
+    routing: Samples | None = number(
+        "θ", "rad", "angle along the arm", shape="along", along=Samples, default=None
+    )
     """θ(Z) - θ0 along the arm [rad], in place of an even rotation."""
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
@@ -131,7 +131,7 @@ class Tendon(Actuator):
         return super().replace(**changes)
 
     def value_on(self, field: str, profile: Profile, section: Section) -> Any:
-        """Value of a variable; of distance and ratio, the one not given follows at the base.
+        """Value of a number; of distance and ratio, the one not given follows at the base.
 
         The revolution of a routing is its rotation from where the tendon begins to its anchor.
         """
@@ -148,9 +148,7 @@ class Tendon(Actuator):
     def _route(self, profile: Profile, z: Array) -> _Route:
         column = z[:, None]
         angle, turning = self._angle(profile, column)
-        return _Route(
-            *self._distance(profile, column), self.offset + self._starts() + angle, turning
-        )
+        return _Route(*self._distance(profile, column), self.start_angles + angle, turning)
 
     def _distance(self, profile: Profile, z: Array) -> tuple[Array, Array]:
         """ρt and its slope."""
@@ -170,16 +168,13 @@ class Tendon(Actuator):
         return rate * (x - self.start_over_length), np.full(z.shape, rate / profile.length)
 
     def _faults(self) -> list[Fault]:
-        return super()._faults() + tendon_faults(vars(self)) + list(self._route_faults())
-
-    def _route_faults(self) -> Iterator[Fault]:
-        """A cable that jumps, or turns in two ways."""
-        if isinstance(self.distance, AlongArm) and not isinstance(self.distance, Samples):
-            yield Fault("distance", self.distance, "must be a number or Samples, which do not jump")
-        if self.routing is None:
-            return
-        if not isinstance(self.routing, Samples):
-            yield Fault("routing", self.routing, "must be Samples of θ(Z) - θ0, or None")
-        elif self.revolution != 0:
+        faults = super()._faults() + length_or_ratio_faults(vars(self), "distance")
+        tensions = as_numbers(self.activation_bounds)
+        if tensions.size and tensions.min() < 0:
+            allowed = "must be at least 0 N: a tendon pulls and cannot push"
+            faults.append(Fault("activation_bounds", self.activation_bounds, allowed))
+        turns_evenly = all(fault.path != "revolution" for fault in faults) and self.revolution != 0
+        if turns_evenly and isinstance(self.routing, Samples):
             allowed = "must be left out where routing is given, which says how the tendon turns"
-            yield Fault("revolution", self.revolution, allowed)
+            faults.append(Fault("revolution", self.revolution, allowed))
+        return faults

@@ -11,7 +11,6 @@ series, and angles in degrees: `taper_deg`, `left.helical_angle.values_deg[2]`.
 """
 
 from softreach.arm.parameters.changes import changed, find_parameter, find_parameters
-from softreach.arm.parameters.of_arm import parameters
-from softreach.arm.parameters.parameter import Parameter
+from softreach.arm.parameters.parameter import Parameter, parameters
 
 __all__ = ["Parameter", "changed", "find_parameter", "find_parameters", "parameters"]

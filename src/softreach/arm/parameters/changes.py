@@ -2,25 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import difflib
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters.draft import Draft
-from softreach.arm.parameters.of_arm import by_ring_name, parameters
-from softreach.arm.parameters.parameter import Parameter
-from softreach.arm.parameters.unknown import unknown_parameter
+from softreach.arm.parameters.parameter import OwnParameter, Parameter, parameters
 from softreach.support.arguments import checked, instance, plain, text
 from softreach.support.errors import Fault, InvalidInput, in_short
 
-__all__ = ["changed", "find_parameter", "find_parameters", "parameters_by_every_name"]
+__all__ = [
+    "changed",
+    "find_parameter",
+    "find_parameters",
+    "parameters_by_every_name",
+    "unknown_parameter",
+]
+
+_ELEMENT = re.compile(r"(.*)\[(\d+)\]$")
+_FEW = 12
 
 
 def parameters_by_every_name(arm: Manipulator) -> dict[str, Parameter]:
     """As `parameters`, and again by the names of rings: `rings[skin].inner_ratio`."""
     known = parameters(arm)
     return known | {
-        name: _renamed(known[listed], name) for name, listed in by_ring_name(arm, known).items()
+        name: _renamed(known[listed], name) for name, listed in _by_ring_name(arm, known).items()
     }
 
 
@@ -49,14 +58,14 @@ def find_parameters(
         InvalidInput: The arm has no such parameter, or two names are of one.
     """
     known = parameters(arm)
-    listed = {name: name for name in known} | by_ring_name(arm, known)
-    asked: dict[str, str] = {}
+    listed = {name: name for name in known} | _by_ring_name(arm, known)
+    aliases: dict[str, str] = {}
     for name in names:
         if not isinstance(name, str) or name not in listed:
             raise unknown_parameter(in_short(name), known)
-        if (first := asked.setdefault(listed[name], name)) != name:
+        if (first := aliases.setdefault(listed[name], name)) != name:
             raise InvalidInput("parameter", name, "given once", f"{first} is the same")
-    return {asked[one]: _renamed(known[one], asked[one]) for one in known if one in asked}
+    return {aliases[one]: _renamed(known[one], aliases[one]) for one in known if one in aliases}
 
 
 @checked(arm=a_manipulator, values=instance(Mapping, "a dictionary of parameters"))
@@ -81,8 +90,46 @@ def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
         if isinstance(value, int | float) and not isinstance(value, bool):
             parameter.change(draft, value)
         else:
-            draft.refuse(Fault(name, value, parameter.variable.allowed))
+            draft.refuse(Fault(name, value, parameter.range))
     return draft.made() if values else arm
+
+
+def unknown_parameter(name: str, known: Mapping[str, Parameter]) -> InvalidInput:
+    """The error for a name that no parameter has, in one line.
+
+    It lists the parameters of the part that the name begins with, or those of the whole arm, and
+    suggests the closest one.
+
+    Args:
+        name: The name.
+        known: All parameters by what they are called where the name was given.
+    """
+    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
+    hint = f'did you mean "{close[0]}"?' if close else ""
+    if name.startswith("loads.") and not any(key.startswith("loads.") for key in known):
+        hint = "the arm has no loads: give it some first"
+    owners = list(dict.fromkeys(one.owner for one in known.values() if one.owner))
+    meant = max((own for own in owners if name.startswith(f"{own}.")), key=len, default="")
+    own = [key for key, one in known.items() if one.owner == meant]
+    allowed = f"one of {', '.join(_shortened(own))}"
+    if owners and not meant:
+        parts = ", ".join(owners[:_FEW]) + (", ..." if len(owners) > _FEW else "")
+        example = next(key for key, one in known.items() if one.owner)
+        allowed += f", or of one part ({parts}), such as {example}"
+    return InvalidInput("parameter", name, allowed, hint)
+
+
+def _by_ring_name(arm: Manipulator, known: Mapping[str, Parameter]) -> dict[str, str]:
+    """Further names of parameters, `rings[skin].inner_ratio` for `rings[0].inner_ratio`."""
+    names: dict[str, str] = {}
+    for listed, one in known.items():
+        if isinstance(one, OwnParameter) and one.path.part[0] == "rings":
+            k = one.path.part[1]
+            ring = arm.section.rings[int(k)].name
+            name = f"rings[{ring}]" + listed.removeprefix(f"rings[{k}]")
+            if ring and name not in known:
+                names[name] = listed
+    return names
 
 
 def _renamed(parameter: Parameter, name: str) -> Parameter:
@@ -90,3 +137,21 @@ def _renamed(parameter: Parameter, name: str) -> Parameter:
         return parameter
     owner = name.removesuffix(f".{parameter.field}")
     return replace(parameter, name=name, owner=owner)
+
+
+def _shortened(names: Iterable[str]) -> list[str]:
+    """The names, of a series its first and its last number."""
+    places: dict[str, list[str]] = {}
+    for name in names:
+        element = _ELEMENT.match(name)
+        base, place = (element[1], element[2]) if element else (name, "")
+        places.setdefault(base, []).append(place)
+    return [text for base, each in places.items() for text in _span(base, each)]
+
+
+def _span(base: str, places: list[str]) -> list[str]:
+    alone = [base] if "" in places else []
+    elements = [place for place in places if place]
+    if len(elements) < 2:
+        return alone + [f"{base}[{place}]" for place in elements]
+    return [*alone, f"{base}[{elements[0]}] to [{elements[-1]}]"]

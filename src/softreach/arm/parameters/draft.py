@@ -1,68 +1,129 @@
-"""Changes of an arm, gathered before any of its parts is made again."""
+"""Changes of numbers of an arm, gathered before any of its parts is made again."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.arm.actuators import Actuator, FiberArchitecture
+from softreach.arm.actuators import Actuator
 from softreach.arm.along import AlongArm
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters.parts import WHOLE, actuator_key, parts, prefix_of
+from softreach.arm.number import fields_of
 from softreach.arm.section import Section
 from softreach.support.errors import Fault, InvalidDesign
 
-__all__ = ["ActuatorDraft", "Draft", "PartDraft"]
+__all__ = ["Draft", "PartKey", "Path", "part_of", "parts"]
 
 Part = TypeVar("Part")
 
+PartKey = tuple[str | int, ...]
+"""("profile",), ("rings", 0, "material"), ("core",), ("actuators", "left"), ("loads",), ..."""
+
+_BOUNDS = "activation_bounds"
+_SIDES = ("lower", "upper")
+
+
+class Path(NamedTuple):
+    """Where a number stands in an arm."""
+
+    part: PartKey
+    field: str
+    """Of the part."""
+    place: tuple[str | int, ...] = ()
+    """In the field: (2,) of a series, ("values", 2) of a function along the arm; of bounds the
+    side, 0 or 1, and a bundle where it is meant alone."""
+
+    @property
+    def owner(self) -> str:
+        """Start of names of numbers of this part; "" for the arm itself."""
+        kind, *rest = self.part
+        if kind == "actuators":
+            return str(rest[0])
+        if kind == "rings":
+            return "".join((f"rings[{rest[0]}]", *(f".{one}" for one in rest[1:])))
+        of_arm = kind == "section" or (kind == "profile" and not self.place)
+        return "" if of_arm else str(kind)
+
+    @property
+    def faulty(self) -> str:
+        """Path of faults of the field, or of the series in it."""
+        inner = [one for one in self.place if isinstance(one, str)]
+        return ".".join(one for one in (self.owner, self.field, *inner) if one)
+
+    @property
+    def text(self) -> str:
+        """The name without the owner."""
+        if self.field == _BOUNDS:
+            side, *bundle = self.place
+            assert isinstance(side, int)
+            return _SIDES[side] + "".join(f"[{one}]" for one in bundle)
+        places = (f"[{one}]" if isinstance(one, int) else f".{one}" for one in self.place)
+        return self.field + "".join(places)
+
+
+def parts(arm: Manipulator) -> dict[PartKey, Any]:
+    """Every part that has numbers, by its key."""
+    keyed: dict[PartKey, Any] = {("profile",): arm.profile, ("section",): arm.section}
+    if arm.loads is not None:
+        keyed["loads",] = arm.loads
+    for k, ring in enumerate(arm.section.rings):
+        keyed |= {("rings", k): ring, ("rings", k, "material"): ring.material}
+    if arm.section.core is not None:
+        keyed["core",] = arm.section.core
+    return keyed | {("actuators", one.name): one for one in arm.actuators}
+
+
+def part_of(arm: Manipulator, key: PartKey) -> Any:
+    """One part by its key."""
+    return parts(arm)[key]
+
 
 @dataclass
-class PartDraft:
+class _PartDraft:
     """Changes of one part."""
 
     start: Any
-    """What the changes start from."""
-    fields: dict[str, Any] = field(default_factory=dict)
-    """Field -> new value."""
-    series: dict[str, dict[int, float]] = field(default_factory=dict)
-    """Path of a series -> place in it -> new value."""
+    """The part before."""
+    values: dict[tuple[str, tuple[str | int, ...]], float] = field(default_factory=dict)
+    """Field and place -> new value."""
 
     def made(self, **others: Any) -> Any:
         """The changed part, with other parts in some fields."""
-        changes = others | self._changes()
+        changes = others | self.changes()
         return self.start.replace(**changes) if changes else self.start
 
-    def _changes(self) -> dict[str, Any]:
-        """New values of fields; what is changed in a series wins over a new value for all of it."""
-        changes: dict[str, Any] = {}
-        for path, numbers in self.series.items():
-            name, _, inner = path.partition(".")
-            whole = changes.get(name, getattr(self.start, name))
-            values = list(getattr(whole, inner) if inner else whole)
-            for place, number in numbers.items():
-                values[place] = number
-            changes[name] = _along(whole, name, inner, values) if inner else tuple(values)
-        return self.fields | changes
+    def changes(self) -> dict[str, Any]:
+        """New values of fields; an element of a series wins over a new value for all of it."""
+        fields = {name: value for (name, place), value in self.values.items() if not place}
+        elements: dict[tuple[str, tuple[str | int, ...]], dict[str | int, float]] = {}
+        for (name, place), value in self.values.items():
+            if place and name != _BOUNDS:
+                elements.setdefault((name, place[:-1]), {})[place[-1]] = value
+        series: dict[str, Any] = {}
+        for (name, inner), new in elements.items():
+            before = series.get(name, getattr(self.start, name))
+            numbers: Any = getattr(before, str(inner[0])) if inner else before
+            numbers = tuple(new.get(k, one) for k, one in enumerate(numbers))
+            series[name] = _along(before, name, str(inner[0]), numbers) if inner else numbers
+        return fields | series
 
 
 @dataclass
-class ActuatorDraft(PartDraft):
+class _ActuatorDraft(_PartDraft):
     """Changes of one actuator."""
 
-    winding: float | None = None
+    revolution: float | None = None
     """Revolution that it gets unless its own parameters say how it winds [rad]."""
-    bounds: dict[tuple[int, int | None], float] = field(default_factory=dict)
-    """0 for lower or 1 for upper, and a bundle or None for all of them -> new value."""
 
-    def _changes(self) -> dict[str, Any]:
-        changes = super()._changes()
-        if self.winding is not None and not changes.keys() & {"revolution", "helical_angle"}:
-            changes["revolution"] = self.winding
+    def changes(self) -> dict[str, Any]:
+        """New values of fields, bounds for as many bundles as it has then."""
+        changes = super().changes()
+        if self.revolution is not None and not changes.keys() & {"revolution", "helical_angle"}:
+            changes["revolution"] = self.revolution
         bounds = self._bounds(changes.get("bundles", self.start.bundles))
         return changes if bounds is None else changes | {"activation_bounds": bounds}
 
@@ -74,14 +135,17 @@ class ActuatorDraft(PartDraft):
         start: NDArray[np.float64] = self.start.bounds
         if not isinstance(bundles, int) or bundles < 1:
             return None
-        if not self.bounds:
+        new: dict[Any, float] = {
+            place: one for (name, place), one in self.values.items() if name == _BOUNDS
+        }
+        if not new:
             return None if bundles == len(start) else tuple(start[0].tolist())
         bounds = start.copy() if bundles == len(start) else start[:1].repeat(bundles, axis=0)
-        for (side, bundle), value in self.bounds.items():
-            if bundle is not None and bundle >= bundles:
+        for (side, *bundle), value in new.items():
+            if bundle and bundle[0] >= bundles:
                 allowed = f"has no bundle, as their number becomes {bundles}"
-                raise InvalidDesign([Fault("activation_bounds", value, allowed)])
-            bounds[slice(None) if bundle is None else bundle, side] = value
+                raise InvalidDesign([Fault(_BOUNDS, value, allowed)])
+            bounds[bundle[0] if bundle else slice(None), side] = value
         return tuple((low, high) for low, high in bounds.tolist())
 
 
@@ -95,53 +159,34 @@ class Draft:
     def __init__(self, arm: Manipulator) -> None:
         """Begin without a change."""
         self.arm = arm
-        self.parts = {
-            key: (ActuatorDraft if isinstance(part, Actuator) else PartDraft)(part)
+        self._parts = {
+            key: (_ActuatorDraft if isinstance(part, Actuator) else _PartDraft)(part)
             for key, part in parts(arm).items()
         }
         self._faults: list[Fault] = []
-        self._asked: dict[str, dict[Any, tuple[str, float]]] = {}
+        self._requests: dict[str, dict[Any, tuple[str, float]]] = {}
 
-    def actuator(self, key: str) -> ActuatorDraft:
-        """The changes of an actuator."""
-        draft = self.parts[key]
-        assert isinstance(draft, ActuatorDraft)
-        return draft
+    def set(self, name: str, path: Path, value: float) -> None:
+        """Note a new value, under the name by which it was requested."""
+        self._parts[path.part].values[path.field, path.place] = value
+        self._requests.setdefault(path.faulty, {})[path.place] = name, value
 
-    def set_field(self, name: str, key: str, path: str, value: float) -> None:
-        """Note a new value of a field, under the name by which it was asked for."""
-        self.parts[key].fields[path] = value
-        self._asked[prefix_of(key, path) + path] = {None: (name, value)}
-
-    def set_element(self, name: str, key: str, path: str, place: int, value: float) -> None:
-        """Note a new value in a series."""
-        self.parts[key].series.setdefault(path, {})[place] = value
-        self._asked.setdefault(prefix_of(key, path) + path, {})[place] = name, value
-
-    def set_bound(self, name: str, key: str, side: int, bundle: int | None, value: float) -> None:
-        """Note a new bound of one bundle, or of all."""
-        self.actuator(key).bounds[side, bundle] = value
-        asked = self._asked.setdefault(f"{prefix_of(key)}activation_bounds", {})
-        asked[side, bundle] = name, value
-
-    def wind(self, name: str, key: str, revolution: float) -> None:
+    def wind(self, name: str, part: PartKey, revolution: float) -> None:
         """Give an actuator another revolution, which its own parameters may still override."""
-        self.actuator(key).winding = revolution
-        self._asked.setdefault(f"{prefix_of(key)}revolution", {None: (name, revolution)})
+        self._actuator(part).revolution = revolution
+        path = Path(part, "revolution")
+        self._requests.setdefault(path.faulty, {path.place: (name, revolution)})
 
     def keep_revolutions(self) -> None:
         """State the revolutions of helical fibers, so that their angles follow the profile.
 
         Angles that are given along the arm stay.
         """
-        for fiber in self.arm.actuators:
-            if not isinstance(fiber, FiberArchitecture) or isinstance(
-                fiber.helical_angle, AlongArm
-            ):
-                continue
-            draft = self.actuator(actuator_key(fiber))
-            if fiber.helical_angle and draft.winding is None:
-                draft.winding = fiber.revolution_on(self.arm.profile, self.arm.section)
+        for fiber in self.arm.fibers:
+            draft = self._actuator(("actuators", fiber.name))
+            winds = fiber.helical_angle and not isinstance(fiber.helical_angle, AlongArm)
+            if winds and draft.revolution is None:
+                draft.revolution = fiber.revolution_on(self.arm.profile, self.arm.section)
 
     def refuse(self, fault: Fault) -> None:
         """Note a change that is wrong whatever the others are."""
@@ -152,67 +197,74 @@ class Draft:
 
         Raises:
             InvalidDesign: The arm cannot exist; the error names every fault by the parameter that
-                was asked for.
+                was requested.
         """
-        changes: dict[str, Any] = {
-            field: self._section() if field == "section" else self._made(field)
-            for field in WHOLE
-            if field in self.parts
-        }
-        keys = [actuator_key(one) for one in self.arm.actuators]
+        changes: dict[str, Any] = {"profile": self._made(("profile",)), "section": self._section()}
+        if self.arm.loads is not None:
+            changes["loads"] = self._made(("loads",))
+        keys = [("actuators", one.name) for one in self.arm.actuators]
         changes["actuators"] = tuple(self._made(key) for key in keys)
         if not self._faults:
-            made = self._tried("", lambda: self.arm.replace(**changes))
+            made = self._tried(None, lambda: self.arm.replace(**changes))
             if made is not None:
                 return made
         raise InvalidDesign(
             list({(one.path, str(one.allowed)): one for one in self._faults}.values())
         )
 
+    def _actuator(self, key: PartKey) -> _ActuatorDraft:
+        draft = self._parts[key]
+        assert isinstance(draft, _ActuatorDraft)
+        return draft
+
     def _section(self) -> Section | None:
         before, rings = len(self._faults), []
         for k in range(len(self.arm.section.rings)):
-            material = self._made(f"rings[{k}].material")
-            rings.append(self._made(f"rings[{k}]", **({"material": material} if material else {})))
-        core = self._made("core") if "core" in self.parts else None
+            material = self._made(("rings", k, "material"))
+            rings.append(self._made(("rings", k), **({"material": material} if material else {})))
+        core = self._made(("core",)) if ("core",) in self._parts else None
         if len(self._faults) == before:
-            return self._made("section", rings=tuple(rings), core=core)
-        self._check_fields("section")
+            return self._made(("section",), rings=tuple(rings), core=core)
+        for (name, _), value in self._parts["section",].values.items():
+            # by themselves, as the parts around them are faulty
+            self._faults += fields_of(Section)[name].faults(value)
         return None
 
-    def _check_fields(self, key: str) -> None:
-        """Judge new values by themselves, where the parts around them are faulty."""
-        draft = self.parts[key]
-        for variable in draft.start.variables:
-            value = draft.fields.get(variable.field)
-            if value is not None and not variable.allowed.admits(value):
-                self.refuse(Fault(variable.field, value, variable.allowed))
+    def _made(self, key: PartKey, **others: Any) -> Any:
+        return self._tried(key, lambda: self._parts[key].made(**others))
 
-    def _made(self, key: str, **others: Any) -> Any:
-        return self._tried(key, lambda: self.parts[key].made(**others))
-
-    def _tried(self, key: str, make: Callable[[], Part]) -> Part | None:
-        """The part, or None and its faults."""
+    def _tried(self, key: PartKey | None, make: Callable[[], Part]) -> Part | None:
+        """The part, or None and its faults; None as a key for the arm itself."""
         try:
             return make()
         except InvalidDesign as error:
-            self._faults += [self._as_asked(key, fault) for fault in error.faults]
+            self._faults += [self._as_requested(key, fault) for fault in error.faults]
             return None
 
-    def _as_asked(self, key: str, fault: Fault) -> Fault:
-        """The fault under the names and with the value that were asked for."""
-        paths = [prefix_of(key, path) + path if key else path for path in fault.path.split(", ")]
-        asked = [tuple(self._asked.get(path, {}).values()) or ((path, None),) for path in paths]
-        names = dict.fromkeys(name for each in asked for name, _ in each)
-        single = asked[0][0][1] if len(names) == 1 else None
+    def _as_requested(self, key: PartKey | None, fault: Fault) -> Fault:
+        """The fault under the names and with the value that were requested."""
+        paths = [self._path(key, field) for field in fault.path.split(", ")]
+        requests = [
+            tuple(self._requests.get(path, {}).values()) or ((path, None),) for path in paths
+        ]
+        names = dict.fromkeys(name for each in requests for name, _ in each)
+        single = requests[0][0][1] if len(names) == 1 else None
         value = fault.value if single is None else single
         return Fault(", ".join(names), value, fault.allowed)
 
+    def _path(self, key: PartKey | None, field: str) -> str:
+        """Path of faults of a field of a part."""
+        if key is None:
+            return field
+        number = fields_of(type(self._parts[key].start)).get(field)
+        is_series = number is not None and number.shape in ("series", "stations")
+        return Path(key, field, (0,) if is_series else ()).faulty
 
-def _along(whole: AlongArm, field: str, inner: str, values: list[float]) -> AlongArm:
+
+def _along(before: AlongArm, field: str, inner: str, numbers: tuple[Any, ...]) -> AlongArm:
     """The function along the arm with other stations or values."""
     try:
-        return whole.replace(**{inner: tuple(values)})
+        return before.replace(**{inner: numbers})
     except InvalidDesign as error:
         faults = [fault._replace(path=f"{field}.{fault.path}") for fault in error.faults]
         raise InvalidDesign(faults) from None

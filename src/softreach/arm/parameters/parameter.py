@@ -1,28 +1,30 @@
-"""One design parameter: its name, its unit, its value for an arm, and how it changes one."""
+"""Design parameters: their names and units, their values on an arm, and how they change one."""
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from softreach.arm.actuators import Actuator
-from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters.draft import Draft
-from softreach.arm.parameters.parts import part_of
-from softreach.arm.variable import Variable
-from softreach.support.arguments import plain
-from softreach.support.errors import Fault
+from softreach.arm.actuators import Actuator, FiberArchitecture
+from softreach.arm.along import AlongArm
+from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.arm.material import Material
+from softreach.arm.number import Number, fields_of
+from softreach.arm.parameters.draft import Draft, PartKey, Path, part_of, parts
+from softreach.arm.profile import LinearTaper
+from softreach.arm.section import Ring
+from softreach.support.arguments import checked, plain
+from softreach.support.errors import Fault, Range
 
-__all__ = [
-    "BoundParameter",
-    "ElementParameter",
-    "FieldParameter",
-    "Parameter",
-    "SharedParameter",
-]
+__all__ = ["OwnParameter", "Parameter", "parameters"]
+
+_SIDES = (("min", "lowest activation"), ("max", "highest activation"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,28 +35,33 @@ class Parameter(ABC):
     """What it is called: `taper`, `left.offset`, or `rings[0].material.young_modulus`."""
     owner: str = ""
     """The part that it belongs to, such as `left` or `rings[0].material`; "" for the whole arm."""
-    variable: Variable
-    """The field behind it."""
+    number: Number
+    """Its declaration."""
 
     @property
     def unit(self) -> str:
         """Unit of its values: "m", "rad", "Pa", "kg/m³", "N", or "1"."""
-        return self.variable.allowed.unit or "1"
+        return self.number.unit or "1"
 
     @property
     def symbol(self) -> str:
-        """What formulas call it."""
-        return self.variable.symbol
+        """Symbol in formulas."""
+        return self.number.symbol
 
     @property
     def meaning(self) -> str:
-        """What it is, in a few words."""
-        return self.variable.meaning
+        """Meaning in a few words."""
+        return self.number.meaning
+
+    @property
+    def range(self) -> Range:
+        """Values that it may have."""
+        return self.number.allowed
 
     @property
     def whole(self) -> bool:
         """Whether it counts something."""
-        return self.variable.allowed.whole
+        return self.range.whole
 
     @property
     def field(self) -> str:
@@ -75,73 +82,46 @@ class Parameter(ABC):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FieldParameter(Parameter):
-    """A field of one part."""
+class OwnParameter(Parameter):
+    """A number of one part: a field, a place in a series, or a bound."""
 
-    key: str
-    """Of the part."""
+    path: Path
 
     def value(self, arm: Manipulator) -> float:
         """What the part has on this arm."""
-        part, name = part_of(arm, self.key), self.variable.field
-        if isinstance(part, Actuator):
-            return _number(part.value_on(name, arm.profile, arm.section))
-        return _number(getattr(part, name))
+        part, (_, field, place) = part_of(arm, self.path.part), self.path
+        if field == "activation_bounds":
+            side, *bundle = place
+            return float(part.bounds[bundle[0] if bundle else 0, side])
+        if place:
+            *inner, k = place
+            series = getattr(part, field)
+            return float(getattr(series, str(inner[0]))[k] if inner else series[k])
+        is_actuator = isinstance(part, Actuator)
+        value = part.value_on(field, arm.profile, arm.section) if is_actuator else None
+        return _float(value if is_actuator else getattr(part, field))
 
     def change(self, draft: Draft, value: float) -> None:
-        """Change the part."""
-        counted = self.whole and float(value).is_integer()
-        draft.set_field(self.name, self.key, self.variable.field, int(value) if counted else value)
-
-
-@dataclass(frozen=True, kw_only=True)
-class ElementParameter(Parameter):
-    """One number of a series: a radius of a profile, or a value along the arm."""
-
-    key: str
-    """Of the part."""
-    series: str
-    """Path of the series in the part: `radii`, or `helical_angle.values`."""
-    place: int
-    """Which number, from 0."""
-
-    def value(self, arm: Manipulator) -> float:
-        """What the series has there."""
-        numbers = part_of(arm, self.key)
-        for field in self.series.split("."):
-            numbers = getattr(numbers, field)
-        return float(numbers[self.place])
-
-    def change(self, draft: Draft, value: float) -> None:
-        """Change that number, if it may have this value: whatever holds it names no places."""
-        if not self.variable.allowed.admits(plain(value)):
-            draft.refuse(Fault(self.name, value, self.variable.allowed))
+        """Change it; an element alone must be admitted, as its series names no places."""
+        if self.path.place and not self.range.admits(plain(value)):
+            draft.refuse(Fault(self.name, value, self.range))
             return
-        draft.set_element(self.name, self.key, self.series, self.place, value)
+        counted = self.whole and float(value).is_integer()
+        draft.set(self.name, self.path, int(value) if counted else value)
 
 
 @dataclass(frozen=True, kw_only=True)
-class BoundParameter(Parameter):
-    """The lower or the upper bound of one actuator's activations."""
-
-    key: str
-    """Of the actuator."""
-    side: int
-    """0 for lower, 1 for upper."""
-    bundle: int | None = None
-    """Which bundle, from 0; None for all."""
-
-    def value(self, arm: Manipulator) -> float:
-        """The bound of the bundle; of all of them, that of the first."""
-        return float(part_of(arm, self.key).bounds[self.bundle or 0, self.side])
+class _Taper(OwnParameter):
+    """The taper angle: when it changes, revolutions stay and helical angles follow."""
 
     def change(self, draft: Draft, value: float) -> None:
-        """Change the bound."""
-        draft.set_bound(self.name, self.key, self.side, self.bundle, value)
+        """Change the profile; the fibers keep their revolutions."""
+        draft.keep_revolutions()
+        super().change(draft, value)
 
 
 @dataclass(frozen=True, kw_only=True)
-class SharedParameter(Parameter):
+class _Shared(Parameter):
     """The same field of several parts at once."""
 
     parts: tuple[Parameter, ...]
@@ -153,10 +133,148 @@ class SharedParameter(Parameter):
     def change(self, draft: Draft, value: float) -> None:
         """Change all of them, under the name that they share."""
         for part in self.parts:
-            replace(part, name=self.name).change(draft, value)
+            dataclasses.replace(part, name=self.name).change(draft, value)
 
 
-def _number(value: Any) -> float:
+@dataclass(frozen=True, kw_only=True)
+class _OuterRadius(Parameter):
+    """The radius at the base of a profile given by radii: all of them keep their proportions."""
+
+    def value(self, arm: Manipulator) -> float:
+        """R2(0) [m]."""
+        return float(arm.profile.radius(0.0))
+
+    def change(self, draft: Draft, value: float) -> None:
+        """Change all radii."""
+        radii: tuple[float, ...] = getattr(draft.arm.profile, "radii")  # noqa: B009
+        scaled = [value if k == 0 else radius * value / radii[0] for k, radius in enumerate(radii)]
+        if not all(self.range.admits(plain(radius)) for radius in scaled):
+            draft.refuse(Fault(self.name, value, self.range))
+            return
+        for k, radius in enumerate(scaled):
+            draft.set(self.name, Path(("profile",), "radii", (k,)), radius)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Revolution(Parameter):
+    """The revolution of all that is helical; each keeps its sense, what is straight stays so.
+
+    Angles that are given along the arm stay as they are.
+    """
+
+    def value(self, arm: Manipulator) -> float:
+        """|Ω| of the first helical fiber or tendon [rad]; 0 without one."""
+        return next((abs(turn) for turn in _revolutions(arm).values() if turn), 0.0)
+
+    def change(self, draft: Draft, value: float) -> None:
+        """Wind fibers and tendons."""
+        for part, turn in _revolutions(draft.arm).items():
+            if turn:
+                draft.wind(self.name, part, math.copysign(value, turn))
+
+
+@checked(arm=a_manipulator)
+def parameters(arm: Manipulator) -> dict[str, Parameter]:
+    """Every parameter of an arm by its name.
+
+    Those of the whole arm come first: fields of profile and section, `revolution` (of all that is
+    helical, each in its own sense), `radius_ratio` where all rings begin at one, `poisson_ratio` of
+    all materials; `extent`, `lower` and `upper` (the bounds of activations) of all actuators that
+    have them. Then come those of single parts, by their path: `profile.radii[1]`,
+    `rings[0].inner_ratio`, `rings[0].material.young_modulus`, `core.density`, and of actuators by
+    their name: `left.offset`, `left.helical_angle.values[2]`, `left.lower[1]`.
+    """
+    own = [one for key, part in parts(arm).items() for one in _of_part(key, part)]
+    every = [*_of_arm(arm, own), *(one for one in own if one.owner)]
+    return {one.name: one for one in every}
+
+
+def _of_arm(arm: Manipulator, own: list[OwnParameter]) -> Iterator[Parameter]:
+    """Parameters of the arm as a whole, from those of its parts."""
+    plain = {one.name: one for one in own if not one.owner}
+    if any(one.path.field == "revolution" for one in own):
+        turn = fields_of(FiberArchitecture)["revolution"]
+        meaning = "revolution of all that is helical, each in its own sense"
+        yield _Revolution(name="revolution", number=dataclasses.replace(turn, meaning=meaning))
+    if (taper := plain.pop("taper", None)) is not None:
+        yield _Taper(name="taper", number=taper.number, path=taper.path)
+    inner = tuple(one for one in own if one.path.field == "inner_ratio")
+    if len({one.value(arm) for one in inner}) == 1:
+        ratio = fields_of(Ring)["inner_ratio"]
+        ratio = dataclasses.replace(ratio, meaning="inner over outer radius")
+        yield _Shared(name="radius_ratio", number=ratio, parts=inner)
+    if "outer_radius" not in plain and hasattr(arm.profile, "radii"):
+        yield _OuterRadius(name="outer_radius", number=fields_of(LinearTaper)["outer_radius"])
+    yield from plain.values()
+    poisson = tuple(one for one in own if one.path.field == "poisson_ratio")
+    number = fields_of(Material)["poisson_ratio"]
+    yield _Shared(name="poisson_ratio", number=number, parts=poisson)
+    for field in ("extent", "lower", "upper"):
+        same = tuple(one for one in own if one.field == field)
+        if len({one.unit for one in same}) == 1:
+            yield _Shared(name=field, number=same[0].number, parts=same)
+
+
+def _of_part(key: PartKey, part: Any) -> Iterator[OwnParameter]:
+    """Its numbers, first those that stand alone, and the bounds of an actuator."""
+    numbers = fields_of(type(part)).values()
+    for number in numbers:
+        if number.shape == "single":
+            yield _own(Path(key, number.field), number)
+    for number in numbers:
+        for place, element in _elements(number, getattr(part, number.field)):
+            yield _own(Path(key, number.field, place), element)
+    if isinstance(part, Actuator):
+        yield from _bounds(key, part)
+
+
+def _elements(number: Number, value: Any) -> Iterator[tuple[tuple[str | int, ...], Number]]:
+    """Places in a series or a function along the arm; of stations only those between the ends."""
+    if isinstance(value, AlongArm):
+        inner = fields_of(type(value))["stations_over_length"]
+        for place, element in _elements(inner, value.stations_over_length):
+            yield (inner.field, *place), element
+        yield from ((("values", k), _element(number, k)) for k in range(len(value.values)))
+    elif isinstance(value, tuple):
+        ends = (1, len(value) - 1) if number.shape == "stations" else (0, len(value))
+        yield from (((k,), _element(number, k)) for k in range(*ends))
+
+
+def _element(number: Number, k: int) -> Number:
+    return dataclasses.replace(
+        number,
+        symbol=f"{number.symbol}[{k}]",
+        meaning=f"{number.meaning}, number {k}",
+        shape="single",
+        along=None,
+    )
+
+
+def _bounds(key: PartKey, actuator: Actuator) -> Iterator[OwnParameter]:
+    unit = "" if actuator.unit == "1" else actuator.unit
+    bundles = [(), *((k,) for k in range(actuator.bundles))] if actuator.bundles > 1 else [()]
+    for side, (end, meaning) in enumerate(_SIDES):
+        for bundle in bundles:
+            symbol = f"{end} {actuator.symbol}" + "".join(f"[{k}]" for k in bundle)
+            number = Number(symbol=symbol, meaning=meaning, allowed=Range(unit=unit))
+            yield _own(Path(key, "activation_bounds", (side, *bundle)), number)
+
+
+def _own(path: Path, number: Number) -> OwnParameter:
+    name = f"{path.owner}.{path.text}" if path.owner else path.text
+    return OwnParameter(name=name, owner=path.owner, number=number, path=path)
+
+
+def _revolutions(arm: Manipulator) -> dict[PartKey, float]:
+    """Ω of all that winds by a single number [rad], by its key."""
+    return {
+        ("actuators", one.name): float(one.value_on("revolution", arm.profile, arm.section))
+        for one in arm.actuators
+        if "revolution" in (numbers := fields_of(type(one)))
+        and not any(isinstance(getattr(one, field), AlongArm) for field in numbers)
+    }
+
+
+def _float(value: Any) -> float:
     """The value, or NaN where it is left out or no number."""
-    plain = isinstance(value, int | float | np.number)
-    return float(value) if plain else float("nan")
+    return float(value) if isinstance(value, int | float | np.number) else float("nan")

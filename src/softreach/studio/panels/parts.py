@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from softreach.arm import designs
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.materials import material_names
+from softreach.arm.material import material_names
 from softreach.arm.parameters import changed
 from softreach.studio import edits
 from softreach.studio.controls import Shown, refusal

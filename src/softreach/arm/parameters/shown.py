@@ -6,28 +6,18 @@ import math
 import re
 
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.number import unit_suffix
 from softreach.arm.parameters.changes import parameters_by_every_name
 from softreach.arm.parameters.parameter import Parameter
 
 __all__ = ["from_written", "with_suffix", "written_name", "written_parameters"]
 
-_SUFFIX = {
-    "rad": "_deg",
-    "m": "_m",
-    "1": "",
-    "Pa": "_pa",
-    "kg/m³": "_kg_m3",
-    "N": "_n",
-    "m/s²": "_m_s2",
-    "N m": "_n_m",
-    "N/m": "_n_per_m",
-}
 _PLACE = re.compile(r"(\[\d+\])?$")
 
 
 def written_name(name: str, unit: str) -> str:
     """A name with its unit: `taper_deg`, `rings[0].material.young_modulus_pa`, `radii_m[1]`."""
-    return with_suffix(name, _SUFFIX.get(unit, f"_{unit}"))
+    return with_suffix(name, unit_suffix(unit))
 
 
 def with_suffix(name: str, suffix: str) -> str:

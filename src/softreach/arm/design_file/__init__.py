@@ -1,0 +1,20 @@
+"""Designs as TOML files: lengths in meters, angles in degrees, the unit in every key."""
+
+from softreach.arm.design_file.keys import in_file_terms
+from softreach.arm.design_file.read import LONGEST, Parts, document_of, parse, text_of
+from softreach.arm.design_file.write import render
+from softreach.support.files.kinds import FileKind, Formats, text_with
+
+__all__ = [
+    "DESIGN_FILE",
+    "LONGEST",
+    "Parts",
+    "document_of",
+    "in_file_terms",
+    "parse",
+    "render",
+    "text_of",
+]
+
+DESIGN_FILE: Formats = {".toml": FileKind("a design file", text_with("length_m"))}
+"""Kind of file that a design is saved as, and replaces."""

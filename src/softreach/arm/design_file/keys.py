@@ -1,0 +1,230 @@
+"""Vocabulary of design files: keys with their units, kinds of tables, values as TOML writes them.
+
+Keys follow from the numbers that the parts of an arm declare; angles are in degrees, and no digit
+is lost either way.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, fields
+from decimal import Decimal, InvalidOperation
+from functools import cache
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from softreach.arm.actuators import (
+    Actuator,
+    Chamber,
+    FiberArchitecture,
+    ObliqueMuscle,
+    RadialMuscle,
+    Tendon,
+)
+from softreach.arm.actuators.actuator import actuator_kinds
+from softreach.arm.loads import Loads, PointLoad
+from softreach.arm.material import Material
+from softreach.arm.number import Number, fields_of, unit_suffix
+from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
+from softreach.arm.section import Ring, Section
+from softreach.support.errors import Fault, InvalidDesign, Range
+
+__all__ = [
+    "ACTUATORS",
+    "PROFILES",
+    "Key",
+    "WrittenFloat",
+    "degrees_text",
+    "field_keys",
+    "in_file_terms",
+    "in_file_units",
+    "inline_table",
+    "key_text",
+    "keys_of",
+    "own_kinds",
+    "radians",
+    "value_text",
+]
+
+PROFILES: Mapping[str, type[Profile]] = MappingProxyType(
+    {"linear": LinearTaper, "piecewise": PiecewiseTaper, "sampled": SampledTaper}
+)
+"""Profiles by the kind that files know them by."""
+
+ACTUATORS: Mapping[str, type[Actuator]] = MappingProxyType(
+    {
+        "fiber": FiberArchitecture,
+        "oblique_muscle": ObliqueMuscle,
+        "radial_muscle": RadialMuscle,
+        "tendon": Tendon,
+        "chamber": Chamber,
+    }
+)
+"""Actuators by the kind that files know them by."""
+
+_BODY = (Material, Ring, Section, Loads, PointLoad)
+_PI = Decimal("3.14159265358979323846264338327950288420")
+_LONG = 17  # digits from which a number of degrees is read exactly
+
+
+class Key(NamedTuple):
+    """A key of a table."""
+
+    name: str
+    """As the file has it: `offset_deg`."""
+    field: str
+    """Field of the part."""
+    number: Number | None
+    """Declaration of a number; None for names, bounds, materials, and lists of tables."""
+    default: Any
+    """Default of the field; MISSING where the key is required."""
+
+    @property
+    def required(self) -> bool:
+        """Whether a table without it is refused."""
+        return self.default is MISSING
+
+
+@cache
+def keys_of(kind: type) -> Mapping[str, Key]:
+    """Keys of the table of a kind of part by their names; other tables of their own are no keys."""
+    numbers = fields_of(kind)
+    keys: list[Key] = []
+    for field in fields(kind):
+        number = numbers.get(field.name)
+        name = number.key if number else field.name
+        if field.name == "activation_bounds":
+            name = f"{kind.activation}_bounds{unit_suffix(kind.unit)}"
+        default = field.default if field.default_factory is MISSING else None
+        if (kind, field.name) != (Section, "rings"):
+            keys.append(Key(name, field.name, number, default))
+    return MappingProxyType({key.name: key for key in keys})
+
+
+def field_keys(kind: type) -> dict[str, str]:
+    """Field -> key."""
+    return {key.field: name for name, key in keys_of(kind).items()}
+
+
+def own_kinds() -> dict[str, type[Actuator]]:
+    """Kinds of actuators that are imported and not softreach's, by the names of their classes."""
+    known = actuator_kinds().items()
+    return {name: kind for name, kind in known if kind.__module__.partition(".")[0] != "softreach"}
+
+
+@cache
+def _every_key() -> Mapping[str, str]:
+    """Field -> key of all parts, but for bounds, whose unit depends on the actuator."""
+    kinds = (*PROFILES.values(), *_BODY, *ACTUATORS.values())
+    keys = {field: key for kind in kinds for field, key in field_keys(kind).items()}
+    return MappingProxyType({**keys, "inner_radius": "inner_radius_m", "activation_bounds": ""})
+
+
+def in_file_terms(error: InvalidDesign, source: str) -> InvalidDesign:
+    """The same faults under the file's keys and in its units; `source` is what the error names."""
+    return InvalidDesign([_in_file_terms(fault) for fault in error.faults], source)
+
+
+def _in_file_terms(fault: Fault) -> Fault:
+    names = ", ".join(map(_key_of_path, fault.path.split(", ")))
+    allowed = in_file_units(fault.allowed)
+    in_degrees = allowed != fault.allowed or names.endswith("_deg")
+    return Fault(names, _shown_degrees(fault.value) if in_degrees else fault.value, allowed)
+
+
+def in_file_units(allowed: Range | str) -> Range | str:
+    """The same range of an angle in degrees; anything else as it is."""
+    if isinstance(allowed, Range) and allowed.unit == "rad":
+        return allowed.in_degrees()
+    return allowed
+
+
+def _key_of_path(path: str) -> str:
+    """The key of a field, behind the name of the part that it belongs to, if any."""
+    owner, dot, field = path.rpartition(".")
+    return owner + dot + (_every_key().get(field) or field)
+
+
+def _shown_degrees(value: object) -> object:
+    if isinstance(value, tuple):
+        return tuple(_shown_degrees(item) for item in value)
+    return float(f"{math.degrees(value):.12g}") if isinstance(value, float) else value
+
+
+class WrittenFloat(float):
+    """A number that remembers how it was written, so that degrees convert without a lost digit."""
+
+    def __new__(cls, text: str) -> WrittenFloat:
+        """The number of a text."""
+        number = super().__new__(cls, text)
+        number.text = text
+        return number
+
+    text: str
+
+
+def radians(degrees: Any) -> float:
+    """Degrees as people write them convert like `math.radians`; longer ones by exact decimals.
+
+    Floating-point degrees miss one angle in ten by a unit in the last place; twenty digits do not.
+    """
+    return _radians(getattr(degrees, "text", repr(degrees)).replace("_", ""))
+
+
+def degrees_text(angle: float) -> str:
+    """The shortest number of degrees that converts to exactly this angle [rad]."""
+    if angle == 0:
+        return repr(float(angle))
+    degrees = Decimal(angle) * 180 / _PI
+    texts = (_decimal_text(f"{degrees:.{digits}g}") for digits in range(1, 26))
+    return next((text for text in texts if _radians(text) == angle), repr(math.degrees(angle)))
+
+
+def _radians(text: str) -> float:
+    digits = text.lower().partition("e")[0].lstrip("+-0.").replace(".", "")
+    short = len(digits) < _LONG and math.isfinite(float(text))
+    try:
+        if short or not Decimal(text).is_finite():
+            return math.radians(float(text))
+        return float(Decimal(text) * _PI / 180)
+    except InvalidOperation:  # an exponent beyond all numbers
+        return math.radians(float(text))
+
+
+def _decimal_text(number: str) -> str:
+    """A TOML float, without an exponent unless it is far from 1."""
+    plain = -6 < Decimal(number).adjusted() < 16
+    text = f"{Decimal(number):f}" if plain else number
+    return text if "." in text or "e" in text else f"{text}.0"
+
+
+def value_text(value: Any) -> str:
+    """Text, numbers, truth values and sequences of them as JSON, which is TOML but for a character.
+
+    Raises:
+        TypeError: Another kind of value.
+        ValueError: A number that is not finite.
+    """
+    if not _is_plain(value):
+        raise TypeError(f"{type(value).__name__} has no text in TOML")
+    return json.dumps(value, ensure_ascii=False, allow_nan=False).replace("\x7f", "\\u007f")
+
+
+def _is_plain(value: Any) -> bool:
+    if isinstance(value, list | tuple):
+        return all(_is_plain(item) for item in value)
+    return isinstance(value, str | int | float)
+
+
+def key_text(name: str) -> str:
+    """A key, in quotes where it needs them."""
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else value_text(name)
+
+
+def inline_table(pairs: Iterable[tuple[str, str]]) -> str:
+    """A table on one line from keys and texts of values."""
+    inside = ", ".join(f"{key} = {text}" for key, text in pairs)
+    return f"{{ {inside} }}" if inside else "{}"

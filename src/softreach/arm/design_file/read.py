@@ -1,0 +1,356 @@
+"""From the text of a design file to the parts of an arm, or every fault of it at once."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
+from os import PathLike
+from typing import Any, NamedTuple
+
+from softreach.arm.actuators import Actuator
+from softreach.arm.actuators.actuator import MOST_BUNDLES
+from softreach.arm.along import AlongArm
+from softreach.arm.design_file.keys import (
+    ACTUATORS,
+    PROFILES,
+    WrittenFloat,
+    field_keys,
+    key_text,
+    keys_of,
+    own_kinds,
+)
+from softreach.arm.design_file.tables import WRONG, TableReader, is_doubtful, unknown_key
+from softreach.arm.loads import Loads, PointLoad
+from softreach.arm.material import LIBRARY_HINT, Material, material_names, named_material
+from softreach.arm.number import Number
+from softreach.arm.profile import LinearTaper, Profile
+from softreach.arm.section import Ring, Section, name_faults
+from softreach.support.errors import Fault, InvalidDesign, Range
+from softreach.support.files.text import read_text
+
+__all__ = ["LONGEST", "Parts", "document_of", "parse", "text_of"]
+
+LONGEST = 250_000
+"""Bytes, or characters, that a design file may have: thousands of times as many as designs take."""
+
+LAYOUT: Mapping[str, tuple[type, bool]] = {
+    "version": (int, True),
+    "profile": (dict, True),
+    "materials": (dict, False),
+    "section": (dict, False),
+    "rings": (list, True),
+    "actuators": (list, True),
+    "loads": (dict, False),
+}
+"""Keys at the top of a file, their types, and whether they are required."""
+
+
+class Parts(NamedTuple):
+    """Parts of an arm that a file describes."""
+
+    profile: Profile
+    section: Section
+    actuators: tuple[Actuator, ...]
+    loads: Loads | None
+
+
+def text_of(path: str | PathLike[str]) -> str:
+    """The text of a design file.
+
+    Raises:
+        InvalidInput: No file that can be read, one too large to be a design, or no text in UTF-8.
+    """
+    return read_text("design", path, LONGEST)
+
+
+def document_of(
+    text: str, source: str, number: Callable[[str], Any] = WrittenFloat
+) -> dict[str, Any]:
+    """The tables of TOML text; numbers with a point or an exponent remember how they were written.
+
+    Args:
+        text: The text of a design file.
+        source: What errors call it.
+        number: What makes a value of a number with a point or an exponent.
+
+    Raises:
+        InvalidDesign: Text that is no TOML, or too long or too deeply nested to be a design.
+    """
+    if len(text) > LONGEST:
+        allowed = f"must be at most {LONGEST:,} characters long, and has {len(text):,}"
+        raise InvalidDesign([Fault("TOML", None, allowed)], source)
+    try:
+        return tomllib.loads(text, parse_float=number)
+    except RecursionError:
+        trouble = "tables or lists in each other, hundreds deep"
+    except ValueError as error:  # beside faults of syntax, numbers of thousands of digits
+        trouble = str(error)
+    raise InvalidDesign([Fault("TOML", trouble, "must be valid TOML")], source)
+
+
+def parse(text: str, source: str) -> Parts:
+    """The parts of an arm from TOML text.
+
+    Args:
+        text: The text of a design file.
+        source: What errors call it.
+
+    Raises:
+        InvalidDesign: Every fault of the text, with its key, value and what is allowed.
+    """
+    document = document_of(text, source)
+    version = document.get("version", 2)
+    if isinstance(version, bool) or version != 2:
+        raise InvalidDesign([Fault("version", version, "must be 2")], source)
+    reader = _DesignReader(document)
+    parts = reader.parts()
+    if parts is None or reader.faults:
+        raise InvalidDesign(reader.faults, source)
+    return parts
+
+
+class _DesignReader(TableReader):
+    """Reads the tables of a design in the order in which they refer to each other."""
+
+    def __init__(self, document: dict[str, Any]) -> None:
+        super().__init__()
+        self._document = document
+        self._materials: dict[str, Material | None] = {}
+        self._unknown_material = False
+
+    def parts(self) -> Parts | None:
+        """The parts of the arm; None where there are faults."""
+        self._check_layout()
+        profile = self._profile()
+        self._materials = dict(self._own_materials())
+        rings = [self._ring(k, raw) for k, raw in self._tables("rings")]
+        section = self._section(rings)
+        tables = self._document.get("actuators")
+        if isinstance(tables, list) and len(tables) > MOST_BUNDLES:
+            self.refused("actuators", f"{len(tables):,} tables", f"must be at most {MOST_BUNDLES}")
+            return None
+        actuators = [(k, self._actuator(k, raw)) for k, raw in self._tables("actuators")]
+        raw = self._table("loads")
+        loads = None if raw is None else self.part(Loads, raw, "loads")
+        names = [one.get("name") if isinstance(one, dict) else None for one in tables or ()]
+        self.faults += name_faults(names, "actuators")
+        if profile is None or section is None:
+            return None
+        sound = [(k, one) for k, one in actuators if one is not None]
+        self._check_fit(profile, section, sound)
+        if loads is not None:
+            self.faults += self._of_section(loads.section_faults(section, profile.length))
+        return Parts(profile, section, tuple(one for _, one in sound), loads)
+
+    def _check_layout(self) -> None:
+        """Top of the file: keys that are unknown or missing, and values of another type."""
+        for key, (kind, required) in LAYOUT.items():
+            value = self._document.get(key)
+            if key not in self._document:
+                if required:
+                    self.refused(key, None, "required key is missing")
+            elif kind is list:
+                self._check_list(key, value)
+            elif kind is dict and not isinstance(value, dict):
+                self.refused(key, value, "must be a table")
+        for key in self._document:
+            if key not in LAYOUT:
+                place = _place(key)
+                known = {one: one for one in LAYOUT}
+                said = f"unknown key; {place}" if place else unknown_key(key, known)
+                self.refused(key_text(key), self._document[key], said)
+
+    def _check_list(self, key: str, value: Any) -> None:
+        if not isinstance(value, list):
+            self._document = {**self._document, key: []}
+            self.refused(key, value, "must be a list")
+        elif key == "rings" and not value:
+            self.refused(key, value, "must not be empty")
+        else:
+            for k, one in enumerate(value):
+                if not isinstance(one, dict):
+                    self.refused(f"{key}[{k}]", one, "must be a table")
+
+    def _table(self, key: str) -> dict[str, Any] | None:
+        """A table at the top; None if there is none, or something else."""
+        value = self._document.get(key)
+        return value if isinstance(value, dict) else None
+
+    def _tables(self, key: str) -> Iterator[tuple[int, dict[str, Any]]]:
+        """Index and content of those under a key that are tables."""
+        for k, raw in enumerate(self._document.get(key, ())):
+            if isinstance(raw, dict):
+                yield k, raw
+
+    def _profile(self) -> Profile | None:
+        if (raw := self._table("profile")) is None:
+            return None
+        kind = raw.get("kind", "linear")
+        if not isinstance(kind, str) or kind not in PROFILES:
+            self.refused("profile.kind", kind, f"must be one of {', '.join(PROFILES)}")
+            return None
+        return self.part(PROFILES[kind], raw, "profile")
+
+    def _own_materials(self) -> Iterator[tuple[str, Material | None]]:
+        for name, raw in (self._table("materials") or {}).items():
+            yield (
+                name,
+                self.part(Material, raw, f"materials.{key_text(name)}", ("name",), name=name),
+            )
+
+    def material(self, raw: Any, path: str) -> Any:
+        """A material by its name or its values; a blank one, and a fault, if there is none."""
+        if isinstance(raw, dict):
+            return super().material(raw, path)
+        if not isinstance(raw, str):
+            self._unknown_material = True
+            allowed = "must be the name of a material, or a table of its values"
+            return self.refused(path, raw, allowed)
+        if raw in self._materials:
+            self._unknown_material |= self._materials[raw] is None
+            return self._materials[raw] or Material()
+        if raw in material_names():
+            return named_material(raw)
+        self._unknown_material = True
+        self.refused(path, raw, _materials_text(raw, [*self._materials]))
+        return Material()
+
+    def _ring(self, k: int, raw: dict[str, Any]) -> Ring | None:
+        return self.part(Ring, raw, f"rings[{k}]")
+
+    def _section(self, rings: list[Ring | None]) -> Section | None:
+        made = tuple(ring for ring in rings if ring is not None)
+        raw = self._document.get("section", {})
+        if not isinstance(raw, dict):
+            return None
+        values, wrong = self.values(Section, raw, "section")
+        if not made or len(made) < len(rings) or values is None:
+            return None
+        if self._unknown_material:
+            made = tuple(ring.replace(material=Material()) for ring in made)
+            values.pop("core", None)
+        try:
+            section = Section(rings=made, **values)
+        except InvalidDesign as error:
+            certain = [one for one in error.faults if not is_doubtful(one, wrong)]
+            self.faults += self._of_section(certain)
+            return None
+        return None if wrong or self._unknown_material else section
+
+    def _of_section(self, faults: list[Fault]) -> list[Fault]:
+        """Faults of the section under the paths of the file, one for each path."""
+        placed = {}
+        for fault in faults:
+            path = self._place(fault.path.removeprefix("section."))
+            placed.setdefault(path, fault._replace(path=path))
+        return list(placed.values())
+
+    def _place(self, path: str) -> str:
+        """Where the file has a field of the section, of a ring or of a material of one."""
+        owner, _, field = path.rpartition(".")
+        if path.startswith("loads."):
+            return f"{owner}.{field_keys(PointLoad).get(field, field)}"
+        if not path.startswith(("rings", "core")):
+            return f"section.{path}"
+        key = field_keys(Material).get(field)
+        if key is None:
+            return path if path.startswith("rings") else f"section.{path}"
+        name = self._material_name(owner)
+        if isinstance(name, str) and name in self._materials:
+            return f"materials.{key_text(name)}.{key}"
+        return f"section.{owner}.{key}" if owner == "core" else f"{owner}.{key}"
+
+    def _material_name(self, owner: str) -> Any:
+        """What the core, or a ring such as `rings[0].material`, names as its material."""
+        if owner == "core":
+            return (self._table("section") or {}).get("core")
+        k = int(owner.partition("[")[2].partition("]")[0])
+        return dict(self._tables("rings"))[k].get("material")
+
+    def _actuator(self, k: int, raw: dict[str, Any]) -> Actuator | None:
+        path, kind, own = f"actuators[{k}]", raw.get("kind"), own_kinds()
+        if isinstance(kind, str) and kind in ACTUATORS:
+            return self.part(ACTUATORS[kind], raw, path)
+        if not isinstance(kind, str) or kind not in own:
+            self.refused(f"{path}.kind", kind, _kinds_text(kind, [*own]))
+            return None
+        try:
+            return _of_own_kind(own[kind], raw)
+        except InvalidDesign as error:
+            for fault in error.faults:
+                self.faults.append(fault._replace(path=f"{path}.{fault.path}".rstrip(".")))
+            return None
+
+    def _check_fit(
+        self, profile: Profile, section: Section, actuators: list[tuple[int, Actuator]]
+    ) -> None:
+        """Faults that keep actuators from driving this body."""
+        lacking: list[Fault] = []
+        for k, actuator in actuators:
+            named = dataclasses.replace(actuator, name=actuator.name or f"actuators[{k}]")
+            for fault in named.section_faults(profile, section):
+                if fault.path.startswith(("rings", "core")):
+                    lacking.append(fault)
+                else:
+                    self.faults.append(fault._replace(path=f"actuators[{k}].{fault.path}"))
+        self.faults += self._of_section(lacking)
+
+
+def _of_own_kind(kind: type[Actuator], table: Mapping[str, Any]) -> Actuator:
+    """An actuator of a class outside softreach from its fields as they are in Python, in SI units.
+
+    Raises:
+        InvalidDesign: Fields that it does not have or that are wrong.
+    """
+    values = {key: _plain(value) for key, value in table.items() if key != "kind"}
+    try:
+        return kind(**values)
+    except TypeError as error:
+        raise InvalidDesign([Fault("", kind.__name__, f"has other fields: {error}")]) from None
+
+
+def _plain(value: Any) -> Any:
+    """Lists as tuples, and tables of values along the arm as functions."""
+    if isinstance(value, dict):
+        anything = Number(symbol="", meaning="", allowed=Range(), along=AlongArm)
+        function = TableReader().along(anything, value, "")
+        return value if function is WRONG else function
+    if isinstance(value, list):
+        return tuple(_plain(item) for item in value)
+    return float(value) if isinstance(value, WrittenFloat) else value
+
+
+def _place(key: str) -> str:
+    """Where a key belongs that is not one of the top."""
+    if key.removesuffix("s") in ACTUATORS:
+        return f'write [[actuators]] with kind = "{key.removesuffix("s")}"'
+    homes = {
+        "[profile]": LinearTaper,
+        "[section]": Section,
+        "[[rings]]": Ring,
+        "[materials.NAME]": Material,
+        "[loads]": Loads,
+    }
+    home = next((home for home, kind in homes.items() if key in keys_of(kind)), "")
+    return f"it belongs in {home}" if home else ""
+
+
+def _materials_text(name: str, own: list[str]) -> str:
+    """Materials that are allowed."""
+    close = difflib.get_close_matches(name, [*own, *material_names()], n=1, cutoff=0.5)
+    hint = f'; did you mean "{close[0]}"?' if close else ""
+    here = f"of this file ({', '.join(own)})" if own else "with a table [materials.NAME]"
+    return f"must be a material {here}, or of the library{hint or f'; {LIBRARY_HINT}'}"
+
+
+def _kinds_text(kind: Any, own: list[str]) -> str:
+    """Kinds of actuators that are allowed."""
+    if kind is None:
+        return f"required key is missing: one of {', '.join(ACTUATORS)}"
+    names = {actuator.__name__: name for name, actuator in ACTUATORS.items()}
+    if isinstance(kind, str) and kind in names:
+        return f'must be the kind of a file; did you mean "{names[kind]}"?'
+    others = ", or a class of your own that is imported" + (f": {', '.join(own)}" if own else "")
+    return f"must be one of {', '.join(ACTUATORS)}{others}"

@@ -1,0 +1,161 @@
+"""A JSON schema of design files, from which editors complete and check them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from softreach.arm.actuators import Actuator
+from softreach.arm.along import Samples
+from softreach.arm.design_file.keys import ACTUATORS, PROFILES, Key, in_file_units, keys_of
+from softreach.arm.loads import Loads, PointLoad
+from softreach.arm.material import Material
+from softreach.arm.number import Number
+from softreach.arm.section import Ring, Section
+from softreach.support.errors import Range
+
+__all__ = ["json_schema"]
+
+_Schema = dict[str, Any]
+
+_NUMBERS: _Schema = {"type": "array", "items": {"type": "number"}}
+_PAIR: _Schema = {**_NUMBERS, "minItems": 2, "maxItems": 2}
+_PAIRS: _Schema = {"type": "array", "items": _PAIR, "minItems": 1}
+_TEXT: _Schema = {"type": "string"}
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON schema (draft 7) of design files of version 2."""
+    definitions = {
+        "material": _table(Material, "Isotropic elastic material", without=("name",)),
+        "inline_material": _table(Material, "Material where it is used"),
+        "ring": _table(Ring, "Layer between two radii"),
+        "section": _table(Section, "Inside of the arm"),
+        "loads": _table(Loads, "Gravity, payload, forces and moments"),
+        "point_load": _table(PointLoad, "Force and moment on one section"),
+        "own_actuator": {
+            "description": "Actuator of a class of one's own: its fields, in SI units",
+            "type": "object",
+            "properties": {"kind": {**_TEXT, "not": {"enum": [*ACTUATORS]}}},
+            "required": ["kind"],
+            "additionalProperties": True,
+        },
+    }
+    kinds = {**PROFILES, **ACTUATORS}
+    definitions |= {
+        name: _table(kind, kind.__doc__ or "", kind=name) for name, kind in kinds.items()
+    }
+    top = {
+        "version": {"const": 2, "description": "Version of the format"},
+        "profile": _one_of(PROFILES, "Length and outer radius along the arm"),
+        "materials": {
+            "description": "Materials by name; others are looked up in the library",
+            "type": "object",
+            "additionalProperties": _of("material"),
+        },
+        "section": _of("section"),
+        "rings": {
+            "description": "Layers that actuators live in",
+            "type": "array",
+            "items": _of("ring"),
+            "minItems": 1,
+        },
+        "actuators": {
+            "description": "In the order of the activations; [] for a passive rod",
+            "type": "array",
+            "items": _one_of({**ACTUATORS, "own_actuator": None}, "What drives the arm"),
+        },
+        "loads": _of("loads"),
+    }
+    return {
+        "$schema": "http://json-schema.org/draft-07/schema#",
+        "title": "softreach design",
+        "description": "An arm: lengths in m, angles in degrees, the unit in every key.",
+        **_object(top, ["version", "profile", "rings", "actuators"]),
+        "$defs": definitions,
+    }
+
+
+def _of(name: str) -> _Schema:
+    return {"$ref": f"#/$defs/{name}"}
+
+
+def _one_of(names: Mapping[str, Any], description: str) -> _Schema:
+    return {"description": description, "anyOf": [_of(name) for name in names]}
+
+
+def _object(properties: Mapping[str, _Schema], required: list[str]) -> _Schema:
+    return {
+        "type": "object",
+        "properties": dict(properties),
+        "required": required,
+        "additionalProperties": False,
+    }
+
+
+def _table(
+    part: type,
+    description: str,
+    *,
+    kind: str = "",
+    without: tuple[str, ...] = (),
+) -> _Schema:
+    """The schema of the table of a kind of part."""
+    keys = {name: key for name, key in keys_of(part).items() if name not in without}
+    properties = {"kind": {"const": kind}} if kind else {}
+    properties |= {name: _value(part, key) for name, key in keys.items()}
+    required = [name for name, key in keys.items() if key.required]
+    if kind and kind != "linear":  # which is the default
+        required.insert(0, "kind")
+    table = _object(properties, required)
+    return {"description": description.partition("\n")[0], **table}
+
+
+def _value(part: type, key: Key) -> _Schema:
+    """The schema of one key."""
+    if key.number is not None:
+        return _number(key.number)
+    if key.field == "activation_bounds":
+        assert issubclass(part, Actuator)
+        unit = "-" if part.unit == "1" else part.unit
+        about = f"{part.activation.capitalize()} [{unit}]: (lower, upper) for all bundles, or one"
+        return {"description": f"{about} such pair for each", "anyOf": [_PAIR, _PAIRS]}
+    others: dict[str, _Schema] = {
+        "ring": {"type": ["integer", "string"], "description": "Index or name of its ring"},
+        "material": {"anyOf": [_TEXT, _of("inline_material")]},
+        "core": {"anyOf": [_TEXT, _of("inline_material")]},
+        "point_loads": {"type": "array", "items": _of("point_load")},
+    }
+    return others.get(key.field, _TEXT)
+
+
+def _number(number: Number) -> _Schema:
+    """The schema of a number, with its limits in the units of files."""
+    allowed = in_file_units(number.allowed)
+    assert isinstance(allowed, Range)
+    about = {"description": f"{number.symbol}: {number.meaning} [{allowed.unit or '-'}]"}
+    single = {"type": "integer" if allowed.whole else "number", **_limits(allowed)}
+    if number.shape == "triple":
+        return {**about, **_NUMBERS, "minItems": 3, "maxItems": 3}
+    if number.shape == "stations":
+        return {**about, **_NUMBERS}
+    if number.shape == "series":
+        return {**about, "type": "array", "items": single}
+    if number.along is None:
+        return {**about, **single}
+    kinds = ["cubic", "linear", *(() if number.along is Samples else ("constant",))]
+    properties = {
+        "stations_over_length": _NUMBERS,
+        "values": {"type": "array", "items": single},
+        "interpolation": {"enum": kinds},
+    }
+    along = _object(properties, ["stations_over_length", "values"])
+    return {**about, **along} if number.shape == "along" else {**about, "anyOf": [single, along]}
+
+
+def _limits(allowed: Range) -> dict[str, float]:
+    low = "exclusiveMinimum" if allowed.open_low else "minimum"
+    high = "exclusiveMaximum" if allowed.open_high else "maximum"
+    ends = ((low, allowed.low), (high, allowed.high))
+    return {word: end for word, end in ends if abs(end) < math.inf}

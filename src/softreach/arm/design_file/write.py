@@ -1,0 +1,167 @@
+"""The text of a design file, every number such that it reads back to the same one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+from softreach.arm.actuators import Actuator
+from softreach.arm.along import AlongArm, Samples
+from softreach.arm.design_file.keys import (
+    ACTUATORS,
+    PROFILES,
+    degrees_text,
+    inline_table,
+    key_text,
+    keys_of,
+    value_text,
+)
+from softreach.arm.loads import Loads
+from softreach.arm.material import Material
+from softreach.arm.profile import Profile
+from softreach.arm.section import Section
+from softreach.support.errors import Fault, InvalidDesign
+
+__all__ = ["render"]
+
+_ALWAYS = {"activation_bounds", "gravity", "offset", "taper"}
+"""Fields that are written even where they are the default, for people to change."""
+
+_FIRST = ("name", "ring", "length", "revolution")
+_LAST = (
+    "taper",
+    "offset",
+    "extent",
+    "bundles",
+    "activation_bounds",
+    "start_over_length",
+    "end_over_length",
+)
+"""Order of fields: between these stands what distinguishes a kind."""
+
+
+def render(
+    profile: Profile, section: Section, actuators: Sequence[Actuator], loads: Loads | None = None
+) -> str:
+    """TOML text of a design, of version 2.
+
+    Raises:
+        InvalidDesign: A profile that design files have no table for, or an actuator of one's own
+            kind that is not made of plain values.
+    """
+    names = _named_materials(section)
+    blocks = [
+        ["version = 2"] if actuators else ["version = 2", "actuators = []"],
+        ["[profile]", *_profile_lines(profile)],
+        *(_material_block(name, material) for name, material in names.items()),
+        *_section_blocks(section, names),
+    ]
+    for actuator in actuators:
+        blocks.append(["[[actuators]]", *_actuator_lines(actuator)])
+    if loads is not None:
+        blocks.append(["[loads]", *_lines(loads)])
+        blocks += [["[[loads.point_loads]]", *_lines(one)] for one in loads.point_loads]
+    return "\n\n".join("\n".join(block) for block in blocks) + "\n"
+
+
+def _profile_lines(profile: Profile) -> Iterator[str]:
+    if (kind := _kind_of(profile, PROFILES)) is None:
+        raise InvalidDesign([Fault("profile", profile, "has no keys in a design file")])
+    yield f"kind = {value_text(kind)}"
+    yield from _lines(profile)
+
+
+def _actuator_lines(actuator: Actuator) -> Iterator[str]:
+    """Kind and fields; of a class outside softreach the fields as they are in Python."""
+    if (kind := _kind_of(actuator, ACTUATORS)) is not None:
+        yield f"kind = {value_text(kind)}"
+        yield from _lines(actuator)
+        return
+    yield f"kind = {value_text(type(actuator).__name__)}"
+    for name in (field.name for field in fields(actuator)):  # pyright: ignore[reportArgumentType]
+        if (value := getattr(actuator, name)) is not None:
+            yield f"{name} = {_plain_text(actuator, name, value)}"
+
+
+def _plain_text(actuator: Actuator, name: str, value: Any) -> str:
+    try:
+        return _text(name, value)
+    except (TypeError, ValueError):
+        kind = type(actuator).__name__
+        allowed = "must be a number, text or a sequence of these to fit in a design file"
+        raise InvalidDesign([Fault(f"{kind}.{name}", value, allowed)]) from None
+
+
+def _kind_of(part: object, kinds: Mapping[str, type]) -> str | None:
+    return next((name for name, kind in kinds.items() if kind is type(part)), None)
+
+
+def _named_materials(section: Section) -> dict[str, Material]:
+    """The materials that get a table: those with a name, the first of each."""
+    used = [ring.material for ring in section.rings]
+    if section.core is not None:
+        used.insert(0, section.core)
+    named: dict[str, Material] = {}
+    for material in used:
+        if material.name:
+            named.setdefault(material.name, material)
+    return named
+
+
+def _material_block(name: str, material: Material) -> list[str]:
+    return [f"[materials.{key_text(name)}]", *_lines(material, without=("name",))]
+
+
+def _section_blocks(section: Section, names: Mapping[str, Material]) -> Iterator[list[str]]:
+    inside = _lines(section, without=("core",))
+    if section.core is not None:
+        inside.insert(0, f"core = {_material_text(section.core, names)}")
+    if inside:
+        yield ["[section]", *inside]
+    for ring in section.rings:
+        text = _material_text(ring.material, names)
+        lines = _lines(ring, without=("material",))
+        yield ["[[rings]]", *lines, *([] if text == "{}" else [f"material = {text}"])]
+
+
+def _material_text(material: Material, names: Mapping[str, Material]) -> str:
+    """The name of a material that has a table, else its values."""
+    if repr(names.get(material.name)) == repr(material):
+        return value_text(material.name)
+    return inline_table(_pairs(material))
+
+
+def _lines(part: object, without: tuple[str, ...] = ("point_loads",)) -> list[str]:
+    return [f"{key} = {text}" for key, text in _pairs(part, without)]
+
+
+def _pairs(part: object, without: tuple[str, ...] = ()) -> Iterator[tuple[str, str]]:
+    """Keys and texts of what is not the default."""
+    for key in sorted(keys_of(type(part)).values(), key=lambda key: _rank(key.field)):
+        value = getattr(part, key.field)
+        if key.field in without or value is None:
+            continue
+        if key.field in _ALWAYS or repr(value) != repr(key.default):
+            yield key.name, _text(key.name, value)
+
+
+def _rank(field: str) -> int:
+    if field in _FIRST:
+        return _FIRST.index(field) - len(_FIRST)
+    return 1 + _LAST.index(field) if field in _LAST else 0
+
+
+def _text(key: str, value: Any) -> str:
+    number = degrees_text if key.endswith("_deg") else value_text
+    return _along_text(value, number) if isinstance(value, AlongArm) else number(value)
+
+
+def _along_text(along: AlongArm, number: Callable[[float], str]) -> str:
+    """The inline table of a function of Z/L; `number` writes its values."""
+    kind = along.interpolation if isinstance(along, Samples) else "constant"
+    pairs = [
+        ("stations_over_length", value_text(along.stations_over_length)),
+        ("values", f"[{', '.join(map(number, along.values))}]"),
+    ]
+    return inline_table(pairs if kind == "cubic" else [*pairs, ("interpolation", value_text(kind))])

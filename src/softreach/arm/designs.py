@@ -1,0 +1,354 @@
+"""Named designs, each with its source."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from softreach.arm.actuators import (
+    Actuator,
+    Chamber,
+    FiberArchitecture,
+    ObliqueMuscle,
+    RadialMuscle,
+    Tendon,
+)
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.material import Material, named_material
+from softreach.arm.number import fields_of
+from softreach.arm.profile import LinearTaper
+from softreach.arm.section import Ring, Section
+from softreach.support.arguments import checked, instance, optional, whole, within
+
+__all__ = [
+    "elephant_trunk",
+    "filament",
+    "helical_tendon_robot",
+    "lce_arm",
+    "minimal_trunk",
+    "redundant_trunk",
+    "three_chamber_arm",
+    "three_tendon_robot",
+]
+
+_PAPER_EXTENT = math.radians(48)
+
+_checked_trunk = checked(
+    revolution=within(fields_of(FiberArchitecture)["revolution"].allowed),
+    taper=within(fields_of(LinearTaper)["taper"].allowed),
+    length=within(fields_of(LinearTaper)["length"].allowed),
+    radius_ratio=within(fields_of(Ring)["inner_ratio"].allowed),
+    material=optional(instance(Material, "a Material, or None")),
+)
+
+
+@_checked_trunk
+def minimal_trunk(
+    revolution: float = math.radians(108),
+    taper: float = math.radians(2),
+    *,
+    length: float = 1.0,
+    radius_ratio: float = 0.75,
+    material: Material | None = None,
+) -> Manipulator:
+    """The paper's minimal design: two helical bundles of opposite hand and a longitudinal one.
+
+    [Kaczmarski2024], section 2. The paper prints R1(0) = L/12, which exceeds its R2(0) = L/16;
+    12/16 of R2(0) is our reading of that misprint, so `radius_ratio` is a parameter and not the
+    paper's value.
+
+    Args:
+        revolution: Ω of the right-handed bundle; the left-handed one has -Ω [rad].
+        taper: φ [rad].
+        length: L [m].
+        radius_ratio: R1/R2 [-].
+        material: What all of the arm is made of; None for an incompressible one whose Young's
+            modulus cancels.
+    """
+    helices = (
+        FiberArchitecture(
+            name="left", revolution=-revolution, offset=math.radians(66), extent=_PAPER_EXTENT
+        ),
+        FiberArchitecture(
+            name="right", revolution=revolution, offset=math.radians(114), extent=_PAPER_EXTENT
+        ),
+    )
+    return _trunk((*helices, _longitudinal(270)), taper, length, radius_ratio, material)
+
+
+@_checked_trunk
+def redundant_trunk(
+    revolution: float = math.radians(108),
+    taper: float = math.radians(2),
+    *,
+    length: float = 1.0,
+    radius_ratio: float = 0.75,
+    material: Material | None = None,
+) -> Manipulator:
+    """The paper's redundant design: the longitudinal bundle of `minimal_trunk` split in two.
+
+    [Kaczmarski2024] does not print where the two lie (section 5). Here they have the extent of the
+    others and centers at 246° and 294°: adjacent like the helical pair, symmetric about the plane
+    of symmetry. At Ω = 108° each then meets a helical bundle near the tip.
+
+    Args:
+        revolution: Ω of the right-handed bundle; the left-handed one has -Ω [rad].
+        taper: φ [rad].
+        length: L [m].
+        radius_ratio: R1/R2 [-].
+        material: What all of the arm is made of; None for an incompressible one whose Young's
+            modulus cancels.
+    """
+    arm = minimal_trunk(
+        revolution, taper, length=length, radius_ratio=radius_ratio, material=material
+    )
+    pair = (_longitudinal(246, "longitudinal 1"), _longitudinal(294, "longitudinal 2"))
+    return arm.replace(actuators=(*arm.actuators[:2], *pair))
+
+
+def _longitudinal(offset_deg: float, name: str = "longitudinal") -> FiberArchitecture:
+    offset = math.radians(offset_deg)
+    return FiberArchitecture(name=name, helical_angle=0.0, offset=offset, extent=_PAPER_EXTENT)
+
+
+def _trunk(
+    fibers: tuple[FiberArchitecture, ...],
+    taper: float,
+    length: float,
+    radius_ratio: float,
+    material: Material | None,
+) -> Manipulator:
+    radius = length / 16
+    arm = Manipulator.tapered(
+        length=length,
+        outer_radius=radius,
+        inner_radius=radius_ratio * radius,
+        taper=taper,
+        poisson_ratio=0.5,
+        actuators=fibers,
+    )
+    if material is None:
+        return arm
+    (ring,) = arm.section.rings
+    return arm.replace(section=Section(rings=(ring.replace(material=material),)))
+
+
+_LCE_LENGTH = 0.09  # m
+_LCE_EXTENT = math.radians(48)
+_LCE_FAMILIES = (("left", -108, 66), ("right", 108, 114), ("longitudinal", 0, 270))  # Ω, θ0 [deg]
+
+
+def lce_arm() -> Manipulator:
+    """The laboratory's arm: three fibers of liquid-crystal elastomer on a soft core.
+
+    [Veil2025], its released code; the robot itself is that of [Leanza2024]. The laboratory models
+    the three families of fibers in one layer by three rings in the same place, each with the share
+    48°/360° of the fibers' Young's modulus, and multiplies its activations in [-5/3, 0] by 3 to
+    make up for it. The activations here are the multiplied ones, in [-5, 0]. The source has one
+    density, 1000 kg/m³, for all of the arm; here a third of it goes to each of the three rings.
+    """
+    fibers = named_material("liquid_crystal_elastomer")
+    share = _LCE_EXTENT / (2 * math.pi)
+    matter = fibers.replace(
+        young_modulus=share * (fibers.young_modulus or 0.0),
+        density=(fibers.density or 0.0) / len(_LCE_FAMILIES),
+        name="fibers",
+    )
+    core = Material(young_modulus=0.1278e6, poisson_ratio=0.5, density=1000.0, name="core")
+    rings = tuple(
+        Ring(inner_ratio=5 / 6, material=matter, name=name) for name, _, _ in _LCE_FAMILIES
+    )
+    return Manipulator(
+        profile=LinearTaper(length=_LCE_LENGTH, outer_radius=_LCE_LENGTH / 20),
+        section=Section(rings=rings, core=core),
+        actuators=tuple(_lce_fiber(*family) for family in _LCE_FAMILIES),
+    )
+
+
+def _lce_fiber(name: str, revolution_deg: float, offset_deg: float) -> FiberArchitecture:
+    return FiberArchitecture(
+        name=name,
+        ring=name,
+        revolution=math.radians(revolution_deg),
+        offset=math.radians(offset_deg),
+        extent=_LCE_EXTENT,
+        activation_bounds=(-5.0, 0.0),
+    )
+
+
+def filament() -> Manipulator:
+    """One ring of three helical sectors: the example of [ActiveFilamentsJl].
+
+    All numbers are those of its README: L = 1 m, R2 = L/16, R1 = 0.6 R2, α = π/10, sectors of 30°.
+    """
+    matter = Material(young_modulus=1e6, poisson_ratio=0.5, density=1000.0, name="filament")
+    sectors = FiberArchitecture(
+        name="sector",
+        bundles=3,
+        helical_angle=math.pi / 10,
+        extent=math.radians(30),
+        activation_bounds=((-2.4, 0.0), (-2.0, 0.0), (-2.7, 0.0)),
+    )
+    return Manipulator(
+        profile=LinearTaper(length=1.0, outer_radius=1 / 16),
+        section=Section(rings=(Ring(inner_ratio=0.6, material=matter, name="fibers"),)),
+        actuators=(sectors,),
+    )
+
+
+@checked(segments=whole(1, 2))
+def three_tendon_robot(*, segments: int = 1) -> Manipulator:
+    """A nitinol wire of 0.2 m a segment with three parallel tendons for each.
+
+    The numbers are those of the code published with [Rao2021], whose robot has two segments: wire
+    of radius 0.7 mm, tendons at 10 mm from its axis and at 90°, 210° and 330°. Its spacer disks add
+    neither stiffness nor weight here. The tension of its example is 8 N; that [0, 8] N is the range
+    of each tendon is our choice.
+
+    Args:
+        segments: 1 or 2; the tendons of the first end where the second begins.
+
+    Raises:
+        InvalidInput: Another number of segments.
+    """
+    names = ("tendon",) if segments == 1 else ("proximal", "distal")
+    tendons = tuple(
+        Tendon(
+            name=name,
+            bundles=3,
+            distance=0.01,
+            offset=math.pi / 2,
+            end_over_length=(place + 1) / segments,
+            activation_bounds=(0.0, 8.0),
+        )
+        for place, name in enumerate(names)
+    )
+    return _backbone(0.2 * segments, 0.0007, named_material("nitinol_backbone"), tendons)
+
+
+def helical_tendon_robot() -> Manipulator:
+    """A steel wire with four tendons that wind once around it from base to tip.
+
+    The static example of the code published with [Till2019], after the robot of [Rucker2011]: 0.5 m
+    of wire of radius 1 mm, tendons at 15.06 mm from its axis, one of them under 15 N. That
+    [0, 15] N is the range of each tendon is our choice. The example's gravity is not part of it.
+    """
+    steel = Material(young_modulus=200e9, poisson_ratio=0.25, density=8000.0, name="steel")
+    tendons = Tendon(
+        name="tendon",
+        bundles=4,
+        distance=0.01506,
+        revolution=2 * math.pi,
+        activation_bounds=(0.0, 15.0),
+    )
+    return _backbone(0.5, 0.001, steel, (tendons,))
+
+
+def _backbone(
+    length: float, radius: float, matter: Material, tendons: tuple[Tendon, ...]
+) -> Manipulator:
+    """A solid round wire."""
+    wire = Ring(inner_ratio=0.0, material=matter, name="backbone")
+    return Manipulator(
+        profile=LinearTaper(length=length, outer_radius=radius),
+        section=Section(rings=(wire,)),
+        actuators=tendons,
+    )
+
+
+def three_chamber_arm() -> Manipulator:
+    """A silicone cylinder with three reinforced pressure chambers along it.
+
+    After the STIFF-FLOP manipulator, [Cianchetti2014] and [Ranzani2015]: Ecoflex 00-50, three
+    chambers 120° apart, kept from ballooning. Its modules are 50 mm long and 25 to 32 mm wide; here
+    three modules, 0.15 m, act as one and are 25 mm wide. The chambers' radius of 4 mm, their
+    distance of 7.5 mm from the axis and the pressures in [0, 100] kPa are our choice, and the
+    stiffness is that of the full cylinder.
+    """
+    silicone = Ring(inner_ratio=0.0, material=named_material("ecoflex_00_50"), name="body")
+    chambers = Chamber(
+        name="chamber",
+        bundles=3,
+        distance=0.0075,
+        radius=0.004,
+        offset=math.pi / 2,
+        activation_bounds=(0.0, 100e3),
+    )
+    return Manipulator(
+        profile=LinearTaper(length=0.15, outer_radius=0.0125),
+        section=Section(rings=(silicone,)),
+        actuators=(chambers,),
+    )
+
+
+_TRUNK_LENGTH, _TRUNK_BASE, _TRUNK_TIP = 1.8, 0.18, 0.05  # m
+_TRUNK_RINGS = (("inner", 0.2, 0.4), ("middle", 0.4, 0.7), ("outer", 0.7, 1.0))  # radii over R2
+_TRUNK_DORSAL, _TRUNK_VENTRAL = (270.0, 342.0), (20.0, 90.0)  # where muscles of the right lie [deg]
+_TRUNK_OBLIQUE = 30.0  # deg
+_TRUNK_BOUNDS = (-0.5, 0.0)
+
+
+def elephant_trunk() -> Manipulator:
+    """An elephant's trunk: longitudinal, oblique and radial muscles, each on the right and left.
+
+    The groups of muscles are those of [KaczmarskiTrunk2025]: dorsal longitudinal, outer and inner
+    ventral oblique of opposite hand, dorsal and ventral radial; the sectors do not wind, and the
+    section is homogeneous. Young's modulus is the apparent one of [Wilson1991], the density that of
+    muscle, [MendezKeys1960]. Lengths, radii, sectors, angles and bounds were not published: those
+    here are ours. The trunk is 1.8 m long and tapers from 0.18 to 0.05 m; the obliques run at 30°;
+    γ is in [-0.5, 0]. Dorsal is -y, ventral +y, and right is +x.
+    """
+    matter = named_material("elephant_trunk")
+    rings = tuple(
+        Ring(inner_ratio=inner, outer_ratio=outer, material=matter, name=name)
+        for name, inner, outer in _TRUNK_RINGS
+    )
+    taper = math.atan((_TRUNK_BASE - _TRUNK_TIP) / _TRUNK_LENGTH)
+    return Manipulator(
+        profile=LinearTaper(length=_TRUNK_LENGTH, outer_radius=_TRUNK_BASE, taper=taper),
+        section=Section(rings=rings),
+        actuators=tuple(_muscles()),
+    )
+
+
+def _muscles() -> Iterator[Actuator]:
+    """Each group on the right and, mirrored at x = 0, on the left."""
+    for side in (1, -1):
+        yield _oblique("dorsal longitudinal", "outer", _TRUNK_DORSAL, side, 0.0)
+    for side in (1, -1):
+        yield _oblique("outer oblique", "outer", _TRUNK_VENTRAL, side, -side * _TRUNK_OBLIQUE)
+    for side in (1, -1):
+        yield _oblique("inner oblique", "middle", _TRUNK_VENTRAL, side, side * _TRUNK_OBLIQUE)
+    for group, sector in (("dorsal radial", _TRUNK_DORSAL), ("ventral radial", _TRUNK_VENTRAL)):
+        for side in (1, -1):
+            yield RadialMuscle(
+                name=_name_of_side(group, side), ring="inner", **_sector_of_side(sector, side)
+            )
+
+
+def _oblique(
+    group: str, ring: str, sector: tuple[float, float], side: int, angle_deg: float
+) -> ObliqueMuscle:
+    angle = math.radians(angle_deg)
+    return ObliqueMuscle(
+        name=_name_of_side(group, side),
+        ring=ring,
+        helical_angle=angle,
+        **_sector_of_side(sector, side),
+    )
+
+
+def _name_of_side(group: str, side: int) -> str:
+    return f"{group} {'right' if side > 0 else 'left'}"
+
+
+def _sector_of_side(sector: tuple[float, float], side: int) -> dict[str, Any]:
+    """Where a muscle lies on the right (1), or mirrored on the left (-1), and its bounds."""
+    start, end = sector
+    middle = (start + end) / 2
+    return {
+        "offset": math.radians(middle if side > 0 else (180.0 - middle) % 360.0),
+        "extent": math.radians(end - start),
+        "activation_bounds": _TRUNK_BOUNDS,
+    }

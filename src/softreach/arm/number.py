@@ -1,0 +1,228 @@
+"""Numbers of a design, each declared once: symbol, unit, meaning, range.
+
+    offset: float = number("θ0", "rad", "polar angle of the first bundle", default=0.0)
+
+stands in a frozen dataclass, and `fields_of` lists the numbers of a kind of part. Checks, keys and
+units of design files, their JSON schema, parameters and sliders follow from it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass
+from functools import cache
+from types import MappingProxyType
+from typing import Any, Literal
+
+import numpy as np
+
+from softreach.support.arguments import plain
+from softreach.support.arrays import as_floats
+from softreach.support.errors import Fault, InvalidInput, Range
+
+__all__ = [
+    "Number",
+    "Shape",
+    "as_numbers",
+    "fields_of",
+    "number",
+    "series_faults",
+    "stations",
+    "unit_suffix",
+]
+
+Shape = Literal["single", "along", "triple", "series", "stations"]
+"""One number, a function along the arm alone, a vector, several along the arm, or their places."""
+
+_SUFFIXES = {
+    "": "",
+    "1": "",
+    "rad": "_deg",
+    "Pa": "_pa",
+    "kg/m³": "_kg_m3",
+    "N": "_n",
+    "m/s²": "_m_s2",
+    "N m": "_n_m",
+    "N/m": "_n_per_m",
+}
+
+
+def unit_suffix(unit: str) -> str:
+    """Suffix of names and keys whose values have a unit; angles are in degrees there."""
+    return _SUFFIXES.get(unit, f"_{unit}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Number:
+    """A number of a part of an arm."""
+
+    field: str = ""
+    """Name in the part."""
+    symbol: str
+    """Symbol in formulas."""
+    meaning: str
+    """Meaning in a few words."""
+    allowed: Range
+    """Unit, limits, and whether it is an integer."""
+    shape: Shape = "single"
+    along: type | None = None
+    """Class of functions along the arm that may take its place."""
+    optional: bool = False
+    """Whether None is allowed."""
+
+    @property
+    def unit(self) -> str:
+        """SI unit; "" for none."""
+        return self.allowed.unit
+
+    @property
+    def key(self) -> str:
+        """Key in design files: the field with its unit."""
+        return self.field + unit_suffix(self.unit)
+
+    def faults(self, value: Any) -> list[Fault]:
+        """Everything wrong with a value by itself, but for what `series_faults` judges."""
+        if self.shape == "stations" or (value is None and self.optional):
+            return []
+        if self.shape == "series":
+            return [
+                Fault(f"{self.field}[{k}]", one, self.allowed)
+                for k, one in enumerate(as_numbers(value).ravel().tolist())
+                if math.isfinite(one) and not self.allowed.admits(one)
+            ]
+        if self.shape == "triple":
+            allowed = "must be three finite numbers"
+            return [] if _is_triple(value) else [Fault(self.field, value, allowed)]
+        if self.along is not None and isinstance(value, self.along):
+            outside = [one for one in value.values if not self.allowed.admits(one)]  # pyright: ignore
+            return [Fault(self.field, one, self.allowed) for one in outside]
+        single = plain(value)
+        if self.shape == "single" and self.allowed.admits(single):
+            return []
+        return [Fault(self.field, single, self._allowed_instead_of(single))]
+
+    def normal(self, value: Any) -> Any:
+        """A checked value as Python's floats, integers and tuples of them."""
+        if self.shape in ("triple", "series", "stations"):
+            return tuple(np.asarray(value, float).tolist())
+        if value is None or (self.along is not None and isinstance(value, self.along)):
+            return value
+        return int(plain(value)) if self.allowed.whole else float(plain(value))
+
+    def _allowed_instead_of(self, value: Any) -> Range | str:
+        if self.along is None or (self.shape == "single" and isinstance(value, int | float)):
+            return self.allowed
+        functions = f"{self.along.__name__} along the arm"
+        single = f"{self.allowed.text}, or " if self.shape == "single" else ""
+        return f"must be {single}{functions}{', or None' if self.optional else ''}"
+
+
+def stations(meaning: str) -> Any:
+    """Field of a dataclass that holds the places Z/L of a series; those between the ends vary."""
+    return number(
+        "Z/L", "", meaning, low=0.0, high=1.0, open_low=True, open_high=True, shape="stations"
+    )
+
+
+def number(
+    symbol: str,
+    unit: str,
+    meaning: str,
+    *,
+    low: float = -math.inf,
+    high: float = math.inf,
+    open_low: bool = False,
+    open_high: bool = False,
+    integer: bool = False,
+    shape: Shape = "single",
+    along: type | None = None,
+    default: Any = MISSING,
+) -> Any:
+    """Field of a dataclass that is a number of a design.
+
+    Args:
+        symbol: Symbol in formulas.
+        unit: SI unit, "rad" for angles, "" for none.
+        meaning: Meaning in a few words.
+        low: Least value.
+        high: Largest value.
+        open_low: Whether `low` itself is excluded.
+        open_high: Whether `high` itself is excluded.
+        integer: Whether it counts something.
+        shape: A single number, a function along the arm, a triple, a series, or its stations.
+        along: Class of functions along the arm that may take its place.
+        default: Default of the field; without one it is required, None makes it optional.
+    """
+    allowed = Range(low, high, unit, open_low, open_high, integer)
+    declared = Number(symbol=symbol, meaning=meaning, allowed=allowed, shape=shape, along=along)
+    return dataclasses.field(default=default, metadata={"number": declared})
+
+
+@cache
+def fields_of(kind: type) -> Mapping[str, Number]:
+    """Numbers of a kind of part by their fields, those of the kind itself before inherited ones."""
+    numbers: dict[str, Number] = {}
+    for owner in kind.__mro__:
+        for field in _own_fields(owner):
+            if (declared := field.metadata.get("number")) and field.name not in numbers:
+                optional = _default(kind, field.name) is None
+                numbers[field.name] = dataclasses.replace(
+                    declared, field=field.name, optional=optional
+                )
+    return MappingProxyType(numbers)
+
+
+def series_faults(values: Mapping[str, Any], field: str, per_station: bool = True) -> list[Fault]:
+    """Everything wrong with values given along the arm.
+
+    Args:
+        values: `stations_over_length` and the values themselves.
+        field: What the values are called.
+        per_station: Whether there is one for each station; else one for each gap between them.
+    """
+    stations, along = as_numbers(values["stations_over_length"]), as_numbers(values[field])
+    if stations.ndim != 1 or len(stations) < 2 or not _ascends_from_0_to_1(stations):
+        allowed = "must be two or more numbers that rise from 0 (base) to 1 (tip)"
+        return [Fault("stations_over_length", values["stations_over_length"], allowed)]
+    count = len(stations) if per_station else len(stations) - 1
+    if along.shape != (count,) or not np.isfinite(along).all():
+        where = "station" if per_station else "gap between stations"
+        return [
+            Fault(field, values[field], f"must be {count} finite numbers, one for each {where}")
+        ]
+    return []
+
+
+def as_numbers(values: Any) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Numbers as an array; empty for text, booleans and anything else that is not a number."""
+    try:
+        return as_floats("values", values)
+    except InvalidInput:
+        return np.empty(0)
+
+
+def _own_fields(owner: type) -> list[dataclasses.Field[Any]]:
+    """Fields that a dataclass declares itself."""
+    declared: dict[str, dataclasses.Field[Any]] = vars(owner).get("__dataclass_fields__", {})
+    inherited = [getattr(base, "__dataclass_fields__", {}) for base in owner.__bases__]
+    return [
+        field
+        for name, field in declared.items()
+        if not any(fields.get(name) is field for fields in inherited)
+    ]
+
+
+def _default(kind: type, field: str) -> Any:
+    return getattr(kind, "__dataclass_fields__")[field].default  # noqa: B009
+
+
+def _is_triple(value: Any) -> bool:
+    triple = as_numbers(value)
+    return triple.shape == (3,) and bool(np.isfinite(triple).all())
+
+
+def _ascends_from_0_to_1(stations: np.ndarray[Any, np.dtype[np.float64]]) -> bool:
+    ends = stations[0] == 0.0 and stations[-1] == 1.0
+    return bool(ends and np.isfinite(stations).all() and (np.diff(stations) > 0).all())
