@@ -5,6 +5,8 @@ from __future__ import annotations
 import inspect
 import json
 import math
+import os
+import re
 import subprocess
 import sys
 
@@ -57,10 +59,22 @@ def test_help_of_every_command_teaches_with_an_example_that_parses(command, caps
     assert bound.arguments
 
 
-def test_help_lists_every_command(capsys):
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [[], ["-h"], ["--help"], ["-q"]], ids=" ".join)
+def test_help_lists_every_command_with_what_it_does(words):
+    command = [sys.executable, "-m", "softreach", *words]  # nothing is imported before
+    wide = os.environ | {"COLUMNS": "100"}
+    text = subprocess.run(command, env=wide, capture_output=True, text=True, check=True).stdout
+    for name in COMMANDS:
+        function = app[name].default_command
+        summary = (function.__doc__ if function else app[name].help).partition("\n")[0]
+        assert re.search(rf" {name} +{re.escape(summary)} ", text)
+
+
+def test_help_has_its_groups_in_order(capsys):
     assert run(["--help"]) == 0
-    text = capsys.readouterr().out
-    assert all(f" {command} " in text for command in COMMANDS)
+    titles = re.findall(r"╭─ (\w+) ─", capsys.readouterr().out)
+    assert titles == ["Design", "Reach", "Places", "Output", "Families", "More"]
 
 
 def test_the_version_is_that_of_the_package(capsys):

@@ -51,6 +51,7 @@ Start with
     console=cast(Any, HelpConsole()),
     default_parameter=Parameter(negative=(), show_default=_shown_default),
 )
+_NAMES = {name for _, names in _COMMANDS for name in names}
 for _group, _names in _COMMANDS:
     for _place, _name in enumerate(_names):
         _object = _OBJECTS.get(_name, _name)
@@ -95,8 +96,8 @@ def run(arguments: list[str]) -> int:
     """Run the command line and return its exit code; wrong input costs one line, no traceback."""
     with console.listening():
         try:
-            if not arguments or set(arguments) & set(app.help_flags):
-                _ = [app[name] for name in app]  # imports them: their docstrings are listed
+            if not _NAMES & {*arguments}:
+                _ = [app[name] for name in _NAMES]  # imports them: help lists their docstrings
             app.meta(arguments, result_action="return_value")
             console.flush()
         except BrokenPipeError:

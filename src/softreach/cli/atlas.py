@@ -36,7 +36,7 @@ atlas = App(
     name="atlas",
     help="""Compute and compare whole families of designs, kept in one store.
 
-Example: softreach atlas build a.zarr --vary revolution_deg=0:108:4 --vary taper_deg=0:3:4
+Example: softreach atlas build a.zarr --vary taper_deg=0:3:4
 """,
 )
 
@@ -91,9 +91,10 @@ def build(
 ) -> None:
     """Compute the clouds and the metrics of all designs.
 
-    The same command continues after an interruption, and computes again what is damaged.
+    The same command continues after an interruption, and computes again what is
+    damaged.
 
-    Example: softreach atlas build a.zarr --vary revolution_deg=0:108:16 --vary taper_deg=0:3:16
+    Example: softreach atlas build a.zarr --vary taper_deg=0:3:9 --vary length_m=1,2
     """
     from softreach.atlas import build_atlas
     from softreach.atlas.metrics import METRIC_GROUPS
@@ -171,7 +172,7 @@ def best(
 ) -> None:
     """Find the designs with the largest metric, under constraints.
 
-    Example: softreach atlas best atlas.zarr exact_volume --where "taper_deg<=1" --count 3
+    Example: softreach atlas best a.zarr exact_volume --where "taper_deg<=1"
     """
     from softreach.atlas import best_designs, open_atlas
 

@@ -25,7 +25,7 @@ def demo(
 ) -> None:
     """Start here: cloud, volumes and picture of the paper's design.
 
-    The design is minimal_trunk (Ω = 108°, φ = 2°); everything is written into one folder.
+    The design is minimal_trunk (Ω = 108°, φ = 2°); all is written into one folder.
 
     Example: softreach demo --out out
     """

@@ -42,9 +42,10 @@ def equilibria(
 ) -> None:
     """Find every equilibrium of a loaded arm at given activations.
 
-    Stable ones come first; the one that the arm comes to from its unloaded shape is marked.
+    Stable ones come first. The one that the arm comes to from its unloaded shape
+    is marked.
 
-    Example: softreach equilibria arm.toml --activation=-1,0,-0.5 --out equilibria.png
+    Example: softreach equilibria arm.toml --activation -1,0,-0.5 --out all.png
     """
     from softreach.rod import equilibria as all_of
 

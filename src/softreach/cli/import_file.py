@@ -32,8 +32,8 @@ def import_file(
 ) -> None:
     """Convert a filament or a cloud of ActiveFilaments.jl.
 
-    Definitions of filaments are read, not run. A cloud is NAME.csv with NAME_gamma.csv beside it;
-    its tips are compared with softreach's own.
+    Definitions of filaments are read, not run. A cloud is NAME.csv with
+    NAME_gamma.csv beside it; its tips are compared with softreach's own.
 
     Example: softreach import filament.jl filament.toml
     """

@@ -144,15 +144,11 @@ def shape_of(text: str | None, arm: Manipulator) -> xr.Dataset:
     return shape
 
 
-def points_of(text: str | None, file: Path | None) -> list[list[float]]:
-    """Positions [m] from `x,y,z`, or from a CSV file with such columns (a header is skipped)."""
-    from softreach.inverse.request import position_in, positions_in
+def points_in(name: str, file: Path) -> list[list[float]]:
+    """Positions [m] from a CSV file with columns x, y, z; a header is skipped."""
+    from softreach.inverse.request import positions_in
 
-    if text is not None:
-        return [position_in("target", text)]
-    if file is None:
-        raise InvalidInput("targets", file, "a CSV file")
-    return positions_in(read_text("targets", file, _MOST_TARGETS), str(file))
+    return positions_in(read_text(name, file, _MOST_TARGETS), str(file))
 
 
 def radius_of(text: str, length: float) -> float | str:

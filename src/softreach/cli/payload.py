@@ -34,7 +34,8 @@ def payload(
 ) -> None:
     """Compute how much of its reach a payload costs an arm.
 
-    The volumes under several payloads, and the largest payload that keeps a share of the volume.
+    The volumes under several payloads, and the largest payload that keeps a
+    share of the volume.
 
     Example: softreach payload lce_arm --gravity up --share 0.8
     """

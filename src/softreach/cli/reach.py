@@ -39,8 +39,8 @@ def reach(
 ) -> None:
     """Compute the exact reachable set: volume, multiplicity, folds.
 
-    Without samples: the volume with its error, the share of the convex hull that is not reached,
-    and the number of activations that reach each place.
+    Without samples: the volume with its error, the share of the convex hull that
+    is not reached, and the number of activations that reach each place.
 
     Example: softreach reach minimal_trunk --out reach.stl --out reach.png
     """

@@ -42,7 +42,7 @@ def show(
 
     Three views are orthogonal, one is oblique; --activation bends the arm.
 
-    Example: softreach show trunk.zarr --color longitudinal --activation -1,0,-0.5 --out trunk.pdf
+    Example: softreach show trunk.zarr --activation -1,0,-0.5 --out trunk.pdf
     """
     from softreach import plot
     from softreach.cloud.clouds import design_of

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
-from softreach.cli.options import AsJson, Design, points_of, refuse
+from softreach.cli.options import AsJson, Design, points_in, refuse
 from softreach.cli.values import WHOLE, activation_text, position_text
 from softreach.support.errors import InvalidInput, counted
 
@@ -40,11 +40,13 @@ def solve(
 ) -> None:
     """Find every activation that puts the tip at a target.
 
-    Where none does, the nearest point that can be reached and a bound on its distance.
+    Where none does, the nearest point that can be reached and a bound on its
+    distance.
 
     Example: softreach solve minimal_trunk --target 0.2,0.1,0.6
     """
     from softreach.inverse import solve_inverse
+    from softreach.inverse.request import position_in
 
     if (target is None) == (targets is None):
         raise InvalidInput("target", target, "given, or --targets, and not both")
@@ -52,7 +54,10 @@ def solve(
     if int((arm.bounds[:, 0] < arm.bounds[:, 1]).sum()) <= 3:
         why = "left out for a design with three free bundles or fewer: all solutions are found"
         refuse(why, family=family, prove_least=prove_least)
-    points = points_of(target, targets)
+    if targets is None:
+        points = [position_in("target", target or "")]
+    else:
+        points = points_in("targets", targets)
     count = 1 if family is None else family
     solutions = solve_inverse(arm, points, family=count, prove_least=prove_least)
     if json:

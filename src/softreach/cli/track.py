@@ -15,7 +15,7 @@ from softreach.cli.options import (
     activation_of,
     check_output,
     out_option,
-    points_of,
+    points_in,
 )
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def track(
     arm = design_from(design, changes)
     check_output(out, table, overwrite)
     first = None if start is None else activation_of(start, arm)
-    tracked = track_path(arm, points_of(None, path), first)
+    tracked = track_path(arm, points_in("path", path), first)
     with writing(out, table[".csv"], overwrite=overwrite) as file:
         file.write(path_csv(tracked).encode())
     followed = int((tracked.status == 0).sum())

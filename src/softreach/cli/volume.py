@@ -42,8 +42,8 @@ def volume(
 ) -> None:
     """Estimate volumes and unreachability from a cloud.
 
-    The volume is that of an α-shape of the samples, which limit its accuracy. The exact volume,
-    without samples and with its error, is that of softreach reach.
+    The volume is that of an α-shape of the samples, which limit its accuracy.
+    softreach reach computes the exact volume, without samples and with its error.
 
     Example: softreach volume trunk.zarr --alpha 0.03L --out hull.ply
     """

@@ -20,7 +20,7 @@ def warmup(
 ) -> None:
     """Compile all kernels now, so that no later command has to.
 
-    They are kept in a cache on disk; where it is full, this takes seconds.
+    They are kept in a cache on disk; if it has them already, this takes seconds.
 
     Example: softreach warmup --loads
     """
