@@ -16,7 +16,9 @@ from .arm import LinearTaper as LinearTaper
 from .arm import Loads as Loads
 from .arm import Manipulator as Manipulator
 from .arm import Material as Material
+from .arm import PiecewiseTaper as PiecewiseTaper
 from .arm import Ring as Ring
+from .arm import SampledTaper as SampledTaper
 from .arm import Section as Section
 from .arm import Tendon as Tendon
 from .arm import describe as describe

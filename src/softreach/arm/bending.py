@@ -1,4 +1,4 @@
-"""How sharply the activation box can bend an arm, exactly: at given stations and along the arm.
+"""Extremes of bending in the activation box, exact: at stations and along the arm.
 
 At one station the reachable (u1, u2) are a zonogon, the image of the activation box. Its farthest
 vertex and its nearest point to the origin are the range of bending there.
@@ -107,7 +107,7 @@ def _vertices(center: Array, halves: Array) -> Array:
 
 
 def _holds_origin(center: Array, halves: Array) -> NDArray[np.bool_]:
-    """Whether no line along an edge, nor one across the center's direction, separates the origin.
+    """Zonogons that hold the origin: no line along an edge or across the center separates them.
 
     The last is what remains to be asked where all edges are parallel or of no length.
     """

@@ -344,7 +344,7 @@ def _name_of_side(group: str, side: int) -> str:
 
 
 def _sector_of_side(sector: tuple[float, float], side: int) -> dict[str, Any]:
-    """Where a muscle lies on the right (1), or mirrored on the left (-1), and its bounds."""
+    """Sector of a muscle on the right (1), or mirrored on the left (-1), and its bounds."""
     start, end = sector
     middle = (start + end) / 2
     return {

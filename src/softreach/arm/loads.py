@@ -87,7 +87,7 @@ class Loads(Part):
         return super()._faults() + wrong
 
     def section_faults(self, section: Section, length: float) -> list[Fault]:
-        """What keeps them from acting on an arm: moduli, densities, places off the arm."""
+        """Faults that keep them from acting on an arm: moduli, densities, places off the arm."""
         faults = section.modulus_faults("where loads act")
         if any(self.gravity):
             faults += section.density_faults("where weight counts")
@@ -100,6 +100,6 @@ class Loads(Part):
 
     @property
     def conservative(self) -> bool:
-        """Whether the loads have a potential, so that stable means of least energy."""
+        """The loads have a potential, so that stable means of least energy."""
         moments = (self.tip_moment, *(one.moment for one in self.point_loads))
         return not any(map(any, (self.follower_force, self.follower_moment, *moments)))

@@ -47,10 +47,9 @@ class Manipulator:
     section: Section
     """The core and the ring of actuators, in proportion to R2(Z)."""
     actuators: tuple[Actuator, ...]
-    """What drives the arm; activations follow their order, bundle by bundle. Empty for a passive
-    rod."""
+    """In the order of the activations, bundle by bundle; empty for a passive rod."""
     loads: Loads | None = None
-    """What acts on the arm beside them; None for nothing, not even its weight."""
+    """Loads beside them; None for nothing, not even its weight."""
 
     def __post_init__(self) -> None:
         if faults := list(_part_faults(self)):
@@ -202,11 +201,11 @@ class Manipulator:
 
     @checked(path=path, overwrite=flag)
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
-        """Write a design file; an older one is replaced whole.
+        """Write a design file; an older one is replaced.
 
         Args:
             path: The file.
-            overwrite: Whether it may replace any file, and not only a design file.
+            overwrite: Replace any file, not only a design file.
 
         Raises:
             InvalidInput: Something else is there.
@@ -237,7 +236,7 @@ class Manipulator:
         """A readable name for each bundle."""
         return tuple(name for actuator in self.actuators for name in actuator.bundle_names)
 
-    @property
+    @cached_property
     def bundle_units(self) -> tuple[str, ...]:
         """The unit of the activation of each bundle."""
         return tuple(one.unit for one in self.actuators for _ in range(one.bundles))
@@ -262,11 +261,11 @@ class Manipulator:
 
     @property
     def bundle_courses(self) -> tuple[str, ...]:
-        """How what contracts runs within each bundle; see `Actuator.course`."""
+        """Direction of contraction within each bundle; see `Actuator.course`."""
         return tuple(one.course for one in self.actuators for _ in range(one.bundles))
 
     def outline(self, z: ArrayLike) -> Outline:
-        """Where all bundles lie in the sections at stations Z [m], shape (station,)."""
+        """Places of all bundles in the sections at stations Z [m], shape (station,)."""
         stations = as_stations("z", z)
         each = [one.outline(self.profile, self.section, stations) for one in self.actuators]
         each = each or [Outline.empty(len(stations))]
@@ -352,7 +351,7 @@ def _part_faults(arm: Manipulator) -> Iterator[Fault]:
 
 
 def _kind_faults(actuators: Any) -> Iterator[Fault]:
-    """What is no sequence of actuators."""
+    """Faults of what is no sequence of actuators, or holds too many bundles."""
     if not isinstance(actuators, Sequence) or isinstance(actuators, str):
         yield Fault("actuators", actuators, "must be a sequence of actuators")
         return
@@ -365,7 +364,7 @@ def _kind_faults(actuators: Any) -> Iterator[Fault]:
 
 
 def _fit_faults(arm: Manipulator) -> Iterator[Fault]:
-    """What keeps actuators and loads from acting on this profile and section."""
+    """Faults that keep actuators and loads from acting on this profile and section."""
     if arm.loads is not None:
         yield from arm.loads.section_faults(arm.section, arm.length)
     for actuator in arm.actuators:

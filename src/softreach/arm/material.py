@@ -28,7 +28,7 @@ __all__ = [
 LIBRARY_HINT = (
     "the page Materials of the guide lists them, and so does arm.material.material_names()"
 )
-"""Where to look for the names of materials."""
+"""Places where the names of materials are listed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,10 +51,10 @@ class Material(Part):
     density: float | None = number("ρ", "kg/m³", "density", low=0.0, open_low=True, default=None)
     """ρ, mass per volume [kg/m³]; None where weight plays no part."""
     name: str = ""
-    """What files and pictures call it."""
+    """Name in files and pictures."""
 
     def same_matter(self, other: Material) -> bool:
-        """Whether all but the names are equal."""
+        """All but the names are equal."""
         return all(
             getattr(self, field.name) == getattr(other, field.name)
             for field in fields(self)
@@ -69,11 +69,11 @@ class MaterialRecord:
     material: Material
     """The material under its name."""
     modulus: str
-    """What the number of Young's modulus is: `Young's modulus`, `stress at 100 % strain`, ..."""
+    """Kind of number of Young's modulus: `Young's modulus`, `stress at 100 % strain`, ..."""
     sources: Mapping[str, str]
     """For every number of the material, by its field, a heading of the page of references."""
     note: str
-    """What a designer should know about it, in a line."""
+    """Advice to a designer, in a line."""
 
 
 def material_names() -> tuple[str, ...]:

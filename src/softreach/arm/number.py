@@ -70,7 +70,7 @@ class Number:
     along: type | None = None
     """Class of functions along the arm that may take its place."""
     optional: bool = False
-    """Whether None is allowed."""
+    """None is allowed."""
 
     @property
     def unit(self) -> str:
@@ -148,9 +148,9 @@ def number(
         meaning: Meaning in a few words.
         low: Least value.
         high: Largest value.
-        open_low: Whether `low` itself is excluded.
-        open_high: Whether `high` itself is excluded.
-        integer: Whether it counts something.
+        open_low: Exclude `low` itself.
+        open_high: Exclude `high` itself.
+        integer: It counts something.
         shape: A single number, a function along the arm, a triple, a series, or its stations.
         along: Class of functions along the arm that may take its place.
         default: Default of the field; without one it is required, None makes it optional.
@@ -180,7 +180,7 @@ def series_faults(values: Mapping[str, Any], field: str, per_station: bool = Tru
     Args:
         values: `stations_over_length` and the values themselves.
         field: What the values are called.
-        per_station: Whether there is one for each station; else one for each gap between them.
+        per_station: One for each station; else one for each gap between them.
     """
     stations, along = as_numbers(values["stations_over_length"]), as_numbers(values[field])
     if stations.ndim != 1 or len(stations) < 2 or not _ascends_from_0_to_1(stations):

@@ -37,9 +37,9 @@ class Ring(Part):
     )
     """Outer radius of the ring over the outer radius of the arm [-]."""
     material: Material = field(default_factory=Material)
-    """What the ring is made of."""
+    """Material of the ring."""
     name: str = ""
-    """What actuators, files and pictures call it."""
+    """Name in actuators, files and pictures."""
 
     @property
     def radius_ratio(self) -> float:
@@ -69,11 +69,11 @@ class Layer(NamedTuple):
     outer_ratio: float
     """Outer radius over R2 [-]."""
     material: Material
-    """What it is made of."""
+    """Its material."""
 
 
 class Stiffness(NamedTuple):
-    """What a section resists with, one value for each station.
+    """Stiffness of sections, one value for each station.
 
     All are divided by Young's modulus where that was left out.
     """
@@ -90,7 +90,7 @@ class Stiffness(NamedTuple):
 class Section(Part):
     """A core and rings around it, in proportion to R2(Z).
 
-    Rings may overlap: each adds its whole stiffness. The core fills the arm from its bore to the
+    Rings may overlap: each adds all of its stiffness. The core fills the arm from its bore to the
     innermost ring.
 
     Raises:
@@ -101,7 +101,7 @@ class Section(Part):
     rings: tuple[Ring, ...]
     """Layers that actuators live in, by index or name."""
     core: Material | None = None
-    """What fills the inside; None for the material of the innermost ring."""
+    """Material inside; None for that of the innermost ring."""
     bore_ratio: float = number(
         "R0/R2", "", "radius of the bore over R2", low=0.0, high=1.0, open_high=True, default=0.0
     )
@@ -151,12 +151,12 @@ class Section(Part):
 
     @property
     def inner_ratio(self) -> float:
-        """Where the innermost ring begins, over R2 [-]."""
+        """Inner radius of the innermost ring over R2 [-]."""
         return min(ring.inner_ratio for ring in self.rings)
 
     @property
     def core_material(self) -> Material:
-        """What fills the inside."""
+        """Material inside."""
         if self.core is not None:
             return self.core
         return min(self.rings, key=lambda ring: ring.inner_ratio).material
@@ -171,7 +171,7 @@ class Section(Part):
 
     @property
     def has_modulus(self) -> bool:
-        """Whether Young's modulus is known, so that forces have a unit."""
+        """Young's modulus is known, so that forces have a unit."""
         return all(layer.material.young_modulus is not None for layer in self.layers)
 
     def stiffness(self, radius: ArrayLike) -> Stiffness:

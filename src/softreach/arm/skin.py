@@ -1,4 +1,4 @@
-"""The skins of an arm on a given centerline: its body, and what shows each bundle.
+"""Skins of an arm on a centerline: its body, and a surface for each bundle.
 
 Bundles that fill a sector of a ring are bands on the outside of that ring, lines are thin tubes,
 lumens tubes of their radius. They are cut where they begin and end to act.
@@ -68,7 +68,7 @@ class Body(Protocol):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Centerline:
-    """Where the sections of an arm are in one configuration."""
+    """Sections of an arm in one configuration."""
 
     z: Array
     """Stations before activation [m], ascending, shape (station,)."""
@@ -115,7 +115,7 @@ class Centerline:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Span:
-    """Where one bundle acts without a gap: stations along the first axis."""
+    """Stretch of an arm on which one bundle acts without a gap: stations along the first axis."""
 
     shape: str
     extent: float
@@ -220,7 +220,7 @@ def bundle_solids(
 
 
 def inside(arm: Body) -> tuple[bool, ...]:
-    """For each bundle, whether the body of the arm hides some of it."""
+    """Bundles of which the body of the arm hides some part."""
     z = np.union1d(np.linspace(0.0, arm.length, 101), arm.breakpoints)
     outline = arm.outline(z)
     middle = 0.5 * (outline.inner_ratio + outline.outer_ratio)
@@ -294,7 +294,7 @@ def _lumen(one: _Span) -> Surface:
 
 
 def _across(vector: Array, along: Array) -> Array:
-    """What is left of vectors without their part along unit vectors."""
+    """Vectors without their part along unit vectors."""
     return vector - np.sum(vector * along, axis=1, keepdims=True) * along
 
 

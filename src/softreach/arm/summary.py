@@ -73,11 +73,11 @@ class DesignSummary:
     """Λ = ρ g L³/(E R2²), or (w + P/L) L³/(4 K1) at the base for loads P beside weight [-]; None
     without E or ρ."""
     lacking: tuple[str, ...]
-    """What to give so that the numbers above are known."""
+    """Properties to give so that the numbers above are known."""
     breakpoints: tuple[float, ...]
     """Z inside (0, L) where profile or actuators are not smooth [m]."""
     validity: tuple[str, ...]
-    """Where the linear law of each kind of actuator ends."""
+    """Limit of the linear law of each kind of actuator."""
     warnings: tuple[str, ...]
     """Limits that the design touches, each with its number."""
 
@@ -119,7 +119,7 @@ def _pairs(values: Iterator[tuple[float, float]]) -> Array:
 
 
 def _of_matter(arm: Manipulator) -> dict[str, Any]:
-    """What follows from moduli and densities, as far as they are known."""
+    """Stiffness, mass and load number, as far as moduli and densities are known."""
     moduli, densities = arm.section.modulus_faults(""), arm.section.density_faults("")
     ends = arm.profile.radius(np.array([0.0, arm.length]))
     return {
@@ -134,7 +134,7 @@ def _of_matter(arm: Manipulator) -> dict[str, Any]:
 
 
 def _lacking(what: str, faults: list[Fault], known: str) -> Iterator[str]:
-    """What to give, and what is known then."""
+    """Property to give, and what is known then."""
     if faults:
         owners = dict.fromkeys(fault.path.rpartition(".")[0] for fault in faults)
         yield f"give {what} of {', '.join(owners)} to know {known}"
@@ -202,7 +202,7 @@ def load_number(arm: Manipulator) -> float:
 
 
 def is_overloaded(arm: Manipulator) -> bool:
-    """Whether the load number is above what was verified, by more than rounding.
+    """The load number is above what was verified, by more than rounding.
 
     Raises:
         InvalidDesign: A layer without Young's modulus, or without a density where it weighs.
@@ -211,7 +211,7 @@ def is_overloaded(arm: Manipulator) -> bool:
 
 
 def load_number_faults(arm: Manipulator) -> list[Fault]:
-    """What keeps the load number from being known."""
+    """Faults that keep the load number from being known."""
     faults = arm.section.modulus_faults("where weight counts")
     weighs = arm.loads is None or any(arm.loads.gravity)
     return faults + (arm.section.density_faults("where weight counts") if weighs else [])

@@ -66,7 +66,7 @@ def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
 
 
 def _resultants(actuator: Actuator, arm: Manipulator, z: Array) -> Resultants:
-    """What an actuator puts on the sections: nothing where it does not act."""
+    """Load of an actuator on the sections: nothing where it does not act."""
     load, acts = actuator.resultants(arm.profile, arm.section, z), actuator.acts(arm.profile, z)
     if acts.all():
         return load
@@ -74,7 +74,7 @@ def _resultants(actuator: Actuator, arm: Manipulator, z: Array) -> Resultants:
 
 
 class Compliance(NamedTuple):
-    """How sections yield to loads, one value for each station."""
+    """Compliance of sections, one value for each station."""
 
     axial: Array
     """1/K0 [1/N]."""

@@ -1,4 +1,4 @@
-"""What drives an arm: one file for each kind of actuator."""
+"""Actuators of an arm: one file for each kind."""
 
 from softreach.arm.actuators.actuator import Actuator, Outline, Resultants
 from softreach.arm.actuators.chamber import Chamber

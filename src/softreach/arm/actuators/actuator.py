@@ -55,7 +55,7 @@ class Resultants(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Outline:
-    """Where bundles lie in the sections, for pictures."""
+    """Places of bundles in the sections, for pictures."""
 
     center: Array
     """Polar angle of the middle of each bundle [rad], shape (station, bundle)."""
@@ -68,7 +68,7 @@ class Outline:
     shape: tuple[str, ...]
     """"sector" of a ring, "line" along the arm, or round "lumen", for each bundle."""
     acts: NDArray[np.bool_]
-    """Where along the arm each bundle acts, shape (station, bundle)."""
+    """Stations at which each bundle acts, shape (station, bundle)."""
 
     @classmethod
     def empty(cls, stations: int) -> Outline:
@@ -100,14 +100,14 @@ class Actuator(Part, ABC):
     symbol: ClassVar[str] = "γ"
     """Symbol of an activation in formulas."""
     activation: ClassVar[str] = "activation"
-    """What an activation is called."""
+    """Quantity that an activation is."""
     default_name: ClassVar[str] = "actuator"
     """Name that an arm gives to unnamed ones, followed by a number."""
     validity: ClassVar[str] = ""
-    """Where the linear law of this kind ends, in a sentence."""
+    """Limit of the linear law of this kind, in a sentence."""
 
     name: str = ""
-    """What summaries and pictures call it; unique within an arm, which names those without."""
+    """Name in summaries and pictures; unique within an arm, which names those without."""
     bundles: int = number(
         "n", "", "number of bundles", low=1, high=MOST_BUNDLES, integer=True, default=1
     )
@@ -133,11 +133,11 @@ class Actuator(Part, ABC):
 
     @abstractmethod
     def outline(self, profile: Profile, section: Section, z: Array) -> Outline:
-        """Where the bundles lie at stations Z [m]."""
+        """Places of the bundles at stations Z [m]."""
 
     @property
     def course(self) -> str:
-        """How what contracts runs within a bundle, for pictures.
+        """Direction of contraction within a bundle, for pictures.
 
         "along" it, "right-handed" or "left-handed" across it, or "radial".
         """
@@ -175,7 +175,7 @@ class Actuator(Part, ABC):
         return np.broadcast_to(inside[:, None], (len(z), self.bundles))
 
     def section_faults(self, profile: Profile, section: Section) -> list[Fault]:
-        """What keeps it from driving an arm with this profile and section."""
+        """Faults that keep it from driving an arm with this profile and section."""
         del profile, section
         return []
 

@@ -69,7 +69,7 @@ class FiberArchitecture(SectorActuator):
         return super().replace(**changes)
 
     def breakpoints(self, profile: Profile) -> tuple[float, ...]:
-        """Where it begins, ends, or its angle is not smooth [m]."""
+        """Stations where it begins, ends, or its angle is not smooth [m]."""
         angle = self.helical_angle
         breaks = angle.breaks if isinstance(angle, AlongArm) else ()
         return (*super().breakpoints(profile), *(profile.length * x for x in breaks))

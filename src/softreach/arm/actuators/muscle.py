@@ -53,7 +53,7 @@ class ObliqueMuscle(SectorActuator):
 
     @property
     def course(self) -> str:
-        """Which way its fibers cross it."""
+        """Direction in which its fibers cross it."""
         if self.helical_angle == 0:
             return "along"
         return "right-handed" if self.helical_angle > 0 else "left-handed"

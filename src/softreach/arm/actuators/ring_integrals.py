@@ -1,4 +1,4 @@
-"""What one fiber does to the cross-section that it pulls on: the theory's radial integrals.
+"""Radial integrals of the theory: the load of one fiber on the cross-section that it pulls on.
 
 The paper prints closed forms (Appendix A) that are singular at φ = 0, α = 0 and α = ±φ, need
 complex numbers, and hold a misprint in δ3. They are the integrals below, which have none of that:
@@ -72,5 +72,5 @@ def _nodes(ratio: Array, tangent: Array) -> tuple[Array, Array]:
     low, high = np.arcsinh(ratio * slope), np.arcsinh(slope)
     half = 0.5 * (high - low)
     u = low + half * (1.0 + _NODES)
-    stretch = half * _WEIGHTS * np.cosh(u) / slope
-    return np.where(steep, np.sinh(u) / slope, x), np.where(steep, stretch, weight)
+    steep_weight = half * _WEIGHTS * np.cosh(u) / slope
+    return np.where(steep, np.sinh(u) / slope, x), np.where(steep, steep_weight, weight)

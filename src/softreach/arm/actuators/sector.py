@@ -32,7 +32,7 @@ class SectorActuator(PolarActuator):
     )
     """σ, angular extent of every bundle [rad]; 0 < σ ≤ 2π."""
     ring: int | str = 0
-    """Which ring of the section it is in: index or name."""
+    """Ring of the section that it is in: index or name."""
     activation_bounds: Bounds = (-5 / 3, 0.0)
     """(lower, upper) of γ for every bundle, or one pair per bundle [-]; γ < 0 contracts."""
 

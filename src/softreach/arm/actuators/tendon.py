@@ -56,10 +56,10 @@ class Tendon(PolarActuator):
     activation: ClassVar[str] = "tension"
     default_name: ClassVar[str] = "tendon"
     validity: ClassVar[str] = (
-        "Exact for tendons parallel to the axis; others pull along their direction at rest, with a "
-        "relative error of the order of curvature times distance from the axis. Curvature is per "
-        "length after activation: an elastic rod whose stiffness is per length at rest bends more "
-        "by 1/ζ, ζ = 1 - τ/K0."
+        "Exact for tendons parallel to the axis; others pull along their direction before "
+        "activation, with a relative error of the order of curvature times distance from the axis. "
+        "Curvature is per length after activation: an elastic rod whose stiffness is per length "
+        "before it bends more by 1/ζ, ζ = 1 - τ/K0."
     )
 
     revolution: float = number(
@@ -80,7 +80,7 @@ class Tendon(PolarActuator):
     """θ(Z) - θ0 along the arm [rad], in place of an even rotation."""
 
     def resultants(self, profile: Profile, section: Section, z: Array) -> Resultants:
-        """N = -t3 and M = -p × t with the tangent t = (p' + e3)/|p' + e3| at rest: theory (52)."""
+        """N = -t3 and M = -p × t along t = (p' + e3)/|p' + e3| of the straight arm: (52)."""
         del section
         route = self._route(profile, z)
         cos, sin = np.cos(route.angle), np.sin(route.angle)
@@ -107,7 +107,7 @@ class Tendon(PolarActuator):
         )
 
     def breakpoints(self, profile: Profile) -> tuple[float, ...]:
-        """Where it begins, ends, or its route is not smooth [m]."""
+        """Stations where it begins, ends, or its route is not smooth [m]."""
         bent = [one for one in (self.distance, self.routing) if isinstance(one, AlongArm)]
         breaks = [profile.length * x for one in bent for x in one.breaks]
         return (*super().breakpoints(profile), *breaks)

@@ -84,7 +84,7 @@ class Key(NamedTuple):
 
     @property
     def required(self) -> bool:
-        """Whether a table without it is refused."""
+        """A table without it is refused."""
         return self.default is MISSING
 
 

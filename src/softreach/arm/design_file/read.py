@@ -248,7 +248,7 @@ class _DesignReader(TableReader):
         return list(placed.values())
 
     def _place(self, path: str) -> str:
-        """Where the file has a field of the section, of a ring or of a material of one."""
+        """Path in the file of a field of the section, of a ring or of a material of one."""
         owner, _, field = path.rpartition(".")
         if path.startswith("loads."):
             return f"{owner}.{field_keys(PointLoad).get(field, field)}"
@@ -263,16 +263,17 @@ class _DesignReader(TableReader):
         return f"section.{owner}.{key}" if owner == "core" else f"{owner}.{key}"
 
     def _material_name(self, owner: str) -> Any:
-        """What the core, or a ring such as `rings[0].material`, names as its material."""
+        """Name of the material of the core, or of a ring such as `rings[0].material`."""
         if owner == "core":
             return (self._table("section") or {}).get("core")
         k = int(owner.partition("[")[2].partition("]")[0])
         return dict(self._tables("rings"))[k].get("material")
 
     def _actuator(self, k: int, raw: dict[str, Any]) -> Actuator | None:
-        path, kind, own = f"actuators[{k}]", raw.get("kind"), own_kinds()
+        path, kind = f"actuators[{k}]", raw.get("kind")
         if isinstance(kind, str) and kind in ACTUATORS:
             return self.part(ACTUATORS[kind], raw, path)
+        own = own_kinds()
         if not isinstance(kind, str) or kind not in own:
             self.refused(f"{path}.kind", kind, _kinds_text(kind, [*own]))
             return None
@@ -323,7 +324,7 @@ def _plain(value: Any) -> Any:
 
 
 def _place(key: str) -> str:
-    """Where a key belongs that is not one of the top."""
+    """Hint where a key belongs that is not one of the top."""
     if key.removesuffix("s") in ACTUATORS:
         return f'write [[actuators]] with kind = "{key.removesuffix("s")}"'
     homes = {

@@ -184,7 +184,7 @@ class TableReader:
 
 
 def unknown_key(name: str, keys: Mapping[str, str]) -> str:
-    """What to say of a key that a table does not have.
+    """Message for a key that a table does not have.
 
     Args:
         name: The key.
@@ -198,7 +198,7 @@ def unknown_key(name: str, keys: Mapping[str, str]) -> str:
 
 
 def is_doubtful(fault: Fault, wrong: Iterable[str]) -> bool:
-    """Whether a fault concerns fields that are wrong anyway."""
+    """A fault of fields that are wrong anyway."""
     fields = set(fault.path.split(", "))
     decisive = fields | {one for field in fields for one in _RESTS_ON.get(field, ())}
     return not decisive.isdisjoint(wrong)
@@ -230,7 +230,7 @@ def _example(key: Key) -> Any:
 
 
 def _is_number(raw: Any) -> bool:
-    """Whether it is a number of Python that a double can hold."""
+    """A number of Python that a double can hold."""
     if isinstance(raw, bool) or not isinstance(raw, int | float):
         return False
     try:

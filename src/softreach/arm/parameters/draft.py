@@ -28,7 +28,7 @@ _SIDES = ("lower", "upper")
 
 
 class Path(NamedTuple):
-    """Where a number stands in an arm."""
+    """Place of a number in an arm."""
 
     part: PartKey
     field: str

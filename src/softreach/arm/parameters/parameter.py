@@ -32,7 +32,7 @@ class Parameter(ABC):
     """A number in which designs can differ."""
 
     name: str
-    """What it is called: `taper`, `left.offset`, or `rings[0].material.young_modulus`."""
+    """`taper`, `left.offset`, or `rings[0].material.young_modulus`."""
     owner: str = ""
     """The part that it belongs to, such as `left` or `rings[0].material`; "" for the whole arm."""
     number: Number
@@ -60,7 +60,7 @@ class Parameter(ABC):
 
     @property
     def whole(self) -> bool:
-        """Whether it counts something."""
+        """It counts something."""
         return self.range.whole
 
     @property
@@ -88,7 +88,7 @@ class OwnParameter(Parameter):
     path: Path
 
     def value(self, arm: Manipulator) -> float:
-        """What the part has on this arm."""
+        """Value in the part of this arm."""
         part, (_, field, place) = part_of(arm, self.path.part), self.path
         if field == "activation_bounds":
             side, *bundle = place
@@ -209,8 +209,11 @@ def _of_arm(arm: Manipulator, own: list[OwnParameter]) -> Iterator[Parameter]:
     poisson = tuple(one for one in own if one.path.field == "poisson_ratio")
     number = fields_of(Material)["poisson_ratio"]
     yield _Shared(name="poisson_ratio", number=number, parts=poisson)
+    by_field: dict[str, list[OwnParameter]] = {}
+    for one in own:
+        by_field.setdefault(one.path.text, []).append(one)
     for field in ("extent", "lower", "upper"):
-        same = tuple(one for one in own if one.field == field)
+        same = tuple(by_field.get(field, ()))
         if len({one.unit for one in same}) == 1:
             yield _Shared(name=field, number=same[0].number, parts=same)
 
