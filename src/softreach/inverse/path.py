@@ -309,7 +309,7 @@ def _dataset(
     """The result; `end` is None if there was nothing to begin with."""
     import xarray as xr
 
-    box, n, units = rod.box, len(followed), activation_attributes(rod.arm)
+    box, n, units = rod.box, len(followed), activation_attributes(rod.arm, rod.box.names)
     outcome = PathStatus.NO_START if end is None else end.status
     status = np.full(len(points), int(outcome), np.int8)
     status[:n] = PathStatus.FOLLOWED
@@ -335,7 +335,7 @@ def _dataset(
             "end_length": ((), length, {"units": "m"}),
             "end_length_error": ((), length_error, {"units": "m"}),
         },
-        {"axis": list(AXES), **bundle_coordinates(rod.arm)},
+        {"axis": list(AXES), **bundle_coordinates(rod.arm, rod.box.names)},
         {
             **provenance(rod.arm),
             "end": "" if outcome == PathStatus.FOLLOWED else outcome.name.lower(),

@@ -104,7 +104,13 @@ def shape_dataset(
 ) -> xr.Dataset:
     """Shapes at stations Z [m] as `configuration` has them, one for each row of activations."""
     return schema.configuration_dataset(
-        rod.arm, gamma, z, **frames._asdict(), **strains._asdict(), radius=rod.radius(z)
+        rod.arm,
+        gamma,
+        z,
+        names=rod.box.names,
+        **frames._asdict(),
+        **strains._asdict(),
+        radius=rod.radius(z),
     )
 
 

@@ -62,13 +62,11 @@ def newton_step(search, active, tips, slopes, low, high, tol):
 
     A trial whose tip is NaN has failed, as one that comes no nearer has.
     """
-    bits = tips.view(np.int64)  # compiled arithmetic knows no NaN
+    bits = tips.view(np.int64)
     for k in range(active.shape[0]):
         n = active[k]
-        residual, miss = _UNKNOWN, (0.0, 0.0, 0.0)
-        if bits[k, 0] & _EXPONENT != _EXPONENT:
-            miss = minus(row(search.target, n), row(tips, k))
-            residual = math.sqrt(dot(miss, miss))
+        miss = minus(row(search.target, n), row(tips, k))
+        residual = _residual(miss, bits[k, 0])
         # A search that creeps toward a fold it cannot cross is given up; a double root is not:
         # each full step quarters its residual.
         if residual < (1.0 - _SUFFICIENT * search.damping[n]) * search.residual[n]:
@@ -95,6 +93,12 @@ def newton_step(search, active, tips, slopes, low, high, tol):
             enough = _STEP_TOL if search.residual[n] <= tol else _TINY_STEP
             if _length(search.step, n, low, high) <= enough:
                 search.state[n] = CONVERGED
+
+
+@inline
+def _residual(miss, bits):
+    """|miss|, unless the bits say that the tip is not finite: compiled arithmetic knows no NaN."""
+    return _UNKNOWN if bits & _EXPONENT == _EXPONENT else math.sqrt(dot(miss, miss))
 
 
 @inline
