@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import warnings
 from collections.abc import Callable
 from functools import partial
 from typing import Annotated
@@ -23,11 +22,11 @@ def warmup(
 
     Example: softreach warmup
     """
+    from softreach.support.errors import no_warnings
     from softreach.support.progress import bar
 
     jobs = [*_free(), *(_loaded() if loads else ())]
-    with bar("compiling", len(jobs)) as done, warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of clouds and grids that are too coarse
+    with bar("compiling", len(jobs)) as done, no_warnings():  # of clouds and grids too coarse
         for job in jobs:
             job()
             done(1)

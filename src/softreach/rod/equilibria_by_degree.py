@@ -8,7 +8,6 @@ odd.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -33,7 +32,7 @@ from softreach.rod.load_tables import LoadTables
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.tip_map import TipMap, TipStatus, tip_map
 from softreach.support.arrays import as_floats
-from softreach.support.errors import InvalidInput, SoftreachWarning
+from softreach.support.errors import InvalidInput, warn
 
 __all__ = ["equilibria"]
 
@@ -209,7 +208,7 @@ def _accurate(solver: Solver, gamma: Array, found: _Found) -> tuple[Solver, _Fou
             solver, found = finer, again
         else:
             solver, found = finer, _search(finer, gamma, found.directions)
-    _warn(f"tips of some equilibria miss tol = {solver.tol:g}")
+    warn(f"tips of some equilibria miss tol = {solver.tol:g}")
     return solver, found
 
 
@@ -241,7 +240,7 @@ def _judged(
     complete = found.complete and (followed is not None or not len(known))
     if not complete:
         total = int(found.signs[~found.is_ring].sum())
-        _warn(f"equilibria may be missing: the degree of those found is {total}")
+        warn(f"equilibria may be missing: the degree of those found is {total}")
     return AllEquilibria(
         rod=rod,
         solver=solver,
@@ -266,7 +265,3 @@ def _nearest(found: _Found, known: Array, axis: Array) -> int | None:
     apart = np.where(found.is_ring, latitudes, apart)
     nearest = int(apart.argmin())
     return nearest if apart[nearest] < _SAME else None
-
-
-def _warn(text: str) -> None:
-    warnings.warn(text, SoftreachWarning, stacklevel=4)

@@ -6,7 +6,6 @@ Whoever asks where an arm can go asks a tip map, never the fields of the arm.
 
 from __future__ import annotations
 
-import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from enum import IntEnum
@@ -23,7 +22,8 @@ from softreach.rod.steps import check_tol
 from softreach.support import parallel
 from softreach.support.arguments import as_given, flag, instance
 from softreach.support.arrays import as_floats
-from softreach.support.errors import InvalidInput, SoftreachWarning, counted
+from softreach.support.errors import InvalidInput, counted
+from softreach.support.errors import warn as issue_warning
 
 __all__ = [
     "BLOCK",
@@ -277,11 +277,9 @@ def _warn_of_large_loads(arm: Manipulator) -> None:
         InvalidDesign: Moduli or densities are missing.
     """
     if is_overloaded(arm):
-        warnings.warn(
+        issue_warning(
             f"the load number is above {VERIFIED_LOAD_NUMBER:g}, up to which shapes under loads "
             "were verified: look at the status of the samples, and compare with a smaller tol",
-            SoftreachWarning,
-            stacklevel=3,
         )
 
 
