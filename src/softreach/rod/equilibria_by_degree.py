@@ -30,7 +30,9 @@ from softreach.rod.equilibrium import Solver
 from softreach.rod.free import FreeRod
 from softreach.rod.load_tables import LoadTables
 from softreach.rod.loaded import LoadedRod
-from softreach.rod.tip_map import TipMap, TipStatus, tip_map
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipMap, TipStatus
+from softreach.rod.view import View
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput, warn
 
@@ -66,7 +68,7 @@ def equilibria(
     has rings of equilibria where it leans: of each ring one is returned.
 
     Args:
-        arm: The design, or its tip map.
+        arm: The design, or its tip map; of a view of it, such as of the free bundles, the whole.
         activations: Of each bundle [unit of each], shape (bundles,) or (1, bundles).
         tol: Largest tip error, in L.
 
@@ -79,8 +81,12 @@ def equilibria(
     """
     rod = tip_map(arm, tol, warn=False)  # the degree tells whether any is missing
     gamma = _one(rod, activations)
-    if not isinstance(rod, LoadedRod):
+    if isinstance(rod, View):  # whose equilibria are those of the arm
+        rod, gamma = rod.base, rod.activations(gamma)
+    if not rod.supports_unstable:
         return _without_loads(rod, gamma)
+    if not isinstance(rod, LoadedRod):
+        raise InvalidInput("arm", repr(rod), "a Manipulator, or a tip map of one")
     _check_loads(rod.tables)
     solver = _resolving(Solver(rod.tables, FreeRod(rod.arm, rod.tol).steps, rod.tol), gamma)
     branch = solver.find(gamma)

@@ -60,14 +60,3 @@ class Response(NamedTuple):
     """Tangents d3 of the tips [-], shape (n, 3), or (0, 3)."""
     status: NDArray[np.int8]
     """`TipStatus`, shape (n,)."""
-
-    @classmethod
-    def empty(cls, n: int, bundles: int, *, compliance: bool, directions: bool) -> Response:
-        """Room for n."""
-        return cls(
-            np.empty((n, 3)),
-            np.empty((n, 6, bundles)),
-            np.empty((n if compliance else 0, 3, 3)),
-            np.empty((n if directions else 0, 3)),
-            np.empty(n, np.int8),
-        )

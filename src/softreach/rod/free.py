@@ -12,12 +12,18 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.tables import tables
 from softreach.kernels.rod import frames, jacobian
 from softreach.kernels.rod import tips as rod
-from softreach.rod.arm_rod import ArmRod
-from softreach.rod.frames import Frames, StrainRange, Strains
 from softreach.rod.linear_strains import linear_strains, strain_range
 from softreach.rod.linearization import Linearization
 from softreach.rod.steps import StepRule
-from softreach.rod.tip_map import BLOCK
+from softreach.rod.tip_map import (
+    ArmRod,
+    Frames,
+    Status,
+    StrainRange,
+    Strains,
+    TipStatus,
+    position_slopes,
+)
 from softreach.support import parallel
 
 __all__ = ["FreeRod"]
@@ -53,23 +59,32 @@ class FreeRod(ArmRod):
     def _table(self) -> Array:
         return self.rule.packed_nodes(self._fineness)
 
-    def fill_tips(self, gamma: Array, out: Array) -> None:
-        """Put the tips [m] of checked activations into `out`, (n, 3), on the calling thread."""
-        rod.tips(self._table, gamma, out)
+    def _prepare(self) -> None:
+        self._table  # noqa: B018
 
-    def fill_slopes(self, gamma: Array, tips: Array, slopes: Array) -> None:
-        """Put tips (n, 3) and ∂r/∂γ (n, 3, bundles) [m] into place: theory (31)."""
-        jacobian.jacobians(self._table, gamma, tips, slopes)
-
-    def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:
-        """Tips [m] and the spatial twist of the tip frame per unit of each activation."""
-        gamma = self.box.check(activations)
-        tips, twists = np.empty((len(gamma), 3)), np.empty((len(gamma), 6, self.box.bundles))
-        parallel.run(
-            partial(jacobian.jacobians, self._table, gamma[b], tips[b], twists[b])
-            for b in parallel.blocks(len(gamma), BLOCK // 8)
-        )
-        return tips, twists
+    def fill(
+        self,
+        gamma: Array,
+        tips: Array,
+        slopes: Array | None = None,
+        twists: Array | None = None,
+        status: Status | None = None,
+        directions: Array | None = None,
+    ) -> None:
+        """Put tips, and what else is asked for, into place: theory (25) and (31)."""
+        derivatives = slopes if twists is None else twists
+        if derivatives is None:
+            rod.tips(self._table, gamma, tips)
+        else:
+            jacobian.jacobians(self._table, gamma, tips, derivatives)
+        if slopes is not None and twists is not None:
+            position_slopes(tips, twists, slopes)
+        if status is not None:
+            status[:] = TipStatus.STABLE
+        if directions is not None:
+            place, directors = np.empty((len(gamma), 1, 3)), np.empty((len(gamma), 1, 3, 3))
+            frames.frames(*self._tip_table, gamma, place, directors)
+            directions[:] = directors[:, 0, 2]
 
     def farthest(self) -> float:
         """No tip is farther from the base than this [m], the length of the longest arm."""
@@ -87,7 +102,9 @@ class FreeRod(ArmRod):
     def _linearization(self) -> Linearization:
         return Linearization(self.arm, self.box)
 
-    def frames(self, activations: ArrayLike, stations: ArrayLike) -> Frames:
+    def frames(
+        self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
+    ) -> Frames:
         """Centerline and directors at ascending stations Z [m]."""
         gamma, z = self.box.check(activations), self.check_stations(stations)
         table, ends = self._station_table(z)
@@ -96,12 +113,20 @@ class FreeRod(ArmRod):
             partial(frames.frames, table, ends, gamma[b], found.position[b], found.directors[b])
             for b in parallel.blocks(len(gamma), 1024)
         )
+        if status is not None:
+            status[:] = TipStatus.STABLE
         return found
 
-    def strains_at(self, stations: ArrayLike) -> Callable[[ArrayLike], Strains]:
+    def strains_at(self, stations: ArrayLike) -> Callable[..., Strains]:
         """u = Uγ and ζ = 1 + z·γ at stations Z [m] as a function of activations: theory (7)."""
         table = tables(self.arm, self.check_stations(stations, ascending=False))
-        return lambda activations: linear_strains(table, self.box.check(activations))
+
+        def strains(activations: ArrayLike, status: Status | None = None) -> Strains:
+            if status is not None:
+                status[:] = TipStatus.STABLE
+            return linear_strains(table, self.box.check(activations))
+
+        return strains
 
     def strain_range(self, stations: ArrayLike) -> StrainRange:
         """What the strains at stations Z [m] can be within the activation box."""

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.tables import Tables
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.frames import StrainRange, Strains
+from softreach.rod.tip_map import StrainRange, Strains
 
 __all__ = ["linear_strains", "strain_range"]
 
