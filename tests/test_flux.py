@@ -38,7 +38,7 @@ class Mapped(TipMap):
     def box(self):
         return ActivationBox.between(((0.0, 1.0),) * 3, tuple("abc"))
 
-    def fill(self, gamma, tips, slopes=None, twists=None, status=None, directions=None):
+    def fill(self, gamma, tips, slopes=None, *, twists=None, status=None, directions=None):
         tips[:] = self.of(gamma)
         if slopes is None:
             return

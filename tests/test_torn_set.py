@@ -52,7 +52,7 @@ class Shifted(TipMap):
     def box(self):
         return ActivationBox.between(self.bounds, tuple("abcdef"[: len(self.bounds)]))
 
-    def fill(self, gamma, tips, slopes=None, twists=None, status=None, directions=None):
+    def fill(self, gamma, tips, slopes=None, *, twists=None, status=None, directions=None):
         tips[:] = 0.0
         columns = min(3, gamma.shape[1])
         tips[:, :columns] = gamma[:, :columns]

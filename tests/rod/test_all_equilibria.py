@@ -9,7 +9,8 @@ import pytest
 
 import softreach as sr
 from softreach.arm.loads import PointLoad
-from softreach.rod import TipStatus, equilibria_by_degree, free_bundles, tip_map
+from softreach.rod import TipStatus, free_bundles, tip_map
+from softreach.rod.loaded import all_equilibria as equilibria_by_degree
 from softreach.rod.view import stable_tips
 from tests.bodies import oracle_rod, rubber
 from tests.oracles import column

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from softreach.arm import Manipulator, designs
 from softreach.arm.loads import Loads
 from softreach.rod.free import FreeRod
-from softreach.rod.loaded import LoadedRod
+from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
 from softreach.support.errors import InvalidDesign, InvalidInput

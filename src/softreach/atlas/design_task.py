@@ -19,9 +19,8 @@ from softreach.cloud.curvature import stream_statistics
 from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.geometry.delaunay import delaunay
 from softreach.geometry.hull import convex_hull
-from softreach.rod.never_at_rest import none_of
 from softreach.rod.rods import tip_map
-from softreach.rod.tip_map import TipMap, TipStatus
+from softreach.rod.tip_map import TipMap, TipStatus, none_of
 from softreach.support.errors import SoftreachError, no_warnings
 from softreach.support.files.sealed_store import StoreFailed
 

@@ -78,8 +78,8 @@ def _loaded() -> list[Callable[[], object]]:
     """Small jobs that together call the kernels of loads."""
     from softreach.arm import designs
     from softreach.arm.loads import Loads
-    from softreach.rod.equilibria_by_degree import equilibria
     from softreach.rod.kinematics import configuration, tip_jacobian, tip_positions
+    from softreach.rod.loaded.all_equilibria import equilibria
 
     free = designs.lce_arm()
     kinds = (

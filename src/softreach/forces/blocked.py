@@ -13,8 +13,8 @@ from softreach.forces.growth import Grown, Growth
 from softreach.forces.stop import Stop
 from softreach.inverse import solve_inverse
 from softreach.inverse.request import checked_activations, checked_targets
-from softreach.rod.loaded import LoadedRod
-from softreach.rod.pushing_tip import PushingTip
+from softreach.rod.loaded.pushing_tip import PushingTip
+from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance

@@ -58,7 +58,7 @@ def refined(rod: TipMap, tol: float) -> TipMap:
 def _of_arm(arm: Manipulator, tol: float) -> TipMap:
     if arm.loads is None:
         return FreeRod(arm, tol)
-    from softreach.rod.loaded import LoadedRod
+    from softreach.rod.loaded.rod import LoadedRod
 
     return LoadedRod(arm, tol)
 

@@ -26,21 +26,6 @@ from softreach.support.arguments import instance
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput, counted
 
-__all__ = [
-    "BLOCK",
-    "ArmRod",
-    "Frames",
-    "Status",
-    "StrainRange",
-    "Strains",
-    "TipMap",
-    "TipMotions",
-    "TipStatus",
-    "a_tip_map",
-    "an_arm",
-    "position_slopes",
-]
-
 Array = NDArray[np.float64]
 Status = NDArray[np.int8]
 
@@ -82,6 +67,7 @@ class TipMap(ABC):
         gamma: Array,
         tips: Array,
         slopes: Array | None = None,
+        *,
         twists: Array | None = None,
         status: Status | None = None,
         directions: Array | None = None,
@@ -339,3 +325,30 @@ an_arm = instance((Manipulator, TipMap), "a Manipulator or a TipMap")
 """An argument that is a design, or its tip map."""
 
 a_tip_map = instance(TipMap, "a TipMap")
+
+
+# What to say of loads under which no activation has an equilibrium that could be used.
+
+
+def none_of(tried: int, sought: str = "a stable equilibrium") -> str:
+    """What was found of as many activations, as a sentence.
+
+    Args:
+        tried: How many.
+        sought: What they do not have.
+    """
+    return f"none of {tried} activations tried has {sought}"
+
+
+def too_heavy(found: str) -> InvalidInput:
+    """What to raise where nothing is left to go on with.
+
+    Args:
+        found: What is missing.
+    """
+    return InvalidInput("loads", found, "such that some have one", "lighten the load")
+
+
+def none_stable(tried: int) -> InvalidInput:
+    """What to raise where nothing is reached, after as many activations."""
+    return too_heavy(none_of(tried))

@@ -144,6 +144,7 @@ class View(TipMap):
         gamma: Array,
         tips: Array,
         slopes: Array | None = None,
+        *,
         twists: Array | None = None,
         status: Status | None = None,
         directions: Array | None = None,
@@ -153,7 +154,9 @@ class View(TipMap):
             status = np.empty(len(gamma), np.int8)
         base_slopes, base_twists = self._room(slopes), self._room(twists)
         at = self.activations(gamma)
-        self.base.fill(at, tips, base_slopes, base_twists, status, directions)
+        self.base.fill(
+            at, tips, base_slopes, twists=base_twists, status=status, directions=directions
+        )
         self._put(base_slopes, slopes)
         self._put(base_twists, twists)
         self._drop(status, tips, slopes, twists, directions)

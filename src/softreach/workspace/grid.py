@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.kernels.image.contour import stretches
-from softreach.rod.never_at_rest import none_stable
 from softreach.rod.rods import refined
-from softreach.rod.tip_map import TipMap
+from softreach.rod.tip_map import TipMap, none_stable
 from softreach.rod.view import stable_tips
 from softreach.support.parallel import blocks
 from softreach.support.progress import Progress, silent

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.never_at_rest import too_heavy
 from softreach.rod.rods import tip_map
-from softreach.rod.tip_map import TipMap
+from softreach.rod.tip_map import TipMap, too_heavy
 from softreach.support.arguments import (
     POSITIVE,
     as_given,

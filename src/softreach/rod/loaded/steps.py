@@ -15,8 +15,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.rod.equilibrium import Solver
-from softreach.rod.found_equilibria import Equilibria
+from softreach.rod.loaded.shooting import Equilibria
+from softreach.rod.loaded.solver import Solver
 from softreach.rod.tip_map import TipStatus
 from softreach.support.errors import InvalidInput
 

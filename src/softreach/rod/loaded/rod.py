@@ -12,14 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.loads import Loads
 from softreach.arm.tables import tables
 from softreach.kernels.rod.tips import LANES
-from softreach.rod.equilibrium import LATER_RUNGS, Solver
-from softreach.rod.found_equilibria import Equilibria
-from softreach.rod.free import FreeRod
-from softreach.rod.linear_strains import linear_strains
-from softreach.rod.load_phase import check_phase
-from softreach.rod.load_tables import ArmBody, Body, LoadTables
-from softreach.rod.loaded_shapes import Shapes
-from softreach.rod.loaded_steps import (
+from softreach.rod.free import FreeRod, linear_strains
+from softreach.rod.loaded.phase import check_phase
+from softreach.rod.loaded.shapes import Shapes
+from softreach.rod.loaded.shooting import Equilibria
+from softreach.rod.loaded.solver import LATER_RUNGS, Solver
+from softreach.rod.loaded.steps import (
     UNJUDGED,
     Differences,
     checked,
@@ -27,8 +25,8 @@ from softreach.rod.loaded_steps import (
     shape_differences,
     tip_differences,
 )
-from softreach.rod.never_at_rest import none_of, too_heavy
-from softreach.rod.pilot import pilot_activations
+from softreach.rod.loaded.tables import ArmBody, Body, LoadTables
+from softreach.rod.steps import pilot_activations
 from softreach.rod.tip_map import (
     BLOCK,
     ArmRod,
@@ -37,7 +35,9 @@ from softreach.rod.tip_map import (
     StrainRange,
     Strains,
     TipStatus,
+    none_of,
     position_slopes,
+    too_heavy,
 )
 from softreach.support import parallel
 
@@ -143,6 +143,7 @@ class LoadedRod(ArmRod):
         gamma: Array,
         tips: Array,
         slopes: Array | None = None,
+        *,
         twists: Array | None = None,
         status: Status | None = None,
         directions: Array | None = None,
