@@ -19,8 +19,6 @@ __all__ = [
     "Range",
     "SoftreachError",
     "SoftreachWarning",
-    "no_warnings",
-    "warn",
 ]
 
 _LONGEST = 300
