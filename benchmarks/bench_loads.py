@@ -20,8 +20,8 @@ import softreach as sr
 from benchmarks import loads_peers
 from benchmarks.bench_kernels import best_time, twelve_bundles
 from softreach.rod.free import FreeRod
-from softreach.rod.loaded import LoadedRod
-from softreach.rod.search import Rung
+from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.loaded.shooting import Rung
 from softreach.rod.tip_map import TipMap, TipStatus
 from softreach.support import parallel
 from softreach.workspace import reachable_set

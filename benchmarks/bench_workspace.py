@@ -17,7 +17,7 @@ import pytest
 
 import softreach as sr
 from benchmarks.memory import peak_bytes, reset_peak
-from softreach.rod.tip_map import tip_map
+from softreach.rod.rods import tip_map
 from softreach.workspace import reachable_set
 
 ALPHA = 0.03

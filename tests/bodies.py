@@ -12,7 +12,7 @@ from numpy.polynomial import chebyshev
 
 from softreach.arm import Loads, Manipulator
 from softreach.arm.tables import tables
-from softreach.rod.load_tables import Body
+from softreach.rod.loaded.tables import Body
 from tests.oracles import rod
 
 _DEGREE = 40

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ import pytest
 from softreach.arm import Loads, Manipulator, designs
 from softreach.arm.parameters import changed
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.tip_map import TipMap, tip_map
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipMap
 from softreach.workspace import ReachableSolid, reachable_set
 from softreach.workspace.flux import signed_volume
 from softreach.workspace.injective import is_one_to_one
@@ -32,27 +34,26 @@ class Mapped(TipMap):
     arm: Manipulator = ARM
     tol: float = 1e-12
 
-    @property
+    @cached_property
     def box(self):
         return ActivationBox.between(((0.0, 1.0),) * 3, tuple("abc"))
 
-    def refined(self, tol):
-        return self
-
-    def fill_tips(self, gamma, out):
-        out[:] = self.of(gamma)
-
-    def fill_slopes(self, gamma, tips, slopes):
-        self.fill_tips(gamma, tips)
+    def fill(self, gamma, tips, slopes=None, *, twists=None, status=None, directions=None):
+        tips[:] = self.of(gamma)
+        if slopes is None:
+            return
         for k in range(3):
             moved = gamma.astype(complex)
             moved[:, k] += 1j * STEP
             slopes[:, :, k] = np.imag(self.of(moved)) / STEP
 
-    def tip_twists(self, activations):
+    def frames(self, activations, stations, status=None):
         raise NotImplementedError
 
-    frames = strains_at = strain_range = radius = tip_twists  # pyright: ignore[reportAssignmentType]
+    def strains_at(self, stations):
+        raise NotImplementedError
+
+    strain_range = strains_at
 
 
 def columns(*each: np.ndarray) -> np.ndarray:

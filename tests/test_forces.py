@@ -9,9 +9,10 @@ from scipy.optimize import minimize
 import softreach as sr
 from softreach.arm.loads import Loads
 from softreach.forces import Stop, blocked_force
-from softreach.rod.equilibrium import Solver
-from softreach.rod.load_tables import LoadTables
-from softreach.rod.tip_map import TipStatus, tip_map
+from softreach.rod.loaded.solver import Solver
+from softreach.rod.loaded.tables import LoadTables
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipStatus
 from softreach.stiffness import tip_compliance
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.bodies import rubber

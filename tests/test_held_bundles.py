@@ -29,6 +29,20 @@ def without(arm: Manipulator, bundle: int) -> Manipulator:
     return arm.replace(actuators=(*arm.actuators[:bundle], *arm.actuators[bundle + 1 :]))
 
 
+def test_results_name_the_bundles_that_their_tip_map_has():
+    arm = holding(designs.redundant_trunk(), {1: -0.5})
+    rod, gamma = free_bundles(tip_map(arm)), [-0.4, -0.8, -0.3]
+    names = [name for k, name in enumerate(arm.bundle_names) if k != 1]
+    shape = configuration(rod, gamma, 5)
+    assert shape.bundle.values.tolist() == names
+    target = rod.tips([gamma])
+    solved = solve_inverse(rod, target).to_dataset()
+    assert solved.bundle.values.tolist() == names
+    np.testing.assert_allclose(solved.activation.sel(bundle=names[0])[0], -0.4, atol=1e-6)
+    path = track_path(rod, rod.tips([gamma, np.add(gamma, 0.01)]), gamma)
+    assert path.bundle.values.tolist() == names
+
+
 def five_bundles() -> Manipulator:
     return designs.redundant_trunk().split("longitudinal 1", 2)
 

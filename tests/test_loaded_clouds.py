@@ -16,7 +16,7 @@ from softreach.cloud.volume import concave_hull, convex_hull, unreachability
 from softreach.export import export_cloud
 from softreach.plot.coloring import color_samples
 from softreach.rod import configuration, tip_map
-from softreach.rod.free_bundles import free_bundles
+from softreach.rod.view import free_bundles
 
 SAMPLES = 3000
 LOADS = Loads(gravity=(0.0, 0.0, 9.81), payload=0.020)

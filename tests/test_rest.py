@@ -10,7 +10,8 @@ import pytest
 import softreach as sr
 from softreach.arm.summary import load_number
 from softreach.rest import rest
-from softreach.rod.tip_map import TipStatus, tip_map
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipStatus
 from softreach.support.errors import SoftreachWarning
 from tests.bodies import rubber
 

@@ -9,8 +9,8 @@ from scipy.integrate import quad
 import softreach as sr
 from softreach.arm.loads import Loads
 from softreach.rod.free import FreeRod
-from softreach.rod.free_bundles import free_bundles
-from softreach.rod.tip_map import tip_map
+from softreach.rod.rods import tip_map
+from softreach.rod.view import free_bundles
 from softreach.stiffness import (
     cloud_compliance,
     principal_compliances,

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 
 from softreach.arm.tables import tables
-from softreach.rod.tip_map import tip_map
+from softreach.rod.rods import refined, tip_map
 from tests.laws import arms, in_box
 
 
@@ -56,9 +56,9 @@ def quantities(strains):
 
 def test_a_refined_map_is_as_near_as_asked_and_a_coarser_one_is_not_made(trunk):
     rod = tip_map(trunk, 1e-4)
-    assert rod.refined(1e-3) is rod
-    fine = rod.refined(1e-9)
+    assert refined(rod, 1e-3) is rod
+    fine = refined(rod, 1e-9)
     assert (fine.arm, fine.tol) == (trunk, 1e-9)
     gamma = in_box(trunk, 100)
     assert np.linalg.norm(fine.tips(gamma) - rod.tips(gamma), axis=1).max() < 1e-4
-    assert fine.refined(1e-6).tol == pytest.approx(1e-9)
+    assert refined(fine, 1e-6).tol == pytest.approx(1e-9)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pytest
@@ -11,8 +12,9 @@ import pytest
 from softreach.arm import Loads, Manipulator, designs
 from softreach.cloud.clouds import compute_cloud
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.stable_tips import stable_tips
-from softreach.rod.tip_map import TipMap, TipStatus, tip_map
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipMap, TipStatus
+from softreach.rod.view import stable_tips
 from softreach.support.errors import InvalidInput
 from softreach.workspace import (
     ReachableCurve,
@@ -46,34 +48,29 @@ class Shifted(TipMap):
     def supports_unstable(self):
         return True
 
-    @property
+    @cached_property
     def box(self):
         return ActivationBox.between(self.bounds, tuple("abcdef"[: len(self.bounds)]))
 
-    def refined(self, tol):
-        return self
-
-    def fill_tips(self, gamma, out):
-        out[:] = 0.0
+    def fill(self, gamma, tips, slopes=None, *, twists=None, status=None, directions=None):
+        tips[:] = 0.0
         columns = min(3, gamma.shape[1])
-        out[:, :columns] = gamma[:, :columns]
-        out[:, 0] += self.shift(gamma)
-
-    def fill_tips_and_status(self, gamma, out, status):
-        self.fill_tips(gamma, out)
+        tips[:, :columns] = gamma[:, :columns]
+        tips[:, 0] += self.shift(gamma)
         lost = ~self.stable(gamma)
-        status[:] = np.where(lost, TipStatus.NO_EQUILIBRIUM, TipStatus.STABLE)
-        out[lost] = np.nan
+        tips[lost] = np.nan
+        if slopes is not None:
+            slopes[:] = np.eye(3, gamma.shape[1])
+        if status is not None:
+            status[:] = np.where(lost, TipStatus.NO_EQUILIBRIUM, TipStatus.STABLE)
 
-    def fill_slopes(self, gamma, tips, slopes):
-        self.fill_tips(gamma, tips)
-        tips[~self.stable(gamma)] = np.nan
-        slopes[:] = np.eye(3, gamma.shape[1])
-
-    def tip_twists(self, activations):
+    def frames(self, activations, stations, status=None):
         raise NotImplementedError
 
-    frames = strains_at = strain_range = radius = tip_twists
+    def strains_at(self, stations):
+        raise NotImplementedError
+
+    strain_range = strains_at
 
 
 def snapping(gamma: np.ndarray) -> np.ndarray:

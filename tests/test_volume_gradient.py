@@ -7,7 +7,7 @@ import pytest
 
 from softreach.arm import Loads, Manipulator, designs
 from softreach.arm.parameters import changed, find_parameter
-from softreach.rod.tip_map import tip_map
+from softreach.rod.rods import tip_map
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.workspace import VolumeGradient, reachable_set, volume_gradient
 from softreach.workspace.flux import signed_volume

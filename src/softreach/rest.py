@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.rod.free import FreeRod
-from softreach.rod.loaded import LoadedRod
+from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.tip_map import TipStatus
 from softreach.support.arguments import checked
 from softreach.support.errors import InvalidInput

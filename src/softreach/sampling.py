@@ -104,16 +104,16 @@ def _sobol(n: int, dim: int, seed: int) -> Draw:
 
     del n
     sequence = qmc.Sobol(dim, scramble=True, rng=np.random.default_rng(seed))
-    # Blocks need not be powers of two, the whole is: its balance is what counts.
-    return lambda first, count: _quiet_random(sequence, count)
+    # Blocks need not be powers of two, the whole is: its balance is what counts. SciPy would warn
+    # of a first draw that is none, so that the first point is drawn by itself.
+    start = sequence.random(1)
 
+    def draw(first: int, count: int) -> Array:
+        if first or not count:
+            return sequence.random(count)
+        return np.concatenate([start, sequence.random(count - 1)]) if count > 1 else start
 
-def _quiet_random(sequence, count: int) -> Array:
-    import warnings
-
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="The balance properties of Sobol'")
-        return sequence.random(count)
+    return draw
 
 
 def _grid(n: int, dim: int, seed: int) -> Draw:

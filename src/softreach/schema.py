@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -89,18 +89,26 @@ def is_stable(data: xr.Dataset | xr.DataArray) -> NDArray[np.bool_]:
 
 
 def configuration_dataset(
-    arm: Manipulator, activation: Array, z: Array, **arrays: Array
+    arm: Manipulator,
+    activation: Array,
+    z: Array,
+    *,
+    names: Sequence[str] | None = None,
+    **arrays: Array,
 ) -> xr.Dataset:
-    """Shapes of an arm at stations Z, one for each row of `activation`."""
+    """Shapes of an arm at stations Z, one for each row of `activation`.
+
+    `names` are those of the bundles with a column there; by default all.
+    """
     import xarray as xr
 
-    variables = _variables(_CONFIGURATION, arm, {**arrays, "activation": activation})
+    variables = _variables(_CONFIGURATION, arm, {**arrays, "activation": activation}, names)
     coordinates = {
         "Z": ("station", z, {"units": "m", "long_name": "station before activation"}),
         "axis": list(AXES),
         "director": ["d1", "d2", "d3"],
         "component": ["u1", "u2", "u3"],
-        **bundle_coordinates(arm),
+        **bundle_coordinates(arm, names),
     }
     return xr.Dataset(variables, coordinates, provenance(arm))
 
@@ -199,11 +207,18 @@ def _disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[InvalidInput
         yield InvalidInput("cloud.status", "another number", f"one of {_STATUS}")
 
 
-def bundle_coordinates(arm: Manipulator) -> dict[str, Any]:
-    """Names of the bundles, and the unit of each if they differ."""
-    units = arm.bundle_units
+def bundle_coordinates(arm: Manipulator, names: Sequence[str] | None = None) -> dict[str, Any]:
+    """Names of the bundles, of all or of some, and the unit of each if they differ."""
+    units = _units(arm, names)
     each = {} if len(set(units)) == 1 else {"unit": ("bundle", list(units))}
-    return {"bundle": list(arm.bundle_names), **each}
+    return {"bundle": list(arm.bundle_names if names is None else names), **each}
+
+
+def _units(arm: Manipulator, names: Sequence[str] | None) -> tuple[str, ...]:
+    if names is None:
+        return arm.bundle_units
+    of_name = dict(zip(arm.bundle_names, arm.bundle_units, strict=True))
+    return tuple(of_name[name] for name in names)
 
 
 _SYMBOLS = {"1": "γ", "N": "τ", "Pa": "P"}
@@ -222,9 +237,9 @@ def activation_units(activation: xr.DataArray) -> tuple[str, ...]:
     return (str(activation.attrs.get("units", "1")),) * count
 
 
-def activation_attributes(arm: Manipulator) -> dict[str, str]:
+def activation_attributes(arm: Manipulator, names: Sequence[str] | None = None) -> dict[str, str]:
     """The unit of activations if all bundles share it; else the coordinate `unit` has each."""
-    units = set(arm.bundle_units)
+    units = set(_units(arm, names))
     return {"units": units.pop()} if len(units) == 1 else {}
 
 
@@ -232,8 +247,9 @@ def _variables(
     table: Mapping[str, tuple[tuple[str, ...], str | None, str]],
     arm: Manipulator,
     arrays: Mapping[str, Array],
+    names: Sequence[str] | None = None,
 ) -> dict[str, tuple[tuple[str, ...], Array, dict[str, str]]]:
-    activation = activation_attributes(arm)
+    activation = activation_attributes(arm, names)
     return {
         name: (
             dims,

@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import tip_map_of
-from softreach.rod.loaded import LoadedRod
-from softreach.rod.tip_map import BLOCK, TipMap, tip_map
+from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import BLOCK, TipMap
 from softreach.schema import AXES, a_cloud, check_cloud
 from softreach.support import parallel
 from softreach.support.arguments import checked

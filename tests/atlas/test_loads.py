@@ -17,7 +17,7 @@ from softreach.atlas import (
 )
 from softreach.cloud.clouds import compute_cloud
 from softreach.cloud.volume import concave_hull
-from softreach.rod import load_phase
+from softreach.rod.loaded import phase as load_phase
 from softreach.rod.tip_map import TipStatus
 from softreach.support.errors import SoftreachWarning
 

@@ -10,7 +10,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.inverse import PathStatus, Status, solve_inverse
 from softreach.inverse.path import track_path
 from softreach.rod import tip_map
-from softreach.rod.loaded import LoadedRod
+from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.tip_map import TipStatus
 from softreach.support.errors import InvalidInput
 from tests.bodies import oracle_rod

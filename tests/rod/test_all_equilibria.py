@@ -9,7 +9,9 @@ import pytest
 
 import softreach as sr
 from softreach.arm.loads import PointLoad
-from softreach.rod import TipStatus, equilibria_by_degree, tip_map
+from softreach.rod import TipStatus, free_bundles, tip_map
+from softreach.rod.loaded import all_equilibria as equilibria_by_degree
+from softreach.rod.view import stable_tips
 from tests.bodies import oracle_rod, rubber
 from tests.oracles import column
 from tests.oracles.chain import Chain
@@ -179,6 +181,19 @@ def test_turning_gravity_and_the_arm_changes_nothing_but_the_directions():
     one, other = (sr.equilibria(arm, np.zeros(3)) for arm in (there, back))
     np.testing.assert_allclose(one.tips * [-1, 1, 1], other.tips, atol=1e-6)
     np.testing.assert_array_equal(one.status, other.status)
+
+
+@pytest.mark.parametrize("restrict", [free_bundles, stable_tips])
+def test_those_of_a_view_are_those_of_the_arm(restrict):
+    arm = trunk(12.0, arm=TRUNK.with_bounds([(-5 / 3, 0), (-0.5, -0.5), (-5 / 3, 0)]))
+    whole, gamma = tip_map(arm), np.array([-0.03, -0.5, -0.1])
+    expected = sr.equilibria(whole, gamma)
+    assert len(expected) == 3
+    rod = restrict(whole)
+    every = sr.equilibria(rod, gamma[whole.box.free] if rod.box.bundles == 2 else gamma)
+    np.testing.assert_array_equal(every.tips, expected.tips)
+    np.testing.assert_array_equal(every.activation, gamma)
+    assert every.to_dataset().bundle.values.tolist() == list(arm.bundle_names)
 
 
 def test_an_arm_without_loads_has_one():

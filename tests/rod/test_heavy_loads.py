@@ -7,12 +7,12 @@ import pytest
 
 from softreach.arm import designs
 from softreach.arm.loads import Loads, PointLoad
-from softreach.rod import loaded_steps
-from softreach.rod.equilibrium import Solver
 from softreach.rod.free import FreeRod
-from softreach.rod.load_tables import LoadTables
-from softreach.rod.loaded import LoadedRod
-from softreach.rod.search import Rung
+from softreach.rod.loaded import steps as loaded_steps
+from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.loaded.shooting import Rung
+from softreach.rod.loaded.solver import Solver
+from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.tip_map import TipStatus
 from softreach.support.errors import InvalidInput
 from tests.bodies import Uniform, rubber, uniform
@@ -176,5 +176,5 @@ def test_a_few_activations_near_the_loss_of_stability_do_not_choose_the_steps(mo
         return found
 
     again = LoadedRod(rod.arm, 1e-6)
-    monkeypatch.setattr("softreach.rod.loaded.tip_differences", magnified)
+    monkeypatch.setattr("softreach.rod.loaded.rod.tip_differences", magnified)
     assert again.steps == expected

@@ -14,7 +14,7 @@ from softreach.arm import describe, designs
 from softreach.arm.tables import tables
 from softreach.kernels.rod import reference
 from softreach.rod.free import FreeRod
-from softreach.rod.tip_map import tip_map
+from softreach.rod.rods import tip_map
 from softreach.support.errors import InvalidInput
 from tests.laws import arm_of, arms, in_box, integrated_tip, single
 

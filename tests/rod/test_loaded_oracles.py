@@ -8,9 +8,9 @@ import pytest
 from softreach.arm import FiberArchitecture, LinearTaper, designs
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.tables import tables
-from softreach.rod.equilibrium import Solver
-from softreach.rod.load_tables import ArmBody, LoadTables
-from softreach.rod.loaded import LoadedRod
+from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.loaded.solver import Solver
+from softreach.rod.loaded.tables import ArmBody, LoadTables
 from softreach.rod.tip_map import TipStatus
 from tests.bodies import oracle_rod, uniform
 from tests.oracles import bend, elastica, loaded_rod

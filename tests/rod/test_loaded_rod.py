@@ -12,13 +12,13 @@ from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.tables import tables
 from softreach.cloud.curvature import stream_statistics
 from softreach.kernels.loaded import loaded_reference
-from softreach.rod import equilibrium
-from softreach.rod import loaded as loaded_module
-from softreach.rod.equilibrium import Solver
 from softreach.rod.free import FreeRod
-from softreach.rod.load_tables import LoadTables
-from softreach.rod.loaded import LoadedRod
-from softreach.rod.search import Rung
+from softreach.rod.loaded import rod as loaded_module
+from softreach.rod.loaded import solver as equilibrium
+from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.loaded.shooting import Rung
+from softreach.rod.loaded.solver import Solver
+from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.tip_map import TipStatus
 from softreach.support.errors import InvalidDesign
 from tests.bodies import oracle_rod, rubber, uniform
@@ -212,8 +212,8 @@ def test_statistics_of_strains_count_only_arms_that_have_an_equilibrium(monkeypa
     expected = stream_statistics(rod, [GAMMA[[0, 3]]], stations, bins=64)
     whole = rod.strains_at(stations)
 
-    def torn(gamma):
-        found = whole(gamma)
+    def torn(gamma, status=None):
+        found = whole(gamma, status)
         found.curvature[1:3], found.extension[1:3] = np.nan, np.nan
         return found
 

@@ -10,8 +10,8 @@ from scipy.optimize import linprog
 
 from softreach.arm import designs
 from softreach.arm.loads import Loads, PointLoad
-from softreach.rod.equilibrium import Solver
-from softreach.rod.load_tables import LoadTables
+from softreach.rod.loaded.solver import Solver
+from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.tip_map import TipStatus
 from tests.bodies import uniform
 from tests.oracles import linear_strains, sorosim

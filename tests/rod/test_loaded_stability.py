@@ -10,10 +10,10 @@ from scipy.integrate import solve_ivp
 
 from softreach.arm import designs
 from softreach.arm.loads import Loads
-from softreach.rod.equilibria_by_degree import equilibria
-from softreach.rod.equilibrium import Solver
 from softreach.rod.free import FreeRod
-from softreach.rod.load_tables import ArmBody, Body, LoadTables
+from softreach.rod.loaded.all_equilibria import equilibria
+from softreach.rod.loaded.solver import Solver
+from softreach.rod.loaded.tables import ArmBody, Body, LoadTables
 from softreach.rod.tip_map import TipStatus
 from tests.bodies import oracle_rod, rubber
 from tests.oracles import column

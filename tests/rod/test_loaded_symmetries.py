@@ -10,8 +10,8 @@ import pytest
 
 from softreach.arm import designs
 from softreach.arm.loads import Loads, PointLoad
-from softreach.rod.equilibrium import Solver
-from softreach.rod.load_tables import ArmBody, Body, LoadTables
+from softreach.rod.loaded.solver import Solver
+from softreach.rod.loaded.tables import ArmBody, Body, LoadTables
 from tests.bodies import rubber
 
 TRUNK = designs.minimal_trunk()

@@ -9,8 +9,8 @@ import pytest
 
 from softreach.arm import designs
 from softreach.arm.loads import Loads
-from softreach.rod.equilibrium import Solver
-from softreach.rod.loaded import LoadedRod
+from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.loaded.solver import Solver
 from softreach.rod.tip_map import TipStatus
 from tests.bodies import rubber
 

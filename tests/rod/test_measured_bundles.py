@@ -7,9 +7,8 @@ import pytest
 
 import softreach as sr
 from softreach.arm import Chamber, LinearTaper, Loads, Material, Ring, Section, Tendon
-from softreach.rod.free_bundles import free_bundles
-from softreach.rod.measured_bundles import activation_measures, measured_bundles
-from softreach.rod.tip_map import tip_map
+from softreach.rod.rods import tip_map
+from softreach.rod.view import activation_measures, free_bundles, measured_bundles
 from tests.laws import in_box
 
 TENDONS = Tendon(name="tendon", distance_ratio=0.9, bundles=3, activation_bounds=(0, 8))

@@ -10,7 +10,7 @@ import pytest
 from softreach.arm import designs
 from softreach.rod import tip_positions
 from softreach.rod.free import FreeRod
-from softreach.rod.tip_map import tip_map
+from softreach.rod.rods import tip_map
 from softreach.support.errors import InvalidDesign, InvalidInput
 
 

@@ -18,8 +18,9 @@ from hypothesis import strategies as st
 from softreach.arm import Manipulator, designs
 from softreach.arm.loads import Loads
 from softreach.rod.free import FreeRod
-from softreach.rod.loaded import LoadedRod
-from softreach.rod.tip_map import BLOCK, TipMap, TipStatus, tip_map
+from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.bodies import rubber
 from tests.laws import arms, in_box, integrated_tip
@@ -225,10 +226,10 @@ def test_the_filling_of_tips_and_slopes_is_that_of_whole_batches(make, arm):
     gamma = activations(rod, 10)
     tips, slopes = rod.tips_and_slopes(gamma)
     filled = np.full_like(tips, np.nan)
-    rod.tip_task(gamma, filled)()
+    rod.fill(gamma, filled)
     np.testing.assert_array_equal(filled, rod.tips(gamma))
     filled_slopes = np.full_like(slopes, np.nan)
-    rod.fill_slopes(gamma, filled, filled_slopes)
+    rod.fill(gamma, filled, filled_slopes)
     np.testing.assert_array_equal(filled, tips)
     np.testing.assert_array_equal(filled_slopes, slopes)
 

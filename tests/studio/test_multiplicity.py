@@ -7,7 +7,7 @@ import pytest
 
 from softreach.arm import designs
 from softreach.inverse import solve_inverse
-from softreach.rod.tip_map import tip_map
+from softreach.rod.rods import tip_map
 from softreach.studio.colors import sample_values
 from softreach.studio.multiplicity import count_activations, uncounted
 from softreach.studio.reach import Quality, Reach, shown_rows

@@ -8,7 +8,8 @@ import pytest
 import softreach as sr
 from softreach.arm import designs
 from softreach.arm.parameters import changed
-from softreach.rod.tip_map import TipStatus, tip_map
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipStatus
 from softreach.studio.pull import Pull
 
 TRUNK = designs.minimal_trunk()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from threading import Lock
@@ -30,7 +29,7 @@ from softreach.support.arguments import (
     optional,
     within,
 )
-from softreach.support.errors import SoftreachWarning, counted
+from softreach.support.errors import counted, warn
 from softreach.support.memory import check_disk, check_memory
 from softreach.support.progress import Progress, bar
 from softreach.workspace.reach import ACCURACIES
@@ -183,7 +182,7 @@ def build_atlas(
     atlas = AtlasStore.begin(store, command, durable=durable)
     held = contents(atlas, tips_of=indices.tolist())
     if held.damage:
-        _warn(f"{held.damage}; what is damaged is computed again")
+        warn(f"{held.damage}; what is damaged is computed again")
     ended = np.isin(held.status[indices], (DONE, GAP, UNSTABLE))
     _run(atlas, indices[~ended], executor, progress)
     built = open_atlas(store)
@@ -200,9 +199,7 @@ def _run(
 ) -> None:
     failures: dict[int, str] = {}
     lock = Lock()
-    with bar("computing designs", len(indices)) as shown, warnings.catch_warnings():
-        # The metrics hold what these warnings say: spacing of the points, error of the volume.
-        warnings.simplefilter("ignore", SoftreachWarning)
+    with bar("computing designs", len(indices)) as shown:
 
         def on_outcome(outcome: tuple[int, str]) -> None:
             index, failure = outcome
@@ -214,14 +211,14 @@ def _run(
         run_designs(atlas, indices.tolist(), executor, on_outcome)
     if failures:
         index, message = next(iter(failures.items()))
-        _warn(f"{counted(len(failures), 'design')} failed, first number {index}: {message}")
+        warn(f"{counted(len(failures), 'design')} failed, first number {index}: {message}")
 
 
 def _warn_of_gaps(space: DesignSpace) -> None:
     if space.gaps and len(space.gaps) < space.size:
         index, reason = next(iter(space.gaps.items()))
         stay = "stays a gap" if len(space.gaps) == 1 else "stay gaps"
-        _warn(
+        warn(
             f"{len(space.gaps)} of {space.size} designs cannot exist and {stay}, first "
             f"{space.values(index)}: {reason}"
         )
@@ -233,7 +230,7 @@ def _warn_of_unstable(atlas: xr.Dataset) -> None:
     if len(unstable):
         first, number = unstable[0], atlas["number"].values.ravel()
         message = atlas["message"].values.ravel()[first]
-        _warn(
+        warn(
             f"{counted(len(unstable), 'design')} without metrics, first number {number[first]}: "
             f"{message}"
         )
@@ -247,11 +244,7 @@ def _warn_of_sparse(atlas: xr.Dataset) -> None:
     sparse = int((radius < 3.0 * over_length(atlas, "spacing")).sum())
     if sparse:
         whose = "its volume is" if sparse == 1 else "their volumes are"
-        _warn(
+        warn(
             f"alpha = {radius:.4g} L is below three mean spacings of the points of "
             f"{counted(sparse, 'design')} and {whose} too small; use more points or a larger alpha"
         )
-
-
-def _warn(message: str) -> None:
-    warnings.warn(message, SoftreachWarning, stacklevel=5)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import socket
-import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from typing import Any
@@ -20,9 +19,9 @@ from softreach.cloud.curvature import stream_statistics
 from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.geometry.delaunay import delaunay
 from softreach.geometry.hull import convex_hull
-from softreach.rod.never_at_rest import none_of
-from softreach.rod.tip_map import TipMap, TipStatus, tip_map
-from softreach.support.errors import SoftreachError, SoftreachWarning
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipMap, TipStatus, none_of
+from softreach.support.errors import SoftreachError, no_warnings
 from softreach.support.files.sealed_store import StoreFailed
 
 # What the metrics of one design are computed from; each result is found once and shared.
@@ -139,6 +138,7 @@ Outcome = tuple[int, str]
 """Number of a design, and why it failed; empty if it did not."""
 
 
+@no_warnings()  # the metrics hold what they say: spacing of the points, error of the volume
 def begin_design(store: AtlasStore, metrics: Sequence[Metric], index: int) -> Callable[[], Outcome]:
     """Do the part of a design that uses all threads; return the rest as a function to call.
 
@@ -202,14 +202,13 @@ _opened: dict[tuple[str, tuple[str, int]], AtlasStore] = {}
 def run_remotely(remote: Remote, index: int) -> Outcome:
     """Compute and store a design in a worker; a repeated call gives the same result."""
     remote.bound_threads()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SoftreachWarning)
-        try:
-            return begin_design(remote.store(), remote.metrics, index)()
-        except SoftreachError as error:
-            raise StoreFailed(str(error)) from None  # this one can be sent back
+    try:
+        return begin_design(remote.store(), remote.metrics, index)()
+    except SoftreachError as error:
+        raise StoreFailed(str(error)) from None  # this one can be sent back
 
 
+@no_warnings()
 def _finish(
     store: AtlasStore,
     metrics: Sequence[Metric],

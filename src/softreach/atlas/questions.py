@@ -24,7 +24,7 @@ from softreach.atlas.store import (
     UNSTABLE,
     AtlasStore,
 )
-from softreach.rod.tip_map import tip_map
+from softreach.rod.rods import tip_map
 from softreach.schema import cloud_dataset, with_status
 from softreach.support.arguments import (
     as_number,

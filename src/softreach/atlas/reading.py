@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -15,7 +14,7 @@ from softreach.atlas.command import Command
 from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import DAMAGED, FAILED, GAP, KNOWN, PER_DESIGN, UNSTABLE, AtlasStore
 from softreach.support.arguments import checked, dataset, text
-from softreach.support.errors import InvalidInput, SoftreachWarning, counted
+from softreach.support.errors import InvalidInput, counted, warn
 from softreach.support.files.sealed_store import Chunk, storage_errors
 from softreach.support.files.store_place import READING, check_arrays
 
@@ -202,7 +201,7 @@ def _opened(store: StoreLike, *, metrics: bool) -> xr.Dataset:
     found = contents(held, metrics=metrics)
     if found.damage:
         then = "left out; the command that built the atlas computes again what is damaged"
-        warnings.warn(f"{found.damage} ({then})", SoftreachWarning, stacklevel=4)
+        warn(f"{found.damage} ({then})")
     with storage_errors(f"{held.location} cannot be read"):
         check_arrays(held.opened)
         raw = xr.open_zarr(held.opened.place, drop_variables=_READ_HERE, **READING)

@@ -45,7 +45,7 @@ def cloud(
     from time import perf_counter
 
     from softreach.cloud.clouds import CLOUD_STORE, compute_cloud, sample_bytes, save_cloud
-    from softreach.rod.tip_map import tip_map
+    from softreach.rod.rods import tip_map
     from softreach.support.memory import check_disk
 
     arm = design_from(design, changes)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from functools import partial
 from typing import Annotated
@@ -24,11 +23,11 @@ def warmup(
 
     Example: softreach warmup --loads
     """
+    from softreach.support.errors import no_warnings
     from softreach.support.progress import bar
 
     jobs = [*_free(), *(_loaded() if loads else ())]
-    with bar("compiling", len(jobs)) as done, warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of clouds and grids that are too coarse
+    with bar("compiling", len(jobs)) as done, no_warnings():  # of clouds and grids too coarse
         for job in jobs:
             job()
             done(1)
@@ -80,8 +79,8 @@ def _loaded() -> list[Callable[[], object]]:
     """Small jobs that together call the kernels of loads."""
     from softreach.arm import designs
     from softreach.arm.loads import Loads
-    from softreach.rod.equilibria_by_degree import equilibria
     from softreach.rod.kinematics import configuration, tip_jacobian, tip_positions
+    from softreach.rod.loaded.all_equilibria import equilibria
 
     free = designs.lce_arm()
     kinds = (

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 
 from softreach import schema
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.free_bundles import FreeBundles
-from softreach.rod.measured_bundles import MeasuredBundles
-from softreach.rod.stable_tips import StableTips
-from softreach.rod.tip_map import BLOCK, TipMap, tip_map
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import BLOCK, TipMap
+from softreach.rod.view import View
 from softreach.sampling import check_sampler, cube_blocks
 from softreach.schema import a_cloud
 from softreach.support import parallel
@@ -90,8 +89,6 @@ def compute_cloud(
         SoftreachWarning: The samples take more than half of the free memory.
     """
     rod = _of_all_bundles(tip_map(arm, tol))
-    if rod.supports_unstable:
-        rod.tips(rod.box.low[None])  # what all samples need, once and not on every thread
     bundles = rod.box.bundles
     check_sampler(sampler, n, bundles, seed)
     check_room("n", int(n), bundles + 3)
@@ -227,9 +224,7 @@ def sample_bytes(bundles: int) -> int:
 
 def _of_all_bundles(rod: TipMap) -> TipMap:
     """The map of every bundle, in its own unit, of which this one may be a restriction."""
-    while isinstance(rod, FreeBundles | MeasuredBundles | StableTips):
-        rod = rod.whole
-    return rod
+    return rod.base if isinstance(rod, View) else rod
 
 
 _CHUNK = 1 << 19  # samples of a stored array that are held at once
@@ -252,12 +247,11 @@ def _fill(
         for cube in cube_blocks(sampler, len(tip), rod.box.bundles, seed, BLOCK):
             block = slice(first, first := first + len(cube))
             rod.box.from_cube(cube, out=activation[block])
-            task = rod.tip_task(activation[block], tip[block])
-            if len(status):
-                asked = activation[block], tip[block], status[block]
-                task = partial(rod.fill_tips_and_status, *asked)
+            told = status[block] if len(status) else None
+            task = partial(rod.fill, activation[block], tip[block], status=told)
             yield partial(_reported, task, progress, len(cube))
 
+    rod.prepare()
     parallel.run(tasks())
 
 

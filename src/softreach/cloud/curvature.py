@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import tip_map_of
-from softreach.rod.frames import Strains
-from softreach.rod.stable_tips import stable_tips
-from softreach.rod.tip_map import TipMap, an_arm, tip_map
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import Strains, TipMap, an_arm
+from softreach.rod.view import stable_tips
 from softreach.schema import a_cloud, provenance
 from softreach.support import parallel
 from softreach.support.arguments import as_given, checked, whole

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.cloud.clouds import tip_map_of
-from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import BLOCK
+from softreach.rod.view import stable_tips
 from softreach.schema import a_cloud, cell_dataset, check_cloud, tip_cells
 from softreach.support import parallel
 from softreach.support.arguments import POSITIVE, checked, optional, within

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.geometry.neighbors import mean_value_distance
-from softreach.rod.measured_bundles import activation_measures
+from softreach.rod.view import activation_measures
 from softreach.schema import a_cloud, cell_dataset, check_cloud, is_stable, tip_cells
 from softreach.support.arguments import POSITIVE, checked, dataset, optional, plain, within
 from softreach.support.arrays import as_indices, as_shares

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Literal
@@ -18,7 +17,7 @@ from softreach.schema import is_stable
 from softreach.support import parallel
 from softreach.support.arguments import POSITIVE, as_given, flag, plain
 from softreach.support.arrays import as_floats, as_points
-from softreach.support.errors import InvalidInput, SoftreachWarning
+from softreach.support.errors import InvalidInput, warn
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -232,11 +231,9 @@ def _warn_if_fine(hull: Hull, convex_volume: float) -> None:
     sparse = 0.6 * float(np.cbrt(convex_volume / max(hull.n, 1)))
     if hull.alpha < SPACINGS * max(hull.spacing, sparse):
         spacing = max(hull.spacing, sparse)
-        warnings.warn(
+        warn(
             f"alpha = {_in_spacings(hull, spacing)}: below {SPACINGS:g} the shape has holes "
             "between points and its volume is too small; use more points or a larger alpha",
-            SoftreachWarning,
-            stacklevel=3,
         )
 
 
@@ -251,12 +248,10 @@ def _in_spacings(hull: Hull, spacing: float) -> str:
 def _corrected(hull: Hull, quarter: Hull) -> Hull:
     """The hull with V* = 2 V(N) - V(N/4), from that of a quarter of the points."""
     if quarter.alpha < QUARTER_SPACINGS * quarter.spacing:
-        warnings.warn(
+        warn(
             f"no estimate of the bias: alpha = {_in_spacings(quarter, quarter.spacing)}, a quarter "
             f"of the cloud; below {QUARTER_SPACINGS:g} the law N^-1/2 fails; use more points or a "
             "larger alpha",
-            SoftreachWarning,
-            stacklevel=3,
         )
         return hull
     # theory (47)

@@ -13,9 +13,10 @@ from softreach.forces.growth import Grown, Growth
 from softreach.forces.stop import Stop
 from softreach.inverse import solve_inverse
 from softreach.inverse.request import checked_activations, checked_targets
-from softreach.rod.loaded import LoadedRod
-from softreach.rod.pushing_tip import PushingTip
-from softreach.rod.tip_map import TipMap, tip_map
+from softreach.rod.loaded.pushing_tip import PushingTip
+from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipMap
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 from softreach.stiffness import a_direction, unit_directions, yielding_rod
 from softreach.support.arguments import checked, function, optional, whole

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from softreach.forces.stop import Stop
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.pushing_tip import PushingTip, TipResponse
+from softreach.rod.loaded.pushing_tip import PushingTip, TipResponse
 
 __all__ = ["Grown", "Growth", "Held"]
 

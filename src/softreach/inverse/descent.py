@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.kernels.box.box_newton import box_steps
-from softreach.rod.activation_box import ActivationBox
-from softreach.rod.damped_step import damped_steps
+from softreach.rod.activation_box import ActivationBox, damped_steps
 from softreach.rod.tip_map import TipMap
 
 Array = NDArray[np.float64]

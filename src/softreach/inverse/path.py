@@ -12,10 +12,9 @@ from softreach.arm.manipulator import Manipulator
 from softreach.inverse.request import checked_activations, checked_residual, checked_targets
 from softreach.inverse.roots import placed
 from softreach.inverse.solve import solve_inverse
-from softreach.rod.free_bundles import free_bundles
-from softreach.rod.measured_bundles import bundle_measures, measured_bundles
-from softreach.rod.stable_tips import stable_tips
-from softreach.rod.tip_map import TipMap, tip_map
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipMap
+from softreach.rod.view import free_bundles, measured_bundles, stable_tips
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 from softreach.support.errors import InvalidInput
 
@@ -271,7 +270,7 @@ def track_path(
     tracker = Continuation(free_bundles(stable_tips(rod)), residual * rod.length)
     if start is not None:
         gamma = checked_activations("start", start, rod.box, 1)[0]
-        gamma = gamma / bundle_measures(rod)[rod.box.free]
+        gamma = gamma / rod.measures[rod.box.free]
         first = tracker.corrected_start(tracker.box.clip(gamma), points[0])
     else:
         first = _best_start(rod, tracker, points[0], residual)
@@ -287,7 +286,7 @@ def _best_start(
     solution = solve_inverse(rod, target[None], residual_over_length=residual)[0]
     if not len(solution):
         return None
-    best = solution.activations[solution.conditions.argmin()] / bundle_measures(rod)
+    best = solution.activations[solution.conditions.argmin()] / rod.measures
     return tracker.at(best[rod.box.free])
 
 
@@ -311,11 +310,11 @@ def _dataset(
     """The result; `end` is None if there was nothing to begin with."""
     import xarray as xr
 
-    box, n, units = rod.box, len(followed), activation_attributes(rod.arm)
+    box, n, units = rod.box, len(followed), activation_attributes(rod.arm, rod.box.names)
     outcome = PathStatus.NO_START if end is None else end.status
     status = np.full(len(points), int(outcome), np.int8)
     status[:n] = PathStatus.FOLLOWED
-    activation, measures = np.full((len(points), box.bundles), np.nan), bundle_measures(rod)
+    activation, measures = np.full((len(points), box.bundles), np.nan), rod.measures
     length, length_error = _end_length(points, n, end)
     error = np.full(len(points), np.nan)
     end_activation, end_position = np.full(box.bundles, np.nan), np.full(3, np.nan)
@@ -337,7 +336,7 @@ def _dataset(
             "end_length": ((), length, {"units": "m"}),
             "end_length_error": ((), length_error, {"units": "m"}),
         },
-        {"axis": list(AXES), **bundle_coordinates(rod.arm)},
+        {"axis": list(AXES), **bundle_coordinates(rod.arm, rod.box.names)},
         {
             **provenance(rod.arm),
             "end": "" if outcome == PathStatus.FOLLOWED else outcome.name.lower(),

@@ -14,10 +14,9 @@ from softreach.inverse.proofs import CoarseCells
 from softreach.inverse.seeds import Landmarks, face_landmarks, landmarks
 from softreach.kernels.branches.space_tree import SpaceTree
 from softreach.kernels.image.activation_mesh import ActivationMesh
-from softreach.rod.free_bundles import free_bundles
-from softreach.rod.measured_bundles import bundle_measures, measured_bundles
-from softreach.rod.stable_tips import stable_tips
-from softreach.rod.tip_map import TipMap, tip_map
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipMap
+from softreach.rod.view import free_bundles, measured_bundles, stable_tips
 from softreach.support.arguments import checked, whole
 
 __all__ = ["PreparedMap", "prepared_map"]
@@ -44,7 +43,7 @@ class PreparedMap:
     @cached_property
     def measures(self) -> Array:
         """What one unit of each activation is in its own unit, shape (bundles,)."""
-        return bundle_measures(self.whole)
+        return self.whole.measures
 
     @cached_property
     def rod(self) -> TipMap:

@@ -118,7 +118,7 @@ def least_of_cells(
 def linearized(rod: TipMap, half: Array, center: Array) -> Linearized:
     """The tip map in cells of equal shape; on the calling thread."""
     tips, slopes = np.empty((len(center), 3)), np.empty((len(center), 3, center.shape[1]))
-    rod.fill_slopes(center, tips, slopes)
+    rod.fill(center, tips, slopes)
     return Linearized(half, tips, slopes, _errors(rod, center, half))
 
 

@@ -94,8 +94,9 @@ def placed(rod: TipMap, gamma: Array) -> tuple[Array, NDArray[np.bool_]]:
         return rod.tips(gamma), np.ones(len(gamma), bool)
     tips, slopes = np.empty((len(gamma), 3)), np.empty((len(gamma), 3, rod.box.bundles))
     status = np.empty(len(gamma), np.int8)
+    rod.prepare()
     parallel.run(
-        partial(rod.fill_slopes_and_status, gamma[b], tips[b], slopes[b], status=status[b])
+        partial(rod.fill, gamma[b], tips[b], slopes[b], status=status[b])
         for b in parallel.blocks(len(gamma), BLOCK // 8)
     )
     return tips, status == TipStatus.STABLE

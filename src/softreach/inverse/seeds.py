@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.kernels.branches.spread import choose_apart
-from softreach.rod.never_at_rest import none_stable
-from softreach.rod.tip_map import TipMap
+from softreach.rod.tip_map import TipMap, none_stable
 from softreach.sampling import sample_cube
 
 __all__ = ["Landmarks", "face_landmarks", "landmarks"]

@@ -89,6 +89,8 @@ class Solutions(Sequence[Solution]):
 
     arm: Manipulator
     """The design."""
+    bundles: tuple[str, ...]
+    """Names of the bundles that were solved for."""
     targets: Array
     """Shape (t, 3) [m]."""
     offsets: Index
@@ -129,6 +131,7 @@ class Solutions(Sequence[Solution]):
         counts = np.concatenate([part.counts for part in parts])
         return cls(
             arm=parts[0].arm,
+            bundles=parts[0].bundles,
             offsets=np.concatenate([[0], np.cumsum(counts)]),
             **{
                 name: np.concatenate([getattr(part, name) for part in parts])
@@ -208,6 +211,7 @@ class Solutions(Sequence[Solution]):
         rows = np.repeat(self.offsets[chosen], counts) + inside
         return Solutions(
             arm=self.arm,
+            bundles=self.bundles,
             offsets=offsets,
             **{name: getattr(self, name)[chosen] for name in _PER_TARGET},
             **{name: getattr(self, name)[rows] for name in _PER_SOLUTION},
@@ -219,7 +223,7 @@ class Solutions(Sequence[Solution]):
 
         meanings = " ".join(f"{status.value}={status.name.lower()}" for status in Status)
         per_target, per_solution = ("target", "bundle"), ("solution", "bundle")
-        units = activation_attributes(self.arm)
+        units = activation_attributes(self.arm, self.bundles)
         return xr.Dataset(
             {
                 "position": (("target", "axis"), self.targets, {"units": "m"}),
@@ -237,7 +241,7 @@ class Solutions(Sequence[Solution]):
                 "condition": ("solution", self.conditions, {"units": "1"}),
                 "margin": ("solution", self.margins, {"units": "1"}),
             },
-            {"axis": list(AXES), **bundle_coordinates(self.arm)},
+            {"axis": list(AXES), **bundle_coordinates(self.arm, self.bundles)},
             provenance(self.arm),
         )
 

@@ -231,6 +231,7 @@ def _solutions(
     )
     return Solutions(
         arm=prepared.whole.arm,
+        bundles=prepared.whole.box.names,
         targets=request.targets,
         offsets=np.searchsorted(roots.target, np.arange(count + 1)),
         activations=prepared.whole.box.with_held(roots.gamma),

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.support.errors import SoftreachWarning
+from softreach.support.errors import warn
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -69,7 +68,7 @@ def _clouds(atlas: xr.Dataset) -> Callable[[int, int], xr.Dataset | None]:
         try:
             return atlas_cloud(atlas, **at)
         except DamagedStore as error:
-            warnings.warn(f"a cloud is left out: {error}", SoftreachWarning, stacklevel=2)
+            warn(f"a cloud is left out: {error}")
             return None
 
     return cloud_at

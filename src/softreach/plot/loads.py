@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from softreach.arm.manipulator import Manipulator
-    from softreach.rod.all_equilibria import AllEquilibria
+    from softreach.rod.loaded.all_equilibria import AllEquilibria
     from softreach.workspace.payload import LargestPayload, PayloadCurve
 
 Array = NDArray[np.float64]

@@ -9,20 +9,26 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.tables import tables
+from softreach.arm.tables import Tables, tables
 from softreach.kernels.rod import frames, jacobian
 from softreach.kernels.rod import tips as rod
-from softreach.rod.arm_rod import ArmRod
-from softreach.rod.frames import Frames, StrainRange, Strains
-from softreach.rod.linear_strains import linear_strains, strain_range
+from softreach.rod.activation_box import ActivationBox
 from softreach.rod.linearization import Linearization
 from softreach.rod.steps import StepRule
-from softreach.rod.tip_map import BLOCK
+from softreach.rod.tip_map import (
+    ArmRod,
+    Frames,
+    Status,
+    StrainRange,
+    Strains,
+    TipStatus,
+    position_slopes,
+)
 from softreach.support import parallel
 
-__all__ = ["FreeRod"]
-
 Array = NDArray[np.float64]
+
+_HEADINGS = 720
 
 
 @dataclass(frozen=True, repr=False)
@@ -53,23 +59,33 @@ class FreeRod(ArmRod):
     def _table(self) -> Array:
         return self.rule.packed_nodes(self._fineness)
 
-    def fill_tips(self, gamma: Array, out: Array) -> None:
-        """Put the tips [m] of checked activations into `out`, (n, 3), on the calling thread."""
-        rod.tips(self._table, gamma, out)
+    def _prepare(self) -> None:
+        self._table  # noqa: B018
 
-    def fill_slopes(self, gamma: Array, tips: Array, slopes: Array) -> None:
-        """Put tips (n, 3) and ∂r/∂γ (n, 3, bundles) [m] into place: theory (31)."""
-        jacobian.jacobians(self._table, gamma, tips, slopes)
-
-    def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:
-        """Tips [m] and the spatial twist of the tip frame per unit of each activation."""
-        gamma = self.box.check(activations)
-        tips, twists = np.empty((len(gamma), 3)), np.empty((len(gamma), 6, self.box.bundles))
-        parallel.run(
-            partial(jacobian.jacobians, self._table, gamma[b], tips[b], twists[b])
-            for b in parallel.blocks(len(gamma), BLOCK // 8)
-        )
-        return tips, twists
+    def fill(
+        self,
+        gamma: Array,
+        tips: Array,
+        slopes: Array | None = None,
+        *,
+        twists: Array | None = None,
+        status: Status | None = None,
+        directions: Array | None = None,
+    ) -> None:
+        """Put tips, and what else is asked for, into place: theory (25) and (31)."""
+        derivatives = slopes if twists is None else twists
+        if derivatives is None:
+            rod.tips(self._table, gamma, tips)
+        else:
+            jacobian.jacobians(self._table, gamma, tips, derivatives)
+        if slopes is not None and twists is not None:
+            position_slopes(tips, twists, slopes)
+        if status is not None:
+            status[:] = TipStatus.STABLE
+        if directions is not None:
+            place, directors = np.empty((len(gamma), 1, 3)), np.empty((len(gamma), 1, 3, 3))
+            frames.frames(*self._tip_table, gamma, place, directors)
+            directions[:] = directors[:, 0, 2]
 
     def farthest(self) -> float:
         """No tip is farther from the base than this [m], the length of the longest arm."""
@@ -87,7 +103,9 @@ class FreeRod(ArmRod):
     def _linearization(self) -> Linearization:
         return Linearization(self.arm, self.box)
 
-    def frames(self, activations: ArrayLike, stations: ArrayLike) -> Frames:
+    def frames(
+        self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
+    ) -> Frames:
         """Centerline and directors at ascending stations Z [m]."""
         gamma, z = self.box.check(activations), self.check_stations(stations)
         table, ends = self._station_table(z)
@@ -96,12 +114,20 @@ class FreeRod(ArmRod):
             partial(frames.frames, table, ends, gamma[b], found.position[b], found.directors[b])
             for b in parallel.blocks(len(gamma), 1024)
         )
+        if status is not None:
+            status[:] = TipStatus.STABLE
         return found
 
-    def strains_at(self, stations: ArrayLike) -> Callable[[ArrayLike], Strains]:
+    def strains_at(self, stations: ArrayLike) -> Callable[..., Strains]:
         """u = Uγ and ζ = 1 + z·γ at stations Z [m] as a function of activations: theory (7)."""
         table = tables(self.arm, self.check_stations(stations, ascending=False))
-        return lambda activations: linear_strains(table, self.box.check(activations))
+
+        def strains(activations: ArrayLike, status: Status | None = None) -> Strains:
+            if status is not None:
+                status[:] = TipStatus.STABLE
+            return linear_strains(table, self.box.check(activations))
+
+        return strains
 
     def strain_range(self, stations: ArrayLike) -> StrainRange:
         """What the strains at stations Z [m] can be within the activation box."""
@@ -118,3 +144,54 @@ class FreeRod(ArmRod):
     def _tip_table(self) -> tuple[Array, NDArray[np.int64]]:
         steps = max(self._fineness, self.rule.fewest_for_frames)
         return self.rule.packed_stations(np.array([self.length]), steps)
+
+
+def linear_strains(table: Tables, gamma: Array) -> Strains:
+    """u = Uγ and ζ = 1 + z·γ at the stations of a table.
+
+    Samples vary fastest in memory, so that all values at one station lie side by side. The sum runs
+    over the bundles in their order, whatever BLAS and its threads would do.
+
+    Args:
+        table: z and U.
+        gamma: Activations, shape (n, bundles).
+    """
+    rows = np.concatenate([table.curvature, table.extension[:, None]], axis=1)
+    bundles = np.ascontiguousarray(gamma.T)
+    total, term = np.empty((len(rows), 4, len(gamma))), np.empty((4, len(gamma)))
+    if not len(bundles):
+        total[:] = 0.0
+    for row, out in zip(
+        rows if len(bundles) else (), total, strict=False
+    ):  # station by station, so that terms stay cached
+        np.multiply(row[:, :1], bundles[0], out=out)
+        for j in range(1, len(bundles)):
+            out += np.multiply(row[:, j : j + 1], bundles[j], out=term)
+    total[:, 3] += 1.0
+    return Strains(np.moveaxis(total[:, :3], 2, 0), total[:, 3].T)
+
+
+def strain_range(table: Tables, box: ActivationBox) -> StrainRange:
+    """Ranges of the strains of all activations in a box."""
+    bounds = np.stack([box.low, box.high], axis=1)
+    most = _most_bending(table.curvature[:, :2], bounds)
+    return StrainRange(
+        bending=np.stack([np.zeros_like(most), most], axis=1),
+        torsion=_ends(table.curvature[:, 2], bounds),
+        extension=1.0 + _ends(table.extension, bounds),
+    )
+
+
+def _ends(rows: Array, bounds: Array) -> Array:
+    """Least and largest of linear functions over a box, shape (station, 2)."""
+    ends = rows[..., None] * bounds
+    return np.stack([ends.min(-1).sum(-1), ends.max(-1).sum(-1)], axis=1)
+
+
+def _most_bending(plane: Array, bounds: Array) -> Array:
+    """An upper bound of √(u1² + u2²): the support of (u1, u2) toward many headings."""
+    heading = np.linspace(0.0, 2.0 * np.pi, _HEADINGS, endpoint=False)
+    toward = np.stack([np.cos(heading), np.sin(heading)], axis=1)
+    along = np.einsum("hc,scb->shb", toward, plane)
+    support = (along[..., None] * bounds).max(-1).sum(-1)
+    return support.max(axis=1) / np.cos(np.pi / _HEADINGS)

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach import schema
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.frames import Frames, Strains
-from softreach.rod.tip_map import TipMap, tip_map
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import Frames, Strains, TipMap
 from softreach.support.arguments import as_given, plain
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput
@@ -93,9 +93,10 @@ def configuration(
     given = as_floats("activation", activation)
     gamma = rod.box.check(np.atleast_2d(given))
     z = stations_along(rod, stations, _COLUMNS * max(1, len(gamma)))
-    dataset = shape_dataset(rod, gamma, z, rod.frames(gamma, z), rod.strains(gamma, z))
+    status = np.empty(len(gamma), np.int8)
+    dataset = shape_dataset(rod, gamma, z, rod.frames(gamma, z, status), rod.strains(gamma, z))
     if rod.supports_unstable:
-        dataset = schema.with_status(dataset, rod.status(gamma))
+        dataset = schema.with_status(dataset, status)
     return dataset.isel(sample=0) if given.ndim == 1 else dataset
 
 
@@ -104,7 +105,13 @@ def shape_dataset(
 ) -> xr.Dataset:
     """Shapes at stations Z [m] as `configuration` has them, one for each row of activations."""
     return schema.configuration_dataset(
-        rod.arm, gamma, z, **frames._asdict(), **strains._asdict(), radius=rod.radius(z)
+        rod.arm,
+        gamma * rod.measures,
+        z,
+        names=rod.box.names,
+        **frames._asdict(),
+        **strains._asdict(),
+        radius=rod.radius(z),
     )
 
 

@@ -6,35 +6,28 @@ Whoever asks where an arm can go asks a tip map, never the fields of the arm.
 
 from __future__ import annotations
 
-import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import IntEnum
-from functools import lru_cache, partial
+from functools import cached_property, partial
+from threading import RLock
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.summary import VERIFIED_LOAD_NUMBER, is_overloaded
+from softreach.arm.tables import check_extension
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.frames import Frames, StrainRange, Strains, TipMotions, position_slopes
 from softreach.rod.steps import check_tol
 from softreach.support import parallel
-from softreach.support.arguments import as_given, flag, instance
+from softreach.support.arguments import instance
 from softreach.support.arrays import as_floats
-from softreach.support.errors import InvalidInput, SoftreachWarning, counted
-
-__all__ = [
-    "BLOCK",
-    "TipMap",
-    "TipStatus",
-    "a_tip_map",
-    "an_arm",
-    "tip_map",
-]
+from softreach.support.errors import InvalidInput, counted
 
 Array = NDArray[np.float64]
+Status = NDArray[np.int8]
 
 BLOCK = 16_384
 """Samples per task: large against a thread's cost, small enough for Ctrl-C to be prompt."""
@@ -63,6 +56,53 @@ class TipMap(ABC):
     tol: float
     """Largest tip error, in L."""
 
+    @cached_property
+    @abstractmethod
+    def box(self) -> ActivationBox:
+        """The activations within bounds."""
+
+    @abstractmethod
+    def fill(
+        self,
+        gamma: Array,
+        tips: Array,
+        slopes: Array | None = None,
+        *,
+        twists: Array | None = None,
+        status: Status | None = None,
+        directions: Array | None = None,
+    ) -> None:
+        """Put tips, and what else is asked for, into place, on the calling thread.
+
+        Whoever calls it from several threads calls `prepare` before.
+
+        Args:
+            gamma: Checked activations, shape (n, bundles).
+            tips: r [m], shape (n, 3); NaN without an equilibrium.
+            slopes: ∂r/∂γ [m], shape (n, 3, bundles).
+            twists: (v, ω) of the tip frame per unit of each activation [m, rad], (n, 6, bundles).
+            status: `TipStatus`, shape (n,).
+            directions: Tangents d3 [-], shape (n, 3).
+        """
+
+    @abstractmethod
+    def frames(
+        self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
+    ) -> Frames:
+        """Centerline and directors at ascending stations Z [m]; `status` (n,) is put into place."""
+
+    @abstractmethod
+    def strains_at(self, stations: ArrayLike) -> Callable[..., Strains]:
+        """The strains at stations Z [m], in any order, as a function of activations.
+
+        What depends on the stations alone is computed once, for many blocks of activations. A
+        second argument `status` (n,) is put into place.
+        """
+
+    @abstractmethod
+    def strain_range(self, stations: ArrayLike) -> StrainRange:
+        """Ranges of the strains at stations Z [m] within the activation box."""
+
     @property
     def length(self) -> float:
         """L [m], the scale of everything in space."""
@@ -74,33 +114,17 @@ class TipMap(ABC):
         return False
 
     @property
-    @abstractmethod
-    def box(self) -> ActivationBox:
-        """The activations within bounds."""
+    def steps(self) -> int:
+        """Steps that an integrator makes along the arm; 0 for a map that has none of its own."""
+        return 0
 
-    @abstractmethod
-    def refined(self, tol: float) -> TipMap:
-        """The map of the same arm to a smaller tolerance; itself if its own is no larger.
+    @cached_property
+    def measures(self) -> Array:
+        """What one unit of each activation is in its own unit, shape (bundles,)."""
+        return np.ones(self.box.bundles)
 
-        Args:
-            tol: Largest tip error, in L.
-        """
-
-    @abstractmethod
-    def fill_tips(self, gamma: Array, out: Array) -> None:
-        """Put the tips [m] of checked activations into `out`, (n, 3), on the calling thread."""
-
-    @abstractmethod
-    def fill_slopes(self, gamma: Array, tips: Array, slopes: Array) -> None:
-        """Put tips (n, 3) and ∂r/∂γ (n, 3, bundles) [m] of checked activations into place."""
-
-    @abstractmethod
-    def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:
-        """Tips [m] and the spatial twist of the tip frame per unit of each activation.
-
-        Returns:
-            Tips, shape (n, 3); (v, ω) with v [m] and ω [rad], shape (n, 6, bundles).
-        """
+    def prepare(self) -> None:  # noqa: B027
+        """Compute what every sample needs, once for all threads."""
 
     def farthest(self) -> float:
         """No tip is farther from the base than this [m]; infinite where no bound is known."""
@@ -122,95 +146,70 @@ class TipMap(ABC):
         """
         return np.full(len(centers), self.linearization_error(half_widths))
 
-    @abstractmethod
-    def frames(self, activations: ArrayLike, stations: ArrayLike) -> Frames:
-        """Centerline and directors at ascending stations Z [m]."""
-
-    @abstractmethod
-    def strains_at(self, stations: ArrayLike) -> Callable[[ArrayLike], Strains]:
-        """The strains at stations Z [m], in any order, as a function of activations.
-
-        What depends on the stations alone is computed once, for many blocks of activations.
-        """
-
-    @abstractmethod
-    def strain_range(self, stations: ArrayLike) -> StrainRange:
-        """Ranges of the strains at stations Z [m] within the activation box."""
-
-    @abstractmethod
-    def radius(self, stations: ArrayLike) -> Array:
-        """Outer radius R2 before activation at stations Z [m]."""
-
-    @property
-    def steps(self) -> int:
-        """Steps that an integrator makes along the arm; 0 for a map that has none of its own."""
-        return 0
-
-    def strains(self, activations: ArrayLike, stations: ArrayLike) -> Strains:
-        """Curvature and extension at ascending stations Z [m]."""
-        return self.strains_at(stations)(activations)
-
     def tips(self, activations: ArrayLike) -> Array:
         """Tip positions [m], shape (n, 3)."""
-        gamma = self.box.check(activations)
-        out = np.empty((len(gamma), 3))
-        parallel.run(self.tip_task(gamma[b], out[b]) for b in parallel.blocks(len(gamma), BLOCK))
-        return out
+        return self._filled(activations)["tips"]
 
-    def tip_task(self, gamma: Array, out: Array) -> Callable[[], object]:
-        """The work of filling `out` with the tips of `gamma`, to be run on any thread."""
-        return partial(self.fill_tips, gamma, out)
+    def status(self, activations: ArrayLike) -> Status:
+        """`TipStatus` of each activation, shape (n,)."""
+        return self.tips_and_status(activations)[1]
 
-    def fill_tips_and_status(self, gamma: Array, out: Array, status: NDArray[np.int8]) -> None:
-        """Put tips [m] (n, 3) and their `TipStatus` (n,) into place, on the calling thread."""
-        self.fill_tips(gamma, out)
-        status[:] = TipStatus.STABLE
-
-    def fill_slopes_and_status(
-        self, gamma: Array, tips: Array, slopes: Array, *, status: NDArray[np.int8]
-    ) -> None:
-        """`fill_slopes`, and the `TipStatus` (n,) of each, on the calling thread."""
-        self.fill_slopes(gamma, tips, slopes)
-        if self.supports_unstable:
-            self.fill_tips_and_status(gamma, np.empty_like(tips), status)
-        else:
-            status[:] = TipStatus.STABLE
-
-    def tips_and_status(self, activations: ArrayLike) -> tuple[Array, NDArray[np.int8]]:
+    def tips_and_status(self, activations: ArrayLike) -> tuple[Array, Status]:
         """Tips [m], shape (n, 3), NaN without an equilibrium, and their `TipStatus`, (n,)."""
-        gamma = self.box.check(activations)
-        tips, status = np.empty((len(gamma), 3)), np.empty(len(gamma), np.int8)
-        parallel.run(
-            partial(self.fill_tips_and_status, gamma[b], tips[b], status[b])
-            for b in parallel.blocks(len(gamma), BLOCK)
-        )
-        return tips, status
+        filled = self._filled(activations, "status")
+        return filled["tips"], filled["status"]
 
     def tips_and_slopes(self, activations: ArrayLike) -> tuple[Array, Array]:
         """Tips [m], shape (n, 3), and their derivatives ∂r/∂γ [m], shape (n, 3, bundles)."""
-        gamma = self.box.check(activations)
-        tips, slopes = np.empty((len(gamma), 3)), np.empty((len(gamma), 3, self.box.bundles))
-        size = BLOCK // (16 if self.supports_unstable else 8)  # an equilibrium takes a search
-        parallel.run(
-            partial(self.fill_slopes, gamma[b], tips[b], slopes[b])
-            for b in parallel.blocks(len(gamma), size)
-        )
-        return tips, slopes
+        filled = self._filled(activations, "slopes")
+        return filled["tips"], filled["slopes"]
+
+    def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:
+        """Tips [m] and the spatial twist of the tip frame per unit of each activation.
+
+        Returns:
+            Tips, shape (n, 3); (v, ω) with v [m] and ω [rad], shape (n, 6, bundles).
+        """
+        filled = self._filled(activations, "twists")
+        return filled["tips"], filled["twists"]
+
+    def tip_motions(self, activations: ArrayLike) -> TipMotions:
+        """Positions and directions of the tips with their derivatives."""
+        filled = self._filled(activations, "slopes", "twists", "directions")
+        rotations = filled["twists"][:, 3:]
+        return TipMotions(filled["tips"], filled["slopes"], filled["directions"], rotations)
 
     def tip_directions(self, activations: ArrayLike) -> Array:
         """Tangents d3 of the tips [-], shape (n, 3)."""
         return np.ascontiguousarray(self.frames(activations, [self.length]).directors[:, 0, 2])
 
-    def tip_motions(self, activations: ArrayLike) -> TipMotions:
-        """Positions and directions of the tips with their derivatives, in two passes over rods."""
-        tips, twists = self.tip_twists(activations)
-        slopes = np.empty_like(twists[:, :3])
-        position_slopes(tips, twists, slopes)
-        return TipMotions(tips, slopes, self.tip_directions(activations), twists[:, 3:])
+    def _filled(self, activations: ArrayLike, *wanted: str) -> dict[str, Any]:
+        """What `fill` computes of tips and of what else is wanted, on all threads, by name."""
+        gamma = self.box.check(activations)
+        n, m = gamma.shape
+        room = {"tips": np.empty((n, 3))}
+        for name in wanted:
+            shape = {"slopes": (n, 3, m), "twists": (n, 6, m), "directions": (n, 3)}.get(name, (n,))
+            room[name] = np.empty(shape, np.int8 if name == "status" else float)
+        size = BLOCK
+        if len(room) > 1 and wanted != ("status",):
+            size //= 16 if self.supports_unstable else 8  # an equilibrium takes a search
+        self.prepare()
+        parallel.run(
+            partial(self.fill, gamma[b], **{name: values[b] for name, values in room.items()})
+            for b in parallel.blocks(n, size)
+        )
+        return room
 
-    def status(self, activations: ArrayLike) -> NDArray[np.int8]:
-        """`TipStatus` of each activation, shape (n,)."""
-        return np.full(len(self.box.check(activations)), TipStatus.STABLE, np.int8)
+    def strains(
+        self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
+    ) -> Strains:
+        """Curvature and extension at stations Z [m]; `status` (n,) is put into place."""
+        return self.strains_at(stations)(activations, status)
+
+    def radius(self, stations: ArrayLike) -> Array:
+        """Outer radius R2 before activation at stations Z [m]."""
+        return self.arm.profile.radius(stations)
 
     def check_stations(self, stations: ArrayLike, *, ascending: bool = True) -> Array:
         """The stations as a float array.
@@ -235,57 +234,121 @@ class TipMap(ABC):
         return f"<{type(self).__name__}: {size}, tip error up to {self.tol:g} L>"
 
 
-def tip_map(arm: Manipulator | TipMap, tol: float = 1e-6, *, warn: bool = True) -> TipMap:
-    """The tip map of an arm, kept for the next call; a tip map is returned as it is.
-
-    Args:
-        arm: The design, or a tip map, whose own tolerance then counts.
-        tol: Largest tip error, in L.
-        warn: Whether to warn of loads beyond what was verified.
+@dataclass(frozen=True, repr=False)
+class ArmRod(TipMap):
+    """The rod that one arm is, free or loaded, in the activations of all its bundles.
 
     Raises:
-        InvalidInput: No arm, or `tol` out of range.
+        InvalidInput: `tol` out of range.
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
     """
-    if isinstance(arm, TipMap):
-        return arm
-    if not isinstance(arm, Manipulator):
-        raise InvalidInput("arm", as_given(arm), "a Manipulator or a TipMap")
-    rod = _of_arm(arm, check_tol(tol))
-    flag("warn", warn)
-    if warn and arm.loads is not None:
-        _warn_of_large_loads(arm)
-    return rod
+
+    arm: Manipulator
+    tol: float = 1e-6
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tol", check_tol(self.tol))
+        check_extension(self.arm)
+
+    @cached_property
+    def box(self) -> ActivationBox:
+        """The activations within bounds."""
+        return ActivationBox.between(self.arm.bounds, self.arm.bundle_names)
+
+    @abstractmethod
+    def _prepare(self) -> None:
+        """Compute what every sample needs."""
+
+    def prepare(self) -> None:
+        """Compute what every sample needs, once for all threads."""
+        known = vars(self)
+        if "_is_prepared" not in known:
+            with known.setdefault("_lock", RLock()):
+                self._prepare()
+                known["_is_prepared"] = True
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_lock"}
 
 
-@lru_cache(maxsize=64)
-def _of_arm(arm: Manipulator, tol: float) -> TipMap:
-    if arm.loads is not None:
-        from softreach.rod.loaded import LoadedRod
+class Frames(NamedTuple):
+    """Rods in space, at stations."""
 
-        return LoadedRod(arm, tol)
-    from softreach.rod.free import FreeRod
-
-    return FreeRod(arm, tol)
+    position: Array
+    """Centerline r [m], shape (n, station, 3)."""
+    directors: Array
+    """d1, d2, d3 as rows, shape (n, station, 3, 3)."""
 
 
-@lru_cache(maxsize=64)
-def _warn_of_large_loads(arm: Manipulator) -> None:
-    """Say once that an arm is loaded beyond what was verified; one text for all.
+class Strains(NamedTuple):
+    """How rods are deformed, at stations."""
 
-    Raises:
-        InvalidDesign: Moduli or densities are missing.
-    """
-    if is_overloaded(arm):
-        warnings.warn(
-            f"the load number is above {VERIFIED_LOAD_NUMBER:g}, up to which shapes under loads "
-            "were verified: look at the status of the samples, and compare with a smaller tol",
-            SoftreachWarning,
-            stacklevel=3,
-        )
+    curvature: Array
+    """u in the directors, per unit of activated arclength [1/m], shape (n, station, 3)."""
+    extension: Array
+    """ζ [-], shape (n, station)."""
+
+
+class StrainRange(NamedTuple):
+    """Ranges of the strains within the activation box, shape (station, 2) each."""
+
+    bending: Array
+    """√(u1² + u2²) [1/m], from 0 to an upper bound at most 1e-5 too large."""
+    torsion: Array
+    """u3 [1/m]."""
+    extension: Array
+    """ζ [-]."""
+
+
+class TipMotions(NamedTuple):
+    """Where tips are and point, and how both change with each activation."""
+
+    tips: Array
+    """r [m], shape (n, 3)."""
+    slopes: Array
+    """∂r/∂γ [m], shape (n, 3, bundles)."""
+    directions: Array
+    """Tangents d3 [-], shape (n, 3)."""
+    rotations: Array
+    """ω [rad], shape (n, 3, bundles): ∂d3/∂γ = ω × d3."""
+
+
+def position_slopes(tips: Array, twists: Array, slopes: Array) -> None:
+    """Put ∂r/∂γ = v + ω × r (n, 3, bundles) into place, from tips and spatial twists (v, ω)."""
+    v, w = twists[:, :3], twists[:, 3:]
+    slopes[:] = v
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        slopes[:, i] += w[:, j] * tips[:, k, None] - w[:, k] * tips[:, j, None]
 
 
 an_arm = instance((Manipulator, TipMap), "a Manipulator or a TipMap")
 """An argument that is a design, or its tip map."""
 
 a_tip_map = instance(TipMap, "a TipMap")
+
+
+# What to say of loads under which no activation has an equilibrium that could be used.
+
+
+def none_of(tried: int, sought: str = "a stable equilibrium") -> str:
+    """What was found of as many activations, as a sentence.
+
+    Args:
+        tried: How many.
+        sought: What they do not have.
+    """
+    return f"none of {tried} activations tried has {sought}"
+
+
+def too_heavy(found: str) -> InvalidInput:
+    """What to raise where nothing is left to go on with.
+
+    Args:
+        found: What is missing.
+    """
+    return InvalidInput("loads", found, "such that some have one", "lighten the load")
+
+
+def none_stable(tried: int) -> InvalidInput:
+    """What to raise where nothing is reached, after as many activations."""
+    return too_heavy(none_of(tried))

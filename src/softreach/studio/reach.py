@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -18,7 +17,7 @@ from softreach.studio.budget import memory_share
 from softreach.studio.effort import level_in_memory
 from softreach.studio.rod import TOL
 from softreach.studio.worker import all_cores
-from softreach.support.errors import SoftreachWarning
+from softreach.support.errors import no_warnings
 from softreach.workspace import (
     ReachableCurve,
     ReachableSet,
@@ -157,8 +156,7 @@ class Reach:
     def alpha_shape(self) -> Hull:
         """The α-shape of at most 2^17 points that are stable, α = 0.05 L."""
         rows = shown_rows(self, level_in_memory(_ALPHA_NUMBERS, memory_share(), 17))
-        with all_cores, warnings.catch_warnings():
-            warnings.simplefilter("ignore", SoftreachWarning)  # coarse clouds are sparse
+        with all_cores, no_warnings():  # coarse clouds are sparse
             return concave_hull(self.cloud.tip[rows[self.status[rows] == TipStatus.STABLE]])
 
     @property

@@ -7,7 +7,8 @@ from functools import lru_cache
 
 from softreach.arm.design_file import in_file_terms
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.tip_map import TipMap, tip_map
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipMap
 from softreach.support.errors import InvalidDesign, InvalidInput
 
 __all__ = ["TOL", "design_of_text", "rod_of", "solvable_rod"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
@@ -17,7 +16,7 @@ from softreach.studio.effort import affordable_level, level_in_memory
 from softreach.studio.reach import Quality, Reach
 from softreach.studio.rod import solvable_rod
 from softreach.studio.worker import StaleCheck, all_cores
-from softreach.support.errors import InvalidInput, SoftreachWarning
+from softreach.support.errors import InvalidInput, no_warnings
 from softreach.workspace import ReachableSet, reachable_set
 
 if TYPE_CHECKING:
@@ -178,8 +177,7 @@ def exact_set(
 
 def _exact(arm: Manipulator, accuracy: float, tol: float, budget: Budget) -> ReachableSet:
     many = solvable_rod(arm).box.dimension > 3
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SoftreachWarning)  # the error is shown beside the volume
+    with no_warnings():  # the error is shown beside the volume
         return reachable_set(
             arm,
             accuracy=accuracy,

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import sys
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import NamedTuple
 
 __all__ = [
@@ -176,3 +180,29 @@ class NotWritten(SoftreachError, OSError):
 
 class SoftreachWarning(UserWarning):
     """A result that can be used, with a limit that its reader should know."""
+
+
+_silenced = ContextVar("_silenced", default=False)
+
+
+def warn(text: str) -> None:
+    """Issue a `SoftreachWarning` that names the line of the caller of softreach."""
+    if _silenced.get():
+        return
+    frame, level = sys._getframe(1), 2
+    while frame is not None and frame.f_globals.get("__name__", "").split(".")[0] == _PACKAGE:
+        frame, level = frame.f_back, level + 1
+    warnings.warn(text, SoftreachWarning, stacklevel=level)
+
+
+_PACKAGE = __name__.split(".")[0]
+
+
+@contextmanager
+def no_warnings() -> Iterator[None]:
+    """Silence `warn` for a block, on this thread only; `warnings.catch_warnings` does on all."""
+    token = _silenced.set(True)
+    try:
+        yield
+    finally:
+        _silenced.reset(token)

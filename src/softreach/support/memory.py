@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import os
 import shutil
-import warnings
 from pathlib import Path
 
-from softreach.support.errors import InvalidInput, SoftreachWarning, in_short
+from softreach.support.errors import InvalidInput, in_short, warn
 
 __all__ = ["check_disk", "check_memory", "check_room", "free_disk", "free_memory"]
 
@@ -89,7 +88,7 @@ def _check(name: str, value: object, needed: float, free: float, what: str) -> N
     if needed > free:
         raise InvalidInput(name, value, f"smaller: it takes {taken}")
     if needed > free / 2:
-        warnings.warn(f"{name} = {value} takes {taken}", SoftreachWarning, stacklevel=4)
+        warn(f"{name} = {value} takes {taken}")
 
 
 def _size(number: float) -> str:

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.geometry.surface import Surface, compact_surface
-from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap
+from softreach.rod.view import stable_tips
 from softreach.support import parallel
 from softreach.support.errors import MissingExtra
 from softreach.workspace.crossings import Crossings

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.tip_map import TipMap, TipStatus, tip_map
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipMap, TipStatus
 from softreach.sampling import cube_blocks, sample_cube
 from softreach.schema import provenance
 from softreach.support import parallel

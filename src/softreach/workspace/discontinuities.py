@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap
+from softreach.rod.view import stable_tips
 from softreach.workspace.image import Image
 
 Array = NDArray[np.float64]

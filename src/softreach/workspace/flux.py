@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.geometry.surface import Surface
-from softreach.rod.stable_tips import stable_tips
+from softreach.rod.rods import refined
 from softreach.rod.tip_map import TipMap
+from softreach.rod.view import stable_tips
 
 # The six faces of the box of three free bundles: nodes, tips, and what flows through them.
 
@@ -123,7 +124,7 @@ def signed_volume(rod: TipMap, nodes: int | None = None) -> Flux:
     Returns:
         Value and error are NaN if a node has no stable equilibrium.
     """
-    rod = rod.refined(flux_tol(rod) if nodes is None else _ROUGH_TOL)
+    rod = refined(rod, flux_tol(rod) if nodes is None else _ROUGH_TOL)
     counts = _NODES if nodes is None else (2 * nodes // 3, nodes)
     found, change = _flux(rod, counts[0]), np.inf
     for count in counts[1:]:

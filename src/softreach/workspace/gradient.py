@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters
 from softreach.geometry.hull import convex_hull
-from softreach.rod.stable_tips import stable_tips
-from softreach.rod.tip_map import TipMap, tip_map
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipMap
+from softreach.rod.view import stable_tips
 from softreach.schema import provenance
 from softreach.support.arguments import checked, function, names, optional, within
 from softreach.support.errors import InvalidInput

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.kernels.image.contour import stretches
-from softreach.rod.never_at_rest import none_stable
-from softreach.rod.stable_tips import stable_tips
-from softreach.rod.tip_map import TipMap
+from softreach.rod.rods import refined
+from softreach.rod.tip_map import TipMap, none_stable
+from softreach.rod.view import stable_tips
 from softreach.support.parallel import blocks
 from softreach.support.progress import Progress, silent
 
@@ -115,7 +115,7 @@ def image_measure(rod: TipMap, nodes: int) -> float:
     gamma = rod.box.from_free_cube(_product([(1.0 + x) / 2.0] * m))
     weights = np.prod(_product([w / 2.0] * m), axis=1) * rod.box.volume
     # Not a BLAS product, whose rounding would depend on its threads.
-    return float((weights * _stretch(rod.refined(_TOL), gamma)).sum())
+    return float((weights * _stretch(refined(rod, _TOL), gamma)).sum())
 
 
 def _stretch(rod: TipMap, gamma: Array) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from functools import partial
 from typing import NamedTuple, TypeVar
@@ -11,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.rod.never_at_rest import too_heavy
-from softreach.rod.tip_map import TipMap, tip_map
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipMap, too_heavy
 from softreach.support.arguments import (
     POSITIVE,
     as_given,
@@ -22,7 +21,7 @@ from softreach.support.arguments import (
     plain,
     within,
 )
-from softreach.support.errors import InvalidInput, Range, SoftreachWarning
+from softreach.support.errors import InvalidInput, Range, warn
 from softreach.support.memory import check_room, free_memory
 from softreach.support.progress import Progress, silent
 from softreach.workspace import measure
@@ -194,7 +193,7 @@ def reachable_set(
         found = _of_many(rod, accuracy, cell, grid, memory, progress or silent)
         finer = "a smaller cell" if cell is not None else "more memory"
     if found.volume_error > accuracy * found.volume:
-        warnings.warn(_inaccurate(found, accuracy, finer), SoftreachWarning, stacklevel=3)
+        warn(_inaccurate(found, accuracy, finer))
     return found
 
 

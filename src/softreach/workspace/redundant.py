@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.geometry.hull import convex_hull
-from softreach.rod.never_at_rest import none_stable
-from softreach.rod.stable_tips import stable_tips
-from softreach.rod.tip_map import TipMap
+from softreach.rod.tip_map import TipMap, none_stable
+from softreach.rod.view import stable_tips
 from softreach.sampling import cube_blocks
 from softreach.support import parallel
 from softreach.support.errors import InvalidInput

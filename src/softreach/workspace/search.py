@@ -18,8 +18,8 @@ from softreach.kernels.box.bounded_descent import (
 )
 from softreach.kernels.box.box_projection import project
 from softreach.kernels.image.space_claims import claim_corners
-from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import BLOCK, TipMap
+from softreach.rod.view import stable_tips
 from softreach.support import parallel
 from softreach.support.progress import Progress, silent
 from softreach.workspace.image import Lattice
@@ -63,6 +63,7 @@ def nearest_tips(rod: TipMap, start: Array, targets: Array, enough: float) -> Ne
         _descend(rod, targets[block], enough, Nearest(*parts))
 
     # Searches that end make room for others; only the last of a task run by a few.
+    rod.prepare()
     share = max(_TOGETHER, -(-len(targets) // parallel.thread_count()))
     parallel.run(partial(task, block) for block in parallel.blocks(len(targets), share))
     return found
@@ -82,7 +83,7 @@ def _descend(rod: TipMap, targets: Array, enough: float, found: Nearest) -> None
         running.row[new], running.steps[new] = np.arange(begun, begun + more), 0
         running.trial[new], running.damping[new] = found.gamma[rows], FIRST_DAMPING
         n, begun = n + more, begun + more
-        rod.fill_slopes(running.trial[:n], tips[:n], ahead[:n])
+        rod.fill(running.trial[:n], tips[:n], ahead[:n])
         if rod.supports_unstable:
             tips[np.isnan(tips[:n, 0]).nonzero()[0]] = NOWHERE
         n = judge(running, n, tips, ahead, targets, found, enough, *bounds)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import os
 import re
-import warnings
 from io import BufferedWriter
+from itertools import chain
 from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,7 +21,7 @@ from softreach.exchange.activefilaments.filament import Filament, filament_of
 from softreach.rod.kinematics import tip_positions
 from softreach.schema import a_cloud
 from softreach.support.arguments import checked, flag, path
-from softreach.support.errors import InvalidInput, SoftreachWarning, counted
+from softreach.support.errors import InvalidInput, counted, warn
 from softreach.support.files.atomic import check_place, writing
 from softreach.support.files.kinds import FileKind, Formats
 from softreach.support.memory import free_memory
@@ -146,13 +146,11 @@ def _warn(arm: Manipulator, activation: Array, difference: float) -> None:
     low, high = arm.bounds.T
     if (activation < low).any() or (activation > high).any():
         text = "activations leave the bounds of the design: widen them before asking for its set"
-        warnings.warn(text, SoftreachWarning, stacklevel=3)
+        warn(text)
     if difference > _SAME * arm.length:
-        warnings.warn(
+        warn(
             f"tips differ by up to {difference / arm.length:.2g} L from those of this design: "
             "compare its numbers, and the order and scale of its sectors, with the filament",
-            SoftreachWarning,
-            stacklevel=3,
         )
 
 
@@ -162,13 +160,15 @@ def _table(path: Path, columns: int, meaning: str) -> Array:
     _check_file(path)
     try:
         # NumPy would unpack or fetch what it is given by name.
-        with warnings.catch_warnings(), path.open(encoding="utf-8-sig") as file:
-            warnings.simplefilter("ignore", UserWarning)  # of an empty file, which is refused below
-            table = np.loadtxt(file, delimiter=",", comments=None, ndmin=2)
+        with path.open(encoding="utf-8-sig") as file:
+            first = next((line for line in file if line.strip()), None)
+            if first is None:  # of which NumPy would warn
+                raise InvalidInput(name, "no rows", "rows of comma-separated numbers")
+            table = np.loadtxt(chain([first], file), delimiter=",", comments=None, ndmin=2)
+    except InvalidInput:
+        raise
     except (ValueError, OverflowError, MemoryError) as error:
         raise InvalidInput(name, _reason(error), "rows of comma-separated numbers") from None
-    if not table.size:
-        raise InvalidInput(name, "no rows", "rows of comma-separated numbers")
     if table.shape[1] != columns:
         found = counted(table.shape[1], "column")
         raise InvalidInput(name, found, f"{columns}: {meaning}")

@@ -31,6 +31,8 @@ _SUFFICIENT = 0.2  # least part of the predicted decrease that is accepted
 _STEP_TOL = 1e-7  # a last step that is small enough, in ranges
 _TINY_STEP = 1e-8  # one after which the tip is at its target but for rounding
 _LEAST_DAMPING = 1 / 32  # part of a step below which a search stagnates
+_UNKNOWN = 1e300  # residual of a search that has not been anywhere yet [m]
+_EXPONENT = 0x7FF0000000000000  # bits of a double that are all set where it is not finite
 
 
 class Search(NamedTuple):
@@ -56,11 +58,15 @@ class Search(NamedTuple):
 
 @kernel
 def newton_step(search, active, tips, slopes, low, high, tol):
-    """Take in the tips and slopes of the active searches' trials and set their next trials."""
+    """Take in the tips and slopes of the active searches' trials and set their next trials.
+
+    A trial whose tip is NaN has failed, as one that comes no nearer has.
+    """
+    bits = tips.view(np.int64)
     for k in range(active.shape[0]):
         n = active[k]
         miss = minus(row(search.target, n), row(tips, k))
-        residual = math.sqrt(dot(miss, miss))
+        residual = _residual(miss, bits[k, 0])
         # A search that creeps toward a fold it cannot cross is given up; a double root is not:
         # each full step quarters its residual.
         if residual < (1.0 - _SUFFICIENT * search.damping[n]) * search.residual[n]:
@@ -80,13 +86,19 @@ def newton_step(search, active, tips, slopes, low, high, tol):
             next_one = search.gamma[n, j] + search.damping[n] * search.step[n, j]
             search.trial[n, j] = min(max(next_one, low[j] - margin), high[j] + margin)
         # Near a fold a small residual says little about γ: there the search goes on while it can.
-        if search.damping[n] < _LEAST_DAMPING:
+        if search.damping[n] < _LEAST_DAMPING or search.residual[n] >= _UNKNOWN:
             search.state[n] = CONVERGED if search.residual[n] <= tol else STAGNATED
             _copy(search.gamma, n, search.trial)
         else:
             enough = _STEP_TOL if search.residual[n] <= tol else _TINY_STEP
             if _length(search.step, n, low, high) <= enough:
                 search.state[n] = CONVERGED
+
+
+@inline
+def _residual(miss, bits):
+    """|miss|, unless the bits say that the tip is not finite: compiled arithmetic knows no NaN."""
+    return _UNKNOWN if bits & _EXPONENT == _EXPONENT else math.sqrt(dot(miss, miss))
 
 
 @inline

@@ -13,7 +13,7 @@ from softreach.arm.summary import describe
 from softreach.paper import printed
 from softreach.paper.claims import Finding, Numbers, Verdict, judged
 from softreach.paper.notebook import Notebook, Settings
-from softreach.rod.tip_map import tip_map
+from softreach.rod.rods import tip_map
 from softreach.support.errors import InvalidDesign
 from softreach.workspace import reachable_set
 

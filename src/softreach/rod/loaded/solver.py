@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -9,12 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.kernels.loaded.any_loads import TRACE
+from softreach.kernels.loaded.grid_values import interpolate
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.found_equilibria import Equilibria, Response
-from softreach.rod.load_tables import LoadTables, StepTables
-from softreach.rod.loaded_shapes import Shapes, shapes_of
-from softreach.rod.search import CONTINUATION, DIRECT, HELD, NEAR, PATIENT, Rung, Search
-from softreach.rod.shooting import (
+from softreach.rod.loaded.shapes import Shapes, shapes_of
+from softreach.rod.loaded.shooting import (
+    CONTINUATION,
+    DIRECT,
+    HELD,
+    NEAR,
+    PATIENT,
+    Equilibria,
+    Response,
+    Rung,
+    Search,
     Shots,
     Walked,
     base_directions,
@@ -22,14 +30,11 @@ from softreach.rod.shooting import (
     shoot_along_one,
     with_across,
 )
-from softreach.rod.start_grid import StartGrid, grid_sizes
+from softreach.rod.loaded.tables import LoadTables, StepTables
 from softreach.rod.tip_map import TipStatus
 from softreach.support import parallel
 
-__all__ = ["LATER_RUNGS", "Solver"]
-
 Array = NDArray[np.float64]
-
 
 _COARSE_STEP = 0.05  # Newton step at which coarse steps have done their work
 _CAREFUL_STEP = 1e-3  # the same of a continuation, on fine steps
@@ -40,6 +45,8 @@ _FOUND = 1.0
 LATER_RUNGS = {Rung.CONTINUATION: CONTINUATION, Rung.PATIENT: PATIENT}
 """How what the first rung leaves in doubt is searched again, in this order."""
 _TRACED = 1 << 20  # numbers kept of the sections of all arms in one task, 8 MB
+_NODES = {1: 33, 2: 33, 3: 17, 4: 9}
+"""Nodes per free bundle: at most a few thousand equilibria, some ten milliseconds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,3 +304,43 @@ class Solver:
         """Dead force at boundaries along the world's axes, as the step beyond has it, (row, 3)."""
         at_ends = np.concatenate([table.scalars[:1, 0, 3:], table.scalars[:, -1, 3:]])
         return at_ends[rows]
+
+
+def grid_sizes(box: ActivationBox) -> tuple[int, ...] | None:
+    """Nodes for every bundle, or None for more free bundles than a grid can hold."""
+    nodes = _NODES.get(box.dimension)
+    if nodes is None:
+        return None
+    return tuple(nodes if free else 1 for free in box.is_free)
+
+
+@dataclass(frozen=True, eq=False)
+class StartGrid:
+    """Frames of the tip at the nodes of a grid."""
+
+    box: ActivationBox
+    sizes: tuple[int, ...]
+    frames: Array
+    """What `Equilibria.frame` holds, of the nodes."""
+
+    @classmethod
+    def over(
+        cls, box: ActivationBox, sizes: tuple[int, ...], find: Callable[[Array], Array]
+    ) -> StartGrid:
+        """Solve at the nodes.
+
+        Args:
+            box: The activations within bounds.
+            sizes: Nodes for every bundle.
+            find: Frames of activations (n, bundles).
+        """
+        ends = zip(box.low, box.high, sizes, strict=True)
+        axes = np.meshgrid(*(np.linspace(*end) for end in ends), indexing="ij")
+        return cls(box, sizes, find(np.stack(axes, axis=-1).reshape(-1, box.bundles)))
+
+    def at(self, gamma: Array) -> Array:
+        """Frames to begin from."""
+        sizes = np.array(self.sizes)
+        found = np.empty((len(gamma), self.frames.shape[1]))
+        interpolate(self.frames, gamma, self.box.low, (sizes - 1) / self.box.scales, sizes, found)
+        return found

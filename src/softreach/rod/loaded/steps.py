@@ -15,12 +15,19 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.rod.equilibrium import Solver
-from softreach.rod.found_equilibria import Equilibria
+from softreach.rod.loaded.shooting import Equilibria
+from softreach.rod.loaded.solver import Solver
 from softreach.rod.tip_map import TipStatus
 from softreach.support.errors import InvalidInput
 
-__all__ = ["Differences", "checked", "fewest_steps", "shape_differences", "tip_differences"]
+__all__ = [
+    "UNJUDGED",
+    "Differences",
+    "checked",
+    "fewest_steps",
+    "shape_differences",
+    "tip_differences",
+]
 
 Array = NDArray[np.float64]
 Differences = Callable[[Solver, Array, Equilibria], Array]
@@ -28,6 +35,8 @@ Differences = Callable[[Solver, Array, Equilibria], Array]
 
 _SAFETY = 2.0
 _FEWEST_STEPS, _MOST_STEPS = 4, 256
+UNJUDGED = 0
+"""Instead of a number of steps: no activation can judge any."""
 _CRITICAL = 0.02
 _BULK, _OUTLYING = 0.99, 10.0
 _FEW = 64
@@ -36,7 +45,7 @@ _STATIONS = 9
 
 def fewest_steps(
     solver_of: Callable[[int], Solver], pilot: Array, steps: int, differences: Differences
-) -> int | InvalidInput | None:
+) -> int | None:
     """The fewest steps for the tolerance of the solvers.
 
     Args:
@@ -46,13 +55,13 @@ def fewest_steps(
         differences: What must be within the tolerance.
 
     Returns:
-        Steps; what to raise where even the most are too few; None where nothing can be judged.
+        Steps; None where even the most are too few, `UNJUDGED` where nothing can be judged.
     """
     steps = max(steps, _FEWEST_STEPS)
-    found = _enough(solver_of, _few(pilot), steps, differences)
-    if isinstance(found, InvalidInput):
-        return found
-    return _enough(solver_of, pilot, found or steps, differences)
+    enough = _enough(solver_of, _few(pilot), steps, differences)
+    if enough is None:
+        return None
+    return _enough(solver_of, pilot, enough or steps, differences)
 
 
 def _few(pilot: Array) -> Array:
@@ -63,7 +72,7 @@ def _few(pilot: Array) -> Array:
 
 def _enough(
     solver_of: Callable[[int], Solver], gamma: Array, steps: int, differences: Differences
-) -> int | InvalidInput | None:
+) -> int | None:
     """As `fewest_steps`, by these activations."""
     tol = solver_of(steps).tol
     while steps <= _MOST_STEPS:
@@ -71,12 +80,12 @@ def _enough(
         allowed = tol * solver.tables.arm.length / _SAFETY
         found = _bulk(differences(solver, *_settled(solver, gamma)))
         if not len(found):
-            return None
+            return UNJUDGED
         error = float(found.max())
         if error <= allowed:
             return steps
         steps = max(steps + 1, int(0.97 * steps * (error / allowed) ** (1 / 8)))
-    return InvalidInput("tol", tol, f"reachable within {_MOST_STEPS} steps", "enlarge it")
+    return None
 
 
 def _settled(solver: Solver, gamma: Array) -> tuple[Array, Equilibria]:
@@ -110,12 +119,12 @@ def _distances(a: Array, b: Array) -> Array:
     return np.linalg.norm(a - b, axis=-1)
 
 
-def checked(steps: int | InvalidInput) -> int:
-    """The steps.
+def checked(steps: int | None, tol: float) -> int:
+    """The steps that a tolerance needs.
 
     Raises:
-        InvalidInput: There are none; found once, raised whenever asked for.
+        InvalidInput: None are enough.
     """
-    if isinstance(steps, InvalidInput):
-        raise steps.with_traceback(None)
+    if steps is None:
+        raise InvalidInput("tol", tol, f"reachable within {_MOST_STEPS} steps", "enlarge it")
     return steps

@@ -1,20 +1,15 @@
-"""Every equilibrium of a loaded arm at given activations, stable or not.
-
-The direction of gravity that the tip sees decides which one the base would have to see: a map of
-the sphere to itself. Unloaded it is the identity, so that its degree is 1, theory (80): every
-direction at the base is covered once more forward than backward, and the number of equilibria is
-odd.
-"""
+"""All equilibria of a loaded arm at one activation, as a value to be asked."""
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach import schema
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.geometry.sphere_maps import (
@@ -26,18 +21,117 @@ from softreach.geometry.sphere_maps import (
     polished_roots,
     sphere_roots,
 )
-from softreach.rod.all_equilibria import AllEquilibria
-from softreach.rod.equilibrium import Solver
 from softreach.rod.free import FreeRod
-from softreach.rod.load_tables import LoadTables
-from softreach.rod.loaded import LoadedRod
-from softreach.rod.tip_map import TipMap, TipStatus, tip_map
+from softreach.rod.kinematics import configuration, shape_dataset, stations_along
+from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.loaded.solver import Solver
+from softreach.rod.loaded.tables import LoadTables
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipMap, TipStatus
+from softreach.rod.view import View
 from softreach.support.arrays import as_floats
-from softreach.support.errors import InvalidInput, SoftreachWarning
+from softreach.support.errors import InvalidInput, warn
 
-__all__ = ["equilibria"]
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
+
+_SMALL = 1e-9  # of a length, below which it is shown as 0, in L
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AllEquilibria:
+    """All equilibria of one arm: stable ones first, then by falling margin."""
+
+    rod: TipMap
+    """The arm."""
+    solver: Solver | None
+    """What walked along it; None without loads."""
+    activation: Array
+    """Of each bundle, shape (bundles,)."""
+    tips: Array
+    """r [m], shape (n, 3)."""
+    status: NDArray[np.int8]
+    """`TipStatus`, shape (n,)."""
+    margin: Array
+    """How far from the loss of stability, from 1 to below 0 [-], shape (n,); 0 of stable rings."""
+    directions: Array
+    """Where gravity pulls as the tip sees it, in the base frame of the arm before its loads, shape
+    (n, 3); NaN without loads."""
+    signs: NDArray[np.int8]
+    """Whether the map of directions keeps the sense of rotation there (1) or turns it over (-1), as
+    it does where the ways to fall are odd in number; 0 of rings; shape (n,)."""
+    is_ring: NDArray[np.bool_]
+    """Whether it stands for a ring of them, all around the direction of gravity; shape (n,)."""
+    followed: int | None
+    """The one that follows continuously from the unloaded arm, which is that of the tip map; None
+    where that branch has ended."""
+    complete: bool
+    """Whether the degree is 1, and the branch is among them: nothing says that one is missing."""
+
+    @property
+    def degree(self) -> int:
+        """The sum of the signs, which is 1 if none is missing; a ring counts 0."""
+        return int(self.signs.sum())
+
+    def configuration(self, stations: int | ArrayLike = 101) -> xr.Dataset:
+        """Their shapes as `softreach.configuration` has them, one for each `sample`.
+
+        Args:
+            stations: Number of stations, evenly spaced from base to tip, or their Z [m], ascending.
+        """
+        gamma, rod = np.repeat(self.activation[None], len(self), axis=0), self.rod
+        if self.solver is None or not isinstance(rod, LoadedRod):
+            return configuration(rod, gamma, stations)
+        z = stations_along(rod, stations)
+        shapes = self.solver.held(gamma, self.directions, z)[0]
+        strains = rod.strains_of_shapes(z)(gamma, shapes.moment, shapes.force)
+        return shape_dataset(rod, gamma, z, shapes.frames, strains)
+
+    def to_dataset(self) -> xr.Dataset:
+        """All numbers over `equilibrium` and `axis`."""
+        import xarray as xr
+
+        each, vector = ("equilibrium",), ("equilibrium", "axis")
+        values = {
+            "tip": (vector, self.tips, {"units": "m"}),
+            "status": (each, self.status),
+            "margin": (each, self.margin, {"units": "1"}),
+            "direction": (vector, self.directions, {"units": "1"}),
+            "sign": (each, self.signs),
+            "is_ring": (each, self.is_ring),
+            "is_followed": (each, np.arange(len(self)) == self.followed),
+            "activation": (("bundle",), self.activation),
+        }
+        names = {"axis": list(schema.AXES), **schema.bundle_coordinates(self.rod.arm)}
+        whole = {"degree": self.degree, "complete": int(self.complete)}
+        return xr.Dataset(values, names, {**schema.provenance(self.rod.arm), **whole})
+
+    def __len__(self) -> int:
+        return len(self.tips)
+
+    def __repr__(self) -> str:
+        stable = int((self.status == TipStatus.STABLE).sum())
+        doubt = "" if self.complete else ", some may be missing"
+        head = f"<AllEquilibria: {len(self)}, of which {stable} stable; degree {self.degree}{doubt}"
+        return "\n".join([head, *(f"  {self._line(k)}" for k in range(len(self)))]) + ">"
+
+    def _line(self, k: int) -> str:
+        small = _SMALL * self.rod.length
+        tip = ", ".join(f"{x:.4g}" if abs(x) > small else "0" for x in self.tips[k])
+        kind = TipStatus(self.status[k]).name.lower() + (" ring" if self.is_ring[k] else "")
+        which = ", follows from the unloaded arm" if k == self.followed else ""
+        return f"{kind}: tip ({tip}) m, margin {self.margin[k]:.3g}{which}"
+
+
+# Every equilibrium of a loaded arm at given activations, stable or not.
+#
+# The direction of gravity that the tip sees decides which one the base would have to see: a map of
+# the sphere to itself. Unloaded it is the identity, so that its degree is 1, theory (80): every
+# direction at the base is covered once more forward than backward, and the number of equilibria is
+# odd.
+
 
 _SEARCHES = ((4, 1.0), (5, 3.0), (6, 10.0))
 """Levels of the first mesh, and caution: the later ones where the degree is not 1."""
@@ -67,7 +161,7 @@ def equilibria(
     has rings of equilibria where it leans: of each ring one is returned.
 
     Args:
-        arm: The design, or its tip map.
+        arm: The design, or its tip map; of a view of it, such as of the free bundles, the whole.
         activations: Of each bundle [unit of each], shape (bundles,) or (1, bundles).
         tol: Largest tip error, in L.
 
@@ -80,8 +174,12 @@ def equilibria(
     """
     rod = tip_map(arm, tol, warn=False)  # the degree tells whether any is missing
     gamma = _one(rod, activations)
-    if not isinstance(rod, LoadedRod):
+    if isinstance(rod, View):  # whose equilibria are those of the arm
+        rod, gamma = rod.base, rod.activations(gamma)
+    if not rod.supports_unstable:
         return _without_loads(rod, gamma)
+    if not isinstance(rod, LoadedRod):
+        raise InvalidInput("arm", repr(rod), "a Manipulator, or a tip map of one")
     _check_loads(rod.tables)
     solver = _resolving(Solver(rod.tables, FreeRod(rod.arm, rod.tol).steps, rod.tol), gamma)
     branch = solver.find(gamma)
@@ -209,7 +307,7 @@ def _accurate(solver: Solver, gamma: Array, found: _Found) -> tuple[Solver, _Fou
             solver, found = finer, again
         else:
             solver, found = finer, _search(finer, gamma, found.directions)
-    _warn(f"tips of some equilibria miss tol = {solver.tol:g}")
+    warn(f"tips of some equilibria miss tol = {solver.tol:g}")
     return solver, found
 
 
@@ -241,7 +339,7 @@ def _judged(
     complete = found.complete and (followed is not None or not len(known))
     if not complete:
         total = int(found.signs[~found.is_ring].sum())
-        _warn(f"equilibria may be missing: the degree of those found is {total}")
+        warn(f"equilibria may be missing: the degree of those found is {total}")
     return AllEquilibria(
         rod=rod,
         solver=solver,
@@ -266,7 +364,3 @@ def _nearest(found: _Found, known: Array, axis: Array) -> int | None:
     apart = np.where(found.is_ring, latitudes, apart)
     nearest = int(apart.argmin())
     return nearest if apart[nearest] < _SAME else None
-
-
-def _warn(text: str) -> None:
-    warnings.warn(text, SoftreachWarning, stacklevel=4)

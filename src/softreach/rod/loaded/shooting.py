@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -9,9 +10,8 @@ from numpy.typing import NDArray
 
 from softreach.kernels.loaded import any_loads as loaded_general
 from softreach.kernels.loaded import shooting as loaded
-from softreach.rod.load_tables import LoadTables, StepTables
-
-__all__ = ["Shots", "Walked", "base_directions", "shoot", "shoot_along_one", "with_across"]
+from softreach.rod.loaded.tables import LoadTables, StepTables
+from softreach.rod.tip_map import TipStatus
 
 Array = NDArray[np.float64]
 
@@ -112,3 +112,92 @@ def with_across(directions: Array) -> Array:
 def _columns(gamma: Array) -> Array:
     """Activations for kernels, which want one bundle at least."""
     return gamma if gamma.shape[1] else np.zeros((len(gamma), 1))
+
+
+# How boldly an equilibrium is searched, and what says how it was found.
+
+
+class Rung(IntEnum):
+    """How an equilibrium was found."""
+
+    DIRECT = 0
+    """Newton's method, all load at once."""
+    CONTINUATION = 1
+    """The load grown in steps along the branch."""
+    PATIENT = 2
+    """The same in steps an order smaller."""
+    NONE = 3
+    """Not found: the branch ends before all of the load is on."""
+
+
+class Search(NamedTuple):
+    """How boldly the kernels search."""
+
+    increment: float
+    """First share of the load to try."""
+    widest: float
+    """Longest first Newton step that is trusted [rad]."""
+    walks: int
+    """Walks allowed."""
+
+
+# An arm that jumps to another branch on its way lands on an unstable one (design/loaded_rod.md);
+# so whatever is not found stable is searched again, more patiently. Where an arm almost buckles to
+# either side, only the last search follows it to the side to which it leans.
+DIRECT = Search(1.0, 1.2, 7)
+CONTINUATION = Search(0.25, 0.1, 400)
+PATIENT = Search(1 / 64, 0.03, 2000)
+# From a known equilibrium: only the rotation about gravity may be far off.
+NEAR = Search(1.0, 4.0, 12)
+# One walk from where it is.
+HELD = Search(1.0, 4.0, 0)
+
+
+# What a search for equilibria finds, and how tips there answer to activations and forces.
+
+
+class Equilibria(NamedTuple):
+    """Where tips come to rest."""
+
+    tips: Array
+    """r [m], shape (n, 3); NaN where there is no equilibrium on the branch."""
+    status: NDArray[np.int8]
+    """`TipStatus`, shape (n,)."""
+    margin: Array
+    """How far from the loss of stability, from 1 to below 0 [-], shape (n,)."""
+    rung: NDArray[np.int8]
+    """`Rung`, shape (n,)."""
+    frame: Array
+    """First axis of the world at the tip, as the base of the unloaded arm sees it, (n, 3); with
+    loads of several directions also the second one, (n, 6)."""
+
+    @classmethod
+    def empty(cls, n: int, components: int) -> Equilibria:
+        """Room for n."""
+        return cls(
+            np.full((n, 3), np.nan),
+            np.full(n, TipStatus.NO_EQUILIBRIUM, np.int8),
+            np.full(n, np.nan),
+            np.full(n, Rung.NONE, np.int8),
+            np.zeros((n, components)),
+        )
+
+    def of(self, rows: slice | NDArray[np.bool_ | np.intp]) -> Equilibria:
+        """Some of them; a slice shares memory."""
+        tips, status, margin, rung, frame = self
+        return Equilibria(tips[rows], status[rows], margin[rows], rung[rows], frame[rows])
+
+
+class Response(NamedTuple):
+    """How tips answer to activations and forces."""
+
+    tips: Array
+    """r [m], shape (n, 3)."""
+    twists: Array
+    """(v, ω) per activation, shape (n, 6, bundles)."""
+    compliance: Array
+    """∂r/∂F [m/N], shape (n, 3, 3), or (0, 3, 3)."""
+    directions: Array
+    """Tangents d3 of the tips [-], shape (n, 3), or (0, 3)."""
+    status: NDArray[np.int8]
+    """`TipStatus`, shape (n,)."""

@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.equilibrium import Solver
-from softreach.rod.found_equilibria import Equilibria
-from softreach.rod.frames import position_slopes
-from softreach.rod.loaded import LoadedRod
-from softreach.rod.tip_force_tables import TipForceTables
-from softreach.rod.tip_map import TipStatus
+from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.loaded.shooting import Equilibria
+from softreach.rod.loaded.solver import Solver
+from softreach.rod.loaded.tables import TipForceTables
+from softreach.rod.tip_map import TipStatus, position_slopes
 
 __all__ = ["PushingTip", "TipResponse"]
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.rod.frames import Frames
+from softreach.rod.tip_map import Frames
 
 __all__ = ["Shapes", "shapes_of"]
 

@@ -12,26 +12,34 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.loads import Loads
 from softreach.arm.tables import tables
 from softreach.kernels.rod.tips import LANES
-from softreach.rod.arm_rod import ArmRod
-from softreach.rod.equilibrium import LATER_RUNGS, Solver
-from softreach.rod.found_equilibria import Equilibria, Response
-from softreach.rod.frames import Frames, StrainRange, Strains, TipMotions, position_slopes
-from softreach.rod.free import FreeRod
-from softreach.rod.linear_strains import linear_strains
-from softreach.rod.load_phase import check_phase
-from softreach.rod.load_tables import ArmBody, Body, LoadTables
-from softreach.rod.loaded_steps import (
+from softreach.rod.free import FreeRod, linear_strains
+from softreach.rod.loaded.phase import check_phase
+from softreach.rod.loaded.shapes import Shapes
+from softreach.rod.loaded.shooting import Equilibria
+from softreach.rod.loaded.solver import LATER_RUNGS, Solver
+from softreach.rod.loaded.steps import (
+    UNJUDGED,
     Differences,
     checked,
     fewest_steps,
     shape_differences,
     tip_differences,
 )
-from softreach.rod.never_at_rest import none_of, too_heavy
-from softreach.rod.pilot import pilot_activations
-from softreach.rod.tip_map import BLOCK
+from softreach.rod.loaded.tables import ArmBody, Body, LoadTables
+from softreach.rod.steps import pilot_activations
+from softreach.rod.tip_map import (
+    BLOCK,
+    ArmRod,
+    Frames,
+    Status,
+    StrainRange,
+    Strains,
+    TipStatus,
+    none_of,
+    position_slopes,
+    too_heavy,
+)
 from softreach.support import parallel
-from softreach.support.errors import InvalidInput
 
 __all__ = ["LoadedRod"]
 
@@ -76,50 +84,51 @@ class LoadedRod(ArmRod):
 
     @property
     def steps(self) -> int:
-        """The number of steps that `tol` needs; see `loaded_steps` for the rule."""
-        return checked(self._fewest_steps)
+        """The number of steps that `tol` needs for tips; see `loaded_steps` for the rule.
+
+        Raises:
+            InvalidInput: None is enough.
+        """
+        return checked(self._tip_steps, self.tol)
 
     @cached_property
-    def _fewest_steps(self) -> int | InvalidInput:
-        """Steps with which `tol` holds for tips, or why there are none, theory (72)."""
+    def _tip_steps(self) -> int | None:
+        """Steps with which `tol` holds for tips, if any are enough, theory (72)."""
         return self._fewest(self.tables.phase.fewest_steps, tip_differences)
 
     @cached_property
-    def _fewest_shape_steps(self) -> int | InvalidInput:
-        """Steps with which `tol` holds all along the arm."""
+    def _shape_steps(self) -> int | None:
+        """Steps with which `tol` holds all along the arm, if any are enough."""
         return self._fewest(self.steps, shape_differences)
 
-    @property
-    def _shape_steps(self) -> int:
-        return checked(self._fewest_shape_steps)
-
-    @cached_property
-    def _shape_solver(self) -> Solver:
-        return self._solver_of(self._shape_steps)
-
-    def _fewest(self, steps: int, differences: Differences) -> int | InvalidInput:
+    def _fewest(self, steps: int, differences: Differences) -> int | None:
         gamma = pilot_activations(self.arm, self.box)
-        found = fewest_steps(self._solver_of, gamma, steps, differences)
-        return found or max(steps, FreeRod(self.arm, self.tol).steps)
+        enough = fewest_steps(self._solver_of, gamma, steps, differences)
+        return max(steps, FreeRod(self.arm, self.tol).steps) if enough == UNJUDGED else enough
 
     def _solver_of(self, steps: int) -> Solver:
         return Solver(self.tables, steps, self.tol)
 
-    @property
+    @cached_property
     def solver(self) -> Solver:
-        """What finds equilibria with the steps that `tol` needs."""
-        return self._solver
+        """Solver with the steps that `tol` needs for tips."""
+        return self._solver_of(self.steps).with_starts(self.box)
 
     @cached_property
-    def _solver(self) -> Solver:
-        return self._solver_of(self.steps).with_starts(self.box)
+    def _shape_solver(self) -> Solver:
+        """Solver with the steps that `tol` needs all along the arm."""
+        return self._solver_of(checked(self._shape_steps, self.tol))
+
+    def _prepare(self) -> None:
+        self.solver  # noqa: B018
 
     def equilibria(self, activations: ArrayLike) -> Equilibria:
         """Tips with their status, the margin of stability, and how each was found.
 
         What is to be searched again is gathered from all samples, so that kernels get whole blocks.
         """
-        gamma, solver = self.box.check(activations), self._solver
+        self.prepare()
+        gamma, solver = self.box.check(activations), self.solver
         found = solver.empty(len(gamma))
         blocks = parallel.blocks(len(gamma), _BLOCK)
         parallel.run(partial(solver.direct, gamma[b], found.of(b)) for b in blocks)
@@ -129,69 +138,60 @@ class LoadedRod(ArmRod):
             parallel.run(partial(solver.again, gamma, rows[b], rung, found) for b in blocks)
         return found
 
-    def status(self, activations: ArrayLike) -> NDArray[np.int8]:
-        """`TipStatus` of each activation, shape (n,)."""
-        return self.equilibria(activations).status
-
-    def fill_tips(self, gamma: Array, out: Array) -> None:
-        """Put the tips [m] of checked activations into `out`, (n, 3), on the calling thread."""
-        out[:] = self._solver.find(gamma).tips
-
-    def fill_tips_and_status(self, gamma: Array, out: Array, status: NDArray[np.int8]) -> None:
-        """Put tips [m] (n, 3) and their `TipStatus` (n,) into place, on the calling thread."""
-        found = self._solver.find(gamma)
-        out[:], status[:] = found.tips, found.status
-
-    def fill_slopes(self, gamma: Array, tips: Array, slopes: Array) -> None:
-        """Put tips (n, 3) and ∂r/∂γ (n, 3, bundles) [m] into place."""
-        self.fill_slopes_and_status(gamma, tips, slopes, status=np.empty(len(gamma), np.int8))
-
-    def fill_slopes_and_status(
-        self, gamma: Array, tips: Array, slopes: Array, *, status: NDArray[np.int8]
+    def fill(
+        self,
+        gamma: Array,
+        tips: Array,
+        slopes: Array | None = None,
+        *,
+        twists: Array | None = None,
+        status: Status | None = None,
+        directions: Array | None = None,
     ) -> None:
-        """`fill_slopes`, and the `TipStatus` (n,) of each, on the calling thread."""
-        response = self._solver.respond(gamma)
-        tips[:], status[:] = response.tips, response.status
-        position_slopes(tips, response.twists, slopes)
-
-    def tip_twists(self, activations: ArrayLike) -> tuple[Array, Array]:
-        """Tips [m] and the spatial twist of the tip frame per unit of each activation."""
-        response = self._responses(activations)
-        return response.tips, response.twists
+        """Put tips, and what else is asked for, into place; each equilibrium is found once."""
+        if slopes is None and twists is None and directions is None:
+            found = self.solver.find(gamma)
+        else:
+            found = self.solver.respond(gamma, directions=directions is not None)
+            if slopes is not None:
+                position_slopes(found.tips, found.twists, slopes)
+            if twists is not None:
+                twists[:] = found.twists
+            if directions is not None:
+                directions[:] = found.directions
+        tips[:] = found.tips
+        if status is not None:
+            status[:] = found.status
 
     def compliance(self, activations: ArrayLike) -> Array:
         """∂r/∂F [m/N]: how a tip yields to a small dead force on it, shape (n, 3, 3)."""
-        return self._responses(activations, compliance=True).compliance
-
-    def tip_motions(self, activations: ArrayLike) -> TipMotions:
-        """Positions and directions of the tips with their derivatives, in one pass over rods."""
-        found = self._responses(activations, directions=True)
-        slopes = np.empty_like(found.twists[:, :3])
-        position_slopes(found.tips, found.twists, slopes)
-        return TipMotions(found.tips, slopes, found.directions, found.twists[:, 3:])
-
-    def _responses(
-        self, activations: ArrayLike, *, compliance: bool = False, directions: bool = False
-    ) -> Response:
-        gamma, solver = self.box.check(activations), self._solver
-        found = Response.empty(
-            len(gamma), self.box.bundles, compliance=compliance, directions=directions
-        )
+        self.prepare()
+        gamma, solver = self.box.check(activations), self.solver
+        compliance = np.empty((len(gamma), 3, 3))
 
         def fill(block: slice) -> None:
-            response = solver.respond(gamma[block], compliance=compliance, directions=directions)
-            for all_values, values in zip(found, response, strict=True):
-                all_values[block] = values
+            compliance[block] = solver.respond(gamma[block], compliance=True).compliance
 
         parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), _BLOCK))
-        return found
+        return compliance
 
-    def frames(self, activations: ArrayLike, stations: ArrayLike) -> Frames:
+    def frames(
+        self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
+    ) -> Frames:
         """Centerline and directors at ascending stations Z [m]."""
         gamma, z = self.box.check(activations), self.check_stations(stations)
-        return self._shape_solver.shapes(gamma, z).frames
+        return self._shapes(gamma, z, status).frames
 
-    def strains_at(self, stations: ArrayLike) -> Callable[[ArrayLike], Strains]:
+    def _shapes(self, gamma: Array, z: Array, status: Status | None) -> Shapes:
+        """Shapes of the equilibria that `tips` finds, at ascending stations."""
+        known = self.equilibria(gamma)
+        shapes = self._shape_solver.shapes(gamma, z, known)
+        if status is not None:
+            lost = np.isnan(shapes.frames.position[:, 0, 0])
+            status[:] = np.where(lost, TipStatus.NO_EQUILIBRIUM, known.status)
+        return shapes
+
+    def strains_at(self, stations: ArrayLike) -> Callable[..., Strains]:
         """(û + K⁻¹m) ζ̂/ζ and ζ = ζ̂ (1 + n3/K0) at stations Z [m] as a function of activations.
 
         Curvature is per length as it is, stretched by loads too, so that dᵢ' = ζ u × dᵢ.
@@ -200,9 +200,9 @@ class LoadedRod(ArmRod):
         of_shapes = self.strains_of_shapes(z)
         ascending, back = np.unique(z, return_inverse=True)
 
-        def strains(activations: ArrayLike) -> Strains:
+        def strains(activations: ArrayLike, status: Status | None = None) -> Strains:
             gamma = self.box.check(activations)
-            shape = self._shape_solver.shapes(gamma, ascending)
+            shape = self._shapes(gamma, ascending, status)
             return of_shapes(gamma, shape.moment[:, back], shape.force[:, back])
 
         return strains
@@ -213,9 +213,9 @@ class LoadedRod(ArmRod):
         yielded = np.stack([bending, bending, torsion], axis=1)
 
         def strains(gamma: Array, moment: Array, force: Array) -> Strains:
-            rest, stretch = linear_strains(table, gamma), 1.0 + force[..., 2] * axial
-            u = rest.curvature + moment * yielded
-            return Strains(u / stretch[..., None], rest.extension * stretch)
+            unloaded, stretch = linear_strains(table, gamma), 1.0 + force[..., 2] * axial
+            u = unloaded.curvature + moment * yielded
+            return Strains(u / stretch[..., None], unloaded.extension * stretch)
 
         return strains
 

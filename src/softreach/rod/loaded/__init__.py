@@ -1,0 +1,1 @@
+"""The rod under loads: equilibria, their stability, and how they yield."""

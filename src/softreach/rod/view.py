@@ -1,0 +1,230 @@
+"""Views of a tip map: some of its bundles, other measures of activation, stable tips alone.
+
+How far two activations are apart has a meaning where all bundles share a unit. Where tensions,
+pressures and strains drive one arm together it has none, until each is counted in its own range.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.arm.manipulator import Manipulator
+from softreach.rod.activation_box import ActivationBox
+from softreach.rod.tip_map import (
+    Array,
+    Frames,
+    Status,
+    StrainRange,
+    Strains,
+    TipMap,
+    TipStatus,
+    a_tip_map,
+)
+from softreach.support.arguments import checked
+
+__all__ = ["View", "activation_measures", "free_bundles", "measured_bundles", "stable_tips"]
+
+
+@checked(rod=a_tip_map)
+def free_bundles(rod: TipMap) -> TipMap:
+    """The restriction of a tip map to its free bundles; the map itself if all are free."""
+    if rod.box.dimension == rod.box.bundles:
+        return rod
+    view = _view(rod)
+    return replace(view, free=tuple(view.free[k] for k in rod.box.free))
+
+
+def measured_bundles(rod: TipMap) -> TipMap:
+    """A tip map whose activations are in `activation_measures`; the map itself if they are."""
+    view, measures = _view(rod), activation_measures(rod.arm)
+    names = rod.arm.bundle_names
+    scale = tuple(float(measures[names.index(name)]) for name in view.base.box.names)
+    return rod if scale == view.scale else replace(view, scale=scale)
+
+
+def stable_tips(rod: TipMap) -> TipMap:
+    """The tip map with NaN where the equilibrium is not stable; the map itself if it has none."""
+    if not rod.supports_unstable or (isinstance(rod, View) and rod.only_stable):
+        return rod
+    return replace(_view(rod), only_stable=True)
+
+
+def activation_measures(arm: Manipulator) -> Array:
+    """What changes of each activation are counted in, shape (bundles,).
+
+    Strains count as they are. Where all bundles share another unit, the widest range is 1, so that
+    distances keep their proportions; where units differ, the range of each bundle is.
+    """
+    units = set(arm.bundle_units)
+    ranges = np.diff(arm.bounds, axis=1)[:, 0]
+    if units == {"1"} or not ranges.any():
+        return np.ones(arm.bundles)
+    if len(units) == 1:
+        return np.full(arm.bundles, ranges.max())
+    return np.where(ranges > 0, ranges, np.maximum(np.abs(arm.bounds[:, 1]), 1.0))
+
+
+def _view(rod: TipMap) -> View:
+    if isinstance(rod, View):
+        return rod
+    bundles = rod.box.bundles
+    return View(rod, (1.0,) * bundles, tuple(range(bundles)))
+
+
+@dataclass(frozen=True, repr=False)
+class View(TipMap):
+    """A tip map in other coordinates x of its activations, γ = offset + scale ∘ x.
+
+    A search that takes NaN for a failed step ends at places that the arm can hold, where unstable
+    equilibria are NaN as missing ones are.
+    """
+
+    base: TipMap
+    """The map of all activations in their own units; no view itself."""
+    scale: tuple[float, ...]
+    """What one unit of x is, for each bundle of the base."""
+    free: tuple[int, ...]
+    """The bundles of the base that x has; the others are fixed at their lower bounds."""
+    only_stable: bool = False
+    """Whether unstable equilibria count as none."""
+    arm: Manipulator = field(init=False, compare=False)
+    tol: float = field(init=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "arm", self.base.arm)
+        object.__setattr__(self, "tol", self.base.tol)
+
+    @property
+    def supports_unstable(self) -> bool:
+        """Whether a tip can have another status than stable."""
+        return self.base.supports_unstable
+
+    @cached_property
+    def box(self) -> ActivationBox:
+        """Bounds of x."""
+        base = self.base.box
+        if self._is_plain:
+            return base
+        ends = np.stack([base.low, base.high], axis=1)[self._columns] / self.measures[:, None]
+        return ActivationBox.between(ends, [base.names[j] for j in self.free])
+
+    @cached_property
+    def measures(self) -> Array:
+        """What one unit of each x is in the unit of its activation, shape (bundles,)."""
+        return np.array(self.scale, float)[self._columns]
+
+    @cached_property
+    def _columns(self) -> NDArray[np.intp]:
+        return np.array(self.free, np.intp)
+
+    @cached_property
+    def _is_plain(self) -> bool:
+        """Whether x are the activations of the base."""
+        return len(self.free) == len(self.scale) and all(one == 1.0 for one in self.scale)
+
+    def activations(self, x: Array) -> Array:
+        """Activations of the base, (n, its bundles), at checked x (n, bundles)."""
+        if self._is_plain:
+            return x
+        gamma = np.tile(self.base.box.low, (len(x), 1))
+        gamma[:, self._columns] = x * self.measures
+        return gamma
+
+    def prepare(self) -> None:
+        """Compute what every sample needs, once for all threads."""
+        self.base.prepare()
+
+    def fill(
+        self,
+        gamma: Array,
+        tips: Array,
+        slopes: Array | None = None,
+        *,
+        twists: Array | None = None,
+        status: Status | None = None,
+        directions: Array | None = None,
+    ) -> None:
+        """Put tips, and what else is asked for, of checked x into place."""
+        if self.only_stable and status is None:
+            status = np.empty(len(gamma), np.int8)
+        base_slopes, base_twists = self._room(slopes), self._room(twists)
+        at = self.activations(gamma)
+        self.base.fill(
+            at, tips, base_slopes, twists=base_twists, status=status, directions=directions
+        )
+        self._put(base_slopes, slopes)
+        self._put(base_twists, twists)
+        self._drop(status, tips, slopes, twists, directions)
+
+    def _room(self, values: Array | None) -> Array | None:
+        """Room for derivatives along all bundles of the base."""
+        if values is None or self._is_plain:
+            return values
+        return np.empty((*values.shape[:2], len(self.scale)))
+
+    def _put(self, of_base: Array | None, values: Array | None) -> None:
+        """Put derivatives along x into place, from those along all bundles of the base."""
+        if of_base is not None and values is not None and of_base is not values:
+            np.multiply(of_base[:, :, self._columns], self.measures, out=values)
+
+    def _drop(self, status: Status | None, *values: Array | None) -> None:
+        """Make NaN, and say that there is no equilibrium, where only stable ones count."""
+        if not self.only_stable or status is None:
+            return
+        lost = status != TipStatus.STABLE
+        status[lost] = TipStatus.NO_EQUILIBRIUM
+        for some in values:
+            if some is not None:
+                some[lost] = np.nan
+
+    def farthest(self) -> float:
+        """No tip is farther from the base than this [m]."""
+        return self.base.farthest()
+
+    def linearization_error(self, half_widths: Array) -> float:
+        """The largest |r(γ + d) - r(γ) - r'(γ) d| [m] for |dj| <= half_widths[j] in the box."""
+        return self.base.linearization_error(self._widths(half_widths))
+
+    def linearization_errors(self, centers: Array, half_widths: Array) -> Array:
+        """The same [m] for |dj| <= half_widths[j] around each center only, shape (n,)."""
+        widths = self._widths(half_widths)
+        return self.base.linearization_errors(self.activations(centers), widths)
+
+    def _widths(self, half_widths: Array) -> Array:
+        widths = np.zeros(len(self.scale))
+        widths[self._columns] = half_widths * self.measures
+        return widths
+
+    def frames(
+        self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
+    ) -> Frames:
+        """Centerline and directors at ascending stations Z [m]."""
+        gamma = self.activations(self.box.check(activations))
+        if self.only_stable and status is None:
+            status = np.empty(len(gamma), np.int8)
+        frames = self.base.frames(gamma, stations, status)
+        self._drop(status, *frames)
+        return frames
+
+    def strains_at(self, stations: ArrayLike) -> Callable[..., Strains]:
+        """The strains at stations Z [m], in any order, as a function of activations."""
+        of_base = self.base.strains_at(stations)
+
+        def strains(activations: ArrayLike, status: Status | None = None) -> Strains:
+            gamma = self.activations(self.box.check(activations))
+            if self.only_stable and status is None:
+                status = np.empty(len(gamma), np.int8)
+            found = of_base(gamma, status)
+            self._drop(status, *found)
+            return found
+
+        return strains
+
+    def strain_range(self, stations: ArrayLike) -> StrainRange:
+        """Ranges of the strains at stations Z [m] within the activation box."""
+        return self.base.strain_range(stations)
