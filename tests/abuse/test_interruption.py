@@ -158,7 +158,7 @@ def test_a_block_done_as_a_whole_ends_before_the_process_and_none_begins_after(t
         """
         import os, signal, threading, time
         from pathlib import Path
-        from softreach.cli import end_on_signals
+        from softreach.cli.signals import end_on_signals
         from softreach.support.files.interruption import as_a_whole
 
         end_on_signals()
@@ -181,7 +181,7 @@ def test_signals_that_are_ignored_stay_ignored(tmp_path):
         tmp_path,
         """
         import os, signal
-        from softreach.cli import end_on_signals
+        from softreach.cli.signals import end_on_signals
 
         signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
         end_on_signals()

@@ -125,15 +125,13 @@ def test_colors_and_terminals_that_are_asked_for_change_no_word(variable, stream
     assert "\x1b" not in printed(err)
 
 
-def test_a_backend_that_does_not_exist_is_named(monkeypatch):
-    from softreach.plot.style import pyplot
-    from softreach.support.errors import InvalidInput
-
-    monkeypatch.setenv("MPLBACKEND", "nonsense")
-    for name in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"]:
-        monkeypatch.delitem(sys.modules, name)
-    with pytest.raises(InvalidInput, match="MPLBACKEND = nonsense"):
-        pyplot()
+@pytest.mark.slow
+def test_a_backend_that_does_not_exist_is_named():
+    script = "from softreach.plot.style import pyplot; pyplot()"
+    environment = os.environ | {"MPLBACKEND": "nonsense"}
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert "InvalidInput: MPLBACKEND = nonsense" in done.stderr
 
 
 START = f"{sys.executable} -m softreach"

@@ -12,8 +12,8 @@ from typing import Annotated, Any, cast
 
 from cyclopts import App, CycloptsError, Group, Parameter
 
-from softreach.cli import INTERRUPTED
 from softreach.cli.console import HelpConsole, console
+from softreach.cli.signals import INTERRUPTED
 from softreach.support.errors import InvalidInput, NotWritten, SoftreachError
 
 _MORE = Group("More", sort_key=-1)
