@@ -279,12 +279,12 @@ def test_the_demo_writes_every_file_it_names(output, folder, capsys):
 
 
 BAD_DESIGN = """
-length_m = 1.0
-outer_radius_m = "thick"
-inner_radius_m = 0.04
-taper_degrees = 2.0
+version = 2
+profile = { length_m = 1.0, outer_radius_m = "thick", taper_degrees = 2.0 }
+rings = [{ inner_ratio = 0.6 }]
 
-[[fibers]]
+[[actuators]]
+kind = "fiber"
 extent_deg = 400.0
 helical_angle_deg = 0.0
 """

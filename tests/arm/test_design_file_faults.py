@@ -161,6 +161,7 @@ TWO = BODY.replace("0.5 }", "0.5, material = 'a' }, { inner_ratio = 0.6 }")
         (BODY.replace("0.5 }", "0.5, outer_ratio = 0.9 }") + FIBER, "rings[0].outer_ratio = 0.9"),
         (BODY.replace("length_m", "kind = 'round', length_m") + FIBER, "profile.kind = 'round'"),
         (BODY.replace("version = 2", "version = 3") + FIBER, "version = 3: must be 2"),
+        (BODY.replace("version = 2", "version = 1") + FIBER, "version = 1: must be 2"),
         (BODY.replace("version = 2", "version = true") + FIBER, "version = True: must be 2"),
         (BODY.replace("version = 2", "") + FIBER, "version: required key is missing"),
         (f"{BODY}[[tendons]]\n{FIBER}", "tendons = [{}]: unknown key; write [[actuators]] with"),

@@ -315,10 +315,10 @@ a_manipulator = instance(Manipulator, "a Manipulator")
 """An argument that is a design."""
 
 
-Part = TypeVar("Part")
+Made = TypeVar("Made")
 
 
-def _part_or_faults(faults: list[Fault], kind: type[Part], **values: Any) -> Part | None:
+def _part_or_faults(faults: list[Fault], kind: type[Made], **values: Any) -> Made | None:
     """A part, or None and its faults added to a list."""
     try:
         return kind(**values)

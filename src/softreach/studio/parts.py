@@ -6,9 +6,9 @@ import math
 from typing import NamedTuple
 
 from softreach.arm.actuators import SectorActuator
+from softreach.arm.edits import ring_label
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import Parameter, parameters
-from softreach.studio.edits import ring_label
 
 __all__ = ["BODY", "Number", "Part", "numbers", "parts"]
 

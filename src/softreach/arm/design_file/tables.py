@@ -131,7 +131,7 @@ class TableReader:
         kind = raw.get("interpolation", "cubic")
         if kind not in kinds:
             self.refused(f"{path}.interpolation", kind, f"must be one of {', '.join(kinds)}")
-        for name in raw.keys() - _ALONG_KEYS.keys():
+        for name in (one for one in raw if one not in _ALONG_KEYS):
             self.refused(f"{path}.{name}", raw[name], unknown_key(name, _ALONG_KEYS))
         if len(self.faults) > before:
             return WRONG

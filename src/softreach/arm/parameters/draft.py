@@ -18,7 +18,7 @@ from softreach.support.errors import Fault, InvalidDesign
 
 __all__ = ["Draft", "PartKey", "Path", "part_of", "parts"]
 
-Part = TypeVar("Part")
+Made = TypeVar("Made")
 
 PartKey = tuple[str | int, ...]
 """("profile",), ("rings", 0, "material"), ("core",), ("actuators", "left"), ("loads",), ..."""
@@ -233,7 +233,7 @@ class Draft:
     def _made(self, key: PartKey, **others: Any) -> Any:
         return self._tried(key, lambda: self._parts[key].made(**others))
 
-    def _tried(self, key: PartKey | None, make: Callable[[], Part]) -> Part | None:
+    def _tried(self, key: PartKey | None, make: Callable[[], Made]) -> Made | None:
         """The part, or None and its faults; None as a key for the arm itself."""
         try:
             return make()

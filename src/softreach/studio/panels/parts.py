@@ -7,11 +7,10 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from softreach.arm import designs
+from softreach.arm import designs, edits
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import material_names
 from softreach.arm.parameters import changed
-from softreach.studio import edits
 from softreach.studio.controls import Shown, refusal
 from softreach.studio.panels.line import Line
 from softreach.studio.panels.typed import NumberField

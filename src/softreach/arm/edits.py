@@ -1,4 +1,4 @@
-"""Changes of what an arm consists of: actuators and rings added, removed, renamed, remade."""
+"""Edits of an arm: actuators and rings added, removed, renamed, made of another material."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ __all__ = [
 ]
 
 _EXTENT = np.radians(40)
-_TURN = 2.0  # bending of a new actuator at its bound, over the whole arm [rad]
+_TURN = 2.0  # bending of a new actuator at its bound, over the arm [rad]
 
 
 def with_actuator(arm: Manipulator, kind: str) -> Manipulator:
@@ -49,8 +49,8 @@ def with_actuator(arm: Manipulator, kind: str) -> Manipulator:
         InvalidDesign: A tendon or a chamber in an arm without Young's modulus.
     """
     name = _new_name(kind, [one.name for one in arm.actuators])
-    made = ACTUATOR_KINDS[kind](arm, name, _widest_gap(arm))
-    return arm.replace(actuators=(*arm.actuators, made))
+    actuator = ACTUATOR_KINDS[kind](arm, name, _widest_gap(arm))
+    return arm.replace(actuators=(*arm.actuators, actuator))
 
 
 def without_actuator(arm: Manipulator, name: str) -> Manipulator:
@@ -59,10 +59,10 @@ def without_actuator(arm: Manipulator, name: str) -> Manipulator:
     Raises:
         InvalidInput: It is the last one.
     """
-    left = tuple(one for one in arm.actuators if one.name != name)
-    if not left:
+    others = tuple(one for one in arm.actuators if one.name != name)
+    if not others:
         raise InvalidInput("actuators", name, "more than one to remove one of them")
-    return arm.replace(actuators=left)
+    return arm.replace(actuators=others)
 
 
 def with_actuator_name(arm: Manipulator, old: str, new: str) -> Manipulator:
@@ -146,7 +146,7 @@ def with_core(arm: Manipulator, material: str) -> Manipulator:
 
 
 def ring_label(arm: Manipulator, index: int) -> str:
-    """What a ring is called: its index, and its name if it has one."""
+    """Label of a ring: its index, and its name if it has one."""
     name = arm.section.rings[index].name
     return f"ring {index} ({name})" if name else f"ring {index}"
 
@@ -190,7 +190,7 @@ ACTUATOR_KINDS: Mapping[str, Callable[[Manipulator, str, float], Actuator]] = {
 
 
 def _moment(arm: Manipulator) -> float:
-    """The moment that bends the base as if the whole arm were to turn by `_TURN` [N m]."""
+    """The moment that bends the base as if the arm were to turn in all by `_TURN` [N m]."""
     stiffness = float(arm.section.stiffness(arm.profile.radius(0.0)).bending)
     return _TURN * stiffness / arm.length
 
