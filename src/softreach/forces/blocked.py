@@ -121,7 +121,7 @@ def _starts(
         gamma = rod.box.check(np.atleast_2d(as_floats("start", start)))
         return rod.tips(gamma), list(gamma[:, None])
     targets = checked_targets("places", places)
-    gamma = rod.box.with_held(checked_activations("start", start, rod.box, len(targets)))
+    gamma = rod.box.with_fixed(checked_activations("start", start, rod.box, len(targets)))
     return targets, list(gamma[:, None])
 
 
