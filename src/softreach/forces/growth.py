@@ -61,7 +61,7 @@ class Grown(NamedTuple):
 
 
 class _Program(NamedTuple):
-    """The solution of a linear program."""
+    """The solution of a linear program; rate and slope are NaN where the solver has none."""
 
     gamma: Array
     """Change of the activations [unit of each], shape (bundles,)."""
@@ -70,7 +70,7 @@ class _Program(NamedTuple):
     rate: float
     """The same in units of force per range of activation."""
     multipliers: Array
-    """What each bundle's bounds cost, shape (bundles,)."""
+    """Price of each bundle's bounds, shape (bundles,)."""
     slope: float
     """By how much the force would change if the place moved [N/m]."""
 
@@ -121,7 +121,7 @@ class Growth:
             return None
         for _ in range(_MOST_STEPS):
             best = self._program(held, reach)
-            if best.rate <= _NO_GROWTH:
+            if not best.rate > _NO_GROWTH:  # NaN too
                 return self._end(held, best)
             tried = self._tried(held, best)
             share = (tried.force - held.force) / best.force if tried else 0.0
@@ -151,6 +151,8 @@ class Growth:
         """The end, by what stopped it; by default bounds if some cost force, else the shape."""
         cost = np.abs(best.multipliers)
         limits = self._at_bound(held.gamma) & (cost > _MULTIPLIER * cost.max(initial=1e-12))
+        if np.isnan(best.rate):
+            stop = Stop.UNFINISHED
         if stop is None:
             stop = Stop.BOUND if limits.any() else Stop.SINGULAR
         return Grown(held, stop, limits & (stop == Stop.BOUND), best.slope)
@@ -183,6 +185,9 @@ class Growth:
         found = linprog(goal, A_eq=columns, b_eq=np.zeros(3), bounds=ends, method="highs-ds")
         if found.x is None:
             found = linprog(goal, A_eq=columns, b_eq=np.zeros(3), bounds=ends, method="highs-ipm")
+        if found.x is None:  # nothing is known but that no change at all is allowed
+            nothing = np.zeros(box.bundles)
+            return _Program(nothing, 0.0, np.nan, nothing, np.nan)
         change = reach * found.x
         price = found.lower.marginals + found.upper.marginals
         return _Program(
