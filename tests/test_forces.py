@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize
@@ -55,6 +57,14 @@ def test_the_bundles_named_are_at_their_bounds():
     limit = found.limit.values
     assert (limit <= at).all()
     np.testing.assert_array_equal(limit.any(axis=1), bound)
+
+
+def test_a_growth_whose_program_has_no_solution_is_unfinished(monkeypatch):
+    unsolved = SimpleNamespace(x=None)
+    monkeypatch.setattr("scipy.optimize.linprog", lambda *_, **__: unsolved)
+    found = blocked_force(LOADED, None, SIDE, start=START[:1])
+    assert found.status.values.tolist() == [Stop.UNFINISHED]
+    assert found.force.values.tolist() == [0.0]
 
 
 def test_the_force_begins_to_grow_by_the_compliance():

@@ -62,7 +62,7 @@ def test_the_tip_map_of_the_free_bundles_is_that_of_all_on_a_face_of_the_box(bun
     gamma = in_box(arm, 40)
     free = np.delete(gamma, bundle, axis=1)
     assert part.box.names == tuple(np.delete(arm.bundle_names, bundle))
-    assert np.array_equal(whole.box.with_held(free), gamma)
+    assert np.array_equal(whole.box.with_fixed(free), gamma)
     assert np.array_equal(part.tips(free), whole.tips(gamma))
     for of_part, of_all in zip(part.tip_motions(free), whole.tip_motions(gamma), strict=True):
         expected = of_all if of_all.ndim == 2 else np.delete(of_all, bundle, axis=2)

@@ -57,13 +57,13 @@ def test_the_phase_of_a_tip_force_is_its_closed_form():
     loads = Loads(gravity=NOTHING, tip_force=(3.0, 0.0, 4.0))
     body = Uniform((0.0, 1 / 4.0, 1 / 2.0), 0.0)
     phase = LoadTables(held(CYLINDER), loads, body).phase
-    assert phase.whole == pytest.approx(np.sqrt(5.0 / 2.0))
-    assert phase.steepest == pytest.approx(phase.whole)
+    assert phase.entire == pytest.approx(np.sqrt(5.0 / 2.0))
+    assert phase.steepest == pytest.approx(phase.entire)
     for force in (50.0, 500.0):
         heavy = loads.replace(tip_force=(0.0, 0.0, force))
         phase = LoadTables(held(CYLINDER), heavy, body).phase
-        assert phase.whole / phase.fewest_steps <= np.pi / 2
-        assert phase.whole / (phase.fewest_steps - 1) > np.pi / 2
+        assert phase.entire / phase.fewest_steps <= np.pi / 2
+        assert phase.entire / (phase.fewest_steps - 1) > np.pi / 2
 
 
 @pytest.mark.parametrize("arm", [CYLINDER, TRUNK], ids=["cylinder", "trunk"])

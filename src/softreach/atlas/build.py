@@ -18,7 +18,7 @@ from softreach.atlas.metrics import METRIC_GROUPS, chosen_metrics
 from softreach.atlas.reading import contents, open_atlas, over_length
 from softreach.atlas.space import DesignSpace
 from softreach.atlas.store import DONE, GAP, UNSTABLE, AtlasStore
-from softreach.rod.steps import check_tol
+from softreach.rod.tip_map import check_tol
 from softreach.sampling import check_sampler
 from softreach.support.arguments import (
     POSITIVE,

@@ -20,7 +20,7 @@ from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.geometry.delaunay import delaunay
 from softreach.geometry.hull import convex_hull
 from softreach.rod.rods import tip_map
-from softreach.rod.tip_map import TipMap, TipStatus, none_of
+from softreach.rod.tip_map import TipMap, TipStatus, no_equilibrium_message
 from softreach.support.errors import SoftreachError, no_warnings
 from softreach.support.files.sealed_store import StoreFailed
 
@@ -236,7 +236,7 @@ def _put_unstable(
     known = [metric for metric in metrics if metric.needs == (Need.LOST_SHARE,)]
     values |= {metric.name: metric.value(found, sizes) for metric in known}
     result = Result(values, _kept_tips(store, found))
-    store.write(index, result, UNSTABLE, none_of(len(found.stable)))
+    store.write(index, result, UNSTABLE, no_equilibrium_message(len(found.stable)))
     return index, ""
 
 

@@ -320,9 +320,9 @@ def _dataset(
     end_activation, end_position = np.full(box.bundles, np.nan), np.full(3, np.nan)
     bundle = bound = ""
     if end is not None:
-        activation[:n] = box.with_held(np.array(followed))
+        activation[:n] = box.with_fixed(np.array(followed))
         error[:n] = np.linalg.norm(placed(rod, activation[:n])[0] - points[:n], axis=1)
-        end_activation, end_position = box.with_held(end.point.gamma[None])[0], end.point.tip
+        end_activation, end_position = box.with_fixed(end.point.gamma[None])[0], end.point.tip
         if end.status == PathStatus.BOUND:
             bundle, bound = box.names[box.free[end.bundle]], "upper" if end.upper else "lower"
     return xr.Dataset(

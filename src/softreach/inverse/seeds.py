@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.kernels.branches.spread import choose_apart
-from softreach.rod.tip_map import TipMap, none_stable
+from softreach.rod.tip_map import TipMap, no_stable_equilibrium
 from softreach.sampling import sample_cube
 
 __all__ = ["Landmarks", "face_landmarks", "landmarks"]
@@ -76,7 +76,7 @@ def landmarks(rod: TipMap) -> Landmarks:
         gamma = box.from_cube(np.array(sample_cube("sobol", _SOBOL, m)))
     found = _with_tips(rod, gamma)
     if not len(found.gamma):
-        raise none_stable(len(gamma))
+        raise no_stable_equilibrium(len(gamma))
     return found
 
 

@@ -1,4 +1,4 @@
-"""The activation box: what the bundles may be activated to, and its map from the unit cube."""
+"""The activation box: bounds of the bundles, its map from the unit cube, and steps within it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ActivationBox:
-    """Bounds of activations; a bundle whose bounds are equal is held, the others are free.
+    """Bounds of activations; a bundle whose bounds are equal is fixed, the others are free.
 
     Raises:
         InvalidInput: No pair lower <= upper of finite numbers and no name for each bundle.
@@ -45,7 +45,7 @@ class ActivationBox:
 
     @property
     def bundles(self) -> int:
-        """Number of bundles, free or held."""
+        """Number of bundles, free or fixed."""
         return len(self.bounds)
 
     @cached_property
@@ -65,12 +65,12 @@ class ActivationBox:
 
     @cached_property
     def scales(self) -> Array:
-        """`widths`, with 1 for held bundles: what changes of activation are measured by."""
+        """`widths`, with 1 for fixed bundles: the measure of changes of activation."""
         return _frozen(np.where(self.widths > 0, self.widths, 1.0))
 
     @cached_property
     def is_free(self) -> NDArray[np.bool_]:
-        """Which bundles can move, shape (bundles,)."""
+        """Mask of the bundles that can move, shape (bundles,)."""
         return self.widths > 0
 
     @cached_property
@@ -108,14 +108,14 @@ class ActivationBox:
         return bool((self.low + self.widths > self.high).any())
 
     def from_free_cube(self, cube: Array) -> Array:
-        """Activations of points of the unit cube of the free bundles; the others stay held.
+        """Activations of points of the unit cube of the free bundles; the others stay fixed.
 
         Args:
             cube: Points in [0, 1], shape (n, dimension).
         """
-        whole = np.zeros((len(cube), self.bundles))
-        whole[:, self.free] = cube
-        return self.from_cube(whole, out=whole)
+        every = np.zeros((len(cube), self.bundles))
+        every[:, self.free] = cube
+        return self.from_cube(every, out=every)
 
     def of_free_bundles(self) -> ActivationBox:
         """The box of the free bundles alone."""
@@ -123,20 +123,20 @@ class ActivationBox:
             tuple(self.bounds[j] for j in self.free), tuple(self.names[j] for j in self.free)
         )
 
-    def with_held(self, activations: Array) -> Array:
-        """Activations of all bundles from those of the free ones; the others stay held.
+    def with_fixed(self, activations: Array) -> Array:
+        """Activations of all bundles from those of the free ones; the others stay fixed.
 
         Args:
             activations: Shape (n, dimension).
         """
         if self.dimension == self.bundles:
             return activations
-        whole = np.tile(self.low, (len(activations), 1))
-        whole[:, self.free] = activations
-        return whole
+        every = np.tile(self.low, (len(activations), 1))
+        every[:, self.free] = activations
+        return every
 
     def to_cube(self, activations: Array) -> Array:
-        """Where activations lie in the unit cube, shape (n, bundles); held bundles at 0."""
+        """Points of the unit cube of activations, shape (n, bundles); fixed bundles at 0."""
         return (activations - self.low) / self.scales
 
     def check(self, activations: ArrayLike) -> Array:
@@ -153,7 +153,7 @@ class ActivationBox:
         return np.clip(activations, self.low, self.high)
 
     def excess(self, activations: Array) -> Array:
-        """How far each bundle is outside its bounds, in `scales`; negative inside."""
+        """Distance of each bundle beyond its bounds, in `scales`; negative inside."""
         return np.maximum(self.low - activations, activations - self.high) / self.scales
 
     def margin(self, activations: Array) -> Array:

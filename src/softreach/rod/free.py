@@ -37,7 +37,7 @@ class FreeRod(ArmRod):
 
     @cached_property
     def rule(self) -> StepRule:
-        """How the arm is cut into steps."""
+        """Rule by which the arm is cut into steps."""
         return StepRule(self.arm, self.box)
 
     @property
@@ -130,7 +130,7 @@ class FreeRod(ArmRod):
         return strains
 
     def strain_range(self, stations: ArrayLike) -> StrainRange:
-        """What the strains at stations Z [m] can be within the activation box."""
+        """Ranges of the strains at stations Z [m] within the activation box."""
         z = self.check_stations(stations, ascending=False)
         return strain_range(tables(self.arm, z), self.box)
 

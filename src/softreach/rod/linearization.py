@@ -1,4 +1,4 @@
-"""How far the tip map of a free rod can be from its linearization.
+"""Bound of the distance of the tip map of a free rod from its linearization.
 
 A change d of activation changes the twist by κ = ∂(ζu)/∂γ d = ζ U d + (z·d) u, and turns a section
 by at most a = ∫ |κ|. From r = ∫ ζ d3 the second derivative along d is
@@ -38,7 +38,7 @@ _MOST_KNOWN = 64  # proportions of half widths whose terms are kept
 
 
 class _Terms(NamedTuple):
-    """What the bound is made of where extension and bending are largest: degree two in d."""
+    """Terms of the bound where extension and bending are largest: degree two in d."""
 
     turned_twice: float
     """∫ 3/2 ζ a² by the first part of κ = ζ U d + (z·d) u."""

@@ -1,4 +1,4 @@
-"""How many steps a rod needs: the grid along Z and the rule that meets a tip tolerance.
+"""Steps of a free rod: the grid along Z, and the rule that meets a tip tolerance.
 
 Steps are uniform in S, theory (15); how many is theory (27).
 """
@@ -19,15 +19,14 @@ from softreach.arm.tables import both_sides, tables
 from softreach.kernels.rod import frames, magnus
 from softreach.kernels.rod import tips as rod
 from softreach.rod.activation_box import ActivationBox
+from softreach.rod.tip_map import check_tol
 from softreach.support import parallel
-from softreach.support.arguments import as_number
-from softreach.support.errors import InvalidInput, Range
+from softreach.support.errors import InvalidInput
 
 Array = NDArray[np.float64]
 Differences = Callable[[Array], Array]
 
 _SAFETY = 2.0
-_SMALLEST_TOL = 1e-12
 _MOST_STEPS = 4096
 # Rotation of one step [rad] up to which the kernels' series are good to 1e-10 (tips), and to
 # rounding (frames, whose directors must stay orthonormal).
@@ -244,17 +243,6 @@ def _read_only(table: Array) -> Array:
     """The same for all tables: kernels are compiled once more for those that can be written."""
     table.setflags(write=False)
     return table
-
-
-def check_tol(tol: float) -> float:
-    """A tolerance that can be met in double precision.
-
-    Raises:
-        InvalidInput: It is below 1e-12 or not a number.
-    """
-    if type(tol) is float and _SMALLEST_TOL <= tol < np.inf:  # by far the most, in a tenth of it
-        return tol
-    return as_number("tol", tol, Range(_SMALLEST_TOL, unit="(in L)"))
 
 
 def pilot_activations(arm: Manipulator, box: ActivationBox) -> Array:

@@ -20,21 +20,21 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import check_extension
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.steps import check_tol
 from softreach.support import parallel
-from softreach.support.arguments import instance
+from softreach.support.arguments import as_number, instance
 from softreach.support.arrays import as_floats
-from softreach.support.errors import InvalidInput, counted
+from softreach.support.errors import InvalidInput, Range, counted
 
 Array = NDArray[np.float64]
 Status = NDArray[np.int8]
 
 BLOCK = 16_384
 """Samples per task: large against a thread's cost, small enough for Ctrl-C to be prompt."""
+_SMALLEST_TOL = 1e-12
 
 
 class TipStatus(IntEnum):
-    """Whether a tip can be trusted."""
+    """Status of a tip: a stable equilibrium, an unstable one, or none."""
 
     STABLE = 0
     """A stable equilibrium."""
@@ -120,7 +120,7 @@ class TipMap(ABC):
 
     @cached_property
     def measures(self) -> Array:
-        """What one unit of each activation is in its own unit, shape (bundles,)."""
+        """Size of one unit of each activation in the unit of its bundle, shape (bundles,)."""
         return np.ones(self.box.bundles)
 
     def prepare(self) -> None:  # noqa: B027
@@ -184,7 +184,7 @@ class TipMap(ABC):
         return np.ascontiguousarray(self.frames(activations, [self.length]).directors[:, 0, 2])
 
     def _filled(self, activations: ArrayLike, *wanted: str) -> dict[str, Any]:
-        """What `fill` computes of tips and of what else is wanted, on all threads, by name."""
+        """Results of `fill` by name: tips and what else is wanted, on all threads."""
         gamma = self.box.check(activations)
         n, m = gamma.shape
         room = {"tips": np.empty((n, 3))}
@@ -281,7 +281,7 @@ class Frames(NamedTuple):
 
 
 class Strains(NamedTuple):
-    """How rods are deformed, at stations."""
+    """Strains of rods at stations."""
 
     curvature: Array
     """u in the directors, per unit of activated arclength [1/m], shape (n, station, 3)."""
@@ -301,7 +301,7 @@ class StrainRange(NamedTuple):
 
 
 class TipMotions(NamedTuple):
-    """Where tips are and point, and how both change with each activation."""
+    """Positions and directions of tips with their derivatives along each activation."""
 
     tips: Array
     """r [m], shape (n, 3)."""
@@ -327,28 +327,36 @@ an_arm = instance((Manipulator, TipMap), "a Manipulator or a TipMap")
 a_tip_map = instance(TipMap, "a TipMap")
 
 
-# What to say of loads under which no activation has an equilibrium that could be used.
+def check_tol(tol: float) -> float:
+    """A tolerance that can be met in double precision.
+
+    Raises:
+        InvalidInput: It is below 1e-12 or not a number.
+    """
+    if type(tol) is float and _SMALLEST_TOL <= tol < np.inf:  # by far the most, in a tenth of it
+        return tol
+    return as_number("tol", tol, Range(_SMALLEST_TOL, unit="(in L)"))
 
 
-def none_of(tried: int, sought: str = "a stable equilibrium") -> str:
-    """What was found of as many activations, as a sentence.
+def no_equilibrium_message(tried: int, sought: str = "a stable equilibrium") -> str:
+    """The sentence "none of 9 activations tried has a stable equilibrium".
 
     Args:
-        tried: How many.
+        tried: Number of activations.
         sought: What they do not have.
     """
     return f"none of {tried} activations tried has {sought}"
 
 
-def too_heavy(found: str) -> InvalidInput:
-    """What to raise where nothing is left to go on with.
+def loads_too_heavy(missing: str) -> InvalidInput:
+    """Error of loads under which nothing is left to go on with.
 
     Args:
-        found: What is missing.
+        missing: As `no_equilibrium_message` says it.
     """
-    return InvalidInput("loads", found, "such that some have one", "lighten the load")
+    return InvalidInput("loads", missing, "such that some have one", "lighten the load")
 
 
-def none_stable(tried: int) -> InvalidInput:
-    """What to raise where nothing is reached, after as many activations."""
-    return too_heavy(none_of(tried))
+def no_stable_equilibrium(tried: int) -> InvalidInput:
+    """Error of loads under which none of so many activations has a stable equilibrium."""
+    return loads_too_heavy(no_equilibrium_message(tried))

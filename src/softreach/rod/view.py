@@ -55,7 +55,7 @@ def stable_tips(rod: TipMap) -> TipMap:
 
 
 def activation_measures(arm: Manipulator) -> Array:
-    """What changes of each activation are counted in, shape (bundles,).
+    """Measures in which changes of each activation are counted, shape (bundles,).
 
     Strains count as they are. Where all bundles share another unit, the widest range is 1, so that
     distances keep their proportions; where units differ, the range of each bundle is.
@@ -87,7 +87,7 @@ class View(TipMap):
     base: TipMap
     """The map of all activations in their own units; no view itself."""
     scale: tuple[float, ...]
-    """What one unit of x is, for each bundle of the base."""
+    """Size of one unit of x, for each bundle of the base."""
     free: tuple[int, ...]
     """The bundles of the base that x has; the others are fixed at their lower bounds."""
     only_stable: bool = False
@@ -115,7 +115,7 @@ class View(TipMap):
 
     @cached_property
     def measures(self) -> Array:
-        """What one unit of each x is in the unit of its activation, shape (bundles,)."""
+        """Size of one unit of each x in the unit of its activation, shape (bundles,)."""
         return np.array(self.scale, float)[self._columns]
 
     @cached_property

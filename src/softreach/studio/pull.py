@@ -103,7 +103,7 @@ class Pull:
 
     def _pulled(self, gamma: Array, target: Array) -> Pulled:
         whole = self._prepared.whole
-        activation = whole.box.with_held(gamma[None])[0] * self._prepared.measures
+        activation = whole.box.with_fixed(gamma[None])[0] * self._prepared.measures
         tip = self._tracker.at(gamma).tip
         gap = float(np.linalg.norm(tip - target))
         within = tuple(float(value) for value in activation)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from softreach.kernels.image.contour import stretches
 from softreach.rod.rods import refined
-from softreach.rod.tip_map import TipMap, none_stable
+from softreach.rod.tip_map import TipMap, no_stable_equilibrium
 from softreach.rod.view import stable_tips
 from softreach.support.parallel import blocks
 from softreach.support.progress import Progress, silent
@@ -44,7 +44,7 @@ def grid_tips(rod: TipMap, cells: int, progress: Progress = silent) -> Array:
         tips[rows] = stable.tips(rod.box.from_free_cube(places[rows]))
         progress(0)
     if rod.supports_unstable and np.isnan(tips[:, 0]).all():
-        raise none_stable(len(tips))
+        raise no_stable_equilibrium(len(tips))
     return tips
 
 

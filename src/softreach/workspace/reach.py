@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.rods import tip_map
-from softreach.rod.tip_map import TipMap, too_heavy
+from softreach.rod.tip_map import TipMap, loads_too_heavy
 from softreach.support.arguments import (
     POSITIVE,
     as_given,
@@ -362,7 +362,7 @@ def _reached(tips: Array, left_out: NDArray[np.bool_]) -> Array:
     used = corners_of(~left_out).ravel()
     if not used.any():
         found = f"no cell of an activation grid of {len(left_out)}³ has a stable, untorn image"
-        raise too_heavy(found)
+        raise loads_too_heavy(found)
     return tips[used]
 
 

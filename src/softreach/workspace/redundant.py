@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.geometry.hull import convex_hull
-from softreach.rod.tip_map import TipMap, none_stable
+from softreach.rod.tip_map import TipMap, no_stable_equilibrium
 from softreach.rod.view import stable_tips
 from softreach.sampling import cube_blocks
 from softreach.support import parallel
@@ -251,5 +251,5 @@ def _cloud(rod: TipMap, seed: int) -> tuple[Array, Array]:
         return gamma, tips
     stable = np.isfinite(tips[:, 0])
     if not stable.any():
-        raise none_stable(len(tips))
+        raise no_stable_equilibrium(len(tips))
     return gamma[stable], tips[stable]

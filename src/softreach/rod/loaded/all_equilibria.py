@@ -1,4 +1,10 @@
-"""All equilibria of a loaded arm at one activation, as a value to be asked."""
+"""Every equilibrium of a loaded arm at one activation, stable or not.
+
+The direction of gravity that the tip sees decides which one the base would have to see: a map of
+the sphere to itself. Unloaded it is the identity, so that its degree is 1, theory (80): every
+direction at the base is covered once more forward than backward, and the number of equilibria is
+odd.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +53,7 @@ class AllEquilibria:
     rod: TipMap
     """The arm."""
     solver: Solver | None
-    """What walked along it; None without loads."""
+    """Solver that walked along it; None without loads."""
     activation: Array
     """Of each bundle, shape (bundles,)."""
     tips: Array
@@ -55,15 +61,15 @@ class AllEquilibria:
     status: NDArray[np.int8]
     """`TipStatus`, shape (n,)."""
     margin: Array
-    """How far from the loss of stability, from 1 to below 0 [-], shape (n,); 0 of stable rings."""
+    """Margin of stability, from 1 to below 0 [-], shape (n,); 0 of stable rings."""
     directions: Array
-    """Where gravity pulls as the tip sees it, in the base frame of the arm before its loads, shape
-    (n, 3); NaN without loads."""
+    """Direction of gravity as the tip sees it, in the base frame of the unloaded arm, shape (n, 3);
+    NaN without loads."""
     signs: NDArray[np.int8]
-    """Whether the map of directions keeps the sense of rotation there (1) or turns it over (-1), as
-    it does where the ways to fall are odd in number; 0 of rings; shape (n,)."""
+    """Sense of rotation of the map of directions there: kept (1), or turned over (-1) where the
+    ways to fall are odd in number; 0 of rings; shape (n,)."""
     is_ring: NDArray[np.bool_]
-    """Whether it stands for a ring of them, all around the direction of gravity; shape (n,)."""
+    """Mask of those that stand for a ring, all around the direction of gravity; shape (n,)."""
     followed: int | None
     """The one that follows continuously from the unloaded arm, which is that of the tip map; None
     where that branch has ended."""
@@ -85,7 +91,7 @@ class AllEquilibria:
         if self.solver is None or not isinstance(rod, LoadedRod):
             return configuration(rod, gamma, stations)
         z = stations_along(rod, stations)
-        shapes = self.solver.held(gamma, self.directions, z)[0]
+        shapes = self.solver.shapes_facing(gamma, self.directions, z)[0]
         strains = rod.strains_of_shapes(z)(gamma, shapes.moment, shapes.force)
         return shape_dataset(rod, gamma, z, shapes.frames, strains)
 
@@ -269,9 +275,9 @@ def _of_roots(roots: Roots, *, complete: bool) -> _Found:
 
 
 def _image(solver: Solver, gamma: Array) -> Map:
-    """What the base would have to see, of what the tip sees; steps do not keep its length."""
+    """Map from the direction that the tip sees to that which the base would have to see."""
 
-    def image(points: Array) -> Array:
+    def image(points: Array) -> Array:  # steps do not keep the length
         images = solver.base_directions(gamma, np.ascontiguousarray(points))
         return images / np.linalg.norm(images, axis=1, keepdims=True)
 
@@ -322,7 +328,7 @@ def _again(solver: Solver, gamma: Array, found: _Found) -> _Found:
 def _tips(solver: Solver, gamma: Array, found: _Found) -> Array:
     many = np.repeat(gamma, len(found.directions), axis=0)
     stations = np.array([solver.tables.arm.length])
-    return solver.held(many, found.directions, stations)[0].frames.position[:, 0]
+    return solver.shapes_facing(many, found.directions, stations)[0].frames.position[:, 0]
 
 
 def _judged(
@@ -330,7 +336,7 @@ def _judged(
 ) -> AllEquilibria:
     """In order, with tips and status."""
     axis, many = solver.tables.axes[0], np.repeat(gamma, len(found.directions), axis=0)
-    shapes, margin = solver.held(many, found.directions, np.array([rod.length]))
+    shapes, margin = solver.shapes_facing(many, found.directions, np.array([rod.length]))
     margin = np.where(found.is_ring & (margin > -_NEUTRAL), 0.0, margin)
     stable = (found.signs > 0) & np.where(found.is_ring, margin == 0.0, margin > 0.0)
     places = np.round(shapes.frames.position[:, 0, ::-1] / rod.length, 6)  # part mirror images
@@ -356,7 +362,7 @@ def _judged(
 
 
 def _nearest(found: _Found, known: Array, axis: Array) -> int | None:
-    """Which one the branch of the unloaded arm ends at, if it does."""
+    """Index of the one at which the branch of the unloaded arm ends, if it does."""
     if not len(known) or not len(found.directions):
         return None
     apart = np.linalg.norm(found.directions - known[0], axis=1)

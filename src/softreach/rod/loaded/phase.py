@@ -1,4 +1,4 @@
-"""How fast loads let tangents swing or grow along an arm, which bounds the length of steps.
+"""Phase by which loads let tangents swing or grow along an arm; it bounds the length of steps.
 
 The tangents of theory (68) obey Jacobi's equation: where a force w pushes, they swing like
 cos ∫ √(w/K) ds, so that conjugate points are about π of this phase apart; where it pulls, they grow
@@ -32,10 +32,10 @@ _STATIONS = 65
 class LoadPhase(NamedTuple):
     """Bounds of the phase of the tangents, theory (85)."""
 
-    whole: float
-    """Over the whole arm [rad]."""
+    entire: float
+    """Over the entire arm [rad]."""
     steepest: float
-    """Over the whole arm, were it everywhere as steep in S as where it is steepest [rad]."""
+    """Over the entire arm, were it everywhere as steep in S as where it is steepest [rad]."""
     squeeze: float
     """The largest force over K0 [-]: from 1 on it could squeeze the arm to nothing."""
 
@@ -83,9 +83,11 @@ def check_phase(arm: Manipulator, phase: LoadPhase) -> None:
     Raises:
         InvalidInput: Too heavy loads.
     """
-    if not phase.whole <= _MOST_GROWTH:
+    if not phase.entire <= _MOST_GROWTH:
         found = f"of load number {load_number(arm):.3g}"
-        allowed = f"lighter: their phase is {phase.whole:.3g} rad, at most {_MOST_GROWTH:g} allowed"
+        allowed = (
+            f"lighter: their phase is {phase.entire:.3g} rad, at most {_MOST_GROWTH:g} allowed"
+        )
         raise InvalidInput("loads", found, allowed, "lighten the load or stiffen the arm")
 
 

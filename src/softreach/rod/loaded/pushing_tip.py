@@ -1,4 +1,4 @@
-"""A tip that pushes: where a rod comes to rest while a force along one direction acts on its tip.
+"""A tip that pushes: equilibria of a rod while a force along one direction acts on its tip.
 
 Every force has tables of its own, but only a column of them is new.
 """
@@ -27,21 +27,21 @@ _DOUBTFUL = 0.05  # margin of stability below which a quick search decides nothi
 
 
 class TipResponse(NamedTuple):
-    """Where one tip is, and how it moves."""
+    """Place and derivatives of one tip."""
 
     tip: Array
     """r [m], shape (3,); NaN where there is no equilibrium."""
     slope: Array
     """∂r/∂γ [m], shape (3, bundles)."""
     retreat: Array
-    """How the tip yields to the force with which it pushes, -∂r/∂F [m/N], shape (3,)."""
-    rest: Equilibria
-    """The equilibrium."""
+    """Retreat of the tip per unit of the force with which it pushes, -∂r/∂F [m/N], shape (3,)."""
+    equilibrium: Equilibria
+    """As the search found it."""
 
     @property
     def margin(self) -> float:
-        """How far from the loss of stability, from 1 to below 0 [-]."""
-        return float(self.rest.margin[0])
+        """Margin of stability, from 1 to below 0 [-]."""
+        return float(self.equilibrium.margin[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,29 +79,29 @@ class PushingTip:
             near: Where the search begins; None for the unloaded arm, by way of the whole load.
         """
         solver, one = self._solver(force, self.steps), gamma[None]
-        rest = solver.find(one) if near is None else solver.near(one, near.rest)
-        found = solver.respond(one, compliance=True, known=rest)
+        known = solver.find(one) if near is None else solver.near(one, near.equilibrium)
+        found = solver.respond(one, compliance=True, known=known)
         slopes = np.empty_like(found.twists[:, :3])
         position_slopes(found.tips, found.twists, slopes)
         retreat = found.compliance[0] @ self.direction
-        return TipResponse(found.tips[0], slopes[0], retreat, rest)
+        return TipResponse(found.tips[0], slopes[0], retreat, known)
 
     def is_stable(self, gamma: Array, force: float, response: TipResponse) -> bool:
         """Whether this equilibrium is stable; in doubt steps half as long decide."""
         if abs(response.margin) > _DOUBTFUL:
             return response.margin > 0
-        fine = self._solver(force, 2 * self.steps).near(gamma[None], response.rest)
+        fine = self._solver(force, 2 * self.steps).near(gamma[None], response.equilibrium)
         return bool(fine.status[0] == TipStatus.STABLE)
 
     def error(self, gamma: Array, force: float, response: TipResponse) -> float:
-        """How far the tip moves if the steps are halved [m]."""
-        fine = self._solver(force, 2 * self.steps).near(gamma[None], response.rest)
+        """Movement of the tip when the steps are halved [m]."""
+        fine = self._solver(force, 2 * self.steps).near(gamma[None], response.equilibrium)
         return float(np.linalg.norm(fine.tips[0] - response.tip))
 
     def settles(self, gamma: Array, force: float, response: TipResponse) -> bool:
-        """Whether the arm that is activated first and loaded slowly then comes to rest there."""
-        found = self._solver(force, self.steps).find(gamma[None])
-        apart = float(np.linalg.norm(found.tips[0] - response.tip))
+        """Whether the arm that is activated first and loaded slowly then ends there."""
+        branch = self._solver(force, self.steps).find(gamma[None])
+        apart = float(np.linalg.norm(branch.tips[0] - response.tip))
         return apart <= self.rod.tol * self.rod.length
 
     def finer(self) -> PushingTip:

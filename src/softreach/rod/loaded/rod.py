@@ -1,4 +1,4 @@
-"""The loaded rod: an arm under gravity, payload and forces, and whether its rest is stable."""
+"""The loaded rod: an arm under gravity, payload and forces, and the stability of its equilibria."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ from softreach.rod.tip_map import (
     StrainRange,
     Strains,
     TipStatus,
-    none_of,
+    loads_too_heavy,
+    no_equilibrium_message,
     position_slopes,
-    too_heavy,
 )
 from softreach.support import parallel
 
@@ -63,17 +63,17 @@ class LoadedRod(ArmRod):
 
     @property
     def loads(self) -> Loads:
-        """What acts on the arm beside its actuators."""
+        """Loads on the arm beside its actuators."""
         return self.arm.loads or Loads(gravity=(0.0, 0.0, 0.0))
 
     @property
     def body(self) -> Body:
-        """How the arm yields and what it weighs."""
+        """Compliance and weight of the arm."""
         return ArmBody(self.arm)
 
     @cached_property
     def tables(self) -> LoadTables:
-        """What the kernels read.
+        """Tables for the kernels.
 
         Raises:
             InvalidInput: Loads so heavy that no walk from tip to base keeps its digits.
@@ -230,7 +230,7 @@ class LoadedRod(ArmRod):
         gamma = pilot_activations(self.arm, self.box)
         found = self.strains_at(stations)(gamma)
         if np.isnan(found.extension).all():
-            raise too_heavy(none_of(len(gamma), "an equilibrium"))
+            raise loads_too_heavy(no_equilibrium_message(len(gamma), "an equilibrium"))
         bend = np.hypot(found.curvature[..., 0], found.curvature[..., 1])
         return StrainRange(
             np.stack([np.zeros(bend.shape[1]), np.nanmax(bend, axis=0)], axis=1),

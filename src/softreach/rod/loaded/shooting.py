@@ -1,4 +1,4 @@
-"""Rods shot from the tip: what the kernels of loaded rods give for many activations, by name."""
+"""Rods shot from the tip: the kernels of loaded rods, and their results by name."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from softreach.kernels.loaded import any_loads as loaded_general
 from softreach.kernels.loaded import shooting as loaded
-from softreach.rod.loaded.tables import LoadTables, StepTables
+from softreach.rod.loaded.tables import LoadTables, OneDirection, StepTables
 from softreach.rod.tip_map import TipStatus
 
 Array = NDArray[np.float64]
 
 
 class Shots(NamedTuple):
-    """Where searches ended."""
+    """Ends of searches."""
 
     tips: Array
     """r [m], shape (n, 3)."""
@@ -30,7 +30,7 @@ class Shots(NamedTuple):
 
 
 class Walked(NamedTuple):
-    """Where searches ended under any loads, and what was asked for with it."""
+    """Ends of searches under any loads, with derivatives and sections where these are wanted."""
 
     shots: Shots
     slopes: Array
@@ -45,8 +45,8 @@ def shoot_along_one(
     gamma: Array,
     tables: LoadTables,
     guesses: Array | None,
-    coarse: StepTables,
-    fine: StepTables,
+    coarse: OneDirection,
+    fine: OneDirection,
     limits: tuple[float, ...],
     most: tuple[int, int],
 ) -> Shots:
@@ -57,8 +57,8 @@ def shoot_along_one(
         tables.axes[0],
         tables.at_tip,
         np.zeros((0, 3)) if guesses is None else guesses,
-        coarse.for_one_direction,
-        fine.for_one_direction,
+        coarse,
+        fine,
         limits,
         most,
         out,
@@ -94,10 +94,12 @@ def shoot(
     return Walked(shots, answers[0][:, :, : gamma.shape[1]], *answers[1:])
 
 
-def base_directions(gamma: Array, tables: LoadTables, directions: Array, fine: StepTables) -> Array:
-    """What the base of one arm (1, bundles) must see of gravity, for what its tip sees, (n, 3)."""
+def base_directions(
+    gamma: Array, tables: LoadTables, directions: Array, fine: OneDirection
+) -> Array:
+    """Directions of gravity at the base of one arm (1, bundles), for those at its tip, (n, 3)."""
     out = np.empty_like(directions)
-    loaded.base_directions(_columns(gamma), tables.at_tip, directions, fine.for_one_direction, out)
+    loaded.base_directions(_columns(gamma), tables.at_tip, directions, fine, out)
     return out
 
 
@@ -114,11 +116,8 @@ def _columns(gamma: Array) -> Array:
     return gamma if gamma.shape[1] else np.zeros((len(gamma), 1))
 
 
-# How boldly an equilibrium is searched, and what says how it was found.
-
-
 class Rung(IntEnum):
-    """How an equilibrium was found."""
+    """Search that found an equilibrium."""
 
     DIRECT = 0
     """Newton's method, all load at once."""
@@ -131,7 +130,7 @@ class Rung(IntEnum):
 
 
 class Search(NamedTuple):
-    """How boldly the kernels search."""
+    """Settings of a search by the kernels."""
 
     increment: float
     """First share of the load to try."""
@@ -150,21 +149,18 @@ PATIENT = Search(1 / 64, 0.03, 2000)
 # From a known equilibrium: only the rotation about gravity may be far off.
 NEAR = Search(1.0, 4.0, 12)
 # One walk from where it is.
-HELD = Search(1.0, 4.0, 0)
-
-
-# What a search for equilibria finds, and how tips there answer to activations and forces.
+ONE_WALK = Search(1.0, 4.0, 0)
 
 
 class Equilibria(NamedTuple):
-    """Where tips come to rest."""
+    """Equilibria of activations."""
 
     tips: Array
     """r [m], shape (n, 3); NaN where there is no equilibrium on the branch."""
     status: NDArray[np.int8]
     """`TipStatus`, shape (n,)."""
     margin: Array
-    """How far from the loss of stability, from 1 to below 0 [-], shape (n,)."""
+    """Margin of stability, from 1 to below 0 [-], shape (n,)."""
     rung: NDArray[np.int8]
     """`Rung`, shape (n,)."""
     frame: Array
@@ -189,7 +185,7 @@ class Equilibria(NamedTuple):
 
 
 class Response(NamedTuple):
-    """How tips answer to activations and forces."""
+    """Derivatives of tips along activations and forces."""
 
     tips: Array
     """r [m], shape (n, 3)."""

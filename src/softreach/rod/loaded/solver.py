@@ -16,8 +16,8 @@ from softreach.rod.loaded.shapes import Shapes, shapes_of
 from softreach.rod.loaded.shooting import (
     CONTINUATION,
     DIRECT,
-    HELD,
     NEAR,
+    ONE_WALK,
     PATIENT,
     Equilibria,
     Response,
@@ -30,7 +30,7 @@ from softreach.rod.loaded.shooting import (
     shoot_along_one,
     with_across,
 )
-from softreach.rod.loaded.tables import LoadTables, StepTables
+from softreach.rod.loaded.tables import LoadTables, OneDirection, StepTables
 from softreach.rod.tip_map import TipStatus
 from softreach.support import parallel
 
@@ -43,7 +43,7 @@ _DOUBTFUL = 0.02  # margin below which the tangents of coarse steps decide nothi
 _OF_TOL = 1e-2  # what the search may use up of the tolerance
 _FOUND = 1.0
 LATER_RUNGS = {Rung.CONTINUATION: CONTINUATION, Rung.PATIENT: PATIENT}
-"""How what the first rung leaves in doubt is searched again, in this order."""
+"""Searches of what the first rung leaves in doubt, in this order."""
 _TRACED = 1 << 20  # numbers kept of the sections of all arms in one task, 8 MB
 _NODES = {1: 33, 2: 33, 3: 17, 4: 9}
 """Nodes per free bundle: at most a few thousand equilibria, some ten milliseconds."""
@@ -63,7 +63,7 @@ class Solver:
     steps: int
     tol: float
     starts: StartGrid | None = None
-    """Where to begin."""
+    """Grid of equilibria to begin from."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "steps", max(self.steps, self.tables.phase.fewest_steps))
@@ -84,6 +84,11 @@ class Solver:
     def _coarse(self) -> StepTables:
         fewest = self.tables.phase.fewest_steps
         return self.tables.uniform(max(fewest, (self.steps + 1) // 2))
+
+    @cached_property
+    def _along_one(self) -> tuple[OneDirection, OneDirection]:
+        """Coarse and fine tables for the kernel of loads along one direction."""
+        return self._coarse.for_one_direction, self._fine.for_one_direction
 
     def halved(self) -> Solver:
         """The same with twice the steps."""
@@ -179,34 +184,30 @@ class Solver:
         found.status[rows] = np.where(good, stable, TipStatus.NO_EQUILIBRIUM)
         found.rung[rows] = np.where(good, rung, Rung.NONE)
 
-    def _first_phase(self, search: Search) -> tuple[StepTables, float]:
-        """Steps for Newton's method, and how near [rad] it is to come."""
-        if search is DIRECT:
-            return self._coarse, _COARSE_STEP
-        return self._fine, _CAREFUL_STEP
-
-    @property
-    def _tiny(self) -> float:
-        """What the search may leave [rad]."""
-        return max(_OF_TOL * self.tol, 1e-13)
-
     def _shoot(self, gamma: Array, search: Search, guesses: Array | None) -> Shots:
         """One search for each activation (n, bundles)."""
-        (coarse, small), fine = self._first_phase(search), self._fine
-        limits = (search.increment, search.widest, small, self._tiny)
+        # Coarse steps do for the first of Newton's method, but not to follow a branch.
+        small = _COARSE_STEP if search is DIRECT else _CAREFUL_STEP
+        limits = (search.increment, search.widest, small, max(_OF_TOL * self.tol, 1e-13))
         most = (search.walks, 10)
         if self.tables.one_direction:
+            coarse, fine = self._along_one
+            if search is not DIRECT:
+                coarse = fine
             return shoot_along_one(gamma, self.tables, guesses, coarse, fine, limits, most)
+        coarse, fine = self._coarse if search is DIRECT else self._fine, self._fine
         return shoot(gamma, self.tables.axes, guesses, coarse, fine, (*limits, 0.0), most).shots
 
     def base_directions(self, gamma: Array, directions: Array) -> Array:
-        """What the base of one arm (1, bundles) must see of gravity, for what its tip sees, (n, 3).
+        """Directions of gravity at the base of one arm (1, bundles), for those at its tip, (n, 3).
 
         Both as the base of the unloaded arm sees them; loads along one direction only.
         """
-        return base_directions(gamma, self.tables, directions, self._fine)
+        return base_directions(gamma, self.tables, directions, self._along_one[1])
 
-    def held(self, gamma: Array, directions: Array, stations: Array) -> tuple[Shapes, Array]:
+    def shapes_facing(
+        self, gamma: Array, directions: Array, stations: Array
+    ) -> tuple[Shapes, Array]:
         """Shapes of arms whose tips see gravity along given directions, and their margins.
 
         Nothing is searched: the directions (n, 3), as in `base_directions`, are those of equilibria
@@ -215,7 +216,7 @@ class Solver:
         edges = self.tables.edges(stations, self.steps)
         table, z = self.tables.of_edges(edges), self.tables.arm.profile.station(edges)
         rows = np.abs(z[None] - np.append(stations, 0.0)[:, None]).argmin(axis=1)
-        walked = self._walk(gamma, with_across(directions), table, HELD, trace=True)
+        walked = self._walk(gamma, with_across(directions), table, ONE_WALK, trace=True)
         at, nowhere = np.zeros((len(gamma), 3)), np.full(len(rows), np.nan)
         shapes = shapes_of(at, walked.trace, rows, self._force_at(table, rows), nowhere)
         return shapes.on_base(), walked.shots.margin
@@ -321,7 +322,7 @@ class StartGrid:
     box: ActivationBox
     sizes: tuple[int, ...]
     frames: Array
-    """What `Equilibria.frame` holds, of the nodes."""
+    """`Equilibria.frame` of the nodes."""
 
     @classmethod
     def over(

@@ -1,8 +1,8 @@
-"""How many steps a loaded rod needs, theory (72).
+"""Steps of a loaded rod, theory (72).
 
 The pilot of the free rod is solved with n and with 2n steps; n is the smallest number, no smaller
 than the phase of the loads needs, whose largest difference, doubled for safety, is within `tol`.
-Few of the pilot are asked first, all of them once these agree.
+Few of the pilot are solved first, all of them once these agree.
 
 Near the loss of stability every error is magnified. Activations there are left out: those of small
 margin, and the few that differ more than tenfold what 99 % of all do.

@@ -1,4 +1,4 @@
-"""Tables of a loaded rod: what its kernels read at the nodes of every step, from tip to base."""
+"""Tables of a loaded rod for its kernels, at the nodes of every step, from tip to base."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 
 
 class Body(Protocol):
-    """How an arm yields and what it weighs, at stations Z [m]."""
+    """Compliance and weight of an arm, at stations Z [m]."""
 
     def compliance(self, z: Array) -> tuple[Array, Array, Array]:
         """1/K0 [1/N], 1/K1 and 1/K3 [1/(N m²)]."""
@@ -53,6 +53,10 @@ class ArmBody:
         return self.arm.section.mass_per_length(self.arm.profile.radius(z))
 
 
+OneDirection = tuple[Array, Array, Array]
+"""Tables for the kernel of loads along one direction: pieces, lengths and scalars."""
+
+
 class StepTables(NamedTuple):
     """Steps from tip to base."""
 
@@ -65,11 +69,11 @@ class StepTables(NamedTuple):
     bends: Array
     """U at the nodes, (step, 5, 3, bundle)."""
     jumps: Array
-    """What acts at the tip end of a step, (step, 18)."""
+    """Point loads at the tip end of a step, (step, 18)."""
 
     @property
-    def for_one_direction(self) -> tuple[Array, Array, Array]:
-        """What the kernel of loads along one direction reads."""
+    def for_one_direction(self) -> OneDirection:
+        """Tables for the kernel of loads along one direction."""
         return self.pieces, self.lengths, np.ascontiguousarray(self.scalars[..., :4])
 
 
@@ -126,7 +130,7 @@ class LoadTables:
 
     @cached_property
     def phase(self) -> LoadPhase:
-        """How far the loads let tangents swing."""
+        """Phase that the loads give the tangents."""
         z = phase_stations(self.arm)
         mass = self.body.mass_per_length(z)
         return load_phase(self.arm, self.loads, self.body.compliance(z), mass)
@@ -225,9 +229,6 @@ def _inward(z: Array) -> Array:
     inward[:, :1] -= hair
     inward[:, -1:] += hair
     return inward
-
-
-# Tables of a loaded rod on whose tip a force grows: only what the force changes is made anew.
 
 
 @dataclass(frozen=True, eq=False)
