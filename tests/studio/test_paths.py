@@ -11,8 +11,8 @@ from softreach.arm import designs
 from softreach.studio.drawn_paths import PATH_SHAPES, PLANES, drawn_path, straight_path
 from softreach.studio.movie import frames_along
 from softreach.studio.plots.histogram import shares
+from softreach.studio.settings import MOST_POINTS, PlotView, TipPath
 from softreach.studio.state import StudioState
-from softreach.studio.wishes import MOST_POINTS, PlotView, TipPath
 from softreach.support.errors import InvalidInput
 
 TIP = np.array([0.2, -0.1, 0.5])

@@ -8,8 +8,8 @@ import pytest
 import softreach as sr
 from softreach.arm.parameters import changed
 from softreach.cloud.volume import volume_curve
+from softreach.studio.settings import PlotView
 from softreach.studio.state import Slice
-from softreach.studio.wishes import PlotView
 
 
 @pytest.fixture(autouse=True)
@@ -92,7 +92,7 @@ def test_histograms_are_those_of_the_samples_that_the_slice_leaves(tab):
 
 
 def test_names_in_a_chart_are_text(tab):
-    from softreach.studio.plots.chart import Chart, Curve
+    from softreach.studio.plots.plot import Chart, Curve
 
     gui = tab.session.client.gui
     folder = gui.add_folder("names")

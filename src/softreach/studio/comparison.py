@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed, parameters
-from softreach.studio.controls import controls
 from softreach.studio.markup import Part, Strong, paragraph, table
+from softreach.studio.shown_parameters import controls
 from softreach.studio.snapshots import Numbers
 from softreach.support.errors import SoftreachError
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.studio.controls import controls
-from softreach.studio.panels.status import legend_text, reach_text
+from softreach.studio.captions import legend_text, reach_text
 from softreach.studio.reach import Reach
+from softreach.studio.shown_parameters import controls
 from softreach.studio.state import StudioState
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.activation_box import ActivationBox
 from softreach.studio.rod import design_of_text, rod_of
+from softreach.studio.settings import PlotView, TipPath
 from softreach.studio.sight import CUTS
-from softreach.studio.wishes import PlotView, TipPath
 from softreach.support.errors import InvalidInput, Range
 
 __all__ = [

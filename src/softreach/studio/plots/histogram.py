@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.schema import activation_symbols
-from softreach.studio.plots.image import Picture, blank_figure, pixels
+from softreach.studio.plots.plot import Picture, blank_figure, pixels
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.rod import rod_of
 from softreach.studio.slicing import in_slice

@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from softreach.arm.manipulator import Manipulator
 from softreach.schema import activation_symbols
-from softreach.studio.panels.binding import bind, bind_button
-from softreach.studio.panels.line import Line
-from softreach.studio.panels.status import tip_text
-from softreach.studio.panels.typed import SliderField
+from softreach.studio.captions import tip_text
+from softreach.studio.fields import Line, SliderField, bind, bind_button
 from softreach.studio.rod import rod_of
 from softreach.studio.scene import MOST_BUNDLES
 from softreach.studio.state import StudioState

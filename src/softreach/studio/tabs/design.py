@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed
-from softreach.studio.controls import Control, Shown, controls, refusal
+from softreach.studio.captions import reach_text
+from softreach.studio.fields import Line, SliderField, bind, bind_button
 from softreach.studio.markup import Part
-from softreach.studio.panels.binding import bind, bind_button
-from softreach.studio.panels.line import Line
-from softreach.studio.panels.status import reach_text
-from softreach.studio.panels.typed import SliderField
 from softreach.studio.reach import beside
 from softreach.studio.rod import rod_of
+from softreach.studio.shown_parameters import Control, Shown, controls, refusal
 from softreach.support.errors import InvalidDesign
 
 if TYPE_CHECKING:

@@ -7,16 +7,13 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from softreach.arm import designs
+from softreach.arm import designs, edits
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.materials import material_names
 from softreach.arm.parameters import changed
-from softreach.studio import edits
-from softreach.studio.controls import Shown, refusal
-from softreach.studio.panels.line import Line
-from softreach.studio.panels.typed import NumberField
-from softreach.studio.parts import Number, Part, numbers, parts
+from softreach.studio.fields import Line, NumberField
 from softreach.studio.rod import rod_of
+from softreach.studio.shown_parameters import Number, Part, Shown, numbers, parts, refusal
 from softreach.support.errors import InvalidDesign, SoftreachError
 
 if TYPE_CHECKING:

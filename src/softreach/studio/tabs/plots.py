@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from softreach.studio.controls import controls
-from softreach.studio.panels.binding import bind
-from softreach.studio.panels.line import Line
-from softreach.studio.panels.picture import PictureFrame
-from softreach.studio.plots.chart import Chart, Curve
+from softreach.studio.fields import Line, PictureFrame, bind
+from softreach.studio.plots.plot import Chart, Curve
 from softreach.studio.plots.sweep import Sweep, swept_control
 from softreach.studio.plots.volumes import VolumeCurve
+from softreach.studio.shown_parameters import controls
 from softreach.studio.state import StudioState
 
 if TYPE_CHECKING:

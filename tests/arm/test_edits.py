@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import softreach as sr
-from softreach.arm import Material
-from softreach.studio import edits
+from softreach.arm import Material, edits
 from softreach.support.errors import InvalidDesign, InvalidInput
 
 SOFT = "dragon_skin_30"

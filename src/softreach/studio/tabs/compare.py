@@ -13,8 +13,7 @@ from softreach.studio.comparison import (
     comparison_csv,
     comparison_html,
 )
-from softreach.studio.panels.binding import bind_button
-from softreach.studio.panels.line import Line
+from softreach.studio.fields import Line, bind_button
 from softreach.studio.snapshots import Snapshot, numbers_of
 from softreach.support.errors import InvalidInput
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.parameters import changed, find_parameter
-from softreach.studio.controls import controls
+from softreach.studio.shown_parameters import controls
 from tests.laws import arm_of, arms
 
 

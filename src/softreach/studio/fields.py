@@ -11,12 +11,47 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from softreach.studio.panels.line import Line
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.studio import markup
+from softreach.studio.state import StudioState
 
 if TYPE_CHECKING:
     from viser import GuiApi
 
-__all__ = ["NumberField", "SliderField", "VectorField", "number_of", "number_text"]
+    from softreach.studio.session import Session
+
+
+# A line of text in a panel, which is shown as it is.
+
+
+class Line:
+    """Text that changes; without any the line takes no room."""
+
+    def __init__(self, gui: GuiApi, *parts: markup.Part) -> None:
+        """Add the line where the panel is being built."""
+        self._widget = gui.add_html(markup.paragraph(*parts), visible=bool(parts))
+
+    def say(self, *parts: markup.Part) -> None:
+        """Show text, some of it bold."""
+        self.show(markup.paragraph(*parts))
+
+    def warn(self, text: str) -> None:
+        """Show in red what is wrong; "" for nothing."""
+        self.show(markup.alert(text) if text else "")
+
+    def show(self, content: str) -> None:
+        """Show what `markup` made."""
+        if self._widget.content != content:
+            self._widget.content = content
+        if self._widget.visible != bool(content):
+            self._widget.visible = bool(content)
+
+    def remove(self) -> None:
+        """Take the line away."""
+        self._widget.remove()
+
 
 _PRECISION = 12
 """Digits after the point that viser leaves of what a slider holds."""
@@ -203,3 +238,59 @@ class SliderField(NumberField):
     def _within(self, value: float) -> float:
         low, high = self._ends
         return min(max(value, low), high)
+
+
+# From a widget that a person moves to a change of the session's state.
+
+
+def bind(widget: Any, session: Session, change: Callable[[StudioState, Any], StudioState]) -> None:
+    """Change the state by what the widget holds whenever a person moves it.
+
+    Events run at once and in any order: each reads what the widget holds by then, so that the last
+    one has it right. Widgets that we set ourselves also send events, without a client.
+    """
+
+    def moved(event: Any) -> None:
+        if event.client_id is not None:
+            attempt(
+                session, lambda: session.update(lambda s: change(s, widget.value), by_widget=True)
+            )
+
+    widget.on_update(moved)
+
+
+def bind_button(button: Any, session: Session, action: Callable[[], object]) -> None:
+    """Act whenever a person presses the button."""
+    button.on_click(lambda _: attempt(session, action))
+
+
+def attempt(session: Session, action: Callable[[], object]) -> None:
+    """Act, and show the reader what is wrong if that fails."""
+    try:
+        action()
+    except Exception as error:  # whoever presses a button sees no log
+        session.fail(error)
+
+
+# A place in a panel for a picture that changes.
+
+
+class PictureFrame:
+    """Empty until there is a picture."""
+
+    def __init__(self, gui: GuiApi, container: Any) -> None:
+        """Take the place."""
+        self._gui, self._container = gui, container
+        self._widget: Any = None
+        self._shown: NDArray[np.uint8] | None = None
+
+    def show(self, image: NDArray[np.uint8]) -> None:
+        """Show a picture, RGB from 0 to 255, shape (rows, columns, 3)."""
+        if image is self._shown:
+            return
+        self._shown = image
+        if self._widget is None:
+            with self._container:
+                self._widget = self._gui.add_image(image, format="png")
+        else:
+            self._widget.image = image

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from softreach.studio.colors import color_names
 from softreach.studio.eye import VIEWS
-from softreach.studio.panels.binding import bind, bind_button
-from softreach.studio.panels.typed import SliderField
+from softreach.studio.fields import SliderField, bind, bind_button
 from softreach.studio.sight import CUTS
 from softreach.studio.state import LEVELS, Appearance, StudioState
 

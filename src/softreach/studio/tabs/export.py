@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from softreach.studio import markup
+from softreach.studio.fields import Line, attempt, bind_button
 from softreach.studio.files import (
     CLOUD_FORMATS,
     SURFACE_FORMATS,
@@ -16,8 +17,6 @@ from softreach.studio.files import (
 )
 from softreach.studio.link import state_link
 from softreach.studio.page import static_page
-from softreach.studio.panels.binding import attempt, bind_button
-from softreach.studio.panels.line import Line
 from softreach.studio.picture import picture_file
 from softreach.support.errors import InvalidInput
 
@@ -72,9 +71,6 @@ class ExportPanel:
             self._button("Save picture (PNG)", self._save_picture)
             self._button("Save web page (HTML)", self._save_page)
         load.on_upload(lambda _: attempt(session, lambda: self._restore(load.value)))
-
-    def show(self, session: Session) -> None:
-        """Nothing here depends on the state."""
 
     def _save_state(self) -> None:
         self._send("softreach-studio.json", self._session.state_now().to_json().encode())

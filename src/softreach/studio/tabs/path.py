@@ -11,16 +11,15 @@ from softreach.export.clouds import path_csv
 from softreach.inverse.path import PathStatus
 from softreach.inverse.request import positions_in
 from softreach.studio.drawn_paths import PATH_SHAPES, PLANES, drawn_path, straight_path
+from softreach.studio.fields import Line, attempt, bind_button
 from softreach.studio.jobs.path import PlayPath, WriteMovie, at_point
-from softreach.studio.panels.binding import attempt, bind_button
-from softreach.studio.panels.line import Line
 from softreach.studio.picking import picked_point
-from softreach.studio.plots.chart import Chart, Curve
+from softreach.studio.plots.plot import Chart, Curve
 from softreach.studio.reach import cloud_points
 from softreach.studio.rod import solvable_rod
+from softreach.studio.settings import MOST_POINTS, TipPath
 from softreach.studio.slicing import in_slice
 from softreach.studio.state import StudioState
-from softreach.studio.wishes import MOST_POINTS, TipPath
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import bundle_color
 

@@ -9,9 +9,8 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.kinematics import tip_positions
-from softreach.studio.panels.binding import attempt, bind, bind_button
-from softreach.studio.panels.line import Line
-from softreach.studio.panels.typed import VectorField
+from softreach.studio.fields import Line, VectorField, attempt, bind, bind_button
+from softreach.studio.grip import Grip
 from softreach.studio.picking import picked_point
 from softreach.studio.reach import cloud_points, shown_samples
 from softreach.studio.rod import rod_of
@@ -23,8 +22,6 @@ if TYPE_CHECKING:
 
     from softreach.inverse import Solution
     from softreach.studio.session import Session
-
-__all__ = ["InversePanel"]
 
 _HINT = "Drag the tip, type a target, or let a click on the cloud set it."
 _ABOUT_CLICKS = "off: a click in the scene changes nothing"
@@ -147,3 +144,43 @@ def _answer_text(answer: Solution, arm: Manipulator) -> str:
 
 def _place(point: Any) -> str:
     return "({:.4f}, {:.4f}, {:.4f}) L".format(*point)
+
+
+# A handle on the tip: drag it, and the arm follows.
+
+
+_DRAG_HINT = "Drag the ball on the tip: the arm follows on its branch of solutions."
+
+
+class DragPanel:
+    """The ball, and whether it is shown."""
+
+    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
+        """Add the widgets."""
+        self._session, self._revision = session, -1
+        self._grip = Grip(session.client.scene, session.pull_tip)
+        with tab:
+            self._text = Line(gui, _DRAG_HINT)
+            self._shown = gui.add_checkbox(
+                "handle on the tip", session.state.appearance.handle, hint=_DRAG_HINT
+            )
+        bind(self._shown, session, lambda s, on: s.showing(handle=on))
+
+    def show(self, session: Session) -> None:
+        """Keep the ball on the tip."""
+        state, pull = session.state, session.tip_pull
+        if session.revision != self._revision:
+            self._revision = session.revision
+            self._shown.value = state.appearance.handle
+        movable = rod_of(state.design).box.dimension > 0
+        grasped = state.appearance.handle and state.appearance.arm and movable
+        arm = state.design
+        radius = float(arm.profile.radius(arm.length)) / arm.length
+        self._grip.move(session.tip if grasped else None, radius, dark=state.appearance.dark)
+        if pull is None:
+            self._text.say(_DRAG_HINT)
+            self._grip.show_lag(None, None)
+            return
+        gap = pull.pulled.gap / arm.length
+        self._text.say(f"This branch ends {gap:.3f} L short of the pointer." if gap else _DRAG_HINT)
+        self._grip.show_lag(pull.wanted, pull.pulled.tip / arm.length, gap)

@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING, Any
 from softreach.arm.manipulator import Manipulator
 from softreach.studio.atlas_map import map_choices, metric_names
 from softreach.studio.atlas_numbers import nearest_numbers
+from softreach.studio.fields import Line, PictureFrame, attempt, bind
 from softreach.studio.map_board import MapBoard
-from softreach.studio.panels.binding import attempt, bind
-from softreach.studio.panels.line import Line
-from softreach.studio.panels.picture import PictureFrame
 from softreach.studio.state import MapView, StudioState
 
 if TYPE_CHECKING:

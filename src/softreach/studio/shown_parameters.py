@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from softreach.arm.actuators import SectorActuator
+from softreach.arm.edits import ring_label
 from softreach.arm.file import in_file_terms
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import Parameter, parameters
 from softreach.support.errors import Fault, InvalidDesign, Range
-
-__all__ = ["Control", "Shown", "controls", "hint", "refusal"]
 
 _DEG = math.radians(1)
 
@@ -125,7 +125,7 @@ def _control(arm: Manipulator, parameter: Parameter, slider: _Slider) -> Control
         high=slider.high,
         step=slider.step,
         scale={"rad": _DEG, "m": arm.length}.get(parameter.unit, 1.0),
-        hint=hint(parameter, _SHOWN_UNITS.get(parameter.unit, parameter.unit)),
+        hint=hint(parameter, _SLIDER_UNITS.get(parameter.unit, parameter.unit)),
     )
 
 
@@ -169,7 +169,7 @@ def _line(fault: Fault, control: Shown | None) -> str:
     return str(Fault(control.label, fault.value / control.scale, allowed))
 
 
-_SHOWN_UNITS = {"rad": "deg", "m": "L"}
+_SLIDER_UNITS = {"rad": "deg", "m": "L"}
 _MORE = {
     "extent": "σ is the angle of the cross-section that the bundle covers",
     "offset": "the angle around the axis at which the bundle starts at the base",
@@ -179,3 +179,70 @@ _MORE = {
     "lower": "the most that a bundle contracts",
     "upper": "the most that a bundle extends",
 }
+
+
+# The parts of an arm as a list, and the numbers of each in units that a person types.
+
+
+BODY = "body"
+
+_SHOWN = {"rad": ("deg", math.radians(1)), "m": ("mm", 1e-3), "Pa": ("kPa", 1e3)}
+
+
+class Part(NamedTuple):
+    """One thing that an arm consists of."""
+
+    label: str
+    """What the list calls it."""
+    owners: tuple[str, ...]
+    """Owners of its parameters."""
+    name: str
+    """Its own name, which may be empty."""
+    ring: int | None = None
+    """Index of a ring; None for all else."""
+    actuator: str = ""
+    """Name of an actuator; "" for all else."""
+    home: int | str | None = None
+    """The ring that an actuator is in."""
+
+
+class Number(NamedTuple):
+    """One parameter of a part as it is typed."""
+
+    parameter: str
+    label: str
+    hint: str
+    value: float
+    """In the unit that is shown; NaN where the design leaves it out."""
+    scale: float
+    """Units of the parameter per shown unit."""
+    whole: bool
+
+
+def parts(arm: Manipulator) -> list[Part]:
+    """Body, core, rings and actuators of an arm."""
+    found = [Part(BODY, ("", "profile"), "")]
+    if arm.section.core is not None:
+        found.append(Part("core", ("core",), ""))
+    for k, ring in enumerate(arm.section.rings):
+        owners = (f"rings[{k}]", f"rings[{k}].material")
+        found.append(Part(ring_label(arm, k), owners, ring.name, ring=k))
+    for one in arm.actuators:
+        home = one.ring if isinstance(one, SectorActuator) else None
+        taken = any(part.label == one.name for part in found)
+        label = f"{one.name} (actuator)" if taken else one.name
+        found.append(Part(label, (one.name,), one.name, actuator=one.name, home=home))
+    return found
+
+
+def numbers(arm: Manipulator, part: Part) -> list[Number]:
+    """What can be typed for a part, in the order of its parameters."""
+    known = parameters(arm).values()
+    return [_number(arm, one) for one in known if one.owner in part.owners]
+
+
+def _number(arm: Manipulator, one: Parameter) -> Number:
+    unit, scale = _SHOWN.get(one.unit, ("" if one.unit == "1" else one.unit, 1.0))
+    label = f"{one.symbol} [{unit}]" if unit else one.symbol
+    value = float(f"{one.value(arm) / scale:.10g}")
+    return Number(one.name, label, f"{one.meaning}: {one.name}", value, scale, one.whole)
