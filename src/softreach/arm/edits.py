@@ -26,6 +26,7 @@ __all__ = [
     "ring_label",
     "with_actuator",
     "with_actuator_name",
+    "with_actuator_ring",
     "with_core",
     "with_ring",
     "with_ring_material",
@@ -73,6 +74,15 @@ def with_actuator_name(arm: Manipulator, old: str, new: str) -> Manipulator:
     """
     return arm.replace(
         actuators=tuple(one.replace(name=new) if one.name == old else one for one in arm.actuators)
+    )
+
+
+def with_actuator_ring(arm: Manipulator, name: str, ring: int) -> Manipulator:
+    """The arm with one of its actuators in another ring, counted from 0."""
+    return arm.replace(
+        actuators=tuple(
+            one.replace(ring=ring) if one.name == name else one for one in arm.actuators
+        )
     )
 
 

@@ -5,20 +5,23 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed, parameters
 from softreach.studio.markup import Part, Strong, paragraph, table
-from softreach.studio.shown_parameters import controls
+from softreach.studio.shown_parameters import (
+    ShownParameter,
+    named_parameters,
+    slider_parameters,
+)
 from softreach.studio.snapshots import Numbers
 from softreach.support.errors import SoftreachError
 
 __all__ = ["Candidate", "Comparison", "compared", "comparison_csv", "comparison_html"]
 
-_DEGREE = math.degrees(1)
 _EQUAL = 1e-9  # relative difference that is rounding
 _MINUS = "\N{MINUS SIGN}"
 _MOST = 24
@@ -145,16 +148,18 @@ def _reach_columns(candidates: Sequence[Candidate]) -> list[_Column]:
     """Volume, area or length, whatever each has, and UNR."""
     known = [one.numbers for one in candidates]
     kinds = dict.fromkeys((one.size.name, one.size.unit) for one in known if one is not None)
-    found = []
+    columns = []
     for name, unit in kinds or {("volume", "L³"): None}:
-        of = [one.size if one is not None and one.size.name == name else None for one in known]
+        sizes = [one.size if one is not None and one.size.name == name else None for one in known]
         title = f"{name} [{unit}]" if unit else name
-        values = [None if size is None else size.value for size in of]
-        found.append(_Column(title, values, [None if size is None else size.error for size in of]))
+        values = [None if size is None else size.value for size in sizes]
+        columns.append(
+            _Column(title, values, [None if size is None else size.error for size in sizes])
+        )
     shares = [None if one is None else _finite(100 * one.unreachability) for one in known]
     if any(share is not None for share in shares):
-        found.append(_Column("UNR [%]", shares, [None] * len(shares)))
-    return found
+        columns.append(_Column("UNR [%]", shares, [None] * len(shares)))
+    return columns
 
 
 def _shown_parameters(designs: Sequence[Manipulator]) -> tuple[list[_Column], bool]:
@@ -163,41 +168,28 @@ def _shown_parameters(designs: Sequence[Manipulator]) -> tuple[list[_Column], bo
     Returns:
         Columns, and whether equal columns mean equal designs.
     """
-    sliders = [_of_sliders(design) for design in designs]
-    shown = _differing(sliders)
-    if _explained(designs, [title for title, _ in shown]):
+    shown = _differing([_by_name(slider_parameters(design)) for design in designs])
+    if _explained(designs, [name for name, _ in shown]):
         return [column for _, column in shown], True
-    every = [_of_parameters(design) for design in designs]
-    known = {title for title, _ in shown}
-    others = [(name, column) for name, column in _differing(every) if name not in known]
+    known = {name for name, _ in shown}
+    every = _differing([_by_name(named_parameters(design)) for design in designs])
+    others = [(name, column) for name, column in every if name not in known]
     return [column for _, column in [*shown, *others][:_MOST]], False
 
 
-def _of_sliders(design: Manipulator) -> dict[str, tuple[str, float]]:
-    return {one.name: (one.label, one.value / one.scale) for one in controls(design)}
+def _by_name(shown: Iterable[ShownParameter]) -> dict[str, ShownParameter]:
+    return {one.name: one for one in shown}
 
 
-def _of_parameters(design: Manipulator) -> dict[str, tuple[str, float]]:
-    return {
-        name: _titled(name, one.unit, one.value(design)) for name, one in parameters(design).items()
-    }
-
-
-def _titled(name: str, unit: str, value: float) -> tuple[str, float]:
-    if unit == "rad":
-        return f"{name} [deg]", value * _DEGREE
-    return (name if unit == "1" else f"{name} [{unit}]"), value
-
-
-def _differing(designs: Sequence[dict[str, tuple[str, float]]]) -> list[tuple[str, _Column]]:
+def _differing(designs: Sequence[dict[str, ShownParameter]]) -> list[tuple[str, _Column]]:
     """Name and column of what is not the same in all."""
-    found = []
+    columns = []
     for name in dict.fromkeys(name for design in designs for name in design):
-        title = next(design[name][0] for design in designs if name in design)
-        values = [_finite(design[name][1]) if name in design else None for design in designs]
+        title = next(design[name].label for design in designs if name in design)
+        values = [_finite(design[name].shown) if name in design else None for design in designs]
         if not all(_same(values[0], value) for value in values):
-            found.append((name, _Column(title, values, [None] * len(values))))
-    return found
+            columns.append((name, _Column(title, values, [None] * len(values))))
+    return columns
 
 
 def _explained(designs: Sequence[Manipulator], names: Sequence[str]) -> bool:
@@ -211,7 +203,7 @@ def _explained(designs: Sequence[Manipulator], names: Sequence[str]) -> bool:
             return False
         if _shape(made) != _shape(other):
             return False
-        if _differing([_of_parameters(made), _of_parameters(other)]):
+        if _differing([_by_name(named_parameters(arm)) for arm in (made, other)]):
             return False
     return True
 

@@ -1,9 +1,10 @@
-"""The sliders of a design: its parameters in the units that a person reads."""
+"""Parameters as a person reads them: on the sliders of a design, part by part, and in tables."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
 from typing import NamedTuple
 
 from softreach.arm.actuators import SectorActuator
@@ -13,30 +14,34 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import Parameter, parameters
 from softreach.support.errors import Fault, InvalidDesign, Range
 
-_DEG = math.radians(1)
+__all__ = [
+    "Part",
+    "ShownParameter",
+    "named_parameters",
+    "part_parameters",
+    "parts",
+    "refusal",
+    "slider_parameters",
+]
 
 
-class Control(NamedTuple):
-    """One slider."""
+class ShownParameter(NamedTuple):
+    """A parameter of a design in the unit that a person reads."""
 
     name: str
     """Of the parameter."""
     label: str
-    value: float
-    """In the unit of the parameter."""
-    low: float
-    """In the unit that is shown, like all that follow."""
-    high: float
-    step: float
+    """With the unit."""
+    hint: str
+    """Symbol, unit and meaning."""
     scale: float
     """Units of the parameter per shown unit."""
-    hint: str = ""
-    """Symbol, unit and meaning."""
-
-    @property
-    def shown(self) -> float:
-        """The value on the slider."""
-        return float(f"{self.value / self.scale:.12g}")
+    shown: float
+    """The value in the shown unit; NaN where the design leaves it out."""
+    low: float = math.nan
+    """End of a slider in the shown unit, like all that follow; NaN without a slider."""
+    high: float = math.nan
+    step: float = math.nan
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -68,22 +73,35 @@ _OF_PART = {
 }
 _AROUND_VALUE = ("lower", "upper", "young_modulus")
 """Fields of any magnitude: their sliders end at multiples of what the design has."""
+_MORE = {
+    "extent": "σ is the angle of the cross-section that the bundle covers",
+    "offset": "the angle around the axis at which the bundle starts at the base",
+    "revolution": "the angle that a fiber turns around the axis from base to tip",
+    "taper": "the angle between the axis and the side of the body",
+    "bundles": "how many equal bundles stand around the axis, each with its own activation",
+    "lower": "the most that a bundle contracts",
+    "upper": "the most that a bundle extends",
+}
+_Unit = tuple[str, float]
+"""Name of a unit, and how many units of the parameter it is."""
+_DEGREES: _Unit = ("deg", math.radians(1))
 
 
-def controls(arm: Manipulator) -> list[Control]:
-    """The sliders of a design, those of the whole arm first.
+@lru_cache(maxsize=16)
+def slider_parameters(arm: Manipulator) -> tuple[ShownParameter, ...]:
+    """The parameters of a design that have sliders, those of the whole arm first.
 
     What the design leaves open, such as a modulus that cancels, has none.
     """
     known = parameters(arm)
-    found: list[Control] = []
+    sliders: list[ShownParameter] = []
     for owner in dict.fromkeys(one.owner for one in known.values()):
         for field in dict.fromkeys((*(_OF_PART if owner else _OF_ARM), *_AROUND_VALUE)):
             one = known.get(f"{owner}.{field}" if owner else field)
             if one is not None and _is_offered(arm, known, one):
                 slider = _slider(one, one.value(arm))
-                found += [_control(arm, one, slider)] if slider else []
-    return found
+                sliders += [_on_slider(arm, one, slider)] if slider else []
+    return tuple(sliders)
 
 
 def _slider(one: Parameter, value: float) -> _Slider | None:
@@ -98,9 +116,9 @@ def _slider(one: Parameter, value: float) -> _Slider | None:
 def _around(one: Parameter, value: float) -> _Slider:
     """From zero, or near it where it is not allowed, to twice the value."""
     owner = f" of {one.owner.removesuffix('.material')}" if one.owner else ""
-    unit = f" [{one.unit}]" if one.unit != "1" else ""
+    unit, _ = _unit(one, {})
     ends = (0.01 if one.field == "young_modulus" else 0.0) * value, 2 * value
-    return _Slider(f"{one.symbol}{owner}{unit}", min(ends), max(ends), abs(value) / 100)
+    return _Slider(_titled(f"{one.symbol}{owner}", unit), min(ends), max(ends), abs(value) / 100)
 
 
 def _is_offered(arm: Manipulator, known: Mapping[str, Parameter], one: Parameter) -> bool:
@@ -116,77 +134,19 @@ def _is_offered(arm: Manipulator, known: Mapping[str, Parameter], one: Parameter
     return one.field != "bundles" or turn is None or turn.value(arm) == 0
 
 
-def _control(arm: Manipulator, parameter: Parameter, slider: _Slider) -> Control:
-    return Control(
-        name=parameter.name,
-        label=slider.label.replace("{owner}", parameter.owner),
-        value=parameter.value(arm),
-        low=slider.low,
-        high=slider.high,
-        step=slider.step,
-        scale={"rad": _DEG, "m": arm.length}.get(parameter.unit, 1.0),
-        hint=hint(parameter, _SLIDER_UNITS.get(parameter.unit, parameter.unit)),
+def _on_slider(arm: Manipulator, one: Parameter, slider: _Slider) -> ShownParameter:
+    unit, scale = _unit(one, {"rad": _DEGREES, "m": ("L", arm.length)})
+    more = f"; {_MORE[one.field]}" if one.field in _MORE else ""
+    return ShownParameter(
+        one.name,
+        slider.label.replace("{owner}", one.owner),
+        f"{_titled(one.symbol, unit)}: {one.meaning}{more} (parameter {one.name})",
+        scale,
+        _value(one, arm, scale),
+        slider.low,
+        slider.high,
+        slider.step,
     )
-
-
-def hint(parameter: Parameter, unit: str) -> str:
-    """Symbol, unit and meaning of a parameter, and what sweeps call it.
-
-    Args:
-        parameter: What is explained.
-        unit: That it is shown in; "1" for none.
-    """
-    what = f"{parameter.symbol} [{unit}]" if unit != "1" else parameter.symbol
-    more = f"; {_MORE[parameter.field]}" if parameter.field in _MORE else ""
-    return f"{what}: {parameter.meaning}{more} (parameter {parameter.name})"
-
-
-class Shown(NamedTuple):
-    """How a parameter appears in a panel."""
-
-    label: str
-    scale: float
-    """Units of the parameter per shown unit."""
-
-
-def refusal(error: InvalidDesign, shown: Mapping[str, Shown]) -> str:
-    """What is wrong with a design, each number by the label and in the unit of its field.
-
-    Args:
-        error: What is wrong.
-        shown: The fields of a panel by the parameters that they are for.
-    """
-    return "\n".join(_line(fault, shown.get(fault.path)) for fault in error.faults)
-
-
-def _line(fault: Fault, control: Shown | None) -> str:
-    if control is None or not isinstance(fault.value, int | float):
-        return str(in_file_terms(InvalidDesign([fault]), ""))
-    allowed = fault.allowed
-    if isinstance(allowed, Range):
-        scaled = {end: getattr(allowed, end) / control.scale for end in ("low", "high")}
-        allowed = allowed._replace(unit="", **scaled)
-    return str(Fault(control.label, fault.value / control.scale, allowed))
-
-
-_SLIDER_UNITS = {"rad": "deg", "m": "L"}
-_MORE = {
-    "extent": "σ is the angle of the cross-section that the bundle covers",
-    "offset": "the angle around the axis at which the bundle starts at the base",
-    "revolution": "the angle that a fiber turns around the axis from base to tip",
-    "taper": "the angle between the axis and the side of the body",
-    "bundles": "how many equal bundles stand around the axis, each with its own activation",
-    "lower": "the most that a bundle contracts",
-    "upper": "the most that a bundle extends",
-}
-
-
-# The parts of an arm as a list, and the numbers of each in units that a person types.
-
-
-BODY = "body"
-
-_SHOWN = {"rad": ("deg", math.radians(1)), "m": ("mm", 1e-3), "Pa": ("kPa", 1e3)}
 
 
 class Part(NamedTuple):
@@ -206,43 +166,71 @@ class Part(NamedTuple):
     """The ring that an actuator is in."""
 
 
-class Number(NamedTuple):
-    """One parameter of a part as it is typed."""
-
-    parameter: str
-    label: str
-    hint: str
-    value: float
-    """In the unit that is shown; NaN where the design leaves it out."""
-    scale: float
-    """Units of the parameter per shown unit."""
-    whole: bool
-
-
-def parts(arm: Manipulator) -> list[Part]:
-    """Body, core, rings and actuators of an arm."""
-    found = [Part(BODY, ("", "profile"), "")]
+def parts(arm: Manipulator) -> dict[str, Part]:
+    """Body, core, rings and actuators of an arm by their labels."""
+    listed = [Part("body", ("", "profile"), "")]
     if arm.section.core is not None:
-        found.append(Part("core", ("core",), ""))
+        listed.append(Part("core", ("core",), ""))
     for k, ring in enumerate(arm.section.rings):
         owners = (f"rings[{k}]", f"rings[{k}].material")
-        found.append(Part(ring_label(arm, k), owners, ring.name, ring=k))
+        listed.append(Part(ring_label(arm, k), owners, ring.name, ring=k))
+    labels = {part.label for part in listed}
     for one in arm.actuators:
         home = one.ring if isinstance(one, SectorActuator) else None
-        taken = any(part.label == one.name for part in found)
-        label = f"{one.name} (actuator)" if taken else one.name
-        found.append(Part(label, (one.name,), one.name, actuator=one.name, home=home))
-    return found
+        label = f"{one.name} (actuator)" if one.name in labels else one.name
+        listed.append(Part(label, (one.name,), one.name, actuator=one.name, home=home))
+    return {part.label: part for part in listed}
 
 
-def numbers(arm: Manipulator, part: Part) -> list[Number]:
+@lru_cache(maxsize=16)
+def part_parameters(arm: Manipulator, part: Part) -> tuple[ShownParameter, ...]:
     """What can be typed for a part, in the order of its parameters."""
+    units = {"rad": _DEGREES, "m": ("mm", 1e-3), "Pa": ("kPa", 1e3)}
+    known = [one for one in parameters(arm).values() if one.owner in part.owners]
+    return tuple(_shown(arm, one, units, one.symbol, f"{one.meaning}: {one.name}") for one in known)
+
+
+def named_parameters(arm: Manipulator) -> list[ShownParameter]:
+    """All parameters of an arm under their own names, angles in degrees."""
     known = parameters(arm).values()
-    return [_number(arm, one) for one in known if one.owner in part.owners]
+    return [_shown(arm, one, {"rad": _DEGREES}, one.name, one.meaning) for one in known]
 
 
-def _number(arm: Manipulator, one: Parameter) -> Number:
-    unit, scale = _SHOWN.get(one.unit, ("" if one.unit == "1" else one.unit, 1.0))
-    label = f"{one.symbol} [{unit}]" if unit else one.symbol
-    value = float(f"{one.value(arm) / scale:.10g}")
-    return Number(one.name, label, f"{one.meaning}: {one.name}", value, scale, one.whole)
+def _shown(
+    arm: Manipulator, one: Parameter, units: Mapping[str, _Unit], name: str, hint: str
+) -> ShownParameter:
+    unit, scale = _unit(one, units)
+    return ShownParameter(one.name, _titled(name, unit), hint, scale, _value(one, arm, scale))
+
+
+def _unit(one: Parameter, units: Mapping[str, _Unit]) -> _Unit:
+    return units.get(one.unit, ("" if one.unit == "1" else one.unit, 1.0))
+
+
+def _value(one: Parameter, arm: Manipulator, scale: float) -> float:
+    return float(f"{one.value(arm) / scale:.12g}")
+
+
+def _titled(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
+
+
+def refusal(error: InvalidDesign, shown: Iterable[ShownParameter]) -> str:
+    """What is wrong with a design, each number by the label and in the unit of its field.
+
+    Args:
+        error: What is wrong.
+        shown: The parameters that have fields.
+    """
+    known = {one.name: one for one in shown}
+    return "\n".join(_line(fault, known.get(fault.path)) for fault in error.faults)
+
+
+def _line(fault: Fault, shown: ShownParameter | None) -> str:
+    if shown is None or not isinstance(fault.value, int | float):
+        return str(in_file_terms(InvalidDesign([fault]), ""))
+    allowed = fault.allowed
+    if isinstance(allowed, Range):
+        scaled = {end: getattr(allowed, end) / shown.scale for end in ("low", "high")}
+        allowed = allowed._replace(unit="", **scaled)
+    return str(Fault(shown.label, fault.value / shown.scale, allowed))

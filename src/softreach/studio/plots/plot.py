@@ -1,32 +1,109 @@
-"""Curves over a common axis, drawn by the page itself."""
+"""Plot beside the scene: what it depends on, how it is computed and shown; charts and pictures."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.studio.plots.along_arm import AlongArm
-from softreach.studio.plots.sweep import Sweep
-from softreach.studio.plots.volumes import VolumeCurve
+from softreach.studio.fields import Fields, PictureFrame
+from softreach.studio.reach import Reach
+from softreach.studio.state import StudioState
+from softreach.studio.worker import StaleCheck
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
     from viser import GuiApi
 
-Array = NDArray[np.float64]
+    from softreach.studio.session import Session
 
-_AXIS, _GRID = "#868e96", "rgba(134,142,150,0.25)"  # legible on white and on black
+__all__ = [
+    "Chart",
+    "Curve",
+    "Figures",
+    "Picture",
+    "PicturePlot",
+    "Plot",
+    "blank_figure",
+    "complete_reach",
+    "pixels",
+]
+
+Array = NDArray[np.float64]
+Source = Literal["reach", "answer"]
+
+
+class Plot(ABC):
+    """Plot beside the scene; a tab has one of each kind, and computes those that are shown.
+
+    What is computed says by its `arm` which design it is of.
+    """
+
+    name: ClassVar[str]
+    """In the settings."""
+    label: ClassVar[str]
+    hint: ClassVar[str]
+    sources: ClassVar[frozenset[Source]] = frozenset()
+    """What it is computed from besides the state: whoever finds that anew asks for the plot."""
+
+    @abstractmethod
+    def __init__(self, gui: GuiApi, folder: Any) -> None:
+        """Take the place in a folder."""
+
+    @classmethod
+    def add_settings(cls, fields: Fields) -> None:
+        """Add fields for what can be chosen of the plot: nothing by default."""
+        del fields
+
+    @staticmethod
+    @abstractmethod
+    def depends_on(state: StudioState) -> object:
+        """The part of the state that decides the result."""
+
+    @staticmethod
+    @abstractmethod
+    def compute(session: Session, check: StaleCheck) -> Iterator[Any]:
+        """Results, each better than the one before; none while the sources are not complete.
+
+        Args:
+            session: Of the tab, in whose present state the plot is shown.
+            check: To be called between stages; raises if the plot is no longer wanted.
+        """
+
+    @abstractmethod
+    def show(self, result: Any) -> str:
+        """Draw a result, and return what it says in words."""
+
+
+@dataclass(eq=False)
+class Figures:
+    """Results of the plots of a tab; jobs replace them, panels show them."""
+
+    plots: dict[str, Any] = field(default_factory=dict)
+    """The latest result of each plot by its name."""
+    track: xr.Dataset | None = None
+    """Result of `track_path` for the path."""
+
+
+def complete_reach(session: Session) -> Reach | None:
+    """What the design of the state can reach, if it is complete; its job says when it is."""
+    reach = session.reach
+    complete = reach is not None and reach.fine and reach.arm == session.state.design
+    return reach if complete else None
+
+
+_AXIS_INK, _GRID = "#868e96", "rgba(134,142,150,0.25)"  # legible on white and on black
 _HEIGHT = 210  # pixels
 
 
 class Curve(NamedTuple):
-    """What one line of a chart is called and how it looks."""
+    """Name and looks of one line of a chart."""
 
     name: str
     color: str
@@ -36,61 +113,54 @@ class Curve(NamedTuple):
 
 
 class Chart:
-    """A chart in a container; nothing is shown before the first `show`."""
+    """Curves over a common axis, drawn by the page itself; nothing before the first `show`."""
 
-    def __init__(
-        self, gui: GuiApi, container: Any, x: str, y: str, *, logarithmic: bool = False
-    ) -> None:
+    def __init__(self, gui: GuiApi, container: Any, y: str, *, logarithmic: bool = False) -> None:
         """Take the place of a chart.
 
         Args:
             gui: Of the tab.
             container: Folder or tab that it goes into.
-            x: Label of the horizontal axis, with its unit.
-            y: Of the vertical one.
+            y: Label of the vertical axis, with its unit.
             logarithmic: Whether the horizontal axis is.
         """
-        self._gui, self._container = gui, container
-        self._axes: Any = tuple(
-            {"label": label, "stroke": _AXIS, "grid": {"stroke": _GRID}, "ticks": {"stroke": _GRID}}
-            | ({"size": 56} if label == y else {})
-            for label in (x, y)
-        )
+        self._gui, self._container, self._y = gui, container, y
         across = {"time": False, **({"distr": 3, "log": 10} if logarithmic else {})}
         self._scales: Any = {"x": across, "y": {"auto": True}}
-        self._x = x
         self._widget: Any = None
-        self._made_of: tuple[Curve, ...] = ()
+        self._made_of: object = None
 
-    def show(self, x: Array, curves: Sequence[Curve], values: Sequence[Array]) -> None:
-        """Draw curves; those of the same names are moved, others made anew.
+    def show(self, label: str, x: Array, curves: Sequence[Curve], values: Sequence[Array]) -> None:
+        """Draw curves; those of the same names over the same axis are moved, others made anew.
 
         Args:
+            label: Of the horizontal axis, with its unit.
             x: Ascending, shape (n,).
-            curves: What they are.
+            curves: Their names and looks.
             values: Of each, shape (n,).
         """
-        data = (np.asarray(x, float), *(np.asarray(one, float) for one in values))
-        if self._widget is None or tuple(curves) != self._made_of:
-            self.remove()
-            self._made_of = tuple(curves)
-            with self._container:
-                self._widget = self._gui.add_uplot(
-                    data,
-                    ({"label": self._x}, *map(_series, curves)),
-                    scales=self._scales,
-                    axes=self._axes,
-                    height=_HEIGHT,
-                )
-        else:
+        data = (np.asarray(x, float), *(np.asarray(each, float) for each in values))
+        made_of = label, *curves
+        if made_of == self._made_of:
             self._widget.data = data
-            self._widget.visible = True
-
-    def remove(self) -> None:
-        """Take it away until it is shown again."""
+            return
         if self._widget is not None:
             self._widget.remove()
-        self._widget = None
+        self._made_of = made_of
+        with self._container:
+            self._widget = self._gui.add_uplot(
+                data,
+                ({"label": label}, *map(_series, curves)),
+                scales=self._scales,
+                axes=(_axis(label), _axis(self._y) | {"size": 56}),
+                height=_HEIGHT,
+            )
+
+
+def _axis(label: str) -> Any:
+    return {
+        "label": label, "stroke": _AXIS_INK, "grid": {"stroke": _GRID}, "ticks": {"stroke": _GRID}
+    }  # fmt: skip
 
 
 def _series(curve: Curve) -> Any:
@@ -99,16 +169,13 @@ def _series(curve: Curve) -> Any:
     return made | ({"dash": (6.0, 4.0)} if curve.dashed else {})
 
 
-# A figure as pixels, drawn away from pyplot, which belongs to one thread.
-
-
 _WIDTH = 4.3  # [inch], about as wide as a panel
 _PAPER, _INK = "#242424", "#c9c9c9"  # of a dark page
 _DPI = 200  # sharp where a page has two pixels per point
 
 
 class Picture(NamedTuple):
-    """A picture of a design."""
+    """Picture of a design."""
 
     arm: Manipulator
     image: NDArray[np.uint8]
@@ -117,8 +184,21 @@ class Picture(NamedTuple):
     """What it says in words."""
 
 
+class PicturePlot(Plot):
+    """Plot whose results are pictures."""
+
+    def __init__(self, gui: GuiApi, folder: Any) -> None:
+        """Take the place in a folder."""
+        self._frame = PictureFrame(gui, folder)
+
+    def show(self, result: Picture) -> str:
+        """Show the picture."""
+        self._frame.show(result.image)
+        return result.text
+
+
 def blank_figure(height: float, width: float = _WIDTH, dpi: int = _DPI) -> Figure:
-    """An empty figure of that size [inch]."""
+    """An empty figure of that size [inch], away from pyplot, which belongs to one thread."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), dpi=dpi, layout="constrained")
@@ -132,11 +212,11 @@ def pixels(figure: Figure, *, dark: bool = False) -> NDArray[np.uint8]:
         _darken(figure)
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
-    shown = np.asarray(canvas.buffer_rgba())[..., :3].copy()
+    image = np.asarray(canvas.buffer_rgba())[..., :3].copy()
     if dark:
-        white = (shown == 255).all(axis=-1)  # of pictures within the figure
-        shown[white] = list(bytes.fromhex(_PAPER[1:]))
-    return shown
+        white = (image == 255).all(axis=-1)  # of pictures within the figure
+        image[white] = list(bytes.fromhex(_PAPER[1:]))
+    return image
 
 
 def _darken(figure: Figure) -> None:
@@ -155,21 +235,5 @@ def _darken(figure: Figure) -> None:
     for spine in figure.findobj(Spine):
         spine.set_edgecolor(_INK)
     for kind in (Text, Line2D):
-        for one in figure.findobj(kind):
-            one.set_color(_INK)
-
-
-# What has been found for the plots of a tab.
-
-
-@dataclass(eq=False)
-class Figures:
-    """Each is None until it is known; jobs replace them, panels show them."""
-
-    along_arm: AlongArm | None = None
-    volume_curve: VolumeCurve | None = None
-    sweep: Sweep | None = None
-    histogram: Picture | None = None
-    section: Picture | None = None
-    track: xr.Dataset | None = None
-    """What `track_path` found for the path."""
+        for artist in figure.findobj(kind):
+            artist.set_color(_INK)

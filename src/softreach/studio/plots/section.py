@@ -1,8 +1,12 @@
-"""The reachable set in the plane of the slice: its boundary, and how many activations reach it."""
+"""Section of the reachable set: its boundary in a plane, and how many activations reach each place.
+
+They are counted as the inverse finds them: the grid of the exact set counts as well, but not near
+its folds.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -12,10 +16,16 @@ from softreach.geometry.surface import plane_cut
 from softreach.picture.projection import View, is_mirrored, plane_of
 from softreach.plot.slice import plot_slice
 from softreach.studio.multiplicity import counts_at
-from softreach.studio.plots.plot import Picture, blank_figure, pixels
+from softreach.studio.plots.plot import (
+    Picture,
+    PicturePlot,
+    blank_figure,
+    complete_reach,
+    pixels,
+)
 from softreach.studio.reach import Reach
 from softreach.studio.rod import solvable_rod
-from softreach.studio.state import Slice
+from softreach.studio.state import Slice, StudioState
 from softreach.studio.worker import StaleCheck, all_cores
 from softreach.support.errors import InvalidInput
 from softreach.workspace import ReachableSolid, ReachableSurface
@@ -24,14 +34,22 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
+    from softreach.studio.session import Session
 
-# How many activations reach the places of a plane, as the inverse finds them.
-#
-# The grid of the exact set counts as well, but not near its folds.
+__all__ = [
+    "SectionPlot",
+    "enclosed_area",
+    "plane_counts",
+    "section_curves",
+    "section_picture",
+    "within",
+]
 
 
 Array = NDArray[np.float64]
 
+_VIEWS: dict[str, View] = {"x": "side", "y": "front", "z": "top"}
+_BOUNDARY = "#16324f"
 _CELLS, _CELLS_LOADED = 120, 40  # along the longer side: under loads each place costs much
 
 
@@ -40,10 +58,10 @@ def within(curves: Sequence[Array], points: Array, axis: int) -> NDArray[np.bool
     from matplotlib.path import Path
 
     flat = np.delete(points, axis, axis=1)
-    found = np.zeros(len(points), bool)
+    inside = np.zeros(len(points), bool)
     for curve in curves:
-        found ^= Path(np.delete(curve, axis, axis=1)).contains_points(flat)
-    return found
+        inside ^= Path(np.delete(curve, axis, axis=1)).contains_points(flat)
+    return inside
 
 
 def plane_counts(
@@ -76,10 +94,6 @@ def plane_counts(
     }
     attrs = {"cell": cell * length, "length": length}
     return xr.Dataset({name: (tuple("xyz"), values)}, coordinates, attrs)
-
-
-_VIEWS: dict[str, View] = {"x": "side", "y": "front", "z": "top"}
-_BOUNDARY = "#16324f"
 
 
 def section_curves(reach: Reach, cut: Slice) -> list[Array]:
@@ -173,3 +187,29 @@ def _described(curves: list[Array], plane: Slice, where: str) -> str:
     parts = "one closed curve" if len(curves) == 1 else f"{len(curves)} closed curves"
     closed = all(np.array_equal(curve[0], curve[-1]) for curve in curves)
     return f"{where}: {parts}, {area:.4f} L²" if closed else f"{where}: {len(curves)} curves"
+
+
+class SectionPlot(PicturePlot):
+    """Picture of the section by the plane of the slice."""
+
+    name = "section"
+    label = "section"
+    hint = (
+        "the reachable set in the plane of the slice (tab View; without a slice y = 0): its "
+        "boundary, and how many activations reach each place"
+    )
+    sources = frozenset({"reach"})
+
+    @staticmethod
+    def depends_on(state: StudioState) -> object:
+        """The plane and the page's light."""
+        look = state.appearance
+        return look.slice.axis, look.slice.center, look.dark
+
+    @staticmethod
+    def compute(session: Session, check: StaleCheck) -> Iterator[Picture]:
+        """Cut and draw it, once the exact set is complete."""
+        look, reach = session.state.appearance, complete_reach(session)
+        if reach is not None:
+            with session.working("cutting the reachable set"):
+                yield section_picture(reach, look.slice, check, dark=look.dark)

@@ -1,15 +1,14 @@
-"""One slider per bundle moves the arm."""
+"""Activation of each bundle: a slider a bundle moves the arm."""
 
 from __future__ import annotations
 
 import math
-import threading
 from typing import TYPE_CHECKING, Any
 
 from softreach.arm.manipulator import Manipulator
 from softreach.schema import activation_symbols
 from softreach.studio.captions import tip_text
-from softreach.studio.fields import Line, SliderField, bind, bind_button
+from softreach.studio.fields import Attribute, Fields, Line, attribute
 from softreach.studio.rod import rod_of
 from softreach.studio.scene import MOST_BUNDLES
 from softreach.studio.state import StudioState
@@ -26,74 +25,69 @@ _MOST = 40
 
 
 class ActivationPanel:
-    """Activations of the bundles within their bounds, and where the tip is."""
+    """Activations of the bundles within their bounds, and the place of the tip."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
         """Add the widgets."""
-        self._gui, self._session = gui, session
-        self._lock = threading.RLock()
-        self._sliders: list[Any] = []
-        self._made_for: Any = None
-        self._revision = -1
+        self._ends: list[_SliderEnds] = []
+        self._design: Manipulator | None = None
+        self._sliders, self._others = Fields(session), Fields(session)
         with tab:
             self._tip = Line(gui)
             self._folder = gui.add_folder("activation")
             self._hidden = Line(gui)
-            self._trail = gui.add_checkbox("show trail", False, hint="Draws where the tip has been")
-            rest = gui.add_button("Rest", hint="Sets every activation to 0, or the nearest to it")
-        bind(self._trail, session, lambda s, on: s.showing(trail=on))
-        bind_button(rest, session, lambda: session.update(lambda s: s.replace(activation=())))
+            self._others.checkbox(
+                "show trail", attribute("appearance.trail"), "Draws where the tip has been"
+            )
+            self._others.button(
+                "Rest",
+                lambda state: state.replace(activation=()),
+                "Sets every activation to 0, or the nearest to it",
+            )
 
     def show(self, session: Session) -> None:
         """Move the sliders to the state, and show where the tip is."""
-        with self._lock:
-            if _slider_ends(session.state.design) != self._made_for:
-                self._build(session)
-            elif session.revision != self._revision:
-                for slider, value in zip(self._sliders, session.state.activation, strict=False):
-                    slider.value = value
-                self._trail.value = session.state.appearance.trail
-            self._revision = session.revision
+        self._others.show(session)
+        if session.state.design is not self._design:
+            self._design = session.state.design
+            self._fit(session)
+        self._sliders.show(session)
         self._tip.say(*tip_text(session))
 
-    def _build(self, session: Session) -> None:
-        self._made_for = _slider_ends(session.state.design)
-        for slider in self._sliders:
-            slider.remove()
+    def _fit(self, session: Session) -> None:
+        """Make the sliders anew, unless the design has the same bundles within the same bounds."""
+        ends = _slider_ends(session.state.design)
+        if ends == self._ends:
+            return
+        self._ends = ends
+        self._sliders.remove()
+        self._sliders = Fields(session)
         with self._folder:
-            self._sliders = [
-                self._slider(name, low, high, value)
-                for (name, low, high), value in zip(
-                    self._made_for[:_MOST], session.state.activation, strict=False
-                )
-            ]
-        hidden = len(self._made_for) - len(self._sliders)
-        drawn = "" if len(self._made_for) <= MOST_BUNDLES else "; no bundle is drawn"
+            for bundle, (label, low, high) in enumerate(ends[:_MOST]):
+                room = 1e-6 * max(1.0, abs(low))
+                upper = max(high, low + room)  # a slider needs room; the state keeps to the bounds
+                hint = f"{label}: activation of a bundle, from {low:g} to {upper:g}; 0 is at rest"
+                step = 10.0 ** (math.floor(math.log10(upper - low)) - 3)  # round
+                self._sliders.slider(label, (low, upper), step, _activation(bundle), hint)
+        hidden = len(ends) - _MOST
+        drawn = "" if len(ends) <= MOST_BUNDLES else "; no bundle is drawn"
         text = f"{hidden} more bundles have no slider here{drawn}."
-        self._hidden.say(*([text] if hidden else []))
-
-    def _slider(self, name: str, low: float, high: float, value: float) -> Any:
-        room = 1e-6 * max(1.0, abs(low))
-        high = max(high, low + room)  # a slider needs room; the state keeps to the bounds
-        about = f"{name}: activation of a bundle, from {low:g} to {high:g}; 0 is at rest"
-        slider = SliderField(self._gui, name, (low, high), _step(high - low), value, about)
-        bind(slider, self._session, self._wanted)
-        return slider
-
-    def _wanted(self, state: StudioState, moved: float) -> StudioState:
-        """Read all sliders: the last of several events that run at once then has it right."""
-        del moved
-        shown = tuple(float(slider.value) for slider in self._sliders)
-        return state.replace(activation=shown + state.activation[len(shown) :])
+        self._hidden.say(*([text] if hidden > 0 else []))
 
 
-def _step(width: float) -> float:
-    """A round step, a thousandth of the range or less."""
-    return 10.0 ** (math.floor(math.log10(width)) - 3)
+def _activation(bundle: int) -> Attribute:
+    def write(state: StudioState, value: float) -> StudioState:
+        before = state.activation
+        return state.replace(activation=(*before[:bundle], value, *before[bundle + 1 :]))
+
+    return Attribute(lambda state: state.activation[bundle], write)
 
 
-def _slider_ends(arm: Manipulator) -> list[tuple[str, float, float]]:
-    """Label and bounds of every bundle."""
+_SliderEnds = tuple[str, float, float]
+"""Label and bounds of a bundle."""
+
+
+def _slider_ends(arm: Manipulator) -> list[_SliderEnds]:
     symbols = activation_symbols(arm.bundle_units)
     units = (f" [{unit}]" if unit != "1" else "" for unit in arm.bundle_units)
     labels = zip(symbols, arm.bundle_names, units, strict=True)

@@ -1,4 +1,4 @@
-"""Which map of an atlas the board shows; a click on it loads the design under it."""
+"""Map of an atlas: its metric and parameters; a click on it loads the design under it."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 from softreach.arm.manipulator import Manipulator
 from softreach.studio.atlas_map import map_choices, metric_names
 from softreach.studio.atlas_numbers import nearest_numbers
-from softreach.studio.fields import Line, PictureFrame, attempt, bind
+from softreach.studio.fields import Attribute, Fields, Line, PictureFrame, attempt, attribute
 from softreach.studio.map_board import MapBoard
 from softreach.studio.state import MapView, StudioState
+from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -32,33 +33,30 @@ class AtlasPanel:
     def __init__(self, gui: GuiApi, tab: Any, session: Session, board: MapBoard) -> None:
         """Add the widgets."""
         self._session, self._board, self._atlas = session, board, board.atlas
-        self._revision = -1
         self._explained: tuple[Manipulator, str] | None = None
-        names = tuple(str(dim) for dim in self._atlas["status"].dims)
+        self._fields = fields = Fields(session, dragged=False)
+        names = {name: name for name in map(str, self._atlas["status"].dims)}
         with tab:
             Line(gui, _HINT)
-            self._metric = gui.add_dropdown(
-                "metric", tuple(metric_names(self._atlas)), hint="What the map shows"
+            fields.dropdown(
+                "metric",
+                {name: name for name in metric_names(self._atlas)},
+                self._choice("metric"),
+                "What the map shows",
             )
-            self._right = gui.add_dropdown(
-                "to the right", names, hint="The parameter from left to right"
+            fields.dropdown(
+                "to the right", names, self._choice("right"), "The parameter from left to right"
             )
-            self._up = gui.add_dropdown("upward", names, hint="The parameter from bottom to top")
-            self._visible = gui.add_checkbox("show the map", True, hint="Beside the arm")
+            fields.dropdown("upward", names, self._choice("up"), "The parameter from bottom to top")
+            fields.checkbox("show the map", attribute("appearance.map.shown"), "Beside the arm")
             self._numbers = Line(gui)
             self._picture = PictureFrame(gui, gui.add_folder("the map"))
-        bind(self._metric, session, lambda s, name: _viewed(s, metric=name))
-        bind(self._right, session, lambda s, name: self._turned(s, "right", name))
-        bind(self._up, session, lambda s, name: self._turned(s, "up", name))
-        bind(self._visible, session, lambda s, on: _viewed(s, shown=on))
 
     def show(self, session: Session) -> None:
         """Bring the widgets in line with the state."""
         if self._board.map is not None:
             self._picture.show(self._board.map.image)
-        if session.revision != self._revision:
-            self._revision = session.revision
-            attempt(session, lambda: self._follow(session.state.appearance.map))
+        self._fields.show(session)
         self._explain(session.state)
 
     def click(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
@@ -68,36 +66,36 @@ class AtlasPanel:
             attempt(self._session, lambda: self._load(at))
         return at is not None
 
-    def _follow(self, view: MapView) -> None:
-        metric, right, up = map_choices(self._atlas, view)
-        self._metric.value, self._right.value, self._up.value = metric, right, up
-        self._visible.value = view.shown
+    def _choice(self, name: str) -> Attribute:
+        """Metric or parameter of the map; an axis takes what the other had if it is the same."""
+
+        def write(state: StudioState, value: str) -> StudioState:
+            choices = self._choices(state)
+            other = {"right": "up", "up": "right"}.get(name)
+            if other and choices[other] == value:
+                choices[other] = choices[name]
+            return state.showing(map=replace(state.appearance.map, **(choices | {name: value})))
+
+        return Attribute(lambda state: self._choices(state)[name], write)
+
+    def _choices(self, state: StudioState) -> dict[str, str]:
+        """Metric and axes of the map; the first there are, if the state is of another atlas."""
+        try:
+            choices = map_choices(self._atlas, state.appearance.map)
+        except InvalidInput:  # which the map says
+            choices = map_choices(self._atlas, MapView())
+        return dict(zip(("metric", "right", "up"), choices, strict=True))
 
     def _explain(self, state: StudioState) -> None:
         """Say what the atlas knows of the nearest design; once for each design and metric."""
-        asked = state.design, state.appearance.map.metric
-        if asked != self._explained:
-            self._explained = asked
-            metric, *_ = map_choices(self._atlas, state.appearance.map)
+        key = state.design, state.appearance.map.metric
+        if key != self._explained:
+            self._explained = key
+            metric = self._choices(state)["metric"]
             self._numbers.say(nearest_numbers(self._atlas, metric, state.design))
-
-    def _turned(self, state: StudioState, axis: str, name: str) -> StudioState:
-        """A parameter on one axis; the other axis takes what this one had if it is the same."""
-        _, right, up = map_choices(self._atlas, state.appearance.map)
-        axes = {"right": right, "up": up}
-        other = "up" if axis == "right" else "right"
-        if axes[other] == name:
-            axes[other] = axes[axis]
-        axes[axis] = name
-        self._right.value, self._up.value = axes["right"], axes["up"]
-        return _viewed(state, **axes)
 
     def _load(self, at: dict[str, float]) -> None:
         from softreach.atlas import atlas_design
 
         design = atlas_design(self._atlas, **at)
         self._session.update(lambda state: state.replace(design=design))
-
-
-def _viewed(state: StudioState, **changes: Any) -> StudioState:
-    return state.showing(map=replace(state.appearance.map, **changes))

@@ -1,4 +1,4 @@
-"""Snapshots of the work, and their designs side by side in a table."""
+"""Comparison of snapshots of the work, their designs side by side in a table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Save what there is, and load it again."""
+"""Export of the state, design, cloud, surface and pictures; and states that are loaded again."""
 
 from __future__ import annotations
 
@@ -114,9 +114,7 @@ class ExportPanel:
         )
 
     def _restore(self, file: UploadedFile) -> None:
-        session = self._session
-        state = state_from(file.name, file.content, session.state)
-        session.restore(state)
+        self._session.restore(state_from(file.name, file.content, self._session.state))
 
     def _reach(self) -> Reach:
         reach = self._session.reach
@@ -127,9 +125,9 @@ class ExportPanel:
     def _write(self, name: str, content: Callable[[], bytes]) -> None:
         """Send what takes a while to make, and say so meanwhile."""
         with self._session.working(f"writing {name}"):
-            made = content()
-        self._send(name, made)
-        self._session.say(f"{name} is written: {_size(len(made))}.")
+            data = content()
+        self._send(name, data)
+        self._session.say(f"{name} is written: {_size(len(data))}.")
 
     def _send(self, name: str, content: bytes) -> None:
         self._session.client.send_file_download(name, content, save_immediately=True)

@@ -1,4 +1,4 @@
-"""Every activation that reaches a place: drag the tip there, click a point, or type it."""
+"""Inverse problem: every activation that reaches a place, and the ball that drags the tip."""
 
 from __future__ import annotations
 
@@ -6,10 +6,19 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.kinematics import tip_positions
-from softreach.studio.fields import Line, VectorField, attempt, bind, bind_button
+from softreach.studio.fields import (
+    VECTOR,
+    Fields,
+    Line,
+    TypedField,
+    attempt,
+    attribute,
+    bind_button,
+)
 from softreach.studio.grip import Grip
 from softreach.studio.picking import picked_point
 from softreach.studio.reach import cloud_points, shown_samples
@@ -23,10 +32,42 @@ if TYPE_CHECKING:
     from softreach.inverse import Solution
     from softreach.studio.session import Session
 
+__all__ = ["DragPanel", "InversePanel", "clicked_point"]
+
+_DRAG_HINT = "Drag the ball on the tip: the arm follows on its branch of solutions."
 _HINT = "Drag the tip, type a target, or let a click on the cloud set it."
 _ABOUT_CLICKS = "off: a click in the scene changes nothing"
-_HELD = 1e-4
-"""Change of activation, in ranges, below which the arm holds a solution."""
+_NEAR = 1e-4
+"""Change of activation, in ranges, below which the arm is in a solution."""
+
+
+class DragPanel:
+    """The ball on the tip, and the choice to show it."""
+
+    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
+        """Add the widgets."""
+        self._grip = Grip(session.client.scene, session.pull_tip)
+        self._fields = Fields(session)
+        with tab:
+            self._text = Line(gui, _DRAG_HINT)
+            self._fields.checkbox("handle on the tip", attribute("appearance.handle"), _DRAG_HINT)
+
+    def show(self, session: Session) -> None:
+        """Keep the ball on the tip."""
+        self._fields.show(session)
+        state, drag, arm = session.state, session.tip_pull, session.state.design
+        look = state.appearance
+        grasped = look.handle and look.arm and rod_of(arm).box.dimension > 0
+        radius = float(arm.profile.radius(arm.length)) / arm.length
+        self._grip.move(session.tip if grasped else None, radius, dark=look.dark)
+        if drag is None:
+            self._text.say(_DRAG_HINT)
+            self._grip.show_lag(None, None)
+            return
+        gap = drag.pulled.gap / arm.length
+        short = f"This branch ends {gap:.3f} L short of the pointer."
+        self._text.say(short if gap else _DRAG_HINT)
+        self._grip.show_lag(drag.wanted, drag.pulled.tip / arm.length, gap)
 
 
 class InversePanel:
@@ -34,40 +75,38 @@ class InversePanel:
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
         """Add the widgets."""
-        self._gui, self._session = gui, session
-        self._revision = -1
-        self._shown: Solution | None = None
+        self._gui, self._session, self._fields = gui, session, Fields(session)
+        self._answer: Solution | None = None
         self._buttons: list[tuple[Any, Any]] = []
         with tab:
             self._text = Line(gui, _HINT)
-            self._target = VectorField(
-                gui, "target / L", (0.0, 0.0, 1.0), "Where the tip should go [L]"
+            self._target = TypedField(
+                gui, "target / L", (0.0, 0.0, 1.0), "Where the tip should go [L]", VECTOR
             )
             self._clicks = gui.add_checkbox("clicks set the target", False, hint=_ABOUT_CLICKS)
             solve = gui.add_button("Solve", hint="Finds every activation that reaches the target")
-            self._ghosts = gui.add_checkbox(
+            self._fields.checkbox(
                 "show all shapes",
-                session.state.appearance.ghosts,
-                hint="Draws the arm in every solution at once",
+                attribute("appearance.ghosts"),
+                "Draws the arm in every solution at once",
             )
             self._folder = gui.add_folder("activations that reach it", visible=False)
-            clear = gui.add_button("Clear", hint="Takes target and solutions away")
+            self._fields.button(
+                "Clear",
+                lambda state: state.replace(target=None),
+                "Takes target and solutions away",
+            )
         bind_button(solve, session, self._solve_typed)
         self._target.on_update(lambda _: attempt(session, self._solve_typed))
-        bind_button(clear, session, lambda: session.update(lambda s: s.replace(target=None)))
-        bind(self._ghosts, session, lambda s, on: s.showing(ghosts=on))
 
     def show(self, session: Session) -> None:
-        """List the solutions, and mark the one that the arm holds."""
-        if session.revision != self._revision:
-            self._revision = session.revision
-            self._ghosts.value = session.state.appearance.ghosts
-        if session.answer is not self._shown:
-            self._shown = session.answer
+        """List the solutions, and mark the one that the arm is in."""
+        self._fields.show(session)
+        if session.answer is not self._answer:
+            self._answer = session.answer
             self._list(session.answer)
         for activation, button in self._buttons:
-            held = _is_held(activation, session.state)
-            button.color = "green" if held else None
+            button.color = "green" if _is_near(activation, session.state) else None
 
     def _list(self, answer: Solution | None) -> None:
         for _, button in self._buttons:
@@ -88,19 +127,12 @@ class InversePanel:
             Whether they are, and there is one.
         """
         session = self._session
-        if not self._clicks.value:
+        number = clicked_point(session, origin, direction) if self._clicks.value else None
+        if number is None or session.reach is None:
             return False
-        reach, look = session.reach, session.state.appearance
-        if reach is None or not look.cloud or reach.arm != session.state.design:
-            return False
-        points = cloud_points(reach, look.level)
-        seen = in_slice(points, look.slice) & ~session.scene.clouds.hidden(points)
-        kept = np.flatnonzero(seen)
-        found = picked_point(points[kept], origin, direction, 0.01 * session.eye.narrowness)
-        if found is None:
-            return False
-        activations = reach.cloud.activation.values[shown_samples(reach, look.level)]
-        attempt(session, lambda: session.aim(_tip(reach.arm, activations[kept[found]])))
+        reach, level = session.reach, session.state.appearance.level
+        activation = reach.cloud.activation.values[shown_samples(reach, level)][number]
+        attempt(session, lambda: session.aim(_tip(reach.arm, activation)))
         return True
 
     def _solve_typed(self) -> None:
@@ -108,22 +140,42 @@ class InversePanel:
         self._session.aim(length * np.asarray(self._target.value))
 
     def _button(self, activation: Any) -> Any:
-        wanted = tuple(activation.tolist())
+        target = tuple(activation.tolist())
         button = self._gui.add_button(
-            ", ".join(f"{value:.4g}" for value in wanted), hint="Moves the arm to this solution"
+            ", ".join(f"{value:.4g}" for value in target), hint="Moves the arm to this solution"
         )
-        take = lambda: self._session.update(lambda s: s.replace(activation=wanted))  # noqa: E731
+        take = lambda: self._session.update(lambda s: s.replace(activation=target))  # noqa: E731
         bind_button(button, self._session, take)
         return button
 
 
-def _is_held(activation: Any, state: StudioState) -> bool:
+def clicked_point(
+    session: Session, origin: Sequence[float], direction: Sequence[float]
+) -> int | None:
+    """Number of the point of the cloud that a ray hits, of those that are seen; None without one.
+
+    Args:
+        session: Of the tab.
+        origin: The eye [L].
+        direction: Of the ray, any length.
+    """
+    reach, look = session.reach, session.state.appearance
+    if reach is None or not look.cloud or reach.arm != session.state.design:
+        return None
+    points = cloud_points(reach, look.level)
+    seen: NDArray[np.bool_] = in_slice(points, look.slice) & ~session.scene.clouds.hidden(points)
+    numbers = np.flatnonzero(seen)
+    hit = picked_point(points[numbers], origin, direction, 0.01 * session.eye.narrowness)
+    return None if hit is None else int(numbers[hit])
+
+
+def _is_near(activation: Any, state: StudioState) -> bool:
     scales = np.maximum(np.ptp(rod_of(state.design).box.bounds, axis=1), 1e-12)
-    return bool((np.abs(activation - state.activation) <= _HELD * scales).all())
+    return bool((np.abs(activation - state.activation) <= _NEAR * scales).all())
 
 
 def _tip(arm: Manipulator, activation: Any) -> Any:
-    """Where a sample really is [m]: its point is rounded, at the rim perhaps to out of reach."""
+    """Exact place of a sample [m]: its point is rounded, at the rim perhaps to out of reach."""
     return tip_positions(arm, [activation])[0]
 
 
@@ -144,43 +196,3 @@ def _answer_text(answer: Solution, arm: Manipulator) -> str:
 
 def _place(point: Any) -> str:
     return "({:.4f}, {:.4f}, {:.4f}) L".format(*point)
-
-
-# A handle on the tip: drag it, and the arm follows.
-
-
-_DRAG_HINT = "Drag the ball on the tip: the arm follows on its branch of solutions."
-
-
-class DragPanel:
-    """The ball, and whether it is shown."""
-
-    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        """Add the widgets."""
-        self._session, self._revision = session, -1
-        self._grip = Grip(session.client.scene, session.pull_tip)
-        with tab:
-            self._text = Line(gui, _DRAG_HINT)
-            self._shown = gui.add_checkbox(
-                "handle on the tip", session.state.appearance.handle, hint=_DRAG_HINT
-            )
-        bind(self._shown, session, lambda s, on: s.showing(handle=on))
-
-    def show(self, session: Session) -> None:
-        """Keep the ball on the tip."""
-        state, pull = session.state, session.tip_pull
-        if session.revision != self._revision:
-            self._revision = session.revision
-            self._shown.value = state.appearance.handle
-        movable = rod_of(state.design).box.dimension > 0
-        grasped = state.appearance.handle and state.appearance.arm and movable
-        arm = state.design
-        radius = float(arm.profile.radius(arm.length)) / arm.length
-        self._grip.move(session.tip if grasped else None, radius, dark=state.appearance.dark)
-        if pull is None:
-            self._text.say(_DRAG_HINT)
-            self._grip.show_lag(None, None)
-            return
-        gap = pull.pulled.gap / arm.length
-        self._text.say(f"This branch ends {gap:.3f} L short of the pointer." if gap else _DRAG_HINT)
-        self._grip.show_lag(pull.wanted, pull.pulled.tip / arm.length, gap)

@@ -1,31 +1,35 @@
-"""What acts on the arm: gravity, a payload, a force on the tip."""
+"""Loads of the arm as they are typed: gravity, a payload, a force on the tip."""
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from softreach.arm.file import in_file_terms
-from softreach.arm.loads import Loads, PointLoad
+from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.weight import GRAVITY
 from softreach.studio.captions import tip_text
-from softreach.studio.fields import Line, NumberField, VectorField, bind
-from softreach.studio.rod import rod_of
+from softreach.studio.fields import Attribute, Fields, Line, attribute
 from softreach.studio.state import Vector, vector
-from softreach.support.errors import Fault, InvalidDesign, InvalidInput, SoftreachError
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput
 
 if TYPE_CHECKING:
     from viser import GuiApi
 
     from softreach.studio.session import Session
 
-
-# Gravity, payload and tip force of a design, in the units that a person types.
-
+__all__ = [
+    "GRAVITIES",
+    "LoadsPanel",
+    "TypedLoads",
+    "gravity_name",
+    "other_loads",
+    "typed_loads",
+    "with_loads",
+]
 
 GRAVITIES: Mapping[str, Vector] = {
     "none": (0.0, 0.0, 0.0),
@@ -35,14 +39,13 @@ GRAVITIES: Mapping[str, Vector] = {
 }
 """Gravity [m/s²] as the base sees it, whose tangent is +z."""
 
-_GRAM, _MILLIMETER = 1e-3, 1e-3
 _NONE = Loads(gravity=GRAVITIES["none"])
 _MOST = 1e6  # of any unit that is typed: far above what an arm bears, far below an overflow
 _SYMBOLS = {"young_modulus": "Young's modulus E", "density": "the density ρ"}
 
 
 class TypedLoads(NamedTuple):
-    """What the fields hold."""
+    """Values of the fields."""
 
     gravity: Vector = GRAVITIES["none"]
     """[m/s²]."""
@@ -54,22 +57,106 @@ class TypedLoads(NamedTuple):
     """[N]."""
 
 
-_FIELDS = {
-    "gravity": ("gravity", "m/s²", 1.0),
-    "payload": ("payload", "g", _GRAM),
-    "payload_arm": ("lever arm", "mm", _MILLIMETER),
-    "tip_force": ("tip force", "N", 1.0),
+class _Quantity(NamedTuple):
+    name: str
+    symbol: str
+    unit: str
+    scale: float
+    """SI units per unit that is typed."""
+    hint: str
+
+
+_QUANTITIES = {
+    "gravity": _Quantity(
+        "gravity",
+        "g",
+        "m/s²",
+        1.0,
+        "g: acceleration of gravity as x, y, z in the frame of the base, whose tangent is z",
+    ),
+    "payload": _Quantity(
+        "payload",
+        "payload",
+        "g",
+        1e-3,
+        "m: mass at the tip; it weighs what gravity makes of it",
+    ),
+    "payload_arm": _Quantity(
+        "lever arm",
+        "lever arm",
+        "mm",
+        1e-3,
+        "From the tip to the center of the payload's mass, as x, y, z in the tip's directors",
+    ),
+    "tip_force": _Quantity(
+        "tip force",
+        "tip force",
+        "N",
+        1.0,
+        "F: force on the tip as x, y, z in the frame of the base",
+    ),
 }
 
 
+class LoadsPanel:
+    """Fields of the loads; a refused value stays in its field beside the reason."""
+
+    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
+        """Add the widgets."""
+        self._design: Manipulator | None = None
+        self._fields = fields = Fields(session, dragged=False)
+        gravity = _typed("gravity")
+        with tab:
+            fields.dropdown(
+                "gravity",
+                {name: name for name in GRAVITIES} | {"": "as typed"},
+                Attribute(
+                    lambda state: gravity_name(gravity.read(state)),
+                    lambda state, name: gravity.write(state, GRAVITIES[name]) if name else state,
+                ),
+                "Which way the base of the arm points",
+            )
+            for name, kind in _QUANTITIES.items():
+                add = fields.number if name == "payload" else fields.vector
+                add(f"{kind.symbol} [{kind.unit}]", _typed(name), kind.hint)
+            fields.message = Line(gui)
+            fields.button(
+                "Take all loads off",
+                lambda state: state.replace(design=state.design.replace(loads=None)),
+                "Gravity, payload and all forces",
+            )
+            fields.checkbox(
+                "show the cloud without loads",
+                attribute("appearance.free"),
+                "Faint, around that of the loaded arm",
+            )
+            self._posture, self._others = Line(gui), Line(gui)
+
+    def show(self, session: Session) -> None:
+        """Show the loads of the design, and whether the arm rests under them."""
+        self._fields.show(session)
+        design = session.state.design
+        if design is not self._design:
+            self._design = design
+            others = ", ".join(other_loads(design))
+            self._others.say(*([f"From the design file act too: {others}."] if others else []))
+        self._posture.say(*(tip_text(session) if design.loads is not None else ()))
+
+
+def _typed(name: str) -> Attribute:
+    return Attribute(
+        lambda state: getattr(typed_loads(state.design), name),
+        lambda state, value: state.replace(
+            design=with_loads(state.design, typed_loads(state.design)._replace(**{name: value}))
+        ),
+    )
+
+
 def typed_loads(arm: Manipulator) -> TypedLoads:
-    """What a design has of the loads that can be typed."""
+    """Loads of a design that can be typed, in the units of the fields."""
     loads = arm.loads or _NONE
     return TypedLoads(
-        loads.gravity,
-        _rounded(loads.payload / _GRAM),
-        vector(_rounded(value / _MILLIMETER) for value in loads.payload_arm),
-        loads.tip_force,
+        *(_in_unit(getattr(loads, name), kind.scale) for name, kind in _QUANTITIES.items())
     )
 
 
@@ -80,12 +167,9 @@ def with_loads(arm: Manipulator, typed: TypedLoads) -> Manipulator:
         InvalidInput: A number that no load can have.
         InvalidDesign: Matter that lacks what loads need, and where to give it.
     """
-    _check(typed)
-    known = typed_loads(arm)  # what a field only shows rounded is left as it is
+    known = typed_loads(arm)._asdict()  # what a field only shows rounded is left as it is
     changes = {
-        name: _in_si(name, getattr(typed, name))
-        for name in TypedLoads._fields
-        if getattr(typed, name) != getattr(known, name)
+        name: _in_si(name, value) for name, value in typed._asdict().items() if value != known[name]
     }
     loads = (arm.loads or _NONE).replace(**changes)
     try:
@@ -95,37 +179,36 @@ def with_loads(arm: Manipulator, typed: TypedLoads) -> Manipulator:
 
 
 def gravity_name(gravity: Vector) -> str:
-    """What the list of directions calls a gravity; "" for any other."""
-    return next((name for name, one in GRAVITIES.items() if one == gravity), "")
+    """Name of a gravity in the list of directions; "" for any other."""
+    return next((name for name, known in GRAVITIES.items() if known == gravity), "")
 
 
 def other_loads(arm: Manipulator) -> list[str]:
     """Loads of a design that have no field, in words."""
     loads = arm.loads or _NONE
     names = ("tip_moment", "follower_force", "follower_moment", "force_per_length")
-    found = [name.replace("_", " ") for name in names if any(getattr(loads, name))]
-    points: tuple[PointLoad, ...] = loads.point_loads
-    return found + ([f"point loads ({len(points)})"] if points else [])
+    others = [name.replace("_", " ") for name in names if any(getattr(loads, name))]
+    count = len(loads.point_loads)
+    return others + ([f"point loads ({count})"] if count else [])
 
 
-def _check(typed: TypedLoads) -> None:
-    for name, value in typed._asdict().items():
-        label, unit, _ = _FIELDS[name]
-        low = 0.0 if name == "payload" else -_MOST
-        numbers = np.atleast_1d(np.asarray(value, float))
-        good = np.isfinite(numbers) & (numbers >= low) & (numbers <= _MOST)
-        if not good.all():
-            wrong = f"{numbers[np.flatnonzero(~good)[0]]:g} {unit}"
-            raise InvalidInput(label, wrong, f"{low:,.0f} to {_MOST:,.0f} {unit}")
+def _in_si(name: str, value: Any) -> Any:
+    label, _, unit, scale, _ = _QUANTITIES[name]
+    low = 0.0 if name == "payload" else -_MOST
+    numbers = np.atleast_1d(np.asarray(value, float))
+    good = (numbers >= low) & (numbers <= _MOST)
+    if not good.all():
+        wrong = f"{numbers[np.flatnonzero(~good)[0]]:g} {unit}"
+        raise InvalidInput(label, wrong, f"{low:,.0f} to {_MOST:,.0f} {unit}")
+    return vector(scale * v for v in value) if isinstance(value, tuple) else scale * value
 
 
-def _in_si(name: str, value: Vector | float) -> Vector | float:
-    scale = _FIELDS[name][2]
-    return value * scale if isinstance(value, float | int) else vector(scale * v for v in value)
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.10g}")
+def _in_unit(value: Any, scale: float) -> Any:
+    if scale == 1.0:
+        return value
+    if isinstance(value, tuple):
+        return vector(_in_unit(each, scale) for each in value)
+    return float(f"{value / scale:.10g}")
 
 
 def _in_words(error: InvalidDesign) -> InvalidDesign:
@@ -144,111 +227,3 @@ def _in_words(error: InvalidDesign) -> InvalidDesign:
 def _owner(path: str) -> str:
     """A part by the name that the list of parts has for it."""
     return path.removesuffix(".material").replace("rings[", "ring ").replace("]", "")
-
-
-_TYPED = "as typed"
-_ZERO = (0.0, 0.0, 0.0)
-_ABOUT = {
-    "gravity": "g: acceleration of gravity as x, y, z in the frame of the base, whose tangent is z",
-    "payload": "m: mass at the tip; it weighs what gravity makes of it",
-    "arm": "From the tip to the center of the payload's mass, as x, y, z in the tip's directors",
-    "force": "F: force on the tip as x, y, z in the frame of the base",
-}
-
-
-class LoadsPanel:
-    """All fields together are the loads; a refused value stays in its field beside the reason."""
-
-    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        """Add the widgets."""
-        self._session, self._lock = session, threading.RLock()
-        self._shown: Manipulator | None = None
-        with tab:
-            self._direction = gui.add_dropdown(
-                "gravity", (*GRAVITIES, _TYPED), hint="Which way the base of the arm points"
-            )
-            self._gravity = VectorField(gui, "g [m/s²]", _ZERO, _ABOUT["gravity"])
-            self._payload = NumberField(gui, "payload [g]", 0.0, _ABOUT["payload"])
-            self._arm = VectorField(gui, "lever arm [mm]", _ZERO, _ABOUT["arm"])
-            self._force = VectorField(gui, "tip force [N]", _ZERO, _ABOUT["force"])
-            self._message = Line(gui)
-            clear = gui.add_button("Take all loads off", hint="Gravity, payload and all forces")
-            clear.on_click(lambda _: self._clear())
-            self._free = gui.add_checkbox(
-                "show the cloud without loads", True, hint="Faint, around that of the loaded arm"
-            )
-            self._posture, self._others = Line(gui), Line(gui)
-        self._direction.on_update(
-            lambda event: self._directed() if event.client_id is not None else None
-        )
-        for field in (self._gravity, self._payload, self._arm, self._force):
-            field.on_update(lambda _, field=field: self._typed(field))
-        bind(self._free, session, lambda s, on: s.showing(free=on))
-
-    def show(self, session: Session) -> None:
-        """Show the loads of the design, and whether the arm rests under them."""
-        design = session.state.design
-        with self._lock:
-            if design != self._shown:
-                self._shown = design
-                self._fill(typed_loads(design))
-                self._message.warn("")
-                others = ", ".join(other_loads(design))
-                self._others.say(*([f"From the design file act too: {others}."] if others else []))
-        self._free.value = session.state.appearance.free
-        self._posture.say(*(tip_text(session) if design.loads is not None else ()))
-
-    def _fill(self, loads: TypedLoads) -> None:
-        """Put values into the fields; those that are there already may be being typed."""
-        self._direction.value = gravity_name(loads.gravity) or _TYPED
-        if self._payload.value != loads.payload:
-            self._payload.value = loads.payload
-        vectors = (
-            (self._gravity, loads.gravity),
-            (self._arm, loads.payload_arm),
-            (self._force, loads.tip_force),
-        )
-        for widget, value in vectors:
-            if vector(widget.value) != value:
-                widget.value = value
-
-    def _directed(self) -> None:
-        """A direction was chosen from the list."""
-        if self._direction.value in GRAVITIES:
-            self._gravity.value = GRAVITIES[self._direction.value]
-            self._apply()
-
-    def _typed(self, field: NumberField | VectorField) -> None:
-        self._direction.value = gravity_name(vector(self._gravity.value)) or _TYPED
-        self._apply(field)
-
-    def _clear(self) -> None:
-        self._fill(TypedLoads())
-        self._change(lambda arm: arm.replace(loads=None))
-
-    def _apply(self, field: NumberField | VectorField | None = None) -> None:
-        typed = TypedLoads(
-            vector(self._gravity.value),
-            float(self._payload.value),
-            vector(self._arm.value),
-            vector(self._force.value),
-        )
-        self._change(lambda arm: with_loads(arm, typed), field)
-
-    def _change(
-        self,
-        change: Callable[[Manipulator], Manipulator],
-        field: NumberField | VectorField | None = None,
-    ) -> None:
-        """Change the design, or say below the field why that cannot be."""
-        with self._lock:
-            known = self._session.state.design
-            try:
-                made = rod_of(change(known)).arm
-            except SoftreachError as error:
-                (field or self._message).warn(str(error))
-                return
-            self._message.warn("")
-            if made == known:
-                return  # a page reports fields that were only drawn anew
-        self._session.update(lambda state: state.replace(design=made))
