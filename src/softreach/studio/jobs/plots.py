@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
+
 from softreach.studio.jobs.job import Job
 from softreach.studio.plots import PLOTS
 from softreach.studio.plots.plot import Plot, Source
@@ -18,7 +20,8 @@ def _job_of(plot: type[Plot]) -> type[Job]:
         @staticmethod
         def depends_on(state: StudioState) -> object:
             """Whether it is shown, and what decides it then."""
-            return plot.name in state.appearance.plots.shown and plot.depends_on(state)
+            shown = plot.name in state.appearance.plots.shown
+            return shown and attrgetter(*plot.depends_on)(state)
 
         def run(self, check: StaleCheck) -> None:
             """Compute it, and show each result."""

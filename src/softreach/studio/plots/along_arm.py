@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.studio.plots.plot import Chart, Curve, Plot
 from softreach.studio.rod import solvable_rod
-from softreach.studio.state import StudioState
 from softreach.studio.worker import StaleCheck
 from softreach.support.errors import InvalidInput
 
@@ -65,16 +64,12 @@ class AlongArmPlot(Plot):
         "curvature κ and torsion u₃ (times L) and axial extension ζ at stations Z, in the "
         "present activation"
     )
+    depends_on = ("design", "activation")
 
     def __init__(self, gui: GuiApi, folder: Any) -> None:
         """Take the place of two charts."""
         self._curvature = Chart(gui, folder, "curvature × L")
         self._strain = Chart(gui, folder, "extension ζ")
-
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """The arm in its activation."""
-        return state.design, state.activation
 
     @staticmethod
     def compute(session: Session, check: StaleCheck) -> Iterator[AlongArm]:

@@ -20,7 +20,7 @@ from softreach.studio.plots.plot import (
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.rod import rod_of
 from softreach.studio.slicing import in_slice
-from softreach.studio.state import Slice, StudioState
+from softreach.studio.state import Slice
 from softreach.studio.worker import StaleCheck
 from softreach.support.palette import bundle_color
 
@@ -125,13 +125,10 @@ class HistogramPlot(PicturePlot):
     name = "histogram"
     label = "activations"
     hint = "how often the samples that the slice leaves pull each bundle how much"
+    depends_on = (
+        "appearance.level", "appearance.slice", "appearance.dark", "activation", "target",
+    )  # fmt: skip
     sources = frozenset({"reach", "answer"})
-
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """Which samples are shown, the present activation, the target, and the page's light."""
-        look = state.appearance
-        return look.level, look.slice, look.dark, state.activation, state.target
 
     @staticmethod
     def compute(session: Session, check: StaleCheck) -> Iterator[Picture]:

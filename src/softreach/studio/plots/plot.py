@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.studio.fields import Fields, PictureFrame
 from softreach.studio.reach import Reach
-from softreach.studio.state import StudioState
 from softreach.studio.worker import StaleCheck
 
 if TYPE_CHECKING:
@@ -49,6 +48,8 @@ class Plot(ABC):
     """In the settings."""
     label: ClassVar[str]
     hint: ClassVar[str]
+    depends_on: ClassVar[tuple[str, ...]]
+    """Attributes of the state that decide the result, such as "appearance.level"."""
     sources: ClassVar[frozenset[Source]] = frozenset()
     """What it is computed from besides the state: whoever finds that anew asks for the plot."""
 
@@ -60,11 +61,6 @@ class Plot(ABC):
     def add_settings(cls, fields: Fields) -> None:
         """Add fields for what can be chosen of the plot: nothing by default."""
         del fields
-
-    @staticmethod
-    @abstractmethod
-    def depends_on(state: StudioState) -> object:
-        """The part of the state that decides the result."""
 
     @staticmethod
     @abstractmethod

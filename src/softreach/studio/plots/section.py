@@ -25,7 +25,7 @@ from softreach.studio.plots.plot import (
 )
 from softreach.studio.reach import Reach
 from softreach.studio.rod import solvable_rod
-from softreach.studio.state import Slice, StudioState
+from softreach.studio.state import Slice
 from softreach.studio.worker import StaleCheck, all_cores
 from softreach.support.errors import InvalidInput
 from softreach.workspace import ReachableSolid, ReachableSurface
@@ -198,13 +198,8 @@ class SectionPlot(PicturePlot):
         "the reachable set in the plane of the slice (tab View; without a slice y = 0): its "
         "boundary, and how many activations reach each place"
     )
+    depends_on = ("appearance.slice.axis", "appearance.slice.center", "appearance.dark")
     sources = frozenset({"reach"})
-
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """The plane and the page's light."""
-        look = state.appearance
-        return look.slice.axis, look.slice.center, look.dark
 
     @staticmethod
     def compute(session: Session, check: StaleCheck) -> Iterator[Picture]:

@@ -118,6 +118,7 @@ class SweepPlot(Plot):
     name = "sweep"
     label = "V against parameter"
     hint = "volume of designs that differ from this one in one parameter, computed while you look"
+    depends_on = ("design", "appearance.plots.parameter")
 
     def __init__(self, gui: GuiApi, folder: Any) -> None:
         """Take the place of a chart."""
@@ -137,11 +138,6 @@ class SweepPlot(Plot):
             ),
             "what changes in the plot of V against a parameter",
         )
-
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """The design and the parameter."""
-        return state.design, state.appearance.plots.parameter
 
     @staticmethod
     def compute(session: Session, check: StaleCheck) -> Iterator[Sweep]:

@@ -14,7 +14,6 @@ from softreach.cloud.volume import volume_curve
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.plots.plot import Chart, Curve, Plot, complete_reach
 from softreach.studio.reach import Reach, shown_rows
-from softreach.studio.state import StudioState
 from softreach.studio.worker import StaleCheck, all_cores
 from softreach.workspace import ReachableSolid
 
@@ -65,16 +64,12 @@ class VolumeCurvePlot(Plot):
     name = "volume_curve"
     label = "V against α"
     hint = "V(α): volume of the α-shape of the cloud against the radius α, beside the exact volume"
+    depends_on = ("appearance.level",)
     sources = frozenset({"reach"})
 
     def __init__(self, gui: GuiApi, folder: Any) -> None:
         """Take the place of a chart."""
         self._chart = Chart(gui, folder, "V / L³", logarithmic=True)
-
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """How many points are shown."""
-        return state.appearance.level
 
     @staticmethod
     def compute(session: Session, check: StaleCheck) -> Iterator[VolumeCurve]:
