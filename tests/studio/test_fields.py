@@ -11,9 +11,10 @@ import pytest
 
 from softreach.arm import designs
 from softreach.arm.parameters import changed
-from softreach.studio.fields import Attribute, Fields, Line, attribute, number_of, vector_of
+from softreach.studio.fields import Attribute, Fields, attribute
 from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import Slice, StudioState
+from softreach.studio.widgets import Line, number_of, vector_of
 from softreach.support.errors import InvalidInput
 
 

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.studio.fields import Fields, PictureFrame
+from softreach.studio.fields import Fields
 from softreach.studio.reach import Reach
+from softreach.studio.widgets import PictureFrame
 from softreach.studio.worker import StaleCheck
 
 if TYPE_CHECKING:

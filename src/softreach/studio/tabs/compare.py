@@ -13,8 +13,9 @@ from softreach.studio.comparison import (
     comparison_csv,
     comparison_html,
 )
-from softreach.studio.fields import Line, bind_button
+from softreach.studio.fields import bind_button
 from softreach.studio.snapshots import Snapshot, numbers_of
+from softreach.studio.widgets import Line
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:

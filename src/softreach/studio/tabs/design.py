@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed
 from softreach.studio.captions import reach_text
-from softreach.studio.fields import Attribute, Fields, Line, SliderField, attribute, bind_button
+from softreach.studio.fields import Attribute, Fields, attribute, bind_button
 from softreach.studio.markup import Part
 from softreach.studio.reach import beside
 from softreach.studio.shown_parameters import ShownParameter, refusal, slider_parameters
 from softreach.studio.state import StudioState
+from softreach.studio.widgets import Line, SliderField
 from softreach.support.errors import InvalidDesign, SoftreachError
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from softreach.studio import markup
-from softreach.studio.fields import Line, attempt, bind_button
+from softreach.studio.fields import attempt, bind_button
 from softreach.studio.files import (
     CLOUD_FORMATS,
     SURFACE_FORMATS,
@@ -18,6 +18,7 @@ from softreach.studio.files import (
 from softreach.studio.link import state_link
 from softreach.studio.page import static_page
 from softreach.studio.picture import picture_file
+from softreach.studio.widgets import Line
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:

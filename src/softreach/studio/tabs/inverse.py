@@ -10,21 +10,14 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.kinematics import tip_positions
-from softreach.studio.fields import (
-    VECTOR,
-    Fields,
-    Line,
-    TypedField,
-    attempt,
-    attribute,
-    bind_button,
-)
+from softreach.studio.fields import Fields, attempt, attribute, bind_button
 from softreach.studio.grip import Grip
 from softreach.studio.picking import picked_point
 from softreach.studio.reach import cloud_points, shown_samples
 from softreach.studio.rod import rod_of
 from softreach.studio.slicing import in_slice
 from softreach.studio.state import StudioState
+from softreach.studio.widgets import VECTOR, Line, TypedField
 
 if TYPE_CHECKING:
     from viser import GuiApi

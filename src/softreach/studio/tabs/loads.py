@@ -12,8 +12,9 @@ from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.weight import GRAVITY
 from softreach.studio.captions import tip_text
-from softreach.studio.fields import Attribute, Fields, Line, attribute
+from softreach.studio.fields import Attribute, Fields, attribute
 from softreach.studio.state import Vector, vector
+from softreach.studio.widgets import Line
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput
 
 if TYPE_CHECKING:

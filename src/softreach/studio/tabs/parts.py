@@ -11,7 +11,7 @@ from softreach.arm import designs, edits
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.materials import material_names
 from softreach.arm.parameters import changed
-from softreach.studio.fields import Attribute, Fields, Line
+from softreach.studio.fields import Attribute, Fields
 from softreach.studio.shown_parameters import (
     Part,
     ShownParameter,
@@ -20,6 +20,7 @@ from softreach.studio.shown_parameters import (
     refusal,
 )
 from softreach.studio.state import StudioState
+from softreach.studio.widgets import Line
 from softreach.support.errors import InvalidDesign, SoftreachError
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from softreach.export.clouds import path_csv
 from softreach.inverse.path import PathStatus
 from softreach.inverse.request import positions_in
 from softreach.studio.drawn_paths import PATH_SHAPES, PLANES, drawn_path, straight_path
-from softreach.studio.fields import Line, attempt, bind_button
+from softreach.studio.fields import attempt, bind_button
 from softreach.studio.jobs.path import PlayPath, WriteMovie, at_point
 from softreach.studio.plots.plot import Chart, Curve
 from softreach.studio.reach import cloud_points
@@ -19,6 +19,7 @@ from softreach.studio.rod import solvable_rod
 from softreach.studio.settings import MOST_POINTS, TipPath
 from softreach.studio.state import StudioState
 from softreach.studio.tabs.inverse import clicked_point
+from softreach.studio.widgets import Line
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import bundle_color
 

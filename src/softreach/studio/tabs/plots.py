@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from softreach.studio.fields import Attribute, Fields, Line
+from softreach.studio.fields import Attribute, Fields
 from softreach.studio.plots import PLOTS
 from softreach.studio.plots.plot import Plot
+from softreach.studio.widgets import Line
 
 if TYPE_CHECKING:
     from viser import GuiApi
