@@ -36,7 +36,7 @@ __all__ = [
 ]
 
 _EXTENT = np.radians(40)
-_TURN = 2.0  # bending of a new actuator at its bound, over the whole arm [rad]
+_TURN = 2.0  # bending of a new actuator at its bound, over its length [rad]
 
 
 def with_actuator(arm: Manipulator, kind: str) -> Manipulator:
@@ -50,8 +50,8 @@ def with_actuator(arm: Manipulator, kind: str) -> Manipulator:
         InvalidDesign: A tendon or a chamber in an arm without Young's modulus.
     """
     name = _new_name(kind, [one.name for one in arm.actuators])
-    made = ACTUATOR_KINDS[kind](arm, name, _widest_gap(arm))
-    return arm.replace(actuators=(*arm.actuators, made))
+    actuator = ACTUATOR_KINDS[kind](arm, name, _widest_gap(arm))
+    return arm.replace(actuators=(*arm.actuators, actuator))
 
 
 def without_actuator(arm: Manipulator, name: str) -> Manipulator:
@@ -144,19 +144,19 @@ def with_ring_material(arm: Manipulator, index: int, material: str) -> Manipulat
     Raises:
         InvalidDesign: Different materials, of which one has no Young's modulus.
     """
-    made = named_material(material)
-    rings = _with(arm, index, lambda ring: ring.replace(material=made))
+    matter = named_material(material)
+    rings = _with(arm, index, lambda ring: ring.replace(material=matter))
     return arm.replace(section=arm.section.replace(rings=rings))
 
 
 def with_core(arm: Manipulator, material: str) -> Manipulator:
     """The arm with a core of a named material; "" for that of the innermost ring."""
-    made = named_material(material) if material else None
-    return arm.replace(section=arm.section.replace(core=made))
+    matter = named_material(material) if material else None
+    return arm.replace(section=arm.section.replace(core=matter))
 
 
 def ring_label(arm: Manipulator, index: int) -> str:
-    """What a ring is called: its index, and its name if it has one."""
+    """Name of a ring in words: its index, and its own name if it has one."""
     name = arm.section.rings[index].name
     return f"ring {index} ({name})" if name else f"ring {index}"
 
@@ -200,7 +200,7 @@ ACTUATOR_KINDS: Mapping[str, Callable[[Manipulator, str, float], Actuator]] = {
 
 
 def _moment(arm: Manipulator) -> float:
-    """The moment that bends the base as if the whole arm were to turn by `_TURN` [N m]."""
+    """The moment that bends the base as if the arm were to turn in all by `_TURN` [N m]."""
     stiffness = float(arm.section.stiffness(arm.profile.radius(0.0)).bending)
     return _TURN * stiffness / arm.length
 

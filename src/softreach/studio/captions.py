@@ -51,7 +51,7 @@ def reach_text(reach: Reach) -> list[Part]:
 
 
 def legend_text(reach: Reach, *, free: bool) -> list[Part]:
-    """What marks stand for, how many samples they are, and what is left out.
+    """Legend of the marks: how many samples have each, and how many are left out.
 
     Args:
         reach: What is shown; of an arm without loads there is nothing to say.
@@ -70,7 +70,7 @@ def legend_text(reach: Reach, *, free: bool) -> list[Part]:
 
 
 def loads_text(session: Session) -> list[Part]:
-    """How much of its reach the loads leave an arm; nothing for an arm without loads."""
+    """Reach under loads beside that without; nothing for an arm without loads."""
     if session.state.design.loads is None:
         return []
     loaded, free = _present_size(session), session.free
@@ -91,7 +91,7 @@ def _present_size(session: Session) -> Size | None:
 
 
 def tip_text(session: Session) -> list[Part]:
-    """Where the tip is, and whether a loaded arm rests there."""
+    """Place of the tip, and whether a loaded arm rests there."""
     parts: list[Part] = []
     if session.tip is not None:
         x, y, z = session.tip

@@ -51,7 +51,7 @@ class Comparison:
     errors: tuple[tuple[Value, ...], ...]
     """The largest errors of the values, where they have one."""
     differ_otherwise: bool
-    """Whether designs differ in something that is no number in the table."""
+    """Whether they differ in more than the numbers of the table."""
 
     def difference(self, row: int, column: int) -> Value:
         """From the first design; None where either is not known."""
@@ -67,11 +67,11 @@ class _Column(NamedTuple):
 
 def compared(candidates: Sequence[Candidate]) -> Comparison:
     """Put designs beside the first of them."""
-    designs = [one.design for one in candidates]
+    designs = [candidate.design for candidate in candidates]
     shown, explained = _shown_parameters(designs)
     columns = [*_reach_columns(candidates), *shown]
     return Comparison(
-        names=tuple(one.name for one in candidates),
+        names=tuple(candidate.name for candidate in candidates),
         titles=tuple(column.title for column in columns),
         values=tuple(zip(*(column.values for column in columns), strict=True)),
         errors=tuple(zip(*(column.errors for column in columns), strict=True)),
@@ -136,7 +136,7 @@ def _written(value: float, error: Value) -> str:
 
 
 def _change(difference: float, first: Value, title: str) -> str:
-    """How far from the first design; of sizes in percent too."""
+    """Difference from the first design; of sizes in percent too."""
     if difference == 0:
         return "="
     size = title.startswith(("volume", "area", "length ")) and first
@@ -146,17 +146,17 @@ def _change(difference: float, first: Value, title: str) -> str:
 
 def _reach_columns(candidates: Sequence[Candidate]) -> list[_Column]:
     """Volume, area or length, whatever each has, and UNR."""
-    known = [one.numbers for one in candidates]
-    kinds = dict.fromkeys((one.size.name, one.size.unit) for one in known if one is not None)
+    numbers = [candidate.numbers for candidate in candidates]
+    kinds = dict.fromkeys((each.size.name, each.size.unit) for each in numbers if each is not None)
     columns = []
     for name, unit in kinds or {("volume", "L³"): None}:
-        sizes = [one.size if one is not None and one.size.name == name else None for one in known]
+        sizes = [each.size if each and each.size.name == name else None for each in numbers]
         title = f"{name} [{unit}]" if unit else name
         values = [None if size is None else size.value for size in sizes]
         columns.append(
             _Column(title, values, [None if size is None else size.error for size in sizes])
         )
-    shares = [None if one is None else _finite(100 * one.unreachability) for one in known]
+    shares = [None if each is None else _finite(100 * each.unreachability) for each in numbers]
     if any(share is not None for share in shares):
         columns.append(_Column("UNR [%]", shares, [None] * len(shares)))
     return columns
@@ -197,19 +197,19 @@ def _explained(designs: Sequence[Manipulator], names: Sequence[str]) -> bool:
     first = designs[0]
     for other in designs[1:]:
         try:
-            known = parameters(other)
-            made = changed(first, {name: known[name].value(other) for name in names})
+            goal = parameters(other)
+            near = changed(first, {name: goal[name].value(other) for name in names})
         except (KeyError, SoftreachError):
             return False
-        if _shape(made) != _shape(other):
+        if _shape(near) != _shape(other):
             return False
-        if _differing([_by_name(named_parameters(arm)) for arm in (made, other)]):
+        if _differing([_by_name(named_parameters(arm)) for arm in (near, other)]):
             return False
     return True
 
 
 def _shape(arm: Manipulator) -> object:
-    """What is no number: kinds and names of the parts."""
+    """Kinds and names of the parts: all that is no number."""
     rings = tuple((ring.name, ring.material) for ring in arm.section.rings)
     parts = tuple((type(one), one.name) for one in arm.actuators)
     return type(arm.profile), rings, parts, arm.loads is None

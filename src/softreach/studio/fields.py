@@ -32,9 +32,9 @@ def attribute(path: str) -> Attribute:
     return Attribute(attrgetter(path), lambda state, value: _with(state, names, value))
 
 
-def _with(whole: Any, names: list[str], value: Any) -> Any:
+def _with(owner: Any, names: list[str], value: Any) -> Any:
     first, *rest = names
-    return replace(whole, **{first: _with(getattr(whole, first), rest, value) if rest else value})
+    return replace(owner, **{first: _with(getattr(owner, first), rest, value) if rest else value})
 
 
 class Fields:
@@ -208,13 +208,13 @@ class _Binding(NamedTuple):
 
     def write(self, state: StudioState) -> StudioState:
         """The state with what the widget holds."""
-        held = self.widget.value
+        value = self.widget.value
         if self.options is not None:
             values = {name: value for value, name in self.options(state).items()}
-            if held not in values:  # of a design before
+            if value not in values:  # of a design before
                 return state
-            held = values[held]
-        return self.at.write(state, held)
+            value = values[value]
+        return self.at.write(state, value)
 
     def follow(self, state: StudioState, *, values: bool) -> None:
         """Offer what the state offers, and show its value."""

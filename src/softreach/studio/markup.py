@@ -64,10 +64,10 @@ class Term(str):
     meaning: str
 
     def __new__(cls, text: str, meaning: str) -> Self:
-        """Text, and what it means."""
-        made = super().__new__(cls, text)
-        made.meaning = meaning
-        return made
+        """Text, and its meaning."""
+        term = super().__new__(cls, text)
+        term.meaning = meaning
+        return term
 
 
 class Swatch(tuple[int, int, int]):
@@ -90,12 +90,12 @@ def paragraph(*parts: Part) -> str:
 
 
 def fields_style() -> str:
-    """How a slider and the field for the same number share a row, as HTML."""
+    """Style by which a slider and the field for the same number share a row, as HTML."""
     return f"<style>{_FIELDS}</style>"
 
 
 def alert(text: str) -> str:
-    """What is wrong, in red, as HTML."""
+    """A warning in red, as HTML."""
     return f'<div role="alert" style="{_ALERT}">{inline(text)}</div>'
 
 

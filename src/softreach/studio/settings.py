@@ -86,5 +86,5 @@ class TipPath:
     @classmethod
     def from_fields(cls, values: Mapping[str, Any]) -> Self:
         """A path from what a saved state holds of it."""
-        made = cls.through(values["points"], values["start"])
-        return cls(points=made.points, start=made.start, at=values["at"])
+        path = cls.through(values["points"], values["start"])
+        return replace(path, at=values["at"])

@@ -122,7 +122,7 @@ def _around(one: Parameter, value: float) -> _Slider:
 
 
 def _is_offered(arm: Manipulator, known: Mapping[str, Parameter], one: Parameter) -> bool:
-    """Whether it changes this arm, and no other slider does the same.
+    """Whether a parameter changes this arm, and no other slider does the same.
 
     Only what is helical has a revolution to change; only what is not, its number of bundles.
     """
@@ -153,7 +153,7 @@ class Part(NamedTuple):
     """One thing that an arm consists of."""
 
     label: str
-    """What the list calls it."""
+    """Name in the list of parts."""
     owners: tuple[str, ...]
     """Owners of its parameters."""
     name: str
@@ -184,7 +184,7 @@ def parts(arm: Manipulator) -> dict[str, Part]:
 
 @lru_cache(maxsize=16)
 def part_parameters(arm: Manipulator, part: Part) -> tuple[ShownParameter, ...]:
-    """What can be typed for a part, in the order of its parameters."""
+    """The parameters of a part in the units in which they are typed."""
     units = {"rad": _DEGREES, "m": ("mm", 1e-3), "Pa": ("kPa", 1e3)}
     known = [one for one in parameters(arm).values() if one.owner in part.owners]
     return tuple(_shown(arm, one, units, one.symbol, f"{one.meaning}: {one.name}") for one in known)
@@ -216,7 +216,7 @@ def _titled(name: str, unit: str) -> str:
 
 
 def refusal(error: InvalidDesign, shown: Iterable[ShownParameter]) -> str:
-    """What is wrong with a design, each number by the label and in the unit of its field.
+    """Faults of a design, each number by the label and in the unit of its field.
 
     Args:
         error: What is wrong.

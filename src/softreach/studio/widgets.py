@@ -109,7 +109,7 @@ class TextKind(NamedTuple):
     """Kind of value that is typed."""
 
     demand: str
-    """What a text has to be."""
+    """Demand on a text, as in "must be a number"."""
     value: Callable[[str], Any]
     """From a text; None if it is no such value."""
     text: Callable[[Any], str]

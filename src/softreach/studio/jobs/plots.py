@@ -19,7 +19,7 @@ def _job_of(plot: type[Plot]) -> type[Job]:
 
         @staticmethod
         def depends_on(state: StudioState) -> object:
-            """Whether it is shown, and what decides it then."""
+            """Its attributes, while it is shown."""
             shown = plot.name in state.appearance.plots.shown
             return shown and attrgetter(*plot.depends_on)(state)
 

@@ -52,7 +52,7 @@ class Plot(ABC):
     depends_on: ClassVar[tuple[str, ...]]
     """Attributes of the state that decide the result, such as "appearance.level"."""
     sources: ClassVar[frozenset[Source]] = frozenset()
-    """What it is computed from besides the state: whoever finds that anew asks for the plot."""
+    """Results of jobs that it is computed from; a job that renews one of them asks for the plot."""
 
     @abstractmethod
     def __init__(self, gui: GuiApi, folder: Any) -> None:
@@ -75,7 +75,7 @@ class Plot(ABC):
 
     @abstractmethod
     def show(self, result: Any) -> str:
-        """Draw a result, and return what it says in words."""
+        """Draw a result, and return its content in words."""
 
 
 @dataclass(eq=False)
@@ -89,7 +89,7 @@ class Figures:
 
 
 def complete_reach(session: Session) -> Reach | None:
-    """What the design of the state can reach, if it is complete; its job says when it is."""
+    """Reach of the design of the state, if it is complete; its job says when it is."""
     reach = session.reach
     complete = reach is not None and reach.fine and reach.arm == session.state.design
     return reach if complete else None
@@ -106,7 +106,7 @@ class Curve(NamedTuple):
     color: str
     dashed: bool = False
     points: bool = False
-    """Whether its points are marked."""
+    """Marks on its points."""
 
 
 class Chart:
@@ -161,9 +161,9 @@ def _axis(label: str) -> Any:
 
 
 def _series(curve: Curve) -> Any:
-    made: dict[str, Any] = {"label": curve.name, "stroke": curve.color, "width": 2}
-    made["points"] = {"show": curve.points, "size": 7, "fill": curve.color}
-    return made | ({"dash": (6.0, 4.0)} if curve.dashed else {})
+    points = {"show": curve.points, "size": 7, "fill": curve.color}
+    line = {"label": curve.name, "stroke": curve.color, "width": 2, "points": points}
+    return line | ({"dash": (6.0, 4.0)} if curve.dashed else {})
 
 
 _WIDTH = 4.3  # [inch], about as wide as a panel
@@ -178,7 +178,7 @@ class Picture(NamedTuple):
     image: NDArray[np.uint8]
     """RGB, shape (rows, columns, 3)."""
     text: str = ""
-    """What it says in words."""
+    """Its content in words."""
 
 
 class PicturePlot(Plot):

@@ -54,7 +54,7 @@ _CELLS, _CELLS_LOADED = 120, 40  # along the longer side: under loads each place
 
 
 def within(curves: Sequence[Array], points: Array, axis: int) -> NDArray[np.bool_]:
-    """Which points in a plane across an axis an odd number of closed curves surround."""
+    """Mask of points in a plane across an axis that an odd number of closed curves surround."""
     from matplotlib.path import Path
 
     flat = np.delete(points, axis, axis=1)

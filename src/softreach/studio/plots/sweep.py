@@ -61,8 +61,8 @@ class Sweep(NamedTuple):
 
 def swept_parameter(state: StudioState) -> ShownParameter | None:
     """The parameter that is chosen, the first for an unknown one; None if there is none."""
-    known = {one.name: one for one in slider_parameters(state.design)}
-    return known.get(state.appearance.plots.parameter) or next(iter(known.values()), None)
+    sliders = {slider.name: slider for slider in slider_parameters(state.design)}
+    return sliders.get(state.appearance.plots.parameter) or next(iter(sliders.values()), None)
 
 
 def sweep(
@@ -104,12 +104,12 @@ def _volume(
 ) -> float | None:
     """In L³; None for no design, or one that takes too much time or memory."""
     try:
-        made = changed(arm, {parameter.name: value * parameter.scale})
-        solvable_rod(made)
-        exact = exact_set(made, quality.coarse_accuracy, quality.tol, check, _SECONDS)
+        design = changed(arm, {parameter.name: value * parameter.scale})
+        solvable_rod(design)
+        exact = exact_set(design, quality.coarse_accuracy, quality.tol, check, _SECONDS)
     except (SoftreachError, OverBudget, MemoryError):
         return None
-    return exact.volume / made.length**3
+    return exact.volume / design.length**3
 
 
 class SweepPlot(Plot):
@@ -142,12 +142,12 @@ class SweepPlot(Plot):
     @staticmethod
     def compute(session: Session, check: StaleCheck) -> Iterator[Sweep]:
         """One value after the other, unless all are known."""
-        state, known = session.state, session.figures.plots.get(SweepPlot.name)
+        state, latest = session.state, session.figures.plots.get(SweepPlot.name)
         parameter = swept_parameter(state)
         if parameter is None:
             return
-        wanted = state.design, parameter
-        if known is None or not known.complete or (known.arm, known.parameter) != wanted:
+        subject = state.design, parameter
+        if latest is None or not latest.complete or (latest.arm, latest.parameter) != subject:
             yield from sweep(state.design, parameter, session.quality, check)
 
     def show(self, result: Sweep) -> str:
@@ -162,4 +162,5 @@ class SweepPlot(Plot):
 
 
 def _offered(state: StudioState) -> dict[str, str]:
-    return {one.name: one.label for one in slider_parameters(state.design)} or {"": ""}
+    sliders = slider_parameters(state.design)
+    return {slider.name: slider.label for slider in sliders} or {"": ""}

@@ -67,20 +67,20 @@ class ComparePanel:
             if self._known == (snapshots, design, numbers):
                 return
             self._known = (snapshots, design, numbers)
-            self._follow_menu(tuple(one.name for one in snapshots))
+            self._follow_menu(tuple(each.name for each in snapshots))
             if not snapshots:
                 self._comparison = None
                 self._table.say(_HINT)
                 return
-            kept = [Candidate(one.name, one.state.design, one.numbers) for one in snapshots]
+            kept = [Candidate(each.name, each.state.design, each.numbers) for each in snapshots]
             self._comparison = compared([*kept, Candidate(_NOW, design, numbers)])
             self._table.show(comparison_html(self._comparison))
 
     def _measure(self, session: Session) -> None:
         """Note the numbers of snapshots whose design has only now been measured."""
-        for one in session.snapshots.all:
-            if one.numbers is None and (numbers := numbers_of(session.reach, one.state)):
-                session.snapshots.measure(one.name, numbers)
+        for each in session.snapshots.all:
+            if each.numbers is None and (numbers := numbers_of(session.reach, each.state)):
+                session.snapshots.measure(each.name, numbers)
 
     def _follow_menu(self, names: tuple[str, ...]) -> None:
         if tuple(self._choice.options) != (names or (_NONE,)):
@@ -93,8 +93,8 @@ class ComparePanel:
         if name == _NOW:
             raise InvalidInput("snapshot name", name, "another, as the table calls this design so")
         numbers = numbers_of(session.reach, state)
-        taken = Snapshot(name=name, state=state, taken=time.time(), numbers=numbers)
-        session.snapshots.add(taken)
+        snapshot = Snapshot(name=name, state=state, taken=time.time(), numbers=numbers)
+        session.snapshots.add(snapshot)
         self._name.value = ""
         session.show()
         self._choice.value = name

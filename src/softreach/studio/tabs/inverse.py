@@ -173,7 +173,7 @@ def _tip(arm: Manipulator, activation: Any) -> Any:
 
 
 def _answer_text(answer: Solution, arm: Manipulator) -> str:
-    """Whether the target is reached, in words."""
+    """Result of a solution in words."""
     place = _place(answer.target / arm.length)
     if not len(answer):
         certain = "out of reach" if answer.status == 1 else "not reached, perhaps out of reach"

@@ -213,7 +213,7 @@ def _in_unit(value: Any, scale: float) -> Any:
 
 
 def _in_words(error: InvalidDesign) -> InvalidDesign:
-    """What an arm lacks that loads need, in one line."""
+    """Moduli and densities that loads need and an arm lacks, in one line."""
     lacking: dict[str, list[str]] = {}
     for fault in error.faults:
         owner, _, field = fault.path.rpartition(".")

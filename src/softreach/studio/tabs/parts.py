@@ -231,7 +231,7 @@ def _typed(part: Part, one: ShownParameter) -> Attribute:
         return 0.0 if math.isnan(shown) else shown
 
     def write(arm: Manipulator, value: float) -> Manipulator:
-        """What the field only shows rounded is left as it is."""
+        """A value that the field only shows rounded is left as it is."""
         return arm if value == read(arm) else changed(arm, {one.name: value * one.scale})
 
     return _of_design(read, write)

@@ -145,10 +145,10 @@ class PathPanel:
     def _extend(self, point: np.ndarray) -> None:
         """On to one more point, straight; what there is of a path begins at the tip."""
         state, path = self._session.state, self._session.state.path
-        known = np.array(path.points) if path is not None else _tip(state)[None]
+        before = np.array(path.points) if path is not None else _tip(state)[None]
         start = state.activation if path is None else path.start
-        more = straight_path([known[-1], point], 24)[1:]
-        self._take(TipPath.through(np.concatenate([known, more]), start))
+        more = straight_path([before[-1], point], 24)[1:]
+        self._take(TipPath.through(np.concatenate([before, more]), start))
 
     def _read(self, file: UploadedFile) -> None:
         if len(file.content) > _FILE_SIZE:
@@ -198,7 +198,7 @@ class PathPanel:
 
 
 def end_text(track: xr.Dataset, length: float) -> str:
-    """How far a path is followed, and why no farther.
+    """End of a path that is followed, and the reason for it, in words.
 
     Args:
         track: Result of `track_path`.
@@ -222,7 +222,7 @@ def end_text(track: xr.Dataset, length: float) -> str:
 
 
 def _tip(state: StudioState) -> np.ndarray:
-    """Where the tip is [m].
+    """Place of the tip [m].
 
     Raises:
         InvalidInput: The arm has no equilibrium.

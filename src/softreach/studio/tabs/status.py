@@ -25,7 +25,7 @@ _ABOUT_CANCEL = "Stops what is being computed; what is complete stays. Every cha
 
 
 class StatusPanel:
-    """Text above all tabs."""
+    """Numbers, key and notes above all tabs."""
 
     def __init__(self, gui: GuiApi, session: Session) -> None:
         """Add the widgets."""
@@ -50,7 +50,7 @@ class StatusPanel:
         self._offer(session)
 
     def _offer(self, session: Session) -> None:
-        """What the button does at this moment; it keeps its place, so that nothing jumps."""
+        """Offer to cancel or to go on; the button keeps its place, so that nothing jumps."""
         busy, lacking = session.busy, is_behind(session) and not session.refusal
         label, disabled = _CANCEL if busy or not lacking else _GO_ON, not (busy or lacking)
         if self._cancel.label != label:
@@ -69,7 +69,7 @@ class StatusPanel:
 
 
 def is_behind(session: Session) -> bool:
-    """Whether what is shown is not yet, or not all, of the design in the fields."""
+    """Whether results of the design in the fields are missing."""
     reach = session.reach
     return reach is None or reach.arm != session.state.design or not reach.fine
 
@@ -86,7 +86,7 @@ def _numbers_text(session: Session) -> list[Part]:
 
 
 def _work(session: Session) -> str:
-    """What is being done; that nothing is, where something is missing."""
+    """Work in progress; that there is none, where something is missing."""
     if session.compiling:
         return "compiling, once on this machine ..."
     if session.doing:
