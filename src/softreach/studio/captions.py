@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from softreach.studio.reach import Reach, Size
     from softreach.studio.session import Session
 
-__all__ = ["UNREACHABILITY", "legend_text", "loads_text", "reach_text", "tip_text"]
-
 UNREACHABILITY = (
     "Unreachability UNR [%]: the share of the convex hull of all tips that no activation reaches, "
     "1 − V / V of the hull"

@@ -20,8 +20,6 @@ from softreach.studio.shown_parameters import (
 from softreach.studio.snapshots import Numbers
 from softreach.support.errors import SoftreachError
 
-__all__ = ["Candidate", "Comparison", "compared", "comparison_csv", "comparison_html"]
-
 _EQUAL = 1e-9  # relative difference that is rounding
 _MINUS = "\N{MINUS SIGN}"
 _MOST = 24

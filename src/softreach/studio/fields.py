@@ -16,8 +16,6 @@ from softreach.support.errors import SoftreachError
 if TYPE_CHECKING:
     from softreach.studio.session import Session
 
-__all__ = ["Attribute", "Fields", "attempt", "attribute", "bind_button"]
-
 
 class Attribute(NamedTuple):
     """A value of the state that a field shows and changes."""

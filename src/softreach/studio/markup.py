@@ -10,20 +10,6 @@ import html
 from collections.abc import Sequence
 from typing import Self
 
-__all__ = [
-    "Part",
-    "Strong",
-    "Swatch",
-    "Term",
-    "alert",
-    "fields_style",
-    "inline",
-    "link",
-    "paragraph",
-    "spread",
-    "table",
-]
-
 _LINE = "font-size:0.85em;line-height:1.45;padding:0 0.8em 0.4em;overflow-wrap:anywhere"
 _SMALL = "font-size:0.8em;padding:0 0.8em 0.5em;overflow-wrap:anywhere"
 _HELP = "cursor:help;text-decoration:underline dotted"

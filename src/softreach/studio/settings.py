@@ -11,8 +11,6 @@ import numpy as np
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput
 
-__all__ = ["MOST_POINTS", "PlotSettings", "TipPath"]
-
 MOST_POINTS = 2000
 """Of a path: each is followed, drawn and kept in the state."""
 

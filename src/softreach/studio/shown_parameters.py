@@ -14,16 +14,6 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import Parameter, parameters
 from softreach.support.errors import Fault, InvalidDesign, Range
 
-__all__ = [
-    "Part",
-    "ShownParameter",
-    "named_parameters",
-    "part_parameters",
-    "parts",
-    "refusal",
-    "slider_parameters",
-]
-
 
 class ShownParameter(NamedTuple):
     """A parameter of a design in the unit that a person reads."""

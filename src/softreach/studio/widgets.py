@@ -20,18 +20,6 @@ from softreach.studio import markup
 if TYPE_CHECKING:
     from viser import GuiApi
 
-__all__ = [
-    "NUMBER",
-    "VECTOR",
-    "Line",
-    "PictureFrame",
-    "SliderField",
-    "TextKind",
-    "TypedField",
-    "number_of",
-    "vector_of",
-]
-
 _PRECISION = 12
 """Digits after the point that viser leaves of what a slider holds."""
 _UNAPPLIED = "Enter applies it."
@@ -41,7 +29,6 @@ class Line:
     """Line of text, shown as it is; without text it takes no room."""
 
     def __init__(self, gui: GuiApi, *parts: markup.Part) -> None:
-        """Add the line where the panel is being built."""
         self._widget = gui.add_html(markup.paragraph(*parts), visible=bool(parts))
 
     def say(self, *parts: markup.Part) -> None:
@@ -68,7 +55,6 @@ class PictureFrame:
     """Place for a picture that changes, empty until there is one."""
 
     def __init__(self, gui: GuiApi, container: Any) -> None:
-        """Take the place in a folder or tab."""
         self._gui, self._container = gui, container
         self._widget: Any = None
         self._shown: NDArray[np.uint8] | None = None
@@ -130,7 +116,6 @@ class TypedField:
     def __init__(
         self, gui: GuiApi, label: str, value: Any, hint: str, kind: TextKind = NUMBER
     ) -> None:
-        """Add the widgets where the panel is being built."""
         self._kind, self._value = kind, value
         self._lock = threading.RLock()
         self._callbacks: list[Callable[[Any], object]] = []
@@ -206,7 +191,6 @@ class SliderField(TypedField):
         value: float,
         hint: str = "",
     ) -> None:
-        """Add the widgets where the panel is being built."""
         self._ends = ends
         self._slider = gui.add_slider(label, *ends, step, self._within(value), hint=hint or None)
         self._slider.precision = _PRECISION

@@ -10,8 +10,6 @@ from softreach.studio.plots.plot import Plot, Source
 from softreach.studio.state import StudioState
 from softreach.studio.worker import StaleCheck
 
-__all__ = ["PLOT_JOBS", "plots_from"]
-
 
 def _job_of(plot: type[Plot]) -> type[Job]:
     class ComputePlot(Job):

@@ -9,8 +9,6 @@ from softreach.studio.plots.section import SectionPlot
 from softreach.studio.plots.sweep import SweepPlot
 from softreach.studio.plots.volumes import VolumeCurvePlot
 
-__all__ = ["PLOTS"]
-
 PLOTS: tuple[type[Plot], ...] = (
     AlongArmPlot,
     SectionPlot,

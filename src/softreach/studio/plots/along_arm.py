@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
-__all__ = ["AlongArm", "AlongArmPlot", "along_arm"]
-
 Array = NDArray[np.float64]
 
 _STATIONS = 121
@@ -67,7 +65,6 @@ class AlongArmPlot(Plot):
     depends_on = ("design", "activation")
 
     def __init__(self, gui: GuiApi, folder: Any) -> None:
-        """Take the place of two charts."""
         self._curvature = Chart(gui, folder, "curvature × L")
         self._strain = Chart(gui, folder, "extension ζ")
 

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
-__all__ = ["HistogramPlot", "histogram_picture", "shares"]
-
 Array = NDArray[np.float64]
 
 _BINS = 40

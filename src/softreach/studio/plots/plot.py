@@ -23,18 +23,6 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
-__all__ = [
-    "Chart",
-    "Curve",
-    "Figures",
-    "Picture",
-    "PicturePlot",
-    "Plot",
-    "blank_figure",
-    "complete_reach",
-    "pixels",
-]
-
 Array = NDArray[np.float64]
 Source = Literal["reach", "answer"]
 
@@ -56,7 +44,7 @@ class Plot(ABC):
 
     @abstractmethod
     def __init__(self, gui: GuiApi, folder: Any) -> None:
-        """Take the place in a folder."""
+        """Take the place of the plot in a folder."""
 
     @classmethod
     def add_settings(cls, fields: Fields) -> None:
@@ -185,7 +173,6 @@ class PicturePlot(Plot):
     """Plot whose results are pictures."""
 
     def __init__(self, gui: GuiApi, folder: Any) -> None:
-        """Take the place in a folder."""
         self._frame = PictureFrame(gui, folder)
 
     def show(self, result: Picture) -> str:

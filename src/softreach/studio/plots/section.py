@@ -36,15 +36,6 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
-__all__ = [
-    "SectionPlot",
-    "enclosed_area",
-    "plane_counts",
-    "section_curves",
-    "section_picture",
-    "within",
-]
-
 
 Array = NDArray[np.float64]
 

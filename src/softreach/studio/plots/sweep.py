@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
-__all__ = ["Sweep", "SweepPlot", "sweep", "swept_parameter"]
-
 Array = NDArray[np.float64]
 
 _VALUES = 9
@@ -121,7 +119,6 @@ class SweepPlot(Plot):
     depends_on = ("design", "appearance.plots.parameter")
 
     def __init__(self, gui: GuiApi, folder: Any) -> None:
-        """Take the place of a chart."""
         self._chart = Chart(gui, folder, "V / L³")
 
     @classmethod

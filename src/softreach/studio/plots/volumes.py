@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
-__all__ = ["VolumeCurve", "VolumeCurvePlot", "volume_curve_of"]
-
 Array = NDArray[np.float64]
 
 _RADII = np.geomspace(0.01, 0.5, 60)  # [L]
@@ -68,7 +66,6 @@ class VolumeCurvePlot(Plot):
     sources = frozenset({"reach"})
 
     def __init__(self, gui: GuiApi, folder: Any) -> None:
-        """Take the place of a chart."""
         self._chart = Chart(gui, folder, "V / L³", logarithmic=True)
 
     @staticmethod

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
-__all__ = ["ActivationPanel"]
-
 _MOST = 40
 """Sliders: a page with hundreds takes minutes to build."""
 
@@ -29,7 +27,6 @@ class ActivationPanel:
     """Activations of the bundles within their bounds, and the place of the tip."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        """Add the widgets."""
         self._ends: list[_SliderEnds] = []
         self._design: Manipulator | None = None
         self._sliders, self._others = Fields(session), Fields(session)

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
-__all__ = ["AtlasPanel"]
-
 _HINT = (
     "Click the map beside the arm to load a design; the ball is the present one. Parameters that "
     "the map does not show are held at the value nearest to the present design's."
@@ -32,7 +30,6 @@ class AtlasPanel:
     """Metric and parameters of the map."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session, board: MapBoard) -> None:
-        """Add the widgets."""
         self._session, self._board, self._atlas = session, board, board.atlas
         self._explained: tuple[Manipulator, str] | None = None
         self._fields = fields = Fields(session, dragged=False)

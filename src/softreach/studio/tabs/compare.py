@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
-__all__ = ["ComparePanel"]
-
 _HINT = "Keep designs as snapshots to see them side by side here."
 _NONE = "none yet"
 _NOW = "now"
@@ -35,7 +33,6 @@ class ComparePanel:
     """Takes, restores and deletes snapshots; the table compares them with the first."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        """Add the widgets."""
         self._session, self._lock = session, threading.RLock()
         self._known: object = None
         self._comparison: Comparison | None = None

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
-__all__ = ["DesignPanel"]
-
 _ABOUT_KEEP = "Keeps what the design reaches now, in gray, to compare others with"
 _ABOUT_BESIDE = "Stands the reference beside the design, pulled as the design is"
 
@@ -31,7 +29,6 @@ class DesignPanel:
     """All sliders of a design together; a change may be valid only together with others."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        """Add the widgets."""
         self._session, self._lock = session, threading.RLock()
         self._rows: list[tuple[ShownParameter, SliderField]] = []
         self._base: Manipulator | None = None

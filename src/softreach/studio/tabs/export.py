@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from softreach.studio.reach import Reach
     from softreach.studio.session import Session
 
-__all__ = ["ExportPanel"]
-
 
 _ABOUT_LINK = (
     "; copy the link to keep it. It holds the state itself, and opens while a studio serves at "
@@ -54,7 +52,6 @@ class ExportPanel:
     """Buttons that send a file to the browser, and one that takes a file back."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session, url: str) -> None:
-        """Add the widgets."""
         self._session, self._url = session, url
         with tab:
             self._button("Save state", self._save_state)

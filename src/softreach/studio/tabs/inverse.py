@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from softreach.inverse import Solution
     from softreach.studio.session import Session
 
-__all__ = ["DragPanel", "InversePanel", "clicked_point"]
-
 _DRAG_HINT = "Drag the ball on the tip: the arm follows on its branch of solutions."
 _HINT = "Drag the tip, type a target, or let a click on the cloud set it."
 _ABOUT_CLICKS = "off: a click in the scene changes nothing"
@@ -38,7 +36,6 @@ class DragPanel:
     """The ball on the tip, and the choice to show it."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        """Add the widgets."""
         self._grip = Grip(session.client.scene, session.pull_tip)
         self._fields = Fields(session)
         with tab:
@@ -67,7 +64,6 @@ class InversePanel:
     """The target, and the activations that reach it."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        """Add the widgets."""
         self._gui, self._session, self._fields = gui, session, Fields(session)
         self._answer: Solution | None = None
         self._buttons: list[tuple[Any, Any]] = []

@@ -22,16 +22,6 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
-__all__ = [
-    "GRAVITIES",
-    "LoadsPanel",
-    "TypedLoads",
-    "gravity_name",
-    "other_loads",
-    "typed_loads",
-    "with_loads",
-]
-
 GRAVITIES: Mapping[str, Vector] = {
     "none": (0.0, 0.0, 0.0),
     "base upright": (0.0, 0.0, -GRAVITY),
@@ -103,7 +93,6 @@ class LoadsPanel:
     """Fields of the loads; a refused value stays in its field beside the reason."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        """Add the widgets."""
         self._design: Manipulator | None = None
         self._fields = fields = Fields(session, dragged=False)
         gravity = _typed("gravity")

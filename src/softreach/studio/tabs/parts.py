@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
-__all__ = ["PartsPanel"]
-
 Change = Callable[[Manipulator], Manipulator]
 
 _AS_TYPED, _AS_INNERMOST = "(as typed)", "as the innermost ring"
@@ -41,7 +39,6 @@ class PartsPanel:
     """A list of parts, and the fields of the one that is chosen."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        """Add the widgets."""
         self._gui, self._session, self._lock = gui, session, threading.RLock()
         self._design: Manipulator | None = None
         self._made_for: object = None

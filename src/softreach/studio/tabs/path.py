@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
-__all__ = ["PathPanel", "end_text"]
-
 _HINT = "The tip follows a path as far as its branch of solutions goes."
 _MOST_CURVES = 8  # in the timeline: more are not told apart
 _FILE_SIZE = 1 << 20  # bytes of a path that is loaded
@@ -40,7 +38,6 @@ class PathPanel:
     """The path of a tab."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        """Add the widgets."""
         self._session, self._gui = session, gui
         self._shown: xr.Dataset | None = None
         self._revision = -1

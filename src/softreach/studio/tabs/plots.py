@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
-__all__ = ["PlotsPanel"]
-
 _HINT = (
     "Plots stand in a window of their own beside the scene (on a phone in Figures, at the end of "
     "this sheet) and follow the arm, the design and the slice. What is not checked is not computed."
@@ -51,7 +49,6 @@ class PlotsPanel:
     """Check boxes in the tab; a folder for each plot in the window."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        """Add the widgets."""
         self._fields = Fields(session, dragged=False)
         with tab:
             Line(gui, _HINT)

@@ -28,7 +28,6 @@ class StatusPanel:
     """Numbers, key and notes above all tabs."""
 
     def __init__(self, gui: GuiApi, session: Session) -> None:
-        """Add the widgets."""
         Line(gui).show(fields_style())
         self._numbers = Line(gui, "computing ...")
         self._comparison = Line(gui)

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from softreach.studio.session import Session
 
-__all__ = ["ViewPanel"]
-
 _COUNTS = {level: f"{1 << level:,}" for level in LEVELS}
 _ACROSS = {axis: axis for axis in ("none", "x", "y", "z")}
 _TOGGLES = {
@@ -37,7 +35,6 @@ class ViewPanel:
     """Fields of the appearance."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        """Add the widgets."""
         self._fields = fields = Fields(session)
         with tab:
             fields.dropdown(
