@@ -21,8 +21,8 @@ from tests.studio.test_handle_in_browser import pose
 from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.studio import Studio
+from softreach.studio.settings import PlotSettings
 from softreach.studio.source import start_on_design
-from softreach.studio.wishes import PlotView
 
 PICTURES = Path(__file__).parent.parent / "docs" / "images"
 LAPTOP, PHONE = (1366, 768), (390, 844)
@@ -55,7 +55,12 @@ def studio_plots(tab: Tab) -> None:
     """The section and the curves along the arm."""
     pose(tab, CURLED)
     tab.open("Plots")
-    views = PlotView(along_arm=True, section=True)
+    views = PlotSettings(
+        shown=(
+            "along_arm",
+            "section",
+        )
+    )
     tab.session.update(lambda state: state.showing(plots=views))
     tab.settle()
     tab.page.get_by_text("one closed curve").wait_for()

@@ -11,8 +11,8 @@ from softreach.arm import designs
 from softreach.studio.drawn_paths import PATH_SHAPES, PLANES, drawn_path, straight_path
 from softreach.studio.movie import frames_along
 from softreach.studio.plots.histogram import shares
+from softreach.studio.settings import MOST_POINTS, PlotSettings, TipPath
 from softreach.studio.state import StudioState
-from softreach.studio.wishes import MOST_POINTS, PlotView, TipPath
 from softreach.support.errors import InvalidInput
 
 TIP = np.array([0.2, -0.1, 0.5])
@@ -50,7 +50,7 @@ def test_a_straight_path_goes_through_its_corners_in_even_steps():
 def test_a_state_keeps_its_path_and_its_plots():
     path = TipPath.through([[0, 0, 1.0], [0.1, 0, 0.9]], (-0.5, 0.0, 0.0))
     state = StudioState(design=designs.minimal_trunk(), path=path).showing(
-        plots=PlotView(section=True, parameter="taper")
+        plots=PlotSettings(shown=("section",), parameter="taper")
     )
     assert StudioState.from_json(state.to_json()) == state
 
@@ -60,6 +60,14 @@ def test_a_state_of_before_there_were_plots_and_paths_opens():
     values = json.loads(state.to_json())
     del values["path"], values["appearance"]["plots"]
     assert StudioState.from_json(json.dumps(values)) == state
+
+
+def test_a_state_with_a_switch_for_each_plot_opens():
+    state = StudioState(design=designs.minimal_trunk())
+    values = json.loads(state.to_json())
+    values["appearance"]["plots"] = {"sweep": True, "section": False, "parameter": "taper"}
+    plots = StudioState.from_json(json.dumps(values)).appearance.plots
+    assert plots == PlotSettings(shown=("sweep",), parameter="taper")
 
 
 @pytest.mark.parametrize(
@@ -77,10 +85,10 @@ def test_a_path_that_cannot_be_followed_is_refused(points):
         TipPath.through(points)
 
 
-@pytest.mark.parametrize("changes", [{"section": 1}, {"parameter": None}])
-def test_a_wish_from_elsewhere_of_another_kind_is_refused(changes):
+@pytest.mark.parametrize("changes", [{"shown": (1,)}, {"parameter": None}])
+def test_plot_settings_of_another_kind_are_refused(changes):
     with pytest.raises(InvalidInput, match="plots"):
-        PlotView(**changes)
+        PlotSettings(**changes)
 
 
 @pytest.mark.parametrize("count", [1, 2, 59, 60, 1000])

@@ -8,7 +8,7 @@ import pytest
 import softreach as sr
 from softreach.cli.app import run
 from softreach.studio.jobs.path import WriteMovie
-from softreach.studio.panels.path import PathPanel
+from softreach.studio.tabs.path import PathPanel
 
 ACTIVATION = (-1.0, -0.2, -0.5)
 

@@ -8,14 +8,14 @@ import pytest
 import softreach as sr
 from softreach.arm.parameters import changed
 from softreach.cloud.volume import volume_curve
+from softreach.studio.settings import PlotSettings
 from softreach.studio.state import Slice
-from softreach.studio.wishes import PlotView
 
 
 @pytest.fixture(autouse=True)
 def _nothing_beside_the_scene(tab):
     yield
-    tab.session.update(lambda s: s.showing(plots=PlotView(), slice=Slice()))
+    tab.session.update(lambda s: s.showing(plots=PlotSettings(), slice=Slice()))
     tab.settle()
 
 
@@ -29,7 +29,7 @@ def test_curvature_along_the_arm_follows_a_slider(tab):
     before = ink(tab)
     tab.drag("γ left", -60)
     tab.settle()
-    state, found = tab.session.state, tab.session.figures.along_arm
+    state, found = tab.session.state, tab.session.figures.plots["along_arm"]
     shape = sr.configuration(state.design, state.activation, len(found.station))
     bending = np.linalg.norm(shape.curvature.values[:, :2], axis=1) * state.design.length
     np.testing.assert_allclose(found.bending, bending, atol=1e-9)
@@ -43,7 +43,7 @@ def test_the_volume_against_alpha_is_that_of_the_cloud(tab):
     tab.page.get_by_label("V against α").check()
     tab.page.get_by_text("V(0.05 L)").wait_for()
     tab.settle()
-    found, reach = tab.session.figures.volume_curve, tab.session.reach
+    found, reach = tab.session.figures.plots["volume_curve"], tab.session.reach
     tips = reach.cloud.tip[: found.samples]
     np.testing.assert_allclose(found.volume[::20], volume_curve(tips, found.radius[::20]))
     assert found.exact == reach.volume
@@ -53,13 +53,13 @@ def test_the_volume_against_alpha_is_that_of_the_cloud(tab):
 def test_the_volume_against_a_parameter_is_computed_while_one_looks(tab):
     tab.open("Plots")
     tab.page.get_by_label("V against parameter").check()
-    tab.wait(lambda: tab.session.state.appearance.plots.sweep, "it is wanted")
+    tab.wait(lambda: "sweep" in tab.session.state.appearance.plots.shown, "it is wanted")
     tab.settle()
     tab.choose("parameter", "taper φ [deg]")
     tab.wait(lambda: tab.session.state.appearance.plots.parameter == "taper", "it is chosen")
     tab.page.get_by_text("here V =").wait_for()
     tab.settle()
-    found, design = tab.session.figures.sweep, tab.session.state.design
+    found, design = tab.session.figures.plots["sweep"], tab.session.state.design
     assert found.complete
     assert (np.diff(found.value) > 0).all()
     assert found.refused  # the steepest tapers leave no tip
@@ -69,12 +69,13 @@ def test_the_volume_against_a_parameter_is_computed_while_one_looks(tab):
 
 
 def test_a_sweep_in_progress_is_dropped_for_that_of_another_design(tab):
-    tab.session.update(lambda s: s.showing(plots=PlotView(sweep=True, parameter="revolution")))
-    tab.wait(lambda: tab.session.figures.sweep is not None, "the sweep begins")
+    settings = PlotSettings(shown=("sweep",), parameter="revolution")
+    tab.session.update(lambda s: s.showing(plots=settings))
+    tab.wait(lambda: "sweep" in tab.session.figures.plots, "the sweep begins")
     tab.session.update(lambda s: s.replace(design=changed(s.design, {"taper": 0.02})))
     tab.settle()
-    assert tab.session.figures.sweep.arm == tab.session.state.design
-    assert tab.session.figures.sweep.complete
+    assert tab.session.figures.plots["sweep"].arm == tab.session.state.design
+    assert tab.session.figures.plots["sweep"].complete
 
 
 def test_histograms_are_those_of_the_samples_that_the_slice_leaves(tab):
@@ -92,13 +93,13 @@ def test_histograms_are_those_of_the_samples_that_the_slice_leaves(tab):
 
 
 def test_names_in_a_chart_are_text(tab):
-    from softreach.studio.plots.chart import Chart, Curve
+    from softreach.studio.plots.plot import Chart, Curve
 
     gui = tab.session.client.gui
     folder = gui.add_folder("names")
-    chart = Chart(gui, folder, "x", "y")
+    chart = Chart(gui, folder, "y")
     name = "<img src=x onerror=alert(1)>"
-    chart.show(np.array([0.0, 1.0]), (Curve(name, "red"),), (np.array([0.0, 1.0]),))
+    chart.show("x", np.array([0.0, 1.0]), (Curve(name, "red"),), (np.array([0.0, 1.0]),))
     tab.page.get_by_text(name).wait_for()
     assert tab.page.locator("img[src=x]").count() == 0
     folder.remove()

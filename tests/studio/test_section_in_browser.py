@@ -7,11 +7,10 @@ import numpy as np
 from softreach.arm import designs
 from softreach.geometry.surface import plane_cut
 from softreach.inverse import solve_inverse
-from softreach.studio.plots.plane_counts import plane_counts, within
-from softreach.studio.plots.section import enclosed_area, section_curves
+from softreach.studio.plots.section import enclosed_area, plane_counts, section_curves, within
+from softreach.studio.settings import PlotSettings
 from softreach.studio.stages import stages
 from softreach.studio.state import Slice
-from softreach.studio.wishes import PlotView
 from tests.studio.conftest import SMALL
 
 
@@ -31,7 +30,7 @@ def test_the_section_is_that_of_the_exact_set(tab):
 
 
 def test_the_section_follows_the_slice_and_the_design(tab):
-    tab.session.update(lambda s: s.showing(plots=PlotView(section=True)))
+    tab.session.update(lambda s: s.showing(plots=PlotSettings(shown=("section",))))
     tab.settle()
     before = tab.page.locator("img").first.get_attribute("src")
     cut = Slice(axis="z", center=0.5, thickness=0.1)
@@ -43,19 +42,19 @@ def test_the_section_follows_the_slice_and_the_design(tab):
     tab.open("Design")
     tab.drag("revolution Ω [deg]", 40)
     tab.settle()
-    assert tab.session.figures.section.arm == tab.session.state.design
+    assert tab.session.figures.plots["section"].arm == tab.session.state.design
     changed = enclosed_area(section_curves(tab.session.reach, cut), 2)
     assert changed != area
     tab.page.get_by_text(f"{changed:.4f} L²").wait_for()
 
 
 def test_the_section_is_drawn_for_a_dark_page_too(tab):
-    tab.session.update(lambda s: s.showing(slice=Slice(), plots=PlotView(section=True)))
+    tab.session.update(lambda s: s.showing(slice=Slice(), plots=PlotSettings(shown=("section",))))
     tab.settle()
-    light = tab.session.figures.section.image
+    light = tab.session.figures.plots["section"].image
     tab.session.update(lambda s: s.showing(dark=True))
     tab.settle()
-    dark = tab.session.figures.section.image
+    dark = tab.session.figures.plots["section"].image
     assert np.median(light) > 200
     assert (light.min(axis=-1) < 60).any()
     assert dark[0].max() < 60
@@ -63,15 +62,15 @@ def test_the_section_is_drawn_for_a_dark_page_too(tab):
     shown = tab.page.locator("img:visible").first
     wide = dark.shape[1]
     tab.wait(lambda: shown.evaluate("image => image.naturalWidth") == wide, "it is shown")
-    tab.session.update(lambda s: s.showing(dark=False, plots=PlotView()))
+    tab.session.update(lambda s: s.showing(dark=False, plots=PlotSettings()))
     tab.settle()
 
 
 def test_beside_the_set_nothing_is_reached(tab):
     cut = Slice(axis="x", center=1.4, thickness=0.1)
-    tab.session.update(lambda s: s.showing(slice=cut, plots=PlotView(section=True)))
+    tab.session.update(lambda s: s.showing(slice=cut, plots=PlotSettings(shown=("section",))))
     tab.page.get_by_text("Nothing is reached at x = 1.4 L.").wait_for()
-    tab.session.update(lambda s: s.showing(slice=Slice(), plots=PlotView()))
+    tab.session.update(lambda s: s.showing(slice=Slice(), plots=PlotSettings()))
     tab.settle()
 
 

@@ -127,7 +127,7 @@ def test_text_becomes_markup_in_one_file_only():
     room = Path(softreach.studio.__file__).parent
     sources = {p.name: p.read_text(encoding="utf-8") for p in room.rglob("*.py")}
     assert {name for name, text in sources.items() if "import html" in text} == {"markup.py"}
-    assert {name for name, text in sources.items() if "add_html(" in text} == {"line.py"}
+    assert {name for name, text in sources.items() if "add_html(" in text} == {"widgets.py"}
     assert not {name for name, text in sources.items() if "add_markdown(" in text}
 
 

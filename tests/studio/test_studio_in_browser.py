@@ -13,9 +13,9 @@ from softreach.arm.parameters import changed, find_parameter
 from softreach.arm.summary import describe
 from softreach.atlas import DesignSpace, build_atlas
 from softreach.studio import Studio, StudioState
-from softreach.studio.panels.inverse import InversePanel
 from softreach.studio.source import start_on_store
 from softreach.studio.state import Slice
+from softreach.studio.tabs.inverse import InversePanel
 from tests.studio.conftest import SMALL
 from tests.studio.tab import PATIENCE, Tab
 

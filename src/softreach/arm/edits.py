@@ -26,6 +26,7 @@ __all__ = [
     "ring_label",
     "with_actuator",
     "with_actuator_name",
+    "with_actuator_ring",
     "with_core",
     "with_ring",
     "with_ring_material",
@@ -73,6 +74,15 @@ def with_actuator_name(arm: Manipulator, old: str, new: str) -> Manipulator:
     """
     return arm.replace(
         actuators=tuple(one.replace(name=new) if one.name == old else one for one in arm.actuators)
+    )
+
+
+def with_actuator_ring(arm: Manipulator, name: str, ring: int) -> Manipulator:
+    """The arm with one of its actuators in another ring, counted from 0."""
+    return arm.replace(
+        actuators=tuple(
+            one.replace(ring=ring) if one.name == name else one for one in arm.actuators
+        )
     )
 
 
@@ -134,15 +144,15 @@ def with_ring_material(arm: Manipulator, index: int, material: str) -> Manipulat
     Raises:
         InvalidDesign: Different materials, of which one has no Young's modulus.
     """
-    made = named_material(material)
-    rings = _with(arm, index, lambda ring: ring.replace(material=made))
+    matter = named_material(material)
+    rings = _with(arm, index, lambda ring: ring.replace(material=matter))
     return arm.replace(section=arm.section.replace(rings=rings))
 
 
 def with_core(arm: Manipulator, material: str) -> Manipulator:
     """The arm with a core of a named material; "" for that of the innermost ring."""
-    made = named_material(material) if material else None
-    return arm.replace(section=arm.section.replace(core=made))
+    matter = named_material(material) if material else None
+    return arm.replace(section=arm.section.replace(core=matter))
 
 
 def ring_label(arm: Manipulator, index: int) -> str:

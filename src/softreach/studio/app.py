@@ -14,10 +14,10 @@ from softreach.studio.axes import round_box
 from softreach.studio.compiling import CompilationWatch
 from softreach.studio.connections import asked_path, close_all
 from softreach.studio.eye import framing
+from softreach.studio.fields import attempt
 from softreach.studio.history import History
 from softreach.studio.kept_work import KeptWork
 from softreach.studio.link import state_in_request
-from softreach.studio.panels.binding import attempt
 from softreach.studio.server import page_url, start_server, stop_server
 from softreach.studio.session import Session
 from softreach.studio.snapshots import Snapshots
@@ -197,30 +197,29 @@ def _look_at_all(session: Session) -> None:
 
 def _furnish(session: Session, url: str) -> None:
     """Add the panels, and let clicks in the scene reach those that wait for them."""
-    from softreach.studio.panels.activation import ActivationPanel
-    from softreach.studio.panels.atlas import AtlasPanel
-    from softreach.studio.panels.compare import ComparePanel
-    from softreach.studio.panels.design import DesignPanel
-    from softreach.studio.panels.export import ExportPanel
-    from softreach.studio.panels.handle import HandlePanel
-    from softreach.studio.panels.history import HistoryPanel
-    from softreach.studio.panels.inverse import InversePanel
-    from softreach.studio.panels.loads import LoadsPanel
-    from softreach.studio.panels.parts import PartsPanel
-    from softreach.studio.panels.path import PathPanel
-    from softreach.studio.panels.plots import PlotsPanel
-    from softreach.studio.panels.status import StatusPanel
-    from softreach.studio.panels.view import ViewPanel
+    from softreach.studio.tabs.activation import ActivationPanel
+    from softreach.studio.tabs.atlas import AtlasPanel
+    from softreach.studio.tabs.compare import ComparePanel
+    from softreach.studio.tabs.design import DesignPanel
+    from softreach.studio.tabs.export import ExportPanel
+    from softreach.studio.tabs.inverse import DragPanel, InversePanel
+    from softreach.studio.tabs.loads import LoadsPanel
+    from softreach.studio.tabs.parts import PartsPanel
+    from softreach.studio.tabs.path import PathPanel
+    from softreach.studio.tabs.plots import PlotsPanel
+    from softreach.studio.tabs.status import StatusPanel, add_history
+    from softreach.studio.tabs.view import ViewPanel
 
     gui = session.client.gui
-    made: list[Any] = [StatusPanel(gui, session), HistoryPanel(gui, session)]
+    made: list[Any] = [StatusPanel(gui, session)]
+    add_history(gui, session)
     tabs = gui.add_tab_group()
     kinds = {
         "Design": (DesignPanel,),
         "Parts": (PartsPanel,),
         "Loads": (LoadsPanel,),
         "Activation": (ActivationPanel,),
-        "Inverse": (HandlePanel, InversePanel),
+        "Inverse": (DragPanel, InversePanel),
         "Path": (PathPanel,),
         "View": (ViewPanel,),
         "Plots": (PlotsPanel,),
@@ -229,7 +228,7 @@ def _furnish(session: Session, url: str) -> None:
     for name, together in kinds.items():
         tab = tabs.add_tab(name)
         made += [kind(gui, tab, session) for kind in together]
-    made.append(ExportPanel(gui, tabs.add_tab("Export"), session, url))
+    ExportPanel(gui, tabs.add_tab("Export"), session, url)
     if session.board is not None:
         made.append(AtlasPanel(gui, tabs.add_tab("Atlas"), session, session.board))
     session.panels = made

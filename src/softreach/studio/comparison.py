@@ -5,20 +5,21 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed, parameters
-from softreach.studio.controls import controls
 from softreach.studio.markup import Part, Strong, paragraph, table
+from softreach.studio.shown_parameters import (
+    ShownParameter,
+    named_parameters,
+    slider_parameters,
+)
 from softreach.studio.snapshots import Numbers
 from softreach.support.errors import SoftreachError
 
-__all__ = ["Candidate", "Comparison", "compared", "comparison_csv", "comparison_html"]
-
-_DEGREE = math.degrees(1)
 _EQUAL = 1e-9  # relative difference that is rounding
 _MINUS = "\N{MINUS SIGN}"
 _MOST = 24
@@ -48,7 +49,7 @@ class Comparison:
     errors: tuple[tuple[Value, ...], ...]
     """The largest errors of the values, where they have one."""
     differ_otherwise: bool
-    """Whether designs differ in something that is no number in the table."""
+    """Whether they differ in more than the numbers of the table."""
 
     def difference(self, row: int, column: int) -> Value:
         """From the first design; None where either is not known."""
@@ -64,11 +65,11 @@ class _Column(NamedTuple):
 
 def compared(candidates: Sequence[Candidate]) -> Comparison:
     """Put designs beside the first of them."""
-    designs = [one.design for one in candidates]
+    designs = [candidate.design for candidate in candidates]
     shown, explained = _shown_parameters(designs)
     columns = [*_reach_columns(candidates), *shown]
     return Comparison(
-        names=tuple(one.name for one in candidates),
+        names=tuple(candidate.name for candidate in candidates),
         titles=tuple(column.title for column in columns),
         values=tuple(zip(*(column.values for column in columns), strict=True)),
         errors=tuple(zip(*(column.errors for column in columns), strict=True)),
@@ -133,7 +134,7 @@ def _written(value: float, error: Value) -> str:
 
 
 def _change(difference: float, first: Value, title: str) -> str:
-    """How far from the first design; of sizes in percent too."""
+    """Difference from the first design; of sizes in percent too."""
     if difference == 0:
         return "="
     size = title.startswith(("volume", "area", "length ")) and first
@@ -143,18 +144,20 @@ def _change(difference: float, first: Value, title: str) -> str:
 
 def _reach_columns(candidates: Sequence[Candidate]) -> list[_Column]:
     """Volume, area or length, whatever each has, and UNR."""
-    known = [one.numbers for one in candidates]
-    kinds = dict.fromkeys((one.size.name, one.size.unit) for one in known if one is not None)
-    found = []
+    numbers = [candidate.numbers for candidate in candidates]
+    kinds = dict.fromkeys((each.size.name, each.size.unit) for each in numbers if each is not None)
+    columns = []
     for name, unit in kinds or {("volume", "L³"): None}:
-        of = [one.size if one is not None and one.size.name == name else None for one in known]
+        sizes = [each.size if each and each.size.name == name else None for each in numbers]
         title = f"{name} [{unit}]" if unit else name
-        values = [None if size is None else size.value for size in of]
-        found.append(_Column(title, values, [None if size is None else size.error for size in of]))
-    shares = [None if one is None else _finite(100 * one.unreachability) for one in known]
+        values = [None if size is None else size.value for size in sizes]
+        columns.append(
+            _Column(title, values, [None if size is None else size.error for size in sizes])
+        )
+    shares = [None if each is None else _finite(100 * each.unreachability) for each in numbers]
     if any(share is not None for share in shares):
-        found.append(_Column("UNR [%]", shares, [None] * len(shares)))
-    return found
+        columns.append(_Column("UNR [%]", shares, [None] * len(shares)))
+    return columns
 
 
 def _shown_parameters(designs: Sequence[Manipulator]) -> tuple[list[_Column], bool]:
@@ -163,41 +166,28 @@ def _shown_parameters(designs: Sequence[Manipulator]) -> tuple[list[_Column], bo
     Returns:
         Columns, and whether equal columns mean equal designs.
     """
-    sliders = [_of_sliders(design) for design in designs]
-    shown = _differing(sliders)
-    if _explained(designs, [title for title, _ in shown]):
+    shown = _differing([_by_name(slider_parameters(design)) for design in designs])
+    if _explained(designs, [name for name, _ in shown]):
         return [column for _, column in shown], True
-    every = [_of_parameters(design) for design in designs]
-    known = {title for title, _ in shown}
-    others = [(name, column) for name, column in _differing(every) if name not in known]
+    known = {name for name, _ in shown}
+    every = _differing([_by_name(named_parameters(design)) for design in designs])
+    others = [(name, column) for name, column in every if name not in known]
     return [column for _, column in [*shown, *others][:_MOST]], False
 
 
-def _of_sliders(design: Manipulator) -> dict[str, tuple[str, float]]:
-    return {one.name: (one.label, one.value / one.scale) for one in controls(design)}
+def _by_name(shown: Iterable[ShownParameter]) -> dict[str, ShownParameter]:
+    return {one.name: one for one in shown}
 
 
-def _of_parameters(design: Manipulator) -> dict[str, tuple[str, float]]:
-    return {
-        name: _titled(name, one.unit, one.value(design)) for name, one in parameters(design).items()
-    }
-
-
-def _titled(name: str, unit: str, value: float) -> tuple[str, float]:
-    if unit == "rad":
-        return f"{name} [deg]", value * _DEGREE
-    return (name if unit == "1" else f"{name} [{unit}]"), value
-
-
-def _differing(designs: Sequence[dict[str, tuple[str, float]]]) -> list[tuple[str, _Column]]:
+def _differing(designs: Sequence[dict[str, ShownParameter]]) -> list[tuple[str, _Column]]:
     """Name and column of what is not the same in all."""
-    found = []
+    columns = []
     for name in dict.fromkeys(name for design in designs for name in design):
-        title = next(design[name][0] for design in designs if name in design)
-        values = [_finite(design[name][1]) if name in design else None for design in designs]
+        title = next(design[name].label for design in designs if name in design)
+        values = [_finite(design[name].shown) if name in design else None for design in designs]
         if not all(_same(values[0], value) for value in values):
-            found.append((name, _Column(title, values, [None] * len(values))))
-    return found
+            columns.append((name, _Column(title, values, [None] * len(values))))
+    return columns
 
 
 def _explained(designs: Sequence[Manipulator], names: Sequence[str]) -> bool:
@@ -205,19 +195,19 @@ def _explained(designs: Sequence[Manipulator], names: Sequence[str]) -> bool:
     first = designs[0]
     for other in designs[1:]:
         try:
-            known = parameters(other)
-            made = changed(first, {name: known[name].value(other) for name in names})
+            goal = parameters(other)
+            near = changed(first, {name: goal[name].value(other) for name in names})
         except (KeyError, SoftreachError):
             return False
-        if _shape(made) != _shape(other):
+        if _shape(near) != _shape(other):
             return False
-        if _differing([_of_parameters(made), _of_parameters(other)]):
+        if _differing([_by_name(named_parameters(arm)) for arm in (near, other)]):
             return False
     return True
 
 
 def _shape(arm: Manipulator) -> object:
-    """What is no number: kinds and names of the parts."""
+    """Kinds and names of the parts: all that is no number."""
     rings = tuple((ring.name, ring.material) for ring in arm.section.rings)
     parts = tuple((type(one), one.name) for one in arm.actuators)
     return type(arm.profile), rings, parts, arm.loads is None

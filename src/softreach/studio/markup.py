@@ -10,20 +10,6 @@ import html
 from collections.abc import Sequence
 from typing import Self
 
-__all__ = [
-    "Part",
-    "Strong",
-    "Swatch",
-    "Term",
-    "alert",
-    "fields_style",
-    "inline",
-    "link",
-    "paragraph",
-    "spread",
-    "table",
-]
-
 _LINE = "font-size:0.85em;line-height:1.45;padding:0 0.8em 0.4em;overflow-wrap:anywhere"
 _SMALL = "font-size:0.8em;padding:0 0.8em 0.5em;overflow-wrap:anywhere"
 _HELP = "cursor:help;text-decoration:underline dotted"
@@ -64,10 +50,10 @@ class Term(str):
     meaning: str
 
     def __new__(cls, text: str, meaning: str) -> Self:
-        """Text, and what it means."""
-        made = super().__new__(cls, text)
-        made.meaning = meaning
-        return made
+        """Text, and its meaning."""
+        term = super().__new__(cls, text)
+        term.meaning = meaning
+        return term
 
 
 class Swatch(tuple[int, int, int]):
@@ -90,12 +76,12 @@ def paragraph(*parts: Part) -> str:
 
 
 def fields_style() -> str:
-    """How a slider and the field for the same number share a row, as HTML."""
+    """Style by which a slider and the field for the same number share a row, as HTML."""
     return f"<style>{_FIELDS}</style>"
 
 
 def alert(text: str) -> str:
-    """What is wrong, in red, as HTML."""
+    """A warning in red, as HTML."""
     return f'<div role="alert" style="{_ALERT}">{inline(text)}</div>'
 
 

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.studio import markup
+from softreach.studio.captions import legend_text, reach_text
 from softreach.studio.colors import key_html
 from softreach.studio.eye import lens
 from softreach.studio.head import headed
-from softreach.studio.panels.status import legend_text, reach_text
 from softreach.studio.reach import Reach
 from softreach.studio.scene import Scene
 from softreach.studio.server import start_server, stop_server

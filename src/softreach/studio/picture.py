@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.studio.controls import controls
-from softreach.studio.panels.status import legend_text, reach_text
+from softreach.studio.captions import legend_text, reach_text
 from softreach.studio.reach import Reach
+from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import StudioState
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def picture_file(
 
 def design_text(state: StudioState) -> str:
     """The parameters of a design, as its sliders name them, and how hard each bundle pulls."""
-    values = ", ".join(f"{c.label} {c.shown:g}" for c in controls(state.design))
+    values = ", ".join(f"{c.label} {c.shown:g}" for c in slider_parameters(state.design))
     pulls = ", ".join(f"{value:.3g}" for value in state.activation)
     return f"{values}; L = {state.design.length:g} m. Activation ({pulls})."
 

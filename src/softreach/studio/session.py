@@ -17,7 +17,7 @@ from softreach.studio.jobs import JOBS, FollowEye, Job, PullTip, SolveInverse, w
 from softreach.studio.jobs.pull import PullOrder, TipPull
 from softreach.studio.kept_work import KeptWork
 from softreach.studio.map_board import MapBoard, board_of
-from softreach.studio.plots.figures import Figures
+from softreach.studio.plots.plot import Figures
 from softreach.studio.reach import Reach
 from softreach.studio.scene import Scene
 from softreach.studio.snapshots import Snapshots

@@ -12,8 +12,8 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.activation_box import ActivationBox
 from softreach.studio.rod import design_of_text, rod_of
+from softreach.studio.settings import PlotSettings, TipPath
 from softreach.studio.sight import CUTS
-from softreach.studio.wishes import PlotView, TipPath
 from softreach.support.errors import InvalidInput, Range
 
 __all__ = [
@@ -102,7 +102,7 @@ class Appearance:
     handle: bool = True
     """The ball on the tip that is dragged."""
     map: MapView = field(default_factory=MapView)
-    plots: PlotView = field(default_factory=PlotView)
+    plots: PlotSettings = field(default_factory=PlotSettings)
 
     def __post_init__(self) -> None:
         if self.level not in LEVELS:
@@ -206,7 +206,7 @@ def _parsed(text: str | bytes) -> dict[str, Any]:
 def _fields(values: dict[str, Any]) -> dict[str, Any]:
     look = dict(values["appearance"])
     look["slice"], look["map"] = Slice(**look["slice"]), MapView(**look["map"])
-    look["plots"] = PlotView(**look.get("plots", {}))
+    look["plots"] = PlotSettings.from_fields(look.get("plots", {}))
     camera, reference, path = values["camera"], values["reference"], values.get("path")
     return {
         "design": design_of_text(values["design"], "state file"),

@@ -10,13 +10,7 @@ from softreach.studio.jobs.job import Job
 from softreach.studio.jobs.keep import KeepState
 from softreach.studio.jobs.map import DrawMap
 from softreach.studio.jobs.path import FollowPath, PlayPath, WriteMovie
-from softreach.studio.jobs.plots import (
-    CountActivations,
-    CutSection,
-    FollowArm,
-    MeasureVolumes,
-    SweepParameter,
-)
+from softreach.studio.jobs.plots import PLOT_JOBS
 from softreach.studio.jobs.pull import PullTip
 from softreach.studio.jobs.reach import ComputeReach, DrawCloud, DrawSurfaces
 from softreach.studio.jobs.reference import DrawReference
@@ -26,25 +20,20 @@ from softreach.studio.state import StudioState
 __all__ = [
     "JOBS",
     "ComputeReach",
-    "CountActivations",
-    "CutSection",
     "DrawArm",
     "DrawCloud",
     "DrawFree",
     "DrawMap",
     "DrawReference",
     "DrawSurfaces",
-    "FollowArm",
     "FollowEye",
     "FollowPath",
     "Job",
     "KeepState",
-    "MeasureVolumes",
     "PlayPath",
     "PullTip",
     "SetTheme",
     "SolveInverse",
-    "SweepParameter",
     "WriteMovie",
     "what_follows",
 ]
@@ -59,11 +48,7 @@ JOBS: tuple[type[Job], ...] = (
     PullTip,
     DrawReference,
     DrawMap,
-    FollowArm,
-    MeasureVolumes,
-    SweepParameter,
-    CountActivations,
-    CutSection,
+    *PLOT_JOBS,
     FollowPath,
     PlayPath,
     WriteMovie,

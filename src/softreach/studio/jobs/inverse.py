@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softreach.studio.jobs.job import Job
-from softreach.studio.jobs.plots import CountActivations
+from softreach.studio.jobs.plots import plots_from
 from softreach.studio.rod import solvable_rod
 from softreach.studio.state import StudioState, Vector
 from softreach.studio.worker import StaleCheck
@@ -41,7 +41,7 @@ class SolveInverse(Job):
         check()
         self._draw(state.design.length)
         self._move()
-        self.session.follow(CountActivations)
+        self.session.follow(*plots_from("answer"))
         self.session.show()
 
     def _draw(self, length: float) -> None:

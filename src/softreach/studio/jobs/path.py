@@ -12,8 +12,8 @@ from softreach.studio.jobs.job import AskedJob, Job
 from softreach.studio.movie import path_movie
 from softreach.studio.reach import cloud_points
 from softreach.studio.rod import solvable_rod
+from softreach.studio.settings import TipPath
 from softreach.studio.state import Camera, StudioState
-from softreach.studio.wishes import TipPath
 from softreach.studio.worker import StaleCheck
 from softreach.support.errors import InvalidInput
 

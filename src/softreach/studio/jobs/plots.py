@@ -1,144 +1,44 @@
-"""Computes what is plotted beside the scene; what is not shown is not computed."""
+"""Jobs that compute the plots beside the scene; what is not shown is not computed."""
 
 from __future__ import annotations
 
+from operator import attrgetter
+
 from softreach.studio.jobs.job import Job
-from softreach.studio.plots.along_arm import along_arm
-from softreach.studio.plots.histogram import histogram_picture
-from softreach.studio.plots.section import section_picture
-from softreach.studio.plots.sweep import sweep, swept_control
-from softreach.studio.plots.volumes import volume_curve_of
-from softreach.studio.reach import Reach
+from softreach.studio.plots import PLOTS
+from softreach.studio.plots.plot import Plot, Source
 from softreach.studio.state import StudioState
 from softreach.studio.worker import StaleCheck
-from softreach.support.errors import InvalidInput
-
-__all__ = [
-    "CountActivations",
-    "CutSection",
-    "FollowArm",
-    "MeasureVolumes",
-    "SweepParameter",
-]
 
 
-class FollowArm(Job):
-    """Curvature and strain along the arm, while its activations move."""
+def _job_of(plot: type[Plot]) -> type[Job]:
+    class ComputePlot(Job):
+        """Computes one plot while it is shown."""
 
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """The arm in its activation."""
-        return state.appearance.plots.along_arm and (state.design, state.activation)
+        @staticmethod
+        def depends_on(state: StudioState) -> object:
+            """Its attributes, while it is shown."""
+            shown = plot.name in state.appearance.plots.shown
+            return shown and attrgetter(*plot.depends_on)(state)
 
-    def run(self, check: StaleCheck) -> None:
-        """Compute them; nothing for an arm that cannot be computed, which `ComputeReach` says."""
-        check()
-        session, state = self.session, self.session.state
-        if state.appearance.plots.along_arm:
-            try:
-                session.figures.along_arm = along_arm(state.design, state.activation)
-            except InvalidInput:
-                session.figures.along_arm = None
-            session.show()
-
-
-class MeasureVolumes(Job):
-    """V(α) of the cloud."""
-
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """Which points are shown; the cloud itself is told by `ComputeReach`."""
-        return state.appearance.plots.volume_curve and state.appearance.level
-
-    def run(self, check: StaleCheck) -> None:
-        """Triangulate the cloud, once it is complete."""
-        check()
-        session, look = self.session, self.session.state.appearance
-        reach = _complete_reach(self)
-        if look.plots.volume_curve and reach is not None:
-            with session.working("V(α): triangulating the cloud"):
-                session.figures.volume_curve = volume_curve_of(reach, look.level)
-            session.show()
-
-
-class SweepParameter(Job):
-    """Volume against one parameter of the design."""
-
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """The design and the parameter."""
-        plots = state.appearance.plots
-        return plots.sweep and (state.design, plots.parameter)
-
-    def run(self, check: StaleCheck) -> None:
-        """Compute one design after the other, and show each."""
-        check()
-        session, state = self.session, self.session.state
-        control = swept_control(state.design, state.appearance.plots.parameter)
-        if not state.appearance.plots.sweep or control is None:
-            return
-        known = session.figures.sweep
-        if (
-            known is not None
-            and known.complete
-            and (known.arm, known.control)
-            == (
-                state.design,
-                control,
-            )
-        ):
-            return
-        for found in sweep(state.design, control, session.quality, check):
+        def run(self, check: StaleCheck) -> None:
+            """Compute it, and show each result."""
             check()
-            session.figures.sweep = found
-            session.show()
+            session = self.session
+            if plot.name in session.state.appearance.plots.shown:
+                for result in plot.compute(session, check):
+                    check()
+                    session.figures.plots[plot.name] = result
+                    session.show()
+
+    return ComputePlot
 
 
-class CountActivations(Job):
-    """Histograms of the activations of the samples that are shown."""
-
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """Which samples are shown, the present activation, the target, and the page's light."""
-        look = state.appearance
-        shown = look.level, look.slice, look.dark
-        return look.plots.histogram and (*shown, state.activation, state.target)
-
-    def run(self, check: StaleCheck) -> None:
-        """Draw them, once the cloud is complete."""
-        check()
-        session, state = self.session, self.session.state
-        look, reach = state.appearance, _complete_reach(self)
-        if look.plots.histogram and reach is not None:
-            solutions = None if session.answer is None else session.answer.activations
-            session.figures.histogram = histogram_picture(
-                reach, look.level, look.slice, state.activation, solutions, dark=look.dark
-            )
-            session.show()
+_JOBS = {plot: _job_of(plot) for plot in PLOTS}
+PLOT_JOBS = tuple(_JOBS.values())
+"""One for each plot."""
 
 
-class CutSection(Job):
-    """The reachable set in the plane of the slice."""
-
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """The plane and the page's light; the set itself is told by `ComputeReach`."""
-        look = state.appearance
-        return look.plots.section and (look.slice.axis, look.slice.center, look.dark)
-
-    def run(self, check: StaleCheck) -> None:
-        """Cut and draw it, once the exact set is complete."""
-        check()
-        session, look = self.session, self.session.state.appearance
-        reach = _complete_reach(self)
-        if look.plots.section and reach is not None:
-            with session.working("cutting the reachable set"):
-                session.figures.section = section_picture(reach, look.slice, check, dark=look.dark)
-            session.show()
-
-
-def _complete_reach(job: Job) -> Reach | None:
-    """What the design of the state can reach, if it is complete; its job says when it is."""
-    reach = job.session.reach
-    wanted = reach is not None and reach.fine and reach.arm == job.session.state.design
-    return reach if wanted else None
+def plots_from(source: Source) -> tuple[type[Job], ...]:
+    """Jobs of the plots that are computed from something else than the state alone."""
+    return tuple(job for plot, job in _JOBS.items() if source in plot.sources)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from softreach.studio.budget import OverBudget
 from softreach.studio.colors import shown_color
 from softreach.studio.jobs.job import Job
-from softreach.studio.jobs.plots import CountActivations, CutSection, MeasureVolumes
+from softreach.studio.jobs.plots import plots_from
 from softreach.studio.multiplicity import count_activations, uncounted
 from softreach.studio.reach import Reach, shown_rows
 from softreach.studio.stages import stages
@@ -117,7 +117,7 @@ def _withdraw(session: Session, refusal: str) -> None:
 
 def _draw_cloud(session: Session) -> None:
     _draw_points(session)
-    session.follow(DrawSurfaces, MeasureVolumes, CountActivations, CutSection)
+    session.follow(DrawSurfaces, *plots_from("reach"))
     session.show()
 
 

@@ -1,8 +1,8 @@
-"""How often the samples that are shown pull each bundle how much."""
+"""Histograms of the activations of the samples that are shown."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,17 +10,24 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.schema import activation_symbols
-from softreach.studio.plots.image import Picture, blank_figure, pixels
+from softreach.studio.plots.plot import (
+    Picture,
+    PicturePlot,
+    blank_figure,
+    complete_reach,
+    pixels,
+)
 from softreach.studio.reach import Reach, cloud_points, shown_samples
 from softreach.studio.rod import rod_of
 from softreach.studio.slicing import in_slice
 from softreach.studio.state import Slice
+from softreach.studio.worker import StaleCheck
 from softreach.support.palette import bundle_color
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["histogram_picture", "shares"]
+    from softreach.studio.session import Session
 
 Array = NDArray[np.float64]
 
@@ -67,12 +74,12 @@ def histogram_picture(
     figure = blank_figure(0.5 + 0.95 * reach.arm.bundles)
     axes = figure.subplots(reach.arm.bundles, 1, squeeze=False)[:, 0]
     bounds = np.array(rod_of(reach.arm).box.bounds)
-    found = shares(activation, bounds)
+    share = shares(activation, bounds)
     for k, ax in enumerate(axes):
-        _draw(ax, found[k], bounds[k], bundle_color(k))
+        _draw(ax, share[k], bounds[k], bundle_color(k))
         ax.axvline(present[k], color="0.15", lw=1.5)
         if solutions is not None and len(solutions):
-            height = np.full(len(solutions), 104 * max(found[k].max(initial=0), 1e-9))
+            height = np.full(len(solutions), 104 * max(share[k].max(initial=0), 1e-9))
             ax.plot(solutions[:, k], height, "v", color="0.15", ms=6, clip_on=False)
         ax.set_xlabel(_label(reach.arm, k), labelpad=1)
     figure.supylabel("share of the samples [%]", fontsize=10)
@@ -91,7 +98,7 @@ def _draw(ax: Axes, share: Array, limits: Array, color: tuple[float, float, floa
 
 
 def _ends(low: float, high: float) -> tuple[float, float]:
-    """Bounds, with room between them for a bundle that is held."""
+    """Bounds, with room between them for a fixed bundle."""
     room = 1e-6 * max(1.0, abs(low))
     return float(low), float(max(high, low + room))
 
@@ -108,3 +115,27 @@ def _described(samples: int, cut: Slice, solutions: Array | None) -> str:
     where = "" if cut.axis == "none" else f" within the slice {cut.axis} = {cut.center:g} L"
     marks = " Triangles are solutions of the inverse problem." if solutions is not None else ""
     return f"{samples:,} samples{where}; the line is the present activation.{marks}"
+
+
+class HistogramPlot(PicturePlot):
+    """Picture of a histogram for each bundle."""
+
+    name = "histogram"
+    label = "activations"
+    hint = "how often the samples that the slice leaves pull each bundle how much"
+    depends_on = (
+        "appearance.level", "appearance.slice", "appearance.dark", "activation", "target",
+    )  # fmt: skip
+    sources = frozenset({"reach", "answer"})
+
+    @staticmethod
+    def compute(session: Session, check: StaleCheck) -> Iterator[Picture]:
+        """Draw them, once the cloud is complete."""
+        del check
+        state, reach = session.state, complete_reach(session)
+        if reach is not None:
+            look, answer = state.appearance, session.answer
+            solutions = None if answer is None else answer.activations
+            yield histogram_picture(
+                reach, look.level, look.slice, state.activation, solutions, dark=look.dark
+            )

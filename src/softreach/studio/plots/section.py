@@ -1,7 +1,12 @@
-"""The reachable set in the plane of the slice: its boundary, and how many activations reach it."""
+"""Section of the reachable set: its boundary in a plane, and how many activations reach each place.
+
+They are counted as the inverse finds them: the grid of the exact set counts as well, but not near
+its folds.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -10,23 +15,76 @@ from numpy.typing import NDArray
 from softreach.geometry.surface import plane_cut
 from softreach.picture.projection import View, is_mirrored, plane_of
 from softreach.plot.slice import plot_slice
-from softreach.studio.plots.image import Picture, blank_figure, pixels
-from softreach.studio.plots.plane_counts import plane_counts
+from softreach.studio.multiplicity import counts_at
+from softreach.studio.plots.plot import (
+    Picture,
+    PicturePlot,
+    blank_figure,
+    complete_reach,
+    pixels,
+)
 from softreach.studio.reach import Reach
+from softreach.studio.rod import solvable_rod
 from softreach.studio.state import Slice
 from softreach.studio.worker import StaleCheck, all_cores
 from softreach.support.errors import InvalidInput
 from softreach.workspace import ReachableSolid, ReachableSurface
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.axes import Axes
 
-__all__ = ["enclosed_area", "section_curves", "section_picture"]
+    from softreach.studio.session import Session
+
 
 Array = NDArray[np.float64]
 
 _VIEWS: dict[str, View] = {"x": "side", "y": "front", "z": "top"}
 _BOUNDARY = "#16324f"
+_CELLS, _CELLS_LOADED = 120, 40  # along the longer side: under loads each place costs much
+
+
+def within(curves: Sequence[Array], points: Array, axis: int) -> NDArray[np.bool_]:
+    """Mask of points in a plane across an axis that an odd number of closed curves surround."""
+    from matplotlib.path import Path
+
+    flat = np.delete(points, axis, axis=1)
+    inside = np.zeros(len(points), bool)
+    for curve in curves:
+        inside ^= Path(np.delete(curve, axis, axis=1)).contains_points(flat)
+    return inside
+
+
+def plane_counts(
+    reach: Reach, curves: Sequence[Array], axis: int, check: StaleCheck = lambda: None
+) -> xr.Dataset:
+    """Cells of a plane, as `ReachableSolid.grid` has them: `count`, or `occupied`.
+
+    Args:
+        reach: Of a design with a solid.
+        curves: Where its boundary meets the plane [L], closed, at least one.
+        axis: Across the plane.
+        check: Called between blocks of targets; raises to stop.
+    """
+    import xarray as xr
+
+    around, length = np.concatenate(curves), reach.arm.length
+    low, high = around.min(axis=0), around.max(axis=0)
+    loaded = reach.arm.loads is not None
+    cell = float((high - low).max()) / (_CELLS_LOADED if loaded else _CELLS)
+    middles = [np.arange(a + cell / 2, b + cell / 2, cell) for a, b in zip(low, high, strict=True)]
+    middles[axis] = low[axis : axis + 1]
+    places = np.stack(np.meshgrid(*middles, indexing="ij"), axis=-1)
+    inside = within(curves, places.reshape(-1, 3), axis).reshape(places.shape[:3])
+    name, values = "occupied", inside
+    if solvable_rod(reach.arm).box.dimension == 3:
+        name, values = "count", inside.astype(np.int64)
+        values[inside] = counts_at(reach, places[inside] * length, check)
+    coordinates = {
+        each: (each, at * length, {"units": "m"}) for each, at in zip("xyz", middles, strict=True)
+    }
+    attrs = {"cell": cell * length, "length": length}
+    return xr.Dataset({name: (tuple("xyz"), values)}, coordinates, attrs)
 
 
 def section_curves(reach: Reach, cut: Slice) -> list[Array]:
@@ -120,3 +178,24 @@ def _described(curves: list[Array], plane: Slice, where: str) -> str:
     parts = "one closed curve" if len(curves) == 1 else f"{len(curves)} closed curves"
     closed = all(np.array_equal(curve[0], curve[-1]) for curve in curves)
     return f"{where}: {parts}, {area:.4f} L²" if closed else f"{where}: {len(curves)} curves"
+
+
+class SectionPlot(PicturePlot):
+    """Picture of the section by the plane of the slice."""
+
+    name = "section"
+    label = "section"
+    hint = (
+        "the reachable set in the plane of the slice (tab View; without a slice y = 0): its "
+        "boundary, and how many activations reach each place"
+    )
+    depends_on = ("appearance.slice.axis", "appearance.slice.center", "appearance.dark")
+    sources = frozenset({"reach"})
+
+    @staticmethod
+    def compute(session: Session, check: StaleCheck) -> Iterator[Picture]:
+        """Cut and draw it, once the exact set is complete."""
+        look, reach = session.state.appearance, complete_reach(session)
+        if reach is not None:
+            with session.working("cutting the reachable set"):
+                yield section_picture(reach, look.slice, check, dark=look.dark)

@@ -1,9 +1,9 @@
-"""The volume of a design while one of its parameters changes."""
+"""Volume of a design against one of its parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,19 +11,26 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed
 from softreach.studio.budget import OverBudget
-from softreach.studio.controls import Control, controls
+from softreach.studio.fields import Attribute, Fields
+from softreach.studio.plots.plot import Chart, Curve, Plot
 from softreach.studio.reach import Quality
 from softreach.studio.rod import solvable_rod
+from softreach.studio.shown_parameters import ShownParameter, slider_parameters
 from softreach.studio.stages import exact_set
+from softreach.studio.state import StudioState
 from softreach.studio.worker import StaleCheck, all_cores
 from softreach.support.errors import SoftreachError
 
-__all__ = ["Sweep", "sweep", "swept_control"]
+if TYPE_CHECKING:
+    from viser import GuiApi
+
+    from softreach.studio.session import Session
 
 Array = NDArray[np.float64]
 
 _VALUES = 9
 _SECONDS = 10.0  # of each value
+_VOLUME = Curve("V", "#2f6db5", points=True)
 
 
 class Sweep(NamedTuple):
@@ -31,8 +38,7 @@ class Sweep(NamedTuple):
 
     arm: Manipulator
     """The design that is varied."""
-    control: Control
-    """The parameter."""
+    parameter: ShownParameter
     value: Array
     """In the unit that is shown, ascending."""
     volume: Array
@@ -51,50 +57,107 @@ class Sweep(NamedTuple):
         )
 
 
-def swept_control(arm: Manipulator, name: str) -> Control | None:
-    """The slider of a parameter, the first for an unknown name; None if there is none."""
-    known = {control.name: control for control in controls(arm)}
-    return known.get(name) or next(iter(known.values()), None)
+def swept_parameter(state: StudioState) -> ShownParameter | None:
+    """The parameter that is chosen, the first for an unknown one; None if there is none."""
+    sliders = {slider.name: slider for slider in slider_parameters(state.design)}
+    return sliders.get(state.appearance.plots.parameter) or next(iter(sliders.values()), None)
 
 
 def sweep(
-    arm: Manipulator, control: Control, quality: Quality, check: StaleCheck
+    arm: Manipulator, parameter: ShownParameter, quality: Quality, check: StaleCheck
 ) -> Iterator[Sweep]:
     """Volumes over the range of a slider, from the design's own value outwards, one by one.
 
     Args:
         arm: The design.
-        control: The slider.
+        parameter: What the slider changes.
         quality: How coarse, and how far off the tips may be.
         check: Called all the time; raises to stop.
     """
-    found = Sweep(arm, control, np.empty(0), np.empty(0))
-    for value in _values(control):
+    volumes = Sweep(arm, parameter, np.empty(0), np.empty(0))
+    for value in _values(parameter):
         check()
         with all_cores:
-            volume = _volume(arm, control, value, quality, check)
-        found = found.having(value, volume)
-        yield found
-    yield found._replace(complete=True)
+            volume = _volume(arm, parameter, value, quality, check)
+        volumes = volumes.having(value, volume)
+        yield volumes
+    yield volumes._replace(complete=True)
 
 
-def _values(control: Control) -> list[float]:
+def _values(parameter: ShownParameter) -> list[float]:
     """Steps of the slider over its range, and the present value; what is nearest to it first."""
-    low, high = control.limits
+    low, high = parameter.limits
     even = np.linspace(low, high, _VALUES)
-    steps = np.clip(low + np.round((even - low) / control.step) * control.step, low, high)
-    values = {round(float(value), 9) for value in steps} | {control.shown}
-    return sorted(values, key=lambda value: abs(value - control.shown))
+    steps = np.clip(low + np.round((even - low) / parameter.step) * parameter.step, low, high)
+    values = {round(float(value), 9) for value in steps} | {parameter.shown}
+    return sorted(values, key=lambda value: abs(value - parameter.shown))
 
 
 def _volume(
-    arm: Manipulator, control: Control, value: float, quality: Quality, check: StaleCheck
+    arm: Manipulator,
+    parameter: ShownParameter,
+    value: float,
+    quality: Quality,
+    check: StaleCheck,
 ) -> float | None:
     """In L³; None for no design, or one that takes too much time or memory."""
     try:
-        made = changed(arm, {control.name: value * control.scale})
-        solvable_rod(made)
-        found = exact_set(made, quality.coarse_accuracy, quality.tol, check, _SECONDS)
+        design = changed(arm, {parameter.name: value * parameter.scale})
+        solvable_rod(design)
+        exact = exact_set(design, quality.coarse_accuracy, quality.tol, check, _SECONDS)
     except (SoftreachError, OverBudget, MemoryError):
         return None
-    return found.volume / made.length**3
+    return exact.volume / design.length**3
+
+
+class SweepPlot(Plot):
+    """Chart of volumes against the parameter that is chosen in the tab."""
+
+    name = "sweep"
+    label = "V against parameter"
+    hint = "volume of designs that differ from this one in one parameter, computed while you look"
+    depends_on = ("design", "appearance.plots.parameter")
+
+    def __init__(self, gui: GuiApi, folder: Any) -> None:
+        self._chart = Chart(gui, folder, "V / L³")
+
+    @classmethod
+    def add_settings(cls, fields: Fields) -> None:
+        """Add a menu of the parameters that the design has; to choose one shows the plot."""
+        fields.dropdown(
+            "parameter",
+            _offered,
+            Attribute(
+                lambda state: parameter.name if (parameter := swept_parameter(state)) else "",
+                lambda state, name: state.showing(
+                    plots=state.appearance.plots.showing(cls.name).sweeping(name)
+                ),
+            ),
+            "what changes in the plot of V against a parameter",
+        )
+
+    @staticmethod
+    def compute(session: Session, check: StaleCheck) -> Iterator[Sweep]:
+        """One value after the other, unless all are known."""
+        state, latest = session.state, session.figures.plots.get(SweepPlot.name)
+        parameter = swept_parameter(state)
+        if parameter is None:
+            return
+        subject = state.design, parameter
+        if latest is None or not latest.complete or (latest.arm, latest.parameter) != subject:
+            yield from sweep(state.design, parameter, session.quality, check)
+
+    def show(self, result: Sweep) -> str:
+        """Draw the volumes that are known so far."""
+        here = result.volume[result.value == result.parameter.shown]
+        if len(result.value) > 1:
+            self._chart.show(result.parameter.label, result.value, (_VOLUME,), (result.volume,))
+        parts = [f"here V = {v:.4f} L³ at {result.parameter.shown:g}" for v in here]
+        if result.refused:
+            parts.append(f"{result.refused} values make no design or take too long")
+        return " · ".join([*parts, *([] if result.complete else ["computing ..."])])
+
+
+def _offered(state: StudioState) -> dict[str, str]:
+    sliders = slider_parameters(state.design)
+    return {slider.name: slider.label for slider in sliders} or {"": ""}

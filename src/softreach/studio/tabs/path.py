@@ -1,4 +1,4 @@
-"""A path of the tip: loaded or drawn, followed, played and saved."""
+"""Path of the tip: loaded or drawn, followed, played and saved."""
 
 from __future__ import annotations
 
@@ -11,16 +11,15 @@ from softreach.export.clouds import path_csv
 from softreach.inverse.path import PathStatus
 from softreach.inverse.request import positions_in
 from softreach.studio.drawn_paths import PATH_SHAPES, PLANES, drawn_path, straight_path
+from softreach.studio.fields import attempt, bind_button
 from softreach.studio.jobs.path import PlayPath, WriteMovie, at_point
-from softreach.studio.panels.binding import attempt, bind_button
-from softreach.studio.panels.line import Line
-from softreach.studio.picking import picked_point
-from softreach.studio.plots.chart import Chart, Curve
+from softreach.studio.plots.plot import Chart, Curve
 from softreach.studio.reach import cloud_points
 from softreach.studio.rod import solvable_rod
-from softreach.studio.slicing import in_slice
+from softreach.studio.settings import MOST_POINTS, TipPath
 from softreach.studio.state import StudioState
-from softreach.studio.wishes import MOST_POINTS, TipPath
+from softreach.studio.tabs.inverse import clicked_point
+from softreach.studio.widgets import Line
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import bundle_color
 
@@ -29,8 +28,6 @@ if TYPE_CHECKING:
     from viser import GuiApi, UploadedFile
 
     from softreach.studio.session import Session
-
-__all__ = ["PathPanel", "end_text"]
 
 _HINT = "The tip follows a path as far as its branch of solutions goes."
 _MOST_CURVES = 8  # in the timeline: more are not told apart
@@ -41,7 +38,6 @@ class PathPanel:
     """The path of a tab."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        """Add the widgets."""
         self._session, self._gui = session, gui
         self._shown: xr.Dataset | None = None
         self._revision = -1
@@ -77,7 +73,7 @@ class PathPanel:
         )
         self._at = gui.add_slider("point", 0, 1, 1, 0, hint="point of the path where the arm is")
         graph = gui.add_folder("activations along the path")
-        self._timeline = Chart(gui, graph, "way / L", "activation")
+        self._timeline = Chart(gui, graph, "activation")
         self._save = gui.add_button_group(
             "save", ("CSV", "GIF"), hint="the activations as a table, or the arm as an animation"
         )
@@ -93,47 +89,44 @@ class PathPanel:
 
     def show(self, session: Session) -> None:
         """Say how far the arm follows, and where it is."""
-        found, path = session.figures.track, session.state.path
-        if path is None or found is None or found.sizes["point"] != len(path.points):
+        track, path = session.figures.track, session.state.path
+        if path is None or track is None or track.sizes["point"] != len(path.points):
             self._shown, self._walk.visible = None, False
             self._text.say(*(("following ...",) if path is not None else ()))
             return
-        if found is not self._shown:
-            self._shown = found
-            self._list(found)
+        if track is not self._shown:
+            self._shown = track
+            self._list(track)
         if self._at.value != path.at and session.revision != self._revision:
             self._revision, self._at.value = session.revision, min(path.at, int(self._at.max))
 
     def click(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
         """Lead the path to the point of the cloud under the cursor, if clicks are for that."""
         session = self._session
-        reach, look = session.reach, session.state.appearance
         if not self._clicks.value:
             return False
-        if reach is not None and look.cloud and reach.arm == session.state.design:
-            points = cloud_points(reach, look.level)
-            points = points[in_slice(points, look.slice)]
-            found = picked_point(points, origin, direction)
-            if found is not None:
-                attempt(session, lambda: self._extend(points[found] * reach.arm.length))
+        number, reach = clicked_point(session, origin, direction), session.reach
+        if number is not None and reach is not None:
+            point = cloud_points(reach, session.state.appearance.level)[number]
+            attempt(session, lambda: self._extend(point * reach.arm.length))
         return True
 
-    def _list(self, found: xr.Dataset) -> None:
+    def _list(self, track: xr.Dataset) -> None:
         """Show the result of following."""
-        count = int((found.status == PathStatus.FOLLOWED).sum())
+        count = int((track.status == PathStatus.FOLLOWED).sum())
         arm = self._session.state.design
-        self._text.say(end_text(found, arm.length))
+        self._text.say(end_text(track, arm.length))
         self._walk.visible = count > 0
         if count == 0:
             return
         self._at.max = max(count - 1, 1)
-        way = np.linalg.norm(np.diff(found.position.values[:count], axis=0), axis=1)
-        along = np.concatenate([[0.0], np.cumsum(way)]) / arm.length
-        names = [str(name) for name in found["bundle"].values][:_MOST_CURVES]
+        steps = np.linalg.norm(np.diff(track.position.values[:count], axis=0), axis=1)
+        way = np.concatenate([[0.0], np.cumsum(steps)]) / arm.length
+        names = [str(name) for name in track["bundle"].values][:_MOST_CURVES]
         curves = [Curve(name, _css(bundle_color(k))) for k, name in enumerate(names)]
-        values = [found.activation.values[:count, k] for k in range(len(names))]
+        values = [track.activation.values[:count, k] for k in range(len(names))]
         if count > 1:
-            self._timeline.show(along, curves, values)
+            self._timeline.show("way / L", way, curves, values)
 
     def _take(self, path: TipPath | None) -> None:
         self._session.update(lambda state: state.replace(path=path))
@@ -149,10 +142,10 @@ class PathPanel:
     def _extend(self, point: np.ndarray) -> None:
         """On to one more point, straight; what there is of a path begins at the tip."""
         state, path = self._session.state, self._session.state.path
-        known = np.array(path.points) if path is not None else _tip(state)[None]
+        before = np.array(path.points) if path is not None else _tip(state)[None]
         start = state.activation if path is None else path.start
-        more = straight_path([known[-1], point], 24)[1:]
-        self._take(TipPath.through(np.concatenate([known, more]), start))
+        more = straight_path([before[-1], point], 24)[1:]
+        self._take(TipPath.through(np.concatenate([before, more]), start))
 
     def _read(self, file: UploadedFile) -> None:
         if len(file.content) > _FILE_SIZE:
@@ -201,15 +194,15 @@ class PathPanel:
             self._session.client.send_file_download("path.csv", content, save_immediately=True)
 
 
-def end_text(found: xr.Dataset, length: float) -> str:
-    """How far a path is followed, and why no farther.
+def end_text(track: xr.Dataset, length: float) -> str:
+    """End of a path that is followed, and the reason for it, in words.
 
     Args:
-        found: From `track_path`.
+        track: Result of `track_path`.
         length: L [m].
     """
-    count, points = int((found.status == PathStatus.FOLLOWED).sum()), found.sizes["point"]
-    end, way = found.attrs["end"], float(found.end_length) / length
+    count, points = int((track.status == PathStatus.FOLLOWED).sum()), track.sizes["point"]
+    end, way = track.attrs["end"], float(track.end_length) / length
     if end == "no_start":
         return "The first point is not reached: out of reach, or not from this activation."
     followed = f"{count} of {points} points are followed"
@@ -218,15 +211,15 @@ def end_text(found: xr.Dataset, length: float) -> str:
         "fold": f"{followed}, {way:.4g} L of path: there the branch turns back (a fold).",
         "unstable": f"{followed}, {way:.4g} L of path: there the arm loses its stability.",
         "bound": (
-            f"{followed}, {way:.4g} L of path: there {found.attrs['end_bundle']} is at its "
-            f"{found.attrs['end_bound']} bound."
+            f"{followed}, {way:.4g} L of path: there {track.attrs['end_bundle']} is at its "
+            f"{track.attrs['end_bound']} bound."
         ),
     }
     return reasons[end]
 
 
 def _tip(state: StudioState) -> np.ndarray:
-    """Where the tip is [m].
+    """Place of the tip [m].
 
     Raises:
         InvalidInput: The arm has no equilibrium.

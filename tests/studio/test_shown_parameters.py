@@ -1,4 +1,4 @@
-"""The sliders of a design."""
+"""Parameters as a person reads them: sliders of a design, numbers of its parts."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from hypothesis import given
 from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.parameters import changed, find_parameter
-from softreach.studio.controls import controls
+from softreach.studio.shown_parameters import slider_parameters
 from tests.laws import arm_of, arms
 
 
 @given(arms())
 def test_every_slider_starts_within_its_ends_at_the_value_of_the_design(arm):
-    for control in controls(arm):
+    for control in slider_parameters(arm):
         low, high = control.limits
         assert low <= control.shown <= high
         value = find_parameter(arm, control.name).value(arm)
@@ -24,11 +24,11 @@ def test_every_slider_starts_within_its_ends_at_the_value_of_the_design(arm):
 @pytest.mark.parametrize("design", designs.__all__)
 def test_a_moved_slider_shows_its_own_value_in_the_new_design(design):
     arm = getattr(designs, design)()
-    for control in controls(arm):
+    for control in slider_parameters(arm):
         to = 0.95 * control.shown + 0.05 * control.limits[0]
         to = 2 if control.name.endswith(".bundles") else to
         made = changed(arm, {control.name: to * control.scale})
-        again = next((c for c in controls(made) if c.name == control.name), None)
+        again = next((c for c in slider_parameters(made) if c.name == control.name), None)
         assert again is not None
         assert again.shown == pytest.approx(to, abs=1e-6)
 
@@ -38,19 +38,19 @@ def test_sliders_of_fibers_bear_their_names_whatever_these_are():
         FiberArchitecture(name=name, revolution=turn, extent=0.3)
         for name, turn in (("a b", 0.0), ("a_b", 0.5))
     ]
-    labels = [control.label for control in controls(arm_of(*fibers))]
+    labels = [control.label for control in slider_parameters(arm_of(*fibers))]
     wanted = ["bundles of a b", "offset of a b [deg]", "offset of a_b [deg]"]
     assert [label for label in labels if " of " in label] == wanted
 
 
 def test_what_does_not_turn_has_no_revolution_to_change(trunk):
-    assert "revolution" in [control.name for control in controls(trunk)]
+    assert "revolution" in [control.name for control in slider_parameters(trunk)]
     straight = trunk.replace(actuators=trunk.actuators[2:])
-    assert "revolution" not in [control.name for control in controls(straight)]
+    assert "revolution" not in [control.name for control in slider_parameters(straight)]
 
 
 def test_forces_and_moduli_have_sliders_of_their_size():
-    found = {control.name: control for control in controls(designs.three_tendon_robot())}
+    found = {control.name: control for control in slider_parameters(designs.three_tendon_robot())}
     modulus = found["rings[0].material.young_modulus"]
     assert modulus.low > 0
     assert modulus.limits[1] == 2 * modulus.shown
@@ -59,4 +59,4 @@ def test_forces_and_moduli_have_sliders_of_their_size():
 
 
 def test_what_a_design_leaves_open_has_no_slider(trunk):
-    assert not [control for control in controls(trunk) if "modulus" in control.name]
+    assert not [control for control in slider_parameters(trunk) if "modulus" in control.name]

@@ -1,17 +1,15 @@
-"""What a tab shows beside the scene, and the path that its arm follows, as values."""
+"""Settings of a tab as values: the plots beside its scene, and the path of its tip."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
 
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput
-
-__all__ = ["MOST_POINTS", "PlotView", "TipPath"]
 
 MOST_POINTS = 2000
 """Of a path: each is followed, drawn and kept in the state."""
@@ -20,32 +18,35 @@ Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlotView:
-    """Which plots are shown beside the scene; each is computed only while it is shown."""
+class PlotSettings:
+    """Plots beside the scene; each is computed only while it is shown."""
 
-    along_arm: bool = False
-    """Curvature and strain along the arm."""
-    volume_curve: bool = False
-    """V(α) of the cloud that is shown."""
-    sweep: bool = False
-    """Volume against one parameter of the design."""
+    shown: tuple[str, ...] = ()
+    """Names of the plots, each once and in order."""
     parameter: str = ""
-    """Which one; "" for the first there is."""
-    histogram: bool = False
-    """Activations of the samples that the slice leaves."""
-    section: bool = False
-    """The reachable set in the plane of the slice."""
+    """Parameter against which the volume is plotted; "" for the first there is."""
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            held, kind = getattr(self, one.name), type(one.default)
-            if not isinstance(held, kind):
-                raise InvalidInput(f"plots.{one.name}", held, f"a {kind.__name__}")
+        if not isinstance(self.parameter, str):
+            raise InvalidInput("plots.parameter", self.parameter, "a str")
+        if not all(isinstance(name, str) for name in self.shown):
+            raise InvalidInput("plots.shown", self.shown, "names of plots")
+        object.__setattr__(self, "shown", tuple(sorted(set(self.shown))))
 
-    @property
-    def any(self) -> bool:
-        """Whether there is anything beside the scene."""
-        return any(getattr(self, one.name) is True for one in fields(self))
+    def showing(self, name: str, on: bool = True) -> Self:
+        """A copy with a plot, or without it."""
+        shown = {*self.shown, name} if on else {*self.shown} - {name}
+        return replace(self, shown=tuple(shown))
+
+    def sweeping(self, parameter: str) -> Self:
+        """A copy with another parameter."""
+        return replace(self, parameter=parameter)
+
+    @classmethod
+    def from_fields(cls, values: Mapping[str, Any]) -> Self:
+        """Settings from what a saved state holds of them; an older one has a switch a plot."""
+        shown = values.get("shown", [name for name, on in values.items() if on is True])
+        return cls(shown=tuple(shown), parameter=values.get("parameter", ""))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,5 +84,5 @@ class TipPath:
     @classmethod
     def from_fields(cls, values: Mapping[str, Any]) -> Self:
         """A path from what a saved state holds of it."""
-        made = cls.through(values["points"], values["start"])
-        return cls(points=made.points, start=made.start, at=values["at"])
+        path = cls.through(values["points"], values["start"])
+        return replace(path, at=values["at"])

@@ -1,4 +1,4 @@
-"""Save what there is, and load it again."""
+"""Export of the state, design, cloud, surface and pictures; and states that are loaded again."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from softreach.studio import markup
+from softreach.studio.fields import attempt, bind_button
 from softreach.studio.files import (
     CLOUD_FORMATS,
     SURFACE_FORMATS,
@@ -16,9 +17,8 @@ from softreach.studio.files import (
 )
 from softreach.studio.link import state_link
 from softreach.studio.page import static_page
-from softreach.studio.panels.binding import attempt, bind_button
-from softreach.studio.panels.line import Line
 from softreach.studio.picture import picture_file
+from softreach.studio.widgets import Line
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
     from softreach.studio.reach import Reach
     from softreach.studio.session import Session
-
-__all__ = ["ExportPanel"]
 
 
 _ABOUT_LINK = (
@@ -54,7 +52,6 @@ class ExportPanel:
     """Buttons that send a file to the browser, and one that takes a file back."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session, url: str) -> None:
-        """Add the widgets."""
         self._session, self._url = session, url
         with tab:
             self._button("Save state", self._save_state)
@@ -72,9 +69,6 @@ class ExportPanel:
             self._button("Save picture (PNG)", self._save_picture)
             self._button("Save web page (HTML)", self._save_page)
         load.on_upload(lambda _: attempt(session, lambda: self._restore(load.value)))
-
-    def show(self, session: Session) -> None:
-        """Nothing here depends on the state."""
 
     def _save_state(self) -> None:
         self._send("softreach-studio.json", self._session.state_now().to_json().encode())
@@ -118,9 +112,7 @@ class ExportPanel:
         )
 
     def _restore(self, file: UploadedFile) -> None:
-        session = self._session
-        state = state_from(file.name, file.content, session.state)
-        session.restore(state)
+        self._session.restore(state_from(file.name, file.content, self._session.state))
 
     def _reach(self) -> Reach:
         reach = self._session.reach
@@ -131,9 +123,9 @@ class ExportPanel:
     def _write(self, name: str, content: Callable[[], bytes]) -> None:
         """Send what takes a while to make, and say so meanwhile."""
         with self._session.working(f"writing {name}"):
-            made = content()
-        self._send(name, made)
-        self._session.say(f"{name} is written: {_size(len(made))}.")
+            data = content()
+        self._send(name, data)
+        self._session.say(f"{name} is written: {_size(len(data))}.")
 
     def _send(self, name: str, content: bytes) -> None:
         self._session.client.send_file_download(name, content, save_immediately=True)

@@ -1,4 +1,4 @@
-"""Snapshots of the work, and their designs side by side in a table."""
+"""Comparison of snapshots of the work, their designs side by side in a table."""
 
 from __future__ import annotations
 
@@ -13,17 +13,15 @@ from softreach.studio.comparison import (
     comparison_csv,
     comparison_html,
 )
-from softreach.studio.panels.binding import bind_button
-from softreach.studio.panels.line import Line
+from softreach.studio.fields import bind_button
 from softreach.studio.snapshots import Snapshot, numbers_of
+from softreach.studio.widgets import Line
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     from viser import GuiApi
 
     from softreach.studio.session import Session
-
-__all__ = ["ComparePanel"]
 
 _HINT = "Keep designs as snapshots to see them side by side here."
 _NONE = "none yet"
@@ -35,7 +33,6 @@ class ComparePanel:
     """Takes, restores and deletes snapshots; the table compares them with the first."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        """Add the widgets."""
         self._session, self._lock = session, threading.RLock()
         self._known: object = None
         self._comparison: Comparison | None = None
@@ -67,20 +64,20 @@ class ComparePanel:
             if self._known == (snapshots, design, numbers):
                 return
             self._known = (snapshots, design, numbers)
-            self._follow_menu(tuple(one.name for one in snapshots))
+            self._follow_menu(tuple(each.name for each in snapshots))
             if not snapshots:
                 self._comparison = None
                 self._table.say(_HINT)
                 return
-            kept = [Candidate(one.name, one.state.design, one.numbers) for one in snapshots]
+            kept = [Candidate(each.name, each.state.design, each.numbers) for each in snapshots]
             self._comparison = compared([*kept, Candidate(_NOW, design, numbers)])
             self._table.show(comparison_html(self._comparison))
 
     def _measure(self, session: Session) -> None:
         """Note the numbers of snapshots whose design has only now been measured."""
-        for one in session.snapshots.all:
-            if one.numbers is None and (numbers := numbers_of(session.reach, one.state)):
-                session.snapshots.measure(one.name, numbers)
+        for each in session.snapshots.all:
+            if each.numbers is None and (numbers := numbers_of(session.reach, each.state)):
+                session.snapshots.measure(each.name, numbers)
 
     def _follow_menu(self, names: tuple[str, ...]) -> None:
         if tuple(self._choice.options) != (names or (_NONE,)):
@@ -93,8 +90,8 @@ class ComparePanel:
         if name == _NOW:
             raise InvalidInput("snapshot name", name, "another, as the table calls this design so")
         numbers = numbers_of(session.reach, state)
-        taken = Snapshot(name=name, state=state, taken=time.time(), numbers=numbers)
-        session.snapshots.add(taken)
+        snapshot = Snapshot(name=name, state=state, taken=time.time(), numbers=numbers)
+        session.snapshots.add(snapshot)
         self._name.value = ""
         session.show()
         self._choice.value = name

@@ -1,0 +1,103 @@
+"""Captions: the numbers of a reach, the legend of its marks, the place of a tip, as text."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from softreach.rod.tip_map import TipStatus
+from softreach.studio.colors import FAINT, UNSTABLE
+from softreach.studio.markup import Part, Strong, Swatch, Term
+
+if TYPE_CHECKING:
+    from softreach.studio.reach import Reach, Size
+    from softreach.studio.session import Session
+
+UNREACHABILITY = (
+    "Unreachability UNR [%]: the share of the convex hull of all tips that no activation reaches, "
+    "1 − V / V of the hull"
+)
+_SIZES = {
+    "volume": "V [L³]: volume of all places that the tip reaches, its error beside it; L: length",
+    "area": "Area [L²] of all places that the tip reaches, its error beside it; L: length",
+    "length": "Length [L] of the curve that the tip reaches, its error beside it",
+    "point": "All activations are held: the tip is at one place",
+}
+_GAP = "\N{EN SPACE} "
+_POSTURES = {
+    TipStatus.STABLE: "a stable equilibrium",
+    TipStatus.UNSTABLE: "an unstable equilibrium: a real arm leaves it",
+    TipStatus.NO_EQUILIBRIUM: "no equilibrium: the arm is not drawn",
+}
+
+
+def reach_text(reach: Reach) -> list[Part]:
+    """The numbers of a reach in one line."""
+    parts: list[Part] = []
+    if reach.size is not None:
+        name, value, error, unit = reach.size
+        value_text = f"{name} {value:.4f} ± {error:.1g} {unit}"
+        parts += [Term(value_text, _SIZES[name]), " · "]
+    if not math.isnan(reach.unreachability):
+        parts += [Term(f"UNR {100 * reach.unreachability:.2f} %", UNREACHABILITY), " · "]
+    if reach.lost_share:
+        parts.append(f"{_percent(reach.lost_share)} of the activations left out · ")
+    parts.append(f"{reach.samples:,} samples")
+    if reach.fine and reach.samples < reach.wanted:
+        parts.append(f" of {reach.wanted:,}")
+    return parts
+
+
+def legend_text(reach: Reach, *, free: bool) -> list[Part]:
+    """Legend of the marks: how many samples have each, and how many are left out.
+
+    Args:
+        reach: What is shown; of an arm without loads there is nothing to say.
+        free: Whether the cloud without loads is shown too.
+    """
+    if reach.arm.loads is None:
+        return []
+    parts: list[Part] = []
+    if unstable := reach.share(TipStatus.UNSTABLE):
+        parts += [Swatch(UNSTABLE), f" unstable: {_percent(unstable)} of the samples {_GAP}"]
+    if lost := reach.share(TipStatus.NO_EQUILIBRIUM):
+        parts.append(f"no equilibrium, not shown: {_percent(lost)} {_GAP}")
+    if not unstable and not lost:
+        parts.append(f"every sample rests in a stable equilibrium {_GAP}")
+    return [*parts, Swatch(FAINT), " without loads"] if free else parts
+
+
+def loads_text(session: Session) -> list[Part]:
+    """Reach under loads beside that without; nothing for an arm without loads."""
+    if session.state.design.loads is None:
+        return []
+    loaded, free = _present_size(session), session.free
+    bare = free.size if free is not None else None
+    if bare is None:
+        return []
+    free_text = f"free {bare.value:.4f} {bare.unit}"
+    if loaded is None:
+        return [free_text]
+    share = f", {100 * loaded.value / bare.value:.0f} %" if bare.value > 0 else ""
+    return [Strong(f"loaded {loaded.value:.4f} {loaded.unit}"), f" · {free_text}{share}"]
+
+
+def _present_size(session: Session) -> Size | None:
+    """The size of what the design itself can reach, not the one before it."""
+    reach = session.reach
+    return reach.size if reach is not None and reach.arm == session.state.design else None
+
+
+def tip_text(session: Session) -> list[Part]:
+    """Place of the tip, and whether a loaded arm rests there."""
+    parts: list[Part] = []
+    if session.tip is not None:
+        x, y, z = session.tip
+        parts.append(f"tip at ({x:.6f}, {y:.6f}, {z:.6f}) L")
+    if session.posture is not None:
+        parts.append(f"{' · ' if parts else ''}{_POSTURES[session.posture]}")
+    return parts
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %"

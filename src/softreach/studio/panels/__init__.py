@@ -1,1 +1,0 @@
-"""Widgets beside the scene, one concept a file."""

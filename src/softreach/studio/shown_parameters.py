@@ -1,0 +1,226 @@
+"""Parameters as a person reads them: on the sliders of a design, part by part, and in tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from typing import NamedTuple
+
+from softreach.arm.actuators import SectorActuator
+from softreach.arm.edits import ring_label
+from softreach.arm.file import in_file_terms
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.parameters import Parameter, parameters
+from softreach.support.errors import Fault, InvalidDesign, Range
+
+
+class ShownParameter(NamedTuple):
+    """A parameter of a design in the unit that a person reads."""
+
+    name: str
+    """Of the parameter."""
+    label: str
+    """With the unit."""
+    hint: str
+    """Symbol, unit and meaning."""
+    scale: float
+    """Units of the parameter per shown unit."""
+    shown: float
+    """The value in the shown unit; NaN where the design leaves it out."""
+    low: float = math.nan
+    """End of a slider in the shown unit, like all that follow; NaN without a slider."""
+    high: float = math.nan
+    step: float = math.nan
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Ends of the slider: wide enough for a design from a file."""
+        return min(self.low, self.shown), max(self.high, self.shown)
+
+
+class _Slider(NamedTuple):
+    label: str
+    low: float
+    high: float
+    step: float
+
+
+_OF_ARM = {
+    "revolution": _Slider("revolution Ω [deg]", 1, 360, 1),
+    "taper": _Slider("taper φ [deg]", -2, 5, 0.05),
+    "radius_ratio": _Slider("inner / outer radius", 0, 1, 0.01),
+    "outer_radius": _Slider("outer radius / L", 0.02, 0.12, 5e-4),
+    "extent": _Slider("extent σ [deg]", 2, 120, 1),
+    "lower": _Slider("lowest γ", -4, 0, 0.01),
+    "upper": _Slider("highest γ", -1, 2, 0.01),
+}
+_OF_PART = {
+    "bundles": _Slider("bundles of {owner}", 1, 6, 1),
+    "offset": _Slider("offset of {owner} [deg]", 0, 360, 1),
+    "distance_ratio": _Slider("distance of {owner} / outer radius", 0, 1, 0.01),
+    "radius_ratio": _Slider("radius of {owner} / outer radius", 0.01, 0.5, 0.005),
+}
+_AROUND_VALUE = ("lower", "upper", "young_modulus")
+"""Fields of any magnitude: their sliders end at multiples of what the design has."""
+_MORE = {
+    "extent": "σ is the angle of the cross-section that the bundle covers",
+    "offset": "the angle around the axis at which the bundle starts at the base",
+    "revolution": "the angle that a fiber turns around the axis from base to tip",
+    "taper": "the angle between the axis and the side of the body",
+    "bundles": "how many equal bundles stand around the axis, each with its own activation",
+    "lower": "the most that a bundle contracts",
+    "upper": "the most that a bundle extends",
+}
+_Unit = tuple[str, float]
+"""Name of a unit, and how many units of the parameter it is."""
+_DEGREES: _Unit = ("deg", math.radians(1))
+
+
+@lru_cache(maxsize=16)
+def slider_parameters(arm: Manipulator) -> tuple[ShownParameter, ...]:
+    """The parameters of a design that have sliders, those of the whole arm first.
+
+    What the design leaves open, such as a modulus that cancels, has none.
+    """
+    known = parameters(arm)
+    sliders: list[ShownParameter] = []
+    for owner in dict.fromkeys(one.owner for one in known.values()):
+        for field in dict.fromkeys((*(_OF_PART if owner else _OF_ARM), *_AROUND_VALUE)):
+            one = known.get(f"{owner}.{field}" if owner else field)
+            if one is not None and _is_offered(arm, known, one):
+                slider = _slider(one, one.value(arm))
+                sliders += [_on_slider(arm, one, slider)] if slider else []
+    return tuple(sliders)
+
+
+def _slider(one: Parameter, value: float) -> _Slider | None:
+    """Ends and label; None for what the design leaves open, or for a zero of unknown size."""
+    fixed = (_OF_PART if one.owner else _OF_ARM).get(one.field)
+    outside_arm = one.field == "distance_ratio" and value > 1
+    if fixed and one.unit in ("1", "rad", "m") and not outside_arm:
+        return fixed if math.isfinite(value) else None
+    return None if value == 0 or math.isnan(value) else _around(one, value)
+
+
+def _around(one: Parameter, value: float) -> _Slider:
+    """From zero, or near it where it is not allowed, to twice the value."""
+    owner = f" of {one.owner.removesuffix('.material')}" if one.owner else ""
+    unit, _ = _unit(one, {})
+    ends = (0.01 if one.field == "young_modulus" else 0.0) * value, 2 * value
+    return _Slider(_titled(f"{one.symbol}{owner}", unit), min(ends), max(ends), abs(value) / 100)
+
+
+def _is_offered(arm: Manipulator, known: Mapping[str, Parameter], one: Parameter) -> bool:
+    """Whether a parameter changes this arm, and no other slider does the same.
+
+    Only what is helical has a revolution to change; only what is not, its number of bundles.
+    """
+    if one.owner and one.field in ("lower", "upper"):
+        return one.field not in known
+    if one.field == "revolution":
+        return one.value(arm) != 0
+    turn = known.get(f"{one.owner}.revolution")
+    return one.field != "bundles" or turn is None or turn.value(arm) == 0
+
+
+def _on_slider(arm: Manipulator, one: Parameter, slider: _Slider) -> ShownParameter:
+    unit, scale = _unit(one, {"rad": _DEGREES, "m": ("L", arm.length)})
+    more = f"; {_MORE[one.field]}" if one.field in _MORE else ""
+    return ShownParameter(
+        one.name,
+        slider.label.replace("{owner}", one.owner),
+        f"{_titled(one.symbol, unit)}: {one.meaning}{more} (parameter {one.name})",
+        scale,
+        _value(one, arm, scale),
+        slider.low,
+        slider.high,
+        slider.step,
+    )
+
+
+class Part(NamedTuple):
+    """One thing that an arm consists of."""
+
+    label: str
+    """Name in the list of parts."""
+    owners: tuple[str, ...]
+    """Owners of its parameters."""
+    name: str
+    """Its own name, which may be empty."""
+    ring: int | None = None
+    """Index of a ring; None for all else."""
+    actuator: str = ""
+    """Name of an actuator; "" for all else."""
+    home: int | str | None = None
+    """The ring that an actuator is in."""
+
+
+def parts(arm: Manipulator) -> dict[str, Part]:
+    """Body, core, rings and actuators of an arm by their labels."""
+    listed = [Part("body", ("", "profile"), "")]
+    if arm.section.core is not None:
+        listed.append(Part("core", ("core",), ""))
+    for k, ring in enumerate(arm.section.rings):
+        owners = (f"rings[{k}]", f"rings[{k}].material")
+        listed.append(Part(ring_label(arm, k), owners, ring.name, ring=k))
+    labels = {part.label for part in listed}
+    for one in arm.actuators:
+        home = one.ring if isinstance(one, SectorActuator) else None
+        label = f"{one.name} (actuator)" if one.name in labels else one.name
+        listed.append(Part(label, (one.name,), one.name, actuator=one.name, home=home))
+    return {part.label: part for part in listed}
+
+
+@lru_cache(maxsize=16)
+def part_parameters(arm: Manipulator, part: Part) -> tuple[ShownParameter, ...]:
+    """The parameters of a part in the units in which they are typed."""
+    units = {"rad": _DEGREES, "m": ("mm", 1e-3), "Pa": ("kPa", 1e3)}
+    known = [one for one in parameters(arm).values() if one.owner in part.owners]
+    return tuple(_shown(arm, one, units, one.symbol, f"{one.meaning}: {one.name}") for one in known)
+
+
+def named_parameters(arm: Manipulator) -> list[ShownParameter]:
+    """All parameters of an arm under their own names, angles in degrees."""
+    known = parameters(arm).values()
+    return [_shown(arm, one, {"rad": _DEGREES}, one.name, one.meaning) for one in known]
+
+
+def _shown(
+    arm: Manipulator, one: Parameter, units: Mapping[str, _Unit], name: str, hint: str
+) -> ShownParameter:
+    unit, scale = _unit(one, units)
+    return ShownParameter(one.name, _titled(name, unit), hint, scale, _value(one, arm, scale))
+
+
+def _unit(one: Parameter, units: Mapping[str, _Unit]) -> _Unit:
+    return units.get(one.unit, ("" if one.unit == "1" else one.unit, 1.0))
+
+
+def _value(one: Parameter, arm: Manipulator, scale: float) -> float:
+    return float(f"{one.value(arm) / scale:.12g}")
+
+
+def _titled(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
+
+
+def refusal(error: InvalidDesign, shown: Iterable[ShownParameter]) -> str:
+    """Faults of a design, each number by the label and in the unit of its field.
+
+    Args:
+        error: What is wrong.
+        shown: The parameters that have fields.
+    """
+    known = {one.name: one for one in shown}
+    return "\n".join(_line(fault, known.get(fault.path)) for fault in error.faults)
+
+
+def _line(fault: Fault, shown: ShownParameter | None) -> str:
+    if shown is None or not isinstance(fault.value, int | float):
+        return str(in_file_terms(InvalidDesign([fault]), ""))
+    allowed = fault.allowed
+    if isinstance(allowed, Range):
+        scaled = {end: getattr(allowed, end) / shown.scale for end in ("low", "high")}
+        allowed = allowed._replace(unit="", **scaled)
+    return str(Fault(shown.label, fault.value / shown.scale, allowed))

@@ -1,0 +1,93 @@
+"""Activation of each bundle: a slider a bundle moves the arm."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from softreach.arm.manipulator import Manipulator
+from softreach.schema import activation_symbols
+from softreach.studio.captions import tip_text
+from softreach.studio.fields import Attribute, Fields, attribute
+from softreach.studio.rod import rod_of
+from softreach.studio.scene import MOST_BUNDLES
+from softreach.studio.state import StudioState
+from softreach.studio.widgets import Line
+
+if TYPE_CHECKING:
+    from viser import GuiApi
+
+    from softreach.studio.session import Session
+
+_MOST = 40
+"""Sliders: a page with hundreds takes minutes to build."""
+
+
+class ActivationPanel:
+    """Activations of the bundles within their bounds, and the place of the tip."""
+
+    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
+        self._ends: list[_SliderEnds] = []
+        self._design: Manipulator | None = None
+        self._sliders, self._others = Fields(session), Fields(session)
+        with tab:
+            self._tip = Line(gui)
+            self._folder = gui.add_folder("activation")
+            self._hidden = Line(gui)
+            self._others.checkbox(
+                "show trail", attribute("appearance.trail"), "Draws where the tip has been"
+            )
+            self._others.button(
+                "Rest",
+                lambda state: state.replace(activation=()),
+                "Sets every activation to 0, or the nearest to it",
+            )
+
+    def show(self, session: Session) -> None:
+        """Move the sliders to the state, and show where the tip is."""
+        self._others.show(session)
+        if session.state.design is not self._design:
+            self._design = session.state.design
+            self._fit(session)
+        self._sliders.show(session)
+        self._tip.say(*tip_text(session))
+
+    def _fit(self, session: Session) -> None:
+        """Make the sliders anew, unless the design has the same bundles within the same bounds."""
+        ends = _slider_ends(session.state.design)
+        if ends == self._ends:
+            return
+        self._ends = ends
+        self._sliders.remove()
+        self._sliders = Fields(session)
+        with self._folder:
+            for bundle, (label, low, high) in enumerate(ends[:_MOST]):
+                room = 1e-6 * max(1.0, abs(low))
+                upper = max(high, low + room)  # a slider needs room; the state keeps to the bounds
+                hint = f"{label}: activation of a bundle, from {low:g} to {upper:g}; 0 is at rest"
+                step = 10.0 ** (math.floor(math.log10(upper - low)) - 3)  # round
+                self._sliders.slider(label, (low, upper), step, _activation(bundle), hint)
+        hidden = len(ends) - _MOST
+        drawn = "" if len(ends) <= MOST_BUNDLES else "; no bundle is drawn"
+        text = f"{hidden} more bundles have no slider here{drawn}."
+        self._hidden.say(*([text] if hidden > 0 else []))
+
+
+def _activation(bundle: int) -> Attribute:
+    def write(state: StudioState, value: float) -> StudioState:
+        before = state.activation
+        return state.replace(activation=(*before[:bundle], value, *before[bundle + 1 :]))
+
+    return Attribute(lambda state: state.activation[bundle], write)
+
+
+_SliderEnds = tuple[str, float, float]
+"""Label and bounds of a bundle."""
+
+
+def _slider_ends(arm: Manipulator) -> list[_SliderEnds]:
+    symbols = activation_symbols(arm.bundle_units)
+    units = (f" [{unit}]" if unit != "1" else "" for unit in arm.bundle_units)
+    labels = zip(symbols, arm.bundle_names, units, strict=True)
+    bounds = rod_of(arm).box.bounds
+    return [("{} {}{}".format(*label), *ends) for label, ends in zip(labels, bounds, strict=True)]

@@ -1,0 +1,119 @@
+"""Sliders of the design, and a reference to compare it with."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Any
+
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.parameters import changed
+from softreach.studio.captions import reach_text
+from softreach.studio.fields import Attribute, Fields, attribute, bind_button
+from softreach.studio.markup import Part
+from softreach.studio.reach import beside
+from softreach.studio.shown_parameters import ShownParameter, refusal, slider_parameters
+from softreach.studio.state import StudioState
+from softreach.studio.widgets import Line, SliderField
+from softreach.support.errors import InvalidDesign, SoftreachError
+
+if TYPE_CHECKING:
+    from viser import GuiApi
+
+    from softreach.studio.session import Session
+
+_ABOUT_KEEP = "Keeps what the design reaches now, in gray, to compare others with"
+_ABOUT_BESIDE = "Stands the reference beside the design, pulled as the design is"
+
+
+class DesignPanel:
+    """All sliders of a design together; a change may be valid only together with others."""
+
+    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
+        self._session, self._lock = session, threading.RLock()
+        self._rows: list[tuple[ShownParameter, SliderField]] = []
+        self._base: Manipulator | None = None
+        """The design that the sliders were made for."""
+        self._made: Manipulator | None = None
+        """The design that they made of it last."""
+        self._revision, self._refused = -1, False
+        self._sliders, self._others = Fields(session), Fields(session)
+        with tab:
+            self._folder = gui.add_folder("design")
+            with gui.add_folder("compare"):
+                self._reference = Line(gui)
+                self._others.button(
+                    "Keep this design as reference",
+                    lambda state: state.replace(reference=state.design),
+                    _ABOUT_KEEP,
+                )
+                beside_box = self._others.checkbox(
+                    "side by side", attribute("side_by_side"), _ABOUT_BESIDE
+                )
+                clear = gui.add_button("Forget the reference", hint="Takes the reference away")
+        bind_button(clear, session, self._forget)
+
+        def stepped(event: Any) -> None:
+            if event.client_id is not None and session.state.reference is not None:
+                self._step(beside_box.value)
+
+        beside_box.on_update(stepped)
+
+    def show(self, session: Session) -> None:
+        """Show the reference; make the sliders anew for a design that they did not make."""
+        self._reference.say(*_reference_text(session))
+        self._others.show(session)
+        with self._lock:
+            if session.revision != self._revision:
+                self._revision = session.revision
+                if session.state.design != self._made or self._refused:
+                    self._build(session.state.design)
+
+    def _forget(self) -> None:
+        if self._session.state.side_by_side and self._session.state.reference is not None:
+            self._step(False)
+        self._session.update(lambda s: s.replace(reference=None, side_by_side=False))
+
+    def _step(self, back: bool) -> None:
+        """Move the eye so that two clouds side by side fit; or to where it was."""
+        session = self._session
+        if session.reach is not None:
+            shift = beside(session.reach)
+            (session.eye.step_back if back else session.eye.step_forth)(shift)
+
+    def _build(self, arm: Manipulator) -> None:
+        self._sliders.remove()
+        self._base = self._made = arm
+        self._refused = False
+        self._sliders = Fields(self._session, words=self._words)
+        with self._folder:
+            self._rows = [(one, self._slider(one)) for one in slider_parameters(arm)]
+
+    def _slider(self, one: ShownParameter) -> SliderField:
+        at = Attribute(lambda _: one.shown, lambda state, _: self._changed(state))
+        return self._sliders.slider(one.label, one.limits, one.step, at, one.hint)
+
+    def _changed(self, state: StudioState) -> StudioState:
+        """The design of all sliders; a slider may show rounded what stays as it is."""
+        with self._lock:
+            assert self._base is not None
+            values = {
+                one.name: field.value * one.scale
+                for one, field in self._rows
+                if field.value != one.shown
+            }
+            self._refused = True
+            new = state.replace(design=changed(self._base, values))
+            self._refused, self._made = False, new.design
+        return new
+
+    def _words(self, error: SoftreachError) -> str:
+        if not isinstance(error, InvalidDesign):
+            return str(error)
+        return refusal(error, [one for one, _ in self._rows])
+
+
+def _reference_text(session: Session) -> tuple[Part, ...]:
+    if session.reference is None:
+        return ("No reference is kept.",)
+    where = "reference" if session.state.side_by_side else "reference (gray)"
+    return (f"{where}: ", *reach_text(session.reference))

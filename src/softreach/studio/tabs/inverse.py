@@ -1,0 +1,187 @@
+"""Inverse problem: every activation that reaches a place, and the ball that drags the tip."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.arm.manipulator import Manipulator
+from softreach.rod.kinematics import tip_positions
+from softreach.studio.fields import Fields, attempt, attribute, bind_button
+from softreach.studio.grip import Grip
+from softreach.studio.picking import picked_point
+from softreach.studio.reach import cloud_points, shown_samples
+from softreach.studio.rod import rod_of
+from softreach.studio.slicing import in_slice
+from softreach.studio.state import StudioState
+from softreach.studio.widgets import VECTOR, Line, TypedField
+
+if TYPE_CHECKING:
+    from viser import GuiApi
+
+    from softreach.inverse import Solution
+    from softreach.studio.session import Session
+
+_DRAG_HINT = "Drag the ball on the tip: the arm follows on its branch of solutions."
+_HINT = "Drag the tip, type a target, or let a click on the cloud set it."
+_ABOUT_CLICKS = "off: a click in the scene changes nothing"
+_NEAR = 1e-4
+"""Change of activation, in ranges, below which the arm is in a solution."""
+
+
+class DragPanel:
+    """The ball on the tip, and the choice to show it."""
+
+    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
+        self._grip = Grip(session.client.scene, session.pull_tip)
+        self._fields = Fields(session)
+        with tab:
+            self._text = Line(gui, _DRAG_HINT)
+            self._fields.checkbox("handle on the tip", attribute("appearance.handle"), _DRAG_HINT)
+
+    def show(self, session: Session) -> None:
+        """Keep the ball on the tip."""
+        self._fields.show(session)
+        state, drag, arm = session.state, session.tip_pull, session.state.design
+        look = state.appearance
+        grasped = look.handle and look.arm and rod_of(arm).box.dimension > 0
+        radius = float(arm.profile.radius(arm.length)) / arm.length
+        self._grip.move(session.tip if grasped else None, radius, dark=look.dark)
+        if drag is None:
+            self._text.say(_DRAG_HINT)
+            self._grip.show_lag(None, None)
+            return
+        gap = drag.pulled.gap / arm.length
+        short = f"This branch ends {gap:.3f} L short of the pointer."
+        self._text.say(short if gap else _DRAG_HINT)
+        self._grip.show_lag(drag.wanted, drag.pulled.tip / arm.length, gap)
+
+
+class InversePanel:
+    """The target, and the activations that reach it."""
+
+    def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
+        self._gui, self._session, self._fields = gui, session, Fields(session)
+        self._answer: Solution | None = None
+        self._buttons: list[tuple[Any, Any]] = []
+        with tab:
+            self._text = Line(gui, _HINT)
+            self._target = TypedField(
+                gui, "target / L", (0.0, 0.0, 1.0), "Where the tip should go [L]", VECTOR
+            )
+            self._clicks = gui.add_checkbox("clicks set the target", False, hint=_ABOUT_CLICKS)
+            solve = gui.add_button("Solve", hint="Finds every activation that reaches the target")
+            self._fields.checkbox(
+                "show all shapes",
+                attribute("appearance.ghosts"),
+                "Draws the arm in every solution at once",
+            )
+            self._folder = gui.add_folder("activations that reach it", visible=False)
+            self._fields.button(
+                "Clear",
+                lambda state: state.replace(target=None),
+                "Takes target and solutions away",
+            )
+        bind_button(solve, session, self._solve_typed)
+        self._target.on_update(lambda _: attempt(session, self._solve_typed))
+
+    def show(self, session: Session) -> None:
+        """List the solutions, and mark the one that the arm is in."""
+        self._fields.show(session)
+        if session.answer is not self._answer:
+            self._answer = session.answer
+            self._list(session.answer)
+        for activation, button in self._buttons:
+            button.color = "green" if _is_near(activation, session.state) else None
+
+    def _list(self, answer: Solution | None) -> None:
+        for _, button in self._buttons:
+            button.remove()
+        self._buttons, self._folder.visible = [], answer is not None and len(answer) > 0
+        self._text.say(_HINT)
+        if answer is not None:
+            arm = self._session.state.design
+            self._target.value = tuple((answer.target / arm.length).tolist())
+            self._text.say(_answer_text(answer, arm))
+            with self._folder:
+                self._buttons = [(row, self._button(row)) for row in answer.activations]
+
+    def click(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
+        """Aim at the point of the cloud under the cursor, if clicks are to do that.
+
+        Returns:
+            Whether they are, and there is one.
+        """
+        session = self._session
+        number = clicked_point(session, origin, direction) if self._clicks.value else None
+        if number is None or session.reach is None:
+            return False
+        reach, level = session.reach, session.state.appearance.level
+        activation = reach.cloud.activation.values[shown_samples(reach, level)][number]
+        attempt(session, lambda: session.aim(_tip(reach.arm, activation)))
+        return True
+
+    def _solve_typed(self) -> None:
+        length = self._session.state.design.length
+        self._session.aim(length * np.asarray(self._target.value))
+
+    def _button(self, activation: Any) -> Any:
+        target = tuple(activation.tolist())
+        button = self._gui.add_button(
+            ", ".join(f"{value:.4g}" for value in target), hint="Moves the arm to this solution"
+        )
+        take = lambda: self._session.update(lambda s: s.replace(activation=target))  # noqa: E731
+        bind_button(button, self._session, take)
+        return button
+
+
+def clicked_point(
+    session: Session, origin: Sequence[float], direction: Sequence[float]
+) -> int | None:
+    """Number of the point of the cloud that a ray hits, of those that are seen; None without one.
+
+    Args:
+        session: Of the tab.
+        origin: The eye [L].
+        direction: Of the ray, any length.
+    """
+    reach, look = session.reach, session.state.appearance
+    if reach is None or not look.cloud or reach.arm != session.state.design:
+        return None
+    points = cloud_points(reach, look.level)
+    seen: NDArray[np.bool_] = in_slice(points, look.slice) & ~session.scene.clouds.hidden(points)
+    numbers = np.flatnonzero(seen)
+    hit = picked_point(points[numbers], origin, direction, 0.01 * session.eye.narrowness)
+    return None if hit is None else int(numbers[hit])
+
+
+def _is_near(activation: Any, state: StudioState) -> bool:
+    scales = np.maximum(np.ptp(rod_of(state.design).box.bounds, axis=1), 1e-12)
+    return bool((np.abs(activation - state.activation) <= _NEAR * scales).all())
+
+
+def _tip(arm: Manipulator, activation: Any) -> Any:
+    """Exact place of a sample [m]: its point is rounded, at the rim perhaps to out of reach."""
+    return tip_positions(arm, [activation])[0]
+
+
+def _answer_text(answer: Solution, arm: Manipulator) -> str:
+    """Result of a solution in words."""
+    place = _place(answer.target / arm.length)
+    if not len(answer):
+        certain = "out of reach" if answer.status == 1 else "not reached, perhaps out of reach"
+        near = _place(answer.nearest / arm.length)
+        return f"{place} is {certain}. Nearest: {near}, {answer.gap / arm.length:.4g} L away."
+    count = "1 activation reaches" if len(answer) == 1 else f"{len(answer)} activations reach"
+    names = ", ".join(arm.bundle_names)
+    return (
+        f"{count} {place} to {answer.residuals.max() / arm.length:.1e} L. "
+        f"Press one ({names}) to move the arm there; green is where it is."
+    )
+
+
+def _place(point: Any) -> str:
+    return "({:.4f}, {:.4f}, {:.4f}) L".format(*point)

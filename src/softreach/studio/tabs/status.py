@@ -1,0 +1,120 @@
+"""Status of the design above all tabs: its numbers, the key to colors, and undo, redo, reset."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from softreach.studio.captions import legend_text, loads_text, reach_text
+from softreach.studio.colors import key_html
+from softreach.studio.fields import attempt, bind_button
+from softreach.studio.markup import Part, Strong, fields_style
+from softreach.studio.widgets import Line
+
+if TYPE_CHECKING:
+    from viser import GuiApi
+
+    from softreach.studio.session import Session
+
+_HISTORY_HINT = (
+    "Undo and redo changes of design, activation and target (Ctrl+Z, Ctrl+Shift+Z; Cmd on a Mac); "
+    "reset to what the studio was opened on. The view stays."
+)
+_CANCEL, _GO_ON = "Cancel", "Compute what is missing"
+_ABOUT_CANCEL = "Stops what is being computed; what is complete stays. Every change starts anew."
+
+
+class StatusPanel:
+    """Numbers, key and notes above all tabs."""
+
+    def __init__(self, gui: GuiApi, session: Session) -> None:
+        Line(gui).show(fields_style())
+        self._numbers = Line(gui, "computing ...")
+        self._comparison = Line(gui)
+        self._key = Line(gui)
+        self._legend = Line(gui)
+        self._refusal = Line(gui)
+        self._coarser = Line(gui)
+        self._note = Line(gui)
+        self._cancel = gui.add_button(_CANCEL, disabled=True, hint=_ABOUT_CANCEL)
+        bind_button(self._cancel, session, lambda: _stop_or_go_on(session))
+
+    def show(self, session: Session) -> None:
+        """Show what is known, and whether it is about to change."""
+        self._numbers.say(*_numbers_text(session))
+        self._comparison.say(*loads_text(session))
+        self._key.show(key_html(session.key))
+        self._explain_marks(session)
+        self._note.say(*((session.note,) if session.note else ()))
+        self._offer(session)
+
+    def _offer(self, session: Session) -> None:
+        """Offer to cancel or to go on; the button keeps its place, so that nothing jumps."""
+        busy, lacking = session.busy, is_behind(session) and not session.refusal
+        label, disabled = _CANCEL if busy or not lacking else _GO_ON, not (busy or lacking)
+        if self._cancel.label != label:
+            self._cancel.label = label
+        if self._cancel.disabled != disabled:
+            self._cancel.disabled = disabled
+
+    def _explain_marks(self, session: Session) -> None:
+        reach = session.reach
+        free = session.state.appearance.free and session.free is not None
+        self._legend.say(*(legend_text(reach, free=free) if reach is not None else ()))
+        refusal = reach.refusal if reach is not None else ""
+        self._refusal.say(*((f"No exact volume: {refusal}",) if refusal else ()))
+        notes = reach.notes if reach is not None and reach.fine else ()
+        self._coarser.say(*((f"{'; '.join(notes)}.",) if notes else ()))
+
+
+def is_behind(session: Session) -> bool:
+    """Whether results of the design in the fields are missing."""
+    reach = session.reach
+    return reach is None or reach.arm != session.state.design or not reach.fine
+
+
+def _numbers_text(session: Session) -> list[Part]:
+    reach, work = session.reach, _work(session)
+    if reach is None:
+        return [session.refusal or work]
+    hull = reach.alpha_volume if session.state.appearance.alpha_shape else None
+    parts = [*reach_text(reach), *([f" · α-shape {hull:.4f} L³"] if hull is not None else [])]
+    if reach.arm != session.state.design:
+        parts = [Strong("of the design before: "), *parts]
+    return [*parts, *([f" · {work}"] if work else [])]
+
+
+def _work(session: Session) -> str:
+    """Work in progress; that there is none, where something is missing."""
+    if session.compiling:
+        return "compiling, once on this machine ..."
+    if session.doing:
+        return f"{session.doing} ..."
+    if not is_behind(session):
+        return ""
+    if session.busy:
+        return "computing ..."
+    return "canceled" if session.canceled else "not computed"
+
+
+def _stop_or_go_on(session: Session) -> None:
+    (session.cancel if session.busy else session.resume)()
+
+
+def add_history(gui: GuiApi, session: Session) -> None:
+    """Add undo, redo and reset: a row of buttons, and keys; text fields keep their own undo."""
+    actions: dict[str, Callable[[], None]] = {
+        "Undo": lambda: session.step(back=True),
+        "Redo": lambda: session.step(back=False),
+        "Reset": session.reset,
+    }
+    row = gui.add_button_group("history", tuple(actions), hint=_HISTORY_HINT)
+    row.on_click(lambda _: attempt(session, actions[row.value]))
+    again: Any = "cmd/ctrl+shift"
+    commands = {
+        "Undo": gui.add_command("Undo", hotkey="Z", modifier="cmd/ctrl"),
+        "Redo": gui.add_command("Redo", hotkey="Z", modifier=again),
+        "Reset": gui.add_command("Reset the design"),
+    }
+    for name, command in commands.items():
+        command.on_trigger(lambda _, name=name: attempt(session, actions[name]))

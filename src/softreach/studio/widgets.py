@@ -1,0 +1,224 @@
+"""Widgets that viser lacks: lines of text, pictures that change, and fields for typed numbers.
+
+Numbers are typed into texts: viser's own number fields drop the sign of "-0.5" and the exponent of
+"1e-5" while one types, and round to the step of a slider. Texts are sent as they are, and a form
+tells when Enter is pressed.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.studio import markup
+
+if TYPE_CHECKING:
+    from viser import GuiApi
+
+_PRECISION = 12
+"""Digits after the point that viser leaves of what a slider holds."""
+_UNAPPLIED = "Enter applies it."
+
+
+class Line:
+    """Line of text, shown as it is; without text it takes no room."""
+
+    def __init__(self, gui: GuiApi, *parts: markup.Part) -> None:
+        self._widget = gui.add_html(markup.paragraph(*parts), visible=bool(parts))
+
+    def say(self, *parts: markup.Part) -> None:
+        """Show text, some of it bold."""
+        self.show(markup.paragraph(*parts))
+
+    def warn(self, text: str) -> None:
+        """Show in red what is wrong; "" for nothing."""
+        self.show(markup.alert(text) if text else "")
+
+    def show(self, content: str) -> None:
+        """Show what `markup` made."""
+        if self._widget.content != content:
+            self._widget.content = content
+        if self._widget.visible != bool(content):
+            self._widget.visible = bool(content)
+
+    def remove(self) -> None:
+        """Take the line away."""
+        self._widget.remove()
+
+
+class PictureFrame:
+    """Place for a picture that changes, empty until there is one."""
+
+    def __init__(self, gui: GuiApi, container: Any) -> None:
+        self._gui, self._container = gui, container
+        self._widget: Any = None
+        self._shown: NDArray[np.uint8] | None = None
+
+    def show(self, image: NDArray[np.uint8]) -> None:
+        """Show a picture, RGB from 0 to 255, shape (rows, columns, 3)."""
+        if image is self._shown:
+            return
+        self._shown = image
+        if self._widget is None:
+            with self._container:
+                self._widget = self._gui.add_image(image, format="png")
+        else:
+            self._widget.image = image
+
+
+def number_of(text: str) -> float | None:
+    """The finite number that a text is, with a minus of any kind; None if it is none."""
+    try:
+        value = float(text.strip().replace("\N{MINUS SIGN}", "-").replace(",", "."))
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _number_text(value: float) -> str:
+    return f"{value:.12g}"
+
+
+def vector_of(text: str) -> tuple[float, ...] | None:
+    """The three finite numbers that a text lists; None if it does not."""
+    numbers = [number_of(part) for part in text.replace(";", ",").replace(",", " ").split()]
+    finite = tuple(value for value in numbers if value is not None)
+    return finite if len(numbers) == len(finite) == 3 else None
+
+
+class TextKind(NamedTuple):
+    """Kind of value that is typed."""
+
+    demand: str
+    """Demand on a text, as in "must be a number"."""
+    value: Callable[[str], Any]
+    """From a text; None if it is no such value."""
+    text: Callable[[Any], str]
+    """From a value, as a person would type it."""
+
+
+NUMBER = TextKind("a number", number_of, _number_text)
+VECTOR = TextKind(
+    "three numbers, such as 0, 0, -9.81",
+    vector_of,
+    lambda values: ", ".join(map(_number_text, values)),
+)
+
+
+class TypedField:
+    """Text field for a value, applied by Enter and by leaving it; below it a line for refusals."""
+
+    def __init__(
+        self, gui: GuiApi, label: str, value: Any, hint: str, kind: TextKind = NUMBER
+    ) -> None:
+        self._kind, self._value = kind, value
+        self._lock = threading.RLock()
+        self._callbacks: list[Callable[[Any], object]] = []
+        self._form = gui.add_form(None)
+        with self._form:
+            self._text = gui.add_text(label, kind.text(value), hint=hint)
+        self._message = Line(gui)
+        self._text.on_update(self._typed)
+        self._form.on_submit(self._submitted)
+
+    @property
+    def value(self) -> Any:
+        """The value that was applied last."""
+        return self._value
+
+    @value.setter
+    def value(self, value: Any) -> None:
+        with self._lock:
+            same, text = value == self._value, self._kind.text(value)
+            self._value = value
+            if not same or self._text.value != text:
+                self._text.value = text
+                self._message.warn("")
+        self._follow()
+
+    def on_update(self, callback: Callable[[Any], object]) -> None:
+        """Call back with the event when a person has applied a value."""
+        self._callbacks.append(callback)
+
+    def warn(self, text: str) -> None:
+        """Say under the field why its value is refused; "" for nothing."""
+        self._message.warn(text)
+
+    def remove(self) -> None:
+        """Take the field away."""
+        self._text.remove()
+        self._form.remove()
+        self._message.remove()
+
+    def _typed(self, event: Any) -> None:
+        if event.client_id is not None:
+            unapplied = self._text.value != self._kind.text(self._value)
+            self._message.say(*((_UNAPPLIED,) if unapplied else ()))
+
+    def _submitted(self, event: Any) -> None:
+        value = self._kind.value(self._text.value)
+        if value is None:
+            self._message.warn(f"{self._text.value!r}: must be {self._kind.demand}")
+            return
+        with self._lock:
+            self._value = value
+            self._message.warn("")
+        self._apply(event)
+
+    def _apply(self, event: Any) -> None:
+        self._follow()
+        for callback in self._callbacks:
+            callback(event)
+
+    def _follow(self) -> None:
+        """Bring what else shows the value in line with it."""
+
+
+class SliderField(TypedField):
+    """Number that is dragged, or typed: also beyond the ends of its slider."""
+
+    def __init__(
+        self,
+        gui: GuiApi,
+        label: str,
+        ends: tuple[float, float],
+        step: float,
+        value: float,
+        hint: str = "",
+    ) -> None:
+        self._ends = ends
+        self._slider = gui.add_slider(label, *ends, step, self._within(value), hint=hint or None)
+        self._slider.precision = _PRECISION
+        self._thumb = self._slider.value
+        super().__init__(gui, "", value, hint)
+        self._slider.on_update(self._dragged)
+
+    def remove(self) -> None:
+        """Take the slider and its field away."""
+        self._slider.remove()
+        super().remove()
+
+    def _dragged(self, event: Any) -> None:
+        # A page also reports sliders that were only drawn anew.
+        if event.client_id is None or self._slider.value == self._thumb:
+            return
+        with self._lock:
+            self._value = self._thumb = self._slider.value
+            self._text.value = self._kind.text(self._value)
+            self._message.warn("")
+        self._apply(event)
+
+    def _follow(self) -> None:
+        """Move the thumb to the value, or to the end that is nearest."""
+        thumb = self._within(self._value)
+        if thumb != self._thumb:
+            self._thumb = self._slider.value = thumb
+
+    def _within(self, value: float) -> float:
+        low, high = self._ends
+        return min(max(value, low), high)

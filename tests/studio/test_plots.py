@@ -1,0 +1,83 @@
+"""Plots as they are declared: what makes them stale, and what is computed of them."""
+
+from __future__ import annotations
+
+from operator import attrgetter
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import softreach as sr
+from softreach.arm import Loads, designs
+from softreach.studio.jobs import JOBS, what_follows
+from softreach.studio.jobs.plots import PLOT_JOBS, plots_from
+from softreach.studio.plots import PLOTS
+from softreach.studio.plots.along_arm import AlongArmPlot, along_arm
+from softreach.studio.plots.plot import Figures
+from softreach.studio.settings import PlotSettings
+from softreach.studio.state import StudioState
+
+STATE = StudioState(design=designs.minimal_trunk())
+MOVED = STATE.replace(activation=(-1.0, 0.0, -0.5))
+SHOWN = PlotSettings(shown=(AlongArmPlot.name,))
+
+
+class Session(SimpleNamespace):
+    """Session that counts what it shows."""
+
+    def __init__(self, state: StudioState) -> None:
+        super().__init__(state=state, figures=Figures(), shown=0)
+
+    def show(self) -> None:
+        self.shown += 1
+
+
+def job_of(plot, state):
+    return PLOT_JOBS[PLOTS.index(plot)](Session(state))
+
+
+def test_a_name_is_of_one_plot_and_what_it_depends_on_is_in_the_state():
+    assert len({plot.name for plot in PLOTS}) == len({plot.label for plot in PLOTS}) == len(PLOTS)
+    for plot in PLOTS:
+        assert attrgetter(*plot.depends_on)(STATE) is not None
+
+
+@pytest.mark.parametrize("plot", PLOTS)
+def test_only_what_is_shown_becomes_stale(plot):
+    job = PLOT_JOBS[PLOTS.index(plot)]
+    assert job in JOBS
+    shown = STATE.showing(plots=PlotSettings(shown=(plot.name,)))
+    assert job in what_follows(STATE, shown)
+    assert job not in what_follows(STATE, MOVED)
+    depends = "activation" in plot.depends_on
+    assert (job in what_follows(shown, shown.replace(activation=MOVED.activation))) == depends
+
+
+def test_plots_are_asked_for_by_what_they_are_computed_from():
+    for source in ("reach", "answer"):
+        jobs = [job for plot, job in zip(PLOTS, PLOT_JOBS, strict=True) if source in plot.sources]
+        assert list(plots_from(source)) == jobs != []
+
+
+def test_a_plot_is_computed_only_while_it_is_shown():
+    for settings, count in ((PlotSettings(), 0), (SHOWN, 1)):
+        job = job_of(AlongArmPlot, MOVED.showing(plots=settings))
+        job.run(lambda: None)
+        assert (len(job.session.figures.plots), job.session.shown) == (count, count)
+
+
+def test_curvature_along_the_arm_is_that_of_its_shape():
+    values = along_arm(MOVED.design, MOVED.activation)
+    shape = sr.configuration(MOVED.design, MOVED.activation, len(values.station))
+    bending = np.linalg.norm(shape.curvature.values[:, :2], axis=1) * MOVED.design.length
+    np.testing.assert_allclose(values.bending, bending, atol=1e-9)
+    np.testing.assert_allclose(values.extension, shape.extension.values, atol=1e-12)
+
+
+@pytest.mark.filterwarnings("ignore:the load number is above")
+def test_an_arm_that_cannot_be_computed_has_no_curves():
+    heavy = designs.lce_arm().replace(loads=Loads(gravity=(0.0, 0.0, 9.81), payload=1.0))
+    values = along_arm(heavy, [0.0] * heavy.bundles)
+    assert values.arm == heavy
+    assert np.isnan(values.extension).all()
