@@ -409,8 +409,7 @@ def test_json_has_null_where_there_is_no_number(capsys):
 class TestList:
     @pytest.mark.parametrize("kind", ["designs", "materials", "metrics"])
     def test_the_names_are_those_of_the_library(self, kind, capsys):
-        from softreach.arm.materials import material_names
-
+        from softreach.arm.material import material_names
         from softreach.atlas.metrics import METRIC_GROUPS
 
         names = {

@@ -8,8 +8,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from softreach.arm.actuators import SectorActuator
+from softreach.arm.design_file import in_file_terms
 from softreach.arm.edits import ring_label
-from softreach.arm.file import in_file_terms
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import Parameter, parameters
 from softreach.support.errors import Fault, InvalidDesign, Range

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from softreach.arm.file import in_file_terms
-from softreach.arm.loads import Loads
+from softreach.arm.design_file import in_file_terms
+from softreach.arm.loads import GRAVITY, Loads
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.weight import GRAVITY
 from softreach.studio.captions import tip_text
 from softreach.studio.fields import Attribute, Fields, attribute
 from softreach.studio.state import Vector, vector

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from softreach.arm import designs, edits
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.materials import material_names
+from softreach.arm.material import material_names
 from softreach.arm.parameters import changed
 from softreach.studio.fields import Attribute, Fields
 from softreach.studio.shown_parameters import (
