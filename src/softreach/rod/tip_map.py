@@ -262,8 +262,10 @@ class ArmRod(TipMap):
     def prepare(self) -> None:
         """Compute what every sample needs, once for all threads."""
         known = vars(self)
-        if "_is_prepared" not in known:
-            with known.setdefault("_lock", RLock()):
+        if "_is_prepared" in known:
+            return
+        with known.setdefault("_lock", RLock()):
+            if "_is_prepared" not in known:
                 self._prepare()
                 known["_is_prepared"] = True
 

@@ -183,12 +183,10 @@ class LoadedRod(ArmRod):
         return self._shapes(gamma, z, status).frames
 
     def _shapes(self, gamma: Array, z: Array, status: Status | None) -> Shapes:
-        """Shapes of the equilibria that `tips` finds, at ascending stations."""
-        known = self.equilibria(gamma)
-        shapes = self._shape_solver.shapes(gamma, z, known)
+        """Shapes at ascending stations; each equilibrium is found once."""
+        shapes = self._shape_solver.shapes(gamma, z, status=status)
         if status is not None:
-            lost = np.isnan(shapes.frames.position[:, 0, 0])
-            status[:] = np.where(lost, TipStatus.NO_EQUILIBRIUM, known.status)
+            status[np.isnan(shapes.frames.position[:, 0, 0])] = TipStatus.NO_EQUILIBRIUM
         return shapes
 
     def strains_at(self, stations: ArrayLike) -> Callable[..., Strains]:

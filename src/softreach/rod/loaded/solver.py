@@ -266,13 +266,21 @@ class Solver:
         shapes = shapes_of(tips, trace, rows, self._force_at(table, rows), at_tip)
         return shapes.frames.directors[:, 0, 2]
 
-    def shapes(self, gamma: Array, stations: Array, known: Equilibria | None = None) -> Shapes:
+    def shapes(
+        self,
+        gamma: Array,
+        stations: Array,
+        known: Equilibria | None = None,
+        *,
+        status: NDArray[np.int8] | None = None,
+    ) -> Shapes:
         """Arms at ascending stations Z [m]; NaN where there is no equilibrium.
 
         Args:
             gamma: Activations (n, bundles).
             stations: Ascending Z [m].
             known: Their equilibria, with these steps or others.
+            status: Room for the `TipStatus` of each, shape (n,).
         """
         edges = self.tables.edges(stations, self.steps)
         table, z = self.tables.of_edges(edges), self.tables.arm.profile.station(edges)
@@ -283,6 +291,8 @@ class Solver:
             at = gamma[block]
             equilibria = self.find(at) if known is None else known.of(block)
             shapes.put(block, self._shapes_of(at, equilibria, stations, table, rows))
+            if status is not None:
+                status[block] = equilibria.status
 
         size = max(1, _TRACED // (len(edges) * TRACE))
         parallel.run(partial(fill, block) for block in parallel.blocks(len(gamma), size))
