@@ -78,6 +78,14 @@ def test_removing_a_ring_leaves_actuators_in_theirs(silicone):
         edits.without_ring(arm, 2)
 
 
+def test_an_actuator_moves_into_another_ring_alone(silicone):
+    arm = edits.with_ring(silicone)
+    moved = edits.with_actuator_ring(arm, "left", 1)
+    assert [arm.section.rings.index(arm.section.ring(one.ring)) for one in moved.actuators] == [
+        int(one.name == "left") for one in arm.actuators
+    ]
+
+
 def test_renaming_a_ring_keeps_its_actuators(silicone):
     named = edits.with_ring_name(silicone, 0, "skin")
     inside = named.replace(actuators=tuple(one.replace(ring="skin") for one in named.actuators))

@@ -8,7 +8,12 @@ from hypothesis import given
 from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.parameters import changed, find_parameter
-from softreach.studio.shown_parameters import slider_parameters
+from softreach.studio.shown_parameters import (
+    named_parameters,
+    part_parameters,
+    parts,
+    slider_parameters,
+)
 from tests.laws import arm_of, arms
 
 
@@ -60,3 +65,19 @@ def test_forces_and_moduli_have_sliders_of_their_size():
 
 def test_what_a_design_leaves_open_has_no_slider(trunk):
     assert not [control for control in slider_parameters(trunk) if "modulus" in control.name]
+
+
+def test_sliders_of_a_design_are_made_once(trunk):
+    assert slider_parameters(trunk) is slider_parameters(
+        changed(trunk, {"taper": find_parameter(trunk, "taper").value(trunk)})
+    )
+
+
+@pytest.mark.parametrize("design", designs.__all__)
+def test_a_parameter_is_shown_in_one_part_and_is_its_value_in_the_unit_that_is_shown(design):
+    arm = getattr(designs, design)()
+    typed = [one for part in parts(arm).values() for one in part_parameters(arm, part)]
+    assert len({one.name for one in typed}) == len(typed)
+    for one in [*typed, *named_parameters(arm)]:
+        value = find_parameter(arm, one.name).value(arm)
+        assert one.shown * one.scale == pytest.approx(value, rel=1e-11, nan_ok=True)
