@@ -21,7 +21,7 @@ from tests.studio.test_handle_in_browser import pose
 from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.studio import Studio
-from softreach.studio.source import start_on_design
+from softreach.studio.start import start_on_design
 from softreach.studio.wishes import PlotView
 
 PICTURES = Path(__file__).parent.parent / "docs" / "images"

@@ -16,13 +16,11 @@ from softreach.cloud.clouds import compute_cloud, save_cloud
 from softreach.export import export_cloud
 from softreach.plot.style import pyplot
 from softreach.studio.atlas_map import atlas_map, held_places, map_choices, metric_names
-from softreach.studio.colors import sample_values
 from softreach.studio.files import cloud_file, figure_file, state_from, surface_file
 from softreach.studio.page import static_page
-from softreach.studio.reach import Quality
-from softreach.studio.slicing import in_slice
-from softreach.studio.source import start_on_design, start_on_state, start_on_store
-from softreach.studio.stages import stages
+from softreach.studio.reach import Quality, stages
+from softreach.studio.scene.clouds import in_slice, sample_values
+from softreach.studio.start import start_on_design, start_on_state, start_on_store
 from softreach.studio.state import MapView, Slice, StudioState
 from softreach.support.errors import InvalidDesign, InvalidInput
 

@@ -10,9 +10,9 @@ import pytest
 from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.cli.studio import _start, _work
-from softreach.studio.kept_work import KeptWork, work_on
 from softreach.studio.reach import Size
 from softreach.studio.snapshots import Numbers, Snapshot, Snapshots
+from softreach.studio.start import KeptWork, work_on
 from softreach.studio.state import StudioState
 from softreach.support.errors import InvalidInput
 

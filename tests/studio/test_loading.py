@@ -10,7 +10,6 @@ import pytest
 import softreach as sr
 from softreach.arm import designs
 from softreach.rod.tip_map import TipStatus
-from softreach.studio.effort import affordable_level
 from softreach.studio.loading import (
     GRAVITIES,
     TypedLoads,
@@ -19,10 +18,9 @@ from softreach.studio.loading import (
     typed_loads,
     with_loads,
 )
-from softreach.studio.reach import Quality, Reach, cloud_points, unstable_samples
-from softreach.studio.rod import solvable_rod
-from softreach.studio.stages import stages
-from softreach.studio.state import StudioState
+from softreach.studio.reach import Quality, Reach, cloud_points, stages, unstable_samples
+from softreach.studio.state import StudioState, solvable_rod
+from softreach.studio.work import affordable_level
 from softreach.support.errors import InvalidDesign, InvalidInput
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)

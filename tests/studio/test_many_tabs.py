@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 import pytest
 
 import softreach.studio.app
-import softreach.studio.stages as stages
+import softreach.studio.reach as stages
 from softreach.arm.parameters import changed
 from softreach.studio import Studio
 from softreach.studio.session import Session

@@ -7,17 +7,21 @@ import pytest
 
 from softreach.arm import designs
 from softreach.cloud.clouds import compute_cloud
+from softreach.picture.axes_box import axes_box, seen_from
 from softreach.plot.coloring import ScalarKey
 from softreach.rod.kinematics import tip_positions
-from softreach.studio.axes import axes_box, seen_from
-from softreach.studio.colors import color_names, key_html, manipulability, sample_colors
-from softreach.studio.picking import picked_point, plane_crossing
-from softreach.studio.reach import Quality, Reach, shown_samples
-from softreach.studio.sight import is_behind
-from softreach.studio.slicing import in_slice, sliced_faces
-from softreach.studio.stages import reached, stages
+from softreach.studio.reach import Quality, Reach, reached, shown_samples, stages
+from softreach.studio.scene.camera import is_behind, picked_point, plane_crossing
+from softreach.studio.scene.clouds import (
+    color_names,
+    in_slice,
+    key_html,
+    manipulability,
+    sample_colors,
+    sliced_faces,
+)
 from softreach.studio.state import Slice
-from softreach.studio.worker import Dropped
+from softreach.studio.work import Dropped
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
 

@@ -9,7 +9,7 @@ from softreach.geometry.surface import plane_cut
 from softreach.inverse import solve_inverse
 from softreach.studio.plots.plane_counts import plane_counts, within
 from softreach.studio.plots.section import enclosed_area, section_curves
-from softreach.studio.stages import stages
+from softreach.studio.reach import stages
 from softreach.studio.state import Slice
 from softreach.studio.wishes import PlotView
 from tests.studio.conftest import SMALL

@@ -10,8 +10,14 @@ from pathlib import Path
 import pytest
 
 import softreach.studio
-from softreach.studio.addresses import page_address, reachable_hosts
-from softreach.studio.server import page_headers, page_url, same_origin, start_server, stop_server
+from softreach.studio.serve.access import page_address, reachable_hosts
+from softreach.studio.serve.server import (
+    page_headers,
+    page_url,
+    same_origin,
+    start_server,
+    stop_server,
+)
 from softreach.support.errors import InvalidInput
 
 
@@ -100,7 +106,7 @@ def test_the_page_is_served_with_rules_and_not_to_be_framed(server):
 
 
 def test_viser_still_has_no_public_way_to_the_sockets_of_its_pages():
-    """If this fails, see whether studio/connections.py and the upper pin of viser can go."""
+    """If this fails, see whether studio/serve/viser_fixes.py and the upper pin of viser can go."""
     import viser
 
     words = re.compile("client|connect|request|header|origin|socket")
@@ -120,7 +126,7 @@ def test_only_one_file_uses_names_that_viser_keeps_to_itself():
     room = Path(softreach.studio.__file__).parent
     private = re.compile(r"server\._[a-z]|_live_connections|_websock|sockets\.serve")
     users = {p.name for p in room.rglob("*.py") if private.search(p.read_text(encoding="utf-8"))}
-    assert users == {"connections.py"}
+    assert users == {"viser_fixes.py"}
 
 
 def test_text_becomes_markup_in_one_file_only():

@@ -8,7 +8,7 @@ import pytest
 from softreach.arm import designs
 from softreach.atlas import DesignSpace, build_atlas
 from softreach.studio import Quality, Studio
-from softreach.studio.source import start_on_store
+from softreach.studio.start import start_on_store
 from tests.studio.tab import Tab
 
 COARSE = Quality(coarse_level=12, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.1)

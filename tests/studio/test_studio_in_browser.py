@@ -13,8 +13,9 @@ from softreach.arm.parameters import changed, find_parameter
 from softreach.arm.summary import describe
 from softreach.atlas import DesignSpace, build_atlas
 from softreach.studio import Studio, StudioState
+from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.panels.inverse import InversePanel
-from softreach.studio.source import start_on_store
+from softreach.studio.start import start_on_store
 from softreach.studio.state import Slice
 from tests.studio.conftest import SMALL
 from tests.studio.tab import PATIENCE, Tab
@@ -156,7 +157,7 @@ def test_surfaces_are_drawn_and_cut(tab):
 
 def test_a_target_out_of_reach_shows_the_gap(tab):
     tab.open("Inverse")
-    tab.session.aim(np.array([0.0, 0.0, 1.5]))
+    tab.session.job(SolveInverse).aim(np.array([0.0, 0.0, 1.5]))
     tab.settle()
     assert len(tab.session.answer) == 0
     tab.page.get_by_text("out of reach").wait_for()

@@ -9,27 +9,50 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from softreach.studio.addresses import LOOPBACK, page_address, reachable_hosts
-from softreach.studio.axes import round_box
-from softreach.studio.compiling import CompilationWatch
-from softreach.studio.connections import asked_path, close_all
-from softreach.studio.eye import framing
-from softreach.studio.history import History
-from softreach.studio.kept_work import KeptWork
-from softreach.studio.link import state_in_request
+from softreach.picture.axes_box import round_box
+from softreach.studio.jobs.beside import DrawFree, DrawReference, DrawReferenceArm
+from softreach.studio.jobs.inverse import DragTip, SolveInverse
+from softreach.studio.jobs.page import DrawMap, KeepState, SetTheme
+from softreach.studio.jobs.path import FollowPath, PlayPath, WriteMovie
+from softreach.studio.jobs.plots import (
+    CountActivations,
+    CutSection,
+    FollowArm,
+    MeasureVolumes,
+    SweepParameter,
+)
+from softreach.studio.jobs.reach import (
+    ComputeReach,
+    DrawArm,
+    DrawCloud,
+    DrawSurfaces,
+    FollowCamera,
+)
 from softreach.studio.panels.binding import attempt
-from softreach.studio.server import page_url, start_server, stop_server
-from softreach.studio.session import Session
+from softreach.studio.scene.camera import framing
+from softreach.studio.serve.access import LOOPBACK, page_address, reachable_hosts, with_token
+from softreach.studio.serve.server import page_url, start_server, stop_server
+from softreach.studio.serve.viser_fixes import asked_path, close_all
+from softreach.studio.session import Job, Session
 from softreach.studio.snapshots import Snapshots
-from softreach.studio.source import Start
-from softreach.studio.state import Camera, StudioState
-from softreach.studio.token import with_token
-from softreach.studio.worker import Latest
+from softreach.studio.start import KeptWork, Start, state_in_request
+from softreach.studio.state import Camera, History, StudioState
+from softreach.studio.work import CompilationWatch, Latest
 
 if TYPE_CHECKING:
     from viser import ClientHandle
 
-__all__ = ["Studio"]
+__all__ = ["JOBS", "Studio"]
+
+JOBS: tuple[type[Job], ...] = (
+    ComputeReach, DrawArm, DrawCloud, DrawSurfaces, FollowCamera,
+    DrawFree, DrawReference, DrawReferenceArm,
+    SolveInverse, DragTip,
+    FollowPath, PlayPath, WriteMovie,
+    FollowArm, MeasureVolumes, SweepParameter, CountActivations, CutSection,
+    DrawMap, SetTheme, KeepState,
+)  # fmt: skip
+"""Every kind of work that a tab has done for it."""
 
 _EYE = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
 _EYE_ON_MAP = Camera(position=(1.9, -6.3, 2.0), look_at=(-0.95, -0.5, 0.3))
@@ -129,7 +152,7 @@ class Studio:
             session.show()
 
     def _connected(self, client: ClientHandle) -> None:
-        session = Session(client, self.start, work=self.work, snapshots=self.snapshots)
+        session = Session(client, self.start, JOBS, work=self.work, snapshots=self.snapshots)
         session.compiling = self._compilation.running
         with self._lock:
             left = self._work_left()
@@ -137,6 +160,7 @@ class Studio:
         if left is not None:
             session.take_up(*left)
         _furnish(session, page_url(self.server))
+        session.eye.on_move(lambda: session.follow(FollowCamera))
         session.begin()
         if session.eye.is_upright:
             _look_at_all(session)

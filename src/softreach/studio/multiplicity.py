@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.studio.reach import Reach
-from softreach.studio.rod import solvable_rod
-from softreach.studio.worker import StaleCheck, all_cores
+from softreach.studio.state import solvable_rod
+from softreach.studio.work import StaleCheck, all_cores
 from softreach.support import parallel
 from softreach.support.progress import Progress, silent
 from softreach.workspace import ReachableSolid

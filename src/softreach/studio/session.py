@@ -1,29 +1,27 @@
-"""One browser tab: its state, what is known and drawn, and the work that follows from changes."""
+"""Session of one browser tab: its state, what is known and drawn, and its jobs."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from operator import attrgetter
+from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.rod.tip_map import TipStatus
-from softreach.studio.eye import VIEWS, Eye, framing
-from softreach.studio.history import History
-from softreach.studio.jobs import JOBS, FollowEye, Job, PullTip, SolveInverse, what_follows
-from softreach.studio.jobs.pull import PullOrder, TipPull
-from softreach.studio.kept_work import KeptWork
-from softreach.studio.map_board import MapBoard, board_of
+from softreach.studio.atlas_map import MapBoard, board_of
 from softreach.studio.plots.figures import Figures
 from softreach.studio.reach import Reach
-from softreach.studio.scene import Scene
+from softreach.studio.scene.camera import VIEWS, Eye, framing
+from softreach.studio.scene.scene import Scene
 from softreach.studio.snapshots import Snapshots
-from softreach.studio.source import Start
-from softreach.studio.state import StudioState, vector
-from softreach.studio.worker import Latest
+from softreach.studio.start import KeptWork, Start
+from softreach.studio.state import History, StudioState
+from softreach.studio.work import Latest, StaleCheck
 from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
@@ -32,11 +30,12 @@ if TYPE_CHECKING:
 
     from softreach.inverse import Solution
     from softreach.plot.coloring import BundleKey, ScalarKey
+    from softreach.studio.scene.drag import TipDrag
 
-__all__ = ["Panel", "Session"]
+__all__ = ["AskedJob", "Job", "Panel", "Session", "what_follows"]
 
 Array = NDArray[np.float64]
-_Kind = TypeVar("_Kind", bound=Job)
+_Kind = TypeVar("_Kind", bound="Job")
 
 _LONGEST_NOTE = 1000  # characters: a file's own text may be in an error
 
@@ -49,13 +48,79 @@ class Panel(Protocol):
         ...
 
 
+class Job(ABC):
+    """Work that follows from some part of the state; a session has one of each kind."""
+
+    depends_on: ClassVar[tuple[str, ...]] = ()
+    """Attributes of the state that decide the result, such as "appearance.arm"."""
+    only_with: ClassVar[str] = ""
+    """Attribute of the state without which there is nothing to do; "" for none."""
+
+    def __init__(self, session: Session) -> None:
+        """Work for a session, which it reads, and where it leaves its results."""
+        self.session = session
+
+    @classmethod
+    def has_use(cls, session: Session) -> bool:
+        """Whether a session has this kind of work at all."""
+        del session
+        return True
+
+    @classmethod
+    def part_of(cls, state: StudioState) -> object:
+        """The part of a state that decides the result; None where there is nothing to do."""
+        if not cls.depends_on or (cls.only_with and not attrgetter(cls.only_with)(state)):
+            return None
+        return attrgetter(*cls.depends_on)(state)
+
+    @abstractmethod
+    def run(self, check: StaleCheck) -> None:
+        """Do the work for the state of the session as it is now, on a thread of its own.
+
+        Args:
+            check: To be called between stages; raises if the work is no longer wanted.
+        """
+
+
+class AskedJob(Job):
+    """Work that no state asks for, but a person who presses a button."""
+
+    wanted = False
+    """Whether somebody pressed it since the work was last done."""
+
+    def ask(self) -> None:
+        """Do the work as soon as possible."""
+        self.wanted = True
+        self.session.follow(type(self))
+
+    def run(self, check: StaleCheck) -> None:
+        """Do the work once for each time it was asked for."""
+        wanted, self.wanted = self.wanted, False
+        if wanted:
+            self.do(check)
+
+    @abstractmethod
+    def do(self, check: StaleCheck) -> None:
+        """Do the work; as `run`."""
+
+
+def what_follows(
+    kinds: Iterable[type[Job]], old: StudioState | None, new: StudioState
+) -> frozenset[type[Job]]:
+    """The jobs whose results a change makes stale; all of them if there was nothing before."""
+    if old is None:
+        return frozenset(kinds)
+    return frozenset(kind for kind in kinds if kind.part_of(old) != kind.part_of(new))
+
+
 class Session:
-    """Holds the state of a tab; everything heavy happens in its jobs, on threads of their own."""
+    """State of a tab and what is known of it; jobs do what is heavy, on threads of their own."""
 
     def __init__(
         self,
         client: ClientHandle,
         start: Start,
+        jobs: Iterable[type[Job]] = (),
         *,
         work: KeptWork | None = None,
         snapshots: Snapshots | None = None,
@@ -65,6 +130,7 @@ class Session:
         Args:
             client: The tab.
             start: What it begins with.
+            jobs: Kinds of work that follow from its state.
             work: Where its state is kept, if anywhere.
             snapshots: Those of all tabs.
         """
@@ -104,8 +170,10 @@ class Session:
         """Where it has been."""
         self.answer: Solution | None = None
         """Of the inverse problem."""
-        self.tip_pull: TipPull | None = None
-        """What a drag of the tip has led to; None when nobody drags."""
+        self.drag: TipDrag | None = None
+        """Of the tip; None when nobody drags."""
+        self.is_dragged = False
+        """Whether a drag of the tip is under way."""
         self.figures = Figures()
         """What was found for the plots beside the scene."""
         self.atlas: xr.Dataset | None = start.atlas
@@ -113,13 +181,12 @@ class Session:
         self.drawing = threading.RLock()
         """Held while nodes that several jobs draw are taken away and drawn again."""
         self._changing, self._showing = threading.RLock(), threading.RLock()
-        self._jobs = {kind: kind(self) for kind in JOBS}
-        self._workers = {kind: Latest(self.fail, self._rested) for kind in JOBS}
-        self.eye.on_move(self.look_again)
+        self._jobs = {kind: kind(self) for kind in jobs if kind.has_use(self)}
+        self._workers = {kind: Latest(self.fail, self._rested) for kind in self._jobs}
 
     def begin(self) -> None:
         """Do everything once."""
-        self.follow(*what_follows(None, self.state))
+        self._follow_change(None)
         self.show()
 
     def update(
@@ -143,43 +210,11 @@ class Session:
         """
         with self._changing:
             old, self.state, self.note = self.state, change(self.state), ""
-            new = self.state
             self._remember(old, goes_on=goes_on or by_widget)
             self.revision += not by_widget
             self.canceled = False
-            self.follow(*what_follows(old, new))
+            self._follow_change(old)
         self.show()
-
-    def aim(self, target: Array) -> None:
-        """Ask for every activation that reaches a target [m], and take the nearest to the present.
-
-        Raises:
-            SoftreachError: The target is no point.
-        """
-        self.job(SolveInverse).take_nearest = True
-        with self._changing:
-            old = self.state
-            self.state = old.replace(target=vector(target))
-            self._remember(old, goes_on=False)
-            self.follow(SolveInverse)
-        self.show()
-
-    def pull_tip(self, phase: str, wanted: Array) -> None:
-        """Follow a drag of the tip; returns at once.
-
-        Args:
-            phase: "start", "update" or "end".
-            wanted: Where the tip should be [L].
-        """
-        self.job(PullTip).order = PullOrder(wanted, rests=phase == "end")
-        self.follow(PullTip)
-        self.look_again()
-
-    @property
-    def is_dragged(self) -> bool:
-        """Whether a drag of the tip is under way."""
-        order = self.job(PullTip).order
-        return order is not None and not order.rests
 
     def restore(self, state: StudioState) -> None:
         """Take up a state that was saved, and its view."""
@@ -200,7 +235,7 @@ class Session:
             stays = self.state is old
             self.note = f"There is nothing to {'undo' if back else 'redo'}." if stays else ""
             self.revision += 1
-            self.follow(*what_follows(old, self.state))
+            self._follow_change(old)
         self.show()
 
     def reset(self) -> None:
@@ -260,7 +295,7 @@ class Session:
     def resume(self) -> None:
         """Compute what is missing since it was canceled, or failed."""
         self.canceled, self.note = False, ""
-        self.follow(*what_follows(None, self.state))
+        self._follow_change(None)
         self.show()
 
     def report(self, doing: str) -> None:
@@ -283,9 +318,12 @@ class Session:
         for kind in kinds:
             self._workers[kind].submit(self._jobs[kind].run)
 
-    def look_again(self) -> None:
-        """See to it that nothing hides the arm: it has moved, or the eye."""
-        self.follow(FollowEye)
+    def refresh(self, *kinds: type[Job]) -> None:
+        """Do these jobs again, as far as the state asks for them."""
+        self.follow(*(kind for kind in kinds if kind.part_of(self.state) is not None))
+
+    def _follow_change(self, old: StudioState | None) -> None:
+        self.follow(*what_follows(self._jobs, old, self.state))
 
     def job(self, kind: type[_Kind]) -> _Kind:
         """The job of a kind."""

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from softreach.inverse.path import PathStatus, track_path
-from softreach.studio.jobs.job import AskedJob, Job
-from softreach.studio.movie import path_movie
+from softreach.plot.path_movie import path_movie
 from softreach.studio.reach import cloud_points
-from softreach.studio.rod import solvable_rod
-from softreach.studio.state import Camera, StudioState
+from softreach.studio.session import AskedJob, Job
+from softreach.studio.state import Camera, StudioState, solvable_rod
 from softreach.studio.wishes import TipPath
-from softreach.studio.worker import StaleCheck
+from softreach.studio.work import StaleCheck
 from softreach.support.errors import InvalidInput
-
-__all__ = ["FollowPath", "PlayPath", "WriteMovie", "at_point"]
 
 _RESIDUAL = 1e-8  # [L]
 _STEP = 0.05  # [s] between points that are played
@@ -27,11 +26,8 @@ _LEVEL = 14  # of the cloud behind an animation
 class FollowPath(Job):
     """The activations along the path, and where the branch ends."""
 
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """The design and the path, not how far along it the arm is."""
-        path = state.path
-        return path and (state.design, path.points, path.start)
+    depends_on = "design", "path.points", "path.start"
+    only_with = "path"
 
     def run(self, check: StaleCheck) -> None:
         """Follow and draw it; or take away what was drawn."""
@@ -130,3 +126,74 @@ def _view_from(camera: Camera) -> tuple[float, float]:
     """Azimuth and elevation of the eye [rad]."""
     x, y, z = np.subtract(camera.position, camera.look_at)
     return float(np.arctan2(y, x)), float(np.arctan2(z, np.hypot(x, y)))
+
+
+# Paths of a few plain shapes that begin at the tip.
+
+
+Array = NDArray[np.float64]
+
+PLANES: Mapping[str, tuple[int, int]] = {"x, y": (0, 1), "x, z": (0, 2), "y, z": (1, 2)}
+"""The plane of a shape: its first and its second direction."""
+
+_POINTS = 97
+
+
+def drawn_path(shape: str, plane: str, size: float, tip: ArrayLike) -> Array:
+    """A shape through the tip, which is where it begins.
+
+    Args:
+        shape: One of `PATH_SHAPES`.
+        plane: One of `PLANES`.
+        size: Largest extent, in the unit of the tip; negative for the other side.
+        tip: Where it begins.
+
+    Returns:
+        Points in the unit of the tip, shape (n, 3).
+
+    Raises:
+        InvalidInput: An unknown shape or plane, or no size.
+    """
+    for name, value, known in (("shape", shape, PATH_SHAPES), ("plane", plane, PLANES)):
+        if value not in known:
+            raise InvalidInput(name, value, f"one of {', '.join(known)}")
+    if not (np.isfinite(size) and size != 0):
+        raise InvalidInput("size", size, "a finite number other than 0")
+    across = PATH_SHAPES[shape](np.linspace(0.0, 1.0, _POINTS))
+    points = np.tile(np.asarray(tip, float), (_POINTS, 1))
+    points[:, PLANES[plane]] += size * across
+    return points
+
+
+def straight_path(corners: ArrayLike, points: int = _POINTS) -> Array:
+    """Even points on the straight lines between corners, which are among them, shape (n, 3)."""
+    places = np.asarray(corners, float)
+    lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    pieces = np.maximum(1, np.round(points * lengths / max(lengths.sum(), 1e-300)).astype(int))
+    parts = [
+        start + np.linspace(0.0, 1.0, count, endpoint=False)[:, None] * (end - start)
+        for start, end, count in zip(places[:-1], places[1:], pieces, strict=True)
+    ]
+    return np.concatenate([*parts, places[-1:]])
+
+
+def _circle(share: Array) -> Array:
+    angle = 2 * np.pi * share
+    return np.stack([np.cos(angle) - 1.0, np.sin(angle)], axis=1) / 2
+
+
+def _figure_eight(share: Array) -> Array:
+    angle = 2 * np.pi * share
+    return np.stack([np.sin(angle), np.sin(2 * angle)], axis=1) / 2
+
+
+def _line(share: Array) -> Array:
+    return np.stack([share, np.zeros_like(share)], axis=1)
+
+
+PATH_SHAPES: Mapping[str, Callable[[Array], Array]] = {
+    "circle": _circle,
+    "figure eight": _figure_eight,
+    "line": _line,
+}
+"""From shares of the way, 0 to 1, to places in the plane."""

@@ -1,16 +1,15 @@
-"""Computes what is plotted beside the scene; what is not shown is not computed."""
+"""Jobs of the plots beside the scene; what is not shown is not computed."""
 
 from __future__ import annotations
 
-from softreach.studio.jobs.job import Job
 from softreach.studio.plots.along_arm import along_arm
 from softreach.studio.plots.histogram import histogram_picture
 from softreach.studio.plots.section import section_picture
 from softreach.studio.plots.sweep import sweep, swept_control
 from softreach.studio.plots.volumes import volume_curve_of
 from softreach.studio.reach import Reach
-from softreach.studio.state import StudioState
-from softreach.studio.worker import StaleCheck
+from softreach.studio.session import Job
+from softreach.studio.work import StaleCheck
 from softreach.support.errors import InvalidInput
 
 __all__ = [
@@ -25,10 +24,8 @@ __all__ = [
 class FollowArm(Job):
     """Curvature and strain along the arm, while its activations move."""
 
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """The arm in its activation."""
-        return state.appearance.plots.along_arm and (state.design, state.activation)
+    depends_on = "design", "activation"
+    only_with = "appearance.plots.along_arm"
 
     def run(self, check: StaleCheck) -> None:
         """Compute them; nothing for an arm that cannot be computed, which `ComputeReach` says."""
@@ -45,10 +42,8 @@ class FollowArm(Job):
 class MeasureVolumes(Job):
     """V(α) of the cloud."""
 
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """Which points are shown; the cloud itself is told by `ComputeReach`."""
-        return state.appearance.plots.volume_curve and state.appearance.level
+    depends_on = ("appearance.level",)  # the cloud itself is told by `ComputeReach`
+    only_with = "appearance.plots.volume_curve"
 
     def run(self, check: StaleCheck) -> None:
         """Triangulate the cloud, once it is complete."""
@@ -64,11 +59,8 @@ class MeasureVolumes(Job):
 class SweepParameter(Job):
     """Volume against one parameter of the design."""
 
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """The design and the parameter."""
-        plots = state.appearance.plots
-        return plots.sweep and (state.design, plots.parameter)
+    depends_on = "design", "appearance.plots.parameter"
+    only_with = "appearance.plots.sweep"
 
     def run(self, check: StaleCheck) -> None:
         """Compute one design after the other, and show each."""
@@ -78,15 +70,8 @@ class SweepParameter(Job):
         if not state.appearance.plots.sweep or control is None:
             return
         known = session.figures.sweep
-        if (
-            known is not None
-            and known.complete
-            and (known.arm, known.control)
-            == (
-                state.design,
-                control,
-            )
-        ):
+        wanted = state.design, control
+        if known is not None and known.complete and (known.arm, known.control) == wanted:
             return
         for found in sweep(state.design, control, session.quality, check):
             check()
@@ -97,12 +82,10 @@ class SweepParameter(Job):
 class CountActivations(Job):
     """Histograms of the activations of the samples that are shown."""
 
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """Which samples are shown, the present activation, the target, and the page's light."""
-        look = state.appearance
-        shown = look.level, look.slice, look.dark
-        return look.plots.histogram and (*shown, state.activation, state.target)
+    depends_on = (
+        "appearance.level", "appearance.slice", "appearance.dark", "activation", "target",
+    )  # fmt: skip
+    only_with = "appearance.plots.histogram"
 
     def run(self, check: StaleCheck) -> None:
         """Draw them, once the cloud is complete."""
@@ -120,11 +103,8 @@ class CountActivations(Job):
 class CutSection(Job):
     """The reachable set in the plane of the slice."""
 
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """The plane and the page's light; the set itself is told by `ComputeReach`."""
-        look = state.appearance
-        return look.plots.section and (look.slice.axis, look.slice.center, look.dark)
+    depends_on = "appearance.slice.axis", "appearance.slice.center", "appearance.dark"
+    only_with = "appearance.plots.section"
 
     def run(self, check: StaleCheck) -> None:
         """Cut and draw it, once the exact set is complete."""

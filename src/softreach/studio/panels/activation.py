@@ -12,9 +12,8 @@ from softreach.studio.panels.binding import bind, bind_button
 from softreach.studio.panels.line import Line
 from softreach.studio.panels.status import tip_text
 from softreach.studio.panels.typed import SliderField
-from softreach.studio.rod import rod_of
-from softreach.studio.scene import MOST_BUNDLES
-from softreach.studio.state import StudioState
+from softreach.studio.scene.scene import MOST_BUNDLES
+from softreach.studio.state import StudioState, rod_of
 
 if TYPE_CHECKING:
     from viser import GuiApi

@@ -7,9 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from softreach.arm.manipulator import Manipulator
-from softreach.studio.atlas_map import map_choices, metric_names
-from softreach.studio.atlas_numbers import nearest_numbers
-from softreach.studio.map_board import MapBoard
+from softreach.studio.atlas_map import MapBoard, map_choices, metric_names, nearest_numbers
 from softreach.studio.panels.binding import attempt, bind
 from softreach.studio.panels.line import Line
 from softreach.studio.panels.picture import PictureFrame

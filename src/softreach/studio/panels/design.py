@@ -14,7 +14,7 @@ from softreach.studio.panels.line import Line
 from softreach.studio.panels.status import reach_text
 from softreach.studio.panels.typed import SliderField
 from softreach.studio.reach import beside
-from softreach.studio.rod import rod_of
+from softreach.studio.state import rod_of
 from softreach.support.errors import InvalidDesign
 
 if TYPE_CHECKING:

@@ -14,11 +14,10 @@ from softreach.studio.files import (
     state_from,
     surface_file,
 )
-from softreach.studio.link import state_link
-from softreach.studio.page import static_page
+from softreach.studio.page import picture_file, static_page
 from softreach.studio.panels.binding import attempt, bind_button
 from softreach.studio.panels.line import Line
-from softreach.studio.picture import picture_file
+from softreach.studio.start import state_link
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from softreach.studio.grip import Grip
+from softreach.studio.jobs.inverse import DragTip
 from softreach.studio.panels.binding import bind
 from softreach.studio.panels.line import Line
-from softreach.studio.rod import rod_of
+from softreach.studio.scene.drag import DragBall
+from softreach.studio.state import rod_of
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -25,7 +26,7 @@ class HandlePanel:
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
         """Add the widgets."""
         self._session, self._revision = session, -1
-        self._grip = Grip(session.client.scene, session.pull_tip)
+        self._grip = DragBall(session.client.scene, session.job(DragTip).order)
         with tab:
             self._text = Line(gui, _HINT)
             self._shown = gui.add_checkbox(
@@ -35,7 +36,7 @@ class HandlePanel:
 
     def show(self, session: Session) -> None:
         """Keep the ball on the tip."""
-        state, pull = session.state, session.tip_pull
+        state, drag = session.state, session.drag
         if session.revision != self._revision:
             self._revision = session.revision
             self._shown.value = state.appearance.handle
@@ -44,10 +45,10 @@ class HandlePanel:
         arm = state.design
         radius = float(arm.profile.radius(arm.length)) / arm.length
         self._grip.move(session.tip if grasped else None, radius, dark=state.appearance.dark)
-        if pull is None:
+        if drag is None:
             self._text.say(_HINT)
             self._grip.show_lag(None, None)
             return
-        gap = pull.pulled.gap / arm.length
+        gap = drag.dragged.gap / arm.length
         self._text.say(f"This branch ends {gap:.3f} L short of the pointer." if gap else _HINT)
-        self._grip.show_lag(pull.wanted, pull.pulled.tip / arm.length, gap)
+        self._grip.show_lag(drag.wanted, drag.dragged.tip / arm.length, gap)

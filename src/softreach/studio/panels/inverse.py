@@ -9,14 +9,14 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.kinematics import tip_positions
+from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.panels.binding import attempt, bind, bind_button
 from softreach.studio.panels.line import Line
 from softreach.studio.panels.typed import VectorField
-from softreach.studio.picking import picked_point
 from softreach.studio.reach import cloud_points, shown_samples
-from softreach.studio.rod import rod_of
-from softreach.studio.slicing import in_slice
-from softreach.studio.state import StudioState
+from softreach.studio.scene.camera import picked_point
+from softreach.studio.scene.clouds import in_slice
+from softreach.studio.state import StudioState, rod_of
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -103,12 +103,15 @@ class InversePanel:
         if found is None:
             return False
         activations = reach.cloud.activation.values[shown_samples(reach, look.level)]
-        attempt(session, lambda: session.aim(_tip(reach.arm, activations[kept[found]])))
+        attempt(
+            session,
+            lambda: session.job(SolveInverse).aim(_tip(reach.arm, activations[kept[found]])),
+        )
         return True
 
     def _solve_typed(self) -> None:
         length = self._session.state.design.length
-        self._session.aim(length * np.asarray(self._target.value))
+        self._session.job(SolveInverse).aim(length * np.asarray(self._target.value))
 
     def _button(self, activation: Any) -> Any:
         wanted = tuple(activation.tolist())

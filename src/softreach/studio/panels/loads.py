@@ -19,8 +19,7 @@ from softreach.studio.panels.binding import bind
 from softreach.studio.panels.line import Line
 from softreach.studio.panels.status import tip_text
 from softreach.studio.panels.typed import NumberField, VectorField
-from softreach.studio.rod import rod_of
-from softreach.studio.state import vector
+from softreach.studio.state import rod_of, vector
 from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:

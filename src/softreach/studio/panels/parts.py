@@ -16,7 +16,7 @@ from softreach.studio.controls import Shown, refusal
 from softreach.studio.panels.line import Line
 from softreach.studio.panels.typed import NumberField
 from softreach.studio.parts import Number, Part, numbers, parts
-from softreach.studio.rod import rod_of
+from softreach.studio.state import rod_of
 from softreach.support.errors import InvalidDesign, SoftreachError
 
 if TYPE_CHECKING:

@@ -10,16 +10,22 @@ import numpy as np
 from softreach.export.clouds import path_csv
 from softreach.inverse.path import PathStatus
 from softreach.inverse.request import positions_in
-from softreach.studio.drawn_paths import PATH_SHAPES, PLANES, drawn_path, straight_path
-from softreach.studio.jobs.path import PlayPath, WriteMovie, at_point
+from softreach.studio.jobs.path import (
+    PATH_SHAPES,
+    PLANES,
+    PlayPath,
+    WriteMovie,
+    at_point,
+    drawn_path,
+    straight_path,
+)
 from softreach.studio.panels.binding import attempt, bind_button
 from softreach.studio.panels.line import Line
-from softreach.studio.picking import picked_point
 from softreach.studio.plots.chart import Chart, Curve
 from softreach.studio.reach import cloud_points
-from softreach.studio.rod import solvable_rod
-from softreach.studio.slicing import in_slice
-from softreach.studio.state import StudioState
+from softreach.studio.scene.camera import picked_point
+from softreach.studio.scene.clouds import in_slice
+from softreach.studio.state import StudioState, solvable_rod
 from softreach.studio.wishes import MOST_POINTS, TipPath
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import bundle_color
@@ -179,9 +185,7 @@ class PathPanel:
         return lambda state: at_point(state, activations, int(self._at.value))
 
     def _ask(self, kind: type[PlayPath | WriteMovie]) -> None:
-        job = self._session.job(kind)
-        job.wanted = True
-        self._session.follow(kind)
+        self._session.job(kind).ask()
 
     def _played(self) -> None:
         if self._play.value == "Play":

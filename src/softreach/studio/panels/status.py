@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from softreach.plot.coloring import UNSTABLE
 from softreach.rod.tip_map import TipStatus
-from softreach.studio.colors import FAINT, UNSTABLE, key_html
 from softreach.studio.markup import Part, Strong, Swatch, Term, fields_style
 from softreach.studio.panels.binding import bind_button
 from softreach.studio.panels.line import Line
+from softreach.studio.scene.clouds import FAINT, key_html
 
 if TYPE_CHECKING:
     from viser import GuiApi

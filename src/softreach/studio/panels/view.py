@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from softreach.studio.colors import color_names
-from softreach.studio.eye import VIEWS
 from softreach.studio.panels.binding import bind, bind_button
 from softreach.studio.panels.typed import SliderField
-from softreach.studio.sight import CUTS
-from softreach.studio.state import LEVELS, Appearance, StudioState
+from softreach.studio.scene.camera import VIEWS
+from softreach.studio.scene.clouds import color_names
+from softreach.studio.state import CUTS, LEVELS, Appearance, StudioState
 
 if TYPE_CHECKING:
     from viser import GuiApi

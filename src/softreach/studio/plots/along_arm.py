@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.studio.rod import solvable_rod
+from softreach.studio.state import solvable_rod
 
 __all__ = ["AlongArm", "along_arm"]
 

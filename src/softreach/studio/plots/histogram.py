@@ -12,9 +12,8 @@ from softreach.arm.manipulator import Manipulator
 from softreach.schema import activation_symbols
 from softreach.studio.plots.image import Picture, blank_figure, pixels
 from softreach.studio.reach import Reach, cloud_points, shown_samples
-from softreach.studio.rod import rod_of
-from softreach.studio.slicing import in_slice
-from softreach.studio.state import Slice
+from softreach.studio.scene.clouds import in_slice
+from softreach.studio.state import Slice, rod_of
 from softreach.support.palette import bundle_color
 
 if TYPE_CHECKING:

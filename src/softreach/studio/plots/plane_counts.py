@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from softreach.studio.multiplicity import counts_at
 from softreach.studio.reach import Reach
-from softreach.studio.rod import solvable_rod
-from softreach.studio.worker import StaleCheck
+from softreach.studio.state import solvable_rod
+from softreach.studio.work import StaleCheck
 
 if TYPE_CHECKING:
     import xarray as xr

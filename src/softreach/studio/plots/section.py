@@ -14,7 +14,7 @@ from softreach.studio.plots.image import Picture, blank_figure, pixels
 from softreach.studio.plots.plane_counts import plane_counts
 from softreach.studio.reach import Reach
 from softreach.studio.state import Slice
-from softreach.studio.worker import StaleCheck, all_cores
+from softreach.studio.work import StaleCheck, all_cores
 from softreach.support.errors import InvalidInput
 from softreach.workspace import ReachableSolid, ReachableSurface
 

@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed
-from softreach.studio.budget import OverBudget
 from softreach.studio.controls import Control, controls
-from softreach.studio.reach import Quality
-from softreach.studio.rod import solvable_rod
-from softreach.studio.stages import exact_set
-from softreach.studio.worker import StaleCheck, all_cores
+from softreach.studio.reach import Quality, exact_set
+from softreach.studio.state import solvable_rod
+from softreach.studio.work import OverBudget, StaleCheck, all_cores
 from softreach.support.errors import SoftreachError
 
 __all__ = ["Sweep", "sweep", "swept_control"]

@@ -12,7 +12,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.cloud.volume import volume_curve
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.reach import Reach, shown_rows
-from softreach.studio.worker import all_cores
+from softreach.studio.work import all_cores
 from softreach.workspace import ReachableSolid
 
 __all__ = ["VolumeCurve", "volume_curve_of"]

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
-from softreach.studio.addresses import LOOPBACK, check_port, page_address
-from softreach.studio.connections import refuse_unless, sending_headers
-from softreach.studio.eye import FOV
+from softreach.studio.scene.camera import FOV
+from softreach.studio.serve.access import LOOPBACK, check_port, page_address
+from softreach.studio.serve.viser_fixes import refuse_unless, sending_headers
 from softreach.support.errors import InvalidInput, MissingExtra
 
 if TYPE_CHECKING:

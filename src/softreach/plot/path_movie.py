@@ -18,7 +18,7 @@ from softreach.picture.shading import draw_mesh, faces_to_eye, seen_through
 from softreach.picture.zbuffer import Extent, ZBuffer
 from softreach.rod.arm_shape import arm_surface, bundle_skins
 from softreach.rod.kinematics import configuration
-from softreach.studio.rod import solvable_rod
+from softreach.rod.tip_map import tip_map
 from softreach.support.errors import MissingExtra
 from softreach.support.palette import BODY, bundle_color
 
@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
 _PIXELS, _SIDES, _STATIONS = 420, 32, 41
+_TOL = 1e-5  # [L]: far below a pixel
 _MOST_FRAMES = 60
 _PATH, _TRACE, _CLOUD = (225, 150, 185), (220, 30, 120), (214, 218, 226)
 _DENSE = 3  # points of the path per pixel
@@ -91,7 +92,7 @@ class _Shape(NamedTuple):
 
 
 def _shape(arm: Manipulator, activation: Array) -> _Shape:
-    shape = configuration(solvable_rod(arm), activation, _STATIONS)
+    shape = configuration(tip_map(arm, _TOL, warn=False), activation, _STATIONS)
     return _Shape(arm_surface(arm, shape, _SIDES), bundle_skins(arm, shape, lift=0.02))
 
 
@@ -125,14 +126,13 @@ def _extent(parts: Sequence[Array], view: View) -> Extent:
 
 
 def _dense(path: Array, extent: Extent) -> Array:
-    """So many points along a path that they make a line."""
-    from softreach.studio.drawn_paths import straight_path
-
+    """Even points along a path, so many that they make a line."""
     if len(path) < 2:
         return path
     pixel = (extent.right - extent.left) / _PIXELS
-    length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
-    return straight_path(path, 2 + int(_DENSE * length / pixel))
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    even = np.linspace(0.0, way[-1], 2 + int(_DENSE * way[-1] / pixel))
+    return np.stack([np.interp(even, way, axis) for axis in path.T], axis=1)
 
 
 def _gif(frames: Sequence[Image]) -> bytes:

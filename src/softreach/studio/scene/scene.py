@@ -10,16 +10,21 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.skin import inside
+from softreach.picture.axes_box import axes_box, round_box, seen_from
+from softreach.plot.coloring import UNSTABLE
 from softreach.rod.arm_shape import arm_surface, bundle_skins
 from softreach.rod.kinematics import configuration
-from softreach.studio.clouds import Clouds, Dots
-from softreach.studio.colors import FAINT, UNSTABLE, sample_colors
-from softreach.studio.numbered_box import NumberedBox, add_label
 from softreach.studio.reach import Reach, cloud_points, unstable_samples
-from softreach.studio.rod import solvable_rod
-from softreach.studio.shading import lit
-from softreach.studio.slicing import in_slice, sliced_faces
-from softreach.studio.state import Appearance, Slice
+from softreach.studio.scene.clouds import (
+    FAINT,
+    Clouds,
+    Dots,
+    in_slice,
+    lit,
+    sample_colors,
+    sliced_faces,
+)
+from softreach.studio.state import Appearance, Slice, solvable_rod
 from softreach.support.palette import BODY, bundle_color
 from softreach.workspace import ReachableSolid, ReachableSurface, Surface
 
@@ -28,12 +33,66 @@ if TYPE_CHECKING:
 
     from softreach.plot.coloring import BundleKey, ScalarKey
 
-__all__ = ["MOST_BUNDLES", "Scene"]
+
+# The box with numbers around what a scene shows; the eye decides which edges are numbered.
+
+
+Array = NDArray[np.float64]
+
+_GRAY = 170, 170, 175
+
+
+class NumberedBox:
+    """One box, drawn into one scene."""
+
+    def __init__(self, api: SceneApi) -> None:
+        """Draw into a scene, around an arm for the time being."""
+        self._api = api
+        self.corners = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
+        """The lowest and the highest [L]."""
+        self._eye: Array = np.array([50.0, -80.0, 30.0])
+        self._focal = np.inf
+
+    def draw(self, *points: Array, shown: bool) -> None:
+        """Surround points [L], shapes (n, 3)."""
+        self.corners = round_box(*points)
+        self._remove()
+        if shown:
+            self._draw()
+
+    def turn(self, eye: Array, focal: float = np.inf) -> None:
+        """Number the edges that are the outer ones for an eye [L] of a focal length [pixel]."""
+        before = seen_from(self._eye, *self.corners, self._focal)
+        self._eye, self._focal = eye, focal
+        if self._is_drawn and seen_from(eye, *self.corners, focal) != before:
+            self._remove()
+            self._draw()
+
+    @property
+    def _is_drawn(self) -> bool:
+        return self._api.get_handle_by_name("/axes/lines") is not None
+
+    def _remove(self) -> None:
+        if self._api.get_handle_by_name("/axes") is not None:
+            self._api.remove_by_name("/axes")
+
+    def _draw(self) -> None:
+        low, high = self.corners
+        box = axes_box(low[None], high[None], eye=self._eye, focal=self._focal)
+        lines = box.lines.astype(np.float32)
+        self._api.add_line_segments("/axes/lines", lines, _GRAY, thickness=0.003)
+        for k, (text, at) in enumerate(box.labels):
+            add_label(self._api, f"/axes/label {k}", text, at)
+
+
+def add_label(api: SceneApi, path: str, text: str, at: Array) -> None:
+    """Words at a place [L], as large on the screen wherever the eye is."""
+    api.add_label(path, text, position=at, font_screen_scale=0.8, anchor="center-center")
+
 
 MOST_BUNDLES = 100
 """With more the body alone is drawn: skins of hundreds take a minute."""
 
-Array = NDArray[np.float64]
 Color = tuple[int, int, int]
 
 _STATIONS, _SIDES, _ACROSS = 51, 24, np.pi / 12
