@@ -32,7 +32,7 @@ from softreach.studio.panels.binding import attempt
 from softreach.studio.scene.camera import framing
 from softreach.studio.serve.access import LOOPBACK, page_address, reachable_hosts, with_token
 from softreach.studio.serve.server import page_url, start_server, stop_server
-from softreach.studio.serve.viser_fixes import asked_path, close_all
+from softreach.studio.serve.viser_fixes import close_sockets, request_path
 from softreach.studio.session import Job, Session
 from softreach.studio.snapshots import Snapshots
 from softreach.studio.start import KeptWork, Start, state_in_request
@@ -126,7 +126,7 @@ class Studio:
 
     def _disconnect_tabs(self, patience: float = 3.0) -> None:
         """Close the tabs' connections first: viser ends its pool before it reports the closing."""
-        close_all(self.server)
+        close_sockets(self.server)
         deadline = time.monotonic() + patience
         while self.sessions and time.monotonic() < deadline:
             time.sleep(0.02)
@@ -176,7 +176,7 @@ class Studio:
 
     def _follow_link(self, session: Session) -> None:
         """Bring a tab that was opened by a link into its state."""
-        state = state_in_request(asked_path(self.server, session.client.client_id))
+        state = state_in_request(request_path(self.server, session.client.client_id))
         if state is not None:
             session.restore(state)
 

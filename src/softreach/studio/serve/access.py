@@ -1,9 +1,10 @@
-"""Where a server is reached, and which ports it may have."""
+"""Access to the server: its addresses, its token, and the requests that it answers."""
 
 from __future__ import annotations
 
 import contextlib
 import hmac
+import re
 import secrets
 import socket
 from collections.abc import Mapping
@@ -67,6 +68,8 @@ def _outward() -> str:
 
 
 _NAME = "softreach_token"
+_NO_TOKEN = "The address lacks the token that softreach printed with it.\n"
+_FOREIGN = "This page is for its own server alone.\n"
 
 
 def new_token() -> str:
@@ -106,3 +109,78 @@ def _kept(text: str) -> list[str]:
     except CookieError:
         return []
     return [kept.value] if kept is not None else []
+
+
+# Requests: whose are answered, and with which headers.
+
+
+def refusal(host: str, token: str, path: str, headers: Mapping[str, str]) -> str:
+    """Why a request is refused; "" for one that is welcome.
+
+    Args:
+        host: That the server listens on.
+        token: "" where none is asked for.
+        path: Of the request, with its query.
+        headers: Of the request.
+    """
+    if not is_welcome(path, headers, token):
+        return _NO_TOKEN
+    return "" if same_origin(headers, host) else _FOREIGN
+
+
+def answer_headers(token: str, path: str, headers: Mapping[str, str]) -> dict[str, str]:
+    """Headers of the answer to a request."""
+    kept = cookie(path, token)
+    return page_headers(headers.get("Host", "")) | ({"Set-Cookie": kept} if kept else {})
+
+
+def same_origin(headers: Mapping[str, str], host: str) -> bool:
+    """Whether a connection comes from our own page, or from no page at all.
+
+    Browsers let any web page open a socket to this machine; they tell where it came from. On
+    loopback the name must be local too, as foreign names can be made to point here.
+    """
+    asked = urlsplit(f"//{headers.get('Host', '')}")
+    if host in _LOCAL and asked.hostname not in _LOCAL:
+        return False
+    origin = headers.get("Origin")
+    return origin is None or urlsplit(origin).netloc == asked.netloc
+
+
+def page_headers(host: str) -> dict[str, str]:
+    """What keeps a page to its own server, whatever its address asks for.
+
+    viser's page is one file of inline scripts and styles; it would open a socket to any server that
+    `?websocket=` names, and read a scene from any address.
+
+    Args:
+        host: Name and port, as the request has them.
+    """
+    plain = _HOST.fullmatch(host) is not None
+    sockets = f" ws://{host} wss://{host}" if plain else ""  # older browsers: not part of 'self'
+    rules = _POLICY | {"connect-src": f"'self' data: blob:{sockets}"}
+    policy = "; ".join(f"{name} {value}" for name, value in rules.items())
+    return {
+        "Content-Security-Policy": policy,
+        "X-Frame-Options": "DENY",
+        "X-Content-Type-Options": "nosniff",
+        "Referrer-Policy": "no-referrer",
+    }
+
+
+_HOST = re.compile(r"[A-Za-z0-9.\-]+(:\d+)?|\[[0-9A-Fa-f:.]+\](:\d+)?")
+_POLICY = {
+    "default-src": "'self'",
+    "script-src": "'self' 'unsafe-inline' 'unsafe-eval' blob:",
+    "script-src-attr": "'none'",
+    "style-src": "'self' 'unsafe-inline'",
+    "img-src": "'self' data: blob:",
+    "font-src": "'self' data:",
+    "media-src": "'none'",
+    "worker-src": "'self' blob: data:",
+    "frame-src": "'none'",
+    "object-src": "'none'",
+    "base-uri": "'none'",
+    "form-action": "'none'",
+    "frame-ancestors": "'none'",
+}

@@ -1,8 +1,8 @@
-"""The sockets behind the tabs: the one place that uses names which viser keeps to itself.
+"""Fixes of viser and of its page: the one file that uses names which viser keeps to itself.
 
-viser offers no public way to see the request of a socket, to refuse it, to close all of them, or to
-send headers with its page.
-The upper pin of viser in `pyproject.toml` is there for this file; a test tells when it can go.
+Each goes when `tests/studio/test_viser_fixes.py` says that viser no longer needs it. Where a name
+is missing, what it was for is left out; only requests that cannot be checked end the start.
+The upper pin of viser in `pyproject.toml` is there for this file.
 """
 
 from __future__ import annotations
@@ -15,14 +15,100 @@ from functools import lru_cache
 from http import HTTPStatus
 from typing import TYPE_CHECKING, Any
 
-from softreach.studio.serve.access import cookie, is_welcome
-
 if TYPE_CHECKING:
     from viser import ViserServer
 
+__all__ = [
+    "close_sockets",
+    "guarding",
+    "headed",
+    "headed_body",
+    "request_path",
+    "without_tunnel",
+]
 
-# Our title, rules for small windows and dark ones, when fields apply: the head of viser's page.
+_starting = threading.Lock()
 
+
+@contextmanager
+def guarding(
+    refusal: Callable[[str, Mapping[str, str]], str],
+    answer: Callable[[str, Mapping[str, str]], Mapping[str, str]],
+) -> Iterator[threading.Event]:
+    """A server that starts inside the block checks every request, page and socket alike.
+
+    viser offers no public way to see a request, to refuse it, or to send headers with its page.
+
+    Args:
+        refusal: Why a request, given by its path and headers, gets 403; "" for a welcome one.
+        answer: Headers of what is sent for a request.
+
+    Yields:
+        Set once a server has taken the checks over; else it has none of them.
+    """
+    import websockets.asyncio.server as sockets
+
+    plain, taken = getattr(sockets, "serve", None), threading.Event()
+
+    def add(connection: Any, request: Any, response: Any) -> None:
+        del connection
+        for name, value in answer(request.path, request.headers).items():
+            response.headers[name] = value
+        if response.headers.get("Content-Type", "").startswith("text/html"):
+            zipped = response.headers.get("Content-Encoding") == "gzip"
+            response.body = headed_body(response.body, zipped=zipped)
+            del response.headers["Content-Length"]
+            response.headers["Content-Length"] = str(len(response.body))
+
+    def serve(*arguments: Any, process_request: Any = None, **options: Any) -> Any:
+        def admit(connection: Any, request: Any) -> Any:
+            if reason := refusal(request.path, request.headers):
+                return connection.respond(HTTPStatus.FORBIDDEN, reason)
+            return process_request(connection, request) if process_request else None
+
+        taken.set()
+        assert plain is not None
+        return plain(*arguments, process_request=admit, process_response=add, **options)
+
+    if plain is None:
+        yield taken
+        return
+    with _starting:
+        sockets.serve = serve  # pyright: ignore[reportAttributeAccessIssue]
+        try:
+            yield taken
+        finally:
+            sockets.serve = plain
+
+
+def request_path(server: ViserServer, client_id: int) -> str:
+    """The address that the socket of a page asked for, from the first slash on; "/" if unknown."""
+    connections = getattr(_sockets(server), "_live_connections", {})
+    request = getattr(connections.get(client_id), "request", None)
+    return "/" if request is None else request.path
+
+
+def close_sockets(server: ViserServer) -> None:
+    """Close the sockets of all tabs; without a way to do so the server's end closes them."""
+    close = getattr(_sockets(server), "disconnect_all_clients", None)
+    if close is not None:
+        close()
+
+
+def _sockets(server: ViserServer) -> Any:
+    return getattr(server, "_websock_server", None)
+
+
+def without_tunnel(server: ViserServer) -> None:
+    """Refuse a public address: any client could ask for one, the button is not the only way."""
+
+    def refuse(*_: Any, **__: Any) -> None:
+        return None
+
+    server.request_share_url = refuse
+
+
+# The head of viser's page: our title, small windows and dark ones, when fields apply.
 
 _THEIRS = "<title>Viser</title>"
 # viser's sheet for phones leaves a third of the width unused, and tabs break into two lines.
@@ -74,83 +160,15 @@ _HEAD = _OURS + _KEYS + _LABELS
 
 
 def headed(page: str) -> str:
-    """A page with our head."""
+    """A page with our head; one without viser's title as it is."""
     return page.replace(_THEIRS, _HEAD, 1)
 
 
 @lru_cache(maxsize=4)
 def headed_body(body: bytes, *, zipped: bool) -> bytes:
-    """The same for what is sent of a page; anything else as it is."""
+    """What is sent of a page, with our head; anything else as it is."""
     content = gzip.decompress(body) if zipped else body
     ours = content.replace(_THEIRS.encode(), _HEAD.encode(), 1)
     if ours == content:
         return body
     return gzip.compress(ours) if zipped else ours
-
-
-_FORBIDDEN = "The address lacks the token that softreach printed with it.\n"
-_starting = threading.Lock()
-
-
-def asked_path(server: ViserServer, client_id: int) -> str:
-    """The address that the socket of a page asked for, from the first slash on."""
-    live = server._websock_server._live_connections.get(client_id)
-    request = live.request if live is not None else None
-    return "/" if request is None else request.path
-
-
-def close_all(server: ViserServer) -> None:
-    """Close the sockets of all tabs."""
-    server._websock_server.disconnect_all_clients()
-
-
-def refuse_unless(server: ViserServer, welcome: Callable[[Any], bool]) -> None:
-    """Close every socket whose headers are not welcome before anything is sent to it."""
-    sockets = server._websock_server
-
-    @sockets.on_client_connect
-    async def _(client: Any) -> None:
-        live = sockets._live_connections[client.client_id]
-        request = live.request
-        if request is None or not welcome(request.headers):
-            await live.close(1008, "not our page")
-
-
-@contextmanager
-def sending_headers(headers: Callable[[str], Mapping[str, str]], token: str = "") -> Iterator[None]:
-    """A server that starts inside the block sends these headers with everything, and our title.
-
-    Args:
-        headers: From the host that was asked for, as the request names it.
-        token: What requests have to show, pages and sockets alike; all others get 403.
-    """
-    import websockets.asyncio.server as sockets
-
-    plain = sockets.serve
-
-    def add(connection: Any, request: Any, response: Any) -> None:
-        del connection
-        for name, value in headers(request.headers.get("Host", "")).items():
-            response.headers[name] = value
-        if kept := cookie(request.path, token):
-            response.headers["Set-Cookie"] = kept
-        if response.headers.get("Content-Type", "").startswith("text/html"):
-            zipped = response.headers.get("Content-Encoding") == "gzip"
-            response.body = headed_body(response.body, zipped=zipped)
-            del response.headers["Content-Length"]
-            response.headers["Content-Length"] = str(len(response.body))
-
-    def serve(*arguments: Any, process_request: Any = None, **options: Any) -> Any:
-        def admit(connection: Any, request: Any) -> Any:
-            if not is_welcome(request.path, request.headers, token):
-                return connection.respond(HTTPStatus.FORBIDDEN, _FORBIDDEN)
-            return process_request(connection, request) if process_request else None
-
-        return plain(*arguments, process_request=admit, process_response=add, **options)
-
-    with _starting:
-        sockets.serve = serve  # pyright: ignore[reportAttributeAccessIssue]
-        try:
-            yield
-        finally:
-            sockets.serve = plain
