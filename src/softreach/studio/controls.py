@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import NamedTuple
 
 from softreach.arm.file import in_file_terms
@@ -70,7 +71,8 @@ _AROUND_VALUE = ("lower", "upper", "young_modulus")
 """Fields of any magnitude: their sliders end at multiples of what the design has."""
 
 
-def controls(arm: Manipulator) -> list[Control]:
+@lru_cache(maxsize=16)
+def controls(arm: Manipulator) -> tuple[Control, ...]:
     """The sliders of a design, those of the whole arm first.
 
     What the design leaves open, such as a modulus that cancels, has none.
@@ -83,7 +85,7 @@ def controls(arm: Manipulator) -> list[Control]:
             if one is not None and _is_offered(arm, known, one):
                 slider = _slider(one, one.value(arm))
                 found += [_control(arm, one, slider)] if slider else []
-    return found
+    return tuple(found)
 
 
 def _slider(one: Parameter, value: float) -> _Slider | None:

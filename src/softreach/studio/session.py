@@ -6,17 +6,18 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from operator import attrgetter
+from operator import attrgetter, is_not
 from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.atlas_map import MapBoard, board_of
 from softreach.studio.plots.figures import Figures
-from softreach.studio.reach import Reach
-from softreach.studio.scene.camera import VIEWS, Eye, framing
+from softreach.studio.reach import Reach, cloud_points, shown_rows
+from softreach.studio.scene.camera import VIEWS, Eye, framing, picked_point
+from softreach.studio.scene.clouds import in_slice
 from softreach.studio.scene.scene import Scene
 from softreach.studio.snapshots import Snapshots
 from softreach.studio.start import KeptWork, Start
@@ -37,11 +38,16 @@ __all__ = ["AskedJob", "Job", "Panel", "Session", "what_follows"]
 Array = NDArray[np.float64]
 _Kind = TypeVar("_Kind", bound="Job")
 
+_CLICK = 0.01  # [rad] between the ray of a click and a point that it hits, with the usual lens
 _LONGEST_NOTE = 1000  # characters: a file's own text may be in an error
 
 
 class Panel(Protocol):
-    """Widgets of one concept; they call `Session.update` and are notified of every change."""
+    """Widgets of one concept; they call `Session.update` and are notified of changes.
+
+    Those that name in `follows` attributes of the session, such as ("state.design", "reach"), are
+    notified only when one of these is another object than before.
+    """
 
     def show(self, session: Session) -> None:
         """Bring the widgets in line with the session; called from any thread, one at a time."""
@@ -143,6 +149,8 @@ class Session:
         """Whether there is anything to keep."""
         self.state: StudioState = start.state
         self.panels: list[Panel] = []
+        self._shown: dict[Panel, list[object]] = {}
+        """What each panel follows, as it was notified of it last."""
         self.note = ""
         """Text for the reader."""
         self.revision = 0
@@ -222,6 +230,21 @@ class Session:
         if state.camera is not None:
             self.eye.look_from(state.camera)
 
+    def picked_sample(self, origin: ArrayLike, direction: ArrayLike) -> int | None:
+        """Number of the sample under the cursor, of those that can be seen; None beside all.
+
+        Args:
+            origin: Of the ray through the pixel: where the camera is [L].
+            direction: Of the ray, any length.
+        """
+        reach, look = self.reach, self.state.appearance
+        if reach is None or not look.cloud or reach.arm != self.state.design:
+            return None
+        points = cloud_points(reach, look.level)
+        seen = np.flatnonzero(in_slice(points, look.slice) & ~self.scene.clouds.hidden(points))
+        hit = picked_point(points[seen], origin, direction, _CLICK * self.eye.narrowness)
+        return None if hit is None else int(shown_rows(reach, look.level)[seen[hit]])
+
     def look_from(self, view: str) -> None:
         """See everything from one of `eye.VIEWS`."""
         self.eye.look_from(framing(*self.scene.axes.corners, VIEWS[view], self.eye.aspect))
@@ -278,7 +301,14 @@ class Session:
         """Notify all panels."""
         with self._showing:
             for panel in self.panels:
-                panel.show(self)
+                if self._has_news(panel):
+                    panel.show(self)
+
+    def _has_news(self, panel: Panel) -> bool:
+        names = getattr(panel, "follows", ())
+        now, before = [attrgetter(name)(self) for name in names], self._shown.get(panel)
+        self._shown[panel] = now
+        return not names or before is None or any(map(is_not, now, before))
 
     @property
     def busy(self) -> bool:
@@ -345,6 +375,7 @@ class Session:
         # viser may hold on to what belongs to a page for a while; clouds are large.
         self.reach = self.free = self.reference = self.answer = self.atlas = None
         self.panels, self.trail, self.figures = [], [], Figures()
+        self._shown.clear()
 
     def _rested(self) -> None:
         """A job has nothing left to do; if that is true of all, the reader is told."""

@@ -13,9 +13,6 @@ from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.panels.binding import attempt, bind, bind_button
 from softreach.studio.panels.line import Line
 from softreach.studio.panels.typed import VectorField
-from softreach.studio.reach import cloud_points, shown_samples
-from softreach.studio.scene.camera import picked_point
-from softreach.studio.scene.clouds import in_slice
 from softreach.studio.state import StudioState, rod_of
 
 if TYPE_CHECKING:
@@ -93,20 +90,12 @@ class InversePanel:
         session = self._session
         if not self._clicks.value:
             return False
-        reach, look = session.reach, session.state.appearance
-        if reach is None or not look.cloud or reach.arm != session.state.design:
+        sample = session.picked_sample(origin, direction)
+        if sample is None or session.reach is None:
             return False
-        points = cloud_points(reach, look.level)
-        seen = in_slice(points, look.slice) & ~session.scene.clouds.hidden(points)
-        kept = np.flatnonzero(seen)
-        found = picked_point(points[kept], origin, direction, 0.01 * session.eye.narrowness)
-        if found is None:
-            return False
-        activations = reach.cloud.activation.values[shown_samples(reach, look.level)]
-        attempt(
-            session,
-            lambda: session.job(SolveInverse).aim(_tip(reach.arm, activations[kept[found]])),
-        )
+        aim, arm = session.job(SolveInverse).aim, session.reach.arm
+        activation = session.reach.cloud.activation.values[sample]
+        attempt(session, lambda: aim(_tip(arm, activation)))
         return True
 
     def _solve_typed(self) -> None:

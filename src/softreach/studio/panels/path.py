@@ -22,9 +22,6 @@ from softreach.studio.jobs.path import (
 from softreach.studio.panels.binding import attempt, bind_button
 from softreach.studio.panels.line import Line
 from softreach.studio.plots.chart import Chart, Curve
-from softreach.studio.reach import cloud_points
-from softreach.studio.scene.camera import picked_point
-from softreach.studio.scene.clouds import in_slice
 from softreach.studio.state import StudioState, solvable_rod
 from softreach.studio.wishes import MOST_POINTS, TipPath
 from softreach.support.errors import InvalidInput
@@ -113,15 +110,12 @@ class PathPanel:
     def click(self, origin: Sequence[float], direction: Sequence[float]) -> bool:
         """Lead the path to the point of the cloud under the cursor, if clicks are for that."""
         session = self._session
-        reach, look = session.reach, session.state.appearance
         if not self._clicks.value:
             return False
-        if reach is not None and look.cloud and reach.arm == session.state.design:
-            points = cloud_points(reach, look.level)
-            points = points[in_slice(points, look.slice)]
-            found = picked_point(points, origin, direction)
-            if found is not None:
-                attempt(session, lambda: self._extend(points[found] * reach.arm.length))
+        sample = session.picked_sample(origin, direction)
+        if sample is not None and session.reach is not None:
+            tip = session.reach.cloud.tip.values[sample]
+            attempt(session, lambda: self._extend(tip))
         return True
 
     def _list(self, found: xr.Dataset) -> None:

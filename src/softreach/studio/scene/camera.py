@@ -285,7 +285,7 @@ def _axes_of(direction: Array) -> tuple[Array, Array, Array]:
 
 
 def picked_point(
-    points: Array, origin: ArrayLike, direction: ArrayLike, tolerance: float = 0.01
+    points: Array, origin: ArrayLike, direction: ArrayLike, tolerance: float
 ) -> int | None:
     """The point that a ray through a pixel hits: of those close to it, the nearest to the eye.
 
