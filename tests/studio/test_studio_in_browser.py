@@ -116,7 +116,7 @@ def test_a_reference_stays_while_the_design_changes(tab):
     tab.wait(lambda: tab.session.state.design != kept, "the design changes")
     tab.settle()
     tab.page.get_by_text(f"reference (gray): volume {known.volume:.4f}").wait_for()
-    eye = np.array(tab.session.eye.camera().position)
+    eye = np.array(tab.session.camera.usual().position)
     tab.page.get_by_label("side by side").check()
     tab.wait(lambda: tab.drawn("/reference/arm"), "the reference stands beside")
     assert tab.session.reference is known
@@ -133,7 +133,7 @@ def parameter(tab, name: str) -> float:
 
 
 def far(tab, eye) -> bool:
-    return np.linalg.norm(np.array(tab.session.eye.camera().position) - eye) > 0.2
+    return np.linalg.norm(np.array(tab.session.camera.usual().position) - eye) > 0.2
 
 
 def test_surfaces_are_drawn_and_cut(tab):
@@ -225,7 +225,7 @@ def test_a_link_opens_the_state_in_another_tab(tab, studio):
     assert other.settle(PATIENCE)
     assert other.reach.arm == kept.design
     tab.wait(
-        lambda: np.allclose(other.eye.camera().position, kept.camera.position, atol=1e-6),
+        lambda: np.allclose(other.camera.usual().position, kept.camera.position, atol=1e-6),
         "the page looks from where the first one did",
     )
     page.close()

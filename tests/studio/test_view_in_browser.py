@@ -141,7 +141,7 @@ def named_axes(tab) -> set[str]:
 
 def along(tab, axis: int) -> float:
     """Cosine between where the eye looks and an axis."""
-    camera = tab.session.eye.camera()
+    camera = tab.session.camera.usual()
     way = np.subtract(camera.look_at, camera.position)
     return abs(way[axis]) / np.linalg.norm(way)
 

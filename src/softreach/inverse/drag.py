@@ -28,9 +28,9 @@ class Dragged(NamedTuple):
     activation: tuple[float, ...]
     """Of each bundle in its unit."""
     tip: Array
-    """Where the tip is then [m], shape (3,)."""
+    """Place of the tip then [m], shape (3,)."""
     gap: float
-    """How far that is from where it was dragged to [m]; 0 where it follows."""
+    """Distance from there to the target [m]; 0 where the tip follows."""
 
 
 class Drag:
@@ -75,14 +75,14 @@ class Drag:
         request = Request(
             targets=np.tile(target, (len(starts), 1)), residual=self._residual, near=starts
         )
-        found = local_minima(self._rod, request, starts).gamma
-        tips, slopes = self._rod.tips_and_slopes(found)
+        ends = local_minima(self._rod, request, starts).gamma
+        tips, slopes = self._rod.tips_and_slopes(ends)
         gaps = np.linalg.norm(tips - target, axis=1)
         gaps = np.where(np.isfinite(gaps), gaps, np.inf)
         best = gaps <= gaps.min() + self._residual
         other_side = [self._side * self._sign(slope) < 0 for slope in slopes]
-        away = np.linalg.norm((found - gamma) / self._rod.box.scales, axis=1)
-        return found[np.lexsort((away, other_side, ~best))[0]]
+        away = np.linalg.norm((ends - gamma) / self._rod.box.scales, axis=1)
+        return ends[np.lexsort((away, other_side, ~best))[0]]
 
     def _beside_fold(self, gamma: Array, slope: Array) -> list[Array]:
         """Starts on both sides of a fold: on it, no small change brings the tip nearer."""

@@ -38,7 +38,7 @@ _LAST = 1200  # [ms]
 
 
 def frames_along(count: int, most: int = _MOST_FRAMES) -> list[int]:
-    """Which of the points of a path are shown: evenly, the first and the last among them."""
+    """Numbers of the points of a path that are shown: evenly, the first and the last among them."""
     return sorted({round(k) for k in np.linspace(0, count - 1, min(count, most))})
 
 

@@ -1,4 +1,4 @@
-"""The studio: a server, and a session for every tab."""
+"""Studio: a server, and a session for every tab."""
 
 from __future__ import annotations
 
@@ -54,9 +54,9 @@ JOBS: tuple[type[Job], ...] = (
 )  # fmt: skip
 """Every kind of work that a tab has done for it."""
 
-_EYE = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
-_EYE_ON_MAP = Camera(position=(1.9, -6.3, 2.0), look_at=(-0.95, -0.5, 0.3))
-_MOST_LEFT = 20  # closed tabs whose work is held
+_CAMERA = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
+_CAMERA_ON_MAP = Camera(position=(1.9, -6.3, 2.0), look_at=(-0.95, -0.5, 0.3))
+_MOST_LEFT = 20  # closed tabs whose work is remembered
 _GOES_ON = "This goes on where the last work on it ended; Reset leads back to the beginning."
 
 
@@ -97,7 +97,7 @@ class Studio:
         self._notice = Latest(_ignored)
         self._compilation = CompilationWatch(self._compiling)
         self.server = start_server(host, port, token)
-        camera = start.state.camera or (_EYE if start.atlas is None else _EYE_ON_MAP)
+        camera = start.state.camera or (_CAMERA if start.atlas is None else _CAMERA_ON_MAP)
         self.server.initial_camera.position = camera.position
         self.server.initial_camera.look_at = camera.look_at
         self.server.on_client_connect(self._connected)
@@ -105,15 +105,15 @@ class Studio:
 
     @property
     def url(self) -> str:
-        """Where the page is, with its token."""
+        """Address of the page, with its token."""
         return with_token(page_url(self.server), self._token)
 
     @property
     def urls_for_others(self) -> list[str]:
-        """Where the page is for other machines; none if it is for this one alone."""
+        """Addresses of the page for other machines; none if it is for this one alone."""
         host, port = self.server.get_host(), self.server.get_port()
-        found = (page_address(one, port) for one in reachable_hosts(host))
-        return [with_token(one, self._token) for one in found]
+        hosts = reachable_hosts(host)
+        return [with_token(page_address(name, port), self._token) for name in hosts]
 
     def stop(self) -> None:
         """Stop serving."""
@@ -160,9 +160,9 @@ class Studio:
         if left is not None:
             session.take_up(*left)
         _furnish(session, page_url(self.server))
-        session.eye.on_move(lambda: session.follow(FollowCamera))
+        session.camera.on_move(lambda: session.follow(FollowCamera))
         session.begin()
-        if session.eye.is_upright:
+        if session.camera.is_upright:
             _look_at_all(session)
         if self.work is not None and self.work.complaint:
             session.say(self.work.complaint)
@@ -191,7 +191,7 @@ class Studio:
                 del self._left[:-_MOST_LEFT]
 
     def _work_left(self) -> tuple[StudioState, History] | None:
-        """What a new tab goes on with: nothing beside tabs that are open, as it is theirs."""
+        """State and history that a new tab goes on with: those of tabs that are open are theirs."""
         if self.work is None:
             return None
         if self._left:
@@ -215,8 +215,8 @@ def _look_at_all(session: Session) -> None:
         session.look_from("oblique")
         return
     low, high = round_box(np.vstack([*session.scene.axes.corners, session.board.corners]))
-    toward = np.subtract(_EYE_ON_MAP.position, _EYE_ON_MAP.look_at)
-    session.eye.look_from(framing(low, high, toward, session.eye.aspect))
+    toward = np.subtract(_CAMERA_ON_MAP.position, _CAMERA_ON_MAP.look_at)
+    session.camera.look_from(framing(low, high, toward, session.camera.aspect))
 
 
 def _furnish(session: Session, url: str) -> None:

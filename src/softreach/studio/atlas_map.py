@@ -1,4 +1,4 @@
-"""A contour map over two parameters of an atlas, and the design under a click."""
+"""Map of an atlas: a metric over two parameters, its board in the scene, its numbers in words."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class AtlasMap:
         return at if all(inside) else None
 
     def place_of(self, **at: float) -> tuple[float, float]:
-        """Where a design is in the picture: the inverse of `parameters_at`."""
+        """Place of a design in the picture: the inverse of `parameters_at`."""
         shares = [
             (at[name] - values[0]) / ((values[-1] - values[0]) or 1.0)
             for name, values in zip(self.names, (self.x, self.y), strict=True)
@@ -97,7 +97,7 @@ def map_choices(atlas: xr.Dataset, view: MapView) -> tuple[str, str, str]:
     return view.metric or metrics[0], right, up
 
 
-def held_places(atlas: xr.Dataset, view: MapView, design: Manipulator) -> dict[str, int]:
+def fixed_places(atlas: xr.Dataset, view: MapView, design: Manipulator) -> dict[str, int]:
     """Of each parameter that a map does not show, the number of the value nearest to a design's."""
     _, *shown = map_choices(atlas, view)
     others = [str(dim) for dim in atlas["status"].dims if dim not in shown]
@@ -107,30 +107,30 @@ def held_places(atlas: xr.Dataset, view: MapView, design: Manipulator) -> dict[s
     }
 
 
-def atlas_map(atlas: xr.Dataset, view: MapView, held: dict[str, int]) -> AtlasMap:
-    """Draw a metric over two parameters, the others held as `held_places` says.
+def atlas_map(atlas: xr.Dataset, view: MapView, fixed: dict[str, int]) -> AtlasMap:
+    """Draw a metric over two parameters, the others fixed as `fixed_places` says.
 
     Raises:
         InvalidInput: There is no such map.
     """
     metric, *names = map_choices(atlas, view)
-    shown = atlas[["status", metric]].isel(held).transpose(*names)
+    shown = atlas[["status", metric]].isel(fixed).transpose(*names)
     x, y = (atlas[name].values.astype(float) for name in names)
     labels = [_label(atlas, name) for name in names]
-    title = "\n".join([metric_label(atlas[metric]), *_held_text(atlas, held)])
+    title = "\n".join([metric_label(atlas[metric]), *_fixed_text(atlas, fixed)])
     return AtlasMap(
         image=_drawn(shown, metric, labels, title),
         x=x,
         y=y,
         names=(names[0], names[1]),
-        fixed={name: float(atlas[name].values[place]) for name, place in held.items()},
+        fixed={name: float(atlas[name].values[place]) for name, place in fixed.items()},
     )
 
 
-def _held_text(atlas: xr.Dataset, held: dict[str, int]) -> list[str]:
-    """One line with the parameters that are held, if there are any."""
-    parts = (f"{_label(atlas, name)} = {_shown(atlas, name)[k]:.4g}" for name, k in held.items())
-    return [", ".join(parts)] if held else []
+def _fixed_text(atlas: xr.Dataset, fixed: dict[str, int]) -> list[str]:
+    """One line with the fixed parameters, if there are any."""
+    parts = (f"{_label(atlas, name)} = {_shown(atlas, name)[k]:.4g}" for name, k in fixed.items())
+    return [", ".join(parts)] if fixed else []
 
 
 def _nearest(values: NDArray[np.float64], share: float) -> float:
@@ -145,8 +145,8 @@ def _shown(atlas: xr.Dataset, name: str) -> NDArray[np.float64]:
 
 
 def _label(atlas: xr.Dataset, name: str) -> str:
-    given = atlas[name].attrs.get("units", "1")
-    unit = {"rad": "deg", "1": ""}.get(given, given)
+    stored = atlas[name].attrs.get("units", "1")
+    unit = {"rad": "deg", "1": ""}.get(stored, stored)
     words = " ".join([name.replace("_", " "), *_symbol(atlas[name])])
     return f"{words} [{unit}]" if unit else words
 
@@ -215,7 +215,7 @@ def nearest_numbers(atlas: xr.Dataset, metric: str, design: Manipulator) -> str:
 
 
 def _reason(atlas: xr.Dataset, here: dict[str, int]) -> str:
-    """Why an α-shape is not the exact set."""
+    """Reason why an α-shape is not the exact set."""
     command = _command(atlas)
     alpha, exact = command["alpha_over_length"], _value(atlas, "exact_volume", here)
     if alpha == "critical" or not exact > 0:
@@ -265,7 +265,7 @@ def _command(atlas: xr.Dataset) -> dict[str, int | float | str]:
 
 Array = NDArray[np.float64]
 
-_ANGLE = 0.5  # [rad] about z, so that the board faces the eye that a tab begins with
+_ANGLE = 0.5  # [rad] about z, so that the board faces the camera of a new tab
 _RIGHT = np.array([np.cos(_ANGLE), np.sin(_ANGLE), 0.0])
 _UP = np.array([0.0, 0.0, 1.0])
 _SIZE = 1.7  # [L]
@@ -285,7 +285,7 @@ class MapBoard:
         """Nothing is drawn yet."""
         self._scene, self.atlas = scene, atlas
         self.map: AtlasMap | None = None
-        """What is drawn."""
+        """The map that is drawn."""
         self._drawn: tuple[MapView, dict[str, int]] | None = None
 
     def draw(self, view: MapView, design: Manipulator) -> None:
@@ -294,7 +294,7 @@ class MapBoard:
         Raises:
             InvalidInput: There is no such map.
         """
-        wanted = view, held_places(self.atlas, view, design)
+        wanted = view, fixed_places(self.atlas, view, design)
         if wanted != self._drawn:
             self.map = atlas_map(self.atlas, view, wanted[1]) if view.shown else None
             self._drawn = wanted
@@ -316,14 +316,14 @@ class MapBoard:
         return self.map.parameters_at(float(right), float(up)) or {}
 
     def place_of(self, **at: float) -> Array:
-        """Where in the scene the map shows a design [L]."""
+        """Place in the scene where the map shows a design [L]."""
         assert self.map is not None
         right, up = self.map.place_of(**at)
         return _CENTER + _SIZE * ((right - 0.5) * _RIGHT + (up - 0.5) * _UP)
 
     @property
     def corners(self) -> Array:
-        """Where it stands in the scene [L], shape (4, 3)."""
+        """Corners of the board in the scene [L], shape (4, 3)."""
         ends = (-_SIZE / 2, _SIZE / 2)
         return np.array([_CENTER + right * _RIGHT + up * _UP for right in ends for up in ends])
 

@@ -57,10 +57,10 @@ def static_page(state: StudioState, reach: Reach, picture: NDArray[np.uint8] | N
 
 
 def _place(server: ViserServer, camera: Camera, *, orthographic: bool) -> None:
-    found, place = lens(camera, orthographic=orthographic)
+    chosen, place = lens(camera, orthographic=orthographic)
     first = server.initial_camera
     first.position, first.look_at = place.position, place.look_at
-    first.fov, first.near, first.far = found.fov, found.near, found.far
+    first.fov, first.near, first.far = chosen.fov, chosen.near, chosen.far
 
 
 def _draw(scene: Scene, state: StudioState, reach: Reach) -> str:

@@ -16,7 +16,7 @@ from softreach.rod.tip_map import TipStatus
 from softreach.studio.atlas_map import MapBoard, board_of
 from softreach.studio.plots.figures import Figures
 from softreach.studio.reach import Reach, cloud_points, shown_rows
-from softreach.studio.scene.camera import VIEWS, Eye, framing, picked_point
+from softreach.studio.scene.camera import VIEWS, TabCamera, framing, picked_point
 from softreach.studio.scene.clouds import in_slice
 from softreach.studio.scene.scene import Scene
 from softreach.studio.snapshots import Snapshots
@@ -68,7 +68,7 @@ class Job(ABC):
 
     @classmethod
     def has_use(cls, session: Session) -> bool:
-        """Whether a session has this kind of work at all."""
+        """True for sessions that have this kind of work at all."""
         del session
         return True
 
@@ -92,7 +92,7 @@ class AskedJob(Job):
     """Work that no state asks for, but a person who presses a button."""
 
     wanted = False
-    """Whether somebody pressed it since the work was last done."""
+    """True if somebody pressed it since the work was last done."""
 
     def ask(self) -> None:
         """Do the work as soon as possible."""
@@ -100,7 +100,7 @@ class AskedJob(Job):
         self.session.follow(type(self))
 
     def run(self, check: StaleCheck) -> None:
-        """Do the work once for each time it was asked for."""
+        """Do the work once for each time that it was ordered."""
         wanted, self.wanted = self.wanted, False
         if wanted:
             self.do(check)
@@ -141,49 +141,49 @@ class Session:
             snapshots: Those of all tabs.
         """
         self.client, self.quality = client, start.quality
-        self.eye, self.scene = Eye(client), Scene(client.scene)
+        self.camera, self.scene = TabCamera(client), Scene(client.scene)
         self.start, self.work = start, work
         self.snapshots = snapshots or Snapshots()
         self.history = History()
         self.is_touched = False
-        """Whether there is anything to keep."""
+        """True once there is anything to keep."""
         self.state: StudioState = start.state
         self.panels: list[Panel] = []
         self._shown: dict[Panel, list[object]] = {}
-        """What each panel follows, as it was notified of it last."""
+        """Values that each panel follows, as it was notified of them last."""
         self.note = ""
         """Text for the reader."""
         self.revision = 0
         """Number of changes that widgets have to follow."""
         self.reach: Reach | None = start.reach
-        """What the design can reach, or the design before it until that is known."""
+        """Reach of the design, or of the design before it until that is known."""
         self.refusal = ""
-        """Why nothing can be computed of the design."""
+        """Reason why nothing can be computed of the design."""
         self.canceled = False
-        """Whether the reader stopped what was being computed of this state."""
+        """True if the reader stopped what was being computed of this state."""
         self.doing = ""
-        """What is being computed or written, for the reader."""
+        """Work that is being done, for the reader."""
         self.compiling = False
-        """Whether kernels are being compiled, for whichever tab."""
+        """True while kernels are being compiled, for whichever tab."""
         self.free: Reach | None = None
-        """What a loaded design would reach without its loads."""
+        """Reach of a loaded design without its loads."""
         self.reference: Reach | None = None
         self.key: BundleKey | ScalarKey | None = None
         """To the colors of the cloud."""
         self.tip: Array | None = None
-        """Where the tip is [L]; None before it is known, and without equilibrium."""
+        """Place of the tip [L]; None before it is known, and without equilibrium."""
         self.posture: TipStatus | None = None
-        """Whether a loaded arm rests in its activation; None for an arm without loads."""
+        """Equilibrium of a loaded arm in its activation; None for an arm without loads."""
         self.trail: list[Array] = []
-        """Where it has been."""
+        """Places of the tip before [L]."""
         self.answer: Solution | None = None
         """Of the inverse problem."""
         self.drag: TipDrag | None = None
         """Of the tip; None when nobody drags."""
         self.is_dragged = False
-        """Whether a drag of the tip is under way."""
+        """True while a drag of the tip is under way."""
         self.figures = Figures()
-        """What was found for the plots beside the scene."""
+        """Results of the plots beside the scene."""
         self.atlas: xr.Dataset | None = start.atlas
         self.board: MapBoard | None = board_of(self.scene, self.atlas)
         self.drawing = threading.RLock()
@@ -228,7 +228,7 @@ class Session:
         """Take up a state that was saved, and its view."""
         self.update(lambda _: state)
         if state.camera is not None:
-            self.eye.look_from(state.camera)
+            self.camera.look_from(state.camera)
 
     def picked_sample(self, origin: ArrayLike, direction: ArrayLike) -> int | None:
         """Number of the sample under the cursor, of those that can be seen; None beside all.
@@ -242,12 +242,12 @@ class Session:
             return None
         points = cloud_points(reach, look.level)
         seen = np.flatnonzero(in_slice(points, look.slice) & ~self.scene.clouds.hidden(points))
-        hit = picked_point(points[seen], origin, direction, _CLICK * self.eye.narrowness)
+        hit = picked_point(points[seen], origin, direction, _CLICK * self.camera.narrowness)
         return None if hit is None else int(shown_rows(reach, look.level)[seen[hit]])
 
     def look_from(self, view: str) -> None:
-        """See everything from one of `eye.VIEWS`."""
-        self.eye.look_from(framing(*self.scene.axes.corners, VIEWS[view], self.eye.aspect))
+        """See everything from one of `camera.VIEWS`."""
+        self.camera.look_from(framing(*self.scene.axes.corners, VIEWS[view], self.camera.aspect))
 
     def step(self, *, back: bool) -> None:
         """Undo the latest step of the work, or do again what was undone last."""
@@ -272,7 +272,7 @@ class Session:
         if state.design != self.start.state.design:
             self.reach = None
         if state.camera is not None:
-            self.eye.look_from(state.camera)
+            self.camera.look_from(state.camera)
 
     def keep(self) -> None:
         """Write the state to where the next tab or server finds it."""
@@ -290,7 +290,7 @@ class Session:
 
     def state_now(self) -> StudioState:
         """The state with the camera, as it is saved."""
-        return self.state.replace(camera=self.eye.camera())
+        return self.state.replace(camera=self.camera.usual())
 
     def say(self, note: str) -> None:
         """Show text to the reader."""
@@ -357,9 +357,9 @@ class Session:
 
     def job(self, kind: type[_Kind]) -> _Kind:
         """The job of a kind."""
-        found = self._jobs[kind]
-        assert isinstance(found, kind)
-        return found
+        job = self._jobs[kind]
+        assert isinstance(job, kind)
+        return job
 
     def settle(self, timeout: float = 60.0) -> bool:
         """Wait until all that follows from the state is done; return whether it is."""

@@ -1,4 +1,4 @@
-"""What the studio is opened on: a design, a stored cloud, or an atlas."""
+"""Start of a tab: a design, a stored cloud, an atlas, a link, or the work that was kept."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Start:
-    """What every new tab begins with."""
+    """State and knowledge that every new tab begins with."""
 
     state: StudioState
     quality: Quality
@@ -107,7 +107,7 @@ def user_folder() -> Path:
 #
 # The page offers no place of its own, so the server keeps it: in the user's own folder, one folder
 # for each design that the studio is opened on, one file for the latest state and one for each
-# snapshot. Every file appears whole or not at all and none is shared by two writers' halves, so
+# snapshot. Every file appears complete or not at all and none is shared by two writers' halves, so
 # that two tabs, or two studios, cannot spoil each other's work: of two latest states the later one
 # stays.
 
@@ -129,7 +129,7 @@ class KeptWork:
         """
         self._folder, self._writing = folder, threading.Lock()
         self.complaint = ""
-        """Why something could not be read or written; one line."""
+        """Reason why something could not be read or written; one line."""
         self.latest: StudioState | None = self._latest() if goes_on else None
         """The state that was kept last."""
 
@@ -140,15 +140,15 @@ class KeptWork:
 
     def snapshots(self) -> tuple[Snapshot, ...]:
         """Those that can be read, in the order in which they were taken."""
-        found: dict[str, Snapshot] = {}
+        known: dict[str, Snapshot] = {}
         for path in sorted(self._folder.glob("snapshot-*.json"))[:_MOST]:
             try:
                 one = Snapshot.from_json(_text(path))
             except (SoftreachError, OSError) as error:
                 self._complain(path, error)
             else:
-                found[one.name] = one
-        return tuple(sorted(found.values(), key=lambda one: one.taken))
+                known[one.name] = one
+        return tuple(sorted(known.values(), key=lambda one: one.taken))
 
     def put(self, snapshot: Snapshot) -> None:
         """Keep a snapshot, instead of an older one of its name."""
@@ -174,7 +174,7 @@ class KeptWork:
         try:
             with (
                 self._writing,
-                # Whatever is in a folder of ours by that name is an older one, whole or not.
+                # Whatever is in a folder of ours by that name is an older one, complete or not.
                 replacing(self._folder / name, _STATE, overwrite=True, durable=False) as partial,
             ):
                 partial.write_text(text, encoding="utf-8")
@@ -186,7 +186,7 @@ class KeptWork:
 
 
 def work_on(design: Manipulator, *, goes_on: bool = True) -> KeptWork:
-    """What is kept of the work that began with a design."""
+    """Work that is kept of a design."""
     digest = hashlib.sha256(design.to_toml().encode()).hexdigest()[:16]
     return KeptWork(user_folder() / "studio" / digest, goes_on=goes_on)
 

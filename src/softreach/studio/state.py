@@ -1,4 +1,4 @@
-"""What a tab of the studio shows, as a value."""
+"""State of a tab of the studio as a value, its tip map, and the history of states."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ CUTS = {
     "half": "the half in front of the arm",
     "none": "nothing",
 }
-"""What is cut away from a cloud in front of the arm: name -> what the menu says."""
+"""Parts of a cloud that are cut away in front of the arm: name -> what the menu says."""
 
 Vector = tuple[float, float, float]
 
@@ -111,7 +111,7 @@ class Slice:
 
 @dataclass(frozen=True, kw_only=True)
 class MapView:
-    """What the map of an atlas shows; "" is the first there is."""
+    """Metric and parameters of the map of an atlas; "" is the first there is."""
 
     metric: str = ""
     right: str = ""
@@ -125,7 +125,7 @@ class MapView:
 
 @dataclass(frozen=True, kw_only=True)
 class Appearance:
-    """What is drawn and how."""
+    """Looks of a tab: what is drawn and how."""
 
     level: int = 17
     color: str = "effort"
@@ -134,13 +134,13 @@ class Appearance:
     """[L]."""
     slice: Slice = field(default_factory=Slice)
     cut: str = "window"
-    """What of the cloud is cut away in front of the arm: one of `CUTS`."""
+    """Part of the cloud that is cut away in front of the arm: one of `CUTS`."""
     lit: bool = True
-    """Whether a lamp shines on the points."""
+    """A lamp shines on the points."""
     orthographic: bool = False
-    """Whether parallels stay parallel."""
+    """Parallels stay parallel."""
     dark: bool = False
-    """Whether the page is dark."""
+    """The page is dark."""
     cloud: bool = True
     arm: bool = True
     axes: bool = True
@@ -148,7 +148,7 @@ class Appearance:
     """The exact boundary of the reachable set."""
     alpha_shape: bool = False
     trail: bool = False
-    """Where the tip has been."""
+    """A line through the places where the tip has been."""
     free: bool = True
     """The cloud without loads, faint, around that of a loaded arm."""
     ghosts: bool = True
@@ -174,7 +174,7 @@ class Appearance:
 
 @dataclass(frozen=True, kw_only=True)
 class Camera:
-    """Where the eye is and what it looks at [L]."""
+    """Place of a camera, and the place it looks at [L]."""
 
     position: Vector
     look_at: Vector
@@ -198,13 +198,13 @@ class StudioState:
     """Of each bundle in its unit, within the bounds; rest, or what is nearest to it, by default."""
     appearance: Appearance = field(default_factory=Appearance)
     target: Vector | None = None
-    """Where the tip should go [m]."""
+    """Place where the tip should go [m]."""
     reference: Manipulator | None = None
     """A design kept for comparison."""
     side_by_side: bool = False
     camera: Camera | None = None
     path: TipPath | None = None
-    """What the tip follows."""
+    """Path that the tip follows."""
 
     def __post_init__(self) -> None:
         if self.reference is not None:
@@ -261,9 +261,9 @@ def _parsed(text: str | bytes) -> dict[str, Any]:
         values = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InvalidInput("state file", str(error), allowed) from None
-    found = values.pop("softreach_studio", None) if isinstance(values, dict) else None
-    if found != VERSION:
-        raise InvalidInput("state file", f"version {found}", allowed)
+    version = values.pop("softreach_studio", None) if isinstance(values, dict) else None
+    if version != VERSION:
+        raise InvalidInput("state file", f"version {version}", allowed)
     return values
 
 
@@ -298,10 +298,10 @@ def _check_number(name: str, value: object, low: float, high: float) -> None:
 def _check_plain(name: str, value: Appearance | MapView) -> None:
     """Texts are texts and switches are switches, in a state that came from elsewhere too."""
     for one in fields(value):
-        held = getattr(value, one.name)
+        content = getattr(value, one.name)
         kind = {"bool": bool, "str": str}.get(str(one.type))
-        if kind is not None and not isinstance(held, kind):
-            raise InvalidInput(f"{name}.{one.name}", held, f"a {kind.__name__}")
+        if kind is not None and not isinstance(content, kind):
+            raise InvalidInput(f"{name}.{one.name}", content, f"a {kind.__name__}")
 
 
 def _within(box: ActivationBox, activation: Sequence[float]) -> tuple[float, ...]:
@@ -389,7 +389,7 @@ def _seen_as(view: StudioState, state: StudioState) -> StudioState:
 
 
 def _kind(old: StudioState, new: StudioState) -> str:
-    """What differs; "" if nothing but the view does."""
+    """Kind of a change; "" if nothing but the view differs."""
     settings = [name for name in _SETTINGS if getattr(old, name) != getattr(new, name)]
     if settings:  # activations may have been moved into other bounds
         return " ".join(settings)

@@ -1,4 +1,4 @@
-"""Background work: the latest order wins, stale work is dropped, heavy work takes turns."""
+"""Background work: the latest order wins, stale work is dropped, budgets and turns are kept."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Dropped(Exception):
 
 
 def _always_wanted() -> None:
-    """What is done outside of a worker is always wanted."""
+    """Check of work outside of a worker, which is always wanted."""
 
 
 _check: ContextVar[StaleCheck] = ContextVar("check", default=_always_wanted)
@@ -145,7 +145,7 @@ class Latest:
 
 
 _SHARE = 0.2
-"""Of the free memory that one computation may plan with: others hold what they found before."""
+"""Of the free memory that one computation may plan with: others hold their results."""
 _LEFT = 0.4
 """Of the memory that was free in the beginning: with less a computation ends."""
 _PAUSE = 0.2  # [s] between looks at the memory
@@ -156,7 +156,7 @@ class OverBudget(Exception):
 
 
 def memory_share() -> float:
-    """What a computation that begins now may plan with [bytes]."""
+    """Memory that a computation that begins now may plan with [bytes]."""
     return _SHARE * free_memory()
 
 
@@ -176,7 +176,7 @@ class Budget:
         self._check, self._report = check, report
         free = free_memory()
         self.memory = _SHARE * free
-        """What it may plan with [bytes]."""
+        """Memory that it may plan with [bytes]."""
         self._least = _LEFT * free
         self._seconds, self._end = seconds, time.monotonic() + seconds
         self._next, self._done = 0.0, 0
@@ -242,7 +242,7 @@ def level_in_memory(bundles: int, memory: float, wanted: int) -> int:
 
 @lru_cache(maxsize=64)
 def _seconds_each(rod: TipMap) -> float:
-    """What one sample costs [s], once everything is compiled and prepared."""
+    """Cost of one sample [s], once everything is compiled and prepared."""
     (cube,) = cube_blocks("sobol", _PILOT, rod.box.bundles, 0, _PILOT)
     gamma = rod.box.from_cube(cube)
     _tips(rod, gamma[:16])
@@ -256,7 +256,7 @@ def _seconds(rod: TipMap, gamma: NDArray[np.float64]) -> float:
 
 
 def _tips(rod: TipMap, gamma: NDArray[np.float64]) -> None:
-    """What a cloud computes of samples."""
+    """Do what a cloud does with samples."""
     (rod.status if rod.supports_unstable else rod.tips)(gamma)
 
 

@@ -77,7 +77,7 @@ class DrawReference(Job):
         session.show()
 
     def _reach_of(self, reference: Manipulator, check: StaleCheck) -> Reach:
-        """What is known already, if it is fine."""
+        """Reach that is known already, if it is fine."""
         known = self.session.reach
         if known is not None and known.fine and known.arm == reference:
             return known

@@ -29,7 +29,7 @@ class SolveInverse(Job):
     only_with = "target"
 
     take_nearest = False
-    """Whether the arm moves to the nearest of them, as after a click or a typed target."""
+    """True if the arm moves to the nearest of them, as after a click or a typed target."""
 
     def aim(self, target: NDArray[np.float64]) -> None:
         """Find every activation that reaches a target [m], and take the nearest to the present.
@@ -42,7 +42,7 @@ class SolveInverse(Job):
         self.session.follow(SolveInverse)  # also where the target is the one before
 
     def run(self, check: StaleCheck) -> None:
-        """Solve, draw, and move the arm if it was asked to."""
+        """Solve, draw, and move the arm if that was ordered."""
         check()
         state = self.session.state
         self.session.answer = None
@@ -67,7 +67,7 @@ class SolveInverse(Job):
             session.scene.draw_ghosts(session.state.design, shapes)
 
     def _move(self) -> None:
-        """Move the arm to the solution nearest to where it is, once after it was asked for."""
+        """Move the arm to the solution nearest to where it is, once after it was ordered."""
         wanted, self.take_nearest = self.take_nearest, False
         answer = self.session.answer
         if wanted and answer is not None and len(answer):
@@ -87,16 +87,16 @@ def _solution(state: StudioState, target: Vector) -> Solution:
 
 
 class _Order(NamedTuple):
-    """What a drag asks for."""
+    """Order of a drag."""
 
     wanted: NDArray[np.float64]
-    """Where the tip should go [L]."""
+    """Place for the tip [L]."""
     rests: bool
-    """Whether the drag has ended there."""
+    """True once the drag has ended there."""
 
 
 class DragTip(Job):
-    """The arm follows its dragged tip on its branch; where that rests, every branch is asked for.
+    """The arm follows its dragged tip on its branch; where that rests, every branch is looked for.
 
     Of the places that a drag passes, only the latest is followed.
     """

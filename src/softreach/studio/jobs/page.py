@@ -20,7 +20,7 @@ class KeepState(Job):
 
     @classmethod
     def has_use(cls, session: Session) -> bool:
-        """Where work is kept at all."""
+        """True where work is kept at all."""
         return session.work is not None
 
     def run(self, check: StaleCheck) -> None:
@@ -41,7 +41,7 @@ class DrawMap(Job):
 
     @classmethod
     def has_use(cls, session: Session) -> bool:
-        """Where there is an atlas that a map can be drawn of."""
+        """True if there is an atlas that a map can be drawn of."""
         return session.board is not None
 
     def run(self, check: StaleCheck) -> None:

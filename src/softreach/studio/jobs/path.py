@@ -1,4 +1,4 @@
-"""Follows the path of a tab with the arm, plays it, and writes it as an animation."""
+"""Jobs of a path of the tip: followed, played, written as an animation; paths of plain shapes."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ class FollowPath(Job):
         session, rod = self.session, solvable_rod(state.design)
         fits = path.start is not None and len(path.start) == rod.box.bundles
         start = rod.box.clip(np.array(path.start)) if fits else None
-        found = track_path(rod, points, start, residual_over_length=_RESIDUAL)
-        session.figures.track = found
-        done = points[found.status.values == PathStatus.FOLLOWED]
+        track = track_path(rod, points, start, residual_over_length=_RESIDUAL)
+        session.figures.track = track
+        done = points[track.status.values == PathStatus.FOLLOWED]
         if len(done) and len(done) < len(points):
-            done = np.concatenate([done, found.end_position.values[None]])
+            done = np.concatenate([done, track.end_position.values[None]])
         session.scene.draw_path(points / state.design.length, done / state.design.length)
 
 
@@ -62,14 +62,14 @@ class PlayPath(AskedJob):
 
     def do(self, check: StaleCheck) -> None:
         """From where the arm is, or from the first point, to the last that is followed."""
-        found, path = self.session.figures.track, self.session.state.path
-        if found is None or path is None:
+        track, path = self.session.figures.track, self.session.state.path
+        if track is None or path is None:
             return
-        count = int((found.status == PathStatus.FOLLOWED).sum())
+        count = int((track.status == PathStatus.FOLLOWED).sum())
         first = path.at if path.at < count - 1 else 0
         for point in range(first, count):
             check()
-            self.session.update(lambda state, k=point: at_point(state, found.activation.values, k))
+            self.session.update(lambda state, k=point: at_point(state, track.activation.values, k))
             time.sleep(_STEP)
 
 
@@ -79,15 +79,15 @@ class WriteMovie(AskedJob):
     def do(self, check: StaleCheck) -> None:
         """Draw and send it; says how far it is, and can be canceled."""
         session, path = self.session, self.session.state.path
-        found, reach = session.figures.track, session.reach
-        if found is None or path is None or reach is None:
+        track, reach = session.figures.track, session.reach
+        if track is None or path is None or reach is None:
             raise InvalidInput("path", "none yet", "followed before it is animated")
 
         def progress(share: float) -> None:
             check()
             session.report(f"drawing path.gif, {100 * share:.0f} %")
 
-        activations = found.activation.values[found.status.values == PathStatus.FOLLOWED]
+        activations = track.activation.values[track.status.values == PathStatus.FOLLOWED]
         if not len(activations):
             raise InvalidInput("path", "not reached", "one whose first point is reached")
         arm = session.state.design
@@ -97,7 +97,7 @@ class WriteMovie(AskedJob):
             activations,
             points,
             cloud_points(reach, _LEVEL),
-            view=_view_from(session.eye.camera()),
+            view=_view_from(session.camera.usual()),
             progress=progress,
         )
         check()
@@ -123,7 +123,7 @@ def at_point(state: StudioState, activations: np.ndarray, point: int) -> StudioS
 
 
 def _view_from(camera: Camera) -> tuple[float, float]:
-    """Azimuth and elevation of the eye [rad]."""
+    """Azimuth and elevation of the camera [rad]."""
     x, y, z = np.subtract(camera.position, camera.look_at)
     return float(np.arctan2(y, x)), float(np.arctan2(z, np.hypot(x, y)))
 

@@ -118,7 +118,7 @@ class CutSection(Job):
 
 
 def _complete_reach(job: Job) -> Reach | None:
-    """What the design of the state can reach, if it is complete; its job says when it is."""
+    """Reach of the design of the state, if it is complete; its job says when it is."""
     reach = job.session.reach
     wanted = reach is not None and reach.fine and reach.arm == job.session.state.design
     return reach if wanted else None

@@ -11,7 +11,7 @@ from softreach.rod.tip_map import TipStatus
 from softreach.studio.jobs.plots import CountActivations, CutSection, MeasureVolumes
 from softreach.studio.multiplicity import count_activations, uncounted
 from softreach.studio.reach import Reach, shown_rows, stages
-from softreach.studio.scene.camera import Sight, is_behind
+from softreach.studio.scene.camera import Viewpoint, is_behind
 from softreach.studio.scene.clouds import shown_color
 from softreach.studio.session import Job, Session
 from softreach.studio.state import StudioState, solvable_rod
@@ -91,7 +91,7 @@ class DrawSurfaces(Job):
 
 
 def _is_complete(known: Reach | None, state: StudioState) -> bool:
-    """Whether what was computed, or read from a file, is all there is to know."""
+    """Whether all there is to know was computed, or read from a file."""
     if known is None or not known.fine or known.arm != state.design:
         return False
     enough = max(known.samples, known.wanted) >= 1 << state.appearance.level
@@ -200,7 +200,7 @@ class DrawArm(Job):
         session.scene.draw_trail(np.array(session.trail))
 
 
-# What follows from where the eye is: the points that hide the arm, and the edges with numbers.
+# The camera: the points that hide the arm from it, and the edges with numbers.
 
 
 Array = NDArray[np.float64]
@@ -211,7 +211,7 @@ _DRAGGED = 1 << 13  # points while the tip is dragged: the page draws all of the
 
 
 class FollowCamera(Job):
-    """Cuts away what is in front of the arm and the target, and turns the axes to the eye."""
+    """Cuts away what is in front of the arm and the target, and turns the axes to the camera."""
 
     depends_on = (
         "appearance.cut", "appearance.arm", "appearance.handle", "appearance.orthographic",
@@ -219,35 +219,35 @@ class FollowCamera(Job):
     )  # fmt: skip
 
     def run(self, check: StaleCheck) -> None:
-        """Look from where the eye is by now."""
+        """Look from where the camera is by now."""
         time.sleep(_PAUSE)
         session = self.session
-        session.eye.project(orthographic=session.state.appearance.orthographic)
-        if session.eye.keep_width():
+        session.camera.project(orthographic=session.state.appearance.orthographic)
+        if session.camera.keep_width():
             session.follow(FollowCamera)
         with session.drawing, session.client.atomic():
-            sight = self._sight()
+            viewpoint = self._viewpoint()
             most = _DRAGGED if session.is_dragged else None
-            session.scene.clouds.look(sight, session.state.appearance.cut, most)
-            session.scene.axes.turn(sight.eye, session.eye.focal)
-            session.scene.see_through_arm(self._hides_handle(sight.eye))
+            session.scene.clouds.look(viewpoint, session.state.appearance.cut, most)
+            session.scene.axes.turn(viewpoint.position, session.camera.focal)
+            session.scene.see_through_arm(self._hides_handle(viewpoint.position))
 
-    def _hides_handle(self, eye: Array) -> bool:
-        """Whether the arm is between the eye [L] and the handle on its own tip."""
+    def _hides_handle(self, camera: Array) -> bool:
+        """Whether the arm is between the camera [L] and the handle on its own tip."""
         session = self.session
         tip, look = session.tip, session.state.appearance
         shown = look.handle and look.arm
-        return shown and tip is not None and is_behind(tip, eye, *session.scene.spine)
+        return shown and tip is not None and is_behind(tip, camera, *session.scene.spine)
 
-    def _sight(self) -> Sight:
+    def _viewpoint(self) -> Viewpoint:
         session, state = self.session, self.session.state
-        camera = session.eye.place()
+        camera = session.camera.actual()
         centers, radii = session.scene.spine if state.appearance.arm else _NOTHING
         if state.target is not None:
             target = np.asarray(state.target) / state.design.length
             centers, radii = np.vstack([centers, target]), np.append(radii, _TARGET)
-        return Sight(
-            eye=np.asarray(camera.position),
+        return Viewpoint(
+            position=np.asarray(camera.position),
             look_at=np.asarray(camera.look_at),
             centers=centers,
             radii=radii,

@@ -98,7 +98,7 @@ class ExportPanel:
 
     def _save_picture(self) -> None:
         session, reach = self._session, self._reach()
-        picture, state = session.eye.picture(), session.state
+        picture, state = session.camera.picture(), session.state
         self._write("studio.png", lambda: picture_file(picture, state, reach, session.key))
 
     def _save_page(self) -> None:

@@ -132,7 +132,7 @@ class ViewPanel:
 
     def _reset(self, session: Session) -> None:
         session.update(lambda s: s.showing(orthographic=False))
-        session.eye.project(orthographic=False)
+        session.camera.project(orthographic=False)
         session.look_from("oblique")
 
     def _recolored(self, state: StudioState, label: str) -> StudioState:

@@ -1,4 +1,4 @@
-"""Where the eye of a tab is."""
+"""Camera of a tab: its place and lens, what hides the arm from it, what a click hits."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ VIEWS: dict[str, Array] = {
     "side": np.array([1.0, 0.0, 0.0]),
     "top": np.array([0.0, -1e-3, 1.0]),  # not quite: z is the way up
 }
-"""From where the views look at the middle."""
+"""Directions from the middle to the camera."""
 
 _STEP_BACK = 1.4  # times the distance, for two clouds side by side
 _AWAY = 40.0  # times the distance from which parallels stay parallel, to 1 %
@@ -35,38 +35,38 @@ _ROOM = 1.12  # times what would just fill the picture
 
 
 class Lens:
-    """How a camera shows what is around the place it looks at."""
+    """Lens of a camera: its angle, its distance and its limits of depth."""
 
     def __init__(self, *, orthographic: bool) -> None:
         """The usual lens, or an orthographic one.
 
         That is a very long lens from very far away: viser has no other. What is in sight does not
-        follow a zoom, as a page tells where its eye is only later, and half of it at a time. Depths
-        are whole numbers to the graphics card: these tell 0.0005 L apart at the usual distance.
+        follow a zoom, as a page tells where its camera is only later, and half of it at a time.
+        Depths are integers to the graphics card: these tell 0.0005 L apart at the usual distance.
         """
-        self.stretch = _AWAY if orthographic else 1.0
-        """Times the distance at which the eye is with this lens."""
-        self.fov = 2.0 * float(np.arctan(np.tan(FOV / 2) / self.stretch))
+        self.distance_ratio = _AWAY if orthographic else 1.0
+        """Times the usual distance at which the camera is with this lens."""
+        self.fov = 2.0 * float(np.arctan(np.tan(FOV / 2) / self.distance_ratio))
         """Vertical angle [rad]."""
         self.near, self.far = (4.0, 4000.0) if orthographic else (0.01, 1000.0)
-        """What is nearer or farther is not drawn [L]."""
+        """Limits of depth: anything nearer or farther is not drawn [L]."""
 
 
 def lens(camera: Camera, *, orthographic: bool) -> tuple[Lens, Camera]:
-    """The lens for a camera, and where it has to be moved to show the same."""
+    """Lens for a camera, and the camera with it that shows the same."""
     offset = np.subtract(camera.position, camera.look_at)
-    found = Lens(orthographic=orthographic)
-    position = np.asarray(camera.look_at) + found.stretch * offset
-    return found, Camera(position=vector(position), look_at=camera.look_at)
+    chosen = Lens(orthographic=orthographic)
+    position = np.asarray(camera.look_at) + chosen.distance_ratio * offset
+    return chosen, Camera(position=vector(position), look_at=camera.look_at)
 
 
 def framing(low: Array, high: Array, direction: Array, aspect: float) -> Camera:
-    """A camera that sees a whole box [L] from a direction.
+    """Camera that sees all of a box [L] from a direction.
 
     Args:
         low: Its lowest corner.
         high: Its highest.
-        direction: From the middle of the box to the eye.
+        direction: From the middle of the box to the camera.
         aspect: Width of the picture over its height.
     """
     middle, radius = (low + high) / 2, _ROOM * float(np.linalg.norm(high - low)) / 2
@@ -83,8 +83,8 @@ def _half_sine(aspect: float) -> float:
     return float(np.sin(np.arctan(np.tan(FOV / 2) * min(1.0, aspect))))
 
 
-class Eye:
-    """The camera of one tab, which the user and the studio both move."""
+class TabCamera:
+    """Camera of one tab, which the user and the studio both move."""
 
     def __init__(self, client: ClientHandle) -> None:
         """Follow the camera of a client."""
@@ -94,7 +94,7 @@ class Eye:
         self._latest: float | None = None
 
     def on_move(self, moved: Callable[[], None]) -> None:
-        """Call this whenever the eye has moved."""
+        """Call this whenever the camera has moved."""
         self._client.camera.on_update(lambda _: moved())
 
     @property
@@ -109,7 +109,7 @@ class Eye:
 
     @property
     def narrowness(self) -> float:
-        """How much smaller angles are than through the usual lens [-]."""
+        """Angles over those of the usual lens [-]."""
         return float(np.tan(self._client.camera.fov / 2) / np.tan(FOV / 2))
 
     @property
@@ -118,29 +118,29 @@ class Eye:
         camera = self._client.camera
         return camera.image_height / (2 * float(np.tan(camera.fov / 2)))
 
-    def place(self) -> Camera:
-        """Where it really is; with an orthographic lens far away."""
+    def actual(self) -> Camera:
+        """Camera as it is; with an orthographic lens far away."""
         camera = self._client.camera
         return Camera(position=vector(camera.position), look_at=vector(camera.look_at))
 
-    def camera(self) -> Camera:
-        """Where it would be with the usual lens."""
-        place, narrowness = self.place(), self.narrowness
+    def usual(self) -> Camera:
+        """Camera with the usual lens that sees the same."""
+        place, narrowness = self.actual(), self.narrowness
         offset = narrowness * np.subtract(place.position, place.look_at)
         return Camera(position=vector(place.look_at + offset), look_at=place.look_at)
 
     def look_from(self, camera: Camera) -> None:
         """Move it to where it sees what the usual lens would see from there."""
-        found, place = lens(camera, orthographic=self._orthographic)
+        chosen, place = lens(camera, orthographic=self._orthographic)
         with self._client.atomic():
             shown = self._client.camera
-            shown.fov, shown.near, shown.far = found.fov, found.near, found.far
+            shown.fov, shown.near, shown.far = chosen.fov, chosen.near, chosen.far
             shown.position, shown.look_at = place.position, place.look_at
 
     def project(self, *, orthographic: bool) -> None:
         """Change the lens and go on looking at the same."""
         if orthographic != self._orthographic:
-            camera, self._orthographic = self.camera(), orthographic
+            camera, self._orthographic = self.usual(), orthographic
             self.look_from(camera)
 
     def keep_width(self) -> bool:
@@ -157,15 +157,15 @@ class Eye:
         if not rests:
             return True
         before, self._aspect = self._aspect or now, now
-        if (stretch := _half_sine(before) / _half_sine(now)) != 1.0:
-            camera = self.camera()
-            offset = stretch * np.subtract(camera.position, camera.look_at)
+        if (ratio := _half_sine(before) / _half_sine(now)) != 1.0:
+            camera = self.usual()
+            offset = ratio * np.subtract(camera.position, camera.look_at)
             position = vector(camera.look_at + offset)
             self.look_from(Camera(position=position, look_at=camera.look_at))
         return False
 
     def picture(self) -> NDArray[np.uint8]:
-        """What it sees now, RGBA on a transparent ground, shape (height, width, 4).
+        """Picture of what it sees now, RGBA on a transparent ground, shape (height, width, 4).
 
         Raises:
             InvalidInput: The tab does not answer: browsers stop drawing tabs in the background.
@@ -186,14 +186,14 @@ class Eye:
         """The inverse of `step_back`."""
         self._step(-shift, 1 / _STEP_BACK)
 
-    def _step(self, shift: Array, stretch: float) -> None:
-        now = self.camera()
+    def _step(self, shift: Array, ratio: float) -> None:
+        now = self.usual()
         look_at = np.asarray(now.look_at) + shift / 2
-        position = (np.asarray(now.position) - now.look_at) * stretch + look_at
+        position = (np.asarray(now.position) - now.look_at) * ratio + look_at
         self.look_from(Camera(position=vector(position), look_at=vector(look_at)))
 
 
-# Which points stand between the eye and what is to be seen: the arm and the target.
+# Points between the camera and what is to be seen: the arm and the target.
 
 
 _CELLS = 192  # of the picture, along each side
@@ -202,10 +202,10 @@ _TOUCHING = 3.0  # radii: what is nearer belongs to the same piece of the arm
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
-    """An eye, and the balls it should see [L]."""
+class Viewpoint:
+    """Camera, and the balls that it should see [L]."""
 
-    eye: Array
+    position: Array
     look_at: Array
     centers: Array
     """Shape (n, 3)."""
@@ -214,50 +214,50 @@ class Sight:
 
     def seen(self, points: ArrayLike) -> Array:
         """Places in the picture (right, up) [-] and depth [L], shape (n, 3)."""
-        right, up, forward = _axes_of(self.look_at - self.eye)
-        offset = np.asarray(points, float) - self.eye
+        right, up, forward = _axes_of(self.look_at - self.position)
+        offset = np.asarray(points, float) - self.position
         depth = np.maximum(offset @ forward, 1e-6)
         return np.stack([offset @ right / depth, offset @ up / depth, depth], axis=-1)
 
 
-def in_the_way(points: Array, sight: Sight, cut: str) -> NDArray[np.bool_]:
-    """Which points [L], shape (n, 3), hide one of the balls, or stand before the base.
+def in_the_way(points: Array, viewpoint: Viewpoint, cut: str) -> NDArray[np.bool_]:
+    """Mask of the points [L], shape (n, 3), that hide one of the balls, or stand before the base.
 
     Args:
         points: Of a cloud.
-        sight: Who looks at what.
+        viewpoint: The camera and what it should see.
         cut: One of `CUTS`.
     """
     if cut == "none" or not len(points):
         return np.zeros(len(points), bool)
-    seen = sight.seen(points)
-    hides = _hides(seen, sight) if len(sight.centers) else np.zeros(len(points), bool)
+    seen = viewpoint.seen(points)
+    hides = _hides(seen, viewpoint) if len(viewpoint.centers) else np.zeros(len(points), bool)
     if cut == "half":
-        ahead = (sight.look_at - sight.eye) * (1.0, 1.0, 0.0)
+        ahead = (viewpoint.look_at - viewpoint.position) * (1.0, 1.0, 0.0)
         hides |= points @ ahead < 0.0
     return hides
 
 
-def is_behind(point: Array, eye: Array, centers: Array, radii: Array) -> bool:
-    """Whether a ball stands between an eye and a point [L]; balls that touch the point do not.
+def is_behind(point: Array, camera: Array, centers: Array, radii: Array) -> bool:
+    """Whether a ball stands between the camera and a point [L], other than those that touch it.
 
     Args:
         point: Shape (3,).
-        eye: Shape (3,).
+        camera: Shape (3,).
         centers: Of the balls, shape (n, 3).
         radii: Shape (n,).
     """
-    distance = float(np.linalg.norm(point - eye))
-    way = (point - eye) / distance
-    ahead = (centers - eye) @ way
-    aside = np.linalg.norm(centers - eye - ahead[:, None] * way, axis=1)
+    distance = float(np.linalg.norm(point - camera))
+    way = (point - camera) / distance
+    ahead = (centers - camera) @ way
+    aside = np.linalg.norm(centers - camera - ahead[:, None] * way, axis=1)
     return bool(((aside < radii) & (ahead > 0) & (ahead < distance - _TOUCHING * radii)).any())
 
 
-def _hides(seen: Array, sight: Sight) -> NDArray[np.bool_]:
+def _hides(seen: Array, viewpoint: Viewpoint) -> NDArray[np.bool_]:
     """Looked up in a picture of how far away the farthest ball is."""
-    balls = sight.seen(sight.centers)
-    sizes = (sight.radii + _MARGIN) / balls[:, 2]
+    balls = viewpoint.seen(viewpoint.centers)
+    sizes = (viewpoint.radii + _MARGIN) / balls[:, 2]
     low = (balls[:, :2] - sizes[:, None]).min(axis=0)
     high = (balls[:, :2] + sizes[:, None]).max(axis=0)
     step = (high - low).max() / _CELLS
@@ -273,7 +273,7 @@ def _hides(seen: Array, sight: Sight) -> NDArray[np.bool_]:
 
 
 def _axes_of(direction: Array) -> tuple[Array, Array, Array]:
-    """Right, up and forward of an eye that keeps z upright."""
+    """Right, up and forward of a camera that keeps z upright."""
     forward = direction / np.linalg.norm(direction)
     upright = np.array([0.0, 0.0, 1.0]) if abs(forward[2]) < 0.999 else np.array([0.0, 1.0, 0.0])
     right = np.cross(forward, upright)
@@ -287,11 +287,11 @@ def _axes_of(direction: Array) -> tuple[Array, Array, Array]:
 def picked_point(
     points: Array, origin: ArrayLike, direction: ArrayLike, tolerance: float
 ) -> int | None:
-    """The point that a ray through a pixel hits: of those close to it, the nearest to the eye.
+    """The point that a ray through a pixel hits: of those close to it, the nearest to the camera.
 
     Args:
         points: Shape (n, 3), any unit.
-        origin: The eye.
+        origin: Where the camera is.
         direction: Of the ray, any length.
         tolerance: Largest angle between the ray and the point [rad].
 
@@ -314,7 +314,7 @@ def picked_point(
 def plane_crossing(
     origin: ArrayLike, direction: ArrayLike, point: ArrayLike, normal: ArrayLike
 ) -> Array | None:
-    """Where a ray meets a plane, or None if it does not."""
+    """Crossing of a ray and a plane, or None if they do not meet."""
     start, ray, n = (np.asarray(v, float) for v in (origin, direction, normal))
     slope = ray @ n
     if slope == 0.0:

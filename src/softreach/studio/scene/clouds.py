@@ -1,4 +1,4 @@
-"""The clouds of a scene, without the points that hide the arm, and thin while it is dragged."""
+"""Clouds of a scene: colors, light and slices of their points, and which are left out."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from softreach.schema import activation_symbols
 from softreach.studio import markup
 from softreach.studio.multiplicity import count_activations
 from softreach.studio.reach import Reach, shown_rows, shown_samples
-from softreach.studio.scene.camera import Sight, in_the_way
+from softreach.studio.scene.camera import Viewpoint, in_the_way
 from softreach.studio.state import Slice, rod_of
 from softreach.studio.work import all_cores
 
@@ -47,13 +47,13 @@ class Dots:
 
 
 class Clouds:
-    """Draws clouds, and draws those again whose hidden points change as eye or arm move."""
+    """Draws clouds, and draws those again whose hidden points change as camera or arm move."""
 
     def __init__(self, api: SceneApi) -> None:
         """Draw into a scene."""
         self._api = api
         self._known: dict[str, tuple[Dots, NDArray[np.bool_]]] = {}
-        self._sight: Sight | None = None
+        self._viewpoint: Viewpoint | None = None
         self._cut = "none"
         self._most: int | None = None
 
@@ -63,17 +63,17 @@ class Clouds:
         self._known[path] = dots, kept
         self._send(path, dots.where(kept))
 
-    def look(self, sight: Sight | None, cut: str, most: int | None = None) -> None:
+    def look(self, viewpoint: Viewpoint | None, cut: str, most: int | None = None) -> None:
         """Cut away what hides the arm; nothing is sent of a cloud that keeps its points.
 
         Args:
-            sight: Who looks at what; None for nobody.
-            cut: One of `sight.CUTS`.
+            viewpoint: The camera and what it should see; None for nobody.
+            cut: One of `state.CUTS`.
             most: How many points to draw of a cloud, the first of it, which then stay the same
-                until others are asked for; None for all.
+                until another number is wanted; None for all.
         """
         is_thin = most is not None and most == self._most
-        self._sight, self._cut, self._most = sight, cut, most
+        self._viewpoint, self._cut, self._most = viewpoint, cut, most
         if is_thin:  # it hides little, and the page draws no frame while it takes up another
             return
         for path, (dots, before) in list(self._known.items()):
@@ -87,10 +87,10 @@ class Clouds:
         self._known.pop(path, None)
 
     def hidden(self, points: Array) -> NDArray[np.bool_]:
-        """Which points [L], shape (n, 3), are cut away."""
-        if self._sight is None:
+        """Mask of the points [L], shape (n, 3), that are cut away."""
+        if self._viewpoint is None:
             return np.zeros(len(points), bool)
-        return in_the_way(points, self._sight, self._cut)
+        return in_the_way(points, self._viewpoint, self._cut)
 
     def _kept(self, dots: Dots) -> NDArray[np.bool_]:
         kept = ~self.hidden(dots.points)
@@ -127,7 +127,7 @@ _RADIUS = 1 / 60  # [L], within which D̄ compares activations
 
 
 def color_names(arm: Manipulator) -> dict[str, str]:
-    """What points can be colored by: name -> what the menu says."""
+    """Colors that points can have: name -> what the menu says."""
     box = rod_of(arm).box
     names = {"effort": "effort: mean |γ| / max |γ|", "rgb": "all activations (RGB)"}
     labels = zip(activation_symbols(arm.bundle_units), box.names, strict=True)
@@ -150,7 +150,7 @@ def sample_colors(reach: Reach, level: int, color: str) -> Coloring:
 
 
 def sample_values(reach: Reach, level: int, color: str) -> Literal["rgb"] | int | xr.DataArray:
-    """What the samples that are shown are colored by, as the library's own figures take it."""
+    """Values behind the colors of the samples shown, as the library's own figures take them."""
     import xarray as xr
 
     color = shown_color(reach.arm, color)
@@ -176,7 +176,7 @@ def _values(reach: Reach, rows: NDArray[np.int64], color: str) -> Array:
 
 
 def shown_color(arm: Manipulator, color: str) -> str:
-    """What points are colored by where that color is asked for; it may be one of another arm."""
+    """Color of points where that name is wanted, which may be one of another arm."""
     return color if color in color_names(arm) else "rgb"
 
 
@@ -230,8 +230,8 @@ def _activation_distance(reach: Reach, rows: NDArray[np.int64]) -> Array:
     settled = np.flatnonzero(reach.status != TipStatus.NO_EQUILIBRIUM)
     cloud = reach.cloud if len(settled) == reach.samples else reach.cloud.isel(sample=settled)
     shown = np.searchsorted(settled, rows)
-    found = activation_distance(cloud, _RADIUS * reach.arm.length, queries=np.sort(shown))
-    return found.values[np.argsort(np.argsort(shown))]
+    distance = activation_distance(cloud, _RADIUS * reach.arm.length, queries=np.sort(shown))
+    return distance.values[np.argsort(np.argsort(shown))]
 
 
 _VALUES = {
@@ -252,7 +252,7 @@ _LABELS = {
 
 
 def in_slice(points: Array, cut: Slice) -> NDArray[np.bool_]:
-    """Which points [L], shape (n, 3), a slice shows."""
+    """Mask of the points [L], shape (n, 3), that a slice shows."""
     if cut.axis == "none":
         return np.ones(len(points), bool)
     return np.abs(points[:, "xyz".index(cut.axis)] - cut.center) <= cut.thickness / 2
@@ -300,7 +300,6 @@ def _outward(points: Array) -> Array:
     i, j, k = np.rint(places).astype(np.intp).T
     full[i, j, k] = 1.0  # whether a cell has points, not how many: the activations decide that
     slopes = np.gradient(gaussian_filter(full, _BLUR, truncate=2.5))
-    found = [map_coordinates(slope, places.T, order=1) for slope in slopes]
-    outward = -np.stack(found, axis=1)
+    outward = -np.stack([map_coordinates(one, places.T, order=1) for one in slopes], axis=1)
     length = np.linalg.norm(outward, axis=1, keepdims=True)
     return outward / np.maximum(length, 0.08)

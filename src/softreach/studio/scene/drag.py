@@ -24,7 +24,7 @@ _COLOR, _LIGHT, _LAG = (25, 25, 30), (255, 225, 90), (220, 30, 120)
 
 
 class TipDrag(NamedTuple):
-    """Where a person drags the tip, and what comes of it."""
+    """Drag of the tip: the place where a person wants it, and what comes of that."""
 
     wanted: Array
     """[L], shape (3,)."""

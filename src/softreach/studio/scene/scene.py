@@ -1,4 +1,4 @@
-"""Draws what a tab shows into a viser scene, in units of L, through nodes named by paths."""
+"""Scene of a tab: arm, clouds, surfaces and marks as viser's nodes, in units of L."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from softreach.plot.coloring import BundleKey, ScalarKey
 
 
-# The box with numbers around what a scene shows; the eye decides which edges are numbered.
+# The box with numbers around what a scene shows; the camera decides which edges are numbered.
 
 
 Array = NDArray[np.float64]
@@ -50,7 +50,7 @@ class NumberedBox:
         self._api = api
         self.corners = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
         """The lowest and the highest [L]."""
-        self._eye: Array = np.array([50.0, -80.0, 30.0])
+        self._camera: Array = np.array([50.0, -80.0, 30.0])
         self._focal = np.inf
 
     def draw(self, *points: Array, shown: bool) -> None:
@@ -60,11 +60,11 @@ class NumberedBox:
         if shown:
             self._draw()
 
-    def turn(self, eye: Array, focal: float = np.inf) -> None:
-        """Number the edges that are the outer ones for an eye [L] of a focal length [pixel]."""
-        before = seen_from(self._eye, *self.corners, self._focal)
-        self._eye, self._focal = eye, focal
-        if self._is_drawn and seen_from(eye, *self.corners, focal) != before:
+    def turn(self, camera: Array, focal: float = np.inf) -> None:
+        """Number the edges that are the outer ones for a camera [L] of a focal length [pixel]."""
+        before = seen_from(self._camera, *self.corners, self._focal)
+        self._camera, self._focal = camera, focal
+        if self._is_drawn and seen_from(camera, *self.corners, focal) != before:
             self._remove()
             self._draw()
 
@@ -78,7 +78,7 @@ class NumberedBox:
 
     def _draw(self) -> None:
         low, high = self.corners
-        box = axes_box(low[None], high[None], eye=self._eye, focal=self._focal)
+        box = axes_box(low[None], high[None], camera=self._camera, focal=self._focal)
         lines = box.lines.astype(np.float32)
         self._api.add_line_segments("/axes/lines", lines, _GRAY, thickness=0.003)
         for k, (text, at) in enumerate(box.labels):
@@ -86,7 +86,7 @@ class NumberedBox:
 
 
 def add_label(api: SceneApi, path: str, text: str, at: Array) -> None:
-    """Words at a place [L], as large on the screen wherever the eye is."""
+    """Words at a place [L], as large on the screen wherever the camera is."""
     api.add_label(path, text, position=at, font_screen_scale=0.8, anchor="center-center")
 
 
@@ -101,7 +101,7 @@ _CLEAR = 0.45  # opacity of a body that has something inside
 _HIDING = 0.6  # opacity of an arm that is in front of its own tip
 _GHOST, _REFERENCE, _SURFACE, _HULL = 0.35, (150, 150, 158), (90, 140, 200), (220, 150, 60)
 _MARK: Color = (235, 90, 0)
-_ASKED: Color = (240, 175, 205)  # of a path, where the arm does not follow it
+_PALE: Color = (240, 175, 205)  # of a path, where the arm does not follow it
 _BLOCKED: Color = (30, 30, 30)
 _FREE_LEVEL, _FREE_SIZE = 15, 0.6
 _TARGET = 0.012  # [L]: less than the ball on the tip, which is grabbed there
@@ -194,7 +194,7 @@ class Scene:
             self.draw_arm(arm, activation.tolist(), f"/ghosts/{k}")
 
     def draw_surfaces(self, reach: Reach, look: Appearance) -> None:
-        """The exact boundary and the α-shape, as asked for; slow the first time."""
+        """The exact boundary and the α-shape, as far as they are shown; slow the first time."""
         self.remove("/surface", "/alpha-shape")
         if look.surface and isinstance(reach.exact, ReachableSolid | ReachableSurface):
             self._surface("/surface", boundary_of(reach.exact), reach, look.slice, _SURFACE)
@@ -219,7 +219,7 @@ class Scene:
         """A path [L], pale, and as far as the arm can follow it, dark; a ball where that ends."""
         self.remove("/path")
         for path, line, color in (
-            ("/path/asked", points, _ASKED),
+            ("/path/all", points, _PALE),
             ("/path/followed", followed, _MARK),
         ):
             if len(line) > 1:
@@ -320,7 +320,7 @@ class Scene:
     def _surface(
         self, path: str, surface: Any, reach: Reach, cut: Slice, color: Color, opacity: float = 0.35
     ) -> None:
-        """What a slice leaves of a surface with `vertices` [m] and `faces`."""
+        """Draw what a slice leaves of a surface with `vertices` [m] and `faces`."""
         vertices = surface.vertices / reach.arm.length
         faces = sliced_faces(vertices, surface.faces, cut)
         if len(faces):
@@ -342,7 +342,7 @@ class Scene:
 
 
 def boundary_of(exact: ReachableSolid | ReachableSurface) -> Surface:
-    """What is drawn of the boundary of a reachable set."""
+    """Boundary of a reachable set, as it is drawn."""
     return exact.sheets() if isinstance(exact, ReachableSolid) else exact.surface()
 
 

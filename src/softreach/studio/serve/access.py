@@ -46,11 +46,11 @@ def reachable_hosts(host: str) -> list[str]:
         return []
     if host not in ANYWHERE:
         return [host]
-    found = [_outward()]
+    hosts = [_outward()]
     with contextlib.suppress(OSError):
-        found += [str(one[4][0]) for one in socket.getaddrinfo(socket.gethostname(), None)]
+        hosts += [str(one[4][0]) for one in socket.getaddrinfo(socket.gethostname(), None)]
     families = (host == "::", False)
-    useful = [one for one in found if one and not is_local(one) and (":" in one) in families]
+    useful = [one for one in hosts if one and not is_local(one) and (":" in one) in families]
     return list(dict.fromkeys(useful))
 
 
@@ -88,7 +88,7 @@ def is_welcome(path: str, headers: Mapping[str, str], token: str) -> bool:
     Args:
         path: Of the request, with its query.
         headers: Of the request.
-        token: "" where none is asked for.
+        token: "" where none is needed.
     """
     if not token:
         return True
@@ -97,7 +97,7 @@ def is_welcome(path: str, headers: Mapping[str, str], token: str) -> bool:
 
 
 def cookie(path: str, token: str) -> str:
-    """What the answer to a request sets, so that the page's own requests show the token."""
+    """Cookie that the answer to a request sets, so that the page's own requests show the token."""
     if not token or "token" not in parse_qs(urlsplit(path).query):
         return ""
     return f"{_NAME}={token}; Path=/; HttpOnly; SameSite=Lax"
@@ -115,11 +115,11 @@ def _kept(text: str) -> list[str]:
 
 
 def refusal(host: str, token: str, path: str, headers: Mapping[str, str]) -> str:
-    """Why a request is refused; "" for one that is welcome.
+    """Reason why a request is refused; "" for one that is welcome.
 
     Args:
         host: That the server listens on.
-        token: "" where none is asked for.
+        token: "" where none is needed.
         path: Of the request, with its query.
         headers: Of the request.
     """
@@ -140,15 +140,15 @@ def same_origin(headers: Mapping[str, str], host: str) -> bool:
     Browsers let any web page open a socket to this machine; they tell where it came from. On
     loopback the name must be local too, as foreign names can be made to point here.
     """
-    asked = urlsplit(f"//{headers.get('Host', '')}")
-    if host in _LOCAL and asked.hostname not in _LOCAL:
+    page = urlsplit(f"//{headers.get('Host', '')}")
+    if host in _LOCAL and page.hostname not in _LOCAL:
         return False
     origin = headers.get("Origin")
-    return origin is None or urlsplit(origin).netloc == asked.netloc
+    return origin is None or urlsplit(origin).netloc == page.netloc
 
 
 def page_headers(host: str) -> dict[str, str]:
-    """What keeps a page to its own server, whatever its address asks for.
+    """Headers that keep a page to its own server, whatever its address says.
 
     viser's page is one file of inline scripts and styles; it would open a socket to any server that
     `?websocket=` names, and read a scene from any address.

@@ -67,7 +67,7 @@ def start_server(host: str = LOOPBACK, port: int | None = None, token: str = "")
 
 
 def theme(gui: GuiApi, *, dark: bool) -> None:
-    """How the page looks around the scene."""
+    """Set the looks of the page around the scene."""
     gui.configure_theme(
         control_width="large", show_logo=False, show_share_button=False, dark_mode=dark
     )
@@ -80,7 +80,7 @@ def stop_server(server: ViserServer) -> None:
 
 
 def page_url(server: ViserServer) -> str:
-    """Where the page is, for a browser on this machine."""
+    """Address of the page, for a browser on this machine."""
     return page_address(server.get_host(), server.get_port())
 
 

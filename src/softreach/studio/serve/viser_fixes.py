@@ -82,7 +82,7 @@ def guarding(
 
 
 def request_path(server: ViserServer, client_id: int) -> str:
-    """The address that the socket of a page asked for, from the first slash on; "/" if unknown."""
+    """Address in the request of a page's socket, from the first slash on; "/" if unknown."""
     connections = getattr(_sockets(server), "_live_connections", {})
     request = getattr(connections.get(client_id), "request", None)
     return "/" if request is None else request.path
@@ -166,7 +166,7 @@ def headed(page: str) -> str:
 
 @lru_cache(maxsize=4)
 def headed_body(body: bytes, *, zipped: bool) -> bytes:
-    """What is sent of a page, with our head; anything else as it is."""
+    """Bytes of a page with our head; those of anything else as they are."""
     content = gzip.decompress(body) if zipped else body
     ours = content.replace(_THEIRS.encode(), _HEAD.encode(), 1)
     if ours == content:
