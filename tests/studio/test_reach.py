@@ -16,8 +16,8 @@ from softreach.studio.scene.clouds import (
     color_names,
     in_slice,
     key_html,
-    manipulability,
     sample_colors,
+    sample_values,
     sliced_faces,
 )
 from softreach.studio.state import Slice
@@ -81,14 +81,17 @@ def test_multiplicity_is_offered_where_it_is_finite(trunk):
     assert "multiplicity" not in color_names(designs.redundant_trunk())
 
 
-def test_manipulability_is_the_determinant_of_the_tips_velocities(trunk):
-    gamma, h = np.full((1, 3), -0.6), 1e-4
+def test_points_are_colored_by_the_determinant_of_the_tips_velocities(both, trunk):
+    reach = both[-1]
+    shown = sample_values(reach, 8, "manipulability").values
+    sample = int(np.argsort(shown)[len(shown) // 2])  # the few largest and smallest are clipped
+    gamma, h = reach.cloud.activation.values[[sample]], 1e-4
     columns = [
         (tip_positions(trunk, gamma + h * e, 1e-9) - tip_positions(trunk, gamma - h * e, 1e-9))[0]
         for e in np.eye(3)
     ]
     expected = abs(np.linalg.det(np.array(columns) / (2 * h)))
-    assert manipulability(trunk, gamma)[0] == pytest.approx(expected, rel=1e-3)
+    assert shown[sample] == pytest.approx(expected, rel=1e-3)
 
 
 def test_a_slice_shows_what_lies_within_its_thickness(rng):

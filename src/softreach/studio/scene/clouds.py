@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from softreach.arm.manipulator import Manipulator
+from softreach.cloud.dexterity import dexterity
 from softreach.cloud.redundancy import activation_distance
 from softreach.plot.coloring import BundleKey, Coloring, ScalarKey, color_samples
 from softreach.rod.tip_map import TipStatus
@@ -115,7 +116,7 @@ class Clouds:
         )
 
 
-# What the color of a point says, and the key that tells the reader.
+# Colors of the points, and the key to them.
 
 
 FAINT = (196, 198, 206)
@@ -185,16 +186,6 @@ def color_label(color: str) -> str:
     return _LABELS.get(color, "")
 
 
-def manipulability(arm: Manipulator, activation: Array) -> Array:
-    """Volume of the tip's velocities for unit rates, √det(J Jᵀ) [L³], shape (n,).
-
-    J = ∂r/∂γ [L]; with fewer than three bundles √det(Jᵀ J): an area or a length.
-    """
-    rod = rod_of(arm)
-    _, slope = rod.tips_and_slopes(activation)
-    return np.prod(np.linalg.svd(slope / rod.length, compute_uv=False), axis=1)
-
-
 def key_html(key: BundleKey | ScalarKey | None) -> str:
     """The colors explained, as HTML without anything from elsewhere."""
     if isinstance(key, BundleKey):
@@ -222,7 +213,9 @@ def _effort(reach: Reach, rows: NDArray[np.int64]) -> Array:
 
 
 def _manipulability(reach: Reach, rows: NDArray[np.int64]) -> Array:
-    return manipulability(reach.arm, reach.cloud.activation.values[rows])
+    """√det(J Jᵀ) with J = ∂r/∂γ [L]; of fewer than three bundles an area [L²] or a length [L]."""
+    volume = dexterity(reach.cloud.isel(sample=rows)).manipulability.values
+    return volume / reach.arm.length ** min(reach.arm.bundles, 3)
 
 
 def _activation_distance(reach: Reach, rows: NDArray[np.int64]) -> Array:
@@ -248,7 +241,7 @@ _LABELS = {
 }
 
 
-# What a slab across the scene leaves of points and surfaces.
+# Slices of points and surfaces.
 
 
 def in_slice(points: Array, cut: Slice) -> NDArray[np.bool_]:
