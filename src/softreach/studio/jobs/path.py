@@ -87,16 +87,9 @@ class WriteMovie(AskedJob):
             check()
             session.report(f"drawing path.gif, {100 * share:.0f} %")
 
-        activations = track.activation.values[track.status.values == PathStatus.FOLLOWED]
-        if not len(activations):
-            raise InvalidInput("path", "not reached", "one whose first point is reached")
-        arm = session.state.design
-        points = np.array(path.points) / arm.length
         movie = path_movie(
-            arm,
-            activations,
-            points,
-            cloud_points(reach, _LEVEL),
+            track,
+            reach.arm.length * cloud_points(reach, _LEVEL),
             view=_view_from(session.camera.usual()),
             progress=progress,
         )
