@@ -19,11 +19,10 @@ from benchmarks.studio_tab import print_latencies
 from softreach import tip_positions
 from softreach.arm import designs
 from softreach.arm.manipulator import Manipulator
-from softreach.studio.pull import Pull
-from softreach.studio.reach import Quality
-from softreach.studio.scene import Scene
-from softreach.studio.server import start_server, stop_server
-from softreach.studio.stages import stages
+from softreach.inverse.drag import Drag
+from softreach.studio.reach import Quality, stages
+from softreach.studio.scene.scene import Scene
+from softreach.studio.serve.server import start_server, stop_server
 from softreach.studio.state import LEVELS, Appearance
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
@@ -67,16 +66,16 @@ def arm_updates(scene: Scene, count: int) -> Cost:
     return Cost((time.perf_counter() - wall) / count, (time.process_time() - cpu) / count)
 
 
-def tip_pulls(scene: Scene, count: int) -> Cost:
+def tip_drags(scene: Scene, count: int) -> Cost:
     """What one update of the arm costs while its tip is dragged along its branch."""
     arm, activation = designs.minimal_trunk(), (-0.7, -0.4, -0.9)
-    pull = Pull(arm)
+    drag = Drag(arm)
     begin, end = tip_positions(arm, [activation, (-0.6, -0.55, -0.8)])
     wall, cpu = time.perf_counter(), time.process_time()
     for share in np.linspace(0, 1, count):
-        pulled = pull.to(activation, begin + share * (end - begin))
-        assert pulled is not None
-        activation = pulled.activation
+        dragged = drag.to(activation, begin + share * (end - begin))
+        assert dragged is not None
+        activation = dragged.activation
         scene.draw_arm(arm, activation)
     return Cost((time.perf_counter() - wall) / count, (time.process_time() - cpu) / count)
 
@@ -99,7 +98,7 @@ def test_a_dragged_activation(benchmark):
 
 
 def test_a_dragged_tip(benchmark):
-    with_scene(lambda scene: benchmark(tip_pulls, scene, 3))
+    with_scene(lambda scene: benchmark(tip_drags, scene, 3))
 
 
 def main(repeat: int = 5) -> None:
@@ -118,8 +117,8 @@ def print_table(scene: Scene, repeat: int) -> None:
     most = first_picture(scene, moved(repeat + 1), Quality(), max(LEVELS))
     arm_updates(scene, 10)
     arm = best([arm_updates(scene, 60) for _ in range(repeat)])
-    tip_pulls(scene, 3)
-    pulled = best([tip_pulls(scene, 60) for _ in range(repeat)])
+    tip_drags(scene, 3)
+    dragged = best([tip_drags(scene, 60) for _ in range(repeat)])
     print(f"## Studio, server side: the best of {repeat}, minimal trunk\n")
     print("| what | wall [s] | CPU [s] | wanted |")
     print("|---|--:|--:|--:|")
@@ -129,7 +128,7 @@ def print_table(scene: Scene, repeat: int) -> None:
     row("first cloud and volume with four bundles, once", four["coarse"])
     row("fine result with four bundles, once", four["fine"], 0.9)
     row("update of the arm while an activation is dragged", arm, 0.05)
-    row("update of the arm while its tip is dragged", pulled, 0.05)
+    row("update of the arm while its tip is dragged", dragged, 0.05)
     print(f"\nThe first volume is off by {100 * off:.2g} % at most (wanted: < 2 %). The browser's")
     print("own drawing is not in these numbers.\n")
 

@@ -12,11 +12,11 @@ from tests.studio.tab import Tab
 from softreach import tip_positions
 from softreach.arm import designs
 from softreach.studio import Studio
-from softreach.studio.jobs import PullTip
-from softreach.studio.source import start_on_design
+from softreach.studio.jobs.inverse import DragTip
+from softreach.studio.start import start_on_design
 
 if TYPE_CHECKING:
-    from softreach.studio.worker import StaleCheck
+    from softreach.studio.work import StaleCheck
 
 _WATCH = """() => new Promise(done => {
     const shown = () => document.body.innerText.match(/volume [^·]*/)?.[0];
@@ -86,7 +86,7 @@ def dragged_tip(tab: Tab, seconds: float = 2.0) -> Drag:
     count = len(served) - first
     mouse.up()
     tab.settle()
-    del tab.session.job(PullTip).run  # counts no more
+    del tab.session.job(DragTip).run  # counts no more
     return Drag(events / spent, count / spent)
 
 
@@ -101,7 +101,7 @@ def measured(tab: Tab, repeat: int, *, cloud: bool) -> tuple[list[float], list[D
 
 def _count_pulls(tab: Tab) -> list[float]:
     """Times at which a pull of this tab was done; grows while the tip is dragged."""
-    job, done = tab.session.job(PullTip), []
+    job, done = tab.session.job(DragTip), []
     run = job.run
 
     def counted(check: StaleCheck) -> None:

@@ -215,9 +215,9 @@ def studio_tasks() -> dict[str, Task]:
     from softreach.studio.reach import Quality
 
     try:
-        from softreach.studio.stages import stages
-    except ImportError:  # an earlier version
         from softreach.studio.reach import stages
+    except ImportError:  # an earlier version
+        from softreach.studio.stages import stages
 
     def fine(arm: Any) -> Task:
         def task() -> Results:

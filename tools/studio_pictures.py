@@ -22,7 +22,7 @@ from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.studio import Studio
 from softreach.studio.settings import PlotSettings
-from softreach.studio.source import start_on_design
+from softreach.studio.start import start_on_design
 
 PICTURES = Path(__file__).parent.parent / "docs" / "images"
 LAPTOP, PHONE = (1366, 768), (390, 844)

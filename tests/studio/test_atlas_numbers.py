@@ -10,7 +10,7 @@ import pytest
 from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.atlas import DesignSpace, build_atlas, open_atlas
-from softreach.studio.atlas_numbers import nearest_numbers
+from softreach.studio.atlas_map import nearest_numbers
 from softreach.support.errors import SoftreachWarning
 
 

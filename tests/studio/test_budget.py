@@ -7,11 +7,10 @@ import time
 import pytest
 
 from softreach.arm.parameters import changed
-from softreach.studio import budget, stages
-from softreach.studio.budget import Budget, OverBudget
-from softreach.studio.effort import level_in_memory
+from softreach.studio import reach as stages
+from softreach.studio import work as budget
 from softreach.studio.reach import Quality
-from softreach.studio.worker import Dropped, all_cores
+from softreach.studio.work import Budget, Dropped, OverBudget, all_cores, level_in_memory
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
 

@@ -9,8 +9,9 @@ import pytest
 
 from softreach.arm import designs
 from softreach.arm.parameters import changed
-from softreach.studio import Quality, StudioState, stages
-from softreach.studio.worker import all_cores
+from softreach.studio import Quality, StudioState
+from softreach.studio import reach as stages
+from softreach.studio.work import all_cores
 from tests.studio.conftest import SMALL
 from tests.studio.tab import Tab
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numba import njit
 
-from softreach.studio.compiling import CompilationWatch
+from softreach.studio.work import CompilationWatch
 
 
 def test_compilation_is_told_when_it_begins_and_when_all_of_it_has_ended():

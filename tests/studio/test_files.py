@@ -15,14 +15,12 @@ from softreach.atlas import DesignSpace, build_atlas, open_atlas
 from softreach.cloud.clouds import compute_cloud, save_cloud
 from softreach.export import export_cloud
 from softreach.plot.style import pyplot
-from softreach.studio.atlas_map import atlas_map, held_places, map_choices, metric_names
-from softreach.studio.colors import sample_values
+from softreach.studio.atlas_map import atlas_map, fixed_places, map_choices, metric_names
 from softreach.studio.files import cloud_file, figure_file, state_from, surface_file
 from softreach.studio.page import static_page
-from softreach.studio.reach import Quality
-from softreach.studio.slicing import in_slice
-from softreach.studio.source import start_on_design, start_on_state, start_on_store
-from softreach.studio.stages import stages
+from softreach.studio.reach import Quality, stages
+from softreach.studio.scene.clouds import in_slice, sample_values
+from softreach.studio.start import start_on_design, start_on_state, start_on_store
 from softreach.studio.state import MapView, Slice, StudioState
 from softreach.support.errors import InvalidDesign, InvalidInput
 
@@ -166,7 +164,7 @@ def test_a_map_holds_what_it_does_not_show_nearest_to_the_design(trunk, tmp_path
     path = tmp_path / "a.zarr"
     build_atlas(space, path, n=100, metrics=("convex",), progress=lambda _: None)
     atlas, view = open_atlas(path), MapView(right="radius_ratio", up="revolution")
-    held = held_places(atlas, view, changed(trunk, {"taper": 0.013}))
+    held = fixed_places(atlas, view, changed(trunk, {"taper": 0.013}))
     assert held == {"taper": 1}
     shown = atlas_map(atlas, view, held)
     assert (shown.names, shown.fixed) == (("radius_ratio", "revolution"), {"taper": 0.02})

@@ -70,8 +70,8 @@ def test_the_arm_follows_a_drag_of_its_tip_on_its_branch(inverse_tab):
     drag_tip(tab, begin, end)
     tab.page.wait_for_timeout(300)
     tab.settle()
-    middle = tab.session.tip_pull
-    assert middle.pulled.gap == 0.0
+    middle = tab.session.drag
+    assert middle.dragged.gap == 0.0
     tab.wait(lambda: len(tab.drawn("/cloud").points) <= 1 << 13, "the cloud is thin")
     assert np.linalg.norm(tip_of(tab) - middle.wanted) < 1e-5
     tab.page.mouse.up()
@@ -99,15 +99,15 @@ def test_beyond_the_boundary_the_arm_stays_near_and_a_line_shows_the_gap(inverse
     tab = inverse_tab
     begin = pose(tab, (-0.2, -0.1, -0.1))
     drag_tip(tab, begin, begin + [0.0, 0.0, 0.35])
-    tab.wait(lambda: tab.session.tip_pull and tab.session.tip_pull.pulled.gap > 0.02, "a gap")
+    tab.wait(lambda: tab.session.drag and tab.session.drag.dragged.gap > 0.02, "a gap")
     tab.settle()
-    pull = tab.session.tip_pull
+    pull = tab.session.drag
     assert tab.drawn("/lag").visible
-    assert tab.drawn("/lag label").text == f"{pull.pulled.gap:.3f} L short"
-    tab.page.get_by_text(f"This branch ends {pull.pulled.gap:.3f} L short").wait_for()
+    assert tab.drawn("/lag label").text == f"{pull.dragged.gap:.3f} L short"
+    tab.page.get_by_text(f"This branch ends {pull.dragged.gap:.3f} L short").wait_for()
     answer = sr.solve_inverse(tab.session.state.design, [pull.wanted])[0]
     assert len(answer) == 0
-    assert pull.pulled.gap == pytest.approx(answer.gap, abs=1e-5)
+    assert pull.dragged.gap == pytest.approx(answer.gap, abs=1e-5)
     tab.page.mouse.up()
     tab.wait(lambda: not tab.drawn("/lag").visible, "the drag rests")
     tab.settle()
@@ -143,7 +143,7 @@ def test_a_handle_behind_the_arm_is_seen_through_it_and_can_be_grabbed(inverse_t
         lambda: around(tab, begin).min() < 0.55, "the ball is seen"
     )  # the body is nearly white
     drag_tip(tab, begin, begin + [0.0, 0.0, 0.02])
-    tab.wait(lambda: tab.session.tip_pull, "the arm follows")
+    tab.wait(lambda: tab.session.drag, "the arm follows")
     tab.page.mouse.up()
     tab.wait(lambda: tab.session.state.target is not None, "the drag rests")
     tab.settle()

@@ -8,8 +8,7 @@ import pytest
 
 from softreach.arm import designs
 from softreach.arm.parameters import changed
-from softreach.studio.history import History
-from softreach.studio.state import StudioState
+from softreach.studio.state import History, StudioState
 
 START = StudioState(design=designs.minimal_trunk())
 

@@ -8,7 +8,7 @@ import pytest
 from softreach.arm import designs
 from softreach.arm.parameters import changed, find_parameter
 from softreach.studio import Start, Studio, StudioState
-from softreach.studio.kept_work import KeptWork
+from softreach.studio.start import KeptWork
 from tests.studio.conftest import SMALL
 from tests.studio.tab import Tab
 

@@ -9,7 +9,7 @@ import pytest
 from softreach.arm import designs
 from softreach.studio import StudioState
 from softreach.studio.files import state_from
-from softreach.studio.source import start_on_state
+from softreach.studio.start import start_on_state
 from softreach.support.errors import SoftreachError
 
 STATE = StudioState(design=designs.minimal_trunk())

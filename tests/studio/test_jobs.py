@@ -6,29 +6,32 @@ from hypothesis import given
 
 from softreach.arm import Loads, designs
 from softreach.arm.parameters import changed
-from softreach.studio.jobs import (
-    JOBS,
+from softreach.studio.app import JOBS
+from softreach.studio.jobs.beside import DrawFree, DrawReference
+from softreach.studio.jobs.inverse import SolveInverse
+from softreach.studio.jobs.page import DrawMap, KeepState, SetTheme
+from softreach.studio.jobs.plots import PLOT_JOBS
+from softreach.studio.jobs.reach import (
     ComputeReach,
     DrawArm,
     DrawCloud,
-    DrawFree,
-    DrawMap,
-    DrawReference,
     DrawSurfaces,
-    FollowEye,
-    KeepState,
-    SetTheme,
-    SolveInverse,
-    what_follows,
+    FollowCamera,
 )
+from softreach.studio.plots import PLOTS
+from softreach.studio.session import what_follows
+from softreach.studio.settings import PlotSettings
 from softreach.studio.state import Camera, MapView, Slice, StudioState
 from tests.studio.test_state import states
+
+_PLOT = {plot.name: job for plot, job in zip(PLOTS, PLOT_JOBS, strict=True)}
+ALONG_ARM, SECTION = _PLOT["along_arm"], _PLOT["section"]
 
 
 @given(states())
 def test_nothing_follows_from_no_change_and_all_from_a_first_state(state):
-    assert what_follows(state, state) == frozenset()
-    assert what_follows(None, state) == frozenset(JOBS)
+    assert what_follows(JOBS, state, state) == frozenset()
+    assert what_follows(JOBS, None, state) == frozenset(JOBS)
 
 
 def test_each_change_makes_stale_what_depends_on_it(trunk):
@@ -36,20 +39,49 @@ def test_each_change_makes_stale_what_depends_on_it(trunk):
     other = changed(trunk, {"taper": 0.01})
     changes = {
         state.replace(activation=(-1.0, 0.0, 0.0)): {DrawArm},
-        state.showing(color="multiplicity"): {DrawCloud, DrawReference},
-        state.showing(slice=Slice(axis="x")): {DrawCloud, DrawReference, DrawSurfaces},
+        state.showing(color="multiplicity"): {DrawCloud},
+        state.showing(slice=Slice(axis="x")): {DrawCloud},
         state.showing(map=MapView(metric="volume")): {DrawMap},
         state.showing(surface=True): {DrawSurfaces},
-        state.replace(target=(0.1, 0.0, 0.8)): {SolveInverse, FollowEye},
-        state.showing(cut="half"): {FollowEye},
-        state.showing(orthographic=True): {FollowEye},
+        state.replace(target=(0.1, 0.0, 0.8)): {SolveInverse, FollowCamera},
+        state.showing(cut="half"): {FollowCamera},
+        state.showing(orthographic=True): {FollowCamera},
         state.showing(dark=True): {SetTheme},
         state.replace(reference=trunk): {DrawReference},
-        state.replace(design=other): {ComputeReach, DrawArm, SolveInverse, DrawMap},
+        state.replace(design=other): {ComputeReach, DrawArm, DrawMap},
         state.replace(camera=Camera(position=(1, 1, 1), look_at=(0, 0, 0))): set(),
     }
     for new, jobs in changes.items():
-        assert what_follows(state, new) == jobs | {KeepState}
+        assert what_follows(JOBS, state, new) == jobs | {KeepState}
+
+
+def test_what_is_not_shown_follows_nothing_and_what_is_taken_away_follows_once(trunk):
+    plots = PlotSettings(shown=("along_arm", "section"))
+    bare = StudioState(design=trunk)
+    full = bare.replace(target=(0.1, 0.0, 0.8), reference=trunk).showing(surface=True, plots=plots)
+    other = changed(trunk, {"taper": 0.01})
+    moves = {
+        full.replace(design=other): {
+            ComputeReach,
+            DrawArm,
+            DrawMap,
+            SolveInverse,
+            ALONG_ARM,
+        },
+        full.showing(slice=Slice(axis="x")): {
+            DrawCloud,
+            DrawReference,
+            DrawSurfaces,
+            SECTION,
+        },
+        full.showing(color="rgb"): {DrawCloud, DrawReference},
+        full.showing(surface=False): {DrawSurfaces},
+        full.showing(plots=PlotSettings()): {ALONG_ARM, SECTION},
+        full.replace(target=None): {SolveInverse, FollowCamera},
+        full.replace(reference=None): {DrawReference},
+    }
+    for new, jobs in moves.items():
+        assert what_follows(JOBS, full, new) == jobs | {KeepState}
 
 
 def test_the_cloud_without_loads_follows_the_design_but_not_its_loads(trunk):
@@ -58,8 +90,8 @@ def test_the_cloud_without_loads_follows_the_design_but_not_its_loads(trunk):
     light, heavy = (
         bare.replace(design=arm.replace(loads=Loads(payload=payload))) for payload in (0.0, 0.001)
     )
-    assert DrawFree in what_follows(bare, light)
-    assert DrawFree not in what_follows(light, heavy)
-    assert DrawFree in what_follows(heavy, heavy.showing(free=False))
-    assert DrawFree in what_follows(heavy, bare)
-    assert DrawFree not in what_follows(bare, bare.replace(design=trunk))
+    assert DrawFree in what_follows(JOBS, bare, light)
+    assert DrawFree not in what_follows(JOBS, light, heavy)
+    assert DrawFree in what_follows(JOBS, heavy, heavy.showing(free=False))
+    assert DrawFree in what_follows(JOBS, heavy, bare)
+    assert DrawFree not in what_follows(JOBS, bare, bare.replace(design=trunk))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import threading
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -10,9 +12,9 @@ import pytest
 from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.cli.studio import _start, _work
-from softreach.studio.kept_work import KeptWork, work_on
 from softreach.studio.reach import Size
 from softreach.studio.snapshots import Numbers, Snapshot, Snapshots
+from softreach.studio.start import KeptWork, work_on
 from softreach.studio.state import StudioState
 from softreach.support.errors import InvalidInput
 
@@ -100,6 +102,39 @@ def test_names_of_snapshots_are_taken_once():
     with pytest.raises(InvalidInput, match="taken"):
         snapshots.add(snapshot("design 1"))
     assert snapshots.free_name() == "design 2"
+
+
+def test_tabs_that_take_a_snapshot_of_one_name_at_the_same_time_keep_one():
+    class SlowStore:
+        """Waits in the midst of writing for whoever else would write."""
+
+        meeting = threading.Barrier(2)
+
+        def snapshots(self):
+            return ()
+
+        def put(self, _):
+            with suppress(threading.BrokenBarrierError):
+                self.meeting.wait(0.3)
+
+        def remove(self, _):
+            pass
+
+    snapshots, refused = Snapshots(SlowStore()), []
+
+    def take():
+        try:
+            snapshots.add(snapshot("same"))
+        except InvalidInput as error:
+            refused.append(error)
+
+    tabs = [threading.Thread(target=take) for _ in range(2)]
+    for tab in tabs:
+        tab.start()
+    for tab in tabs:
+        tab.join()
+    assert len(refused) == 1
+    assert [one.name for one in snapshots.all] == ["same"]
 
 
 def test_work_is_found_again(tmp_path):

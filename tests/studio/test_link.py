@@ -7,7 +7,7 @@ from urllib.parse import parse_qs, urlsplit
 import pytest
 from hypothesis import given
 
-from softreach.studio.link import state_in_request, state_link
+from softreach.studio.start import state_in_request, state_link
 from softreach.studio.state import StudioState
 from softreach.support.errors import InvalidInput
 from tests.studio.test_state import states
@@ -42,6 +42,6 @@ def test_a_broken_link_says_so(trunk):
 
 
 def test_a_state_too_long_for_an_address_is_refused(trunk, monkeypatch):
-    monkeypatch.setattr("softreach.studio.link._LONGEST", 100)
+    monkeypatch.setattr("softreach.studio.start._LONGEST", 100)
     with pytest.raises(InvalidInput, match="in a link"):
         state_link(URL, StudioState(design=trunk))

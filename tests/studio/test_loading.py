@@ -10,11 +10,8 @@ import pytest
 import softreach as sr
 from softreach.arm import designs
 from softreach.rod.tip_map import TipStatus
-from softreach.studio.effort import affordable_level
-from softreach.studio.reach import Quality, Reach, cloud_points, unstable_samples
-from softreach.studio.rod import solvable_rod
-from softreach.studio.stages import stages
-from softreach.studio.state import StudioState
+from softreach.studio.reach import Quality, Reach, cloud_points, stages, unstable_samples
+from softreach.studio.state import StudioState, solvable_rod
 from softreach.studio.tabs.loads import (
     GRAVITIES,
     TypedLoads,
@@ -23,6 +20,7 @@ from softreach.studio.tabs.loads import (
     typed_loads,
     with_loads,
 )
+from softreach.studio.work import affordable_level
 from softreach.support.errors import InvalidDesign, InvalidInput
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)

@@ -6,74 +6,21 @@ import gc
 import threading
 import time
 import weakref
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
 
 import pytest
 
 import softreach.studio.app
-import softreach.studio.stages as stages
+import softreach.studio.reach as stages
 from softreach.arm.parameters import changed
-from softreach.studio import Studio
 from softreach.studio.session import Session
+from tests.studio.sockets import PATIENCE, connected, page, until
 
 pytestmark = pytest.mark.slow
 
-PATIENCE = 60.0  # [s] on a loaded machine
 
-
-def until(condition: Callable[[], object]) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-
-
-@contextmanager
-def connected(studio: Studio) -> Iterator[None]:
-    """What a tab is to the server: a socket that reads all it is sent and has told its camera."""
-    import msgspec
-    import viser
-    from websockets.exceptions import ConnectionClosed
-    from websockets.sync.client import connect
-
-    camera = {
-        "type": "ViewerCameraMessage",
-        "wxyz": (1.0, 0.0, 0.0, 0.0),
-        "position": (2.0, -4.0, 1.0),
-        "fov": 0.8,
-        "near": 0.1,
-        "far": 100.0,
-        "image_height": 500,
-        "image_width": 800,
-        "look_at": (0.0, 0.0, 0.3),
-        "up_direction": (0.0, 0.0, 1.0),
-    }
-    address = studio.url.replace("http", "ws", 1)
-    version = [f"viser-v{viser.__version__}"]
-    with connect(address, subprotocols=version, max_size=None) as socket:
-
-        def read() -> None:
-            with suppress(ConnectionClosed):
-                for _ in socket:
-                    pass
-
-        reader = threading.Thread(target=read, daemon=True)
-        reader.start()
-        socket.send(msgspec.msgpack.encode(camera))
-        yield
-    reader.join(PATIENCE)
-
-
-@contextmanager
-def page(studio: Studio) -> Iterator[Session]:
-    """A tab that shows what it has to."""
-    known = set(studio.sessions)
-    with connected(studio):
-        until(lambda: set(studio.sessions) - known)
-        session = studio.sessions[max(studio.sessions)]
-        until(lambda: session.panels and session.reach is not None and not session.busy)
-        yield session
+def own_threads() -> int:
+    """Threads other than those of viser's pool, which grows as events come together."""
+    return sum(not thread.name.startswith("ThreadPool") for thread in threading.enumerate())
 
 
 def shake(session: Session, times: int, pause: float = 0.0) -> None:
@@ -91,14 +38,14 @@ def test_of_ten_tabs_that_were_closed_nothing_stays(studio):
     with page(studio):
         pass  # what is made once
     until(lambda: not studio.sessions)
-    before = threading.active_count()
+    before = own_threads()
     gone = []
     for _ in range(10):
         with page(studio) as session:
             gone.append(weakref.ref(session.reach.cloud))
             del session
     until(lambda: not studio.sessions)
-    until(lambda: threading.active_count() <= before)
+    until(lambda: own_threads() <= before)
 
     def clouds() -> int:
         gc.collect()
@@ -117,7 +64,7 @@ def test_a_shaken_tab_computes_the_last_place_of_its_sliders_and_no_other_in_ful
     )
     with page(studio) as session:
         computed.clear()
-        threads = threading.active_count()
+        threads = own_threads()
         shake(session, 100, 0.01)
         assert session.settle(PATIENCE)
         assert session.reach is not None
@@ -125,7 +72,7 @@ def test_a_shaken_tab_computes_the_last_place_of_its_sliders_and_no_other_in_ful
         assert computed[-1] == session.state.design
         assert len(computed) < 120  # each in two or three stages, of which the later are dropped
         assert len(session.history.past) < 50
-        until(lambda: threading.active_count() <= threads)
+        until(lambda: own_threads() <= threads)
 
 
 def test_a_tab_that_is_shaken_lets_another_have_its_turn(studio):

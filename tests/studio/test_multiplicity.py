@@ -8,11 +8,10 @@ import pytest
 from softreach.arm import designs
 from softreach.inverse import solve_inverse
 from softreach.rod.rods import tip_map
-from softreach.studio.colors import sample_values
 from softreach.studio.multiplicity import count_activations, uncounted
-from softreach.studio.reach import Quality, Reach, shown_rows
-from softreach.studio.stages import stages
-from softreach.studio.worker import Dropped
+from softreach.studio.reach import Quality, Reach, shown_rows, stages
+from softreach.studio.scene.clouds import sample_values
+from softreach.studio.work import Dropped
 
 SMALL = Quality(coarse_level=8, fine_level=13, fine_accuracy=0.01)
 LEVEL = 13

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from softreach.arm import designs
-from softreach.studio.drawn_paths import PATH_SHAPES, PLANES, drawn_path, straight_path
-from softreach.studio.movie import frames_along
+from softreach.plot.path_movie import frames_along
+from softreach.studio.jobs.path import PATH_SHAPES, PLANES, drawn_path, straight_path
 from softreach.studio.plots.histogram import shares
 from softreach.studio.settings import MOST_POINTS, PlotSettings, TipPath
 from softreach.studio.state import StudioState

@@ -10,11 +10,12 @@ import pytest
 
 import softreach as sr
 from softreach.arm import Loads, designs
-from softreach.studio.jobs import JOBS, what_follows
+from softreach.studio.app import JOBS
 from softreach.studio.jobs.plots import PLOT_JOBS, plots_from
 from softreach.studio.plots import PLOTS
 from softreach.studio.plots.along_arm import AlongArmPlot, along_arm
 from softreach.studio.plots.plot import Figures
+from softreach.studio.session import what_follows
 from softreach.studio.settings import PlotSettings
 from softreach.studio.state import StudioState
 
@@ -48,10 +49,10 @@ def test_only_what_is_shown_becomes_stale(plot):
     job = PLOT_JOBS[PLOTS.index(plot)]
     assert job in JOBS
     shown = STATE.showing(plots=PlotSettings(shown=(plot.name,)))
-    assert job in what_follows(STATE, shown)
-    assert job not in what_follows(STATE, MOVED)
+    assert job in what_follows(JOBS, STATE, shown)
+    assert job not in what_follows(JOBS, STATE, MOVED)
     depends = "activation" in plot.depends_on
-    assert (job in what_follows(shown, shown.replace(activation=MOVED.activation))) == depends
+    assert (job in what_follows(JOBS, shown, shown.replace(activation=MOVED.activation))) == depends
 
 
 def test_plots_are_asked_for_by_what_they_are_computed_from():

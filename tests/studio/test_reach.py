@@ -7,17 +7,21 @@ import pytest
 
 from softreach.arm import designs
 from softreach.cloud.clouds import compute_cloud
+from softreach.picture.axes_box import axes_box, seen_from
 from softreach.plot.coloring import ScalarKey
 from softreach.rod.kinematics import tip_positions
-from softreach.studio.axes import axes_box, seen_from
-from softreach.studio.colors import color_names, key_html, manipulability, sample_colors
-from softreach.studio.picking import picked_point, plane_crossing
-from softreach.studio.reach import Quality, Reach, shown_samples
-from softreach.studio.sight import is_behind
-from softreach.studio.slicing import in_slice, sliced_faces
-from softreach.studio.stages import reached, stages
+from softreach.studio.reach import Quality, Reach, reached, shown_samples, stages
+from softreach.studio.scene.camera import is_behind, picked_point, plane_crossing
+from softreach.studio.scene.clouds import (
+    color_names,
+    in_slice,
+    key_html,
+    sample_colors,
+    sample_values,
+    sliced_faces,
+)
 from softreach.studio.state import Slice
-from softreach.studio.worker import Dropped
+from softreach.studio.work import Dropped
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
 
@@ -77,14 +81,17 @@ def test_multiplicity_is_offered_where_it_is_finite(trunk):
     assert "multiplicity" not in color_names(designs.redundant_trunk())
 
 
-def test_manipulability_is_the_determinant_of_the_tips_velocities(trunk):
-    gamma, h = np.full((1, 3), -0.6), 1e-4
+def test_points_are_colored_by_the_determinant_of_the_tips_velocities(both, trunk):
+    reach = both[-1]
+    shown = sample_values(reach, 8, "manipulability").values
+    sample = int(np.argsort(shown)[len(shown) // 2])  # the few largest and smallest are clipped
+    gamma, h = reach.cloud.activation.values[[sample]], 1e-4
     columns = [
         (tip_positions(trunk, gamma + h * e, 1e-9) - tip_positions(trunk, gamma - h * e, 1e-9))[0]
         for e in np.eye(3)
     ]
     expected = abs(np.linalg.det(np.array(columns) / (2 * h)))
-    assert manipulability(trunk, gamma)[0] == pytest.approx(expected, rel=1e-3)
+    assert shown[sample] == pytest.approx(expected, rel=1e-3)
 
 
 def test_a_slice_shows_what_lies_within_its_thickness(rng):
@@ -96,9 +103,9 @@ def test_a_slice_shows_what_lies_within_its_thickness(rng):
 
 def test_a_ray_picks_the_nearest_of_the_points_on_it():
     eye, points = np.zeros(3), np.array([[0, 0, 5.0], [0, 0, 2.0], [1, 0, 1.0], [0, 0, -1.0]])
-    assert picked_point(points, eye, (0, 0, 3)) == 1
-    assert picked_point(points, eye, (1, 0, 1)) == 2
-    assert picked_point(points, eye, (0, 1, 0)) is None
+    assert picked_point(points, eye, (0, 0, 3), 0.01) == 1
+    assert picked_point(points, eye, (1, 0, 1), 0.01) == 2
+    assert picked_point(points, eye, (0, 1, 0), 0.01) is None
 
 
 def test_a_ray_meets_a_plane_in_front_of_the_eye_only():

@@ -9,7 +9,7 @@ import pytest
 
 from softreach.arm import designs
 from softreach.studio import StudioState
-from softreach.studio.link import state_link
+from softreach.studio.start import state_link
 from tests.studio.tab import Tab
 
 STRIKE = '<img src=x onerror="document.title=1"><b class=struck>struck</b><iframe srcdoc=struck>'

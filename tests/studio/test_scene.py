@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from softreach.studio.scene import Scene
+from softreach.studio.scene.scene import Scene
 from tests.made_arms import MADE_ARMS
 
 

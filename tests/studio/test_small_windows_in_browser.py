@@ -8,7 +8,7 @@ import pytest
 from softreach.arm import designs
 from softreach.atlas import DesignSpace, build_atlas
 from softreach.studio import Quality, Studio
-from softreach.studio.source import start_on_store
+from softreach.studio.start import start_on_store
 from tests.studio.tab import Tab
 
 COARSE = Quality(coarse_level=12, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.1)
@@ -79,7 +79,7 @@ def see_all(tab):
 
     def told() -> bool:
         box = tab.page.locator("canvas").first.bounding_box()
-        return np.isclose(tab.session.eye.aspect, box["width"] / box["height"], rtol=0.01)
+        return np.isclose(tab.session.camera.aspect, box["width"] / box["height"], rtol=0.01)
 
     tab.wait(told, "the page has told how wide it is")
     tab.page.wait_for_timeout(500)  # the eye looks twice before it moves
@@ -152,7 +152,7 @@ def test_numbers_at_the_axes_stay_in_sight_when_plots_stand_beside_the_scene(ope
     tab = opened("laptop")
     see_all(tab)
     wide = tab.page.locator("canvas").first.bounding_box()["width"]
-    before = tab.session.eye.camera()
+    before = tab.session.camera.usual()
     tab.open("Plots")
     tab.page.get_by_label("along the arm", exact=True).check()
     tab.wait(lambda: tab.page.locator("canvas").first.bounding_box()["width"] < wide, "it docks")
@@ -165,7 +165,7 @@ def test_numbers_at_the_axes_stay_in_sight_when_plots_stand_beside_the_scene(ope
     tab.wait(in_sight, "all numbers are in sight")
     tab.page.get_by_label("along the arm", exact=True).uncheck()
     tab.wait(
-        lambda: np.allclose(tab.session.eye.camera().position, before.position, rtol=1e-2),
+        lambda: np.allclose(tab.session.camera.usual().position, before.position, rtol=1e-2),
         "the eye steps forth again",
     )
 
@@ -173,13 +173,13 @@ def test_numbers_at_the_axes_stay_in_sight_when_plots_stand_beside_the_scene(ope
 def test_the_arm_stays_in_sight_in_a_window_that_gets_narrow_and_wide_again(opened):
     tab = opened("laptop")
     see_all(tab)
-    before = tab.session.eye.camera()
+    before = tab.session.camera.usual()
     distance = np.linalg.norm(np.subtract(before.position, before.look_at))
     tab.page.set_viewport_size({"width": 390, "height": 844})
-    tab.wait(lambda: tab.session.eye.aspect < 0.5, "the window is narrow")
+    tab.wait(lambda: tab.session.camera.aspect < 0.5, "the window is narrow")
 
     def stretch() -> float:
-        now = tab.session.eye.camera()
+        now = tab.session.camera.usual()
         return float(np.linalg.norm(np.subtract(now.position, now.look_at)) / distance)
 
     tab.wait(lambda: 1.5 < stretch() < 3.0, "the eye steps back")

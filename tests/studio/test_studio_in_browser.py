@@ -13,7 +13,8 @@ from softreach.arm.parameters import changed, find_parameter
 from softreach.arm.summary import describe
 from softreach.atlas import DesignSpace, build_atlas
 from softreach.studio import Studio, StudioState
-from softreach.studio.source import start_on_store
+from softreach.studio.jobs.inverse import SolveInverse
+from softreach.studio.start import start_on_store
 from softreach.studio.state import Slice
 from softreach.studio.tabs.inverse import InversePanel
 from tests.studio.conftest import SMALL
@@ -115,7 +116,7 @@ def test_a_reference_stays_while_the_design_changes(tab):
     tab.wait(lambda: tab.session.state.design != kept, "the design changes")
     tab.settle()
     tab.page.get_by_text(f"reference (gray): volume {known.volume:.4f}").wait_for()
-    eye = np.array(tab.session.eye.camera().position)
+    eye = np.array(tab.session.camera.usual().position)
     tab.page.get_by_label("side by side").check()
     tab.wait(lambda: tab.drawn("/reference/arm"), "the reference stands beside")
     assert tab.session.reference is known
@@ -132,7 +133,7 @@ def parameter(tab, name: str) -> float:
 
 
 def far(tab, eye) -> bool:
-    return np.linalg.norm(np.array(tab.session.eye.camera().position) - eye) > 0.2
+    return np.linalg.norm(np.array(tab.session.camera.usual().position) - eye) > 0.2
 
 
 def test_surfaces_are_drawn_and_cut(tab):
@@ -156,7 +157,7 @@ def test_surfaces_are_drawn_and_cut(tab):
 
 def test_a_target_out_of_reach_shows_the_gap(tab):
     tab.open("Inverse")
-    tab.session.aim(np.array([0.0, 0.0, 1.5]))
+    tab.session.job(SolveInverse).aim(np.array([0.0, 0.0, 1.5]))
     tab.settle()
     assert len(tab.session.answer) == 0
     tab.page.get_by_text("out of reach").wait_for()
@@ -224,7 +225,7 @@ def test_a_link_opens_the_state_in_another_tab(tab, studio):
     assert other.settle(PATIENCE)
     assert other.reach.arm == kept.design
     tab.wait(
-        lambda: np.allclose(other.eye.camera().position, kept.camera.position, atol=1e-6),
+        lambda: np.allclose(other.camera.usual().position, kept.camera.position, atol=1e-6),
         "the page looks from where the first one did",
     )
     page.close()

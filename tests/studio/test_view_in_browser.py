@@ -9,7 +9,9 @@ import pytest
 
 from softreach.arm import designs
 from softreach.studio import Quality, Start, Studio, StudioState
-from softreach.studio.eye import FOV, VIEWS
+from softreach.studio.jobs.inverse import SolveInverse
+from softreach.studio.jobs.reach import FollowCamera
+from softreach.studio.scene.camera import FOV, VIEWS
 from softreach.support.palette import bundle_color
 from tests.studio.tab import Tab
 
@@ -78,7 +80,7 @@ def test_a_page_that_nobody_touches_sends_no_clouds(tab, monkeypatch):
     clouds = tab.session.scene.clouds
     monkeypatch.setattr(clouds, "_send", lambda path, _: sent.append(path))
     tab.page.wait_for_timeout(1500)
-    tab.session.look_again()
+    tab.session.follow(FollowCamera)
     tab.settle()
     assert sent == []
 
@@ -86,7 +88,7 @@ def test_a_page_that_nobody_touches_sends_no_clouds(tab, monkeypatch):
 def test_the_target_is_seen_through_the_cloud(tab):
     target = np.array([0.0, 0.1, 0.5])
     show(tab, arm=False, ghosts=False, point_size=0.02)
-    tab.session.aim(target)
+    tab.session.job(SolveInverse).aim(target)
     tab.wait(lambda: tab.session.answer is not None, "the target is solved for")
     image = pixels(tab)
     right, down = tab.projected(target)
@@ -139,7 +141,7 @@ def named_axes(tab) -> set[str]:
 
 def along(tab, axis: int) -> float:
     """Cosine between where the eye looks and an axis."""
-    camera = tab.session.eye.camera()
+    camera = tab.session.camera.usual()
     way = np.subtract(camera.look_at, camera.position)
     return abs(way[axis]) / np.linalg.norm(way)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from softreach.studio.worker import Latest
+from softreach.studio.work import Latest
 
 
 def test_of_waiting_work_only_the_last_is_done():

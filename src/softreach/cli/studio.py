@@ -13,7 +13,7 @@ from softreach.cli.values import WHOLE
 
 if TYPE_CHECKING:
     from softreach.studio import Start
-    from softreach.studio.kept_work import KeptWork
+    from softreach.studio.start import KeptWork
 
 
 def studio(
@@ -55,8 +55,7 @@ def studio(
     import webbrowser
 
     from softreach.studio import Studio
-    from softreach.studio.addresses import check_port, is_local
-    from softreach.studio.token import new_token
+    from softreach.studio.serve.access import check_port, is_local, new_token
 
     # viser's, of what is drawn for a page that was closed a moment ago
     warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
@@ -86,8 +85,8 @@ def _warning(*, with_token: bool) -> str:
 
 
 def _work(start: Start, source: str, *, fresh: bool) -> KeptWork:
-    """The work kept of earlier sessions; a state or a cloud is shown as it is in its file."""
-    from softreach.studio.kept_work import work_on
+    """What is kept of the work; a state or a cloud that is opened is shown as it is in its file."""
+    from softreach.studio.start import work_on
 
     as_it_is = source.lower().endswith(".json") or start.reach is not None
     if as_it_is:
@@ -96,7 +95,7 @@ def _work(start: Start, source: str, *, fresh: bool) -> KeptWork:
 
 
 def _start(source: str) -> Start:
-    from softreach.studio.source import start_on_design, start_on_state, start_on_store
+    from softreach.studio.start import start_on_design, start_on_state, start_on_store
 
     if source.rstrip("/").endswith(".zarr"):
         return start_on_store(source)

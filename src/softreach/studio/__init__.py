@@ -2,7 +2,7 @@
 
 from softreach.studio.app import Studio
 from softreach.studio.reach import Quality
-from softreach.studio.source import Start
+from softreach.studio.start import Start
 from softreach.studio.state import StudioState
 
 __all__ = ["Quality", "Start", "Studio", "StudioState"]

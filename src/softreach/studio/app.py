@@ -1,4 +1,4 @@
-"""The studio: a server, and a session for every tab."""
+"""Studio: a server, and a session for every tab."""
 
 from __future__ import annotations
 
@@ -9,31 +9,48 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from softreach.studio.addresses import LOOPBACK, page_address, reachable_hosts
-from softreach.studio.axes import round_box
-from softreach.studio.compiling import CompilationWatch
-from softreach.studio.connections import asked_path, close_all
-from softreach.studio.eye import framing
+from softreach.picture.axes_box import round_box
 from softreach.studio.fields import attempt
-from softreach.studio.history import History
-from softreach.studio.kept_work import KeptWork
-from softreach.studio.link import state_in_request
-from softreach.studio.server import page_url, start_server, stop_server
-from softreach.studio.session import Session
+from softreach.studio.jobs.beside import DrawFree, DrawReference, DrawReferenceArm
+from softreach.studio.jobs.inverse import DragTip, SolveInverse
+from softreach.studio.jobs.page import DrawMap, KeepState, SetTheme
+from softreach.studio.jobs.path import FollowPath, PlayPath, WriteMovie
+from softreach.studio.jobs.plots import PLOT_JOBS
+from softreach.studio.jobs.reach import (
+    ComputeReach,
+    DrawArm,
+    DrawCloud,
+    DrawSurfaces,
+    FollowCamera,
+)
+from softreach.studio.scene.camera import framing
+from softreach.studio.serve.access import LOOPBACK, page_address, reachable_hosts, with_token
+from softreach.studio.serve.server import page_url, start_server, stop_server
+from softreach.studio.serve.viser_fixes import close_sockets, request_path
+from softreach.studio.session import Job, Session
 from softreach.studio.snapshots import Snapshots
-from softreach.studio.source import Start
-from softreach.studio.state import Camera, StudioState
-from softreach.studio.token import with_token
-from softreach.studio.worker import Latest
+from softreach.studio.start import KeptWork, Start, state_in_request
+from softreach.studio.state import Camera, History, StudioState
+from softreach.studio.work import CompilationWatch, Latest
 
 if TYPE_CHECKING:
     from viser import ClientHandle
 
-__all__ = ["Studio"]
+__all__ = ["JOBS", "Studio"]
 
-_EYE = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
-_EYE_ON_MAP = Camera(position=(1.9, -6.3, 2.0), look_at=(-0.95, -0.5, 0.3))
-_MOST_LEFT = 20  # closed tabs whose work is held
+JOBS: tuple[type[Job], ...] = (
+    ComputeReach, DrawArm, DrawCloud, DrawSurfaces, FollowCamera,
+    DrawFree, DrawReference, DrawReferenceArm,
+    SolveInverse, DragTip,
+    FollowPath, PlayPath, WriteMovie,
+    *PLOT_JOBS,
+    DrawMap, SetTheme, KeepState,
+)  # fmt: skip
+"""Every kind of work that a tab has done for it."""
+
+_CAMERA = Camera(position=(2.1, -3.85, 1.45), look_at=(0.0, 0.0, 0.28))
+_CAMERA_ON_MAP = Camera(position=(1.9, -6.3, 2.0), look_at=(-0.95, -0.5, 0.3))
+_MOST_LEFT = 20  # closed tabs whose work is remembered
 _GOES_ON = "This goes on where the last work on it ended; Reset leads back to the beginning."
 
 
@@ -74,7 +91,7 @@ class Studio:
         self._notice = Latest(_ignored)
         self._compilation = CompilationWatch(self._compiling)
         self.server = start_server(host, port, token)
-        camera = start.state.camera or (_EYE if start.atlas is None else _EYE_ON_MAP)
+        camera = start.state.camera or (_CAMERA if start.atlas is None else _CAMERA_ON_MAP)
         self.server.initial_camera.position = camera.position
         self.server.initial_camera.look_at = camera.look_at
         self.server.on_client_connect(self._connected)
@@ -82,15 +99,15 @@ class Studio:
 
     @property
     def url(self) -> str:
-        """Where the page is, with its token."""
+        """Address of the page, with its token."""
         return with_token(page_url(self.server), self._token)
 
     @property
     def urls_for_others(self) -> list[str]:
-        """Where the page is for other machines; none if it is for this one alone."""
+        """Addresses of the page for other machines; none if it is for this one alone."""
         host, port = self.server.get_host(), self.server.get_port()
-        found = (page_address(one, port) for one in reachable_hosts(host))
-        return [with_token(one, self._token) for one in found]
+        hosts = reachable_hosts(host)
+        return [with_token(page_address(name, port), self._token) for name in hosts]
 
     def stop(self) -> None:
         """Stop serving."""
@@ -103,7 +120,7 @@ class Studio:
 
     def _disconnect_tabs(self, patience: float = 3.0) -> None:
         """Close the tabs' connections first: viser ends its pool before it reports the closing."""
-        close_all(self.server)
+        close_sockets(self.server)
         deadline = time.monotonic() + patience
         while self.sessions and time.monotonic() < deadline:
             time.sleep(0.02)
@@ -129,7 +146,7 @@ class Studio:
             session.show()
 
     def _connected(self, client: ClientHandle) -> None:
-        session = Session(client, self.start, work=self.work, snapshots=self.snapshots)
+        session = Session(client, self.start, JOBS, work=self.work, snapshots=self.snapshots)
         session.compiling = self._compilation.running
         with self._lock:
             left = self._work_left()
@@ -137,8 +154,9 @@ class Studio:
         if left is not None:
             session.take_up(*left)
         _furnish(session, page_url(self.server))
+        session.camera.on_move(lambda: session.follow(FollowCamera))
         session.begin()
-        if session.eye.is_upright:
+        if session.camera.is_upright:
             _look_at_all(session)
         if self.work is not None and self.work.complaint:
             session.say(self.work.complaint)
@@ -152,7 +170,7 @@ class Studio:
 
     def _follow_link(self, session: Session) -> None:
         """Bring a tab that was opened by a link into its state."""
-        state = state_in_request(asked_path(self.server, session.client.client_id))
+        state = state_in_request(request_path(self.server, session.client.client_id))
         if state is not None:
             session.restore(state)
 
@@ -167,7 +185,7 @@ class Studio:
                 del self._left[:-_MOST_LEFT]
 
     def _work_left(self) -> tuple[StudioState, History] | None:
-        """What a new tab goes on with: nothing beside tabs that are open, as it is theirs."""
+        """State and history that a new tab goes on with: those of tabs that are open are theirs."""
         if self.work is None:
             return None
         if self._left:
@@ -191,8 +209,8 @@ def _look_at_all(session: Session) -> None:
         session.look_from("oblique")
         return
     low, high = round_box(np.vstack([*session.scene.axes.corners, session.board.corners]))
-    toward = np.subtract(_EYE_ON_MAP.position, _EYE_ON_MAP.look_at)
-    session.eye.look_from(framing(low, high, toward, session.eye.aspect))
+    toward = np.subtract(_CAMERA_ON_MAP.position, _CAMERA_ON_MAP.look_at)
+    session.camera.look_from(framing(low, high, toward, session.camera.aspect))
 
 
 def _furnish(session: Session, url: str) -> None:

@@ -1,7 +1,9 @@
-"""A contour map over two parameters of an atlas, and the design under a click."""
+"""Map of an atlas: a metric over two parameters, its board in the scene, its numbers in words."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,14 +12,15 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import find_parameter
+from softreach.atlas import over_length
 from softreach.plot.metric_map import metric_label, plot_metric_map
+from softreach.studio.scene.camera import plane_crossing
+from softreach.studio.scene.scene import Scene
 from softreach.studio.state import MapView
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     import xarray as xr
-
-__all__ = ["AtlasMap", "atlas_map", "held_places", "map_choices", "metric_names"]
 
 _INCHES, _DPI = 3.1, 400  # small type would be lost in the scene, few pixels would blur it
 _FRAME = (0.19, 0.16, 0.57, 0.68)  # of the axes: left, bottom, width, height
@@ -59,7 +62,7 @@ class AtlasMap:
         return at if all(inside) else None
 
     def place_of(self, **at: float) -> tuple[float, float]:
-        """Where a design is in the picture: the inverse of `parameters_at`."""
+        """Place of a design in the picture: the inverse of `parameters_at`."""
         shares = [
             (at[name] - values[0]) / ((values[-1] - values[0]) or 1.0)
             for name, values in zip(self.names, (self.x, self.y), strict=True)
@@ -94,7 +97,7 @@ def map_choices(atlas: xr.Dataset, view: MapView) -> tuple[str, str, str]:
     return view.metric or metrics[0], right, up
 
 
-def held_places(atlas: xr.Dataset, view: MapView, design: Manipulator) -> dict[str, int]:
+def fixed_places(atlas: xr.Dataset, view: MapView, design: Manipulator) -> dict[str, int]:
     """Of each parameter that a map does not show, the number of the value nearest to a design's."""
     _, *shown = map_choices(atlas, view)
     others = [str(dim) for dim in atlas["status"].dims if dim not in shown]
@@ -104,30 +107,30 @@ def held_places(atlas: xr.Dataset, view: MapView, design: Manipulator) -> dict[s
     }
 
 
-def atlas_map(atlas: xr.Dataset, view: MapView, held: dict[str, int]) -> AtlasMap:
-    """Draw a metric over two parameters, the others held as `held_places` says.
+def atlas_map(atlas: xr.Dataset, view: MapView, fixed: dict[str, int]) -> AtlasMap:
+    """Draw a metric over two parameters, the others fixed as `fixed_places` says.
 
     Raises:
         InvalidInput: There is no such map.
     """
     metric, *names = map_choices(atlas, view)
-    shown = atlas[["status", metric]].isel(held).transpose(*names)
+    shown = atlas[["status", metric]].isel(fixed).transpose(*names)
     x, y = (atlas[name].values.astype(float) for name in names)
     labels = [_label(atlas, name) for name in names]
-    title = "\n".join([metric_label(atlas[metric]), *_held_text(atlas, held)])
+    title = "\n".join([metric_label(atlas[metric]), *_fixed_text(atlas, fixed)])
     return AtlasMap(
         image=_drawn(shown, metric, labels, title),
         x=x,
         y=y,
         names=(names[0], names[1]),
-        fixed={name: float(atlas[name].values[place]) for name, place in held.items()},
+        fixed={name: float(atlas[name].values[place]) for name, place in fixed.items()},
     )
 
 
-def _held_text(atlas: xr.Dataset, held: dict[str, int]) -> list[str]:
-    """One line with the parameters that are held, if there are any."""
-    parts = (f"{_label(atlas, name)} = {_shown(atlas, name)[k]:.4g}" for name, k in held.items())
-    return [", ".join(parts)] if held else []
+def _fixed_text(atlas: xr.Dataset, fixed: dict[str, int]) -> list[str]:
+    """One line with the fixed parameters, if there are any."""
+    parts = (f"{_label(atlas, name)} = {_shown(atlas, name)[k]:.4g}" for name, k in fixed.items())
+    return [", ".join(parts)] if fixed else []
 
 
 def _nearest(values: NDArray[np.float64], share: float) -> float:
@@ -142,8 +145,8 @@ def _shown(atlas: xr.Dataset, name: str) -> NDArray[np.float64]:
 
 
 def _label(atlas: xr.Dataset, name: str) -> str:
-    given = atlas[name].attrs.get("units", "1")
-    unit = {"rad": "deg", "1": ""}.get(given, given)
+    stored = atlas[name].attrs.get("units", "1")
+    unit = {"rad": "deg", "1": ""}.get(stored, stored)
     words = " ".join([name.replace("_", " "), *_symbol(atlas[name])])
     return f"{words} [{unit}]" if unit else words
 
@@ -175,3 +178,164 @@ def _drawn(atlas: xr.Dataset, metric: str, labels: list[str], title: str) -> NDA
 
 def _end(values: NDArray[np.float64]) -> float:
     return float(values[-1]) if len(values) > 1 else float(values[0]) + 1.0
+
+
+# What an atlas says of the design that is nearest, and why its numbers differ.
+
+
+_PAIRS = {"volume": ("V / L³", 1.0, ""), "unreachability": ("UNR", 100.0, " %")}
+_SPACINGS = 3.0
+"""Radii below so many mean spacings fall through between the samples."""
+
+
+def nearest_numbers(atlas: xr.Dataset, metric: str, design: Manipulator) -> str:
+    """The metric at the design of the atlas that is nearest; beside it what it is compared with.
+
+    The volume and the unreachability are known in two ways: of the α-shape of samples, and exactly.
+
+    Args:
+        atlas: From `open_atlas`.
+        metric: Which one.
+        design: The present one.
+    """
+    here = _nearest_places(atlas, design)
+    name = metric.removeprefix("exact_")
+    both = {name, f"exact_{name}", "exact_volume"} <= set(atlas.data_vars)
+    where = f"Nearest design of the atlas ({_place(atlas, here)}): "
+    if name not in _PAIRS or not both:
+        return f"{where}{metric.replace('_', ' ')} {_value(atlas, metric, here):.4g}."
+    symbol, scale, unit = _PAIRS[name]
+    exact, sampled = (scale * _value(atlas, each, here) for each in (f"exact_{name}", name))
+    if not np.isfinite([exact, sampled]).all():
+        return f"{where}not computed."
+    return (
+        f"{where}{symbol} {exact:.4g}{unit} exact, {sampled:.4g}{unit} of the α-shape of "
+        f"{_command(atlas)['n']:,} samples. {_reason(atlas, here)}"
+    )
+
+
+def _reason(atlas: xr.Dataset, here: dict[str, int]) -> str:
+    """Reason why an α-shape is not the exact set."""
+    command = _command(atlas)
+    alpha, exact = command["alpha_over_length"], _value(atlas, "exact_volume", here)
+    if alpha == "critical" or not exact > 0:
+        return "Samples fill less than the set, a wide α bridges what is hollow."
+    spacing = (exact / float(command["n"])) ** (1 / 3)
+    needed = _SPACINGS * spacing
+    if float(alpha) < needed:
+        return (
+            f"The samples are too few: {spacing:.2g} L apart, they need α ≥ {needed:.2g} L, and "
+            f"it is {float(alpha):g} L, so that the α-shape is full of holes."
+        )
+    return (
+        f"Samples {spacing:.2g} L apart fill a few percent less than the set; α = "
+        f"{float(alpha):g} L bridges gaps and hollows narrower than {2 * float(alpha):g} L."
+    )
+
+
+def _nearest_places(atlas: xr.Dataset, design: Manipulator) -> dict[str, int]:
+    """Its place along each parameter."""
+    values = {str(name): atlas[name].values for name in atlas["status"].dims}
+    return {
+        name: int(np.abs(known - find_parameter(design, name).value(design)).argmin())
+        for name, known in values.items()
+    }
+
+
+def _place(atlas: xr.Dataset, here: dict[str, int]) -> str:
+    parts = []
+    for name, k in here.items():
+        value, unit = float(atlas[name].values[k]), atlas[name].attrs.get("units", "1")
+        if unit == "rad":
+            value, unit = float(np.degrees(value)), "deg"
+        parts.append(f"{name.replace('_', ' ')} {value:.4g}{'' if unit == '1' else f' {unit}'}")
+    return ", ".join(parts)
+
+
+def _value(atlas: xr.Dataset, metric: str, here: dict[str, int]) -> float:
+    return float(over_length(atlas, metric).isel(here))
+
+
+def _command(atlas: xr.Dataset) -> dict[str, int | float | str]:
+    return json.loads(atlas.attrs["command"])
+
+
+# The map of an atlas as a board in the scene: drawn, marked, and read under a click.
+
+
+Array = NDArray[np.float64]
+
+_ANGLE = 0.5  # [rad] about z, so that the board faces the camera of a new tab
+_RIGHT = np.array([np.cos(_ANGLE), np.sin(_ANGLE), 0.0])
+_UP = np.array([0.0, 0.0, 1.0])
+_SIZE = 1.7  # [L]
+_TURN = (  # the picture's right goes to _RIGHT, its down to -z
+    np.sqrt(0.5) * np.cos(_ANGLE / 2),
+    -np.sqrt(0.5) * np.cos(_ANGLE / 2),
+    -np.sqrt(0.5) * np.sin(_ANGLE / 2),
+    np.sqrt(0.5) * np.sin(_ANGLE / 2),
+)
+_CENTER = -2.0 * _RIGHT + 0.4 * _UP
+
+
+class MapBoard:
+    """The board of one tab."""
+
+    def __init__(self, scene: Scene, atlas: xr.Dataset) -> None:
+        """Nothing is drawn yet."""
+        self._scene, self.atlas = scene, atlas
+        self.map: AtlasMap | None = None
+        """The map that is drawn."""
+        self._drawn: tuple[MapView, dict[str, int]] | None = None
+
+    def draw(self, view: MapView, design: Manipulator) -> None:
+        """Show a map and where the design is on it; the map is drawn anew if it changes.
+
+        Raises:
+            InvalidInput: There is no such map.
+        """
+        wanted = view, fixed_places(self.atlas, view, design)
+        if wanted != self._drawn:
+            self.map = atlas_map(self.atlas, view, wanted[1]) if view.shown else None
+            self._drawn = wanted
+            self._scene.remove("/atlas")
+            if self.map is not None:
+                self._scene.draw_picture("/atlas/map", self.map.image, _SIZE, _CENTER, _TURN)
+        self._mark(design)
+
+    def parameters_under(
+        self, origin: Sequence[float], direction: Sequence[float]
+    ) -> dict[str, float] | None:
+        """The place of the atlas under the cursor, {} beside the axes, None beside the board."""
+        hit = plane_crossing(origin, direction, _CENTER, np.cross(_UP, _RIGHT))
+        if self.map is None or hit is None:
+            return None
+        right, up = (hit - _CENTER) @ np.stack([_RIGHT, _UP]).T / _SIZE + 0.5
+        if not (0 <= right <= 1 and 0 <= up <= 1):
+            return None
+        return self.map.parameters_at(float(right), float(up)) or {}
+
+    def place_of(self, **at: float) -> Array:
+        """Place in the scene where the map shows a design [L]."""
+        assert self.map is not None
+        right, up = self.map.place_of(**at)
+        return _CENTER + _SIZE * ((right - 0.5) * _RIGHT + (up - 0.5) * _UP)
+
+    @property
+    def corners(self) -> Array:
+        """Corners of the board in the scene [L], shape (4, 3)."""
+        ends = (-_SIZE / 2, _SIZE / 2)
+        return np.array([_CENTER + right * _RIGHT + up * _UP for right in ends for up in ends])
+
+    def _mark(self, design: Manipulator) -> None:
+        self._scene.remove("/atlas/here")
+        at = None if self.map is None else self.map.values_of(design)
+        if at is not None:
+            self._scene.draw_mark("/atlas/here", self.place_of(**at))
+
+
+def board_of(scene: Scene, atlas: xr.Dataset | None) -> MapBoard | None:
+    """A board, if there is an atlas that a map can be drawn of."""
+    if atlas is None or len(atlas["status"].dims) < 2:
+        return None
+    return MapBoard(scene, atlas)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from softreach.plot.coloring import UNSTABLE
 from softreach.rod.tip_map import TipStatus
-from softreach.studio.colors import FAINT, UNSTABLE
 from softreach.studio.markup import Part, Strong, Swatch, Term
+from softreach.studio.scene.clouds import FAINT
 
 if TYPE_CHECKING:
     from softreach.studio.reach import Reach, Size

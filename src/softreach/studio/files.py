@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 
 from softreach.export import export_cloud, export_mesh
 from softreach.rod.kinematics import configuration
-from softreach.studio.colors import sample_values
 from softreach.studio.reach import Reach, cloud_points, shown_samples
-from softreach.studio.rod import design_of_text
-from softreach.studio.slicing import in_slice
-from softreach.studio.state import Appearance, StudioState
+from softreach.studio.scene.clouds import in_slice, sample_values
+from softreach.studio.state import Appearance, StudioState, design_of_text
 from softreach.support.errors import InvalidInput
 from softreach.workspace import ReachableSolid, ReachableSurface, Surface
 

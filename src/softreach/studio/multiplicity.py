@@ -1,4 +1,4 @@
-"""How many activations reach a place, as the inverse finds them.
+"""Multiplicity: the number of activations that reach a place, as the inverse finds them.
 
 The grid of the exact set counts as well, but not near its folds, which in a folded set is where
 half of the samples are.
@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.studio.reach import Reach
-from softreach.studio.rod import solvable_rod
-from softreach.studio.worker import StaleCheck, all_cores
+from softreach.studio.state import solvable_rod
+from softreach.studio.work import StaleCheck, all_cores
 from softreach.support import parallel
 from softreach.support.progress import Progress, silent
 from softreach.workspace import ReachableSolid
@@ -37,9 +37,9 @@ def count_activations(
     check: StaleCheck = lambda: None,
     progress: Progress = silent,
 ) -> NDArray[np.float64]:
-    """How many stable activations put the tip where that of each sample is, shape (n,).
+    """Number of stable activations that put the tip where that of each sample is, shape (n,).
 
-    What is found is kept with the reach, also if `check` raises.
+    Counts are kept with the reach, also if `check` raises.
 
     Args:
         reach: Of an arm with three free bundles.
@@ -50,14 +50,14 @@ def count_activations(
     if _reached_once(reach):
         return np.ones(len(rows))
     missing = uncounted(reach, rows)
-    for block, found in _counted(reach, reach.cloud.tip.values[missing], check):
-        reach.counts[missing[block]] = found
-        progress(len(found))
+    for block, counts_there in _counted(reach, reach.cloud.tip.values[missing], check):
+        reach.counts[missing[block]] = counts_there
+        progress(len(counts_there))
     return reach.counts[rows]
 
 
 def counts_at(reach: Reach, targets: Array, check: StaleCheck = lambda: None) -> NDArray[np.int64]:
-    """How many stable activations put the tip at each target [m], shape (t,).
+    """Number of stable activations that put the tip at each target [m], shape (t,).
 
     Args:
         reach: Of an arm with three free bundles.
@@ -66,8 +66,8 @@ def counts_at(reach: Reach, targets: Array, check: StaleCheck = lambda: None) ->
     """
     counts = np.ones(len(targets), np.int64)
     if not _reached_once(reach):
-        for block, found in _counted(reach, targets, check):
-            counts[block] = found
+        for block, counts_there in _counted(reach, targets, check):
+            counts[block] = counts_there
     return counts
 
 
@@ -79,11 +79,11 @@ def _reached_once(reach: Reach) -> bool:
 def _counted(
     reach: Reach, targets: Array, check: StaleCheck
 ) -> Iterator[tuple[slice, NDArray[np.int64]]]:
-    """Blocks of the targets with what was found there."""
+    """Blocks of the targets with their counts."""
     from softreach.inverse import solve_inverse
 
     for block in parallel.blocks(len(targets), _BLOCK):
         check()
         with all_cores:
-            found = solve_inverse(solvable_rod(reach.arm), targets[block]).counts
-        yield block, found
+            counts = solve_inverse(solvable_rod(reach.arm), targets[block]).counts
+        yield block, counts

@@ -4,25 +4,28 @@ from __future__ import annotations
 
 import base64
 import io
-from typing import TYPE_CHECKING
+import textwrap
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.studio import markup
 from softreach.studio.captions import legend_text, reach_text
-from softreach.studio.colors import key_html
-from softreach.studio.eye import lens
-from softreach.studio.head import headed
 from softreach.studio.reach import Reach
-from softreach.studio.scene import Scene
-from softreach.studio.server import start_server, stop_server
+from softreach.studio.scene.camera import lens
+from softreach.studio.scene.clouds import key_html
+from softreach.studio.scene.scene import Scene
+from softreach.studio.serve.server import start_server, stop_server
+from softreach.studio.serve.viser_fixes import headed
+from softreach.studio.shown_parameters import slider_parameters
 from softreach.studio.state import Camera, StudioState
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from viser import ViserServer
 
-__all__ = ["static_page"]
+    from softreach.plot.coloring import BundleKey, ScalarKey
 
 _MOST = 17  # level: a page of some 2 MB
 _BOX = (
@@ -50,14 +53,14 @@ def static_page(state: StudioState, reach: Reach, picture: NDArray[np.uint8] | N
     finally:
         stop_server(server)
     end = page.rindex("</body>")
-    return page[:end] + _caption(state, reach, key + _image(picture)) + page[end:]
+    return page[:end] + _html_caption(state, reach, key + _html_image(picture)) + page[end:]
 
 
 def _place(server: ViserServer, camera: Camera, *, orthographic: bool) -> None:
-    found, place = lens(camera, orthographic=orthographic)
+    chosen, place = lens(camera, orthographic=orthographic)
     first = server.initial_camera
     first.position, first.look_at = place.position, place.look_at
-    first.fov, first.near, first.far = found.fov, found.near, found.far
+    first.fov, first.near, first.far = chosen.fov, chosen.near, chosen.far
 
 
 def _draw(scene: Scene, state: StudioState, reach: Reach) -> str:
@@ -69,14 +72,14 @@ def _draw(scene: Scene, state: StudioState, reach: Reach) -> str:
     return key_html(scene.draw_cloud(reach, look))
 
 
-def _caption(state: StudioState, reach: Reach, key: str) -> str:
+def _html_caption(state: StudioState, reach: Reach, key: str) -> str:
     numbers, file = markup.inline(*reach_text(reach)), markup.inline(state.design.to_toml())
     design = f"<details><summary>design</summary><pre>{file}</pre></details>"
     marks = markup.paragraph(*legend_text(reach, free=False))
     return f'<div style="{_BOX}">{numbers}{key}{marks}{design}</div>'
 
 
-def _image(picture: NDArray[np.uint8] | None) -> str:
+def _html_image(picture: NDArray[np.uint8] | None) -> str:
     """The picture inside the page itself."""
     if picture is None:
         return ""
@@ -87,3 +90,86 @@ def _image(picture: NDArray[np.uint8] | None) -> str:
     data = base64.b64encode(file.getvalue()).decode()
     shown = f'<img alt="map" style="width:20em" src="data:image/png;base64,{data}">'
     return f"<details><summary>atlas</summary>{shown}</details>"
+
+
+# What a tab shows as a picture that explains itself: key, numbers and design under the scene.
+
+
+_DPI = 100.0
+_KEY, _LINE, _EDGE = 46, 17, 14  # pixels: height of the key and of a line of text, margin
+_CHARACTER = 6.4  # pixels
+_INK = {False: ("white", "#222"), True: ("#141414", "#ddd")}
+
+
+def picture_file(
+    scene: NDArray[np.uint8], state: StudioState, reach: Reach, key: BundleKey | ScalarKey | None
+) -> bytes:
+    """The picture as PNG.
+
+    Args:
+        scene: What the canvas shows, RGBA on a transparent ground.
+        state: What it shows.
+        reach: Of its design.
+        key: To its colors.
+    """
+    from matplotlib.figure import Figure
+
+    height, width = scene.shape[:2]
+    lines = _wrapped(_caption(state, reach), width)
+    below = 2 * _EDGE + _LINE * len(lines) + (_KEY if key is not None else 0)
+    total = height + below
+    paper, ink = _INK[state.appearance.dark]
+    figure = Figure(figsize=(width / _DPI, total / _DPI), dpi=_DPI, facecolor=paper)
+    figure.figimage(scene, 0, below)
+    if key is not None and state.appearance.cloud:
+        _draw_key(figure, key, (1 - (height + 0.35 * _KEY) / total, _KEY / total), ink)
+    for k, line in enumerate(reversed(lines)):
+        at = (_EDGE + k * _LINE) / total
+        figure.text(_EDGE / width, at, line, fontsize=8.5, color=ink, va="bottom")
+    file = io.BytesIO()
+    figure.savefig(file, format="png", dpi=_DPI, facecolor=paper)
+    return file.getvalue()
+
+
+def design_text(state: StudioState) -> str:
+    """The parameters of a design, as its sliders name them, and how hard each bundle pulls."""
+    values = ", ".join(f"{c.label} {c.shown:g}" for c in slider_parameters(state.design))
+    pulls = ", ".join(f"{value:.3g}" for value in state.activation)
+    return f"{values}; L = {state.design.length:g} m. Activation ({pulls})."
+
+
+def _caption(state: StudioState, reach: Reach) -> list[str]:
+    numbers = "".join(part for part in reach_text(reach) if isinstance(part, str))
+    marks = "".join(part for part in legend_text(reach, free=False) if isinstance(part, str))
+    return [numbers, *([marks.strip()] if marks else []), design_text(state)]
+
+
+def _wrapped(paragraphs: list[str], width: int) -> list[str]:
+    room = max(20, int((width - 2 * _EDGE) / _CHARACTER))
+    return [line for text in paragraphs for line in textwrap.wrap(text, room)]
+
+
+def _draw_key(
+    figure: Figure, key: BundleKey | ScalarKey, place: tuple[float, float], ink: str
+) -> None:
+    """A legend, or a color bar over half of the width, below the scene."""
+    from matplotlib.patches import Patch
+
+    from softreach.plot.coloring import BundleKey, color_map
+
+    top, height = place
+    if isinstance(key, BundleKey):
+        patches: list[Any] = [
+            Patch(facecolor=tuple(rgb / 255), label=label)
+            for label, rgb in zip(key.labels, key.colors, strict=True)
+        ]
+        figure.legend(
+            handles=patches, loc="center", bbox_to_anchor=(0.5, top), ncols=len(patches),
+            fontsize=8.5, frameon=False, labelcolor=ink,
+        )  # fmt: skip
+        return
+    bar = figure.add_axes((0.25, top, 0.5, 0.22 * height))
+    extend = "both" if key.clipped else "neither"
+    figure.colorbar(color_map(key), cax=bar, orientation="horizontal", extend=extend)
+    bar.tick_params(labelsize=8, colors=ink)
+    bar.set_title(key.label, fontsize=8.5, color=ink, pad=3)

@@ -1,9 +1,10 @@
-"""What a design can reach, coarse first and then fine."""
+"""Reach of a design: its cloud and its exact set, coarse first and then fine, within a budget."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -11,35 +12,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
+from softreach.cloud.clouds import compute_cloud, design_of
 from softreach.cloud.volume import concave_hull
-from softreach.rod.tip_map import TipStatus
-from softreach.studio.budget import memory_share
-from softreach.studio.effort import level_in_memory
-from softreach.studio.rod import TOL
-from softreach.studio.worker import all_cores
-from softreach.support.errors import no_warnings
+from softreach.rod.tip_map import TipMap, TipStatus
+from softreach.studio.state import TOL, solvable_rod
+from softreach.studio.work import (
+    Budget,
+    OverBudget,
+    StaleCheck,
+    affordable_level,
+    all_cores,
+    level_in_memory,
+    memory_share,
+)
+from softreach.support.errors import InvalidInput, no_warnings
 from softreach.workspace import (
     ReachableCurve,
     ReachableSet,
     ReachableSolid,
     ReachableSurface,
+    reachable_set,
 )
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from softreach.geometry.hull import Hull
-
-__all__ = [
-    "Quality",
-    "Reach",
-    "Size",
-    "beside",
-    "cloud_points",
-    "shown_rows",
-    "shown_samples",
-    "unstable_samples",
-]
 
 _ALPHA_NUMBERS = 128
 """A point of an α-shape takes about as much memory as a sample of so many activations."""
@@ -49,7 +47,7 @@ Rows = slice | NDArray[np.int64]
 
 @dataclass(frozen=True, kw_only=True)
 class Quality:
-    """How much is computed before the first picture, and after it."""
+    """Sizes and accuracies before the first picture, and after it."""
 
     coarse_level: int = 16
     fine_level: int = 19
@@ -59,14 +57,14 @@ class Quality:
     tol: float = TOL
     """Largest tip error, in L."""
     coarse_seconds: float = 0.25
-    """What the first cloud of a loaded arm may take; it has fewer points if they cost more."""
+    """Time for the first cloud of a loaded arm; it has fewer points if they cost more."""
     fine_seconds: float = 5.0
     most_seconds: float = 30.0
-    """What an exact set may take before the studio does without it."""
+    """Time for an exact set, before the studio does without it."""
 
 
 class Size(NamedTuple):
-    """How large a reachable set is, in L."""
+    """Size of a reachable set, in L."""
 
     name: str
     value: float
@@ -85,11 +83,11 @@ class Reach:
     """None while it is not known, and where there is none."""
     fine: bool
     refusal: str = ""
-    """Why there is no exact set."""
+    """Reason why there is no exact set."""
     notes: tuple[str, ...] = ()
-    """What was left out or is coarser than asked, and why."""
+    """Parts that are left out or coarser than wanted, and why."""
     wanted: int = 0
-    """Samples that were asked for; there are fewer where each costs much."""
+    """Number of samples wanted; there are fewer where each costs much."""
     order: NDArray[np.int64] | None = field(default=None, repr=False)
     """An order whose prefixes are even subsamples, where the cloud's own is not."""
 
@@ -106,19 +104,19 @@ class Reach:
     @property
     def size(self) -> Size | None:
         """Volume, area or length of what can be reached; None while it is not known."""
-        length, found = self.arm.length, self.exact
-        match found:
+        length, exact = self.arm.length, self.exact
+        match exact:
             case None:
                 return None
             case ReachableSolid():
                 return Size(
-                    "volume", found.volume / length**3, found.volume_error / length**3, "L³"
+                    "volume", exact.volume / length**3, exact.volume_error / length**3, "L³"
                 )
             case ReachableSurface():
-                return Size("area", found.area / length**2, found.area_error / length**2, "L²")
+                return Size("area", exact.area / length**2, exact.area_error / length**2, "L²")
             case ReachableCurve():
-                error = found.curve_length_error / length
-                return Size("length", found.curve_length / length, error, "L")
+                error = exact.curve_length_error / length
+                return Size("length", exact.curve_length / length, error, "L")
             case _:
                 return Size("point", 0.0, 0.0, "")
 
@@ -137,7 +135,7 @@ class Reach:
 
     @cached_property
     def counts(self) -> NDArray[np.float64]:
-        """How many activations reach the place of each sample, as far as that is known, else NaN.
+        """Number of activations that reach the place of each sample; NaN where it is not known.
 
         Filled by `studio.multiplicity`.
         """
@@ -149,7 +147,7 @@ class Reach:
         return float(getattr(self.exact, "lost_share", 0.0))  # only sets of loaded arms lose any
 
     def share(self, status: TipStatus) -> float:
-        """How many of the samples have a status [-]."""
+        """Share of the samples that have a status [-]."""
         return float((self.status == status).mean())
 
     @cached_property
@@ -161,13 +159,13 @@ class Reach:
 
     @property
     def alpha_volume(self) -> float | None:
-        """Volume of the α-shape [L³], if it has been asked for; nothing is computed."""
+        """Volume of the α-shape [L³], if it is known; nothing is computed."""
         hull: Hull | None = vars(self).get("alpha_shape")
         return None if hull is None else hull.volume / self.arm.length**3
 
 
 def shown_samples(reach: Reach, level: int) -> Rows:
-    """Which samples a picture of 2^level points shows: those that have a tip."""
+    """Samples that a picture of 2^level points shows: those that have a tip."""
     first = slice(0, min(1 << level, reach.samples))
     rows = first if reach.order is None else reach.order[first]
     settled = reach.status[rows] != TipStatus.NO_EQUILIBRIUM
@@ -180,7 +178,7 @@ def shown_rows(reach: Reach, level: int) -> NDArray[np.int64]:
 
 
 def unstable_samples(reach: Reach, level: int) -> NDArray[np.bool_]:
-    """Which of the samples that are shown are unstable."""
+    """Mask of the unstable ones among the samples that are shown."""
     return reach.status[shown_samples(reach, level)] == TipStatus.UNSTABLE
 
 
@@ -190,6 +188,172 @@ def cloud_points(reach: Reach, level: int) -> NDArray[np.float64]:
 
 
 def beside(reach: Reach) -> NDArray[np.float64]:
-    """How far a cloud stands beside another of about its size [L], shape (3,)."""
+    """Offset of a cloud beside another of about its size [L], shape (3,)."""
     across = cloud_points(reach, 14)[:, 0]
     return np.array([1.3 * float(np.ptp(across)) if len(across) else 0.0, 0.0, 0.0])
+
+
+# What a design can reach, coarse first and then fine, within a budget of time and memory.
+
+
+Report = Callable[[str], None]
+"""Told what is being computed, and how far it is."""
+
+
+def _silent(doing: str) -> None:
+    del doing
+
+
+def stages(
+    arm: Manipulator,
+    level: int,
+    quality: Quality,
+    check: StaleCheck,
+    report: Report = _silent,
+) -> Iterator[Reach]:
+    """The reach of a design, coarse and then fine; waits for its turn where all cores are used.
+
+    Args:
+        arm: The design.
+        level: The fine cloud has at least 2^level points, where there is time and memory for them.
+        quality: How much is computed in each stage, and how long it may take.
+        check: Called all the time; raises to stop.
+        report: Told what is being computed.
+
+    Raises:
+        InvalidInput: Loads that cannot be computed.
+    """
+    work = _Work(arm, solvable_rod(arm), quality, check, report)
+    if arm.loads is not None or work.rod.box.dimension > 3:
+        yield from _slow_stages(work, level)
+        return
+    fine = max(level, quality.fine_level)
+    sizes = (quality.coarse_level, quality.coarse_accuracy), (fine, quality.fine_accuracy)
+    reach = None
+    for stage, (points, accuracy) in enumerate(sizes):
+        check()
+        with all_cores:
+            reach = work.cloud(points, stage == 1, reach)
+            reach = work.measured(reach, accuracy)
+        yield reach
+
+
+def _slow_stages(work: _Work, level: int) -> Iterator[Reach]:
+    """First a cloud alone, as large as there is time for; the exact set takes much longer."""
+    work.check()
+    quality = work.quality
+    points = affordable_level(work.rod, quality.coarse_seconds, min(level, quality.coarse_level))
+    with all_cores:
+        first = replace(work.cloud(points, False), wanted=1 << level)
+    yield first
+    work.check()
+    with all_cores:
+        first = work.measured(first, quality.coarse_accuracy)
+    yield first
+    work.check()
+    points = affordable_level(work.rod, quality.fine_seconds, level)
+    with all_cores:
+        fine = replace(work.cloud(points, True, first), wanted=1 << level)
+        if fine.samples < fine.wanted:
+            note = f"fewer samples than asked: {fine.wanted:,} would take too long"
+            fine = replace(fine, notes=(*fine.notes, note))
+        if not first.refusal:
+            fine = work.measured(fine, quality.fine_accuracy)
+    yield fine  # outside of the turn: whoever draws it may take one
+
+
+class _Work(NamedTuple):
+    """One design, and whoever waits for what it can reach."""
+
+    arm: Manipulator
+    rod: TipMap
+    quality: Quality
+    check: StaleCheck
+    report: Report
+
+    def cloud(self, level: int, fine: bool, known: Reach | None = None) -> Reach:
+        """A cloud of 2^level points, or of as many as memory holds, with what is known besides."""
+        budget = self._budget(f"computing the cloud of {1 << level:,} points", 1 << level)
+        fitting = level_in_memory(self.rod.box.bundles, budget.memory, level)
+        short = f"{1 << fitting:,} of {1 << level:,} samples: more do not fit into the free memory"
+        tol = self.quality.tol
+        cloud = compute_cloud(self.arm, 1 << fitting, 0, "sobol", tol=tol, progress=budget)
+        return Reach(
+            arm=self.arm,
+            cloud=cloud,
+            exact=known and known.exact,
+            refusal=known.refusal if known else "",
+            fine=fine,
+            notes=(short,) if fitting < level else (),
+            wanted=1 << level,
+        )
+
+    def measured(self, reach: Reach, accuracy: float) -> Reach:
+        """With its exact set, or with why there is none, or none as accurate as wanted."""
+        budget = self._budget(f"computing the exact set to {100 * accuracy:g} %")
+        try:
+            exact = _exact(reach.arm, accuracy, self.quality.tol, budget)
+        except InvalidInput as error:
+            if error.name == "memory":  # so many bundles that no search fits
+                return _without(reach, accuracy, MemoryError())
+            return replace(reach, exact=None, refusal=str(error))  # never at rest
+        except (OverBudget, MemoryError) as error:
+            return _without(reach, accuracy, error)
+        return replace(reach, exact=exact, refusal="")
+
+    def _budget(self, doing: str, total: int = 0) -> Budget:
+        def report(done: int) -> None:
+            part = f", {100 * done // total} %" if total else f", {done:,} cells"
+            self.report(doing + part if done else doing)
+
+        return Budget(self.check, self.quality.most_seconds, report)
+
+
+def _without(reach: Reach, accuracy: float, error: Exception) -> Reach:
+    """Reach with the exact set known before, and with the reason why no more is."""
+    needed = f"needs {error}" if isinstance(error, OverBudget) else "needs more memory than is free"
+    if reach.exact is None:
+        return replace(reach, refusal=f"to {100 * accuracy:g} % it {needed}")
+    note = f"exact set coarser than asked: to {100 * accuracy:g} % it {needed}"
+    return replace(reach, notes=(*reach.notes, note))
+
+
+def reached(cloud: xr.Dataset, quality: Quality) -> Reach:
+    """The reach that belongs to a cloud from a file."""
+    ordered = cloud.attrs.get("sampler") in ("uniform", "sobol")
+    shuffled = None if ordered else np.random.default_rng(0).permutation(cloud.sizes["sample"])
+    reach = Reach(arm=design_of(cloud), cloud=cloud, exact=None, fine=True, order=shuffled)
+    work = _Work(reach.arm, solvable_rod(reach.arm), quality, lambda: None, _silent)
+    with all_cores:
+        return work.measured(reach, quality.fine_accuracy)
+
+
+def exact_set(
+    arm: Manipulator, accuracy: float, tol: float, check: StaleCheck, seconds: float
+) -> ReachableSet:
+    """The exact set alone.
+
+    Args:
+        arm: The design.
+        accuracy: Relative error allowed in the volume.
+        tol: Largest tip error, in L.
+        check: Called all the time; raises to stop.
+        seconds: What it may take [s].
+
+    Raises:
+        InvalidInput: Some activation never comes to rest.
+        OverBudget: It takes more time or memory.
+    """
+    return _exact(arm, accuracy, tol, Budget(check, seconds))
+
+
+def _exact(arm: Manipulator, accuracy: float, tol: float, budget: Budget) -> ReachableSet:
+    many = solvable_rod(arm).box.dimension > 3
+    with no_warnings():  # the error is shown beside the volume
+        return reachable_set(
+            arm,
+            accuracy=accuracy,
+            tol=tol,
+            memory=budget.memory if many else None,
+            progress=budget,
+        )

@@ -1,29 +1,28 @@
-"""One browser tab: its state, what is known and drawn, and the work that follows from changes."""
+"""Session of one browser tab: its state, what is known and drawn, and its jobs."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from operator import attrgetter, is_not
+from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from softreach.rod.tip_map import TipStatus
-from softreach.studio.eye import VIEWS, Eye, framing
-from softreach.studio.history import History
-from softreach.studio.jobs import JOBS, FollowEye, Job, PullTip, SolveInverse, what_follows
-from softreach.studio.jobs.pull import PullOrder, TipPull
-from softreach.studio.kept_work import KeptWork
-from softreach.studio.map_board import MapBoard, board_of
+from softreach.studio.atlas_map import MapBoard, board_of
 from softreach.studio.plots.plot import Figures
-from softreach.studio.reach import Reach
-from softreach.studio.scene import Scene
+from softreach.studio.reach import Reach, cloud_points, shown_rows
+from softreach.studio.scene.camera import VIEWS, TabCamera, framing, picked_point
+from softreach.studio.scene.clouds import in_slice
+from softreach.studio.scene.scene import Scene
 from softreach.studio.snapshots import Snapshots
-from softreach.studio.source import Start
-from softreach.studio.state import StudioState, vector
-from softreach.studio.worker import Latest
+from softreach.studio.start import KeptWork, Start
+from softreach.studio.state import History, StudioState
+from softreach.studio.work import Latest, StaleCheck
 from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:
@@ -32,30 +31,102 @@ if TYPE_CHECKING:
 
     from softreach.inverse import Solution
     from softreach.plot.coloring import BundleKey, ScalarKey
+    from softreach.studio.scene.drag import TipDrag
 
-__all__ = ["Panel", "Session"]
+__all__ = ["AskedJob", "Job", "Panel", "Session", "what_follows"]
 
 Array = NDArray[np.float64]
-_Kind = TypeVar("_Kind", bound=Job)
+_Kind = TypeVar("_Kind", bound="Job")
 
+_CLICK = 0.01  # [rad] between the ray of a click and a point that it hits, with the usual lens
 _LONGEST_NOTE = 1000  # characters: a file's own text may be in an error
 
 
 class Panel(Protocol):
-    """Widgets of one concept; they call `Session.update` and are notified of every change."""
+    """Widgets of one concept; they call `Session.update` and are notified of changes.
+
+    Those that name in `follows` attributes of the session, such as ("state.design", "reach"), are
+    notified only when one of these is another object than before.
+    """
 
     def show(self, session: Session) -> None:
         """Bring the widgets in line with the session; called from any thread, one at a time."""
         ...
 
 
+class Job(ABC):
+    """Work that follows from some part of the state; a session has one of each kind."""
+
+    depends_on: ClassVar[tuple[str, ...]] = ()
+    """Attributes of the state that decide the result, such as "appearance.arm"."""
+    only_with: ClassVar[str] = ""
+    """Attribute of the state without which there is nothing to do; "" for none."""
+
+    def __init__(self, session: Session) -> None:
+        """Work for a session, which it reads, and where it leaves its results."""
+        self.session = session
+
+    @classmethod
+    def has_use(cls, session: Session) -> bool:
+        """True for sessions that have this kind of work at all."""
+        del session
+        return True
+
+    @classmethod
+    def part_of(cls, state: StudioState) -> object:
+        """The part of a state that decides the result; None where there is nothing to do."""
+        if not cls.depends_on or (cls.only_with and not attrgetter(cls.only_with)(state)):
+            return None
+        return attrgetter(*cls.depends_on)(state)
+
+    @abstractmethod
+    def run(self, check: StaleCheck) -> None:
+        """Do the work for the state of the session as it is now, on a thread of its own.
+
+        Args:
+            check: To be called between stages; raises if the work is no longer wanted.
+        """
+
+
+class AskedJob(Job):
+    """Work that no state asks for, but a person who presses a button."""
+
+    wanted = False
+    """True if somebody pressed it since the work was last done."""
+
+    def ask(self) -> None:
+        """Do the work as soon as possible."""
+        self.wanted = True
+        self.session.follow(type(self))
+
+    def run(self, check: StaleCheck) -> None:
+        """Do the work once for each time that it was ordered."""
+        wanted, self.wanted = self.wanted, False
+        if wanted:
+            self.do(check)
+
+    @abstractmethod
+    def do(self, check: StaleCheck) -> None:
+        """Do the work; as `run`."""
+
+
+def what_follows(
+    kinds: Iterable[type[Job]], old: StudioState | None, new: StudioState
+) -> frozenset[type[Job]]:
+    """The jobs whose results a change makes stale; all of them if there was nothing before."""
+    if old is None:
+        return frozenset(kinds)
+    return frozenset(kind for kind in kinds if kind.part_of(old) != kind.part_of(new))
+
+
 class Session:
-    """Holds the state of a tab; everything heavy happens in its jobs, on threads of their own."""
+    """State of a tab and what is known of it; jobs do what is heavy, on threads of their own."""
 
     def __init__(
         self,
         client: ClientHandle,
         start: Start,
+        jobs: Iterable[type[Job]] = (),
         *,
         work: KeptWork | None = None,
         snapshots: Snapshots | None = None,
@@ -65,61 +136,65 @@ class Session:
         Args:
             client: The tab.
             start: What it begins with.
+            jobs: Kinds of work that follow from its state.
             work: Where its state is kept, if anywhere.
             snapshots: Those of all tabs.
         """
         self.client, self.quality = client, start.quality
-        self.eye, self.scene = Eye(client), Scene(client.scene)
+        self.camera, self.scene = TabCamera(client), Scene(client.scene)
         self.start, self.work = start, work
         self.snapshots = snapshots or Snapshots()
         self.history = History()
         self.is_touched = False
-        """Whether there is anything to keep."""
+        """True once there is anything to keep."""
         self.state: StudioState = start.state
         self.panels: list[Panel] = []
+        self._shown: dict[Panel, list[object]] = {}
+        """Values that each panel follows, as it was notified of them last."""
         self.note = ""
         """Text for the reader."""
         self.revision = 0
         """Number of changes that widgets have to follow."""
         self.reach: Reach | None = start.reach
-        """What the design can reach, or the design before it until that is known."""
+        """Reach of the design, or of the design before it until that is known."""
         self.refusal = ""
-        """Why nothing can be computed of the design."""
+        """Reason why nothing can be computed of the design."""
         self.canceled = False
-        """Whether the reader stopped what was being computed of this state."""
+        """True if the reader stopped what was being computed of this state."""
         self.doing = ""
-        """What is being computed or written, for the reader."""
+        """Work that is being done, for the reader."""
         self.compiling = False
-        """Whether kernels are being compiled, for whichever tab."""
+        """True while kernels are being compiled, for whichever tab."""
         self.free: Reach | None = None
-        """What a loaded design would reach without its loads."""
+        """Reach of a loaded design without its loads."""
         self.reference: Reach | None = None
         self.key: BundleKey | ScalarKey | None = None
         """To the colors of the cloud."""
         self.tip: Array | None = None
-        """Where the tip is [L]; None before it is known, and without equilibrium."""
+        """Place of the tip [L]; None before it is known, and without equilibrium."""
         self.posture: TipStatus | None = None
-        """Whether a loaded arm rests in its activation; None for an arm without loads."""
+        """Equilibrium of a loaded arm in its activation; None for an arm without loads."""
         self.trail: list[Array] = []
-        """Where it has been."""
+        """Places of the tip before [L]."""
         self.answer: Solution | None = None
         """Of the inverse problem."""
-        self.tip_pull: TipPull | None = None
-        """What a drag of the tip has led to; None when nobody drags."""
+        self.drag: TipDrag | None = None
+        """Of the tip; None when nobody drags."""
+        self.is_dragged = False
+        """True while a drag of the tip is under way."""
         self.figures = Figures()
-        """What was found for the plots beside the scene."""
+        """Results of the plots beside the scene."""
         self.atlas: xr.Dataset | None = start.atlas
         self.board: MapBoard | None = board_of(self.scene, self.atlas)
         self.drawing = threading.RLock()
         """Held while nodes that several jobs draw are taken away and drawn again."""
         self._changing, self._showing = threading.RLock(), threading.RLock()
-        self._jobs = {kind: kind(self) for kind in JOBS}
-        self._workers = {kind: Latest(self.fail, self._rested) for kind in JOBS}
-        self.eye.on_move(self.look_again)
+        self._jobs = {kind: kind(self) for kind in jobs if kind.has_use(self)}
+        self._workers = {kind: Latest(self.fail, self._rested) for kind in self._jobs}
 
     def begin(self) -> None:
         """Do everything once."""
-        self.follow(*what_follows(None, self.state))
+        self._follow_change(None)
         self.show()
 
     def update(
@@ -143,53 +218,36 @@ class Session:
         """
         with self._changing:
             old, self.state, self.note = self.state, change(self.state), ""
-            new = self.state
             self._remember(old, goes_on=goes_on or by_widget)
             self.revision += not by_widget
             self.canceled = False
-            self.follow(*what_follows(old, new))
+            self._follow_change(old)
         self.show()
-
-    def aim(self, target: Array) -> None:
-        """Ask for every activation that reaches a target [m], and take the nearest to the present.
-
-        Raises:
-            SoftreachError: The target is no point.
-        """
-        self.job(SolveInverse).take_nearest = True
-        with self._changing:
-            old = self.state
-            self.state = old.replace(target=vector(target))
-            self._remember(old, goes_on=False)
-            self.follow(SolveInverse)
-        self.show()
-
-    def pull_tip(self, phase: str, wanted: Array) -> None:
-        """Follow a drag of the tip; returns at once.
-
-        Args:
-            phase: "start", "update" or "end".
-            wanted: Where the tip should be [L].
-        """
-        self.job(PullTip).order = PullOrder(wanted, rests=phase == "end")
-        self.follow(PullTip)
-        self.look_again()
-
-    @property
-    def is_dragged(self) -> bool:
-        """Whether a drag of the tip is under way."""
-        order = self.job(PullTip).order
-        return order is not None and not order.rests
 
     def restore(self, state: StudioState) -> None:
         """Take up a state that was saved, and its view."""
         self.update(lambda _: state)
         if state.camera is not None:
-            self.eye.look_from(state.camera)
+            self.camera.look_from(state.camera)
+
+    def picked_sample(self, origin: ArrayLike, direction: ArrayLike) -> int | None:
+        """Number of the sample under the cursor, of those that can be seen; None beside all.
+
+        Args:
+            origin: Of the ray through the pixel: where the camera is [L].
+            direction: Of the ray, any length.
+        """
+        reach, look = self.reach, self.state.appearance
+        if reach is None or not look.cloud or reach.arm != self.state.design:
+            return None
+        points = cloud_points(reach, look.level)
+        seen = np.flatnonzero(in_slice(points, look.slice) & ~self.scene.clouds.hidden(points))
+        hit = picked_point(points[seen], origin, direction, _CLICK * self.camera.narrowness)
+        return None if hit is None else int(shown_rows(reach, look.level)[seen[hit]])
 
     def look_from(self, view: str) -> None:
-        """See everything from one of `eye.VIEWS`."""
-        self.eye.look_from(framing(*self.scene.axes.corners, VIEWS[view], self.eye.aspect))
+        """See everything from one of `camera.VIEWS`."""
+        self.camera.look_from(framing(*self.scene.axes.corners, VIEWS[view], self.camera.aspect))
 
     def step(self, *, back: bool) -> None:
         """Undo the latest step of the work, or do again what was undone last."""
@@ -200,7 +258,7 @@ class Session:
             stays = self.state is old
             self.note = f"There is nothing to {'undo' if back else 'redo'}." if stays else ""
             self.revision += 1
-            self.follow(*what_follows(old, self.state))
+            self._follow_change(old)
         self.show()
 
     def reset(self) -> None:
@@ -214,7 +272,7 @@ class Session:
         if state.design != self.start.state.design:
             self.reach = None
         if state.camera is not None:
-            self.eye.look_from(state.camera)
+            self.camera.look_from(state.camera)
 
     def keep(self) -> None:
         """Write the state to where the next tab or server finds it."""
@@ -232,7 +290,7 @@ class Session:
 
     def state_now(self) -> StudioState:
         """The state with the camera, as it is saved."""
-        return self.state.replace(camera=self.eye.camera())
+        return self.state.replace(camera=self.camera.usual())
 
     def say(self, note: str) -> None:
         """Show text to the reader."""
@@ -243,7 +301,14 @@ class Session:
         """Notify all panels."""
         with self._showing:
             for panel in self.panels:
-                panel.show(self)
+                if self._has_news(panel):
+                    panel.show(self)
+
+    def _has_news(self, panel: Panel) -> bool:
+        names = getattr(panel, "follows", ())
+        now, before = [attrgetter(name)(self) for name in names], self._shown.get(panel)
+        self._shown[panel] = now
+        return not names or before is None or any(map(is_not, now, before))
 
     @property
     def busy(self) -> bool:
@@ -260,7 +325,7 @@ class Session:
     def resume(self) -> None:
         """Compute what is missing since it was canceled, or failed."""
         self.canceled, self.note = False, ""
-        self.follow(*what_follows(None, self.state))
+        self._follow_change(None)
         self.show()
 
     def report(self, doing: str) -> None:
@@ -283,15 +348,18 @@ class Session:
         for kind in kinds:
             self._workers[kind].submit(self._jobs[kind].run)
 
-    def look_again(self) -> None:
-        """See to it that nothing hides the arm: it has moved, or the eye."""
-        self.follow(FollowEye)
+    def refresh(self, *kinds: type[Job]) -> None:
+        """Do these jobs again, as far as the state asks for them."""
+        self.follow(*(kind for kind in kinds if kind.part_of(self.state) is not None))
+
+    def _follow_change(self, old: StudioState | None) -> None:
+        self.follow(*what_follows(self._jobs, old, self.state))
 
     def job(self, kind: type[_Kind]) -> _Kind:
         """The job of a kind."""
-        found = self._jobs[kind]
-        assert isinstance(found, kind)
-        return found
+        job = self._jobs[kind]
+        assert isinstance(job, kind)
+        return job
 
     def settle(self, timeout: float = 60.0) -> bool:
         """Wait until all that follows from the state is done; return whether it is."""
@@ -307,6 +375,7 @@ class Session:
         # viser may hold on to what belongs to a page for a while; clouds are large.
         self.reach = self.free = self.reference = self.answer = self.atlas = None
         self.panels, self.trail, self.figures = [], [], Figures()
+        self._shown.clear()
 
     def _rested(self) -> None:
         """A job has nothing left to do; if that is true of all, the reader is told."""

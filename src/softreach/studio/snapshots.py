@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol, Self
@@ -96,6 +97,7 @@ class Snapshots:
     def __init__(self, store: SnapshotStore | None = None) -> None:
         """Begin with what the store holds."""
         self._store = store
+        self._lock = threading.RLock()  # tabs take and delete them at the same time
         self.changed: Callable[[], object] = lambda: None
         """Called after every change."""
         self.all: tuple[Snapshot, ...] = () if store is None else store.snapshots()
@@ -107,23 +109,26 @@ class Snapshots:
         Raises:
             InvalidInput: The name is taken, or there are too many.
         """
-        if any(snapshot.name == one.name for one in self.all):
-            raise InvalidInput("snapshot name", snapshot.name, "another, as this one is taken")
-        if len(self.all) >= _MOST:
-            raise InvalidInput("snapshots", len(self.all), f"at most {_MOST}", "delete some")
-        self._put(snapshot)
+        with self._lock:
+            if any(snapshot.name == one.name for one in self.all):
+                raise InvalidInput("snapshot name", snapshot.name, "another, as this one is taken")
+            if len(self.all) >= _MOST:
+                raise InvalidInput("snapshots", len(self.all), f"at most {_MOST}", "delete some")
+            self._put(snapshot)
 
     def measure(self, name: str, numbers: Numbers) -> None:
         """Note the numbers of a snapshot that was taken before they were known."""
-        for one in self.all:
-            if one.name == name and one.numbers != numbers:
-                self._put(replace(one, numbers=numbers))
+        with self._lock:
+            for one in self.all:
+                if one.name == name and one.numbers != numbers:
+                    self._put(replace(one, numbers=numbers))
 
     def remove(self, name: str) -> None:
         """Forget one."""
-        if self._store is not None:
-            self._store.remove(name)
-        self._become(tuple(one for one in self.all if one.name != name))
+        with self._lock:
+            if self._store is not None:
+                self._store.remove(name)
+            self._become(tuple(one for one in self.all if one.name != name))
 
     def named(self, name: str) -> Snapshot | None:
         """The snapshot of this name."""

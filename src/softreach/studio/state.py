@@ -1,35 +1,90 @@
-"""What a tab of the studio shows, as a value."""
+"""State of a tab of the studio as a value, its tip map, and the history of states."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+import threading
+import time
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
+from functools import lru_cache
 from typing import Any, Self
 
 import numpy as np
 
+from softreach.arm.design_file import in_file_terms
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.activation_box import ActivationBox
-from softreach.studio.rod import design_of_text, rod_of
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipMap
 from softreach.studio.settings import PlotSettings, TipPath
-from softreach.studio.sight import CUTS
-from softreach.support.errors import InvalidInput, Range
+from softreach.support.errors import InvalidDesign, InvalidInput, Range
 
-__all__ = [
-    "LEVELS",
-    "Appearance",
-    "Camera",
-    "MapView",
-    "Slice",
-    "StudioState",
-    "Vector",
-    "vector",
-]
+# The rod of a design, as the studio uses it.
+
+
+TOL = 1e-5
+"""Largest tip error, in L: far below a pixel."""
+
+
+def rod_of(arm: Manipulator) -> TipMap:
+    """The tip map of a design, kept for the next call.
+
+    Raises:
+        InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
+    """
+    return tip_map(arm, TOL, warn=False)  # the page says whether samples are stable
+
+
+def design_of_text(text: str, source: str) -> Manipulator:
+    """A design that has a rod, from the text of a file; `source` is what errors call it.
+
+    Raises:
+        InvalidDesign: The arm cannot exist, or would be shortened to nothing.
+    """
+    arm = Manipulator.from_toml(text, source)
+    try:
+        return rod_of(arm).arm
+    except InvalidDesign as error:
+        raise in_file_terms(error, source) from None
+
+
+def solvable_rod(arm: Manipulator) -> TipMap:
+    """The tip map of a design whose loads can be computed; slow the first time for a loaded arm.
+
+    Raises:
+        InvalidInput: The arm is loaded so heavily that no number of steps suffices.
+    """
+    if arm.loads is not None:
+        with _one_at_a_time:  # jobs that draw and measure the same arm would both try for long
+            solvable = _is_solvable(arm)
+        if not solvable:
+            allowed = f"such that tips can be computed to {TOL:g} L"
+            raise InvalidInput("loads", "too large", allowed, "lighten them or stiffen the arm")
+    return rod_of(arm)
+
+
+_one_at_a_time = threading.Lock()
+
+
+@lru_cache(maxsize=64)
+def _is_solvable(arm: Manipulator) -> bool:
+    try:
+        return rod_of(arm).steps > 0
+    except InvalidInput:  # which a tip map does not keep
+        return False
+
 
 VERSION = 1
 LEVELS = range(14, 22)
 """The cloud has 2^level points: in a Sobol sequence every such prefix is an even subsample."""
+
+CUTS = {
+    "window": "a window to the arm",
+    "half": "the half in front of the arm",
+    "none": "nothing",
+}
+"""Parts of a cloud that are cut away in front of the arm: name -> what the menu says."""
 
 Vector = tuple[float, float, float]
 
@@ -57,7 +112,7 @@ class Slice:
 
 @dataclass(frozen=True, kw_only=True)
 class MapView:
-    """What the map of an atlas shows; "" is the first there is."""
+    """Metric and parameters of the map of an atlas; "" is the first there is."""
 
     metric: str = ""
     right: str = ""
@@ -71,7 +126,7 @@ class MapView:
 
 @dataclass(frozen=True, kw_only=True)
 class Appearance:
-    """What is drawn and how."""
+    """Looks of a tab: what is drawn and how."""
 
     level: int = 17
     color: str = "effort"
@@ -80,13 +135,13 @@ class Appearance:
     """[L]."""
     slice: Slice = field(default_factory=Slice)
     cut: str = "window"
-    """What of the cloud is cut away in front of the arm: one of `sight.CUTS`."""
+    """Part of the cloud that is cut away in front of the arm: one of `CUTS`."""
     lit: bool = True
-    """Whether a lamp shines on the points."""
+    """A lamp shines on the points."""
     orthographic: bool = False
-    """Whether parallels stay parallel."""
+    """Parallels stay parallel."""
     dark: bool = False
-    """Whether the page is dark."""
+    """The page is dark."""
     cloud: bool = True
     arm: bool = True
     axes: bool = True
@@ -94,7 +149,7 @@ class Appearance:
     """The exact boundary of the reachable set."""
     alpha_shape: bool = False
     trail: bool = False
-    """Where the tip has been."""
+    """A line through the places where the tip has been."""
     free: bool = True
     """The cloud without loads, faint, around that of a loaded arm."""
     ghosts: bool = True
@@ -103,6 +158,11 @@ class Appearance:
     """The ball on the tip that is dragged."""
     map: MapView = field(default_factory=MapView)
     plots: PlotSettings = field(default_factory=PlotSettings)
+
+    @property
+    def surfaces(self) -> bool:
+        """Whether any surface is shown."""
+        return self.surface or self.alpha_shape
 
     def __post_init__(self) -> None:
         if self.level not in LEVELS:
@@ -115,7 +175,7 @@ class Appearance:
 
 @dataclass(frozen=True, kw_only=True)
 class Camera:
-    """Where the eye is and what it looks at [L]."""
+    """Place of a camera, and the place it looks at [L]."""
 
     position: Vector
     look_at: Vector
@@ -139,19 +199,24 @@ class StudioState:
     """Of each bundle in its unit, within the bounds; rest, or what is nearest to it, by default."""
     appearance: Appearance = field(default_factory=Appearance)
     target: Vector | None = None
-    """Where the tip should go [m]."""
+    """Place where the tip should go [m]."""
     reference: Manipulator | None = None
     """A design kept for comparison."""
     side_by_side: bool = False
     camera: Camera | None = None
     path: TipPath | None = None
-    """What the tip follows."""
+    """Path that the tip follows."""
 
     def __post_init__(self) -> None:
         if self.reference is not None:
             rod_of(self.reference)
         within = _within(rod_of(self.design).box, self.activation)
         object.__setattr__(self, "activation", within)
+
+    @property
+    def unloaded(self) -> Manipulator:
+        """The design without loads."""
+        return self.design.replace(loads=None)
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed; activations are moved into the bounds."""
@@ -197,9 +262,9 @@ def _parsed(text: str | bytes) -> dict[str, Any]:
         values = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InvalidInput("state file", str(error), allowed) from None
-    found = values.pop("softreach_studio", None) if isinstance(values, dict) else None
-    if found != VERSION:
-        raise InvalidInput("state file", f"version {found}", allowed)
+    version = values.pop("softreach_studio", None) if isinstance(values, dict) else None
+    if version != VERSION:
+        raise InvalidInput("state file", f"version {version}", allowed)
     return values
 
 
@@ -234,10 +299,10 @@ def _check_number(name: str, value: object, low: float, high: float) -> None:
 def _check_plain(name: str, value: Appearance | MapView) -> None:
     """Texts are texts and switches are switches, in a state that came from elsewhere too."""
     for one in fields(value):
-        held = getattr(value, one.name)
+        content = getattr(value, one.name)
         kind = {"bool": bool, "str": str}.get(str(one.type))
-        if kind is not None and not isinstance(held, kind):
-            raise InvalidInput(f"{name}.{one.name}", held, f"a {kind.__name__}")
+        if kind is not None and not isinstance(content, kind):
+            raise InvalidInput(f"{name}.{one.name}", content, f"a {kind.__name__}")
 
 
 def _within(box: ActivationBox, activation: Sequence[float]) -> tuple[float, ...]:
@@ -248,3 +313,85 @@ def _within(box: ActivationBox, activation: Sequence[float]) -> tuple[float, ...
     if not np.isfinite(wanted).all():
         raise InvalidInput("activation", tuple(activation), "finite numbers")
     return tuple(box.clip(wanted).tolist())
+
+
+# What was designed and posed before, and what was undone: values, so that going back is exact.
+#
+# How things look is no part of it: whoever goes back to an earlier design keeps the view.
+
+
+_LONGEST = 200  # steps back
+_PAUSE = 1.5  # [s] without changes of the same kind, after which the next is another step
+_SETTINGS = ("design", "reference", "side_by_side")
+_POSE = ("activation", "target")
+
+
+@dataclass(frozen=True, kw_only=True)
+class History:
+    """States to go back and forth to; a change makes a new history."""
+
+    past: tuple[StudioState, ...] = ()
+    """The latest last."""
+    future: tuple[StudioState, ...] = ()
+    """The next last."""
+    kind: str = ""
+    """Of the latest change; "" after a step back or forth."""
+    at: float = field(default=0.0, compare=False)
+    """When that was [s]."""
+
+    def after(
+        self,
+        old: StudioState,
+        new: StudioState,
+        *,
+        goes_on: bool,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> History:
+        """The history after a change.
+
+        Args:
+            old: Before the change.
+            new: After it. If only the view differs, the history stays.
+            goes_on: Whether it may be part of the step before, as while a slider is dragged: it is
+                if that was of the same kind, and a moment ago.
+            clock: The time [s].
+        """
+        kind = _kind(old, new)
+        if not kind:
+            return self
+        now = clock()
+        same = goes_on and kind == self.kind and now - self.at < _PAUSE
+        past = self.past if same else (*self.past, old)[-_LONGEST:]
+        return History(past=past, kind=kind, at=now)
+
+    def at_rest(self) -> History:
+        """The same, of which the latest step is over: the next change is another."""
+        return replace(self, kind="")
+
+    def back(self, present: StudioState) -> tuple[History, StudioState]:
+        """The state before the latest step, seen as now; the present one if there was none."""
+        if not self.past:
+            return self, present
+        *past, last = self.past
+        future = (*self.future, present)
+        return History(past=tuple(past), future=future), _seen_as(present, last)
+
+    def forth(self, present: StudioState) -> tuple[History, StudioState]:
+        """The state that was undone last, seen as now; the present one if there is none."""
+        if not self.future:
+            return self, present
+        *future, following = self.future
+        past = (*self.past, present)
+        return History(past=past, future=tuple(future)), _seen_as(present, following)
+
+
+def _seen_as(view: StudioState, state: StudioState) -> StudioState:
+    return replace(state, appearance=view.appearance, camera=view.camera)
+
+
+def _kind(old: StudioState, new: StudioState) -> str:
+    """Kind of a change; "" if nothing but the view differs."""
+    settings = [name for name in _SETTINGS if getattr(old, name) != getattr(new, name)]
+    if settings:  # activations may have been moved into other bounds
+        return " ".join(settings)
+    return "pose" if any(getattr(old, name) != getattr(new, name) for name in _POSE) else ""

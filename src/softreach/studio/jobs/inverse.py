@@ -1,38 +1,48 @@
-"""Finds and draws every activation that reaches the target."""
+"""Jobs of the inverse problem: the activations that reach a target, and a tip that is dragged."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from softreach.studio.jobs.job import Job
+from softreach.inverse.drag import Drag, Dragged
 from softreach.studio.jobs.plots import plots_from
-from softreach.studio.rod import solvable_rod
-from softreach.studio.state import StudioState, Vector
-from softreach.studio.worker import StaleCheck
+from softreach.studio.scene.drag import TipDrag
+from softreach.studio.session import Job
+from softreach.studio.state import StudioState, Vector, solvable_rod, vector
+from softreach.studio.work import StaleCheck
+from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     from softreach.inverse import Solution
 
-__all__ = ["SolveInverse"]
-
 _FAMILY = 6  # shapes offered where infinitely many reach the target
+_DECIMALS = 5  # of the place where a drag rests [L]: a hundredth of a pixel, and can be read
 
 
 class SolveInverse(Job):
     """The activations that reach the target, and their shapes."""
 
-    take_nearest = False
-    """Whether the arm moves to the nearest of them, as after a click or a typed target."""
+    depends_on = "design", "target", "appearance.ghosts"
+    only_with = "target"
 
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """The design, the target, and whether all shapes are shown."""
-        return state.design, state.target, state.appearance.ghosts
+    take_nearest = False
+    """True if the arm moves to the nearest of them, as after a click or a typed target."""
+
+    def aim(self, target: NDArray[np.float64]) -> None:
+        """Find every activation that reaches a target [m], and take the nearest to the present.
+
+        Raises:
+            SoftreachError: The target is no point.
+        """
+        self.take_nearest = True
+        self.session.update(lambda state: state.replace(target=vector(target)))
+        self.session.follow(SolveInverse)  # also where the target is the one before
 
     def run(self, check: StaleCheck) -> None:
-        """Solve, draw, and move the arm if it was asked to."""
+        """Solve, draw, and move the arm if that was ordered."""
         check()
         state = self.session.state
         self.session.answer = None
@@ -41,7 +51,7 @@ class SolveInverse(Job):
         check()
         self._draw(state.design.length)
         self._move()
-        self.session.follow(*plots_from("answer"))
+        self.session.refresh(*plots_from("answer"))
         self.session.show()
 
     def _draw(self, length: float) -> None:
@@ -50,14 +60,14 @@ class SolveInverse(Job):
         if answer is None:
             session.scene.draw_target(None)
             return
-        out_of_reach = None if len(answer) else answer.nearest / length
-        session.scene.draw_target(answer.target / length, out_of_reach)
+        nearest = None if len(answer) else answer.nearest / length
+        session.scene.draw_target(answer.target / length, nearest)
         if session.state.appearance.ghosts:
             shapes = answer.activations if len(answer) else answer.nearest_activation[None]
             session.scene.draw_ghosts(session.state.design, shapes)
 
     def _move(self) -> None:
-        """Move the arm to the solution nearest to where it is, once after it was asked for."""
+        """Move the arm to the solution nearest to where it is, once after it was ordered."""
         wanted, self.take_nearest = self.take_nearest, False
         answer = self.session.answer
         if wanted and answer is not None and len(answer):
@@ -74,3 +84,67 @@ def _solution(state: StudioState, target: Vector) -> Solution:
     solvable_rod(state.design)
     near = state.activation if len(state.activation) > 3 else None
     return solve_inverse(state.design, [target], near=near, family=_FAMILY)[0]
+
+
+class _Order(NamedTuple):
+    """Order of a drag."""
+
+    wanted: NDArray[np.float64]
+    """Place for the tip [L]."""
+    rests: bool
+    """True once the drag has ended there."""
+
+
+class DragTip(Job):
+    """The arm follows its dragged tip on its branch; where that rests, every branch is looked for.
+
+    Of the places that a drag passes, only the latest is followed.
+    """
+
+    _order: _Order | None = None
+    """The latest; None when nobody drags."""
+    _drag: Drag | None = None
+
+    def order(self, phase: str, wanted: NDArray[np.float64]) -> None:
+        """Follow a drag of the tip; returns at once.
+
+        Args:
+            phase: "start", "update" or "end".
+            wanted: Where the tip should be [L].
+        """
+        self._order = _Order(wanted, rests=phase == "end")
+        self.session.is_dragged = phase != "end"
+        self.session.follow(DragTip)
+
+    def run(self, check: StaleCheck) -> None:
+        """Drag the tip to where it is wanted by now."""
+        check()
+        session, state, order = self.session, self.session.state, self._order
+        if order is None:
+            return
+        wanted, rests = order
+        if rests:
+            wanted = np.round(wanted, _DECIMALS)
+        target = wanted * state.design.length
+        dragged = self._drag_of(state).to(state.activation, target)
+        if dragged is not None:
+            session.drag = None if rests else TipDrag(wanted, dragged)
+            rest = vector(target) if rests else None
+            session.update(lambda s: _moved(s, state, dragged, rest), goes_on=True)
+        if rests:
+            session.end_step()
+            self._order = None if self._order is order else self._order
+
+    def _drag_of(self, state: StudioState) -> Drag:
+        solvable_rod(state.design)
+        if self._drag is None or self._drag.arm != state.design:
+            self._drag = Drag(state.design)
+        return self._drag
+
+
+def _moved(
+    now: StudioState, then: StudioState, dragged: Dragged, target: Vector | None
+) -> StudioState:
+    if now.design != then.design:
+        raise InvalidInput("design", "changed", "unchanged while its tip is dragged")
+    return now.replace(activation=dragged.activation, target=target)

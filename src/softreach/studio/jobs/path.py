@@ -1,23 +1,22 @@
-"""Follows the path of a tab with the arm, plays it, and writes it as an animation."""
+"""Jobs of a path of the tip: followed, played, written as an animation; paths of plain shapes."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from softreach.inverse.path import PathStatus, track_path
-from softreach.studio.jobs.job import AskedJob, Job
-from softreach.studio.movie import path_movie
+from softreach.plot.path_movie import path_movie
 from softreach.studio.reach import cloud_points
-from softreach.studio.rod import solvable_rod
+from softreach.studio.session import AskedJob, Job
 from softreach.studio.settings import TipPath
-from softreach.studio.state import Camera, StudioState
-from softreach.studio.worker import StaleCheck
+from softreach.studio.state import Camera, StudioState, solvable_rod
+from softreach.studio.work import StaleCheck
 from softreach.support.errors import InvalidInput
-
-__all__ = ["FollowPath", "PlayPath", "WriteMovie", "at_point"]
 
 _RESIDUAL = 1e-8  # [L]
 _STEP = 0.05  # [s] between points that are played
@@ -27,11 +26,8 @@ _LEVEL = 14  # of the cloud behind an animation
 class FollowPath(Job):
     """The activations along the path, and where the branch ends."""
 
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """The design and the path, not how far along it the arm is."""
-        path = state.path
-        return path and (state.design, path.points, path.start)
+    depends_on = "design", "path.points", "path.start"
+    only_with = "path"
 
     def run(self, check: StaleCheck) -> None:
         """Follow and draw it; or take away what was drawn."""
@@ -53,11 +49,11 @@ class FollowPath(Job):
         session, rod = self.session, solvable_rod(state.design)
         fits = path.start is not None and len(path.start) == rod.box.bundles
         start = rod.box.clip(np.array(path.start)) if fits else None
-        found = track_path(rod, points, start, residual_over_length=_RESIDUAL)
-        session.figures.track = found
-        done = points[found.status.values == PathStatus.FOLLOWED]
+        track = track_path(rod, points, start, residual_over_length=_RESIDUAL)
+        session.figures.track = track
+        done = points[track.status.values == PathStatus.FOLLOWED]
         if len(done) and len(done) < len(points):
-            done = np.concatenate([done, found.end_position.values[None]])
+            done = np.concatenate([done, track.end_position.values[None]])
         session.scene.draw_path(points / state.design.length, done / state.design.length)
 
 
@@ -66,14 +62,14 @@ class PlayPath(AskedJob):
 
     def do(self, check: StaleCheck) -> None:
         """From where the arm is, or from the first point, to the last that is followed."""
-        found, path = self.session.figures.track, self.session.state.path
-        if found is None or path is None:
+        track, path = self.session.figures.track, self.session.state.path
+        if track is None or path is None:
             return
-        count = int((found.status == PathStatus.FOLLOWED).sum())
+        count = int((track.status == PathStatus.FOLLOWED).sum())
         first = path.at if path.at < count - 1 else 0
         for point in range(first, count):
             check()
-            self.session.update(lambda state, k=point: at_point(state, found.activation.values, k))
+            self.session.update(lambda state, k=point: at_point(state, track.activation.values, k))
             time.sleep(_STEP)
 
 
@@ -83,25 +79,18 @@ class WriteMovie(AskedJob):
     def do(self, check: StaleCheck) -> None:
         """Draw and send it; says how far it is, and can be canceled."""
         session, path = self.session, self.session.state.path
-        found, reach = session.figures.track, session.reach
-        if found is None or path is None or reach is None:
+        track, reach = session.figures.track, session.reach
+        if track is None or path is None or reach is None:
             raise InvalidInput("path", "none yet", "followed before it is animated")
 
         def progress(share: float) -> None:
             check()
             session.report(f"drawing path.gif, {100 * share:.0f} %")
 
-        activations = found.activation.values[found.status.values == PathStatus.FOLLOWED]
-        if not len(activations):
-            raise InvalidInput("path", "not reached", "one whose first point is reached")
-        arm = session.state.design
-        points = np.array(path.points) / arm.length
         movie = path_movie(
-            arm,
-            activations,
-            points,
-            cloud_points(reach, _LEVEL),
-            view=_view_from(session.eye.camera()),
+            track,
+            reach.arm.length * cloud_points(reach, _LEVEL),
+            view=_view_from(session.camera.usual()),
             progress=progress,
         )
         check()
@@ -127,6 +116,77 @@ def at_point(state: StudioState, activations: np.ndarray, point: int) -> StudioS
 
 
 def _view_from(camera: Camera) -> tuple[float, float]:
-    """Azimuth and elevation of the eye [rad]."""
+    """Azimuth and elevation of the camera [rad]."""
     x, y, z = np.subtract(camera.position, camera.look_at)
     return float(np.arctan2(y, x)), float(np.arctan2(z, np.hypot(x, y)))
+
+
+# Paths of a few plain shapes that begin at the tip.
+
+
+Array = NDArray[np.float64]
+
+PLANES: Mapping[str, tuple[int, int]] = {"x, y": (0, 1), "x, z": (0, 2), "y, z": (1, 2)}
+"""The plane of a shape: its first and its second direction."""
+
+_POINTS = 97
+
+
+def drawn_path(shape: str, plane: str, size: float, tip: ArrayLike) -> Array:
+    """A shape through the tip, which is where it begins.
+
+    Args:
+        shape: One of `PATH_SHAPES`.
+        plane: One of `PLANES`.
+        size: Largest extent, in the unit of the tip; negative for the other side.
+        tip: Where it begins.
+
+    Returns:
+        Points in the unit of the tip, shape (n, 3).
+
+    Raises:
+        InvalidInput: An unknown shape or plane, or no size.
+    """
+    for name, value, known in (("shape", shape, PATH_SHAPES), ("plane", plane, PLANES)):
+        if value not in known:
+            raise InvalidInput(name, value, f"one of {', '.join(known)}")
+    if not (np.isfinite(size) and size != 0):
+        raise InvalidInput("size", size, "a finite number other than 0")
+    across = PATH_SHAPES[shape](np.linspace(0.0, 1.0, _POINTS))
+    points = np.tile(np.asarray(tip, float), (_POINTS, 1))
+    points[:, PLANES[plane]] += size * across
+    return points
+
+
+def straight_path(corners: ArrayLike, points: int = _POINTS) -> Array:
+    """Even points on the straight lines between corners, which are among them, shape (n, 3)."""
+    places = np.asarray(corners, float)
+    lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    pieces = np.maximum(1, np.round(points * lengths / max(lengths.sum(), 1e-300)).astype(int))
+    parts = [
+        start + np.linspace(0.0, 1.0, count, endpoint=False)[:, None] * (end - start)
+        for start, end, count in zip(places[:-1], places[1:], pieces, strict=True)
+    ]
+    return np.concatenate([*parts, places[-1:]])
+
+
+def _circle(share: Array) -> Array:
+    angle = 2 * np.pi * share
+    return np.stack([np.cos(angle) - 1.0, np.sin(angle)], axis=1) / 2
+
+
+def _figure_eight(share: Array) -> Array:
+    angle = 2 * np.pi * share
+    return np.stack([np.sin(angle), np.sin(2 * angle)], axis=1) / 2
+
+
+def _line(share: Array) -> Array:
+    return np.stack([share, np.zeros_like(share)], axis=1)
+
+
+PATH_SHAPES: Mapping[str, Callable[[Array], Array]] = {
+    "circle": _circle,
+    "figure eight": _figure_eight,
+    "line": _line,
+}
+"""From shares of the way, 0 to 1, to places in the plane."""

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from operator import attrgetter
-
-from softreach.studio.jobs.job import Job
 from softreach.studio.plots import PLOTS
 from softreach.studio.plots.plot import Plot, Source
+from softreach.studio.session import Job
 from softreach.studio.state import StudioState
-from softreach.studio.worker import StaleCheck
+from softreach.studio.work import StaleCheck
 
 
 def _job_of(plot: type[Plot]) -> type[Job]:
     class ComputePlot(Job):
         """Computes one plot while it is shown."""
 
-        @staticmethod
-        def depends_on(state: StudioState) -> object:
+        depends_on = plot.depends_on
+
+        @classmethod
+        def part_of(cls, state: StudioState) -> object:
             """Its attributes, while it is shown."""
             shown = plot.name in state.appearance.plots.shown
-            return shown and attrgetter(*plot.depends_on)(state)
+            return super().part_of(state) if shown else None
 
         def run(self, check: StaleCheck) -> None:
             """Compute it, and show each result."""

@@ -1,33 +1,28 @@
-"""Computes what a design can reach, and draws its cloud and its surfaces."""
+"""Jobs of a design in the scene: its reach, its arm, and what the camera should see of both."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import time
 
-from softreach.studio.budget import OverBudget
-from softreach.studio.colors import shown_color
-from softreach.studio.jobs.job import Job
+import numpy as np
+from numpy.typing import NDArray
+
+from softreach.rod.tip_map import TipStatus
 from softreach.studio.jobs.plots import plots_from
 from softreach.studio.multiplicity import count_activations, uncounted
-from softreach.studio.reach import Reach, shown_rows
-from softreach.studio.stages import stages
-from softreach.studio.state import StudioState
-from softreach.studio.worker import StaleCheck
+from softreach.studio.reach import Reach, shown_rows, stages
+from softreach.studio.scene.camera import Viewpoint, is_behind
+from softreach.studio.scene.clouds import shown_color
+from softreach.studio.session import Job, Session
+from softreach.studio.state import StudioState, solvable_rod
+from softreach.studio.work import OverBudget, StaleCheck
 from softreach.support.errors import InvalidInput
-
-if TYPE_CHECKING:
-    from softreach.studio.session import Session
-
-__all__ = ["ComputeReach", "DrawCloud", "DrawSurfaces", "draw_axes"]
 
 
 class ComputeReach(Job):
     """Cloud, volume and unreachability of the design, coarse and then fine."""
 
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """The design alone; how many points are shown, `DrawCloud` watches."""
-        return state.design
+    depends_on = ("design",)  # how many points are shown, `DrawCloud` watches
 
     def run(self, check: StaleCheck) -> None:
         """Compute what is not known yet, and draw each stage; or say why it cannot be."""
@@ -57,11 +52,10 @@ class ComputeReach(Job):
 class DrawCloud(Job):
     """Points, their colors, and the axes around them."""
 
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """How points look and which of them are shown."""
-        look = state.appearance
-        return look.level, look.color, look.point_size, look.slice, look.cloud, look.axes, look.lit
+    depends_on = (
+        "appearance.level", "appearance.color", "appearance.point_size", "appearance.slice",
+        "appearance.cloud", "appearance.axes", "appearance.lit",
+    )  # fmt: skip
 
     def run(self, check: StaleCheck) -> None:
         """Draw what is known; ask for more where it is not enough."""
@@ -77,11 +71,8 @@ class DrawCloud(Job):
 class DrawSurfaces(Job):
     """The exact boundary and the α-shape."""
 
-    @staticmethod
-    def depends_on(state: StudioState) -> object:
-        """Which surfaces are shown, and the slice through them."""
-        look = state.appearance
-        return look.surface, look.alpha_shape, look.slice
+    depends_on = "appearance.surface", "appearance.alpha_shape", "appearance.slice"
+    only_with = "appearance.surfaces"
 
     def run(self, check: StaleCheck) -> None:
         """Draw them, which computes them the first time."""
@@ -92,7 +83,7 @@ class DrawSurfaces(Job):
 
     def _draw(self, reach: Reach) -> None:
         session, look = self.session, self.session.state.appearance
-        if not (look.surface or look.alpha_shape):
+        if not look.surfaces:
             session.scene.draw_surfaces(reach, look)
             return
         with session.working("computing surfaces"):
@@ -100,7 +91,7 @@ class DrawSurfaces(Job):
 
 
 def _is_complete(known: Reach | None, state: StudioState) -> bool:
-    """Whether what was computed, or read from a file, is all there is to know."""
+    """Whether all there is to know was computed, or read from a file."""
     if known is None or not known.fine or known.arm != state.design:
         return False
     enough = max(known.samples, known.wanted) >= 1 << state.appearance.level
@@ -117,7 +108,7 @@ def _withdraw(session: Session, refusal: str) -> None:
 
 def _draw_cloud(session: Session) -> None:
     _draw_points(session)
-    session.follow(DrawSurfaces, *plots_from("reach"))
+    session.refresh(DrawSurfaces, *plots_from("reach"))
     session.show()
 
 
@@ -154,3 +145,113 @@ def draw_axes(session: Session) -> None:
     if session.reach is not None:
         free = session.free if session.state.design.loads is not None else None
         session.scene.draw_axes(session.reach, session.state.appearance, free)
+
+
+# Draws the arm, and the trail of its tip.
+
+
+_LONGEST_TRAIL = 2000
+
+
+class DrawArm(Job):
+    """The arm in its activation, and where its tip has been."""
+
+    _trail_of: object = None
+    """The design whose tip left the trail."""
+
+    depends_on = "design", "activation", "appearance.arm", "appearance.trail"
+
+    def run(self, check: StaleCheck) -> None:
+        """Draw them, and note where the tip is."""
+        check()
+        session, state = self.session, self.session.state
+        if not state.appearance.arm:
+            session.scene.remove("/arm")
+        else:
+            self._draw(state)
+        self._draw_trail()
+        session.follow(FollowCamera)
+        session.show()
+
+    def _draw(self, state: StudioState) -> None:
+        session = self.session
+        session.posture = None
+        try:
+            rod = solvable_rod(state.design)
+        except InvalidInput:  # `ComputeReach` says so
+            session.tip, session.posture = None, TipStatus.NO_EQUILIBRIUM
+            session.scene.remove("/arm")
+            return
+        with session.client.atomic():
+            tip = session.scene.draw_arm(state.design, state.activation)
+        session.tip = tip if np.isfinite(tip).all() else None
+        if session.tip is not None:
+            session.trail = [*session.trail[-_LONGEST_TRAIL:], session.tip]
+        if rod.supports_unstable:
+            lost = session.tip is None
+            status = TipStatus.NO_EQUILIBRIUM if lost else rod.status([state.activation])[0]
+            session.posture = TipStatus(status)
+
+    def _draw_trail(self) -> None:
+        session, state = self.session, self.session.state
+        # Another arm's tip was never there.
+        if self._trail_of != state.design or not state.appearance.trail:
+            self._trail_of, session.trail = state.design, session.trail[-1:]
+        session.scene.draw_trail(np.array(session.trail))
+
+
+# The camera: the points that hide the arm from it, and the edges with numbers.
+
+
+Array = NDArray[np.float64]
+
+_PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
+_TARGET = 0.02  # [L]
+_DRAGGED = 1 << 13  # points while the tip is dragged: the page draws all of them at each step
+
+
+class FollowCamera(Job):
+    """Cuts away what is in front of the arm and the target, and turns the axes to the camera."""
+
+    depends_on = (
+        "appearance.cut", "appearance.arm", "appearance.handle", "appearance.orthographic",
+        "target",
+    )  # fmt: skip
+
+    def run(self, check: StaleCheck) -> None:
+        """Look from where the camera is by now."""
+        time.sleep(_PAUSE)
+        session = self.session
+        session.camera.project(orthographic=session.state.appearance.orthographic)
+        if session.camera.keep_width():
+            session.follow(FollowCamera)
+        with session.drawing, session.client.atomic():
+            viewpoint = self._viewpoint()
+            most = _DRAGGED if session.is_dragged else None
+            session.scene.clouds.look(viewpoint, session.state.appearance.cut, most)
+            session.scene.axes.turn(viewpoint.position, session.camera.focal)
+            session.scene.see_through_arm(self._hides_handle(viewpoint.position))
+
+    def _hides_handle(self, camera: Array) -> bool:
+        """Whether the arm is between the camera [L] and the handle on its own tip."""
+        session = self.session
+        tip, look = session.tip, session.state.appearance
+        shown = look.handle and look.arm
+        return shown and tip is not None and is_behind(tip, camera, *session.scene.spine)
+
+    def _viewpoint(self) -> Viewpoint:
+        session, state = self.session, self.session.state
+        camera = session.camera.actual()
+        centers, radii = session.scene.spine if state.appearance.arm else _NOTHING
+        if state.target is not None:
+            target = np.asarray(state.target) / state.design.length
+            centers, radii = np.vstack([centers, target]), np.append(radii, _TARGET)
+        return Viewpoint(
+            position=np.asarray(camera.position),
+            look_at=np.asarray(camera.look_at),
+            centers=centers,
+            radii=radii,
+        )
+
+
+_NOTHING = np.empty((0, 3)), np.empty(0)

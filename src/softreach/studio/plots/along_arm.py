@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.studio.plots.plot import Chart, Curve, Plot
-from softreach.studio.rod import solvable_rod
-from softreach.studio.worker import StaleCheck
+from softreach.studio.state import solvable_rod
+from softreach.studio.work import StaleCheck
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:

@@ -18,10 +18,9 @@ from softreach.studio.plots.plot import (
     pixels,
 )
 from softreach.studio.reach import Reach, cloud_points, shown_samples
-from softreach.studio.rod import rod_of
-from softreach.studio.slicing import in_slice
-from softreach.studio.state import Slice
-from softreach.studio.worker import StaleCheck
+from softreach.studio.scene.clouds import in_slice
+from softreach.studio.state import Slice, rod_of
+from softreach.studio.work import StaleCheck
 from softreach.support.palette import bundle_color
 
 if TYPE_CHECKING:

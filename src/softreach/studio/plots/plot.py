@@ -14,7 +14,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.studio.fields import Fields
 from softreach.studio.reach import Reach
 from softreach.studio.widgets import PictureFrame
-from softreach.studio.worker import StaleCheck
+from softreach.studio.work import StaleCheck
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -24,9 +24,8 @@ from softreach.studio.plots.plot import (
     pixels,
 )
 from softreach.studio.reach import Reach
-from softreach.studio.rod import solvable_rod
-from softreach.studio.state import Slice
-from softreach.studio.worker import StaleCheck, all_cores
+from softreach.studio.state import Slice, solvable_rod
+from softreach.studio.work import StaleCheck, all_cores
 from softreach.support.errors import InvalidInput
 from softreach.workspace import ReachableSolid, ReachableSurface
 

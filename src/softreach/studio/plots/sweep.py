@@ -10,15 +10,12 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import changed
-from softreach.studio.budget import OverBudget
 from softreach.studio.fields import Attribute, Fields
 from softreach.studio.plots.plot import Chart, Curve, Plot
-from softreach.studio.reach import Quality
-from softreach.studio.rod import solvable_rod
+from softreach.studio.reach import Quality, exact_set
 from softreach.studio.shown_parameters import ShownParameter, slider_parameters
-from softreach.studio.stages import exact_set
-from softreach.studio.state import StudioState
-from softreach.studio.worker import StaleCheck, all_cores
+from softreach.studio.state import StudioState, solvable_rod
+from softreach.studio.work import OverBudget, StaleCheck, all_cores
 from softreach.support.errors import SoftreachError
 
 if TYPE_CHECKING:

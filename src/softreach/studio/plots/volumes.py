@@ -14,7 +14,7 @@ from softreach.cloud.volume import volume_curve
 from softreach.rod.tip_map import TipStatus
 from softreach.studio.plots.plot import Chart, Curve, Plot, complete_reach
 from softreach.studio.reach import Reach, shown_rows
-from softreach.studio.worker import StaleCheck, all_cores
+from softreach.studio.work import StaleCheck, all_cores
 from softreach.workspace import ReachableSolid
 
 if TYPE_CHECKING:

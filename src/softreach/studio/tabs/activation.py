@@ -9,9 +9,8 @@ from softreach.arm.manipulator import Manipulator
 from softreach.schema import activation_symbols
 from softreach.studio.captions import tip_text
 from softreach.studio.fields import Attribute, Fields, attribute
-from softreach.studio.rod import rod_of
-from softreach.studio.scene import MOST_BUNDLES
-from softreach.studio.state import StudioState
+from softreach.studio.scene.scene import MOST_BUNDLES
+from softreach.studio.state import StudioState, rod_of
 from softreach.studio.widgets import Line
 
 if TYPE_CHECKING:

@@ -7,10 +7,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from softreach.arm.manipulator import Manipulator
-from softreach.studio.atlas_map import map_choices, metric_names
-from softreach.studio.atlas_numbers import nearest_numbers
+from softreach.studio.atlas_map import MapBoard, map_choices, metric_names, nearest_numbers
 from softreach.studio.fields import Attribute, Fields, attempt, attribute
-from softreach.studio.map_board import MapBoard
 from softreach.studio.state import MapView, StudioState
 from softreach.studio.widgets import Line, PictureFrame
 from softreach.support.errors import InvalidInput

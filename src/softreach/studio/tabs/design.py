@@ -78,7 +78,7 @@ class DesignPanel:
         session = self._session
         if session.reach is not None:
             shift = beside(session.reach)
-            (session.eye.step_back if back else session.eye.step_forth)(shift)
+            (session.camera.step_back if back else session.camera.step_forth)(shift)
 
     def _build(self, arm: Manipulator) -> None:
         self._sliders.remove()

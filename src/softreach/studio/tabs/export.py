@@ -15,9 +15,8 @@ from softreach.studio.files import (
     state_from,
     surface_file,
 )
-from softreach.studio.link import state_link
-from softreach.studio.page import static_page
-from softreach.studio.picture import picture_file
+from softreach.studio.page import picture_file, static_page
+from softreach.studio.start import state_link
 from softreach.studio.widgets import Line
 from softreach.support.errors import InvalidInput
 
@@ -93,7 +92,7 @@ class ExportPanel:
 
     def _save_picture(self) -> None:
         session, reach = self._session, self._reach()
-        picture, state = session.eye.picture(), session.state
+        picture, state = session.camera.picture(), session.state
         self._write("studio.png", lambda: picture_file(picture, state, reach, session.key))
 
     def _save_page(self) -> None:

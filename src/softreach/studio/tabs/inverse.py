@@ -6,17 +6,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.kinematics import tip_positions
 from softreach.studio.fields import Fields, attempt, attribute, bind_button
-from softreach.studio.grip import Grip
-from softreach.studio.picking import picked_point
-from softreach.studio.reach import cloud_points, shown_samples
-from softreach.studio.rod import rod_of
-from softreach.studio.slicing import in_slice
-from softreach.studio.state import StudioState
+from softreach.studio.jobs.inverse import DragTip, SolveInverse
+from softreach.studio.scene.drag import DragBall
+from softreach.studio.state import StudioState, rod_of
 from softreach.studio.widgets import VECTOR, Line, TypedField
 
 if TYPE_CHECKING:
@@ -36,7 +32,7 @@ class DragPanel:
     """The ball on the tip, and the choice to show it."""
 
     def __init__(self, gui: GuiApi, tab: Any, session: Session) -> None:
-        self._grip = Grip(session.client.scene, session.pull_tip)
+        self._ball = DragBall(session.client.scene, session.job(DragTip).order)
         self._fields = Fields(session)
         with tab:
             self._text = Line(gui, _DRAG_HINT)
@@ -45,19 +41,19 @@ class DragPanel:
     def show(self, session: Session) -> None:
         """Keep the ball on the tip."""
         self._fields.show(session)
-        state, drag, arm = session.state, session.tip_pull, session.state.design
+        state, drag, arm = session.state, session.drag, session.state.design
         look = state.appearance
         grasped = look.handle and look.arm and rod_of(arm).box.dimension > 0
         radius = float(arm.profile.radius(arm.length)) / arm.length
-        self._grip.move(session.tip if grasped else None, radius, dark=look.dark)
+        self._ball.move(session.tip if grasped else None, radius, dark=look.dark)
         if drag is None:
             self._text.say(_DRAG_HINT)
-            self._grip.show_lag(None, None)
+            self._ball.show_lag(None, None)
             return
-        gap = drag.pulled.gap / arm.length
+        gap = drag.dragged.gap / arm.length
         short = f"This branch ends {gap:.3f} L short of the pointer."
         self._text.say(short if gap else _DRAG_HINT)
-        self._grip.show_lag(drag.wanted, drag.pulled.tip / arm.length, gap)
+        self._ball.show_lag(drag.wanted, drag.dragged.tip / arm.length, gap)
 
 
 class InversePanel:
@@ -116,17 +112,17 @@ class InversePanel:
             Whether they are, and there is one.
         """
         session = self._session
-        number = clicked_point(session, origin, direction) if self._clicks.value else None
-        if number is None or session.reach is None:
+        sample = session.picked_sample(origin, direction) if self._clicks.value else None
+        if sample is None or session.reach is None:
             return False
-        reach, level = session.reach, session.state.appearance.level
-        activation = reach.cloud.activation.values[shown_samples(reach, level)][number]
-        attempt(session, lambda: session.aim(_tip(reach.arm, activation)))
+        aim, arm = session.job(SolveInverse).aim, session.reach.arm
+        activation = session.reach.cloud.activation.values[sample]
+        attempt(session, lambda: aim(_tip(arm, activation)))
         return True
 
     def _solve_typed(self) -> None:
         length = self._session.state.design.length
-        self._session.aim(length * np.asarray(self._target.value))
+        self._session.job(SolveInverse).aim(length * np.asarray(self._target.value))
 
     def _button(self, activation: Any) -> Any:
         target = tuple(activation.tolist())
@@ -136,26 +132,6 @@ class InversePanel:
         take = lambda: self._session.update(lambda s: s.replace(activation=target))  # noqa: E731
         bind_button(button, self._session, take)
         return button
-
-
-def clicked_point(
-    session: Session, origin: Sequence[float], direction: Sequence[float]
-) -> int | None:
-    """Number of the point of the cloud that a ray hits, of those that are seen; None without one.
-
-    Args:
-        session: Of the tab.
-        origin: The eye [L].
-        direction: Of the ray, any length.
-    """
-    reach, look = session.reach, session.state.appearance
-    if reach is None or not look.cloud or reach.arm != session.state.design:
-        return None
-    points = cloud_points(reach, look.level)
-    seen: NDArray[np.bool_] = in_slice(points, look.slice) & ~session.scene.clouds.hidden(points)
-    numbers = np.flatnonzero(seen)
-    hit = picked_point(points[numbers], origin, direction, 0.01 * session.eye.narrowness)
-    return None if hit is None else int(numbers[hit])
 
 
 def _is_near(activation: Any, state: StudioState) -> bool:

@@ -10,15 +10,19 @@ import numpy as np
 from softreach.export.clouds import path_csv
 from softreach.inverse.path import PathStatus
 from softreach.inverse.request import positions_in
-from softreach.studio.drawn_paths import PATH_SHAPES, PLANES, drawn_path, straight_path
 from softreach.studio.fields import attempt, bind_button
-from softreach.studio.jobs.path import PlayPath, WriteMovie, at_point
+from softreach.studio.jobs.path import (
+    PATH_SHAPES,
+    PLANES,
+    PlayPath,
+    WriteMovie,
+    at_point,
+    drawn_path,
+    straight_path,
+)
 from softreach.studio.plots.plot import Chart, Curve
-from softreach.studio.reach import cloud_points
-from softreach.studio.rod import solvable_rod
 from softreach.studio.settings import MOST_POINTS, TipPath
-from softreach.studio.state import StudioState
-from softreach.studio.tabs.inverse import clicked_point
+from softreach.studio.state import StudioState, solvable_rod
 from softreach.studio.widgets import Line
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import bundle_color
@@ -105,10 +109,10 @@ class PathPanel:
         session = self._session
         if not self._clicks.value:
             return False
-        number, reach = clicked_point(session, origin, direction), session.reach
-        if number is not None and reach is not None:
-            point = cloud_points(reach, session.state.appearance.level)[number]
-            attempt(session, lambda: self._extend(point * reach.arm.length))
+        sample = session.picked_sample(origin, direction)
+        if sample is not None and session.reach is not None:
+            tip = session.reach.cloud.tip.values[sample]
+            attempt(session, lambda: self._extend(tip))
         return True
 
     def _list(self, track: xr.Dataset) -> None:
@@ -172,9 +176,7 @@ class PathPanel:
         return lambda state: at_point(state, activations, int(self._at.value))
 
     def _ask(self, kind: type[PlayPath | WriteMovie]) -> None:
-        job = self._session.job(kind)
-        job.wanted = True
-        self._session.follow(kind)
+        self._session.job(kind).ask()
 
     def _played(self) -> None:
         if self._play.value == "Play":

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from softreach.studio.captions import legend_text, loads_text, reach_text
-from softreach.studio.colors import key_html
 from softreach.studio.fields import attempt, bind_button
 from softreach.studio.markup import Part, Strong, fields_style
+from softreach.studio.scene.clouds import key_html
 from softreach.studio.widgets import Line
 
 if TYPE_CHECKING:

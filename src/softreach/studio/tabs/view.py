@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from softreach.studio.colors import color_names
-from softreach.studio.eye import VIEWS
 from softreach.studio.fields import Attribute, Fields, attribute, bind_button
-from softreach.studio.sight import CUTS
-from softreach.studio.state import LEVELS, StudioState
+from softreach.studio.scene.camera import VIEWS
+from softreach.studio.scene.clouds import color_names
+from softreach.studio.state import CUTS, LEVELS, StudioState
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -112,5 +111,5 @@ def _color(state: StudioState) -> str:
 
 def _reset(session: Session) -> None:
     session.update(lambda s: s.showing(orthographic=False))
-    session.eye.project(orthographic=False)
+    session.camera.project(orthographic=False)
     session.look_from("oblique")

@@ -1,37 +1,47 @@
-"""The ball on the tip that a person drags, and what shows how far the arm lags behind."""
+"""Drag of the tip in the scene: the ball on it, and how far the arm lags behind."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.inverse.drag import Dragged
+
 if TYPE_CHECKING:
     from viser import SceneApi
 
-__all__ = ["Grip"]
+__all__ = ["DragBall", "TipDrag"]
 
 Array = NDArray[np.float64]
-Dragged = Callable[[str, Array], None]
+OnDrag = Callable[[str, Array], None]
 """(phase "start", "update" or "end"; where the ball should be [L])."""
 
 _HALO, _SMALLEST, _POINTER = 0.035, 0.016, 0.009  # radii [L]
 _COLOR, _LIGHT, _LAG = (25, 25, 30), (255, 225, 90), (220, 30, 120)
 
 
-class Grip:
+class TipDrag(NamedTuple):
+    """Drag of the tip: the place where a person wants it, and what comes of that."""
+
+    wanted: Array
+    """[L], shape (3,)."""
+    dragged: Dragged
+
+
+class DragBall:
     """Nodes that move instead of being drawn anew: a node that is replaced is let go."""
 
-    def __init__(self, api: SceneApi, dragged: Dragged) -> None:
+    def __init__(self, api: SceneApi, on_drag: OnDrag) -> None:
         """Draw into the scene of a client once there is a tip.
 
         Args:
             api: The scene.
-            dragged: Called on the event loop, so that it must not take long.
+            on_drag: Called on the event loop, so that it must not take long.
         """
-        self._api, self._dragged = api, dragged
+        self._api, self._on_drag = api, on_drag
         self._nodes: tuple[Any, Any] | None = None
         self._lag: tuple[Any, Any, Any] | None = None
         self._offset = np.zeros(3)
@@ -61,7 +71,7 @@ class Grip:
         halo.visible = True
 
     def show_lag(self, wanted: Array | None, tip: Array | None, gap: float = 0.0) -> None:
-        """A line from the tip to where it was pulled to [L], and how long it is; None for none."""
+        """A line from the tip to where it is dragged to [L], and how long it is; None for none."""
         if wanted is None or tip is None or gap == 0.0:
             for node in self._lag or ():
                 node.visible = False
@@ -86,7 +96,7 @@ class Grip:
             end = np.array(event.end_position)
             if event.phase == "start":
                 self._offset = np.array(halo.position) - event.start_position
-            self._dragged(event.phase, end + self._offset)
+            self._on_drag(event.phase, end + self._offset)
 
         return halo, ball
 

@@ -1,26 +1,32 @@
-"""An animation of an arm that follows a path, as a GIF."""
+"""Animation of an arm that follows a path, as a GIF."""
 
 from __future__ import annotations
 
 import io
 from collections.abc import Callable, Sequence
 from copy import deepcopy
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.skin import inside
+from softreach.cloud.clouds import design_of
 from softreach.geometry.surface import Surface
+from softreach.inverse.path import PathStatus
 from softreach.picture.projection import View, project
 from softreach.picture.shading import draw_mesh, faces_to_eye, seen_through
 from softreach.picture.zbuffer import Extent, ZBuffer
 from softreach.rod.arm_shape import arm_surface, bundle_skins
 from softreach.rod.kinematics import configuration
-from softreach.studio.rod import solvable_rod
-from softreach.support.errors import MissingExtra
+from softreach.rod.rods import tip_map
+from softreach.rod.tip_map import TipMap
+from softreach.support.errors import InvalidInput, MissingExtra
 from softreach.support.palette import BODY, bundle_color
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["frames_along", "path_movie"]
 
@@ -37,40 +43,44 @@ _LAST = 1200  # [ms]
 
 
 def frames_along(count: int, most: int = _MOST_FRAMES) -> list[int]:
-    """Which of the points of a path are shown: evenly, the first and the last among them."""
+    """Numbers of the points of a path that are shown: evenly, the first and the last among them."""
     return sorted({round(k) for k in np.linspace(0, count - 1, min(count, most))})
 
 
 def path_movie(
-    arm: Manipulator,
-    activations: Array,
-    path: Array,
-    cloud: Array,
+    track: xr.Dataset,
+    cloud: ArrayLike | None = None,
     *,
     view: View = "oblique",
     progress: Callable[[float], None] = lambda share: None,
 ) -> bytes:
-    """Draw the arm along a path, and the path as far as it has come.
+    """Animation of an arm along a path, and of the path as far as it has come.
 
     Args:
-        arm: The design.
-        activations: At the points that are followed, shape (n, bundles).
-        path: All points [L], shape (k, 3), k not below n.
-        cloud: Faint points behind [L], shape (m, 3).
-        view: The direction of the eye.
+        track: From `track_path`; shown as far as it is followed.
+        cloud: Faint points behind [m], shape (m, 3), such as the tips of a cloud.
+        view: The direction of the camera.
         progress: Told the share of frames drawn so far; may raise to stop.
 
     Returns:
         The content of a GIF file.
 
     Raises:
+        InvalidInput: A path that is not followed at all.
         MissingExtra: Pillow is not installed.
     """
+    activations = track.activation.values[track.status.values == PathStatus.FOLLOWED]
+    if not len(activations):
+        raise InvalidInput("path", "not reached", "one whose first point is reached")
+    arm = design_of(track)
+    rod = tip_map(arm, float(track.attrs["tol"]), warn=False)
+    path = track.position.values / arm.length
+    points = np.empty((0, 3)) if cloud is None else np.asarray(cloud, float) / arm.length
     shown = frames_along(len(activations))
-    shapes = [_shape(arm, activations[k]) for k in shown]
-    extent = _extent([cloud, path, *(body.vertices / arm.length for body, _ in shapes)], view)
+    shapes = [_shape(rod, activations[k]) for k in shown]
+    extent = _extent([points, path, *(body.vertices / arm.length for body, _ in shapes)], view)
     behind, line = (ZBuffer(extent, _PIXELS, oversample=2) for _ in range(2))
-    behind.draw_points(cloud, _CLOUD, 1.5, view=view)
+    behind.draw_points(points, _CLOUD, 1.5, view=view)
     line.draw_points(_dense(path, extent), _PATH, 2.0, view=view)
     paper = _over(behind.rgba(), np.full((*behind.shape, 3), 255, np.uint8))
     frames = []
@@ -90,9 +100,9 @@ class _Shape(NamedTuple):
     bundles: Sequence[Surface]
 
 
-def _shape(arm: Manipulator, activation: Array) -> _Shape:
-    shape = configuration(solvable_rod(arm), activation, _STATIONS)
-    return _Shape(arm_surface(arm, shape, _SIDES), bundle_skins(arm, shape, lift=0.02))
+def _shape(rod: TipMap, activation: Array) -> _Shape:
+    shape = configuration(rod, activation, _STATIONS)
+    return _Shape(arm_surface(rod.arm, shape, _SIDES), bundle_skins(rod.arm, shape, lift=0.02))
 
 
 def _drawn(buffer: ZBuffer, within: ZBuffer, arm: Manipulator, shape: _Shape, view: View) -> Image:
@@ -125,14 +135,13 @@ def _extent(parts: Sequence[Array], view: View) -> Extent:
 
 
 def _dense(path: Array, extent: Extent) -> Array:
-    """So many points along a path that they make a line."""
-    from softreach.studio.drawn_paths import straight_path
-
+    """Even points along a path, so many that they make a line."""
     if len(path) < 2:
         return path
     pixel = (extent.right - extent.left) / _PIXELS
-    length = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
-    return straight_path(path, 2 + int(_DENSE * length / pixel))
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    even = np.linspace(0.0, way[-1], 2 + int(_DENSE * way[-1] / pixel))
+    return np.stack([np.interp(even, way, axis) for axis in path.T], axis=1)
 
 
 def _gif(frames: Sequence[Image]) -> bytes:

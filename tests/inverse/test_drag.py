@@ -1,4 +1,4 @@
-"""An arm whose tip is pulled follows on its branch, and stays as near as that leads."""
+"""An arm whose tip is dragged follows on its branch, and stays as near as that leads."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import pytest
 import softreach as sr
 from softreach.arm import designs
 from softreach.arm.parameters import changed
+from softreach.inverse.drag import Drag
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipStatus
-from softreach.studio.pull import Pull
 
 TRUNK = designs.minimal_trunk()
 START = (-0.7, -0.4, -0.9)
@@ -21,10 +21,10 @@ def tip_of(arm, activation):
 
 
 def dragged(arm, start, places):
-    """What each of the pulls leads to, one after the other."""
-    pull, activation, found = Pull(arm), start, []
+    """What each of the steps leads to, one after the other."""
+    drag, activation, found = Drag(arm), start, []
     for place in places:
-        found.append(pull.to(activation, np.asarray(place)))
+        found.append(drag.to(activation, np.asarray(place)))
         activation = found[-1].activation
     return found
 

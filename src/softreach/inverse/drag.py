@@ -1,4 +1,4 @@
-"""Where an arm goes when its tip is pulled: on along its branch, or as near to it as that leads."""
+"""Drag of an arm by its tip: on along its branch, or as near to the target as that leads."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from softreach.inverse.nearest import local_minima
 from softreach.inverse.path import Continuation
 from softreach.inverse.request import Request
 
-__all__ = ["Pull", "Pulled"]
+__all__ = ["Drag", "Dragged"]
 
 Array = NDArray[np.float64]
 
@@ -22,22 +22,22 @@ _FLAT = 0.05  # smallest over largest singular value, below which a fold may be 
 _ASIDE = 0.02  # from a fold, where the search on its either side begins, in ranges
 
 
-class Pulled(NamedTuple):
-    """What a pull leads to."""
+class Dragged(NamedTuple):
+    """Result of one step of a drag."""
 
     activation: tuple[float, ...]
     """Of each bundle in its unit."""
     tip: Array
-    """Where the tip is then [m], shape (3,)."""
+    """Place of the tip then [m], shape (3,)."""
     gap: float
-    """How far that is from where it was pulled to [m]; 0 where it follows."""
+    """Distance from there to the target [m]; 0 where the tip follows."""
 
 
-class Pull:
-    """One arm whose tip is pulled from place to place.
+class Drag:
+    """One arm whose tip is dragged from place to place.
 
     With three free bundles the arm stays on its branch: a fold, where two branches meet, is left
-    to the side from which it was entered. With more, each pull changes the activation least.
+    to the side from which it was entered. With more, each step changes the activation least.
     """
 
     def __init__(self, arm: Manipulator) -> None:
@@ -49,8 +49,8 @@ class Pull:
         self._tracker = Continuation(self._rod, self._residual)
         self._side = 0.0
 
-    def to(self, activation: tuple[float, ...], target: Array) -> Pulled | None:
-        """Pull the tip of the arm in an activation straight to a target [m].
+    def to(self, activation: tuple[float, ...], target: Array) -> Dragged | None:
+        """Drag the tip of the arm in an activation straight to a target [m].
 
         Returns:
             None where the arm has no stable equilibrium to begin with.
@@ -64,9 +64,9 @@ class Pull:
         if box.dimension >= 3:
             end = self._tracker.follow(point, point.tip, target)
             if end.status == PathStatus.FOLLOWED:
-                return self._pulled(end.point.gamma, target)
+                return self._dragged(end.point.gamma, target)
             gamma = end.point.gamma
-        return self._pulled(self._nearest(gamma, target), target)
+        return self._dragged(self._nearest(gamma, target), target)
 
     def _nearest(self, gamma: Array, target: Array) -> Array:
         """The activation around here that brings the tip nearest to the target."""
@@ -75,14 +75,14 @@ class Pull:
         request = Request(
             targets=np.tile(target, (len(starts), 1)), residual=self._residual, near=starts
         )
-        found = local_minima(self._rod, request, starts).gamma
-        tips, slopes = self._rod.tips_and_slopes(found)
+        ends = local_minima(self._rod, request, starts).gamma
+        tips, slopes = self._rod.tips_and_slopes(ends)
         gaps = np.linalg.norm(tips - target, axis=1)
         gaps = np.where(np.isfinite(gaps), gaps, np.inf)
         best = gaps <= gaps.min() + self._residual
         other_side = [self._side * self._sign(slope) < 0 for slope in slopes]
-        away = np.linalg.norm((found - gamma) / self._rod.box.scales, axis=1)
-        return found[np.lexsort((away, other_side, ~best))[0]]
+        away = np.linalg.norm((ends - gamma) / self._rod.box.scales, axis=1)
+        return ends[np.lexsort((away, other_side, ~best))[0]]
 
     def _beside_fold(self, gamma: Array, slope: Array) -> list[Array]:
         """Starts on both sides of a fold: on it, no small change brings the tip nearer."""
@@ -101,10 +101,10 @@ class Pull:
         sizes = np.linalg.svd(scaled, compute_uv=False)
         return float(np.sign(np.linalg.det(scaled))) if sizes[2] > 1e-6 * sizes[0] else 0.0
 
-    def _pulled(self, gamma: Array, target: Array) -> Pulled:
+    def _dragged(self, gamma: Array, target: Array) -> Dragged:
         whole = self._prepared.whole
         activation = whole.box.with_fixed(gamma[None])[0] * self._prepared.measures
         tip = self._tracker.at(gamma).tip
         gap = float(np.linalg.norm(tip - target))
         within = tuple(float(value) for value in activation)
-        return Pulled(within, tip, 0.0 if gap <= self._residual else gap)
+        return Dragged(within, tip, 0.0 if gap <= self._residual else gap)

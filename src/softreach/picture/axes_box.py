@@ -1,4 +1,4 @@
-"""A box around everything, with numbers along its outer edges as seen from where the eye is."""
+"""A box around everything, with numbers along its outer edges as a camera sees it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Side(NamedTuple):
     """From where a box is seen, as far as its drawing depends on it."""
 
     visible: tuple[int, int, int]
-    """Which of the faces across x, y and z is seen from outside: 1 the high one, -1 the low one."""
+    """Face across x, y and z that is seen from outside: 1 the high one, -1 the low one."""
     edges: tuple[Edge | None, Edge | None, Edge | None]
     """With the numbers of x, y and z; None of an axis that is seen end on."""
     steps: tuple[float, float, float]
@@ -47,16 +47,16 @@ class AxesBox(NamedTuple):
     """Text and where it stands."""
 
 
-def seen_from(eye: ArrayLike, low: Array, high: Array, focal: float = np.inf) -> Side:
-    """The side of a box that an eye sees.
+def seen_from(camera: ArrayLike, low: Array, high: Array, focal: float = np.inf) -> Side:
+    """The side of a box that a camera sees.
 
     Args:
-        eye: Where it is [L].
+        camera: Where it is [L].
         low: Lowest corner of the box [L].
         high: Highest [L].
-        focal: Focal length of the eye [pixel]: numbers have room between each other.
+        focal: Focal length of the camera [pixel]: numbers have room between each other.
     """
-    place = np.asarray(eye, float)
+    place = np.asarray(camera, float)
     x, y, z = ((place > high).astype(int) - (place < low)).tolist()
     toward = place - (low + high) / 2
     toward /= max(float(np.linalg.norm(toward)), 1e-12)
@@ -74,7 +74,7 @@ def seen_from(eye: ArrayLike, low: Array, high: Array, focal: float = np.inf) ->
 
 
 def _seen(ends: Array, toward: Array, picture: Array) -> Array:
-    """How far from each other two points are to the right and up, in focal lengths, shape (2,)."""
+    """Distances of two points to the right and up, in focal lengths, shape (2,)."""
     depth = np.maximum(-ends @ toward, 1e-3)
     first, last = ends @ picture.T / depth[:, None]
     return np.abs(last - first)
@@ -91,7 +91,7 @@ def _room(seen: Array, focal: float) -> float:
 
 
 def _picture(toward: Array) -> Array:
-    """Right and up of an eye in a direction, shape (2, 3)."""
+    """Right and up of a camera in a direction, shape (2, 3)."""
     right = np.array([-toward[1], toward[0], 0.0])
     right = right / np.linalg.norm(right) if right.any() else np.array([1.0, 0.0, 0.0])
     return np.stack([right, np.cross(toward, right)])
@@ -102,7 +102,7 @@ def _outer_edge(
 ) -> Edge | None:
     """Of the edges in the outline the lowest one, and of upright ones the leftmost.
 
-    An edge is in the outline if the eye sees one of its two faces.
+    An edge is in the outline if the camera sees one of its two faces.
     """
     if abs(toward[axis]) > _END_ON:
         return None
@@ -110,7 +110,7 @@ def _outer_edge(
     sides = [(p, q) for p in (-1, 1) for q in (-1, 1) if (p == visible[b]) != (q == visible[c])]
     aims = -picture[0] if axis == 2 else -picture[1]
     p, q = max(sides or [(-1, -1)], key=lambda at: at[0] * aims[b] + at[1] * aims[c])
-    # Out of the box along the floor, unless that leads towards the eye.
+    # Out of the box along the floor, unless that leads towards the camera.
     reach = np.linalg.norm(picture, axis=0)
     first = p * aims[b] > q * aims[c] if axis == 2 else reach[b] > _FLAT
     high = [False, False, False]
@@ -119,17 +119,17 @@ def _outer_edge(
 
 
 def axes_box(
-    *points: Array, eye: ArrayLike = (50.0, -80.0, 30.0), focal: float = np.inf
+    *points: Array, camera: ArrayLike = (50.0, -80.0, 30.0), focal: float = np.inf
 ) -> AxesBox:
     """The box around points, shapes (n, 3), without the edges that would run across them.
 
     Args:
         points: What is in the box [L].
-        eye: From where it is seen [L].
+        camera: From where it is seen [L].
         focal: As `seen_from` takes it.
     """
     low, high = round_box(*points)
-    side = seen_from(eye, low, high, focal)
+    side = seen_from(camera, low, high, focal)
     lines, labels = [*_edges(low, high, side)], []
     size = _TICK * float((high - low).max())
     for axis, edge in enumerate(side.edges):
@@ -178,7 +178,7 @@ def _round_up(value: float) -> float:
 
 
 def _edges(low: Array, high: Array, side: Side) -> list[Array]:
-    """The edges, shape (2, 3) each, but those between two faces that the eye sees."""
+    """The edges, shape (2, 3) each, but those between two faces that the camera sees."""
     edges = []
     for axis in range(3):
         others = [k for k in range(3) if k != axis]

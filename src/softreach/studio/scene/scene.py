@@ -1,4 +1,4 @@
-"""Draws what a tab shows into a viser scene, in units of L, through nodes named by paths."""
+"""Scene of a tab: arm, clouds, surfaces and marks as viser's nodes, in units of L."""
 
 from __future__ import annotations
 
@@ -10,16 +10,21 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.skin import inside
+from softreach.picture.axes_box import axes_box, round_box, seen_from
+from softreach.plot.coloring import UNSTABLE
 from softreach.rod.arm_shape import arm_surface, bundle_skins
 from softreach.rod.kinematics import configuration
-from softreach.studio.clouds import Clouds, Dots
-from softreach.studio.colors import FAINT, UNSTABLE, sample_colors
-from softreach.studio.numbered_box import NumberedBox, add_label
 from softreach.studio.reach import Reach, cloud_points, unstable_samples
-from softreach.studio.rod import solvable_rod
-from softreach.studio.shading import lit
-from softreach.studio.slicing import in_slice, sliced_faces
-from softreach.studio.state import Appearance, Slice
+from softreach.studio.scene.clouds import (
+    FAINT,
+    Clouds,
+    Dots,
+    in_slice,
+    lit,
+    sample_colors,
+    sliced_faces,
+)
+from softreach.studio.state import Appearance, Slice, solvable_rod
 from softreach.support.palette import BODY, bundle_color
 from softreach.workspace import ReachableSolid, ReachableSurface, Surface
 
@@ -28,12 +33,66 @@ if TYPE_CHECKING:
 
     from softreach.plot.coloring import BundleKey, ScalarKey
 
-__all__ = ["MOST_BUNDLES", "Scene"]
+
+# The box with numbers around what a scene shows; the camera decides which edges are numbered.
+
+
+Array = NDArray[np.float64]
+
+_GRAY = 170, 170, 175
+
+
+class NumberedBox:
+    """One box, drawn into one scene."""
+
+    def __init__(self, api: SceneApi) -> None:
+        """Draw into a scene, around an arm for the time being."""
+        self._api = api
+        self.corners = np.array([-0.6, -0.6, -0.4]), np.array([0.6, 0.6, 1.0])
+        """The lowest and the highest [L]."""
+        self._camera: Array = np.array([50.0, -80.0, 30.0])
+        self._focal = np.inf
+
+    def draw(self, *points: Array, shown: bool) -> None:
+        """Surround points [L], shapes (n, 3)."""
+        self.corners = round_box(*points)
+        self._remove()
+        if shown:
+            self._draw()
+
+    def turn(self, camera: Array, focal: float = np.inf) -> None:
+        """Number the edges that are the outer ones for a camera [L] of a focal length [pixel]."""
+        before = seen_from(self._camera, *self.corners, self._focal)
+        self._camera, self._focal = camera, focal
+        if self._is_drawn and seen_from(camera, *self.corners, focal) != before:
+            self._remove()
+            self._draw()
+
+    @property
+    def _is_drawn(self) -> bool:
+        return self._api.get_handle_by_name("/axes/lines") is not None
+
+    def _remove(self) -> None:
+        if self._api.get_handle_by_name("/axes") is not None:
+            self._api.remove_by_name("/axes")
+
+    def _draw(self) -> None:
+        low, high = self.corners
+        box = axes_box(low[None], high[None], camera=self._camera, focal=self._focal)
+        lines = box.lines.astype(np.float32)
+        self._api.add_line_segments("/axes/lines", lines, _GRAY, thickness=0.003)
+        for k, (text, at) in enumerate(box.labels):
+            add_label(self._api, f"/axes/label {k}", text, at)
+
+
+def add_label(api: SceneApi, path: str, text: str, at: Array) -> None:
+    """Words at a place [L], as large on the screen wherever the camera is."""
+    api.add_label(path, text, position=at, font_screen_scale=0.8, anchor="center-center")
+
 
 MOST_BUNDLES = 100
 """With more the body alone is drawn: skins of hundreds take a minute."""
 
-Array = NDArray[np.float64]
 Color = tuple[int, int, int]
 
 _STATIONS, _SIDES, _ACROSS = 51, 24, np.pi / 12
@@ -42,7 +101,7 @@ _CLEAR = 0.45  # opacity of a body that has something inside
 _HIDING = 0.6  # opacity of an arm that is in front of its own tip
 _GHOST, _REFERENCE, _SURFACE, _HULL = 0.35, (150, 150, 158), (90, 140, 200), (220, 150, 60)
 _MARK: Color = (235, 90, 0)
-_ASKED: Color = (240, 175, 205)  # of a path, where the arm does not follow it
+_PALE: Color = (240, 175, 205)  # of a path, where the arm does not follow it
 _BLOCKED: Color = (30, 30, 30)
 _FREE_LEVEL, _FREE_SIZE = 15, 0.6
 _TARGET = 0.012  # [L]: less than the ball on the tip, which is grabbed there
@@ -135,7 +194,7 @@ class Scene:
             self.draw_arm(arm, activation.tolist(), f"/ghosts/{k}")
 
     def draw_surfaces(self, reach: Reach, look: Appearance) -> None:
-        """The exact boundary and the α-shape, as asked for; slow the first time."""
+        """The exact boundary and the α-shape, as far as they are shown; slow the first time."""
         self.remove("/surface", "/alpha-shape")
         if look.surface and isinstance(reach.exact, ReachableSolid | ReachableSurface):
             self._surface("/surface", boundary_of(reach.exact), reach, look.slice, _SURFACE)
@@ -160,7 +219,7 @@ class Scene:
         """A path [L], pale, and as far as the arm can follow it, dark; a ball where that ends."""
         self.remove("/path")
         for path, line, color in (
-            ("/path/asked", points, _ASKED),
+            ("/path/all", points, _PALE),
             ("/path/followed", followed, _MARK),
         ):
             if len(line) > 1:
@@ -261,7 +320,7 @@ class Scene:
     def _surface(
         self, path: str, surface: Any, reach: Reach, cut: Slice, color: Color, opacity: float = 0.35
     ) -> None:
-        """What a slice leaves of a surface with `vertices` [m] and `faces`."""
+        """Draw what a slice leaves of a surface with `vertices` [m] and `faces`."""
         vertices = surface.vertices / reach.arm.length
         faces = sliced_faces(vertices, surface.faces, cut)
         if len(faces):
@@ -283,7 +342,7 @@ class Scene:
 
 
 def boundary_of(exact: ReachableSolid | ReachableSurface) -> Surface:
-    """What is drawn of the boundary of a reachable set."""
+    """Boundary of a reachable set, as it is drawn."""
     return exact.sheets() if isinstance(exact, ReachableSolid) else exact.surface()
 
 

@@ -1,0 +1,67 @@
+"""Jobs around the scene: the light of the page, the map of an atlas, the state that is kept."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import fields
+
+from softreach.studio.serve.server import theme
+from softreach.studio.session import Job, Session
+from softreach.studio.state import StudioState
+from softreach.studio.work import StaleCheck
+
+_REST = 0.5  # [s] without changes
+
+
+class KeepState(Job):
+    """Writes the state, once it rests for a moment, to where the next tab or server finds it."""
+
+    depends_on = tuple(field.name for field in fields(StudioState))
+
+    @classmethod
+    def has_use(cls, session: Session) -> bool:
+        """True where work is kept at all."""
+        return session.work is not None
+
+    def run(self, check: StaleCheck) -> None:
+        """Wait until nothing changes, and write."""
+        if not self.session.is_touched:
+            return
+        for _ in range(10):
+            check()
+            time.sleep(_REST / 10)
+        check()
+        self.session.keep()
+
+
+class DrawMap(Job):
+    """A metric of an atlas over two parameters, and where the design is on it."""
+
+    depends_on = "design", "appearance.map"
+
+    @classmethod
+    def has_use(cls, session: Session) -> bool:
+        """True if there is an atlas that a map can be drawn of."""
+        return session.board is not None
+
+    def run(self, check: StaleCheck) -> None:
+        """Draw it."""
+        check()
+        if self.session.board is not None:
+            self.session.board.draw(self.session.state.appearance.map, self.session.state.design)
+            self.session.show()
+
+
+class SetTheme(Job):
+    """Turns the light of the page on or off."""
+
+    depends_on = ("appearance.dark",)
+    _dark = False
+
+    def run(self, check: StaleCheck) -> None:
+        """Tell the page, if it does not look so already."""
+        check()
+        dark = self.session.state.appearance.dark
+        if dark != self._dark:
+            self._dark = dark
+            theme(self.session.client.gui, dark=dark)

@@ -1,0 +1,323 @@
+"""Camera of a tab: its place and lens, what hides the arm from it, what a click hits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.studio.state import Camera, vector
+from softreach.support.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from viser import ClientHandle
+
+Array = NDArray[np.float64]
+
+FOV = 0.6  # [rad]; viser's 75 degrees draw a ball at the rim as an egg
+VIEWS: dict[str, Array] = {
+    "oblique": np.array([2.1, -3.85, 1.17]),
+    "front": np.array([0.0, -1.0, 0.0]),
+    "side": np.array([1.0, 0.0, 0.0]),
+    "top": np.array([0.0, -1e-3, 1.0]),  # not quite: z is the way up
+}
+"""Directions from the middle to the camera."""
+
+_STEP_BACK = 1.4  # times the distance, for two clouds side by side
+_AWAY = 40.0  # times the distance from which parallels stay parallel, to 1 %
+_PATIENCE = 30.0  # [s] for a picture
+_UPRIGHT = 0.6  # aspect below which a window is that of a phone
+_NARROWEST = 0.3  # aspect below which a page is only being laid out
+_ROOM = 1.12  # times what would just fill the picture
+
+
+class Lens:
+    """Lens of a camera: its angle, its distance and its limits of depth."""
+
+    def __init__(self, *, orthographic: bool) -> None:
+        """The usual lens, or an orthographic one.
+
+        That is a very long lens from very far away: viser has no other. What is in sight does not
+        follow a zoom, as a page tells where its camera is only later, and half of it at a time.
+        Depths are integers to the graphics card: these tell 0.0005 L apart at the usual distance.
+        """
+        self.distance_ratio = _AWAY if orthographic else 1.0
+        """Times the usual distance at which the camera is with this lens."""
+        self.fov = 2.0 * float(np.arctan(np.tan(FOV / 2) / self.distance_ratio))
+        """Vertical angle [rad]."""
+        self.near, self.far = (4.0, 4000.0) if orthographic else (0.01, 1000.0)
+        """Limits of depth: anything nearer or farther is not drawn [L]."""
+
+
+def lens(camera: Camera, *, orthographic: bool) -> tuple[Lens, Camera]:
+    """Lens for a camera, and the camera with it that shows the same."""
+    offset = np.subtract(camera.position, camera.look_at)
+    chosen = Lens(orthographic=orthographic)
+    position = np.asarray(camera.look_at) + chosen.distance_ratio * offset
+    return chosen, Camera(position=vector(position), look_at=camera.look_at)
+
+
+def framing(low: Array, high: Array, direction: Array, aspect: float) -> Camera:
+    """Camera that sees all of a box [L] from a direction.
+
+    Args:
+        low: Its lowest corner.
+        high: Its highest.
+        direction: From the middle of the box to the camera.
+        aspect: Width of the picture over its height.
+    """
+    middle, radius = (low + high) / 2, _ROOM * float(np.linalg.norm(high - low)) / 2
+    distance = radius / _half_sine(aspect)
+    toward = direction / np.linalg.norm(direction)
+    if aspect < _UPRIGHT:  # the sheet of a phone covers the lower half
+        up = np.cross(toward, (-toward[1], toward[0], 0.0))
+        middle = middle - 0.45 * distance * np.tan(FOV / 2) * up / np.linalg.norm(up)
+    return Camera(position=vector(middle + distance * toward), look_at=vector(middle))
+
+
+def _half_sine(aspect: float) -> float:
+    """Sine of half of the smaller angle of a picture."""
+    return float(np.sin(np.arctan(np.tan(FOV / 2) * min(1.0, aspect))))
+
+
+class TabCamera:
+    """Camera of one tab, which the user and the studio both move."""
+
+    def __init__(self, client: ClientHandle) -> None:
+        """Follow the camera of a client."""
+        self._client = client
+        self._orthographic = False
+        self._aspect: float | None = None
+        self._latest: float | None = None
+
+    def on_move(self, moved: Callable[[], None]) -> None:
+        """Call this whenever the camera has moved."""
+        self._client.camera.on_update(lambda _: moved())
+
+    @property
+    def is_upright(self) -> bool:
+        """Whether the window is that of a phone."""
+        return self.aspect < _UPRIGHT
+
+    @property
+    def aspect(self) -> float:
+        """Width of the picture over its height."""
+        return self._client.camera.aspect
+
+    @property
+    def narrowness(self) -> float:
+        """Angles over those of the usual lens [-]."""
+        return float(np.tan(self._client.camera.fov / 2) / np.tan(FOV / 2))
+
+    @property
+    def focal(self) -> float:
+        """Focal length [pixel]: what is as far away as it is long is so long in the picture."""
+        camera = self._client.camera
+        return camera.image_height / (2 * float(np.tan(camera.fov / 2)))
+
+    def actual(self) -> Camera:
+        """Camera as it is; with an orthographic lens far away."""
+        camera = self._client.camera
+        return Camera(position=vector(camera.position), look_at=vector(camera.look_at))
+
+    def usual(self) -> Camera:
+        """Camera with the usual lens that sees the same."""
+        place, narrowness = self.actual(), self.narrowness
+        offset = narrowness * np.subtract(place.position, place.look_at)
+        return Camera(position=vector(place.look_at + offset), look_at=place.look_at)
+
+    def look_from(self, camera: Camera) -> None:
+        """Move it to where it sees what the usual lens would see from there."""
+        chosen, place = lens(camera, orthographic=self._orthographic)
+        with self._client.atomic():
+            shown = self._client.camera
+            shown.fov, shown.near, shown.far = chosen.fov, chosen.near, chosen.far
+            shown.position, shown.look_at = place.position, place.look_at
+
+    def project(self, *, orthographic: bool) -> None:
+        """Change the lens and go on looking at the same."""
+        if orthographic != self._orthographic:
+            camera, self._orthographic = self.usual(), orthographic
+            self.look_from(camera)
+
+    def keep_width(self) -> bool:
+        """Step back as the picture gets narrower, and forth again: what was in sight stays so.
+
+        Returns:
+            Whether the window is changing, so that one has to look again: a layout passes through
+            widths that are gone before the page has heard of a step.
+        """
+        now = self.aspect
+        if now < _NARROWEST:
+            return False
+        rests, self._latest = now == self._latest, now
+        if not rests:
+            return True
+        before, self._aspect = self._aspect or now, now
+        if (ratio := _half_sine(before) / _half_sine(now)) != 1.0:
+            camera = self.usual()
+            offset = ratio * np.subtract(camera.position, camera.look_at)
+            position = vector(camera.look_at + offset)
+            self.look_from(Camera(position=position, look_at=camera.look_at))
+        return False
+
+    def picture(self) -> NDArray[np.uint8]:
+        """Picture of what it sees now, RGBA on a transparent ground, shape (height, width, 4).
+
+        Raises:
+            InvalidInput: The tab does not answer: browsers stop drawing tabs in the background.
+        """
+        camera, client = self._client.camera, self._client
+        size = {"height": camera.image_height, "width": camera.image_width}
+        try:
+            return client.get_render(**size, transport_format="png", timeout=_PATIENCE)
+        except TimeoutError:
+            allowed = "in the foreground"
+            raise InvalidInput("tab", "not drawing", allowed, "bring it to the front") from None
+
+    def step_back(self, shift: Array) -> None:
+        """Make room for a second cloud that stands `shift` [L] beside the first."""
+        self._step(shift, _STEP_BACK)
+
+    def step_forth(self, shift: Array) -> None:
+        """The inverse of `step_back`."""
+        self._step(-shift, 1 / _STEP_BACK)
+
+    def _step(self, shift: Array, ratio: float) -> None:
+        now = self.usual()
+        look_at = np.asarray(now.look_at) + shift / 2
+        position = (np.asarray(now.position) - now.look_at) * ratio + look_at
+        self.look_from(Camera(position=vector(position), look_at=vector(look_at)))
+
+
+# Points between the camera and what is to be seen: the arm and the target.
+
+
+_CELLS = 192  # of the picture, along each side
+_MARGIN = 0.02  # [L] around what is to be seen
+_TOUCHING = 3.0  # radii: what is nearer belongs to the same piece of the arm
+
+
+@dataclass(frozen=True, eq=False)
+class Viewpoint:
+    """Camera, and the balls that it should see [L]."""
+
+    position: Array
+    look_at: Array
+    centers: Array
+    """Shape (n, 3)."""
+    radii: Array
+    """Shape (n,)."""
+
+    def seen(self, points: ArrayLike) -> Array:
+        """Places in the picture (right, up) [-] and depth [L], shape (n, 3)."""
+        right, up, forward = _axes_of(self.look_at - self.position)
+        offset = np.asarray(points, float) - self.position
+        depth = np.maximum(offset @ forward, 1e-6)
+        return np.stack([offset @ right / depth, offset @ up / depth, depth], axis=-1)
+
+
+def in_the_way(points: Array, viewpoint: Viewpoint, cut: str) -> NDArray[np.bool_]:
+    """Mask of the points [L], shape (n, 3), that hide one of the balls, or stand before the base.
+
+    Args:
+        points: Of a cloud.
+        viewpoint: The camera and what it should see.
+        cut: One of `CUTS`.
+    """
+    if cut == "none" or not len(points):
+        return np.zeros(len(points), bool)
+    seen = viewpoint.seen(points)
+    hides = _hides(seen, viewpoint) if len(viewpoint.centers) else np.zeros(len(points), bool)
+    if cut == "half":
+        ahead = (viewpoint.look_at - viewpoint.position) * (1.0, 1.0, 0.0)
+        hides |= points @ ahead < 0.0
+    return hides
+
+
+def is_behind(point: Array, camera: Array, centers: Array, radii: Array) -> bool:
+    """Whether a ball stands between the camera and a point [L], other than those that touch it.
+
+    Args:
+        point: Shape (3,).
+        camera: Shape (3,).
+        centers: Of the balls, shape (n, 3).
+        radii: Shape (n,).
+    """
+    distance = float(np.linalg.norm(point - camera))
+    way = (point - camera) / distance
+    ahead = (centers - camera) @ way
+    aside = np.linalg.norm(centers - camera - ahead[:, None] * way, axis=1)
+    return bool(((aside < radii) & (ahead > 0) & (ahead < distance - _TOUCHING * radii)).any())
+
+
+def _hides(seen: Array, viewpoint: Viewpoint) -> NDArray[np.bool_]:
+    """Looked up in a picture of how far away the farthest ball is."""
+    balls = viewpoint.seen(viewpoint.centers)
+    sizes = (viewpoint.radii + _MARGIN) / balls[:, 2]
+    low = (balls[:, :2] - sizes[:, None]).min(axis=0)
+    high = (balls[:, :2] + sizes[:, None]).max(axis=0)
+    step = (high - low).max() / _CELLS
+    picture = np.zeros((_CELLS + 1, _CELLS + 1))
+    across, along = (low[k] + step * np.arange(_CELLS + 1) for k in range(2))
+    for (x, y, depth), size in zip(balls, sizes, strict=True):
+        disk = (across[:, None] - x) ** 2 + (along - y) ** 2 <= size**2
+        picture[disk] = np.maximum(picture[disk], depth)
+    cell = np.rint((seen[:, :2] - low) / step)
+    inside = ((cell >= 0) & (cell <= _CELLS)).all(axis=1)
+    i, j = np.where(inside[:, None], cell, 0).astype(np.intp).T
+    return inside & (seen[:, 2] < picture[i, j])
+
+
+def _axes_of(direction: Array) -> tuple[Array, Array, Array]:
+    """Right, up and forward of a camera that keeps z upright."""
+    forward = direction / np.linalg.norm(direction)
+    upright = np.array([0.0, 0.0, 1.0]) if abs(forward[2]) < 0.999 else np.array([0.0, 1.0, 0.0])
+    right = np.cross(forward, upright)
+    right /= np.linalg.norm(right)
+    return right, np.cross(right, forward), forward
+
+
+# Which point of a cloud a click means.
+
+
+def picked_point(
+    points: Array, origin: ArrayLike, direction: ArrayLike, tolerance: float
+) -> int | None:
+    """The point that a ray through a pixel hits: of those close to it, the nearest to the camera.
+
+    Args:
+        points: Shape (n, 3), any unit.
+        origin: Where the camera is.
+        direction: Of the ray, any length.
+        tolerance: Largest angle between the ray and the point [rad].
+
+    Returns:
+        The point's number, or None if the ray passes all of them by.
+    """
+    ray = np.asarray(direction, float) / np.linalg.norm(direction)
+    offset = points - np.asarray(origin, float)
+    depth = offset @ ray
+    aside = np.sqrt(np.maximum(np.einsum("ni,ni->n", offset, offset) - depth**2, 0.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        angle = np.where(depth > 0, aside / depth, np.inf)
+    near = np.flatnonzero(angle <= tolerance)
+    if not len(near):
+        return None
+    # A little deeper but under the cursor is better than in front and beside it.
+    return int(near[np.argmin(depth[near] * (1.0 + 0.1 * angle[near] / tolerance))])
+
+
+def plane_crossing(
+    origin: ArrayLike, direction: ArrayLike, point: ArrayLike, normal: ArrayLike
+) -> Array | None:
+    """Crossing of a ray and a plane, or None if they do not meet."""
+    start, ray, n = (np.asarray(v, float) for v in (origin, direction, normal))
+    slope = ray @ n
+    if slope == 0.0:
+        return None
+    far = (np.asarray(point, float) - start) @ n / slope
+    return start + far * ray if far > 0 else None

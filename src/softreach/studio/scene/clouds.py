@@ -1,0 +1,298 @@
+"""Clouds of a scene: colors, light and slices of their points, and which are left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter, map_coordinates
+
+from softreach.arm.manipulator import Manipulator
+from softreach.cloud.dexterity import dexterity
+from softreach.cloud.redundancy import activation_distance
+from softreach.plot.coloring import BundleKey, Coloring, ScalarKey, color_samples
+from softreach.rod.tip_map import TipStatus
+from softreach.schema import activation_symbols
+from softreach.studio import markup
+from softreach.studio.multiplicity import count_activations
+from softreach.studio.reach import Reach, shown_rows, shown_samples
+from softreach.studio.scene.camera import Viewpoint, in_the_way
+from softreach.studio.state import Slice, rod_of
+from softreach.studio.work import all_cores
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from viser import SceneApi
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Dots:
+    """Points [L] and how they look."""
+
+    points: Array
+    """Shape (n, 3)."""
+    colors: NDArray[np.uint8]
+    """RGB, shape (n, 3) or (3,)."""
+    size: float
+    """[L]."""
+    shape: Literal["circle", "diamond"] = "circle"
+
+    def where(self, kept: NDArray[np.bool_]) -> Dots:
+        """Those that are kept."""
+        colors = self.colors[kept] if self.colors.ndim == 2 else self.colors
+        return Dots(points=self.points[kept], colors=colors, size=self.size, shape=self.shape)
+
+
+class Clouds:
+    """Draws clouds, and draws those again whose hidden points change as camera or arm move."""
+
+    def __init__(self, api: SceneApi) -> None:
+        """Draw into a scene."""
+        self._api = api
+        self._known: dict[str, tuple[Dots, NDArray[np.bool_]]] = {}
+        self._viewpoint: Viewpoint | None = None
+        self._cut = "none"
+        self._most: int | None = None
+
+    def draw(self, path: str, dots: Dots) -> None:
+        """All but the points in the way of what the last `look` wanted to see."""
+        kept = self._kept(dots)
+        self._known[path] = dots, kept
+        self._send(path, dots.where(kept))
+
+    def look(self, viewpoint: Viewpoint | None, cut: str, most: int | None = None) -> None:
+        """Cut away what hides the arm; nothing is sent of a cloud that keeps its points.
+
+        Args:
+            viewpoint: The camera and what it should see; None for nobody.
+            cut: One of `state.CUTS`.
+            most: How many points to draw of a cloud, the first of it, which then stay the same
+                until another number is wanted; None for all.
+        """
+        is_thin = most is not None and most == self._most
+        self._viewpoint, self._cut, self._most = viewpoint, cut, most
+        if is_thin:  # it hides little, and the page draws no frame while it takes up another
+            return
+        for path, (dots, before) in list(self._known.items()):
+            kept = self._kept(dots)
+            if not np.array_equal(kept, before):
+                self._known[path] = dots, kept
+                self._send(path, dots.where(kept))
+
+    def forget(self, path: str) -> None:
+        """Draw a cloud no more; its node is the caller's to remove."""
+        self._known.pop(path, None)
+
+    def hidden(self, points: Array) -> NDArray[np.bool_]:
+        """Mask of the points [L], shape (n, 3), that are cut away."""
+        if self._viewpoint is None:
+            return np.zeros(len(points), bool)
+        return in_the_way(points, self._viewpoint, self._cut)
+
+    def _kept(self, dots: Dots) -> NDArray[np.bool_]:
+        kept = ~self.hidden(dots.points)
+        if self._most is not None:
+            kept[self._most :] = False
+        return kept
+
+    def _send(self, path: str, dots: Dots) -> None:
+        if not len(dots.points):
+            if self._api.get_handle_by_name(path) is not None:
+                self._api.remove_by_name(path)
+            return
+        # viser's default is float16: a quarter of a millimeter in a meter
+        self._api.add_point_cloud(
+            path,
+            dots.points.astype(np.float32),
+            dots.colors,
+            point_size=dots.size,
+            precision="float32",
+            point_shape=dots.shape,
+            point_shading="gradient",
+        )
+
+
+# Colors of the points, and the key to them.
+
+
+FAINT = (196, 198, 206)
+"""Gray, of the cloud without loads."""
+
+_CLIPPED = ("manipulability", "activation distance")
+_PERCENTILES = (1.0, 99.0)
+_RADIUS = 1 / 60  # [L], within which D̄ compares activations
+
+
+def color_names(arm: Manipulator) -> dict[str, str]:
+    """Colors that points can have: name -> what the menu says."""
+    box = rod_of(arm).box
+    names = {"effort": "effort: mean |γ| / max |γ|", "rgb": "all activations (RGB)"}
+    labels = zip(activation_symbols(arm.bundle_units), box.names, strict=True)
+    names |= {f"bundle {k}": f"|{symbol}| {name}" for k, (symbol, name) in enumerate(labels)}
+    names["manipulability"] = "manipulability"
+    names["activation distance"] = "activation distance D̄"
+    if box.dimension == 3:
+        names["multiplicity"] = "multiplicity"
+    return names
+
+
+def sample_colors(reach: Reach, level: int, color: str) -> Coloring:
+    """Colors of the samples that are shown; an unknown name colors by all activations.
+
+    The few smallest and largest values of a scale look like the next ones: they would leave the
+    others one color.
+    """
+    cloud = reach.cloud[["tip", "activation"]].isel(sample=shown_samples(reach, level))
+    return color_samples(cloud, sample_values(reach, level, color))
+
+
+def sample_values(reach: Reach, level: int, color: str) -> Literal["rgb"] | int | xr.DataArray:
+    """Values behind the colors of the samples shown, as the library's own figures take them."""
+    import xarray as xr
+
+    color = shown_color(reach.arm, color)
+    if color == "rgb":
+        return "rgb"
+    if color.startswith("bundle "):
+        return int(color[7:])
+    if color == "multiplicity" and not reach.fine:
+        return "rgb"  # coarse clouds last for a moment only, in which nothing is counted
+    values = _values(reach, shown_rows(reach, level), color)
+    clipped = color in _CLIPPED and np.isfinite(values).any()
+    if clipped:
+        values = np.clip(values, *np.nanpercentile(values, _PERCENTILES))
+    attrs = {"long_name": color_label(color), "clipped": clipped}
+    return xr.DataArray(values, dims="sample", attrs=attrs)
+
+
+def _values(reach: Reach, rows: NDArray[np.int64], color: str) -> Array:
+    if color == "multiplicity":
+        return count_activations(reach, rows)  # which lets others have their turn
+    with all_cores:
+        return _VALUES[color](reach, rows)
+
+
+def shown_color(arm: Manipulator, color: str) -> str:
+    """Color of points where that name is wanted, which may be one of another arm."""
+    return color if color in color_names(arm) else "rgb"
+
+
+def color_label(color: str) -> str:
+    """Label of the key of a color; "" where the key needs none."""
+    return _LABELS.get(color, "")
+
+
+def key_html(key: BundleKey | ScalarKey | None) -> str:
+    """The colors explained, as HTML without anything from elsewhere."""
+    if isinstance(key, BundleKey):
+        named = zip(key.labels, key.colors.tolist(), strict=True)
+        parts = ((markup.Swatch(rgb), f" {label} \N{EN SPACE} ") for label, rgb in named)
+        return _line(markup.inline(*(part for pair in parts for part in pair)))
+    if key is None:
+        return ""
+    stops = ("#440154", "#3b528b", "#21918c", "#5ec962", "#fde725")  # viridis
+    bar = f"background:linear-gradient(90deg,{','.join(stops)});height:0.6em;margin:0.2em 0"
+    below, above = ("≤ ", "≥ ") if key.clipped else ("", "")
+    ends = markup.spread(f"{below}{key.low:.3g}", key.label, f"{above}{key.high:.3g}")
+    return _line(f'<div style="{bar}"></div>{ends}')
+
+
+def _line(content: str) -> str:
+    return f'<div style="font-size:0.8em;padding:0 0.8em 0.4em">{content}</div>'
+
+
+def _effort(reach: Reach, rows: NDArray[np.int64]) -> Array:
+    """Mean over the bundles of |γ| over the largest that each can have [-]."""
+    largest = np.abs(rod_of(reach.arm).box.bounds).max(axis=1)
+    share = np.abs(reach.cloud.activation.values[rows]) / np.where(largest > 0, largest, 1.0)
+    return share.sum(axis=1) / max(np.count_nonzero(largest), 1)
+
+
+def _manipulability(reach: Reach, rows: NDArray[np.int64]) -> Array:
+    """√det(J Jᵀ) with J = ∂r/∂γ [L]; of fewer than three bundles an area [L²] or a length [L]."""
+    volume = dexterity(reach.cloud.isel(sample=rows)).manipulability.values
+    return volume / reach.arm.length ** min(reach.arm.bundles, 3)
+
+
+def _activation_distance(reach: Reach, rows: NDArray[np.int64]) -> Array:
+    """D̄ of the samples that are shown, among all that have a tip; NaN where isolated."""
+    settled = np.flatnonzero(reach.status != TipStatus.NO_EQUILIBRIUM)
+    cloud = reach.cloud if len(settled) == reach.samples else reach.cloud.isel(sample=settled)
+    shown = np.searchsorted(settled, rows)
+    distance = activation_distance(cloud, _RADIUS * reach.arm.length, queries=np.sort(shown))
+    return distance.values[np.argsort(np.argsort(shown))]
+
+
+_VALUES = {
+    "effort": _effort,
+    "manipulability": _manipulability,
+    "activation distance": _activation_distance,
+}
+
+_LABELS = {
+    "effort": "effort: mean |γ| / max |γ| [-]",
+    "multiplicity": "multiplicity",
+    "manipulability": "manipulability [L³]",
+    "activation distance": "activation distance D̄ [-]",
+}
+
+
+# Slices of points and surfaces.
+
+
+def in_slice(points: Array, cut: Slice) -> NDArray[np.bool_]:
+    """Mask of the points [L], shape (n, 3), that a slice shows."""
+    if cut.axis == "none":
+        return np.ones(len(points), bool)
+    return np.abs(points[:, "xyz".index(cut.axis)] - cut.center) <= cut.thickness / 2
+
+
+def sliced_faces(vertices: Array, faces: NDArray[Any], cut: Slice) -> NDArray[Any]:
+    """The faces whose centers [L] a slice shows."""
+    return faces[in_slice(vertices[faces].mean(axis=1), cut)]
+
+
+# Light on a cloud: points at its surface are as bright as the surface would be.
+
+
+_CELLS = 48  # along the longest side
+_BLUR = 1.2  # [cells]
+_LIGHT = np.array([0.35, -0.55, 0.76])  # from the front, the right and above
+_DARKEST, _BRIGHTEST = 0.62, 1.0
+
+
+def lit(colors: NDArray[np.uint8], points: Array) -> NDArray[np.uint8]:
+    """Colors, shape (n, 3), as a lamp beside the reader lights them; those inside are bright.
+
+    Args:
+        colors: RGB from 0 to 255.
+        points: Where they are, any unit, shape (n, 3).
+    """
+    if len(points) < 2:
+        return colors
+    outward = _outward(points)
+    facing = np.clip(outward @ _LIGHT, -1.0, 1.0)
+    shade = _BRIGHTEST - (_BRIGHTEST - _DARKEST) * 0.5 * (1.0 - facing)
+    # Inside there is no surface that could turn away from the lamp.
+    surface = np.minimum(np.linalg.norm(outward, axis=1), 1.0)
+    shade = surface * shade + (1.0 - surface) * (_DARKEST + _BRIGHTEST) / 2
+    return np.rint(colors * shade[:, None]).astype(np.uint8)
+
+
+def _outward(points: Array) -> Array:
+    """Towards where there are fewer points: of length 1 at the surface, 0 deep inside."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    step = max(float((high - low).max()) / _CELLS, 1e-12)
+    places = (points - low) / step + 3.0
+    shape = tuple(np.ceil((high - low) / step).astype(int) + 7)
+    full = np.zeros(shape)
+    i, j, k = np.rint(places).astype(np.intp).T
+    full[i, j, k] = 1.0  # whether a cell has points, not how many: the activations decide that
+    slopes = np.gradient(gaussian_filter(full, _BLUR, truncate=2.5))
+    outward = -np.stack([map_coordinates(one, places.T, order=1) for one in slopes], axis=1)
+    length = np.linalg.norm(outward, axis=1, keepdims=True)
+    return outward / np.maximum(length, 0.08)

@@ -1,0 +1,95 @@
+"""Server of the page, safely started: this machine only, a free port, no pages from elsewhere."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import socket
+from functools import partial
+from typing import TYPE_CHECKING
+
+from softreach.studio.scene.camera import FOV
+from softreach.studio.serve.access import (
+    LOOPBACK,
+    answer_headers,
+    check_port,
+    page_address,
+    refusal,
+)
+from softreach.studio.serve.viser_fixes import guarding, without_tunnel
+from softreach.support.errors import InvalidInput, MissingExtra
+
+if TYPE_CHECKING:
+    from viser import GuiApi, ViserServer
+
+__all__ = ["page_url", "start_server", "stop_server", "theme"]
+
+
+def start_server(host: str = LOOPBACK, port: int | None = None, token: str = "") -> ViserServer:
+    """Start serving the page.
+
+    Args:
+        host: Address to listen on; everyone who can reach it may use the studio.
+        port: None for a free one.
+        token: What every page has to know; "" for nothing.
+
+    Raises:
+        InvalidInput: The port is none or taken, the host is not this machine's, or viser is a
+            version whose requests cannot be checked.
+        MissingExtra: viser is not installed.
+    """
+    try:
+        import viser
+    except ModuleNotFoundError as error:
+        raise MissingExtra("viser", "studio") from error
+
+    check_port(port or 0)
+    _check_free(host, port or 0)
+    # viser prints a banner; we print our own line.
+    with (
+        contextlib.redirect_stdout(io.StringIO()),
+        guarding(partial(refusal, host, token), partial(answer_headers, token)) as guard,
+    ):
+        server = viser.ViserServer(host=host, port=port or 0, verbose=False, label="softreach")
+    if not guard.is_set():
+        stop_server(server)
+        allowed = "one whose requests can be checked"
+        raise InvalidInput("viser", viser.__version__, allowed, "install viser>=1.1,<1.2")
+    without_tunnel(server)
+    # Shadows and a mirrored room cost seconds where no graphics card helps, and show nothing.
+    server.scene.configure_environment_map(None)
+    server.scene.configure_default_lights(cast_shadow=False)
+    server.scene.add_light_ambient("/light", intensity=1.6)
+    theme(server.gui, dark=False)
+    server.gui.main_panel.dock_right()
+    server.initial_camera.fov = FOV
+    return server
+
+
+def theme(gui: GuiApi, *, dark: bool) -> None:
+    """Set the looks of the page around the scene."""
+    gui.configure_theme(
+        control_width="large", show_logo=False, show_share_button=False, dark_mode=dark
+    )
+
+
+def stop_server(server: ViserServer) -> None:
+    """Stop serving, without the line that viser prints."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        server.stop()
+
+
+def page_url(server: ViserServer) -> str:
+    """Address of the page, for a browser on this machine."""
+    return page_address(server.get_host(), server.get_port())
+
+
+def _check_free(host: str, port: int) -> None:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family) as trial:
+        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            trial.bind((host, port))
+        except OSError as error:
+            allowed = "an address of this machine and a free port"
+            raise InvalidInput("host:port", f"{host}:{port}", allowed, str(error)) from None

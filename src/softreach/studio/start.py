@@ -1,0 +1,256 @@
+"""Start of a tab: a design, a stored cloud, an atlas, a link, or the work that was kept."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import os
+import sys
+import threading
+import zlib
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+from urllib.parse import parse_qs, quote, urlsplit
+
+from softreach.arm.manipulator import Manipulator
+from softreach.studio.atlas_map import metric_names
+from softreach.studio.files import LARGEST
+from softreach.studio.reach import Quality, Reach, reached
+from softreach.studio.snapshots import Snapshot
+from softreach.studio.state import StudioState
+from softreach.support.errors import InvalidInput, SoftreachError
+from softreach.support.files.atomic import replacing
+from softreach.support.files.kinds import FileKind, text_with
+from softreach.support.files.store_place import kind_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """State and knowledge that every new tab begins with."""
+
+    state: StudioState
+    quality: Quality
+    reach: Reach | None = None
+    atlas: xr.Dataset | None = None
+
+
+def start_on_design(arm: Manipulator, quality: Quality | None = None) -> Start:
+    """Begin with a design."""
+    return Start(state=StudioState(design=arm), quality=quality or Quality())
+
+
+def start_on_state(path: str | PathLike[str], quality: Quality | None = None) -> Start:
+    """Begin with a state that a tab was saved as.
+
+    Raises:
+        InvalidInput: There is no such file, or it is no state.
+        InvalidDesign: A design in it cannot exist.
+    """
+    try:
+        if (size := Path(path).stat().st_size) > LARGEST:
+            most = f"at most {LARGEST / 1e6:g} MB"
+            raise InvalidInput("state file", f"{size / 1e6:.3g} MB", most)
+        text = Path(path).read_bytes()
+    except OSError as error:
+        raise InvalidInput("state file", str(path), "a file that can be read", str(error)) from None
+    return Start(state=StudioState.from_json(text), quality=quality or Quality())
+
+
+def start_on_store(path: str | PathLike[str], quality: Quality | None = None) -> Start:
+    """Begin with a cloud that `save_cloud` wrote, or with the largest design of an atlas.
+
+    Raises:
+        InvalidInput: The store is neither, or the atlas holds no design yet.
+    """
+    quality = quality or Quality()
+    if kind_of(path) == "cloud":
+        from softreach.cloud.clouds import open_cloud
+
+        reach = reached(open_cloud(path), quality)
+        return Start(state=StudioState(design=reach.arm), quality=quality, reach=reach)
+    from softreach.atlas import open_atlas
+
+    atlas = open_atlas(path)
+    return Start(state=StudioState(design=_best(atlas)), quality=quality, atlas=atlas)
+
+
+def _best(atlas: xr.Dataset) -> Manipulator:
+    from softreach.atlas import atlas_design, best_designs
+
+    best = best_designs(atlas, metric_names(atlas)[0])
+    dims = [str(dim) for dim in atlas["status"].dims]
+    if not best.sizes.get("rank"):
+        raise InvalidInput("atlas", "no design is done", "built, at least in part")
+    return atlas_design(atlas, **{dim: float(best[dim].values[0]) for dim in dims})
+
+
+# Where a program keeps what a person did with it, on this kind of machine.
+
+
+def user_folder() -> Path:
+    """The folder for the state of softreach; `XDG_STATE_HOME` moves it on every system."""
+    if chosen := os.environ.get("XDG_STATE_HOME"):
+        return Path(chosen) / "softreach"
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData/Local") / "softreach"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Application Support" / "softreach"
+    return Path.home() / ".local" / "state" / "softreach"
+
+
+# What stays of the work on a design when its tab is reloaded or the server ends.
+#
+# The page offers no place of its own, so the server keeps it: in the user's own folder, one folder
+# for each design that the studio is opened on, one file for the latest state and one for each
+# snapshot. Every file appears complete or not at all and none is shared by two writers' halves, so
+# that two tabs, or two studios, cannot spoil each other's work: of two latest states the later one
+# stays.
+
+
+_LARGEST = 1 << 20  # bytes of a file
+_MOST = 200  # files that are read
+_STATE = FileKind("a state of the studio", text_with("softreach_studio"))
+
+
+class KeptWork:
+    """One folder; what in it cannot be read is left alone and named in `complaint`."""
+
+    def __init__(self, folder: Path, *, goes_on: bool = True) -> None:
+        """Read what there is.
+
+        Args:
+            folder: Made when first written to.
+            goes_on: Whether to begin with the latest state; snapshots are there in any case.
+        """
+        self._folder, self._writing = folder, threading.Lock()
+        self.complaint = ""
+        """Reason why something could not be read or written; one line."""
+        self.latest: StudioState | None = self._latest() if goes_on else None
+        """The state that was kept last."""
+
+    def keep(self, state: StudioState) -> None:
+        """Keep the latest state."""
+        self.latest = state
+        self._write("latest.json", state.to_json())
+
+    def snapshots(self) -> tuple[Snapshot, ...]:
+        """Those that can be read, in the order in which they were taken."""
+        known: dict[str, Snapshot] = {}
+        for path in sorted(self._folder.glob("snapshot-*.json"))[:_MOST]:
+            try:
+                one = Snapshot.from_json(_text(path))
+            except (SoftreachError, OSError) as error:
+                self._complain(path, error)
+            else:
+                known[one.name] = one
+        return tuple(sorted(known.values(), key=lambda one: one.taken))
+
+    def put(self, snapshot: Snapshot) -> None:
+        """Keep a snapshot, instead of an older one of its name."""
+        self._write(_file_of(snapshot.name), snapshot.to_json())
+
+    def remove(self, name: str) -> None:
+        """Forget a snapshot."""
+        try:
+            (self._folder / _file_of(name)).unlink(missing_ok=True)
+        except OSError as error:
+            self._complain(self._folder, error)
+
+    def _latest(self) -> StudioState | None:
+        path = self._folder / "latest.json"
+        try:
+            return StudioState.from_json(_text(path)) if path.exists() else None
+        except (SoftreachError, OSError) as error:
+            self._complain(path, error)
+            return None
+
+    def _write(self, name: str, text: str) -> None:
+        """A disk that is full or read-only costs the memory of the work, not the work."""
+        try:
+            with (
+                self._writing,
+                # Whatever is in a folder of ours by that name is an older one, complete or not.
+                replacing(self._folder / name, _STATE, overwrite=True, durable=False) as partial,
+            ):
+                partial.write_text(text, encoding="utf-8")
+        except (SoftreachError, OSError) as error:
+            self._complain(self._folder / name, error)
+
+    def _complain(self, path: Path, error: Exception) -> None:
+        self.complaint = f"Work is not kept: {path}: {' '.join(str(error).split())}"[:500]
+
+
+def work_on(design: Manipulator, *, goes_on: bool = True) -> KeptWork:
+    """Work that is kept of a design."""
+    digest = hashlib.sha256(design.to_toml().encode()).hexdigest()[:16]
+    return KeptWork(user_folder() / "studio" / digest, goes_on=goes_on)
+
+
+def _file_of(name: str) -> str:
+    return f"snapshot-{hashlib.sha256(name.encode()).hexdigest()[:16]}.json"
+
+
+def _text(path: Path) -> bytes:
+    """The file, unless nobody would call it one of ours.
+
+    Raises:
+        InvalidInput: It is no plain file, or too large.
+        OSError: It cannot be read.
+    """
+    if not path.is_file():  # a pipe would never end
+        raise InvalidInput("file", path.name, "a plain file")
+    with path.open("rb") as file:
+        text = file.read(_LARGEST + 1)
+    if len(text) > _LARGEST:
+        raise InvalidInput("file", path.name, f"at most {_LARGEST} bytes")
+    return text
+
+
+# A web address that holds the state of a tab.
+
+
+_LONGEST = 7000  # a request line may have 8192 characters
+
+
+def state_link(url: str, state: StudioState) -> str:
+    """The address that opens a tab in this state, while the studio serves at that port.
+
+    viser's page hands nothing of its address to the server but the socket that it is told to open,
+    so the state travels in the socket's address.
+
+    Raises:
+        InvalidInput: The state is too long for an address.
+    """
+    packed = base64.urlsafe_b64encode(zlib.compress(state.to_json().encode(), 9)).decode()
+    socket = url.replace("http", "ws", 1) + "/?state=" + packed.rstrip("=")
+    if len(socket) > _LONGEST:
+        raise InvalidInput("state", f"{len(socket)} characters", f"{_LONGEST} in a link", "save it")
+    return f"{url}/?websocket={quote(socket, safe='')}"
+
+
+def state_in_request(path: str) -> StudioState | None:
+    """The state that the socket of a page asks for, or None.
+
+    Raises:
+        InvalidInput: It is no state.
+        InvalidDesign: A design in it cannot exist.
+    """
+    packed = parse_qs(urlsplit(path).query).get("state")
+    return StudioState.from_json(_unpacked(packed[0])) if packed else None
+
+
+def _unpacked(text: str) -> bytes:
+    stream = zlib.decompressobj()
+    try:
+        data = base64.b64decode(text + "=" * (-len(text) % 4), altchars=b"-_", validate=True)
+        unpacked = stream.decompress(data, _LARGEST)
+    except (ValueError, zlib.error) as error:
+        raise InvalidInput("link", str(error), "one that the studio made, complete") from None
+    if not stream.eof:
+        raise InvalidInput("link", "cut short", "one that the studio made, complete")
+    return unpacked

@@ -1,0 +1,301 @@
+"""Background work: the latest order wins, stale work is dropped, budgets and turns are kept."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Callable
+from contextvars import ContextVar
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numba.core import event
+from numpy.typing import NDArray
+
+from softreach.rod.tip_map import TipMap
+from softreach.sampling import cube_blocks
+from softreach.support.memory import free_memory
+
+StaleCheck = Callable[[], None]
+"""Raises `Dropped` if what is being done is no longer wanted."""
+
+_PATIENCE = 0.1  # [s], after which whoever waits for a turn looks whether it is still wanted
+
+
+class Dropped(Exception):
+    """The work in hand is no longer wanted."""
+
+
+def _always_wanted() -> None:
+    """Check of work outside of a worker, which is always wanted."""
+
+
+_check: ContextVar[StaleCheck] = ContextVar("check", default=_always_wanted)
+
+
+def check_wanted() -> None:
+    """Raise `Dropped` if what this thread is working on is no longer wanted."""
+    _check.get()()
+
+
+class _Turns:
+    """A lock; whoever waits for it and is no longer wanted stops waiting."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+
+    @property
+    def taken(self) -> bool:
+        """Whether it is somebody's turn."""
+        return self._lock.locked()
+
+    def __enter__(self) -> None:
+        while not self._lock.acquire(timeout=_PATIENCE):
+            check_wanted()
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
+
+
+all_cores = _Turns()
+"""Held by whoever uses every core, so that tabs take turns and do not slow each other down."""
+
+
+class Latest:
+    """Does one piece of work at a time, and of those that wait only the last.
+
+    The thread lives while there is work. Work is called with a check that it should make between
+    its stages, and as often as it can within them.
+    """
+
+    def __init__(
+        self, failed: Callable[[Exception], None], idle: Callable[[], None] = _always_wanted
+    ) -> None:
+        """Start with nothing to do.
+
+        Args:
+            failed: Called with an exception other than `Dropped`.
+            idle: Called when there is nothing left to do.
+        """
+        self._failed, self._idle = failed, idle
+        self._waiting: Callable[[StaleCheck], None] | None = None
+        self._busy = self._closed = self._canceled = False
+        self._changed = threading.Condition()
+
+    @property
+    def busy(self) -> bool:
+        """Whether there is something to do."""
+        return self._busy
+
+    def submit(self, work: Callable[[StaleCheck], None]) -> None:
+        """Do this next, instead of whatever was to be next."""
+        with self._changed:
+            if self._closed:
+                return
+            self._waiting = work
+            if not self._busy:
+                self._busy = True
+                threading.Thread(target=self._run, daemon=True).start()
+
+    def cancel(self) -> bool:
+        """Drop what is being done and what waits; return whether there was anything."""
+        with self._changed:
+            self._waiting, self._canceled = None, self._busy
+            return self._busy
+
+    def close(self) -> None:
+        """Drop everything, for good."""
+        with self._changed:
+            self._closed, self._waiting = True, None
+
+    def join(self, timeout: float | None = None) -> bool:
+        """Wait until there is nothing left to do; return whether that is so."""
+        with self._changed:
+            return self._changed.wait_for(lambda: not self._busy, timeout)
+
+    def _run(self) -> None:
+        _check.set(self._check)
+        while (work := self._next()) is not None:
+            try:
+                work(self._check)
+            except Dropped:
+                continue
+            except Exception as error:  # shown to the reader; a thread has nobody to raise to
+                if not self._closed:  # else the reader is gone
+                    self._failed(error)
+        if not self._closed:
+            self._idle()
+
+    def _next(self) -> Callable[[StaleCheck], None] | None:
+        with self._changed:
+            work, self._waiting, self._canceled = self._waiting, None, False
+            if work is None:
+                self._busy = False
+                self._changed.notify_all()
+            return work
+
+    def _check(self) -> None:
+        if self._closed or self._canceled or self._waiting is not None:
+            raise Dropped
+
+
+# What one computation may use: a share of the memory that is free, and some seconds.
+
+
+_SHARE = 0.2
+"""Of the free memory that one computation may plan with: others hold their results."""
+_LEFT = 0.4
+"""Of the memory that was free in the beginning: with less a computation ends."""
+_PAUSE = 0.2  # [s] between looks at the memory
+
+
+class OverBudget(Exception):
+    """A computation would need more than it may have; the text says of what."""
+
+
+def memory_share() -> float:
+    """Memory that a computation that begins now may plan with [bytes]."""
+    return _SHARE * free_memory()
+
+
+class Budget:
+    """Limits of one computation, which has to call it as often as it can."""
+
+    def __init__(
+        self, check: StaleCheck, seconds: float, report: Callable[[int], None] | None = None
+    ) -> None:
+        """Begin now.
+
+        Args:
+            check: Raises when the computation is no longer wanted.
+            seconds: What it may take [s].
+            report: Told how many items are done in all, at most some times a second.
+        """
+        self._check, self._report = check, report
+        free = free_memory()
+        self.memory = _SHARE * free
+        """Memory that it may plan with [bytes]."""
+        self._least = _LEFT * free
+        self._seconds, self._end = seconds, time.monotonic() + seconds
+        self._next, self._done = 0.0, 0
+
+    def __call__(self, done: int = 0) -> None:
+        """Go on if that is wanted, and there is time and memory.
+
+        Args:
+            done: Items done since the last call.
+
+        Raises:
+            OverBudget: There is not.
+        """
+        self._check()
+        self._done += done
+        now = time.monotonic()
+        if now > self._end:
+            raise OverBudget(f"more than {self._seconds:g} s")
+        if now >= self._next:
+            self._next = now + _PAUSE
+            self._look()
+
+    def _look(self) -> None:
+        if free_memory() < self._least:
+            raise OverBudget("more memory than is free")
+        if self._report is not None:
+            self._report(self._done)
+
+
+# How many samples of an arm there is time and memory for.
+
+
+_PILOT = 512
+_LOWEST = 10
+"""Level below which a cloud shows no shape."""
+_COPIES = 4
+"""Of a cloud that exist at a time: while it is drawn, colored or written."""
+
+
+def affordable_level(rod: TipMap, seconds: float, wanted: int) -> int:
+    """The level of the largest cloud of at most 2^wanted samples that is computed in time.
+
+    Args:
+        rod: Of an arm whose samples cost much: loaded, or of many bundles.
+        seconds: What the cloud may take on one core [s].
+        wanted: Level beyond which nobody asks.
+    """
+    affordable = math.floor(math.log2(max(seconds, 1e-9) / _seconds_each(rod)))
+    return min(wanted, max(_LOWEST, affordable))
+
+
+def level_in_memory(bundles: int, memory: float, wanted: int) -> int:
+    """The level of the largest cloud of at most 2^wanted samples that memory holds.
+
+    Args:
+        bundles: How many activations a sample has.
+        memory: What the cloud and its copies may take [bytes].
+        wanted: Level beyond which nobody asks.
+    """
+    each = 8.0 * (bundles + 3) * _COPIES
+    return min(wanted, max(_LOWEST, math.floor(math.log2(max(memory, 1.0) / each))))
+
+
+@lru_cache(maxsize=64)
+def _seconds_each(rod: TipMap) -> float:
+    """Cost of one sample [s], once everything is compiled and prepared."""
+    (cube,) = cube_blocks("sobol", _PILOT, rod.box.bundles, 0, _PILOT)
+    gamma = rod.box.from_cube(cube)
+    _tips(rod, gamma[:16])
+    return max(min(_seconds(rod, gamma) for _ in range(2)), 1e-6) / _PILOT
+
+
+def _seconds(rod: TipMap, gamma: NDArray[np.float64]) -> float:
+    start = time.perf_counter()
+    _tips(rod, gamma)
+    return time.perf_counter() - start
+
+
+def _tips(rod: TipMap, gamma: NDArray[np.float64]) -> None:
+    """Do what a cloud does with samples."""
+    (rod.status if rod.supports_unstable else rod.tips)(gamma)
+
+
+# Whether kernels are being compiled, which only the first use on a machine has to wait for.
+
+
+_KIND = "numba:compile"
+
+
+class CompilationWatch(event.Listener):
+    """Calls back when compilation begins and when all of it has ended, on a compiling thread."""
+
+    def __init__(self, changed: Callable[[bool], None]) -> None:
+        """Watch from now on, until `close`."""
+        self._changed, self._running, self._lock = changed, 0, threading.Lock()
+        event.register(_KIND, self)
+
+    @property
+    def running(self) -> bool:
+        """Whether anything is being compiled."""
+        return self._running > 0
+
+    def close(self) -> None:
+        """Watch no longer."""
+        event.unregister(_KIND, self)
+
+    def on_start(self, event: Any) -> None:
+        """Something is being compiled."""
+        del event
+        self._count(1)
+
+    def on_end(self, event: Any) -> None:
+        """It is compiled; or that failed."""
+        del event
+        self._count(-1)
+
+    def _count(self, change: int) -> None:
+        with self._lock:
+            before, self._running = self._running, self._running + change
+            now = self._running
+        if bool(before) != bool(now):
+            self._changed(bool(now))

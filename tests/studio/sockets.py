@@ -1,0 +1,67 @@
+"""A tab without a browser: a socket that reads what it is sent."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+
+from softreach.studio import Studio
+from softreach.studio.session import Session
+
+PATIENCE = 60.0  # [s] on a loaded machine
+
+
+def until(condition: Callable[[], object]) -> None:
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+@contextmanager
+def connected(studio: Studio) -> Iterator[None]:
+    """What a tab is to the server: a socket that reads all it is sent and has told its camera."""
+    import msgspec
+    import viser
+    from websockets.exceptions import ConnectionClosed
+    from websockets.sync.client import connect
+
+    camera = {
+        "type": "ViewerCameraMessage",
+        "wxyz": (1.0, 0.0, 0.0, 0.0),
+        "position": (2.0, -4.0, 1.0),
+        "fov": 0.8,
+        "near": 0.1,
+        "far": 100.0,
+        "image_height": 500,
+        "image_width": 800,
+        "look_at": (0.0, 0.0, 0.3),
+        "up_direction": (0.0, 0.0, 1.0),
+    }
+    address = studio.url.replace("http", "ws", 1)
+    version = [f"viser-v{viser.__version__}"]
+    with connect(address, subprotocols=version, max_size=None) as socket:
+
+        def read() -> None:
+            with suppress(ConnectionClosed):
+                for _ in socket:
+                    pass
+
+        reader = threading.Thread(target=read, daemon=True)
+        reader.start()
+        socket.send(msgspec.msgpack.encode(camera))
+        yield
+    reader.join(PATIENCE)
+
+
+@contextmanager
+def page(studio: Studio) -> Iterator[Session]:
+    """A tab that shows what it has to."""
+    known = set(studio.sessions)
+    with connected(studio):
+        until(lambda: set(studio.sessions) - known)
+        session = studio.sessions[max(studio.sessions)]
+        until(lambda: session.panels and session.reach is not None and not session.busy)
+        yield session
