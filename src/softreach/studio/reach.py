@@ -193,7 +193,7 @@ def beside(reach: Reach) -> NDArray[np.float64]:
     return np.array([1.3 * float(np.ptp(across)) if len(across) else 0.0, 0.0, 0.0])
 
 
-# What a design can reach, coarse first and then fine, within a budget of time and memory.
+# Stages: coarse first and then fine, within a budget of time and memory.
 
 
 Report = Callable[[str], None]

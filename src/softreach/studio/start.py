@@ -89,7 +89,7 @@ def _best(atlas: xr.Dataset) -> Manipulator:
     return atlas_design(atlas, **{dim: float(best[dim].values[0]) for dim in dims})
 
 
-# Where a program keeps what a person did with it, on this kind of machine.
+# Folder of a user for the state of a program.
 
 
 def user_folder() -> Path:
@@ -103,7 +103,7 @@ def user_folder() -> Path:
     return Path.home() / ".local" / "state" / "softreach"
 
 
-# What stays of the work on a design when its tab is reloaded or the server ends.
+# Work on a design that stays when its tab is reloaded or the server ends.
 #
 # The page offers no place of its own, so the server keeps it: in the user's own folder, one folder
 # for each design that the studio is opened on, one file for the latest state and one for each
@@ -211,7 +211,7 @@ def _text(path: Path) -> bytes:
     return text
 
 
-# A web address that holds the state of a tab.
+# Link: a web address that holds the state of a tab.
 
 
 _LONGEST = 7000  # a request line may have 8192 characters

@@ -20,7 +20,7 @@ from softreach.rod.tip_map import TipMap
 from softreach.studio.settings import PlotSettings, TipPath
 from softreach.support.errors import InvalidDesign, InvalidInput, Range
 
-# The rod of a design, as the studio uses it.
+# Tip map of a design, as the studio uses it.
 
 
 TOL = 1e-5
@@ -315,9 +315,9 @@ def _within(box: ActivationBox, activation: Sequence[float]) -> tuple[float, ...
     return tuple(box.clip(wanted).tolist())
 
 
-# What was designed and posed before, and what was undone: values, so that going back is exact.
+# History: states before and states undone, as values, so that going back is exact.
 #
-# How things look is no part of it: whoever goes back to an earlier design keeps the view.
+# Looks are no part of it: whoever goes back to an earlier design keeps the view.
 
 
 _LONGEST = 200  # steps back

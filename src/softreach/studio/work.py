@@ -141,7 +141,7 @@ class Latest:
             raise Dropped
 
 
-# What one computation may use: a share of the memory that is free, and some seconds.
+# Budget of one computation: a share of the free memory, and some seconds.
 
 
 _SHARE = 0.2
@@ -206,7 +206,7 @@ class Budget:
             self._report(self._done)
 
 
-# How many samples of an arm there is time and memory for.
+# Effort: the samples of an arm that there is time and memory for.
 
 
 _PILOT = 512
@@ -260,7 +260,7 @@ def _tips(rod: TipMap, gamma: NDArray[np.float64]) -> None:
     (rod.status if rod.supports_unstable else rod.tips)(gamma)
 
 
-# Whether kernels are being compiled, which only the first use on a machine has to wait for.
+# Compilation of kernels, for which only the first use on a machine has to wait.
 
 
 _KIND = "numba:compile"

@@ -18,6 +18,14 @@ from softreach.studio.state import StudioState, solvable_rod
 from softreach.studio.work import OverBudget, StaleCheck
 from softreach.support.errors import InvalidInput
 
+Array = NDArray[np.float64]
+
+_LONGEST_TRAIL = 2000
+_PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
+_TARGET = 0.02  # [L]
+_DRAGGED = 1 << 13  # points while the tip is dragged: the page draws all of them at each step
+_NOTHING = np.empty((0, 3)), np.empty(0)
+
 
 class ComputeReach(Job):
     """Cloud, volume and unreachability of the design, coarse and then fine."""
@@ -147,10 +155,7 @@ def draw_axes(session: Session) -> None:
         session.scene.draw_axes(session.reach, session.state.appearance, free)
 
 
-# Draws the arm, and the trail of its tip.
-
-
-_LONGEST_TRAIL = 2000
+# The arm, and the trail of its tip.
 
 
 class DrawArm(Job):
@@ -203,13 +208,6 @@ class DrawArm(Job):
 # The camera: the points that hide the arm from it, and the edges with numbers.
 
 
-Array = NDArray[np.float64]
-
-_PAUSE = 0.12  # [s] between two looks: a cloud is megabytes
-_TARGET = 0.02  # [L]
-_DRAGGED = 1 << 13  # points while the tip is dragged: the page draws all of them at each step
-
-
 class FollowCamera(Job):
     """Cuts away what is in front of the arm and the target, and turns the axes to the camera."""
 
@@ -252,6 +250,3 @@ class FollowCamera(Job):
             centers=centers,
             radii=radii,
         )
-
-
-_NOTHING = np.empty((0, 3)), np.empty(0)

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from softreach.plot.coloring import BundleKey, ScalarKey
 
 
-# The box with numbers around what a scene shows; the camera decides which edges are numbered.
+# Box with numbers around everything; the camera decides which edges are numbered.
 
 
 Array = NDArray[np.float64]
@@ -88,6 +88,9 @@ class NumberedBox:
 def add_label(api: SceneApi, path: str, text: str, at: Array) -> None:
     """Words at a place [L], as large on the screen wherever the camera is."""
     api.add_label(path, text, position=at, font_screen_scale=0.8, anchor="center-center")
+
+
+# Everything that is drawn.
 
 
 MOST_BUNDLES = 100

@@ -64,7 +64,7 @@ def _outward() -> str:
         return ""
 
 
-# A secret that a page has to know where others can reach the studio.
+# Token: a secret that a page has to know where others can reach the studio.
 
 
 _NAME = "softreach_token"
