@@ -298,7 +298,7 @@ def test_an_output_that_cannot_be_written_is_refused_before_the_work(
     def computed(*_, **__):
         raise AssertionError("it was computed first")
 
-    for place in ("cloud.compute_cloud", "workspace.reachable_set", "payload.payload_curve"):
+    for place in ("cloud.compute_cloud", "workspace.reachable_set", "workspace.payload.payload_curve"):
         monkeypatch.setattr(f"softreach.{place}", computed)
     assert expected in refusal_of(arguments, capsys, crowded)
 

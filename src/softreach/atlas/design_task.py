@@ -22,13 +22,12 @@ from softreach.geometry.delaunay import delaunay
 from softreach.geometry.hull import convex_hull
 from softreach.rod.never_at_rest import none_of
 from softreach.rod.tip_map import TipMap, TipStatus, tip_map
+from softreach.support.arrays import Array
 from softreach.support.errors import SoftreachError, SoftreachWarning
 from softreach.support.files.sealed_store import StoreFailed
 
 # What the metrics of one design are computed from; each result is found once and shared.
 
-
-Array = NDArray[np.float64]
 
 _BLOCK = 65_536  # samples at a time, where not all of them are needed at once
 
@@ -134,7 +133,7 @@ _COMPUTE: dict[Need, Callable[[Intermediates], Any]] = {
     Need.REACHABLE_SET: _reachable_set,
     Need.STRAIN_STATISTICS: _strain_statistics,
 }
-Values = dict[str, NDArray[np.float64]]
+Values = dict[str, Array]
 Outcome = tuple[int, str]
 """Number of a design, and why it failed; empty if it did not."""
 
@@ -246,7 +245,7 @@ def _values(metrics: Sequence[Metric], found: Intermediates) -> Values:
     return {metric.name: metric.value(found, sizes) for metric in metrics}
 
 
-def _kept_tips(store: AtlasStore, found: Intermediates) -> NDArray[np.float64] | None:
+def _kept_tips(store: AtlasStore, found: Intermediates) -> Array | None:
     return found.tips if store.command.keep_clouds else None
 
 

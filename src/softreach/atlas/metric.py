@@ -10,14 +10,12 @@ from enum import Enum
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.support.arguments import instance, text
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, SoftreachError
 
 __all__ = ["Metric", "MetricFailed", "Need", "check_travels"]
-
-Array = NDArray[np.float64]
 
 PROFILE = ("station", "quantile")
 

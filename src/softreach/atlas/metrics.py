@@ -8,13 +8,11 @@ from functools import partial
 from operator import attrgetter
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
 from softreach.atlas.metric import PROFILE, Metric, Need
 from softreach.cloud.curvature import QUANTITIES
 from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.support.arguments import as_given
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -23,8 +21,6 @@ if TYPE_CHECKING:
     from softreach.workspace import ReachableSet
 
 __all__ = ["METRIC_GROUPS", "chosen_metrics", "known_metric"]
-
-Array = NDArray[np.float64]
 
 
 def _lowest(axis: int, tips: Array) -> float:

@@ -15,6 +15,7 @@ from softreach.atlas.command import Command
 from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import DAMAGED, FAILED, GAP, KNOWN, PER_DESIGN, UNSTABLE, AtlasStore
 from softreach.support.arguments import checked, dataset, text
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, SoftreachWarning, counted
 from softreach.support.files.sealed_store import Chunk, storage_errors
 from softreach.support.files.store_place import READING, check_arrays
@@ -93,7 +94,7 @@ class _Reader:
             self.damaged.setdefault(self._store.number(chunk), line)
         return values
 
-    def table(self, name: str, status: NDArray[np.uint8]) -> NDArray[np.float64]:
+    def table(self, name: str, status: NDArray[np.uint8]) -> Array:
         """All metrics of an array; nothing is read where there are none yet."""
         if np.isin(status, KNOWN).any():
             return self.read(name)

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.atlas.command import Command
 from softreach.atlas.layout import CUBE, MISSING, SEAL, Plan, array_plans
 from softreach.sampling import sample_cube
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.files.sealed_store import Chunk, StoreFailed, Watch, storage_errors, writing
 from softreach.support.files.store_place import REMEDY, Opened, absolute, checked_place, opened_root
@@ -93,7 +94,7 @@ class Result(NamedTuple):
 
     metrics: Mapping[str, ArrayLike]
     """Every metric of the command by name."""
-    tips: NDArray[np.float64] | None
+    tips: Array | None
     """Tips [m], shape (n, 3), NaN without equilibrium; None if clouds are not kept."""
 
 
@@ -245,7 +246,7 @@ class AtlasStore:
         return str(np.asarray(self.array("message")[self.command.space.place(index)]).item())
 
     @cached_property
-    def cube(self) -> NDArray[np.float64]:
+    def cube(self) -> Array:
         """Unit activations that all designs share, shape (n, bundles).
 
         Raises:
@@ -297,7 +298,7 @@ class AtlasStore:
         self.array("status")[place] = status
 
 
-def fixed_point(tips: NDArray[np.float64], scale: float) -> NDArray[np.int32]:
+def fixed_point(tips: Array, scale: float) -> NDArray[np.int32]:
     """Tips as whole multiples of the scale, shape (3, n); NaN as what fills missing ones."""
     whole = np.rint(tips.T / scale)
     return np.where(np.isnan(whole), MISSING, whole).astype(np.int32)
@@ -315,12 +316,12 @@ def _attributes(command: Command) -> dict[str, str]:
     }
 
 
-def drawn_cube(command: Command) -> NDArray[np.float64]:
+def drawn_cube(command: Command) -> Array:
     """The activations that the command draws on this machine."""
     return sample_cube(command.sampler, command.n, command.space.bundles, command.seed)
 
 
-def digest(cube: NDArray[np.float64]) -> str:
+def digest(cube: Array) -> str:
     """SHA-256 of activations."""
     return hashlib.sha256(np.ascontiguousarray(cube).tobytes()).hexdigest()
 
@@ -389,7 +390,7 @@ def _create_array(store: AtlasStore, plan: Plan) -> None:
         array[...] = data
 
 
-def _drawn(store: AtlasStore) -> NDArray[np.float64]:
+def _drawn(store: AtlasStore) -> Array:
     cube = drawn_cube(store.command)
     if digest(cube) != store.cube_digest:
         raise StoreFailed(

@@ -13,16 +13,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.export import ply
-from softreach.export.formats import Writers, load_library, write_by_suffix, write_vtk, write_vtu
+from softreach.export.formats import (
+    format_file,
+    load_library,
+    write_by_suffix,
+    write_vtk,
+    write_vtu,
+)
 from softreach.support.arguments import checked, dataset, flag, path
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
-from softreach.support.files.kinds import FileKind, Formats, Recognizes, beginning_with, text_with
+from softreach.support.files.kinds import Formats, beginning_with, text_with
 from softreach.support.palette import activation_colors
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Array = NDArray[np.float64]
 
 _BLOCK = 1 << 18
 
@@ -160,7 +165,7 @@ def export_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: boo
     """
     table = cloud_table(cloud)
     takes = _BYTES * (table.tip.size + table.activation.size)
-    write_by_suffix(path, CLOUD_FILES, _WRITERS, table, overwrite, takes=takes)
+    write_by_suffix(path, CLOUD_FILES, table, overwrite=overwrite, takes=takes)
 
 
 def _write_ply(table: CloudTable, file: BufferedWriter) -> None:
@@ -249,30 +254,18 @@ def _point_mesh(table: CloudTable) -> Any:
     return meshio.Mesh(table.tip, cells, point_data=data)
 
 
-def _file(name: str, recognizes: Recognizes, *libraries: str) -> FileKind:
-    return FileKind(f"{name} file", recognizes, libraries, "export")
-
-
 CLOUD_FILES: Formats = {
-    ".ply": _file("a PLY", beginning_with(b"ply\n", b"ply\r")),
-    ".csv": _file("a cloud's CSV", beginning_with(b'"x","y","z",', b"x,y,z,gamma_"), "pyarrow"),
-    ".parquet": _file("a Parquet", beginning_with(b"PAR1"), "pyarrow"),
-    ".npz": _file("an NPZ", beginning_with(b"PK")),
-    ".mat": _file("a MAT", beginning_with(b"MATLAB ")),
-    ".vtu": _file("a VTU", text_with("<VTKFile", "UnstructuredGrid"), "meshio"),
-    ".vtk": _file("a VTK", beginning_with(b"# vtk DataFile"), "meshio"),
+    ".ply": format_file("a PLY", beginning_with(b"ply\n", b"ply\r"), _write_ply),
+    ".csv": format_file(
+        "a cloud's CSV", beginning_with(b'"x","y","z",', b"x,y,z,gamma_"), _write_csv, "pyarrow"
+    ),
+    ".parquet": format_file("a Parquet", beginning_with(b"PAR1"), _write_parquet, "pyarrow"),
+    ".npz": format_file("an NPZ", beginning_with(b"PK"), _write_npz),
+    ".mat": format_file("a MAT", beginning_with(b"MATLAB "), _write_mat),
+    ".vtu": format_file("a VTU", text_with("<VTKFile", "UnstructuredGrid"), _write_vtu, "meshio"),
+    ".vtk": format_file("a VTK", beginning_with(b"# vtk DataFile"), _write_vtk, "meshio"),
 }
 """What clouds can be exported as."""
-
-_WRITERS: Writers = {
-    ".ply": _write_ply,
-    ".csv": _write_csv,
-    ".parquet": _write_parquet,
-    ".npz": _write_npz,
-    ".mat": _write_mat,
-    ".vtu": _write_vtu,
-    ".vtk": _write_vtk,
-}
 
 
 # The activations along a path as a table.

@@ -5,38 +5,37 @@ from __future__ import annotations
 import errno
 import importlib
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from io import BufferedWriter
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 from softreach.support.errors import MissingExtra
 from softreach.support.files.atomic import writing
-from softreach.support.files.kinds import Formats, format_of
+from softreach.support.files.kinds import FileKind, Formats, Recognizes, format_of
 
-__all__ = ["Writers", "load_library", "write_by_suffix", "write_vtk", "write_vtu"]
+__all__ = ["format_file", "load_library", "write_by_suffix", "write_vtk", "write_vtu"]
 
-Writers = Mapping[str, Callable[[Any, BufferedWriter], None]]
-"""Suffix -> what writes a content to a file."""
+
+def format_file(
+    name: str,
+    recognizes: Recognizes,
+    write: Callable[[Any, BufferedWriter], None],
+    library: str = "",
+) -> FileKind:
+    """A row of a table of formats: name, content, writer, and the library that it needs."""
+    return FileKind(f"{name} file", recognizes, (library,) if library else (), "export", write)
 
 
 def write_by_suffix(
-    path: str | PathLike[str],
-    formats: Formats,
-    writers: Writers,
-    content: Any,
-    overwrite: bool,
-    *,
-    takes: float,
+    path: str | PathLike[str], formats: Formats, content: Any, *, overwrite: bool, takes: float
 ) -> None:
     """Write the content whole, or leave what was there.
 
     Args:
         path: The file.
         formats: What can be written, by suffix.
-        writers: What writes it, by suffix.
-        content: What they write.
+        content: What their writers take.
         overwrite: Whether it may replace anything.
         takes: What the file will take of the disk, roughly [bytes].
 
@@ -47,8 +46,9 @@ def write_by_suffix(
         NotWritten: It cannot be written.
     """
     kind = format_of(path, formats)
+    assert kind.write is not None
     with writing(path, kind, takes=takes, overwrite=overwrite) as file:
-        writers[Path(path).suffix.lower()](content, file)
+        kind.write(content, file)
 
 
 def write_vtu(mesh: Any, file: BufferedWriter, **options: Any) -> None:

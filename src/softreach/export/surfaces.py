@@ -14,13 +14,19 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.manipulator import a_manipulator
 from softreach.arm.skin import inside
 from softreach.export import ply
-from softreach.export.formats import Writers, load_library, write_by_suffix, write_vtk, write_vtu
+from softreach.export.formats import (
+    format_file,
+    load_library,
+    write_by_suffix,
+    write_vtk,
+    write_vtu,
+)
 from softreach.geometry.surface import SurfaceMesh
 from softreach.rod.arm_shape import arm_surface, bundle_surfaces
 from softreach.support.arguments import as_given, checked, dataset, flag, path, whole
-from softreach.support.arrays import Faces, as_faces, as_points
+from softreach.support.arrays import Array, Faces, as_faces, as_points
 from softreach.support.errors import InvalidInput
-from softreach.support.files.kinds import FileKind, Formats, Recognizes, beginning_with, text_with
+from softreach.support.files.kinds import Formats, beginning_with, text_with
 from softreach.support.palette import BODY, Color, bundle_color
 
 if TYPE_CHECKING:
@@ -36,7 +42,7 @@ class Part(NamedTuple):
     """One surface of a scene."""
 
     name: str
-    vertices: NDArray[np.float64]
+    vertices: Array
     """[m], shape (v, 3)."""
     faces: Faces
     """Shape (f, 3)."""
@@ -51,7 +57,7 @@ def _parts_of(value: Any) -> tuple[Any, Any] | None:
     return value.vertices, value.faces
 
 
-def _a_mesh(name: str, value: Any) -> tuple[NDArray[np.float64], Faces]:
+def _a_mesh(name: str, value: Any) -> tuple[Array, Faces]:
     """Vertices and faces of a surface, or the pair of them."""
     allowed = "an object with vertices [m] and faces, or the pair of them"
     pair = value if isinstance(value, tuple) else _parts_of(value)
@@ -84,7 +90,7 @@ def export_mesh(
         MissingExtra: The format needs a library that is not installed.
         NotWritten: It cannot be written.
     """
-    vertices, faces = cast("tuple[NDArray[np.float64], Faces]", mesh_or_hull)
+    vertices, faces = cast("tuple[Array, Faces]", mesh_or_hull)
     if not len(faces):
         raise InvalidInput("mesh.faces", "none", "at least one triangle")
     write_parts([Part("surface", vertices, faces)], path, overwrite=overwrite)
@@ -104,7 +110,7 @@ def write_parts(
         NotWritten: It cannot be written.
     """
     takes = _BYTES * sum(len(part.faces) for part in parts)
-    write_by_suffix(path, SURFACE_FILES, _WRITERS, parts, overwrite, takes=takes)
+    write_by_suffix(path, SURFACE_FILES, parts, overwrite=overwrite, takes=takes)
 
 
 def _write_ply(parts: Sequence[Part], file: BufferedWriter) -> None:
@@ -155,7 +161,7 @@ def _mesh(parts: Sequence[Part]) -> Any:
     return meshio.Mesh(vertices, [("triangle", faces)], cell_data={"part": [number]})
 
 
-def _joined(parts: Sequence[Part]) -> tuple[NDArray[np.float64], Faces]:
+def _joined(parts: Sequence[Part]) -> tuple[Array, Faces]:
     """Vertices and faces of all parts as one mesh."""
     starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
     faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
@@ -202,28 +208,15 @@ def _is_stl(path: Path) -> bool:
     return head.startswith(b"solid ") or (len(head) == 84 and path.stat().st_size == size)
 
 
-def _file(name: str, recognizes: Recognizes, library: str = "") -> FileKind:
-    return FileKind(f"{name} file", recognizes, (library,) if library else (), "export")
-
-
 SURFACE_FILES: Formats = {
-    ".ply": _file("a PLY", beginning_with(b"ply\n", b"ply\r")),
-    ".stl": _file("an STL", _is_stl, "trimesh"),
-    ".obj": _file("an OBJ", text_with("\nv "), "trimesh"),
-    ".glb": _file("a GLB", beginning_with(b"glTF"), "trimesh"),
-    ".vtu": _file("a VTU", text_with("<VTKFile", "UnstructuredGrid"), "meshio"),
-    ".vtk": _file("a VTK", beginning_with(b"# vtk DataFile"), "meshio"),
+    ".ply": format_file("a PLY", beginning_with(b"ply\n", b"ply\r"), _write_ply),
+    ".stl": format_file("an STL", _is_stl, _write_stl, "trimesh"),
+    ".obj": format_file("an OBJ", text_with("\nv "), _write_obj, "trimesh"),
+    ".glb": format_file("a GLB", beginning_with(b"glTF"), _write_glb, "trimesh"),
+    ".vtu": format_file("a VTU", text_with("<VTKFile", "UnstructuredGrid"), _write_vtu, "meshio"),
+    ".vtk": format_file("a VTK", beginning_with(b"# vtk DataFile"), _write_vtk, "meshio"),
 }
 """What surfaces and arms can be written as."""
-
-_WRITERS: Writers = {
-    ".ply": _write_ply,
-    ".stl": _write_stl,
-    ".obj": _write_obj,
-    ".glb": _write_glb,
-    ".vtu": _write_vtu,
-    ".vtk": _write_vtk,
-}
 
 
 # An arm for other programs: its body and every bundle as closed surfaces with names and colors.

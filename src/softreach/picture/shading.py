@@ -7,8 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.picture.projection import View, project
 from softreach.picture.zbuffer import ZBuffer
-
-Array = NDArray[np.float64]
+from softreach.support.arrays import Array, Index
 
 _LAMP = np.array([-0.45, 0.60, 0.66])  # over the left shoulder: right, up, toward the eye
 _AMBIENT, _DIFFUSE, _GLOSS = 0.40, 0.62, 0.08
@@ -84,7 +83,7 @@ def seen_through(image: NDArray[np.uint8], within: NDArray[np.uint8]) -> NDArray
     return np.rint(mixed).astype(np.uint8)
 
 
-def faces_to_eye(vertices: ArrayLike, faces: ArrayLike, view: View) -> NDArray[np.int64]:
+def faces_to_eye(vertices: ArrayLike, faces: ArrayLike, view: View) -> Index:
     """Those of the faces that are seen from outside, shape (n, 3).
 
     Args:

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.picture.projection import View, project
 from softreach.picture.shading import draw_mesh, faces_to_eye, seen_through
 from softreach.picture.zbuffer import Extent, ZBuffer
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import STEEL, Color
 
@@ -125,7 +126,7 @@ def thumbnail(*parts: Skin | Dots, view: View = "oblique", width: int = _WIDTH) 
     return png_bytes(seen_through(buffer.rgba(), within.rgba()) if clear else buffer.rgba())
 
 
-def _square_around(seen: list[NDArray[np.float64]]) -> Extent | None:
+def _square_around(seen: list[Array]) -> Extent | None:
     """A square of the projection plane with a margin around all finite points."""
     flat = np.concatenate([points[:, :2] for points in seen]) if seen else np.empty((0, 2))
     flat = flat[np.isfinite(flat).all(axis=1)]
@@ -148,6 +149,6 @@ def _draw_skin(buffer: ZBuffer, skin: Skin, view: View) -> None:
         draw_mesh(buffer, skin.vertices, skin.faces, skin.color, view)
 
 
-def _draw_dots(buffer: ZBuffer, points: NDArray[np.float64], colors: ArrayLike) -> None:
+def _draw_dots(buffer: ZBuffer, points: Array, colors: ArrayLike) -> None:
     size = float(np.clip(0.8 * buffer.shape[1] / np.cbrt(max(len(points), 1)), 1.0, 6.0))
     buffer.draw_points(points, colors, size)

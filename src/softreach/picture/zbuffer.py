@@ -16,12 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.picture.projection import View, project
+from softreach.support.arrays import Array, Index
 
 # Triangles to pixels, row by row: only pixels that are covered are ever computed.
 
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _PIXELS = 1 << 17  # at a time: temporary arrays stay in the MB
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.skin import inside
 from softreach.picture.projection import View
@@ -26,7 +26,7 @@ from softreach.plot.style import (
 )
 from softreach.rod.arm_shape import arm_surface, bundle_skins, rest_configuration
 from softreach.support.arguments import checked, each_of, flag, instance, optional
-from softreach.support.arrays import as_stations
+from softreach.support.arrays import Array, as_stations
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import BODY, bundle_color
 
@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from softreach.arm.manipulator import Manipulator
-
-Array = NDArray[np.float64]
 
 _SIDES = 96
 _BULGE = 1.01  # of R2, beyond which a bundle makes the picture wider

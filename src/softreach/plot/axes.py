@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.picture.projection import View, is_mirrored, plane_of, project, view_axes
 from softreach.picture.shading import seen_through
 from softreach.picture.zbuffer import Extent, ZBuffer
 from softreach.plot.lengths import LengthUnit
 from softreach.plot.style import DPI, pyplot
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 
 # A box in space behind an oblique view: three far walls with a grid, and coordinates on edges.
 
-
-Array = NDArray[np.float64]
 
 _TICK_GAP = 4.0  # points between an edge and its numbers
 _LABEL_GAP = np.array([23.0, 15.0])  # points between an edge beside or above its label and that

@@ -31,6 +31,7 @@ from softreach.plot.style import (
 from softreach.rod.arm_shape import rest_configuration
 from softreach.support import parallel
 from softreach.support.arguments import checked, flag, optional
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -84,9 +85,7 @@ def plot_cloud(
     return panel.ax
 
 
-def cloud_image(
-    panel: Panel, tips: NDArray[np.float64], rgb: NDArray[np.uint8], size: float | None
-) -> ZBuffer:
+def cloud_image(panel: Panel, tips: Array, rgb: NDArray[np.uint8], size: float | None) -> ZBuffer:
     """The image of points in a panel.
 
     Args:
@@ -103,13 +102,13 @@ def cloud_image(
     return buffer
 
 
-def drawn_tips(cloud: xr.Dataset) -> NDArray[np.float64]:
+def drawn_tips(cloud: xr.Dataset) -> Array:
     """Tip positions in the units of the axes, shape (sample, 3)."""
     tip = cloud["tip"].transpose("sample", "axis")
     return unit_of(tip).of(tip.values)
 
 
-def point_size(samples: int, box: NDArray[np.float64]) -> float:
+def point_size(samples: int, box: Array) -> float:
     """A diameter that closes the surface of a cloud without blurring it, in units of the box."""
     spacing = np.ptp(box, axis=0).max() / np.cbrt(max(samples, 1))
     return 0.45 * float(spacing)
@@ -177,7 +176,7 @@ def plot_slab(
     return panel.ax
 
 
-def _half(thickness: float | None, tips: NDArray[np.float64], unit: LengthUnit) -> float:
+def _half(thickness: float | None, tips: Array, unit: LengthUnit) -> float:
     """Half the thickness in the units of the axes."""
     if thickness is not None:
         return float(unit.of(thickness)) / 2
@@ -269,9 +268,7 @@ def plot_views(
     return figure
 
 
-def _layout(
-    span: NDArray[np.float64], width: float, view: View
-) -> tuple[Figure, list[tuple[View, Axes]], float]:
+def _layout(span: Array, width: float, view: View) -> tuple[Figure, list[tuple[View, Axes]], float]:
     """Views and axes whose sizes are the spans at one scale, and the share of height above them."""
     x, y, z = span * (width - _LEFT - _GAP - _RIGHT) / (span[0] + span[1])
     height = _BOTTOM + y + _GAP + z + _TOP

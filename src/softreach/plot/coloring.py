@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.schema import activation_symbols, activation_units
-from softreach.support.arrays import as_floats
+from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import activation_colors
 
@@ -32,8 +32,6 @@ __all__ = [
     "draw_figure_key",
     "draw_key",
 ]
-
-Array = NDArray[np.float64]
 
 COLORMAP = "viridis"
 _MISSING = 204  # light gray
@@ -240,7 +238,7 @@ def _logarithmic(values: Array, label: str) -> Coloring:
     return Coloring(rgb, ScalarKey(label, low, high, logarithmic=True))
 
 
-def _scalar(values: NDArray[np.float64], label: str, low: float | None = None) -> Coloring:
+def _scalar(values: Array, label: str, low: float | None = None) -> Coloring:
     from matplotlib import colormaps
 
     finite = np.isfinite(values)

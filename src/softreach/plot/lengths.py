@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ class LengthUnit(NamedTuple):
     relative: bool
     """Whether it is L, the length of the arm."""
 
-    def of(self, meters: ArrayLike) -> NDArray[np.float64]:
+    def of(self, meters: ArrayLike) -> Array:
         """Lengths [m] as numbers on an axis."""
         return np.asarray(meters, float) / self.size
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.picture.projection import View, is_mirrored, project, view_axes
 from softreach.plot.arm import arm_points, draw_arms, plot_arm, shapes_of
@@ -16,7 +16,7 @@ from softreach.plot.lengths import in_lengths
 from softreach.plot.style import DRAWN, MANIPULATOR, SHAPE, figure_style, small_axes
 from softreach.rod.tip_map import TipStatus
 from softreach.support.arguments import POSITIVE, as_given, checked, flag, optional, within
-from softreach.support.arrays import as_floats
+from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
     from softreach.rod.all_equilibria import AllEquilibria
     from softreach.workspace.payload import LargestPayload, PayloadCurve
-
-Array = NDArray[np.float64]
 
 _STATIONS = 121
 _PALE = 0.7  # how far the colors of other stable arms go toward white

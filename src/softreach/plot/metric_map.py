@@ -7,18 +7,16 @@ import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.atlas import over_length
 from softreach.plot.coloring import COLORMAP
 from softreach.plot.style import figure_style, small_axes
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-
-Array = NDArray[np.float64]
 
 _UNITS = {"rad": "°", "1": ""}
 _INDEXED = re.compile(r"(?<![a-z])([ERZaρθ])([0-9tc])")

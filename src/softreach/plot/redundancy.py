@@ -41,6 +41,7 @@ from softreach.support.arguments import (
     whole,
     within,
 )
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -147,7 +148,7 @@ def largest_distance(distances: Iterable[xr.DataArray]) -> float:
     return max((float(f.max()) for f in finite if len(f)), default=1.0) or 1.0
 
 
-def _draw_histogram(ax: Any, values: NDArray[np.float64], edges: NDArray[np.float64]) -> None:
+def _draw_histogram(ax: Any, values: Array, edges: Array) -> None:
     finite = values[np.isfinite(values)]
     share = 100.0 * np.histogram(finite, edges)[0] / max(len(values), 1)
     colors = _colors(edges[:-1], edges[-1]) / 255
@@ -161,7 +162,7 @@ def _draw_histogram(ax: Any, values: NDArray[np.float64], edges: NDArray[np.floa
         write_note(ax, text, 0.98, 0.98)
 
 
-def _colors(values: NDArray[np.float64], high: float) -> NDArray[np.uint8]:
+def _colors(values: Array, high: float) -> NDArray[np.uint8]:
     from matplotlib import colormaps
 
     shares = np.nan_to_num(values) / (high or 1.0)
@@ -232,9 +233,7 @@ def plot_redundancy(
     return figure
 
 
-def _rows(
-    titles: list[str], box: NDArray[np.float64], width: float
-) -> tuple[Figure, dict[str, dict[str, Axes]]]:
+def _rows(titles: list[str], box: Array, width: float) -> tuple[Figure, dict[str, dict[str, Axes]]]:
     """Axes at one scale: four columns, a row for each title."""
     x, y, z = np.ptp(box, axis=0)
     spans = {"cloud": x, "front": x, "side": y, "distance": x}

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.support.palette import BODY, Color, bundle_color, material_fill
 
@@ -104,8 +103,6 @@ def _annulus(low: float, high: float) -> Patch:
 
 # The bundles in a cross-section: sectors, dots and lumens in their colors.
 
-
-Array = NDArray[np.float64]
 
 _STROKE_ANGLE = np.radians(8)  # between fibers that do not run along the bundle
 _LIGHTNESS = (0.21, 0.72, 0.07)  # of red, green and blue

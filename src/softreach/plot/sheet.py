@@ -23,6 +23,7 @@ from softreach.plot.metric_map import SheetAxis
 from softreach.plot.style import BOX, DPI, POINTS, WIDTH, a_view, figure_style, pyplot
 from softreach.support import parallel
 from softreach.support.arguments import checked, mapping_of
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import STEEL, activation_colors
 
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 Grid = NDArray[np.object_]
 Content = TypeVar("Content")
 

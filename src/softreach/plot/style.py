@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.geometry.surface import SurfaceMesh
@@ -26,7 +25,7 @@ from softreach.support.arguments import (
     path,
     within,
 )
-from softreach.support.arrays import as_floats, as_indices
+from softreach.support.arrays import Array, as_floats, as_indices
 from softreach.support.errors import InvalidInput, MissingExtra, Range
 from softreach.support.files.atomic import writing
 from softreach.support.files.kinds import PICTURES, format_of
@@ -158,7 +157,7 @@ def a_view(name: str, value: Any) -> Any:
     return value
 
 
-def _box(name: str, value: Any) -> NDArray[np.float64]:
+def _box(name: str, value: Any) -> Array:
     """A lower and an upper corner, shape (2, 3)."""
     allowed = "a lower and an upper corner, finite numbers of shape (2, 3)"
     corners = as_floats(name, value, allowed)

@@ -7,7 +7,6 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm import designs
 from softreach.cloud.clouds import compute_cloud
@@ -15,6 +14,7 @@ from softreach.cloud.dexterity import solution_measure
 from softreach.cloud.redundancy import activation_distance, redundancy_summary, tip_density
 from softreach.paper.claims import Finding, Numbers, Verdict, judged
 from softreach.paper.notebook import Notebook, Settings
+from softreach.support.arrays import Array
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,7 +75,7 @@ def _found(cloud: xr.Dataset, distance: xr.DataArray) -> dict[str, Any]:
     }
 
 
-def _inside(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _inside(values: Array) -> Array:
     """Values of cells none of whose neighbors is empty: the border cuts others."""
     from scipy.ndimage import binary_erosion
 

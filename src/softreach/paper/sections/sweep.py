@@ -6,20 +6,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.designs import minimal_trunk
 from softreach.atlas import DesignSpace, build_atlas, open_atlas
 from softreach.paper.atlas_figures import atlas_figures
 from softreach.paper.claims import Finding, Numbers, judged
 from softreach.paper.notebook import Notebook, Settings
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.workspace import ReachableSolid, reachable_set
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Array = NDArray[np.float64]
 
 ASIDE = 0.3
 """From where on a place lies far from the plane of symmetry [L]."""

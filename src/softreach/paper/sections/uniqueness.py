@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.designs import minimal_trunk
 from softreach.arm.manipulator import Manipulator
@@ -15,12 +14,11 @@ from softreach.paper.claims import Finding, Numbers, judged
 from softreach.paper.notebook import Notebook, Settings
 from softreach.paper.sections.sweep import swept_atlas
 from softreach.rod.kinematics import configuration
+from softreach.support.arrays import Array
 from softreach.workspace import ReachableCurve, ReachableSolid, ReachableSurface, reachable_set
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Array = NDArray[np.float64]
 
 _TARGETS = 2_000
 _LABEL = "reached more than once / %"
