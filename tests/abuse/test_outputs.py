@@ -298,7 +298,8 @@ def test_an_output_that_cannot_be_written_is_refused_before_the_work(
     def computed(*_, **__):
         raise AssertionError("it was computed first")
 
-    for place in ("cloud.compute_cloud", "workspace.reachable_set", "workspace.payload.payload_curve"):
+    heavy = "cloud.compute_cloud", "workspace.reachable_set", "workspace.payload.payload_curve"
+    for place in heavy:
         monkeypatch.setattr(f"softreach.{place}", computed)
     assert expected in refusal_of(arguments, capsys, crowded)
 

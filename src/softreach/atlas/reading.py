@@ -17,8 +17,7 @@ from softreach.atlas.store import DAMAGED, FAILED, GAP, KNOWN, PER_DESIGN, UNSTA
 from softreach.support.arguments import checked, dataset, text
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, SoftreachWarning, counted
-from softreach.support.files.sealed_store import Chunk, storage_errors
-from softreach.support.files.store_place import READING, check_arrays
+from softreach.support.files.stores import ARRAYS, READING, Chunk, check_arrays, storage_errors
 
 TOLD = (FAILED, GAP, UNSTABLE)
 """The status of designs that have a message."""
@@ -208,6 +207,7 @@ def _opened(store: StoreLike, *, metrics: bool) -> xr.Dataset:
         check_arrays(held.opened)
         raw = xr.open_zarr(held.opened.place, drop_variables=_READ_HERE, **READING)
         coordinates = _coordinates(held, raw)
+    raw.attrs.pop(ARRAYS)
     variables = _variables(held, found) | (_metrics(held.command, found) if metrics else {})
     whole = raw.assign(variables).assign_coords(coordinates)
     whole.encoding["source"] = str(held.location)

@@ -14,7 +14,7 @@ from softreach.studio.reach import Quality, Reach
 from softreach.studio.stages import reached
 from softreach.studio.state import StudioState
 from softreach.support.errors import InvalidInput
-from softreach.support.files.store_place import kind_of
+from softreach.support.files.stores import kind_of
 
 if TYPE_CHECKING:
     import xarray as xr
