@@ -24,7 +24,7 @@ from softreach.rod.never_at_rest import none_of
 from softreach.rod.tip_map import TipMap, TipStatus, tip_map
 from softreach.support.arrays import Array
 from softreach.support.errors import SoftreachError, SoftreachWarning
-from softreach.support.files.stores import StoreFailed
+from softreach.support.files.damage import StoreFailed
 
 # What the metrics of one design are computed from; each result is found once and shared.
 

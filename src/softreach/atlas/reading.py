@@ -17,7 +17,8 @@ from softreach.atlas.store import DAMAGED, FAILED, GAP, KNOWN, PER_DESIGN, UNSTA
 from softreach.support.arguments import checked, dataset, text
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, SoftreachWarning, counted
-from softreach.support.files.stores import ARRAYS, READING, Chunk, check_arrays, storage_errors
+from softreach.support.files.damage import Chunk, storage_errors
+from softreach.support.files.stores import ARRAYS, READING, check_arrays
 
 TOLD = (FAILED, GAP, UNSTABLE)
 """The status of designs that have a message."""

@@ -29,19 +29,15 @@ from softreach.atlas.layout import CUBE, MISSING, SEAL, Plan, array_plans
 from softreach.sampling import sample_cube
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
+from softreach.support.files.damage import Chunk, StoreFailed, Watch, storage_errors, writing
 from softreach.support.files.stores import (
     ARRAYS,
     REMEDY,
     CheckedStore,
-    Chunk,
     Opened,
-    StoreFailed,
-    Watch,
     absolute,
     checked_place,
     opened_root,
-    storage_errors,
-    writing,
 )
 
 if TYPE_CHECKING:

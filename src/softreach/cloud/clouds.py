@@ -25,17 +25,16 @@ from softreach.support import parallel
 from softreach.support.arguments import checked, dataset, flag, function, optional, path
 from softreach.support.errors import InvalidInput
 from softreach.support.files.atomic import replacing
+from softreach.support.files.damage import Watch, storage_errors
 from softreach.support.files.kinds import FileKind, Formats
 from softreach.support.files.stores import (
     ARRAYS,
     READING,
     REMEDY,
-    Watch,
     check_arrays,
     checked_place,
     list_arrays,
     opened_root,
-    storage_errors,
 )
 from softreach.support.memory import check_room
 from softreach.support.progress import Progress, bar, silent

@@ -11,18 +11,23 @@ import copy
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 import google_crc32c
 from zarr.storage import LocalStore, WrapperStore  # noqa: TID253  (imported where stores are)
 
-from softreach.support.errors import InvalidInput, SoftreachError
+from softreach.support.errors import InvalidInput
 from softreach.support.files.atomic import sync_file_in
-from softreach.support.files.interruption import as_a_whole
+from softreach.support.files.damage import (
+    AS_WRITTEN,
+    DOCUMENT,
+    Chunk,
+    DamagedStore,
+    Watch,
+    storage_errors,
+)
 
 if TYPE_CHECKING:
     import zarr
@@ -50,8 +55,6 @@ READING: Mapping[str, Any] = {
 }
 """Options with which xarray reads a store: as it was written, and numbers as numbers."""
 
-_DOCUMENT = "zarr.json"
-_AS_WRITTEN = "as softreach wrote it"
 _ALLOWED = {"cloud": "a Zarr store written by softreach", "atlas": "a new folder, or an atlas"}
 _CHECKSUM = 4  # bytes at the end of every chunk, by the crc32c codec
 _TYPES = (
@@ -62,88 +65,6 @@ _TYPES = (
 _CODECS = ("bytes", "vlen-utf8", "blosc", "zstd", "gzip", "crc32c")
 """Those of the Zarr v3 core; none of them can run code."""
 _GROUP = {"zarr_format", "node_type", "attributes", "consolidated_metadata"}
-
-
-class StoreFailed(SoftreachError):
-    """The store cannot be written to, for instance because the disk is full; it can be resumed."""
-
-
-class DamagedStore(InvalidInput):
-    """A store that holds something else than softreach wrote.
-
-    Attributes:
-        location: The store.
-        array: Which of its arrays; empty for the store itself.
-        chunk: Which chunk of the array, such as (0, 3); None for what describes the array.
-    """
-
-    def __init__(
-        self, location: object, chunk: Chunk, found: str, remedy: str, allowed: str = _AS_WRITTEN
-    ) -> None:
-        self.location, self.array, self.chunk = str(location), *chunk
-        place = "" if chunk.place is None else "/".join(map(str, chunk.place)) or "0"
-        what = f"chunk {place} of array {chunk.array}" if place else f"array {chunk.array}"
-        where = f"{what} in {location}" if chunk.array else f"{_DOCUMENT} of {location}"
-        super().__init__(where, found, allowed, remedy)
-
-
-class Chunk(NamedTuple):
-    """A file of a store: a chunk of an array, or what describes an array or the store."""
-
-    array: str
-    """Empty for the store itself."""
-    place: tuple[int, ...] | None
-    """None for what describes the array."""
-
-    @classmethod
-    def of_key(cls, key: str) -> Self | None:
-        """The file with this key, from the root of the store on; None for any other."""
-        if key == _DOCUMENT or key.endswith(f"/{_DOCUMENT}"):
-            return cls(key.removesuffix(_DOCUMENT).rstrip("/"), None)
-        array, found, numbers = key.rpartition("/c/")
-        if key.endswith("/c"):  # the only chunk of a number
-            array, found, numbers = key[:-2], "/c", ""
-        places = numbers.split("/") if numbers else []
-        if not found or not all(text.isascii() and text.isdigit() for text in places):
-            return None
-        return cls(array, tuple(map(int, places)))
-
-
-@dataclass(kw_only=True, eq=False)
-class Watch:
-    """What is asked of the files of a store that are read, and what becomes of damaged ones."""
-
-    location: object
-    remedy: str
-    """What a person does about damage."""
-    required: Callable[[Chunk], bool] = lambda _: False
-    """Which chunks must exist; others that are missing hold fill values."""
-    digests: dict[str, str] = field(default_factory=dict)
-    """Digest of what describes each array, as the root lists it or as it was written."""
-    listed: bool = False
-    """Whether the digests are those of the root."""
-    _noted: dict[Chunk, str] | None = field(default=None, init=False)
-
-    def report(self, chunk: Chunk, found: str, allowed: str = _AS_WRITTEN) -> None:
-        """Note damage where that is asked for.
-
-        Raises:
-            DamagedStore: It is not.
-        """
-        error = DamagedStore(self.location, chunk, found, self.remedy, allowed)
-        if self._noted is None:
-            raise error
-        self._noted[chunk] = str(error)
-
-    @contextmanager
-    def noting(self) -> Iterator[dict[Chunk, str]]:
-        """Read damaged files as missing ones, and collect what is wrong with each."""
-        before, noted = self._noted, {}
-        self._noted = noted
-        try:
-            yield noted
-        finally:
-            self._noted = before
 
 
 class Opened(NamedTuple):
@@ -234,9 +155,9 @@ def kind_of(path: str | os.PathLike[str]) -> Kind:
         InvalidInput: No store of softreach.
     """
     try:
-        attributes = _unsealed((Path(path) / _DOCUMENT).read_bytes())["attributes"]
+        attributes = _unsealed((Path(path) / DOCUMENT).read_bytes())["attributes"]
     except (OSError, _Broken) as error:
-        reason = f"its {_DOCUMENT} is {error.found}" if isinstance(error, _Broken) else str(error)
+        reason = f"its {DOCUMENT} is {error.found}" if isinstance(error, _Broken) else str(error)
         raise InvalidInput("store", os.fspath(path), _ALLOWED["cloud"], reason) from None
     return "atlas" if "command" in attributes else "cloud"
 
@@ -249,30 +170,6 @@ def absolute(location: StoreLike) -> StoreLike:
     if isinstance(location, os.PathLike) or (isinstance(location, str) and "://" not in location):
         return str(Path(location).absolute())
     return location
-
-
-@contextmanager
-def writing(location: object) -> Iterator[None]:
-    """Turn errors of the disk or the network into one line that says what to do.
-
-    A process that a signal ends waits for what is being written.
-    """
-    failed = f"{location} cannot be written"
-    then = "; what is done is safe, and the same command continues once that is fixed"
-    with as_a_whole(), storage_errors(failed, then):
-        yield
-
-
-@contextmanager
-def storage_errors(what: str, then: str = "") -> Iterator[None]:
-    """Raise any error of any kind of store as `StoreFailed`, in one line."""
-    try:
-        yield
-    except SoftreachError:
-        raise
-    except Exception as error:
-        reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
-        raise StoreFailed(f"{what}: {' '.join(reason.split())}{then}") from error
 
 
 class CheckedStore(WrapperStore[Any]):
@@ -394,7 +291,7 @@ def _store(location: Any, mode: Mode) -> Store:
 class _Broken(Exception):
     """A file that cannot be trusted, or is none of softreach: what it is, and what it must be."""
 
-    def __init__(self, found: str, allowed: str = _AS_WRITTEN) -> None:
+    def __init__(self, found: str, allowed: str = AS_WRITTEN) -> None:
         self.found, self.allowed = found, allowed
         super().__init__(f"{found}: must be {allowed}")
 
