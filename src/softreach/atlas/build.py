@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
     from softreach.atlas.space import DesignSpace
 
+
 STORED = 6.2
 """What a tip takes in a store [bytes]."""
 
@@ -73,9 +74,6 @@ def check_demand(
         of_each = STORED * n * keep_clouds + _FILES * _ON_DISK
         asked = f"{n} samples of {designs} designs"
         check_disk("n", asked, of_each * designs + 8 * n * space.base.bundles, str(store))
-
-
-# Build an atlas: every design of a space, stored as it comes, resumed where it stopped.
 
 
 @checked(

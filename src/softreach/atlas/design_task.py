@@ -26,10 +26,12 @@ from softreach.support.arrays import Array
 from softreach.support.errors import SoftreachError, SoftreachWarning
 from softreach.support.files.damage import StoreFailed
 
-# What the metrics of one design are computed from; each result is found once and shared.
-
-
 _BLOCK = 65_536  # samples at a time, where not all of them are needed at once
+Values = dict[str, Array]
+Outcome = tuple[int, str]
+"""Number of a design, and why it failed; empty if it did not."""
+
+_opened: dict[tuple[str, tuple[str, int]], AtlasStore] = {}
 
 
 class Intermediates(Mapping[Need, Any]):
@@ -90,54 +92,6 @@ def activations_of(rod: TipMap, cube: Array) -> Array:
     return rod.box.from_cube(cube[:, : rod.box.bundles])
 
 
-def _stable(of: Intermediates, values: Array) -> Array:
-    """Those of the samples that have a stable equilibrium; not copied if all have."""
-    return values if of.stable.all() else values[of.stable]
-
-
-def _alpha_complex(of: Intermediates) -> AlphaComplex:
-    return AlphaComplex(triangulation=delaunay(of[Need.TIPS]))
-
-
-def _convex_volume(of: Intermediates) -> float:
-    """From the triangulation, if one is needed anyway."""
-    if Need.ALPHA_COMPLEX in of.wanted:
-        return float(of[Need.ALPHA_COMPLEX].volumes.sum())
-    return convex_hull(of[Need.TIPS]).volume
-
-
-def _reachable_set(of: Intermediates) -> Any:
-    from softreach.workspace import reachable_set
-
-    return reachable_set(of.rod, accuracy=of.command.accuracy)
-
-
-def _strain_statistics(of: Intermediates) -> Any:
-    rod, cube = of.rod, of.cube
-    if rod.supports_unstable:
-        cube = cube[of.stable]
-    blocks = (activations_of(rod, cube[k : k + _BLOCK]) for k in range(0, len(cube), _BLOCK))
-    stations = np.array(of.command.stations) * rod.length
-    return stream_statistics(rod, blocks, stations, quantiles=of.command.quantiles)
-
-
-_COMPUTE: dict[Need, Callable[[Intermediates], Any]] = {
-    Need.ARM: lambda of: of.arm,
-    Need.LENGTH: lambda of: of.arm.length,
-    Need.ACTIVATIONS: lambda of: _stable(of, activations_of(of.rod, of.cube)),
-    Need.TIPS: lambda of: _stable(of, of.tips),
-    Need.LOST_SHARE: lambda of: float((~of.stable).mean()),
-    Need.ALPHA: lambda of: of.command.alpha_over_length * of.arm.length,
-    Need.ALPHA_COMPLEX: _alpha_complex,
-    Need.CONVEX_VOLUME: _convex_volume,
-    Need.REACHABLE_SET: _reachable_set,
-    Need.STRAIN_STATISTICS: _strain_statistics,
-}
-Values = dict[str, Array]
-Outcome = tuple[int, str]
-"""Number of a design, and why it failed; empty if it did not."""
-
-
 def begin_design(store: AtlasStore, metrics: Sequence[Metric], index: int) -> Callable[[], Outcome]:
     """Do the part of a design that uses all threads; return the rest as a function to call.
 
@@ -195,9 +149,6 @@ class Remote:
             os.environ.setdefault("SOFTREACH_NUM_THREADS", "1")
 
 
-_opened: dict[tuple[str, tuple[str, int]], AtlasStore] = {}
-
-
 def run_remotely(remote: Remote, index: int) -> Outcome:
     """Compute and store a design in a worker; a repeated call gives the same result."""
     remote.bound_threads()
@@ -207,6 +158,37 @@ def run_remotely(remote: Remote, index: int) -> Outcome:
             return begin_design(remote.store(), remote.metrics, index)()
         except SoftreachError as error:
             raise StoreFailed(str(error)) from None  # this one can be sent back
+
+
+def _stable(of: Intermediates, values: Array) -> Array:
+    """Those of the samples that have a stable equilibrium; not copied if all have."""
+    return values if of.stable.all() else values[of.stable]
+
+
+def _alpha_complex(of: Intermediates) -> AlphaComplex:
+    return AlphaComplex(triangulation=delaunay(of[Need.TIPS]))
+
+
+def _convex_volume(of: Intermediates) -> float:
+    """From the triangulation, if one is needed anyway."""
+    if Need.ALPHA_COMPLEX in of.wanted:
+        return float(of[Need.ALPHA_COMPLEX].volumes.sum())
+    return convex_hull(of[Need.TIPS]).volume
+
+
+def _reachable_set(of: Intermediates) -> Any:
+    from softreach.workspace import reachable_set
+
+    return reachable_set(of.rod, accuracy=of.command.accuracy)
+
+
+def _strain_statistics(of: Intermediates) -> Any:
+    rod, cube = of.rod, of.cube
+    if rod.supports_unstable:
+        cube = cube[of.stable]
+    blocks = (activations_of(rod, cube[k : k + _BLOCK]) for k in range(0, len(cube), _BLOCK))
+    stations = np.array(of.command.stations) * rod.length
+    return stream_statistics(rod, blocks, stations, quantiles=of.command.quantiles)
 
 
 def _finish(
@@ -253,3 +235,17 @@ def _fail(store: AtlasStore, index: int, error: Exception) -> Outcome:
     message = f"{type(error).__name__}: {error}"
     store.write_failure(index, message)
     return index, message
+
+
+_COMPUTE: dict[Need, Callable[[Intermediates], Any]] = {
+    Need.ARM: lambda of: of.arm,
+    Need.LENGTH: lambda of: of.arm.length,
+    Need.ACTIVATIONS: lambda of: _stable(of, activations_of(of.rod, of.cube)),
+    Need.TIPS: lambda of: _stable(of, of.tips),
+    Need.LOST_SHARE: lambda of: float((~of.stable).mean()),
+    Need.ALPHA: lambda of: of.command.alpha_over_length * of.arm.length,
+    Need.ALPHA_COMPLEX: _alpha_complex,
+    Need.CONVEX_VOLUME: _convex_volume,
+    Need.REACHABLE_SET: _reachable_set,
+    Need.STRAIN_STATISTICS: _strain_statistics,
+}

@@ -20,8 +20,18 @@ from softreach.support.errors import InvalidInput, SoftreachWarning, counted
 from softreach.support.files.damage import Chunk, storage_errors
 from softreach.support.files.stores import ARRAYS, READING, check_arrays
 
+if TYPE_CHECKING:
+    import xarray as xr
+    from zarr.storage import StoreLike
+
+    AtlasLike = StoreLike | xr.Dataset
+
+
 TOLD = (FAILED, GAP, UNSTABLE)
 """The status of designs that have a message."""
+
+_POWERS = {"m": 1, "m2": 2, "m3": 3, "1/m": -1}
+_READ_HERE = ("metrics", "metric", "curvature", "quantity", "status", "message")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,57 +85,6 @@ def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] 
     status[[*reader.damaged]] = DAMAGED
     messages = dict(sorted((texts | reader.damaged).items()))
     return Contents(status=status, messages=messages, tables=tables)
-
-
-class _Reader:
-    """Reads arrays of an atlas, and notes which designs are damaged."""
-
-    def __init__(self, store: AtlasStore) -> None:
-        self._store = store
-        self.damaged: dict[int, str] = {}
-        """What is damaged of each: number -> message."""
-
-    def read(self, name: str, place: Any = ...) -> NDArray[Any]:
-        """Values of an array; fill values where it is damaged."""
-        array = self._store.array(name)
-        with self._store.watch.noting() as noted:
-            values = np.array(array[place])
-        for chunk, line in noted.items():
-            self.damaged.setdefault(self._store.number(chunk), line)
-        return values
-
-    def table(self, name: str, status: NDArray[np.uint8]) -> Array:
-        """All metrics of an array; nothing is read where there are none yet."""
-        if np.isin(status, KNOWN).any():
-            return self.read(name)
-        return np.full(self._store.array(name).shape, np.nan)
-
-
-def _required(store: AtlasStore, status: NDArray[np.uint8]) -> Callable[[Chunk], bool]:
-    """Which chunks must be there, by the status of their designs."""
-    known, told = np.isin(status, KNOWN), np.isin(status, TOLD)
-
-    def required(chunk: Chunk) -> bool:
-        if chunk.array not in PER_DESIGN:
-            return True
-        if chunk.array == "status":
-            return False
-        return bool((told if chunk.array == "message" else known)[store.number(chunk)])
-
-    return required
-
-
-# Read an atlas, also while it is being written: a dataset over the parameters of its designs.
-
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from zarr.storage import StoreLike
-
-    AtlasLike = StoreLike | xr.Dataset
-
-
-_POWERS = {"m": 1, "m2": 2, "m3": 3, "1/m": -1}
 
 
 @checked(store=a_store)
@@ -196,6 +155,44 @@ def over_length(atlas: xr.Dataset, metric: str) -> xr.DataArray:
     return relative.assign_attrs({**values.attrs, "units": "1"})
 
 
+class _Reader:
+    """Reads arrays of an atlas, and notes which designs are damaged."""
+
+    def __init__(self, store: AtlasStore) -> None:
+        self._store = store
+        self.damaged: dict[int, str] = {}
+        """What is damaged of each: number -> message."""
+
+    def read(self, name: str, place: Any = ...) -> NDArray[Any]:
+        """Values of an array; fill values where it is damaged."""
+        array = self._store.array(name)
+        with self._store.watch.noting() as noted:
+            values = np.array(array[place])
+        for chunk, line in noted.items():
+            self.damaged.setdefault(self._store.number(chunk), line)
+        return values
+
+    def table(self, name: str, status: NDArray[np.uint8]) -> Array:
+        """All metrics of an array; nothing is read where there are none yet."""
+        if np.isin(status, KNOWN).any():
+            return self.read(name)
+        return np.full(self._store.array(name).shape, np.nan)
+
+
+def _required(store: AtlasStore, status: NDArray[np.uint8]) -> Callable[[Chunk], bool]:
+    """Which chunks must be there, by the status of their designs."""
+    known, told = np.isin(status, KNOWN), np.isin(status, TOLD)
+
+    def required(chunk: Chunk) -> bool:
+        if chunk.array not in PER_DESIGN:
+            return True
+        if chunk.array == "status":
+            return False
+        return bool((told if chunk.array == "message" else known)[store.number(chunk)])
+
+    return required
+
+
 def _opened(store: StoreLike, *, metrics: bool) -> xr.Dataset:
     import xarray as xr
 
@@ -213,9 +210,6 @@ def _opened(store: StoreLike, *, metrics: bool) -> xr.Dataset:
     whole = raw.assign(variables).assign_coords(coordinates)
     whole.encoding["source"] = str(held.location)
     return whole
-
-
-_READ_HERE = ("metrics", "metric", "curvature", "quantity", "status", "message")
 
 
 def _variables(store: AtlasStore, found: Contents) -> dict[str, Any]:

@@ -47,7 +47,6 @@ if TYPE_CHECKING:
 
 
 TODO, DONE, FAILED, GAP, UNSTABLE, DAMAGED = range(6)
-
 KNOWN = (DONE, UNSTABLE)
 """The status of designs of which metrics are stored."""
 
@@ -270,6 +269,16 @@ def fixed_point(tips: Array, scale: float) -> NDArray[np.int32]:
     return np.where(np.isnan(whole), MISSING, whole).astype(np.int32)
 
 
+def drawn_cube(command: Command) -> Array:
+    """The activations that the command draws on this machine."""
+    return sample_cube(command.sampler, command.n, command.space.bundles, command.seed)
+
+
+def digest(cube: Array) -> str:
+    """SHA-256 of activations."""
+    return hashlib.sha256(np.ascontiguousarray(cube).tobytes()).hexdigest()
+
+
 def _attributes(command: Command) -> dict[str, Any]:
     """What the root says about the atlas."""
     versions = {name: version(name) for name in ("numpy", "scipy", "zarr", "xarray", "numba")}
@@ -293,16 +302,6 @@ def _digests(command: Command) -> dict[str, str]:
     for plan in array_plans(command):
         _described(group, plan)
     return watch.digests
-
-
-def drawn_cube(command: Command) -> Array:
-    """The activations that the command draws on this machine."""
-    return sample_cube(command.sampler, command.n, command.space.bundles, command.seed)
-
-
-def digest(cube: Array) -> str:
-    """SHA-256 of activations."""
-    return hashlib.sha256(np.ascontiguousarray(cube).tobytes()).hexdigest()
 
 
 def _is_shared(chunk: Chunk) -> bool:

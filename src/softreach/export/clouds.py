@@ -29,7 +29,10 @@ from softreach.support.palette import activation_colors
 if TYPE_CHECKING:
     import xarray as xr
 
+
 _BLOCK = 1 << 18
+_BYTES = 12  # of a number in a file: 8, or about 18 in text, which few formats are
+_MAT_LIMIT = 2**31  # bytes of one variable in a version 5 file
 
 
 class CloudTable(NamedTuple):
@@ -107,6 +110,45 @@ def column_names(bundles: Sequence[str]) -> list[str]:
     return names
 
 
+@checked(cloud=dataset("tip", "activation", what="a cloud"), path=path, overwrite=flag)
+def export_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+    """Write a cloud as .ply, .csv, .parquet, .npz, .mat, .vtu or .vtk, chosen by the suffix.
+
+    Tables have the columns x, y, z [m] and one activation per bundle, such as ``gamma_left``;
+    NPZ and MAT hold the arrays tip, activation and bundle. Clouds of arms under loads have the
+    column or array status too: 0 stable, 1 unstable, 2 no equilibrium, whose tip is NaN. Design,
+    seed, tolerance, version and units go along, except in CSV, VTU and VTK, which have no place for
+    them. PLY carries the picture's colors too.
+
+    Args:
+        cloud: tip(sample, axis) [m] and activation(sample, bundle), each in its unit.
+        path: The file; it is replaced only when the new one is complete.
+        overwrite: Whether it may replace any file, and not only a table of that format.
+
+    Raises:
+        InvalidInput: Unknown suffix, not a cloud, more than the format can hold, or something else
+            is there.
+        MissingExtra: The format needs a library that is not installed.
+        NotWritten: It cannot be written.
+    """
+    table = cloud_table(cloud)
+    takes = _BYTES * (table.tip.size + table.activation.size)
+    write_by_suffix(path, CLOUD_FILES, table, overwrite=overwrite, takes=takes)
+
+
+def path_csv(found: xr.Dataset) -> str:
+    """Activations and tip errors [m] at the points of a path, one line each, as CSV.
+
+    Args:
+        found: From `track_path`; what is beyond the end of the branch is nan.
+    """
+    names = [str(name) for name in found["bundle"].values]
+    rows = zip(found.activation.values.tolist(), found.tip_error.values.tolist(), strict=True)
+    header = ",".join([*column_names(names), "tip_error_m"])
+    lines = [header, *(",".join(f"{x:.12g}" for x in (*g, error)) for g, error in rows)]
+    return "\n".join([*lines, ""])
+
+
 def _bundle_names(activation: xr.DataArray) -> tuple[str, ...]:
     if "bundle" in activation.coords:
         return tuple(map(str, activation["bundle"].values))
@@ -133,39 +175,6 @@ def _metadata(cloud: xr.Dataset) -> dict[str, str | int | float]:
 def _plain(value: Any) -> str | int | float:
     value = value.item() if isinstance(value, np.generic) else value
     return value if isinstance(value, str | int | float) else str(value)
-
-
-# Clouds for other programs: every format holds the tips and the activations of all samples.
-
-
-_BYTES = 12  # of a number in a file: 8, or about 18 in text, which few formats are
-_MAT_LIMIT = 2**31  # bytes of one variable in a version 5 file
-
-
-@checked(cloud=dataset("tip", "activation", what="a cloud"), path=path, overwrite=flag)
-def export_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
-    """Write a cloud as .ply, .csv, .parquet, .npz, .mat, .vtu or .vtk, chosen by the suffix.
-
-    Tables have the columns x, y, z [m] and one activation per bundle, such as ``gamma_left``;
-    NPZ and MAT hold the arrays tip, activation and bundle. Clouds of arms under loads have the
-    column or array status too: 0 stable, 1 unstable, 2 no equilibrium, whose tip is NaN. Design,
-    seed, tolerance, version and units go along, except in CSV, VTU and VTK, which have no place for
-    them. PLY carries the picture's colors too.
-
-    Args:
-        cloud: tip(sample, axis) [m] and activation(sample, bundle), each in its unit.
-        path: The file; it is replaced only when the new one is complete.
-        overwrite: Whether it may replace any file, and not only a table of that format.
-
-    Raises:
-        InvalidInput: Unknown suffix, not a cloud, more than the format can hold, or something else
-            is there.
-        MissingExtra: The format needs a library that is not installed.
-        NotWritten: It cannot be written.
-    """
-    table = cloud_table(cloud)
-    takes = _BYTES * (table.tip.size + table.activation.size)
-    write_by_suffix(path, CLOUD_FILES, table, overwrite=overwrite, takes=takes)
 
 
 def _write_ply(table: CloudTable, file: BufferedWriter) -> None:
@@ -266,19 +275,3 @@ CLOUD_FILES: Formats = {
     ".vtk": format_file("a VTK", beginning_with(b"# vtk DataFile"), _write_vtk, "meshio"),
 }
 """What clouds can be exported as."""
-
-
-# The activations along a path as a table.
-
-
-def path_csv(found: xr.Dataset) -> str:
-    """Activations and tip errors [m] at the points of a path, one line each, as CSV.
-
-    Args:
-        found: From `track_path`; what is beyond the end of the branch is nan.
-    """
-    names = [str(name) for name in found["bundle"].values]
-    rows = zip(found.activation.values.tolist(), found.tip_error.values.tolist(), strict=True)
-    header = ",".join([*column_names(names), "tip_error_m"])
-    lines = [header, *(",".join(f"{x:.12g}" for x in (*g, error)) for g, error in rows)]
-    return "\n".join([*lines, ""])

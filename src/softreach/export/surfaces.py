@@ -34,8 +34,10 @@ if TYPE_CHECKING:
 
     from softreach.arm.manipulator import Manipulator
 
+
 _BYTES = 50  # of a triangle and its share of the vertices
 _Z_UP_TO_Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
+_CLEAR = 0.45  # opacity of a body that has something inside
 
 
 class Part(NamedTuple):
@@ -48,13 +50,6 @@ class Part(NamedTuple):
     """Shape (f, 3)."""
     color: Color = BODY
     opacity: float = 1.0
-
-
-def _parts_of(value: Any) -> tuple[Any, Any] | None:
-    """Vertices and faces of an object that has them."""
-    if isinstance(value, type) or not (hasattr(value, "vertices") and hasattr(value, "faces")):
-        return None
-    return value.vertices, value.faces
 
 
 def _a_mesh(name: str, value: Any) -> tuple[Array, Faces]:
@@ -111,6 +106,56 @@ def write_parts(
     """
     takes = _BYTES * sum(len(part.faces) for part in parts)
     write_by_suffix(path, SURFACE_FILES, parts, overwrite=overwrite, takes=takes)
+
+
+@checked(
+    arm=a_manipulator,
+    configuration=dataset("position", "directors", "extension", "Z", what="a configuration"),
+    path=path,
+    sides=whole(3, 10_000),
+    overwrite=flag,
+)
+def export_arm(
+    arm: Manipulator,
+    configuration: xr.Dataset,
+    path: str | PathLike[str],
+    *,
+    sides: int = 64,
+    overwrite: bool = False,
+) -> None:
+    """Write a deformed arm as .ply, .stl, .obj, .glb, .vtu or .vtk, chosen by the suffix.
+
+    The body is a closed tube, translucent in .glb and .ply where something lies inside. A bundle
+    that fills a sector is a closed skin as wide as its extent, half sunk into the outside of its
+    ring; a tendon is a thin tube, a chamber a tube of its radius. Parts are called ``body`` and by
+    the names of the bundles.
+
+    Args:
+        arm: The design.
+        configuration: One configuration of that arm [m].
+        path: The file; it is replaced only when the new one is complete.
+        sides: Corners of each section of the body.
+        overwrite: Whether it may replace any file, and not only a surface of that format.
+
+    Raises:
+        InvalidInput: Unknown suffix, several configurations, or something else is there.
+        MissingExtra: The format needs a library that is not installed.
+        NotWritten: It cannot be written.
+    """
+    body = arm_surface(arm, configuration, sides)
+    opacity = _CLEAR if any(inside(arm)) else 1.0
+    parts = [Part("body", body.vertices, body.faces, opacity=opacity)]
+    for index, skin in enumerate(bundle_surfaces(arm, configuration)):
+        name = _part_name(arm.bundle_names, index)
+        parts.append(Part(name, skin.vertices, skin.faces, bundle_color(index)))
+    write_parts(parts, path, overwrite=overwrite)
+
+
+def _parts_of(value: Any) -> tuple[Any, Any] | None:
+    """Vertices and faces of an object that has them."""
+    if isinstance(value, type) or not (hasattr(value, "vertices") and hasattr(value, "faces")):
+        return None
+    return value.vertices, value.faces
 
 
 def _write_ply(parts: Sequence[Part], file: BufferedWriter) -> None:
@@ -208,6 +253,12 @@ def _is_stl(path: Path) -> bool:
     return head.startswith(b"solid ") or (len(head) == 84 and path.stat().st_size == size)
 
 
+def _part_name(names: tuple[str, ...], index: int) -> str:
+    """The bundle's name, with its number where another part has that name."""
+    taken = ("body", *names[:index])
+    return names[index] if names[index] not in taken else f"{names[index]} ({index + 1})"
+
+
 SURFACE_FILES: Formats = {
     ".ply": format_file("a PLY", beginning_with(b"ply\n", b"ply\r"), _write_ply),
     ".stl": format_file("an STL", _is_stl, _write_stl, "trimesh"),
@@ -217,58 +268,3 @@ SURFACE_FILES: Formats = {
     ".vtk": format_file("a VTK", beginning_with(b"# vtk DataFile"), _write_vtk, "meshio"),
 }
 """What surfaces and arms can be written as."""
-
-
-# An arm for other programs: its body and every bundle as closed surfaces with names and colors.
-
-
-_CLEAR = 0.45  # opacity of a body that has something inside
-
-
-@checked(
-    arm=a_manipulator,
-    configuration=dataset("position", "directors", "extension", "Z", what="a configuration"),
-    path=path,
-    sides=whole(3, 10_000),
-    overwrite=flag,
-)
-def export_arm(
-    arm: Manipulator,
-    configuration: xr.Dataset,
-    path: str | PathLike[str],
-    *,
-    sides: int = 64,
-    overwrite: bool = False,
-) -> None:
-    """Write a deformed arm as .ply, .stl, .obj, .glb, .vtu or .vtk, chosen by the suffix.
-
-    The body is a closed tube, translucent in .glb and .ply where something lies inside. A bundle
-    that fills a sector is a closed skin as wide as its extent, half sunk into the outside of its
-    ring; a tendon is a thin tube, a chamber a tube of its radius. Parts are called ``body`` and by
-    the names of the bundles.
-
-    Args:
-        arm: The design.
-        configuration: One configuration of that arm [m].
-        path: The file; it is replaced only when the new one is complete.
-        sides: Corners of each section of the body.
-        overwrite: Whether it may replace any file, and not only a surface of that format.
-
-    Raises:
-        InvalidInput: Unknown suffix, several configurations, or something else is there.
-        MissingExtra: The format needs a library that is not installed.
-        NotWritten: It cannot be written.
-    """
-    body = arm_surface(arm, configuration, sides)
-    opacity = _CLEAR if any(inside(arm)) else 1.0
-    parts = [Part("body", body.vertices, body.faces, opacity=opacity)]
-    for index, skin in enumerate(bundle_surfaces(arm, configuration)):
-        name = _part_name(arm.bundle_names, index)
-        parts.append(Part(name, skin.vertices, skin.faces, bundle_color(index)))
-    write_parts(parts, path, overwrite=overwrite)
-
-
-def _part_name(names: tuple[str, ...], index: int) -> str:
-    """The bundle's name, with its number where another part has that name."""
-    taken = ("body", *names[:index])
-    return names[index] if names[index] not in taken else f"{names[index]} ({index + 1})"

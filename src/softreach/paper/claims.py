@@ -37,9 +37,6 @@ def judged(text: str, agrees: bool, nearly: bool = False) -> Finding:
     return Finding(text, verdict)
 
 
-# What the paper says, statement by statement: `claims.toml`, and the check of each.
-
-
 @dataclass(frozen=True)
 class Claim:
     """A statement of the paper and its check."""

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+
 _NOTES = FileKind("what a part of the report found", text_with('"folder": null,\n "part": '))
 
 
@@ -84,9 +85,6 @@ class Notebook:
     @property
     def _file(self) -> Path:
         return self.folder / f"{self.part}.json"
-
-
-# Sizes of the clouds with which the paper is recomputed.
 
 
 @dataclass(frozen=True, kw_only=True)

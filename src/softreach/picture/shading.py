@@ -11,6 +11,7 @@ from softreach.support.arrays import Array, Index
 
 _LAMP = np.array([-0.45, 0.60, 0.66])  # over the left shoulder: right, up, toward the eye
 _AMBIENT, _DIFFUSE, _GLOSS = 0.40, 0.62, 0.08
+_SHARE = 0.55  # of what is inside, in the color of a pixel
 
 
 def draw_mesh(
@@ -60,12 +61,6 @@ def vertex_normals(points: Array, faces: NDArray[np.integer]) -> Array:
         np.add.at(total, faces[:, k], normals)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.divide(total, length, out=np.zeros_like(total), where=length > 0)
-
-
-# What lies inside of something, seen through it.
-
-
-_SHARE = 0.55  # of what is inside, in the color of a pixel
 
 
 def seen_through(image: NDArray[np.uint8], within: NDArray[np.uint8]) -> NDArray[np.uint8]:

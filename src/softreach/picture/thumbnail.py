@@ -18,10 +18,11 @@ from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import STEEL, Color
 
-# An image as a PNG file, without an image library.
-
-
 _COLOR_TYPES = {3: 2, 4: 6}  # channels -> RGB or RGBA
+_WIDTH = 220  # pixels
+_MARGIN = 0.03
+_MOST = 100_000  # points; more do not show at this size
+_FINE = 20_000  # faces; more are about a pixel each, whose edges need no smoothing
 
 
 def png_bytes(image: NDArray[np.uint8]) -> bytes:
@@ -42,16 +43,6 @@ def png_bytes(image: NDArray[np.uint8]) -> bytes:
     content = zlib.compress(lines.tobytes(), 9)
     parts = ((b"IHDR", header), (b"IDAT", content), (b"IEND", b""))
     return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(kind, data) for kind, data in parts)
-
-
-def _chunk(kind: bytes, data: bytes) -> bytes:
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-
-_WIDTH = 220  # pixels
-_MARGIN = 0.03
-_MOST = 100_000  # points; more do not show at this size
-_FINE = 20_000  # faces; more are about a pixel each, whose edges need no smoothing
 
 
 class Skin(NamedTuple):
@@ -124,6 +115,10 @@ def thumbnail(*parts: Skin | Dots, view: View = "oblique", width: int = _WIDTH) 
             faces = faces_to_eye(part.vertices, part.faces, view)
             _draw_skin(within, part._replace(faces=faces), view)
     return png_bytes(seen_through(buffer.rgba(), within.rgba()) if clear else buffer.rgba())
+
+
+def _chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
 def _square_around(seen: list[Array]) -> Extent | None:

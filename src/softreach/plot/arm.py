@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
     from softreach.arm.manipulator import Manipulator
 
+
 _SIDES = 96
 _BULGE = 1.01  # of R2, beyond which a bundle makes the picture wider
 _FADE = 0.62  # how far the colors of the arm at rest go toward white
@@ -138,18 +139,6 @@ def arm_images(
     return buffer, within if clear else None
 
 
-def _draw_body(
-    buffer: ZBuffer, arm: Manipulator, shape: xr.Dataset, view: View, fade: float
-) -> None:
-    body = arm_surface(arm, shape, _SIDES)
-    caps = 2 * _SIDES  # the last faces; apart, so that light breaks at the rim
-    for part in (body.faces[:-caps], body.faces[-caps:]):
-        draw_mesh(buffer, body.vertices / arm.length, part, BODY, view, fade)
-
-
-# Designs at rest side by side: the arm, and below it some of its cross-sections.
-
-
 class DesignPanel(NamedTuple):
     """One arm in a row of arms."""
 
@@ -212,3 +201,12 @@ def plot_designs(
         for ax in np.ravel(axes[:, 1:]):
             ax.set(ylabel="", yticklabels=[])
     return figure
+
+
+def _draw_body(
+    buffer: ZBuffer, arm: Manipulator, shape: xr.Dataset, view: View, fade: float
+) -> None:
+    body = arm_surface(arm, shape, _SIDES)
+    caps = 2 * _SIDES  # the last faces; apart, so that light breaks at the rim
+    for part in (body.faces[:-caps], body.faces[-caps:]):
+        draw_mesh(buffer, body.vertices / arm.length, part, BODY, view, fade)

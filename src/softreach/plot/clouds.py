@@ -41,7 +41,13 @@ if TYPE_CHECKING:
 
     from softreach.arm.manipulator import Manipulator
 
+
 _LARGEST = 8.0  # pixels
+_THICKNESS = 1 / 50  # of L, or of the cloud's extent
+Images = tuple[ZBuffer, ZBuffer | None]
+"""An image, and what shows through it."""
+
+_LEFT, _GAP, _RIGHT, _BOTTOM, _TOP = 0.55, 0.60, 0.12, 0.42, 0.42  # inches
 
 
 @checked(**DRAWN, cloud=POINTS, size=SIZE, key=flag)
@@ -114,12 +120,6 @@ def point_size(samples: int, box: Array) -> float:
     return 0.45 * float(spacing)
 
 
-# The tips of a cloud near a plane, so that what lies inside can be seen.
-
-
-_THICKNESS = 1 / 50  # of L, or of the cloud's extent
-
-
 @checked(**DRAWN, cloud=POINTS, at=PLACE, thickness=optional(LENGTH), size=SIZE, key=flag)
 def plot_slab(
     cloud: xr.Dataset,
@@ -174,35 +174,6 @@ def plot_slab(
         if key:
             draw_key(panel.ax, coloring.key)
     return panel.ax
-
-
-def _half(thickness: float | None, tips: Array, unit: LengthUnit) -> float:
-    """Half the thickness in the units of the axes."""
-    if thickness is not None:
-        return float(unit.of(thickness)) / 2
-    return _THICKNESS / 2 * (1.0 if unit.relative else float(np.nanmax(np.ptp(tips, axis=0))))
-
-
-def _place(axis: str, middle: float, half: float, unit: LengthUnit) -> str:
-    """Which slab it is, such as |x| ≤ 0.01 L."""
-    distance = f"{axis} - {middle:.3g} {unit.symbol}" if middle else axis
-    return f"|{distance}| ≤ {half:.3g} {unit.symbol}"
-
-
-def _point_size(count: int, panel: Panel) -> float:
-    """A diameter [pixels] that closes a slice: about the mean spacing in the plane."""
-    extent = panel.extent
-    area = (extent.right - extent.left) * (extent.top - extent.bottom)
-    return float(np.clip(1.2 * np.sqrt(area / count) * panel.pixels_per_unit, 2.0, 8.0))
-
-
-# A cloud from the front, the side and the top at one scale, and obliquely in its box.
-
-
-Images = tuple[ZBuffer, ZBuffer | None]
-"""An image, and what shows through it."""
-
-_LEFT, _GAP, _RIGHT, _BOTTOM, _TOP = 0.55, 0.60, 0.12, 0.42, 0.42  # inches
 
 
 @checked(
@@ -266,6 +237,26 @@ def plot_views(
                 panel.show(image, within)
         draw_figure_key(figure, coloring.key, top)
     return figure
+
+
+def _half(thickness: float | None, tips: Array, unit: LengthUnit) -> float:
+    """Half the thickness in the units of the axes."""
+    if thickness is not None:
+        return float(unit.of(thickness)) / 2
+    return _THICKNESS / 2 * (1.0 if unit.relative else float(np.nanmax(np.ptp(tips, axis=0))))
+
+
+def _place(axis: str, middle: float, half: float, unit: LengthUnit) -> str:
+    """Which slab it is, such as |x| ≤ 0.01 L."""
+    distance = f"{axis} - {middle:.3g} {unit.symbol}" if middle else axis
+    return f"|{distance}| ≤ {half:.3g} {unit.symbol}"
+
+
+def _point_size(count: int, panel: Panel) -> float:
+    """A diameter [pixels] that closes a slice: about the mean spacing in the plane."""
+    extent = panel.extent
+    area = (extent.right - extent.left) * (extent.top - extent.bottom)
+    return float(np.clip(1.2 * np.sqrt(area / count) * panel.pixels_per_unit, 2.0, 8.0))
 
 
 def _layout(span: Array, width: float, view: View) -> tuple[Figure, list[tuple[View, Axes]], float]:

@@ -68,9 +68,6 @@ def plot_hull(
     return panel.ax
 
 
-# How the volume of an alpha shape depends on its radius, beside the exact volume.
-
-
 @checked(
     curves=mapping_of(as_floats),
     alphas=as_floats,

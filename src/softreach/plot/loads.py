@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from softreach.rod.all_equilibria import AllEquilibria
     from softreach.workspace.payload import LargestPayload, PayloadCurve
 
+
 _STATIONS = 121
 _PALE = 0.7  # how far the colors of other stable arms go toward white
 _FOLLOWED, _STABLE, _UNSTABLE = "0.05", "#1f4e9e", "0.55"
@@ -35,6 +36,9 @@ _ARROW = 26  # length of the arrow of gravity [points]
 _ALONG_SIGHT = 0.1  # part of a direction in the paper, below which an arrow says nothing
 _LEAST_WIDTH, _ENTRY = 2.6, 0.18  # of figures, and the height of an entry of the legend [inch]
 _ABOVE = 4  # the order of lines over images
+_LARGEST = 0.2  # L, the longest half axis if the force is not given
+_CORNERS = 120
+_COLOR = "tab:orange"
 
 
 def _equilibria(name: str, value: Any) -> Any:
@@ -92,6 +96,110 @@ def plot_equilibria(
         _gravity_arrow(panel, equilibria)
         _add_legend(panel.ax, own_figure=ax is None)
     return panel.ax
+
+
+@checked(
+    **DRAWN,
+    arm=MANIPULATOR,
+    configuration=SHAPE,
+    compliance=as_floats,
+    force=optional(within(POSITIVE)),
+    rest=flag,
+)
+def plot_compliance(
+    arm: Manipulator,
+    configuration: xr.Dataset,
+    compliance: ArrayLike,
+    *,
+    ax: Axes | None = None,
+    view: View = "front",
+    force: float | None = None,
+    rest: bool = False,
+    box: ArrayLike | None = None,
+) -> Axes:
+    """Draw an arm with the ellipsoids over which a small force in any direction moves its tip.
+
+    They are to scale, as far as the tip yields in proportion to the force.
+
+    Args:
+        arm: The design.
+        configuration: One configuration of that arm or several along `sample`.
+        compliance: That of each, from `tip_compliance` [m/N], shape (3, 3) or (n, 3, 3).
+        ax: Axes to draw in; None for a new figure.
+        view: As in `plot_cloud`.
+        force: Size of the force [N]; None for a round one.
+        rest: Whether to draw the arm at rest too.
+        box: What to show, lower and upper corner [m], shape (2, 3); None for all that is drawn.
+
+    Returns:
+        The axes, in L.
+
+    Raises:
+        InvalidInput: Unknown view, a force that is not positive, or another number of compliances.
+        MissingExtra: matplotlib is not installed.
+    """
+    shapes = shapes_of(configuration)
+    given = np.asarray(compliance, float)
+    matrices = given if given.ndim == 3 else given[None]
+    if matrices.shape[1:] != (3, 3):
+        raise InvalidInput("compliance.shape", np.shape(compliance), "(3, 3) or (n, 3, 3)")
+    if len(matrices) != len(shapes):
+        raise InvalidInput("compliance", f"{len(matrices)} of them", f"one each of {len(shapes)}")
+    force = _round_force(matrices, arm.length) if force is None else force
+    if not 0 < force < np.inf:
+        raise InvalidInput("force", force, "> 0 N")
+    tips = np.array([shape["position"].values[-1] for shape in shapes]) / arm.length
+    axes = force * matrices / arm.length
+    with figure_style(ax):
+        if box is None:
+            surfaces = [arm_points(arm, shape) for shape in shapes]
+            box = arm.length * bounding_box(*surfaces, *_ends(tips, axes))
+        ax = plot_arm(arm, configuration, ax=ax, view=view, rest=rest, box=box)
+        for outline in _outlines(tips, axes, view):
+            ax.fill(*outline, facecolor=_COLOR, alpha=0.3, zorder=3)
+            ax.plot(*outline, color=_COLOR, linewidth=0.8, zorder=3)
+        ax.set_title(f"tip under {force:g} N in any direction")
+    return ax
+
+
+def plot_payload_curve(
+    curve: PayloadCurve,
+    *,
+    ax: Axes | None = None,
+    largest: Sequence[LargestPayload] = (),
+    label: str | None = None,
+) -> Axes:
+    """Draw the share of the reachable volume against the payload, with its errors.
+
+    Args:
+        curve: What `payload_curve` gives.
+        ax: Axes to draw in; None for a new figure.
+        largest: Payloads to mark, from `PayloadCurve.largest_payload`.
+        label: What a legend calls the curve.
+
+    Returns:
+        The axes, payloads in kg.
+
+    Raises:
+        MissingExtra: matplotlib is not installed.
+    """
+    points = [(0.0, 1.0), *((one.payload, one.share) for one in largest)]
+    points += zip(curve.payloads[1:], curve.shares[1:], strict=True)
+    mass, share = zip(*sorted(points), strict=True)
+    with figure_style(ax):
+        ax = small_axes(3.4, 2.6) if ax is None else ax
+        (line,) = ax.plot(mass, share, linewidth=1.2, label=label)
+        style = {"fmt": "o", "markersize": 3, "color": line.get_color(), "linewidth": 0.8}
+        ax.errorbar(curve.payloads, curve.shares, yerr=curve.share_errors, **style)
+        for one in largest:
+            ax.vlines(one.payload, 0.0, one.share, color="0.3", linewidth=0.8, linestyle=":")
+            ax.hlines(one.share, 0.0, one.payload, color="0.3", linewidth=0.8, linestyle=":")
+            ax.plot(one.payload, one.share, "o", markersize=4, mfc="white", color="0.3")
+        ax.set(xlabel="payload [kg]", ylabel="share of the volume without payload")
+        ax.set(xlim=(0.0, None), ylim=(0.0, None))
+        if label is not None:
+            ax.legend(loc="upper right")
+    return ax
 
 
 def _style(equilibria: AllEquilibria, k: int) -> dict[str, Any]:
@@ -167,78 +275,6 @@ def _add_legend(ax: Axes, *, own_figure: bool) -> None:
     figure.legend(kinds.values(), kinds.keys(), loc="outside lower center")
 
 
-# The picture of how an arm yields at its tip: where a force of one size can push it.
-
-
-_LARGEST = 0.2  # L, the longest half axis if the force is not given
-_CORNERS = 120
-_COLOR = "tab:orange"
-
-
-@checked(
-    **DRAWN,
-    arm=MANIPULATOR,
-    configuration=SHAPE,
-    compliance=as_floats,
-    force=optional(within(POSITIVE)),
-    rest=flag,
-)
-def plot_compliance(
-    arm: Manipulator,
-    configuration: xr.Dataset,
-    compliance: ArrayLike,
-    *,
-    ax: Axes | None = None,
-    view: View = "front",
-    force: float | None = None,
-    rest: bool = False,
-    box: ArrayLike | None = None,
-) -> Axes:
-    """Draw an arm with the ellipsoids over which a small force in any direction moves its tip.
-
-    They are to scale, as far as the tip yields in proportion to the force.
-
-    Args:
-        arm: The design.
-        configuration: One configuration of that arm or several along `sample`.
-        compliance: That of each, from `tip_compliance` [m/N], shape (3, 3) or (n, 3, 3).
-        ax: Axes to draw in; None for a new figure.
-        view: As in `plot_cloud`.
-        force: Size of the force [N]; None for a round one.
-        rest: Whether to draw the arm at rest too.
-        box: What to show, lower and upper corner [m], shape (2, 3); None for all that is drawn.
-
-    Returns:
-        The axes, in L.
-
-    Raises:
-        InvalidInput: Unknown view, a force that is not positive, or another number of compliances.
-        MissingExtra: matplotlib is not installed.
-    """
-    shapes = shapes_of(configuration)
-    given = np.asarray(compliance, float)
-    matrices = given if given.ndim == 3 else given[None]
-    if matrices.shape[1:] != (3, 3):
-        raise InvalidInput("compliance.shape", np.shape(compliance), "(3, 3) or (n, 3, 3)")
-    if len(matrices) != len(shapes):
-        raise InvalidInput("compliance", f"{len(matrices)} of them", f"one each of {len(shapes)}")
-    force = _round_force(matrices, arm.length) if force is None else force
-    if not 0 < force < np.inf:
-        raise InvalidInput("force", force, "> 0 N")
-    tips = np.array([shape["position"].values[-1] for shape in shapes]) / arm.length
-    axes = force * matrices / arm.length
-    with figure_style(ax):
-        if box is None:
-            surfaces = [arm_points(arm, shape) for shape in shapes]
-            box = arm.length * bounding_box(*surfaces, *_ends(tips, axes))
-        ax = plot_arm(arm, configuration, ax=ax, view=view, rest=rest, box=box)
-        for outline in _outlines(tips, axes, view):
-            ax.fill(*outline, facecolor=_COLOR, alpha=0.3, zorder=3)
-            ax.plot(*outline, color=_COLOR, linewidth=0.8, zorder=3)
-        ax.set_title(f"tip under {force:g} N in any direction")
-    return ax
-
-
 def _ends(tips: Array, axes: Array) -> list[Array]:
     """The corners of the boxes around the ellipsoids."""
     half = np.linalg.norm(axes, axis=2)
@@ -264,46 +300,3 @@ def _round_force(matrices: Array, length: float) -> float:
     most = _LARGEST * length / softest
     power = 10.0 ** math.floor(math.log10(most))
     return max(power * digit for digit in (1.0, 2.0, 5.0) if power * digit <= most * (1 + 1e-9))
-
-
-# How much of its reachable volume an arm keeps under a payload.
-
-
-def plot_payload_curve(
-    curve: PayloadCurve,
-    *,
-    ax: Axes | None = None,
-    largest: Sequence[LargestPayload] = (),
-    label: str | None = None,
-) -> Axes:
-    """Draw the share of the reachable volume against the payload, with its errors.
-
-    Args:
-        curve: What `payload_curve` gives.
-        ax: Axes to draw in; None for a new figure.
-        largest: Payloads to mark, from `PayloadCurve.largest_payload`.
-        label: What a legend calls the curve.
-
-    Returns:
-        The axes, payloads in kg.
-
-    Raises:
-        MissingExtra: matplotlib is not installed.
-    """
-    points = [(0.0, 1.0), *((one.payload, one.share) for one in largest)]
-    points += zip(curve.payloads[1:], curve.shares[1:], strict=True)
-    mass, share = zip(*sorted(points), strict=True)
-    with figure_style(ax):
-        ax = small_axes(3.4, 2.6) if ax is None else ax
-        (line,) = ax.plot(mass, share, linewidth=1.2, label=label)
-        style = {"fmt": "o", "markersize": 3, "color": line.get_color(), "linewidth": 0.8}
-        ax.errorbar(curve.payloads, curve.shares, yerr=curve.share_errors, **style)
-        for one in largest:
-            ax.vlines(one.payload, 0.0, one.share, color="0.3", linewidth=0.8, linestyle=":")
-            ax.hlines(one.share, 0.0, one.payload, color="0.3", linewidth=0.8, linestyle=":")
-            ax.plot(one.payload, one.share, "o", markersize=4, mfc="white", color="0.3")
-        ax.set(xlabel="payload [kg]", ylabel="share of the volume without payload")
-        ax.set(xlim=(0.0, None), ylim=(0.0, None))
-        if label is not None:
-            ax.legend(loc="upper right")
-    return ax

@@ -18,7 +18,12 @@ if TYPE_CHECKING:
     from softreach.arm.material import Material
     from softreach.arm.section import Section
 
+
 _EDGE, _HATCH = "0.4", "0.55"
+_STROKE_ANGLE = np.radians(8)  # between fibers that do not run along the bundle
+_LIGHTNESS = (0.21, 0.72, 0.07)  # of red, green and blue
+_LEAN = np.radians(14)  # of oblique strokes from the inner to the outer radius
+_OVERLAP = 1e-6  # [rad] or [-], below which bundles only touch
 
 
 def draw_layers(ax: Axes, section: Section, outer: float) -> None:
@@ -65,49 +70,6 @@ def material_style(section: Section, material: Material) -> dict[str, Any]:
     known = [material.same_matter(other) for _, other in section_materials(section)]
     color, hatch = material_fill(known.index(True))
     return {"facecolor": color, "hatch": hatch, "edgecolor": _HATCH, "linewidth": 0.0}
-
-
-def _draw_material(
-    ax: Axes, section: Section, material: Material, low: float, high: float, alpha: float = 1.0
-) -> None:
-    style = material_style(section, material)
-    fill = _annulus(low, high)
-    fill.set(**{**style, "facecolor": (style["facecolor"], alpha)})
-    fill.set_hatch_linewidth(0.4)
-    edge = _annulus(low, high)
-    edge.set(facecolor="none", edgecolor=_EDGE, linewidth=0.4)
-    ax.add_patch(fill)
-    ax.add_patch(edge)
-
-
-def _draw_voids(ax: Axes, section: Section, outer: float) -> None:
-    """The bore, and gaps between rings."""
-    reached = section.bore_ratio
-    voids = [(0.0, reached)] if reached > 0 else []
-    reached = max(reached, section.inner_ratio)
-    for ring in sorted(section.rings, key=lambda one: one.inner_ratio):
-        if ring.inner_ratio > reached:
-            voids.append((reached, ring.inner_ratio))
-        reached = max(reached, ring.outer_ratio)
-    for low, high in voids:
-        void = _annulus(outer * low, outer * high)
-        void.set(facecolor="white", edgecolor=_EDGE, linewidth=0.4)
-        ax.add_patch(void)
-
-
-def _annulus(low: float, high: float) -> Patch:
-    from matplotlib.patches import Annulus, Circle
-
-    return Annulus((0, 0), high, high - low) if low > 0 else Circle((0, 0), high)
-
-
-# The bundles in a cross-section: sectors, dots and lumens in their colors.
-
-
-_STROKE_ANGLE = np.radians(8)  # between fibers that do not run along the bundle
-_LIGHTNESS = (0.21, 0.72, 0.07)  # of red, green and blue
-_LEAN = np.radians(14)  # of oblique strokes from the inner to the outer radius
-_OVERLAP = 1e-6  # [rad] or [-], below which bundles only touch
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,6 +154,40 @@ def lumen_style(color: Color) -> dict[str, Any]:
     """Properties of the patch of a lumen: pale within a rim."""
     pale = tuple(0.25 * part + 0.75 for part in color)
     return {"facecolor": pale, "edgecolor": color, "linewidth": 1.4}
+
+
+def _draw_material(
+    ax: Axes, section: Section, material: Material, low: float, high: float, alpha: float = 1.0
+) -> None:
+    style = material_style(section, material)
+    fill = _annulus(low, high)
+    fill.set(**{**style, "facecolor": (style["facecolor"], alpha)})
+    fill.set_hatch_linewidth(0.4)
+    edge = _annulus(low, high)
+    edge.set(facecolor="none", edgecolor=_EDGE, linewidth=0.4)
+    ax.add_patch(fill)
+    ax.add_patch(edge)
+
+
+def _draw_voids(ax: Axes, section: Section, outer: float) -> None:
+    """The bore, and gaps between rings."""
+    reached = section.bore_ratio
+    voids = [(0.0, reached)] if reached > 0 else []
+    reached = max(reached, section.inner_ratio)
+    for ring in sorted(section.rings, key=lambda one: one.inner_ratio):
+        if ring.inner_ratio > reached:
+            voids.append((reached, ring.inner_ratio))
+        reached = max(reached, ring.outer_ratio)
+    for low, high in voids:
+        void = _annulus(outer * low, outer * high)
+        void.set(facecolor="white", edgecolor=_EDGE, linewidth=0.4)
+        ax.add_patch(void)
+
+
+def _annulus(low: float, high: float) -> Patch:
+    from matplotlib.patches import Annulus, Circle
+
+    return Annulus((0, 0), high, high - low) if low > 0 else Circle((0, 0), high)
 
 
 def _sector(one: PlacedBundle, outer: float, **style: Any) -> Wedge:

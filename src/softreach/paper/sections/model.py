@@ -29,6 +29,23 @@ def model(settings: Settings, folder: Path, notes: Notebook) -> None:
     _draw(arm, notes)
 
 
+def meeting(n: Numbers) -> Finding:
+    """Where the fibers are at the tip."""
+    words = f"at Z = L the edges of the sectors are {abs(n['gap_deg']):.2g}° apart"
+    return judged(words, abs(n["gap_deg"]) < 1.0)
+
+
+def narrowing(n: Numbers) -> Finding:
+    """How much the radius shrinks."""
+    return judged(f"{n['narrowing']:.2f}-fold", round(n["narrowing"], 1) == 6.2)
+
+
+def symmetry(n: Numbers) -> Finding:
+    """Mirror images."""
+    words = f"exchanging the helical activations mirrors the tip to within {n['asymmetry']:.1e} L"
+    return judged(words, n["asymmetry"] < 1e-9)
+
+
 def _gap(arm: Manipulator) -> float:
     """Angle between the right-handed bundle and the longitudinal one at the tip [deg]."""
     angles = arm.outline(arm.length).center[0]
@@ -60,23 +77,3 @@ def _draw(arm: Manipulator, notes: Notebook) -> None:
     sides = [DesignPanel("front", arm), DesignPanel("back", arm, "back")]
     words = "The minimal design from the front and the back, above its cross-section at the base."
     notes.draw("1d", "figure_1d_design", words, plot_designs(sides))
-
-
-# The design: its angles, radii and symmetry.
-
-
-def meeting(n: Numbers) -> Finding:
-    """Where the fibers are at the tip."""
-    words = f"at Z = L the edges of the sectors are {abs(n['gap_deg']):.2g}° apart"
-    return judged(words, abs(n["gap_deg"]) < 1.0)
-
-
-def narrowing(n: Numbers) -> Finding:
-    """How much the radius shrinks."""
-    return judged(f"{n['narrowing']:.2f}-fold", round(n["narrowing"], 1) == 6.2)
-
-
-def symmetry(n: Numbers) -> Finding:
-    """Mirror images."""
-    words = f"exchanging the helical activations mirrors the tip to within {n['asymmetry']:.1e} L"
-    return judged(words, n["asymmetry"] < 1e-9)
