@@ -145,7 +145,7 @@ def _first(suffix: str):
 
 
 PLACES = [
-    pytest.param("x" * 300 + ".ply", "choose a shorter name", id="a name too long"),
+    pytest.param("x" * 300 + ".ply", "choose another name", id="a name too long"),
     pytest.param("\0.ply", "must be a path", id="a zero byte"),
     pytest.param("circle/a.ply", "choose another name", id="links in a circle"),
     pytest.param("/dev/full/a.ply", "a part of its path is a file", id="below a device"),

@@ -1,4 +1,4 @@
-"""What an atlas takes of memory and disk, told before it is begun."""
+"""Building an atlas: every design of a space, stored as it comes, resumed where it stopped."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 
 STORED = 6.2
-"""What a tip takes in a store [bytes]."""
+"""Size of a stored tip [bytes]."""
 
 _ON_DISK = 4096  # bytes that the smallest file takes
 _FILES = 4  # of a design without tips: status, message, metrics, curvature

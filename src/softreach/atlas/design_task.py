@@ -1,4 +1,4 @@
-"""One design, start to end: tips, metrics, store."""
+"""Task of one design, start to end: tips, what its metrics are computed from, and its store."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def begin_design(store: AtlasStore, metrics: Sequence[Metric], index: int) -> Ca
 
 
 class Remote:
-    """What a worker elsewhere needs to compute designs of a store.
+    """Task as it travels to a worker elsewhere that computes designs of a store.
 
     It travels to the worker instead of arrays: the worker reads the activations from the store and
     writes its results there. The metrics' functions are in no store, so they travel along.

@@ -1,4 +1,4 @@
-"""Questions asked of an atlas: how much is done, which design is where, and its cloud."""
+"""Questions to an atlas: its status, its designs and their clouds, and the best of them."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ Interval = tuple[float | None, float | None]
 
 @dataclass(frozen=True, kw_only=True)
 class AtlasStatus:
-    """How much of an atlas is done."""
+    """Status of an atlas: numbers of its designs."""
 
     designs: int
     done: int
@@ -70,7 +70,7 @@ class AtlasStatus:
 
 @checked(atlas=an_atlas)
 def atlas_status(atlas: AtlasLike) -> AtlasStatus:
-    """How many designs of an atlas are done, and what is wrong with the others.
+    """Number of designs of an atlas that are done, and faults of the others.
 
     Metrics are verified, and so are tips if they are on disk and take no more than a second;
     `verify_atlas` verifies all of them.

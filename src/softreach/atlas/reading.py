@@ -1,4 +1,4 @@
-"""What an atlas holds of its designs, and which of them are damaged."""
+"""Reading an atlas, also while it is being written: a dataset over its parameters."""
 
 from __future__ import annotations
 
@@ -36,18 +36,18 @@ _READ_HERE = ("metrics", "metric", "curvature", "quantity", "status", "message")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Contents:
-    """What is stored of all designs but their tips, each of them checked."""
+    """Contents of an atlas but its tips, each chunk checked."""
 
     status: NDArray[np.uint8]
     """DAMAGED for designs of which a chunk is, shape (designs,)."""
     messages: dict[int, str]
     """Why designs failed, cannot exist, are nowhere stable or are damaged: number -> message."""
     tables: dict[str, Any]
-    """What is stored as `metrics` and `curvature`; fill values where it is damaged."""
+    """Arrays `metrics` and `curvature`; fill values where they are damaged."""
 
     @property
     def damage(self) -> str:
-        """How many designs are damaged, and the first of them; empty if none is."""
+        """Number of damaged designs, and the first of them; empty if none is."""
         damaged = np.flatnonzero(self.status == DAMAGED).tolist()
         if not damaged:
             return ""
@@ -133,7 +133,7 @@ def opened_atlas(atlas: AtlasLike, *, metrics: bool = True) -> xr.Dataset:
 
 
 def command_of(atlas: xr.Dataset) -> Command:
-    """What the atlas was asked to hold."""
+    """Command that built the atlas."""
     return Command.from_json(atlas.attrs["command"])
 
 
@@ -161,7 +161,7 @@ class _Reader:
     def __init__(self, store: AtlasStore) -> None:
         self._store = store
         self.damaged: dict[int, str] = {}
-        """What is damaged of each: number -> message."""
+        """Damage of each: number -> message."""
 
     def read(self, name: str, place: Any = ...) -> NDArray[Any]:
         """Values of an array; fill values where it is damaged."""
@@ -180,7 +180,7 @@ class _Reader:
 
 
 def _required(store: AtlasStore, status: NDArray[np.uint8]) -> Callable[[Chunk], bool]:
-    """Which chunks must be there, by the status of their designs."""
+    """Chunks that must be there, by the status of their designs."""
     known, told = np.isin(status, KNOWN), np.isin(status, TOLD)
 
     def required(chunk: Chunk) -> bool:

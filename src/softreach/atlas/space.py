@@ -139,11 +139,11 @@ class DesignSpace:
         return {name: one.unit for name, one in self.varied().items()}
 
     def varied(self) -> dict[str, Parameter]:
-        """What varies, by name."""
+        """Varied parameters, by name."""
         return find_parameters(self.base, self.names)
 
     def place(self, index: int) -> tuple[int, ...]:
-        """Where the design with this number is, along each dimension."""
+        """Place of the design with this number, along each dimension."""
         number = as_whole_number("number of the design", index, 0, self.size - 1)
         return tuple(map(int, np.unravel_index(number, self.shape)))
 

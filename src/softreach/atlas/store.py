@@ -55,7 +55,7 @@ PER_DESIGN = ("status", "message", "curvature", "tip", "metrics")
 
 
 class Result(NamedTuple):
-    """What is stored of one design."""
+    """Stored result of one design."""
 
     metrics: Mapping[str, ArrayLike]
     """Every metric of the command by name."""
@@ -146,7 +146,7 @@ class AtlasStore:
 
     @property
     def watch(self) -> Watch:
-        """What becomes of damage that is found."""
+        """Watch over damage that is found."""
         return self.opened.watch
 
     @property
@@ -226,7 +226,7 @@ class AtlasStore:
 
     @property
     def cube_digest(self) -> object:
-        """What tells the activations from any others."""
+        """Digest of the activations."""
         return self.group.attrs["unit_activation_sha256"]
 
     def write(self, index: int, result: Result, status: int = DONE, message: str = "") -> None:
@@ -280,7 +280,7 @@ def digest(cube: Array) -> str:
 
 
 def _attributes(command: Command) -> dict[str, Any]:
-    """What the root says about the atlas."""
+    """Attributes of the root."""
     versions = {name: version(name) for name in ("numpy", "scipy", "zarr", "xarray", "numba")}
     return {
         "title": "reachability cloud atlas",

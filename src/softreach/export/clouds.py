@@ -1,4 +1,4 @@
-"""A cloud as a table: x, y, z and one activation column per bundle, with what describes it."""
+"""Clouds for other programs: tips and activations of all samples, in every format."""
 
 from __future__ import annotations
 
@@ -274,4 +274,4 @@ CLOUD_FILES: Formats = {
     ".vtu": format_file("a VTU", text_with("<VTKFile", "UnstructuredGrid"), _write_vtu, "meshio"),
     ".vtk": format_file("a VTK", beginning_with(b"# vtk DataFile"), _write_vtk, "meshio"),
 }
-"""What clouds can be exported as."""
+"""Formats of clouds."""

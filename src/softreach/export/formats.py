@@ -1,4 +1,4 @@
-"""From the suffix of a path to the function that writes it, and to the library that this needs."""
+"""Tables of formats by suffix: name, content, writer, and the library that it needs."""
 
 from __future__ import annotations
 

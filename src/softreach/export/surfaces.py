@@ -1,4 +1,4 @@
-"""Surfaces for other programs: parts with a name and a color, in the formats that have them."""
+"""Surfaces and arms for other programs: parts with a name and a color."""
 
 from __future__ import annotations
 
@@ -267,4 +267,4 @@ SURFACE_FILES: Formats = {
     ".vtu": format_file("a VTU", text_with("<VTKFile", "UnstructuredGrid"), _write_vtu, "meshio"),
     ".vtk": format_file("a VTK", beginning_with(b"# vtk DataFile"), _write_vtk, "meshio"),
 }
-"""What surfaces and arms can be written as."""
+"""Formats of surfaces and arms."""

@@ -1,4 +1,4 @@
-"""What a part of the report found: numbers and figures, on disk as soon as they are there."""
+"""Notebook of a section of the report, on disk as soon as it is done, and sizes of its clouds."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Picture:
     """A figure of the report."""
 
     label: str
-    """Which figure of the paper it recomputes, such as "2a"; empty for one of our own."""
+    """Number of the figure in the paper, such as "2a"; empty for one of our own."""
     name: str
     """Of its files, without suffix."""
     caption: str

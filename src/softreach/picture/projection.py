@@ -1,4 +1,4 @@
-"""From space to paper: orthographic views, by name or by the direction of the eye."""
+"""Orthographic views of space on paper, by name or by the direction of the camera."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Light on a surface: a mesh drawn into a z-buffer, bright where it faces the lamp."""
+"""Lit meshes drawn into a z-buffer, and what lies inside of them, seen through."""
 
 from __future__ import annotations
 

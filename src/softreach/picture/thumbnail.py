@@ -1,4 +1,4 @@
-"""Small pictures for notebooks: what a value looks like, above its text."""
+"""Small pictures of values for notebooks, above their text, as PNG without an image library."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The picture of an arm, at rest and deformed: a lit tube with its fibers in color."""
+"""Pictures of arms, unloaded and deformed: lit tubes with their bundles, alone or side by side."""
 
 from __future__ import annotations
 

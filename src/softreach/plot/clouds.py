@@ -1,4 +1,4 @@
-"""The picture of a reachability cloud: every tip a point, its color the activation."""
+"""Pictures of a reachability cloud: whole, in a slab, and in four views."""
 
 from __future__ import annotations
 
@@ -247,7 +247,7 @@ def _half(thickness: float | None, tips: Array, unit: LengthUnit) -> float:
 
 
 def _place(axis: str, middle: float, half: float, unit: LengthUnit) -> str:
-    """Which slab it is, such as |x| ≤ 0.01 L."""
+    """Name of a slab, such as |x| ≤ 0.01 L."""
     distance = f"{axis} - {middle:.3g} {unit.symbol}" if middle else axis
     return f"|{distance}| ≤ {half:.3g} {unit.symbol}"
 

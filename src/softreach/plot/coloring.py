@@ -1,4 +1,4 @@
-"""What a color says about a sample, and the key that tells the reader."""
+"""Colors of samples, and the key that explains them."""
 
 from __future__ import annotations
 
@@ -47,13 +47,13 @@ class BundleKey(NamedTuple):
     names: tuple[str, ...]
     colors: NDArray[np.uint8]
     symbols: tuple[str, ...]
-    """What formulas call the activation of each: γ, τ or P."""
+    """Symbol of the activation of each: γ, τ or P."""
     unstable: bool = False
     """Whether some samples are marked as unstable equilibria."""
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """What each color stands for."""
+        """Label of each color."""
         pairs = zip(self.symbols, self.names, strict=True)
         return tuple(f"|{symbol}| {name}" for symbol, name in pairs)
 
@@ -216,7 +216,7 @@ def _clipped(coloring: Coloring) -> Coloring:
 
 
 def _described(color: ArrayLike) -> str:
-    """What an array says of itself: its long name and unit."""
+    """Label of an array: its long name and unit."""
     attrs = getattr(color, "attrs", {})
     name, unit = attrs.get("long_name", ""), attrs.get("units")
     return f"{name} [{'-' if unit == '1' else unit}]" if unit else name
@@ -257,7 +257,7 @@ def _extend(key: ScalarKey) -> str:
 
 
 def color_map(key: ScalarKey) -> Any:
-    """What matplotlib draws a color bar of."""
+    """Scale of colors, from which matplotlib draws a color bar."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm, Normalize
 
@@ -273,7 +273,7 @@ def _patches(key: BundleKey) -> list[Any]:
 
 
 def _marks(key: BundleKey | ScalarKey) -> list[Any]:
-    """What marks unstable samples, if there are any."""
+    """Mark of unstable samples, if there are any."""
     from matplotlib.patches import Patch
 
     color = tuple(np.array(UNSTABLE) / 255)

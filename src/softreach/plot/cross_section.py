@@ -1,4 +1,4 @@
-"""The picture of a cross-section: its layers, and the place of each bundle in it."""
+"""Picture of a cross-section: its layers, its bundles, and the key of both."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _MARGIN = 1.08
 
 
 class SectionKey(NamedTuple):
-    """What materials and bundles look like, and what they are called."""
+    """Key of a cross-section: looks and names of its materials and bundles."""
 
     handles: list[Artist]
     labels: list[str]

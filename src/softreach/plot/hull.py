@@ -1,4 +1,4 @@
-"""The picture of a hull: its boundary as a lit surface."""
+"""Pictures of hulls: a lit surface, and the volume of alpha shapes over their radius."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What lengths are counted in on paper: in L where the data know L, else in meters."""
+"""Unit of lengths on paper: L where the data know L, else the meter."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SUPERSCRIPTS = {1: "", 2: "²", 3: "³"}
 
 
 class LengthUnit(NamedTuple):
-    """What 1 on an axis stands for, and how its label says so."""
+    """Unit of an axis, and its label."""
 
     size: float
     """[m]"""

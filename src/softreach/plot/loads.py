@@ -1,4 +1,4 @@
-"""The picture of all equilibria of an arm: what it could do under its loads, and what it does."""
+"""Pictures of arms under loads: all equilibria, compliance of the tip, and payload curves."""
 
 from __future__ import annotations
 
@@ -203,7 +203,7 @@ def plot_payload_curve(
 
 
 def _style(equilibria: AllEquilibria, k: int) -> dict[str, Any]:
-    """How the centerline of one is drawn."""
+    """Line style of the centerline of an equilibrium."""
     stable = equilibria.status[k] == TipStatus.STABLE
     follows = k == equilibria.followed
     kind = ("stable" if stable else "unstable") + (" ring" if equilibria.is_ring[k] else "")
@@ -223,7 +223,7 @@ def _line(panel: Panel, points: Array, **style: Any) -> None:
 
 
 def _circle(equilibria: AllEquilibria, k: int) -> Array:
-    """Where the tip of a ring may be [L]."""
+    """Circle of tips of a ring of equilibria [L]."""
     assert equilibria.solver is not None
     axis, tip = equilibria.solver.tables.axes[0], equilibria.tips[k]
     angle = np.linspace(0.0, 2.0 * np.pi, 97)[:, None]
@@ -239,7 +239,7 @@ def _rim(radius: float) -> Array:
 
 
 def _gravity_arrow(panel: Panel, equilibria: AllEquilibria) -> None:
-    """Where gravity pulls, or along which line the forces act that there are."""
+    """Arrow of gravity, or along the line of the forces that there are."""
     if equilibria.solver is None:
         return
     tables = equilibria.solver.tables
@@ -282,7 +282,7 @@ def _ends(tips: Array, axes: Array) -> list[Array]:
 
 
 def _outlines(tips: Array, axes: Array, view: View) -> list[Array]:
-    """What one sees of the ellipsoids {tip + A f, |f| = 1}: ellipses, shape (2, corner) each."""
+    """Outlines of the ellipsoids {tip + A f, |f| = 1}: ellipses, shape (2, corner) each."""
     turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS)
     circle = np.array([np.cos(turn), np.sin(turn)])
     mirror = np.array([-1.0 if is_mirrored(view) else 1.0, 1.0])[:, None]

@@ -1,4 +1,4 @@
-"""What the figures of an atlas share: the axes of its two parameters, its lengths, its box."""
+"""Maps of the metrics of an atlas, and the axes of its two parameters."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def plot_metric_map(
 
 
 def metric_label(metric: xr.DataArray) -> str:
-    """What is drawn of a metric, in words or symbols, with what it is relative to."""
+    """Label of a metric, in words or symbols, with what it is relative to."""
     name = str(metric.name)
     relative = _RELATIVE.get(metric.attrs.get("units", "1"), "")
     return _METRICS.get(name, plain(name) + relative)
@@ -182,7 +182,7 @@ def _draw_contours(
 
 
 def _label_place(path: Array) -> list[Array]:
-    """Where on a contour, from 0 to 1 across and up, its label is far from every edge."""
+    """Place on a contour, from 0 to 1 across and up, that is far from every edge."""
     inside = path[((path > 0.1) & (path < 0.86)).all(axis=1)]
     distance = np.abs(inside - (0.5, 0.35)).sum(axis=1)
     return [inside[distance.argmin()]] if len(inside) else []

@@ -1,4 +1,4 @@
-"""How differently the neighbors in a cloud are activated: D̄ over space, and its distribution."""
+"""Pictures of redundancy: activation distance D̄ in space, its distribution, and sheets."""
 
 from __future__ import annotations
 

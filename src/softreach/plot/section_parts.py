@@ -1,4 +1,4 @@
-"""The layers of a cross-section: bore, core and rings, by material."""
+"""Parts of a cross-section: bore, core and rings by material, and bundles in their colors."""
 
 from __future__ import annotations
 
@@ -208,7 +208,7 @@ def _draw_stripes(ax: Axes, part: PlacedBundle, outer: float) -> None:
 
 
 def _draw_strokes(ax: Axes, one: PlacedBundle, outer: float) -> None:
-    """How its fibers run, where not along it: outwards, or leaning the way they wind."""
+    """Strokes of fibers that do not run along: outwards, or leaning the way they wind."""
     from matplotlib.collections import LineCollection
 
     lean = {"along": None, "radial": 0.0, "right-handed": _LEAN, "left-handed": -_LEAN}[one.course]
@@ -230,7 +230,7 @@ def _draw_strokes(ax: Axes, one: PlacedBundle, outer: float) -> None:
 
 
 def _contrast(color: Color) -> str:
-    """What stands out on a color."""
+    """A color that stands out on another."""
     return "white" if np.dot(color, _LIGHTNESS) < 0.55 else "0.3"
 
 
@@ -253,6 +253,6 @@ def _draw_disks(ax: Axes, lines: Collection[PlacedBundle], outer: float) -> None
 
 
 def _middle(one: PlacedBundle, outer: float) -> tuple[list[float], list[float]]:
-    """Where a tendon or the center of a lumen is."""
+    """Place of a tendon, or of the center of a lumen."""
     radius = 0.5 * outer * (one.inner_ratio + one.outer_ratio)
     return [radius * np.cos(one.center)], [radius * np.sin(one.center)]

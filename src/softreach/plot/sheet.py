@@ -113,7 +113,7 @@ def plot_hull_sheet(
 
 
 def panel_extent(box: Array, view: View) -> Extent:
-    """What a panel shows: tighter than a box in space, whose corners are empty.
+    """Extent of a panel: tighter than a box in space, whose corners are empty.
 
     The ellipsoid in the box reaches √Σ(hᵢ eᵢ)² along a unit vector e; a fifth more leaves room for
     clouds that bulge beyond it.

@@ -1,4 +1,4 @@
-"""How every figure looks: light, small type, thin lines, images sharp at print size."""
+"""Style of every figure: light, small type, thin lines, images sharp at print size."""
 
 from __future__ import annotations
 
@@ -182,4 +182,4 @@ def _box(name: str, value: Any) -> Array:
 AX: Callable[[str, Any], Any] = optional(_axes)
 BOX = optional(_box)
 DRAWN = {"ax": AX, "view": a_view, "box": BOX}
-"""What figures of one panel have in common."""
+"""Arguments of figures of one panel."""

@@ -1,4 +1,4 @@
-"""How much memory and disk there is, and whether what is asked for fits."""
+"""Free memory and disk space, and checks of what is asked of them."""
 
 from __future__ import annotations
 

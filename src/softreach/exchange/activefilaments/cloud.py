@@ -137,7 +137,7 @@ def _is_of_pair(path: Path) -> bool:
 CLOUD_PAIR: Formats = {
     ".csv": FileKind("one of NAME.csv and NAME_gamma.csv of numbers alone", _is_of_pair)
 }
-"""What `write_cloud` writes, and replaces."""
+"""Format of `write_cloud`."""
 
 
 def _warn(arm: Manipulator, activation: Array, difference: float) -> None:
@@ -187,7 +187,7 @@ def _check_file(path: Path) -> None:
 
 
 def _reason(error: Exception) -> str:
-    """What is wrong with a table, in a few printable words."""
+    """Fault of a table, in a few printable words."""
     if isinstance(error, UnicodeDecodeError):
         return "no text"
     text = str(error).partition(";")[0] or type(error).__name__

@@ -49,7 +49,7 @@ class Unreadable:
 
     error: InvalidInput
     names: frozenset[str]
-    """What it was made from."""
+    """Names that it was made from."""
 
 
 class Constructed(SimpleNamespace):

@@ -51,12 +51,12 @@ class FilamentRing:
     scale: float = 1.0
     """Their γ over that of the arm [-]."""
     name: str = ""
-    """What the arm calls it."""
+    """Its name in the arm."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Filament:
-    """What `AFilament` holds, and the structure of its activation."""
+    """An `AFilament`, and the structure of its activation."""
 
     length: float
     """L [m]."""
@@ -73,7 +73,7 @@ class Filament:
 
     @property
     def columns(self) -> int:
-        """How many activations it has: sectors of all rings."""
+        """Number of its activations: sectors of all rings."""
         return sum(len(ring.bounds) for ring in self.rings)
 
     def to_columns(self, activation: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Julia source read by a grammar and never run: what each name in it stands for.
+"""Julia source read by a grammar and never run: the value of each name in it.
 
 Read are literal numbers with `+ - * / ^` and parentheses, `pi` and `π`, names that were assigned
 before, a few elementary functions, vectors, tuples, and constructors of ActiveFilaments.jl. A
@@ -104,7 +104,7 @@ class Julia:
     def __init__(self, source: str) -> None:
         self.source = source
         self.known: dict[str, Any] = {}
-        """What each name stands for: numbers, vectors, tuples, constructors, or `Unreadable`."""
+        """Value of each name: numbers, vectors, tuples, constructors, or `Unreadable`."""
         values: Any = _Values(self)
         self._lark = Lark(
             _GRAMMAR,

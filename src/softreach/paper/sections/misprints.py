@@ -1,4 +1,4 @@
-"""What is misprinted in the paper, found by computing with it as it is printed."""
+"""Misprints of the paper, found by computing with it as it is printed."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def _of_minimal_trunk() -> tuple[float, float, float]:
 
 
 def _rotation(arm: Manipulator, taper: float, angle: float) -> dict[str, float]:
-    """How far the printed fiber rotation is from the integral, and near φ = 0 from its limit."""
+    """Errors of the printed fiber rotation: from the integral, and near φ = 0 from its limit."""
     from scipy.integrate import quad
 
     rod = tip_map(arm)
@@ -124,7 +124,7 @@ def _inclination(arm: Manipulator, taper: float) -> tuple[float, float]:
 
 
 def _errors(ratio: float, taper: float, angle: float) -> tuple[float, ...]:
-    """How far the printed δ0, δ1 and δ3, and the corrected δ3, are from the integrals [-]."""
+    """Errors of the printed δ0, δ1 and δ3, and of the corrected δ3, against the integrals [-]."""
     exact = ring_integrals(ratio, taper, angle, 0.5)
     pairs = (
         (printed.delta0(ratio, taper, angle, 0.5), 4 * exact.axial),

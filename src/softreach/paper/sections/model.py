@@ -30,13 +30,13 @@ def model(settings: Settings, folder: Path, notes: Notebook) -> None:
 
 
 def meeting(n: Numbers) -> Finding:
-    """Where the fibers are at the tip."""
+    """Places of the fibers at the tip."""
     words = f"at Z = L the edges of the sectors are {abs(n['gap_deg']):.2g}° apart"
     return judged(words, abs(n["gap_deg"]) < 1.0)
 
 
 def narrowing(n: Numbers) -> Finding:
-    """How much the radius shrinks."""
+    """Shrinking of the radius."""
     return judged(f"{n['narrowing']:.2f}-fold", round(n["narrowing"], 1) == 6.2)
 
 
@@ -54,7 +54,7 @@ def _gap(arm: Manipulator) -> float:
 
 
 def _asymmetry(arm: Manipulator, seed: int) -> float:
-    """How far tips of exchanged helical activations are from mirror images [L]."""
+    """Distance of tips of exchanged helical activations from mirror images [L]."""
     low, high = arm.bounds.T
     gamma = np.random.default_rng(seed).uniform(low, high, (2_000, 3))
     tips, others = tip_positions(arm, gamma), tip_positions(arm, gamma[:, [1, 0, 2]])

@@ -53,7 +53,7 @@ def cost(n: Numbers) -> Finding:
 
 
 def split(n: Numbers) -> Finding:
-    """Where the two longitudinal fibers lie."""
+    """Places of the two longitudinal fibers."""
     first, second = n["offsets_deg"]
     words = (
         "neither their places nor their extents are printed. We keep the extent of "
@@ -63,7 +63,7 @@ def split(n: Numbers) -> Finding:
 
 
 def families(n: Numbers) -> Finding:
-    """How many activations reach a place."""
+    """Number of activations that reach a place."""
     three, four = n["minimal"], n["redundant"]
     words = (
         f"three fibers: {three['solution_median']:.2f} activations reach a place (median over "

@@ -1,4 +1,4 @@
-"""How the reachable sets of the sweep extend: from the plane of symmetry, behind, in thickness."""
+"""Sections 3 and 4: the atlas of designs, its volumes and its curvatures (figures 2a to 3c)."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def sweep(settings: Settings, folder: Path, notes: Notebook) -> None:
 
 
 def size(n: Numbers) -> Finding:
-    """How many designs and points."""
+    """Number of designs and points."""
     words = f"{n['designs']} clouds of {n['samples']:,} points, and the volume of each"
     return judged(words, n["designs"] == 256 and n["samples"] == 400_000)
 
@@ -306,7 +306,7 @@ class _Sweep:
 
 
 def _rises(values: Array, axis: int) -> str:
-    """How many steps along an axis go up."""
+    """Number of steps along an axis that go up."""
     step = np.diff(values, axis=axis)
     return f"{int((step > 0).sum())} of {step.size}"
 

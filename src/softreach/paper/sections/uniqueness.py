@@ -1,4 +1,4 @@
-"""Sections 5 and 6: whether three fibers reach every place with one activation only."""
+"""Sections 5 and 6: places that three fibers reach with several activations."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def unique(n: Numbers) -> Finding:
 
 
 def dimension(n: Numbers) -> Finding:
-    """What two fibers and one reach."""
+    """Sets that two fibers and one reach."""
     words = (
         f"two fibers sweep a surface of {n['area']:.3f} L², one fiber a curve of "
         f"{n['curve']:.3f} L (of the minimal design, in the order of its fibers)"
@@ -96,7 +96,7 @@ def _clearest_pair(reached: ReachableSolid) -> Pair:
 
 
 def _apart(activations: Array) -> float:
-    """How different the first and the last activation are [-]."""
+    """Distance of the first and the last activation [-]."""
     return float(np.linalg.norm(activations[0] - activations[-1]))
 
 

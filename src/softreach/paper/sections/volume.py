@@ -1,4 +1,4 @@
-"""Section 4: what the volume of an α-shape has to do with the volume that can be reached."""
+"""Section 4: volume of α-shapes against the volume that can be reached."""
 
 from __future__ import annotations
 

@@ -32,17 +32,20 @@ REPLACED = ".replaced"
 
 _PREFIX = ".softreach-unfinished-"
 _PATIENCE = 1.0  # [s]
+
 StrPath = str | os.PathLike[str]
-_WHAT_TO_DO = {
-    errno.ENOSPC: "free some space, or choose another disk",
-    errno.EDQUOT: "free some space, or choose another disk",
+_NO_ROOM = "free some space, or choose another disk"
+_NO_RIGHT = "choose a place that you may write to"
+_REMEDIES = {
+    errno.ENOSPC: _NO_ROOM,
+    errno.EDQUOT: _NO_ROOM,
     errno.EFBIG: "choose another disk, or raise the limit on the size of files",
-    errno.EACCES: "choose a place that you may write to",
-    errno.EPERM: "choose a place that you may write to",
-    errno.EROFS: "choose a place that you may write to",
-    errno.ENAMETOOLONG: "choose a shorter name",
+    errno.EACCES: _NO_RIGHT,
+    errno.EPERM: _NO_RIGHT,
+    errno.EROFS: _NO_RIGHT,
+    errno.ENAMETOOLONG: "choose another name",
+    errno.ELOOP: "choose another name",
     errno.ENOTDIR: "a part of its path is a file: choose another folder",
-    errno.ELOOP: "its links lead in a circle: choose another name",
 }
 
 
@@ -358,4 +361,4 @@ def _one_line(path: StrPath) -> Iterator[None]:
     except OSError as error:
         number = error.errno or 0
         reason = error.strerror or str(error) or type(error).__name__
-        raise NotWritten(os.fspath(path), number, reason, _WHAT_TO_DO.get(number, "")) from error
+        raise NotWritten(os.fspath(path), number, reason, _REMEDIES.get(number, "")) from error

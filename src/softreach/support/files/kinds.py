@@ -121,4 +121,4 @@ PICTURES: Formats = {
     ".tiff": _TIFF,
     ".webp": _picture("a WebP", beginning_with(b"RIFF")),
 }
-"""What figures can be saved as."""
+"""Formats of figures."""
