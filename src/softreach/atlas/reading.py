@@ -207,9 +207,9 @@ def _opened(store: StoreLike, *, metrics: bool) -> xr.Dataset:
         coordinates = _coordinates(held, raw)
     raw.attrs.pop(ARRAYS)
     variables = _variables(held, found) | (_metrics(held.command, found) if metrics else {})
-    whole = raw.assign(variables).assign_coords(coordinates)
-    whole.encoding["source"] = str(held.location)
-    return whole
+    opened = raw.assign(variables).assign_coords(coordinates)
+    opened.encoding["source"] = str(held.location)
+    return opened
 
 
 def _variables(store: AtlasStore, found: Contents) -> dict[str, Any]:

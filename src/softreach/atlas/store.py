@@ -265,8 +265,8 @@ class AtlasStore:
 
 def fixed_point(tips: Array, scale: float) -> NDArray[np.int32]:
     """Tips as whole multiples of the scale, shape (3, n); NaN as what fills missing ones."""
-    whole = np.rint(tips.T / scale)
-    return np.where(np.isnan(whole), MISSING, whole).astype(np.int32)
+    steps = np.rint(tips.T / scale)
+    return np.where(np.isnan(steps), MISSING, steps).astype(np.int32)
 
 
 def drawn_cube(command: Command) -> Array:

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.export import ply
 from softreach.export.formats import (
     format_file,
     load_library,
     write_by_suffix,
+    write_ply_points,
     write_vtk,
     write_vtu,
 )
@@ -188,7 +188,7 @@ def _write_ply(table: CloudTable, file: BufferedWriter) -> None:
             yield {**block, **rgb}
             start = stop
 
-    ply.write_points(file, len(table.tip), blocks(), table.metadata)
+    write_ply_points(file, len(table.tip), blocks(), table.metadata)
 
 
 def _write_csv(table: CloudTable, file: BufferedWriter) -> None:

@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import a_manipulator
 from softreach.arm.skin import inside
-from softreach.export import ply
 from softreach.export.formats import (
     format_file,
     load_library,
     write_by_suffix,
+    write_ply_mesh,
     write_vtk,
     write_vtu,
 )
@@ -163,7 +163,7 @@ def _write_ply(parts: Sequence[Part], file: BufferedWriter) -> None:
     colors = np.concatenate([np.tile(_rgba(part), (len(part.vertices), 1)) for part in parts])
     columns = dict(zip("xyz", vertices.T, strict=True))
     columns |= dict(zip(("red", "green", "blue", "alpha"), colors.T, strict=True))
-    ply.write_mesh(file, columns, faces)
+    write_ply_mesh(file, columns, faces)
 
 
 def _write_stl(parts: Sequence[Part], file: BufferedWriter) -> None:

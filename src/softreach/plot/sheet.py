@@ -119,15 +119,15 @@ def panel_extent(box: Array, view: View) -> Extent:
     clouds that bulge beyond it.
     """
     middle, half = box.mean(axis=0), np.ptp(box, axis=0) / 2
-    whole = view_extent(box, view)
+    limits = view_extent(box, view)
     axes = view_axes(view)[:2]
     x, y = axes @ middle
     w, h = 1.2 * np.linalg.norm(axes * half, axis=1)
     return Extent(
-        max(whole.left, x - w),
-        min(whole.right, x + w),
-        max(whole.bottom, y - h),
-        min(whole.top, y + h),
+        max(limits.left, x - w),
+        min(limits.right, x + w),
+        max(limits.bottom, y - h),
+        min(limits.top, y + h),
     )
 
 
@@ -196,10 +196,10 @@ def _filled_sheet(
             return None if content is None else image(content, columns).rgba()
 
         tasks = (partial(pixels, *place) for place in np.ndindex(panels.shape))
-        for ax, found in zip(panels.ravel().tolist(), parallel.in_order(tasks), strict=True):
-            if found is not None:
+        for ax, rgba in zip(panels.ravel().tolist(), parallel.in_order(tasks), strict=True):
+            if rgba is not None:
                 # the frame of the axes and their limits stay
-                ax.imshow(found, extent=extent, interpolation="none", aspect="auto")
+                ax.imshow(rgba, extent=extent, interpolation="none", aspect="auto")
         _draw_scale(figure, panels[0, 0], view)
     return figure
 

@@ -122,9 +122,9 @@ def save_figure(
     """
     kind, suffix = format_of(path, PICTURES), Path(path).suffix.lower()
     with pyplot().rc_context(_SAVING), writing(path, kind, overwrite=overwrite) as file:
-        whole = figure.get_figure(root=True)
-        if whole is not None:
-            whole.savefig(file, dpi=DPI, format=suffix[1:], **_encoding(suffix))
+        root = figure.get_figure(root=True)
+        if root is not None:
+            root.savefig(file, dpi=DPI, format=suffix[1:], **_encoding(suffix))
 
 
 def write_note(ax: Axes, text: str, right: float, up: float) -> None:
