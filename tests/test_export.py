@@ -222,7 +222,7 @@ class TestWhole:
             file.write(b"half")
             raise stop
 
-        monkeypatch.setattr("softreach.export.ply.write_points", fail)
+        monkeypatch.setattr("softreach.export.clouds.write_ply_points", fail)
         with pytest.raises(stop):
             export_cloud(cloud, path)
         assert path.read_text() == "ply\nold"

@@ -23,7 +23,7 @@ from softreach import schema
 from softreach.atlas import DamagedStore, atlas_cloud, build_atlas, open_atlas, verify_atlas
 from softreach.cli.app import run
 from softreach.support.errors import SoftreachError, SoftreachWarning
-from softreach.support.files.sealed_store import SEAL, sealed
+from softreach.support.files.stores import ARRAYS, DIGEST, sealed
 from tests.abuse.refusals import files_in, raised_by, refusal_of
 from tests.atlas.families import TINY, gapped_space
 
@@ -66,22 +66,26 @@ FOREIGN = {
 }
 
 
+def forged(damage: Damage) -> Damage:
+    """A change of what describes an array that the root lists too, as if it were right."""
+    FORGED.add(damage)
+    return damage
+
+
+FORGED: set[Damage] = set()
+
+
 def with_values(**values: Any) -> Damage:
-    """What describes an array with other values, and a seal that says it is whole."""
+    """What describes an array with other values."""
+    return forged(lambda content: json.dumps(json.loads(content) | values).encode())
 
-    def damaged(content: bytes) -> bytes:
-        document = json.loads(content)
-        document["attributes"].pop(SEAL)
-        text = json.dumps(document | values)
-        try:
-            return sealed(text.encode())
-        except Exception:  # what no softreach would seal
-            plain = json.loads(text)
-            packed = json.dumps(plain, sort_keys=True, separators=(",", ":"))
-            plain["attributes"][SEAL] = hashlib.sha256(packed.encode()).hexdigest()
-            return json.dumps(plain).encode()
 
-    return damaged
+def listed(root: bytes, array: str, content: bytes) -> bytes:
+    """A root that lists another description of an array."""
+    document = json.loads(root)
+    packed = json.dumps(json.loads(content), sort_keys=True, separators=(",", ":"))
+    document["attributes"][ARRAYS][array] = hashlib.sha256(packed.encode()).hexdigest()
+    return sealed(json.dumps(document).encode())
 
 
 BYTES = {"name": "bytes", "configuration": {"endian": "little"}}
@@ -105,16 +109,17 @@ ARRAY: dict[str, Damage] = {
 
 
 def changed_attribute(name: str, value: Any) -> Damage:
-    """An attribute with another value, or without one if that is None; sealed again."""
+    """An attribute with another value, or without one if that is None; its digest is right."""
 
     def damaged(content: bytes) -> bytes:
         document = json.loads(content)
-        document["attributes"].pop(name)
+        before = document["attributes"].pop(name)
         if value is not None:
-            document["attributes"][name] = value
-        return sealed(json.dumps(document).encode())
+            document["attributes"][name] = before | value if name == ARRAYS else value
+        text = json.dumps(document).encode()
+        return sealed(text) if DIGEST in document["attributes"] else text
 
-    return damaged
+    return forged(damaged)
 
 
 # ---------------------------------------------------------------- stores to damage
@@ -162,6 +167,9 @@ def written(files: Files, place: Path, name: str = "", damage: Damage | None = N
         if kept is not None:
             (place / file).parent.mkdir(parents=True, exist_ok=True)
             (place / file).write_bytes(kept)
+    if damage in FORGED and name != "zarr.json":
+        root, content = place / "zarr.json", (place / name).read_bytes()
+        root.write_bytes(listed(root.read_bytes(), name.partition("/")[0], content))
     return place
 
 
@@ -216,6 +224,16 @@ def test_what_describes_a_cloud_is_checked(cloud_files, tmp_path, file, damage):
     assert "\n" not in str(error)
 
 
+def test_a_description_from_another_store_is_noticed(cloud, cloud_files, tmp_path):
+    """It is whole, but not of this store."""
+    sr.save_cloud(cloud.assign(tip=cloud.tip.assign_attrs(note="other")), tmp_path / "other.zarr")
+    foreign = (tmp_path / "other.zarr/tip/zarr.json").read_bytes()
+    place = written(cloud_files, tmp_path / "cloud.zarr", "tip/zarr.json", lambda _: foreign)
+    error = raised_by(lambda: sr.open_cloud(place))
+    assert isinstance(error, DamagedStore)
+    assert f"array tip in {place} = changed since it was written" in str(error)
+
+
 OTHER_DESIGN = sr.designs.lce_arm().to_toml()
 CLOUD_ATTRIBUTES = {
     "no design": ("zarr.json", "design", None, r"attrs\['design'\] = None: must be the text"),
@@ -235,7 +253,7 @@ CLOUD_ATTRIBUTES = {
     "a tol in words": ("zarr.json", "tol", "small", "tol.*a number"),
     "a negative tol": ("zarr.json", "tol", -1.0, "tol.*> 0"),
     "a tol that is no number": ("zarr.json", "tol", float("nan"), "tol.*> 0"),
-    "no arrays": ("zarr.json", "arrays", ["tip", "speed"], "array speed in .* = missing"),
+    "no arrays": ("zarr.json", "arrays", {"speed": ""}, "array speed in .* = missing"),
     "no length": ("tip/zarr.json", "length", None, "length.*must be 1.0 m, as its design says"),
     "another length": ("tip/zarr.json", "length", 2.0, "length.*must be 1.0 m"),
     "a length in words": ("tip/zarr.json", "length", "long", "length.*must be 1.0 m"),
@@ -443,7 +461,7 @@ COMMAND = {
     "no JSON": "{",
     "a list": "[]",
     "nothing in it": "{}",
-    "only a version": '{"atlas_version": 3}',
+    "only a version": '{"atlas_version": 4}',
 }
 
 

@@ -145,7 +145,7 @@ def _first(suffix: str):
 
 
 PLACES = [
-    pytest.param("x" * 300 + ".ply", "choose a shorter name", id="a name too long"),
+    pytest.param("x" * 300 + ".ply", "choose another name", id="a name too long"),
     pytest.param("\0.ply", "must be a path", id="a zero byte"),
     pytest.param("circle/a.ply", "choose another name", id="links in a circle"),
     pytest.param("/dev/full/a.ply", "a part of its path is a file", id="below a device"),
@@ -298,7 +298,8 @@ def test_an_output_that_cannot_be_written_is_refused_before_the_work(
     def computed(*_, **__):
         raise AssertionError("it was computed first")
 
-    for place in ("cloud.compute_cloud", "workspace.reachable_set", "payload.payload_curve"):
+    heavy = "cloud.compute_cloud", "workspace.reachable_set", "workspace.payload.payload_curve"
+    for place in heavy:
         monkeypatch.setattr(f"softreach.{place}", computed)
     assert expected in refusal_of(arguments, capsys, crowded)
 

@@ -237,11 +237,11 @@ def imported_from_zarr(tree: ast.AST) -> list[str]:
 
 def test_a_store_of_another_version_is_refused_in_one_line(tmp_path):
     store = AtlasStore.begin(tmp_path / "a.zarr", command(small_space(), **SMALL))
-    text = store.group.attrs["command"].replace('"atlas_version": 3', '"atlas_version": 1')
+    text = store.group.attrs["command"].replace('"atlas_version": 4', '"atlas_version": 1')
     store.group.attrs["command"] = text
     for ask in (open_atlas, lambda at: build_atlas(small_space(), at, **SMALL)):
         with pytest.raises(
-            InvalidInput, match="version of the atlas = 1: must be 3; build"
+            InvalidInput, match="version of the atlas = 1: must be 4; build"
         ) as told:
             ask(tmp_path / "a.zarr")
         assert "\n" not in str(told.value)

@@ -23,9 +23,8 @@ from softreach.arm import (
     designs,
 )
 from softreach.exchange.activefilaments import design_script, read_design, write_design
-from softreach.exchange.activefilaments.expressions import value_of
 from softreach.exchange.activefilaments.filament import arm_of, filament_of
-from softreach.exchange.activefilaments.tokens import statements
+from softreach.exchange.activefilaments.julia import Julia
 from tests.laws import arm_of as tube_of
 from tests.laws import arms, in_box
 from tests.test_golden import DIRECTORS, POSITION
@@ -248,8 +247,7 @@ def test_what_no_filament_has_is_refused_in_one_line(changes, reason):
     ],
 )
 def test_arithmetic_is_that_of_julia(text, value):
-    (tokens,) = statements("text", text)
-    assert value_of("text", tokens, {"x": 4.0}) == value
+    assert Julia("text").read(f"x = 4.0\ny = {text}")["y"] == value
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""What an atlas takes of memory and disk, told before it is begun."""
+"""Building an atlas: every design of a space, stored as it comes, resumed where it stopped."""
 
 from __future__ import annotations
 
@@ -38,43 +38,13 @@ if TYPE_CHECKING:
     import xarray as xr
     from zarr.storage import StoreLike
 
-    from softreach.atlas.space import DesignSpace
 
 STORED = 6.2
-"""What a tip takes in a store [bytes]."""
+"""Size of a stored tip [bytes]."""
 
 _ON_DISK = 4096  # bytes that the smallest file takes
 _FILES = 4  # of a design without tips: status, message, metrics, curvature
 _HELD = 700  # bytes of memory of a sample and its share of the triangulation
-
-
-def check_demand(
-    space: DesignSpace, designs: int, n: int, store: StoreLike, *, keep_clouds: bool
-) -> None:
-    """Refuse an atlas that cannot fit, and announce one that takes much; no design is made for it.
-
-    Args:
-        space: The designs.
-        designs: How many of them are to be computed here.
-        n: Samples of each design.
-        store: Where it goes; of one that exists, nobody knows how much is done.
-        keep_clouds: Whether the tips are stored.
-
-    Raises:
-        InvalidInput: One design does not fit into memory, or all do not fit on the disk.
-
-    Warns:
-        SoftreachWarning: It takes more than half of what is free.
-    """
-    check_memory("n", n, _HELD * n)
-    local = isinstance(store, str | os.PathLike) and "://" not in str(store)
-    if local and not Path(str(store)).exists():
-        of_each = STORED * n * keep_clouds + _FILES * _ON_DISK
-        asked = f"{n} samples of {designs} designs"
-        check_disk("n", asked, of_each * designs + 8 * n * space.base.bundles, str(store))
-
-
-# Build an atlas: every design of a space, stored as it comes, resumed where it stopped.
 
 
 @checked(
@@ -163,7 +133,7 @@ def build_atlas(
     check_names(chosen, space)
     numbers = range(shard[0], space.size, shard[1])
     check_sampler(sampler, n, 0, seed)
-    check_demand(space, len(numbers), n, store, keep_clouds=keep_clouds)
+    _check_demand(space, len(numbers), n, store, keep_clouds=keep_clouds)
     with bar("looking at all designs", space.size) as shown:
         space.survey(shown)
     command = Command(
@@ -189,6 +159,27 @@ def build_atlas(
     _warn_of_unstable(built)
     _warn_of_sparse(built)
     return built
+
+
+def _check_demand(
+    space: DesignSpace, designs: int, n: int, store: StoreLike, *, keep_clouds: bool
+) -> None:
+    """Refuse an atlas that cannot fit, and announce one that takes much.
+
+    No design is made for it; of a store that exists, nobody knows how much is done.
+
+    Raises:
+        InvalidInput: One design does not fit into memory, or all do not fit on the disk.
+
+    Warns:
+        SoftreachWarning: It takes more than half of what is free.
+    """
+    check_memory("n", n, _HELD * n)
+    local = isinstance(store, str | os.PathLike) and "://" not in str(store)
+    if local and not Path(str(store)).exists():
+        of_each = STORED * n * keep_clouds + _FILES * _ON_DISK
+        asked = f"{n} samples of {designs} designs"
+        check_disk("n", asked, of_each * designs + 8 * n * space.base.bundles, str(store))
 
 
 def _run(

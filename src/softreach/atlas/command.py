@@ -1,4 +1,4 @@
-"""What an atlas was asked to hold: the same command resumes, another one is refused."""
+"""Command that builds an atlas: the same one resumes, another one is refused."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from softreach.support.errors import InvalidInput, SoftreachError, counted
 
 __all__ = ["ATLAS_VERSION", "Command", "check_names"]
 
-ATLAS_VERSION = 3
+ATLAS_VERSION = 4
 """Version of the layout of a store."""
 STATIONS = tuple(np.linspace(0.5, 1.0, 6).tolist())
 
@@ -65,7 +65,7 @@ class Command:
     """As `chosen_metrics` has them."""
     keep_clouds: bool
     stations: tuple[float, ...] = STATIONS
-    """Where curvature is measured, over the length of each design."""
+    """Places at which curvature is measured, over the length of each design."""
     quantiles: tuple[float, ...] = QUANTILES
     softreach_version: str = field(default_factory=lambda: version("softreach"))
     atlas_version: int = ATLAS_VERSION
@@ -131,7 +131,7 @@ class Command:
         return cls(**values)
 
     def differences(self, other: Command) -> list[str]:
-        """What differs between this command and another, one line each."""
+        """Differences between this command and another, one line each."""
         metrics = _metric_differences(self.metrics, other.metrics)
         return [*_differences(_flat(self), _flat(other)), *metrics]
 

@@ -1,4 +1,4 @@
-"""One design, start to end: tips, metrics, store."""
+"""Task of one design, start to end: tips, what its metrics are computed from, and its store."""
 
 from __future__ import annotations
 
@@ -21,15 +21,16 @@ from softreach.geometry.delaunay import delaunay
 from softreach.geometry.hull import convex_hull
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap, TipStatus, no_equilibrium_message
+from softreach.support.arrays import Array
 from softreach.support.errors import SoftreachError, no_warnings
-from softreach.support.files.sealed_store import StoreFailed
-
-# What the metrics of one design are computed from; each result is found once and shared.
-
-
-Array = NDArray[np.float64]
+from softreach.support.files.damage import StoreFailed
 
 _BLOCK = 65_536  # samples at a time, where not all of them are needed at once
+Values = dict[str, Array]
+Outcome = tuple[int, str]
+"""Number of a design, and why it failed; empty if it did not."""
+
+_opened: dict[tuple[str, tuple[str, int]], AtlasStore] = {}
 
 
 class Intermediates(Mapping[Need, Any]):
@@ -90,54 +91,6 @@ def activations_of(rod: TipMap, cube: Array) -> Array:
     return rod.box.from_cube(cube[:, : rod.box.bundles])
 
 
-def _stable(of: Intermediates, values: Array) -> Array:
-    """Those of the samples that have a stable equilibrium; not copied if all have."""
-    return values if of.stable.all() else values[of.stable]
-
-
-def _alpha_complex(of: Intermediates) -> AlphaComplex:
-    return AlphaComplex(triangulation=delaunay(of[Need.TIPS]))
-
-
-def _convex_volume(of: Intermediates) -> float:
-    """From the triangulation, if one is needed anyway."""
-    if Need.ALPHA_COMPLEX in of.wanted:
-        return float(of[Need.ALPHA_COMPLEX].volumes.sum())
-    return convex_hull(of[Need.TIPS]).volume
-
-
-def _reachable_set(of: Intermediates) -> Any:
-    from softreach.workspace import reachable_set
-
-    return reachable_set(of.rod, accuracy=of.command.accuracy)
-
-
-def _strain_statistics(of: Intermediates) -> Any:
-    rod, cube = of.rod, of.cube
-    if rod.supports_unstable:
-        cube = cube[of.stable]
-    blocks = (activations_of(rod, cube[k : k + _BLOCK]) for k in range(0, len(cube), _BLOCK))
-    stations = np.array(of.command.stations) * rod.length
-    return stream_statistics(rod, blocks, stations, quantiles=of.command.quantiles)
-
-
-_COMPUTE: dict[Need, Callable[[Intermediates], Any]] = {
-    Need.ARM: lambda of: of.arm,
-    Need.LENGTH: lambda of: of.arm.length,
-    Need.ACTIVATIONS: lambda of: _stable(of, activations_of(of.rod, of.cube)),
-    Need.TIPS: lambda of: _stable(of, of.tips),
-    Need.LOST_SHARE: lambda of: float((~of.stable).mean()),
-    Need.ALPHA: lambda of: of.command.alpha_over_length * of.arm.length,
-    Need.ALPHA_COMPLEX: _alpha_complex,
-    Need.CONVEX_VOLUME: _convex_volume,
-    Need.REACHABLE_SET: _reachable_set,
-    Need.STRAIN_STATISTICS: _strain_statistics,
-}
-Values = dict[str, NDArray[np.float64]]
-Outcome = tuple[int, str]
-"""Number of a design, and why it failed; empty if it did not."""
-
-
 @no_warnings()  # the metrics hold what they say: spacing of the points, error of the volume
 def begin_design(store: AtlasStore, metrics: Sequence[Metric], index: int) -> Callable[[], Outcome]:
     """Do the part of a design that uses all threads; return the rest as a function to call.
@@ -161,7 +114,7 @@ def begin_design(store: AtlasStore, metrics: Sequence[Metric], index: int) -> Ca
 
 
 class Remote:
-    """What a worker elsewhere needs to compute designs of a store.
+    """Task as it travels to a worker elsewhere that computes designs of a store.
 
     It travels to the worker instead of arrays: the worker reads the activations from the store and
     writes its results there. The metrics' functions are in no store, so they travel along.
@@ -196,9 +149,6 @@ class Remote:
             os.environ.setdefault("SOFTREACH_NUM_THREADS", "1")
 
 
-_opened: dict[tuple[str, tuple[str, int]], AtlasStore] = {}
-
-
 def run_remotely(remote: Remote, index: int) -> Outcome:
     """Compute and store a design in a worker; a repeated call gives the same result."""
     remote.bound_threads()
@@ -206,6 +156,37 @@ def run_remotely(remote: Remote, index: int) -> Outcome:
         return begin_design(remote.store(), remote.metrics, index)()
     except SoftreachError as error:
         raise StoreFailed(str(error)) from None  # this one can be sent back
+
+
+def _stable(of: Intermediates, values: Array) -> Array:
+    """Those of the samples that have a stable equilibrium; not copied if all have."""
+    return values if of.stable.all() else values[of.stable]
+
+
+def _alpha_complex(of: Intermediates) -> AlphaComplex:
+    return AlphaComplex(triangulation=delaunay(of[Need.TIPS]))
+
+
+def _convex_volume(of: Intermediates) -> float:
+    """From the triangulation, if one is needed anyway."""
+    if Need.ALPHA_COMPLEX in of.wanted:
+        return float(of[Need.ALPHA_COMPLEX].volumes.sum())
+    return convex_hull(of[Need.TIPS]).volume
+
+
+def _reachable_set(of: Intermediates) -> Any:
+    from softreach.workspace import reachable_set
+
+    return reachable_set(of.rod, accuracy=of.command.accuracy)
+
+
+def _strain_statistics(of: Intermediates) -> Any:
+    rod, cube = of.rod, of.cube
+    if rod.supports_unstable:
+        cube = cube[of.stable]
+    blocks = (activations_of(rod, cube[k : k + _BLOCK]) for k in range(0, len(cube), _BLOCK))
+    stations = np.array(of.command.stations) * rod.length
+    return stream_statistics(rod, blocks, stations, quantiles=of.command.quantiles)
 
 
 @no_warnings()
@@ -245,7 +226,7 @@ def _values(metrics: Sequence[Metric], found: Intermediates) -> Values:
     return {metric.name: metric.value(found, sizes) for metric in metrics}
 
 
-def _kept_tips(store: AtlasStore, found: Intermediates) -> NDArray[np.float64] | None:
+def _kept_tips(store: AtlasStore, found: Intermediates) -> Array | None:
     return found.tips if store.command.keep_clouds else None
 
 
@@ -253,3 +234,17 @@ def _fail(store: AtlasStore, index: int, error: Exception) -> Outcome:
     message = f"{type(error).__name__}: {error}"
     store.write_failure(index, message)
     return index, message
+
+
+_COMPUTE: dict[Need, Callable[[Intermediates], Any]] = {
+    Need.ARM: lambda of: of.arm,
+    Need.LENGTH: lambda of: of.arm.length,
+    Need.ACTIVATIONS: lambda of: _stable(of, activations_of(of.rod, of.cube)),
+    Need.TIPS: lambda of: _stable(of, of.tips),
+    Need.LOST_SHARE: lambda of: float((~of.stable).mean()),
+    Need.ALPHA: lambda of: of.command.alpha_over_length * of.arm.length,
+    Need.ALPHA_COMPLEX: _alpha_complex,
+    Need.CONVEX_VOLUME: _convex_volume,
+    Need.REACHABLE_SET: _reachable_set,
+    Need.STRAIN_STATISTICS: _strain_statistics,
+}

@@ -1,4 +1,4 @@
-"""Who computes the designs: the threads of this process, or workers elsewhere.
+"""Executors of designs: the threads of this process, or workers elsewhere.
 
 Workers write to the store themselves, so a task that ran twice, or whose answer was lost with its
 worker, leaves the same bytes.
@@ -33,11 +33,11 @@ from softreach.support.files.interruption import undoing
 __all__ = ["ExecutorLike", "an_executor", "run_designs"]
 
 ATTEMPTS = 3
-"""How often a design may take its worker with it before it counts as failed."""
+"""Workers that a design may take with it before it counts as failed."""
 
 
 class DaskClient(Protocol):
-    """What is asked of a `dask.distributed.Client`."""
+    """Method of a `dask.distributed.Client` that is used."""
 
     def get_executor(self, **options: Any) -> Executor:
         """Its tasks as futures."""
@@ -53,10 +53,10 @@ _ALLOWED = "a concurrent.futures executor, a function that makes one, or a Dask 
 
 
 def an_executor(name: str, value: Any) -> Any:
-    """Who computes designs.
+    """An executor of designs.
 
     Raises:
-        InvalidInput: Nobody who could.
+        InvalidInput: None of those.
     """
     known = value is None or isinstance(value, Executor) or hasattr(value, "get_executor")
     if known or (callable(value) and not isinstance(value, type)):

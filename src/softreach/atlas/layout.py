@@ -25,7 +25,7 @@ CUBE = "unit_activation"
 """The array of activations that all designs share."""
 
 MISSING = int(np.iinfo(np.int32).min)
-"""What stands for a tip that is NaN, or not stored."""
+"""Number in place of a tip that is NaN, or not stored."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -134,7 +134,7 @@ def _described(command: Command) -> dict[str, Any]:
 
 
 def _meanings(metrics: Sequence[Metric]) -> str:
-    """What each number is, for readers without softreach."""
+    """Meaning of each number, for readers without softreach."""
     return "; ".join(f"{metric.name} [{metric.unit}]: {metric.meaning}" for metric in metrics)
 
 

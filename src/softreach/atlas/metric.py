@@ -1,4 +1,4 @@
-"""A number that an atlas holds of every design: its name, unit and meaning, and how it is found."""
+"""Metrics: numbers that an atlas holds of every design, with name, unit, meaning and function."""
 
 from __future__ import annotations
 
@@ -10,20 +10,18 @@ from enum import Enum
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.support.arguments import instance, text
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, SoftreachError
 
 __all__ = ["Metric", "MetricFailed", "Need", "check_travels"]
-
-Array = NDArray[np.float64]
 
 PROFILE = ("station", "quantile")
 
 
 class Need(Enum):
-    """What a metric can be computed from; each is found once per design, for all metrics."""
+    """Results that a metric can be computed from; each is computed once per design."""
 
     ARM = "the design, a Manipulator"
     LENGTH = "its length L [m]"
@@ -55,7 +53,7 @@ class Metric:
     """As in "m", "m3", "1/m"; "1" if there is none."""
     meaning: str
     needs: tuple[Need, ...]
-    """What `compute` takes, in this order."""
+    """Arguments of `compute`, in this order."""
     compute: Callable[..., Any]
     """Returns the number. Worker processes can use functions of a module only, no lambdas."""
     over: tuple[str, ...] = ()

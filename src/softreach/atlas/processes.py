@@ -17,7 +17,7 @@ from softreach.support.files.interruption import PATIENCE, as_a_whole, live_with
 __all__ = ["WORKERS", "LocalProcesses", "Workers", "worker_processes"]
 
 WORKERS = 1, 1_024
-"""How many processes of one machine may be asked for."""
+"""Smallest and largest number of processes of one machine."""
 
 Workers = Callable[[], Executor]
 """Starts a pool; called again when a dead worker has broken the one before."""

@@ -1,4 +1,4 @@
-"""Questions asked of an atlas: how much is done, which design is where, and its cloud."""
+"""Questions to an atlas: its status, its designs and their clouds, and the best of them."""
 
 from __future__ import annotations
 
@@ -45,9 +45,13 @@ if TYPE_CHECKING:
     from softreach.atlas.reading import AtlasLike
 
 
+_QUICK = 3e8  # bytes of tips
+Interval = tuple[float | None, float | None]
+
+
 @dataclass(frozen=True, kw_only=True)
 class AtlasStatus:
-    """How much of an atlas is done."""
+    """Status of an atlas: numbers of its designs."""
 
     designs: int
     done: int
@@ -66,7 +70,7 @@ class AtlasStatus:
 
 @checked(atlas=an_atlas)
 def atlas_status(atlas: AtlasLike) -> AtlasStatus:
-    """How many designs of an atlas are done, and what is wrong with the others.
+    """Number of designs of an atlas that are done, and faults of the others.
 
     Metrics are verified, and so are tips if they are on disk and take no more than a second;
     `verify_atlas` verifies all of them.
@@ -102,40 +106,6 @@ def verify_atlas(store: StoreLike) -> AtlasStatus:
         DamagedStore: What all designs share is damaged.
     """
     return _verified(AtlasStore.open(store, "r"), tips=True)
-
-
-_QUICK = 3e8  # bytes of tips
-
-
-def _is_small(store: AtlasStore) -> bool:
-    command = store.command
-    at_hand = isinstance(store.location, str) and "://" not in store.location
-    size = 12.0 * command.n * command.space.size
-    return not command.keep_clouds or (at_hand and size <= _QUICK)
-
-
-def _verified(store: AtlasStore, *, tips: bool) -> AtlasStatus:
-    for plan in array_plans(store.command):
-        if plan.name not in PER_DESIGN:
-            store.array(plan.name)[...]
-    numbers = range(store.command.space.size) if tips else ()
-    found = contents(store, tips_of=numbers)
-    return _counted(found.status, found.messages, tips)
-
-
-def _counted(status: np.ndarray, messages: dict[int, str], tips_verified: bool) -> AtlasStatus:
-    counts = np.bincount(status, minlength=DAMAGED + 1).tolist()
-    return AtlasStatus(
-        designs=status.size,
-        done=counts[DONE],
-        failed=counts[FAILED],
-        gaps=counts[GAP],
-        unstable=counts[UNSTABLE],
-        damaged=counts[DAMAGED],
-        todo=counts[TODO],
-        tips_verified=tips_verified,
-        messages=messages,
-    )
 
 
 @checked(atlas=an_atlas)
@@ -188,30 +158,6 @@ def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
     return cloud_dataset(arm, activation, tip, **drawn)
 
 
-def _messages(atlas: xr.Dataset, told: np.ndarray) -> dict[int, str]:
-    numbers = atlas["number"].values.ravel()[told].tolist()
-    texts = atlas["message"].values.ravel()[told].tolist() if told.any() else []
-    return dict(zip(numbers, map(str, texts), strict=True))
-
-
-def _nearest(atlas: xr.Dataset, at: Mapping[str, float]) -> xr.Dataset:
-    """One design of an atlas or of a part of it."""
-    dims = [str(dim) for dim in atlas["number"].dims]
-    if set(at) != set(dims):
-        raise InvalidInput("parameters", ", ".join(at) or "none", f"all of {', '.join(dims)}")
-    if "design" in at:
-        last = atlas.sizes["design"] - 1
-        return atlas.isel(design=as_whole_number("design", at["design"], 0, last))
-    place = {name: as_number(name, value) for name, value in at.items()}
-    return atlas.sel(place, method="nearest")
-
-
-# The best designs of an atlas under constraints.
-
-
-Interval = tuple[float | None, float | None]
-
-
 @checked(
     atlas=an_atlas,
     metric=text,
@@ -255,6 +201,55 @@ def best_designs(
         allowed &= (values >= low) & (values <= high)
     order = np.argsort(stacked[metric].values * (1 if smallest else -1), kind="stable")
     return stacked.isel(rank=order[allowed[order]][:count])
+
+
+def _is_small(store: AtlasStore) -> bool:
+    command = store.command
+    at_hand = isinstance(store.location, str) and "://" not in store.location
+    size = 12.0 * command.n * command.space.size
+    return not command.keep_clouds or (at_hand and size <= _QUICK)
+
+
+def _verified(store: AtlasStore, *, tips: bool) -> AtlasStatus:
+    for plan in array_plans(store.command):
+        if plan.name not in PER_DESIGN:
+            store.array(plan.name)[...]
+    numbers = range(store.command.space.size) if tips else ()
+    found = contents(store, tips_of=numbers)
+    return _counted(found.status, found.messages, tips)
+
+
+def _counted(status: np.ndarray, messages: dict[int, str], tips_verified: bool) -> AtlasStatus:
+    counts = np.bincount(status, minlength=DAMAGED + 1).tolist()
+    return AtlasStatus(
+        designs=status.size,
+        done=counts[DONE],
+        failed=counts[FAILED],
+        gaps=counts[GAP],
+        unstable=counts[UNSTABLE],
+        damaged=counts[DAMAGED],
+        todo=counts[TODO],
+        tips_verified=tips_verified,
+        messages=messages,
+    )
+
+
+def _messages(atlas: xr.Dataset, told: np.ndarray) -> dict[int, str]:
+    numbers = atlas["number"].values.ravel()[told].tolist()
+    texts = atlas["message"].values.ravel()[told].tolist() if told.any() else []
+    return dict(zip(numbers, map(str, texts), strict=True))
+
+
+def _nearest(atlas: xr.Dataset, at: Mapping[str, float]) -> xr.Dataset:
+    """One design of an atlas or of a part of it."""
+    dims = [str(dim) for dim in atlas["number"].dims]
+    if set(at) != set(dims):
+        raise InvalidInput("parameters", ", ".join(at) or "none", f"all of {', '.join(dims)}")
+    if "design" in at:
+        last = atlas.sizes["design"] - 1
+        return atlas.isel(design=as_whole_number("design", at["design"], 0, last))
+    place = {name: as_number(name, value) for name, value in at.items()}
+    return atlas.sel(place, method="nearest")
 
 
 def _parameters(atlas: xr.Dataset) -> list[str]:

@@ -1,4 +1,4 @@
-"""What an atlas holds of its designs, and which of them are damaged."""
+"""Reading an atlas, also while it is being written: a dataset over its parameters."""
 
 from __future__ import annotations
 
@@ -14,28 +14,39 @@ from softreach.atlas.command import Command
 from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import DAMAGED, FAILED, GAP, KNOWN, PER_DESIGN, UNSTABLE, AtlasStore
 from softreach.support.arguments import checked, dataset, text
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, counted, warn
-from softreach.support.files.sealed_store import Chunk, storage_errors
-from softreach.support.files.store_place import READING, check_arrays
+from softreach.support.files.damage import Chunk, storage_errors
+from softreach.support.files.stores import ARRAYS, READING, check_arrays
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from zarr.storage import StoreLike
+
+    AtlasLike = StoreLike | xr.Dataset
+
 
 TOLD = (FAILED, GAP, UNSTABLE)
 """The status of designs that have a message."""
 
+_POWERS = {"m": 1, "m2": 2, "m3": 3, "1/m": -1}
+_READ_HERE = ("metrics", "metric", "curvature", "quantity", "status", "message")
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Contents:
-    """What is stored of all designs but their tips, each of them checked."""
+    """Contents of an atlas but its tips, each chunk checked."""
 
     status: NDArray[np.uint8]
     """DAMAGED for designs of which a chunk is, shape (designs,)."""
     messages: dict[int, str]
     """Why designs failed, cannot exist, are nowhere stable or are damaged: number -> message."""
     tables: dict[str, Any]
-    """What is stored as `metrics` and `curvature`; fill values where it is damaged."""
+    """Arrays `metrics` and `curvature`; fill values where they are damaged."""
 
     @property
     def damage(self) -> str:
-        """How many designs are damaged, and the first of them; empty if none is."""
+        """Number of damaged designs, and the first of them; empty if none is."""
         damaged = np.flatnonzero(self.status == DAMAGED).tolist()
         if not damaged:
             return ""
@@ -73,57 +84,6 @@ def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] 
     status[[*reader.damaged]] = DAMAGED
     messages = dict(sorted((texts | reader.damaged).items()))
     return Contents(status=status, messages=messages, tables=tables)
-
-
-class _Reader:
-    """Reads arrays of an atlas, and notes which designs are damaged."""
-
-    def __init__(self, store: AtlasStore) -> None:
-        self._store = store
-        self.damaged: dict[int, str] = {}
-        """What is damaged of each: number -> message."""
-
-    def read(self, name: str, place: Any = ...) -> NDArray[Any]:
-        """Values of an array; fill values where it is damaged."""
-        array = self._store.array(name)
-        with self._store.watch.noting() as noted:
-            values = np.array(array[place])
-        for chunk, line in noted.items():
-            self.damaged.setdefault(self._store.number(chunk), line)
-        return values
-
-    def table(self, name: str, status: NDArray[np.uint8]) -> NDArray[np.float64]:
-        """All metrics of an array; nothing is read where there are none yet."""
-        if np.isin(status, KNOWN).any():
-            return self.read(name)
-        return np.full(self._store.array(name).shape, np.nan)
-
-
-def _required(store: AtlasStore, status: NDArray[np.uint8]) -> Callable[[Chunk], bool]:
-    """Which chunks must be there, by the status of their designs."""
-    known, told = np.isin(status, KNOWN), np.isin(status, TOLD)
-
-    def required(chunk: Chunk) -> bool:
-        if chunk.array not in PER_DESIGN:
-            return True
-        if chunk.array == "status":
-            return False
-        return bool((told if chunk.array == "message" else known)[store.number(chunk)])
-
-    return required
-
-
-# Read an atlas, also while it is being written: a dataset over the parameters of its designs.
-
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from zarr.storage import StoreLike
-
-    AtlasLike = StoreLike | xr.Dataset
-
-
-_POWERS = {"m": 1, "m2": 2, "m3": 3, "1/m": -1}
 
 
 @checked(store=a_store)
@@ -172,7 +132,7 @@ def opened_atlas(atlas: AtlasLike, *, metrics: bool = True) -> xr.Dataset:
 
 
 def command_of(atlas: xr.Dataset) -> Command:
-    """What the atlas was asked to hold."""
+    """Command that built the atlas."""
     return Command.from_json(atlas.attrs["command"])
 
 
@@ -194,6 +154,44 @@ def over_length(atlas: xr.Dataset, metric: str) -> xr.DataArray:
     return relative.assign_attrs({**values.attrs, "units": "1"})
 
 
+class _Reader:
+    """Reads arrays of an atlas, and notes which designs are damaged."""
+
+    def __init__(self, store: AtlasStore) -> None:
+        self._store = store
+        self.damaged: dict[int, str] = {}
+        """Damage of each: number -> message."""
+
+    def read(self, name: str, place: Any = ...) -> NDArray[Any]:
+        """Values of an array; fill values where it is damaged."""
+        array = self._store.array(name)
+        with self._store.watch.noting() as noted:
+            values = np.array(array[place])
+        for chunk, line in noted.items():
+            self.damaged.setdefault(self._store.number(chunk), line)
+        return values
+
+    def table(self, name: str, status: NDArray[np.uint8]) -> Array:
+        """All metrics of an array; nothing is read where there are none yet."""
+        if np.isin(status, KNOWN).any():
+            return self.read(name)
+        return np.full(self._store.array(name).shape, np.nan)
+
+
+def _required(store: AtlasStore, status: NDArray[np.uint8]) -> Callable[[Chunk], bool]:
+    """Chunks that must be there, by the status of their designs."""
+    known, told = np.isin(status, KNOWN), np.isin(status, TOLD)
+
+    def required(chunk: Chunk) -> bool:
+        if chunk.array not in PER_DESIGN:
+            return True
+        if chunk.array == "status":
+            return False
+        return bool((told if chunk.array == "message" else known)[store.number(chunk)])
+
+    return required
+
+
 def _opened(store: StoreLike, *, metrics: bool) -> xr.Dataset:
     import xarray as xr
 
@@ -206,13 +204,11 @@ def _opened(store: StoreLike, *, metrics: bool) -> xr.Dataset:
         check_arrays(held.opened)
         raw = xr.open_zarr(held.opened.place, drop_variables=_READ_HERE, **READING)
         coordinates = _coordinates(held, raw)
+    raw.attrs.pop(ARRAYS)
     variables = _variables(held, found) | (_metrics(held.command, found) if metrics else {})
-    whole = raw.assign(variables).assign_coords(coordinates)
-    whole.encoding["source"] = str(held.location)
-    return whole
-
-
-_READ_HERE = ("metrics", "metric", "curvature", "quantity", "status", "message")
+    opened = raw.assign(variables).assign_coords(coordinates)
+    opened.encoding["source"] = str(held.location)
+    return opened
 
 
 def _variables(store: AtlasStore, found: Contents) -> dict[str, Any]:

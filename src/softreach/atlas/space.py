@@ -28,7 +28,7 @@ _MOST = 1_000_000  # designs, each of which is looked at and has files of its ow
 
 
 class _Extent(NamedTuple):
-    """What all designs of a space have in common room for."""
+    """Largest number of bundles and range of lengths of the designs of a space."""
 
     bundles: int
     """The largest number of bundles; 0 if there is no design."""
@@ -56,7 +56,7 @@ class DesignSpace:
     layout: Layout = "grid"
     """Every combination (grid), or the values taken together, one of each (list)."""
     known: _Extent | None = field(default=None, repr=False, compare=False)
-    """What a store tells of all designs, so that reading it makes none of them."""
+    """Extent that a store tells, so that reading it makes no design."""
 
     def __post_init__(self) -> None:
         a_manipulator("base", self.base)
@@ -108,8 +108,8 @@ class DesignSpace:
         cube = _spread(count, len(ranges), method, seed)
         ends = np.array([_ends(name, ends) for name, ends in ranges.items()])
         points = ends[:, 0] + cube * np.diff(ends, axis=1)[:, 0]
-        if whole := [k for k, name in enumerate(ranges) if find_parameter(base, name).whole]:
-            points[:, whole] = np.rint(points[:, whole])
+        if counts := [k for k, name in enumerate(ranges) if find_parameter(base, name).whole]:
+            points[:, counts] = np.rint(points[:, counts])
         columns = zip(ranges, points.T.tolist(), strict=True)
         return cls(base=base, parameters=_plain(dict(columns)), layout="list")
 
@@ -139,11 +139,11 @@ class DesignSpace:
         return {name: one.unit for name, one in self.varied().items()}
 
     def varied(self) -> dict[str, Parameter]:
-        """What varies, by name."""
+        """Varied parameters, by name."""
         return find_parameters(self.base, self.names)
 
     def place(self, index: int) -> tuple[int, ...]:
-        """Where the design with this number is, along each dimension."""
+        """Place of the design with this number, along each dimension."""
         number = as_whole_number("number of the design", index, 0, self.size - 1)
         return tuple(map(int, np.unravel_index(number, self.shape)))
 
@@ -216,7 +216,7 @@ class DesignSpace:
 
 
 class _Survey(NamedTuple):
-    """What is known of all designs of a space once each has been made."""
+    """Gaps and extent of a space, known once each of its designs has been made."""
 
     gaps: dict[int, str]
     extent: _Extent

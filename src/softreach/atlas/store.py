@@ -1,4 +1,15 @@
-"""The root of a store, claimed by whoever comes first."""
+"""The Zarr v3 store of an atlas: one chunk is one design, and its status is written last.
+
+No two tasks ever write to the same chunk. Zarr's local store writes every chunk beside its place
+and renames it, so a killed writer leaves chunks whole or absent; a design whose status is missing
+is computed again, whatever else of it exists.
+
+A store is created in three steps, so that the tasks of a job array may all do it at once and be
+killed anywhere: its root, which holds the command, appears at once and is never written again, so
+that everybody knows whose store it is; then come the arrays, whose bytes are the same whoever
+writes them, so that a late creator changes nothing; `metrics` is the last of them, and nobody
+reads a store or adds designs without it.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +27,18 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.atlas.command import Command
 from softreach.atlas.layout import CUBE, MISSING, SEAL, Plan, array_plans
 from softreach.sampling import sample_cube
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
-from softreach.support.files.sealed_store import Chunk, StoreFailed, Watch, storage_errors, writing
-from softreach.support.files.store_place import REMEDY, Opened, absolute, checked_place, opened_root
+from softreach.support.files.damage import Chunk, StoreFailed, Watch, storage_errors, writing
+from softreach.support.files.stores import (
+    ARRAYS,
+    REMEDY,
+    CheckedStore,
+    Opened,
+    absolute,
+    checked_place,
+    opened_root,
+)
 
 if TYPE_CHECKING:
     import zarr
@@ -26,61 +46,7 @@ if TYPE_CHECKING:
     from zarr.storage import StoreLike
 
 
-def claim(location: StoreLike, attributes: Mapping[str, Any], *, durable: bool = False) -> None:
-    """Write the root of a store, whole and only once: of several who try, the first succeeds.
-
-    Raises:
-        InvalidInput: The place holds something else.
-    """
-    import zarr
-    from zarr.errors import ContainsGroupError
-
-    watch = Watch(location=location, remedy=REMEDY["atlas"])
-    place = checked_place(location, watch, mode="r+", durable=durable)
-    store = _first_wins(place.store, location)
-    with suppress(ContainsGroupError):
-        zarr.create_group(store, path=place.path, zarr_format=3, attributes=dict(attributes))
-
-
-def _first_wins(store: Store, location: StoreLike) -> Store:
-    """The same store, to which only what is missing is written, and nothing beside other files.
-
-    Zarr's groups have no exclusive mode, but its stores do: a key is set only if it is missing.
-    """
-    from zarr.storage import WrapperStore
-
-    class FirstWins(WrapperStore):
-        async def set(self, key: str, value: Any) -> None:
-            folder = key.rpartition("/")[0]
-            names = [name async for name in self.list_dir(folder)]
-            # In this order: files of a claim made in between are not foreign.
-            if any(map(_is_foreign, names)) and not await self.exists(key):
-                raise InvalidInput("store", location, "a new folder, or an atlas")
-            await self.set_if_not_exists(key, value)
-
-    return FirstWins(store)
-
-
-def _is_foreign(name: str) -> bool:
-    """Whether a file is anything but what a killed writer leaves behind."""
-    return not name.endswith(".partial")
-
-
-# The Zarr v3 store of an atlas: one chunk is one design, and its status is written last.
-#
-# No two tasks ever write to the same chunk. Zarr's local store writes every chunk beside its place
-# and renames it, so a killed writer leaves chunks whole or absent; a design whose status is missing
-# is computed again, whatever else of it exists.
-#
-# A store is created in three steps, so that the tasks of a job array may all do it at once and be
-# killed anywhere: its root, which holds the command, appears at once and is never written again, so
-# that everybody knows whose store it is; then come the arrays, whose bytes are the same whoever
-# writes them, so that a late creator changes nothing; the last of them is the seal, and nobody
-# reads a store or adds designs without it.
-
-
 TODO, DONE, FAILED, GAP, UNSTABLE, DAMAGED = range(6)
-
 KNOWN = (DONE, UNSTABLE)
 """The status of designs of which metrics are stored."""
 
@@ -89,11 +55,11 @@ PER_DESIGN = ("status", "message", "curvature", "tip", "metrics")
 
 
 class Result(NamedTuple):
-    """What is stored of one design."""
+    """Stored result of one design."""
 
     metrics: Mapping[str, ArrayLike]
     """Every metric of the command by name."""
-    tips: NDArray[np.float64] | None
+    tips: Array | None
     """Tips [m], shape (n, 3), NaN without equilibrium; None if clouds are not kept."""
 
 
@@ -123,14 +89,14 @@ class AtlasStore:
         location = absolute(location)
         with writing(location):
             if opened_root(location, "atlas", "r+") is None:
-                claim(location, _attributes(command), durable=durable)
+                _claim(location, command, durable=durable)
         opened, begun = cls._begun(location, durable)
         if differences := command.differences(begun):
             hint = f"it differs in {'; '.join(differences)}"
             raise InvalidInput("store", location, "new, or begun by the same command", hint)
         store = cls(location, command, opened)  # this command has all functions
         with writing(location):
-            complete(store)
+            _complete(store)
         return store
 
     @classmethod
@@ -180,7 +146,7 @@ class AtlasStore:
 
     @property
     def watch(self) -> Watch:
-        """What becomes of damage that is found."""
+        """Watch over damage that is found."""
         return self.opened.watch
 
     @property
@@ -245,7 +211,7 @@ class AtlasStore:
         return str(np.asarray(self.array("message")[self.command.space.place(index)]).item())
 
     @cached_property
-    def cube(self) -> NDArray[np.float64]:
+    def cube(self) -> Array:
         """Unit activations that all designs share, shape (n, bundles).
 
         Raises:
@@ -260,7 +226,7 @@ class AtlasStore:
 
     @property
     def cube_digest(self) -> object:
-        """What tells the activations from any others."""
+        """Digest of the activations."""
         return self.group.attrs["unit_activation_sha256"]
 
     def write(self, index: int, result: Result, status: int = DONE, message: str = "") -> None:
@@ -297,14 +263,24 @@ class AtlasStore:
         self.array("status")[place] = status
 
 
-def fixed_point(tips: NDArray[np.float64], scale: float) -> NDArray[np.int32]:
+def fixed_point(tips: Array, scale: float) -> NDArray[np.int32]:
     """Tips as whole multiples of the scale, shape (3, n); NaN as what fills missing ones."""
-    whole = np.rint(tips.T / scale)
-    return np.where(np.isnan(whole), MISSING, whole).astype(np.int32)
+    steps = np.rint(tips.T / scale)
+    return np.where(np.isnan(steps), MISSING, steps).astype(np.int32)
 
 
-def _attributes(command: Command) -> dict[str, str]:
-    """What the root says about the atlas."""
+def drawn_cube(command: Command) -> Array:
+    """The activations that the command draws on this machine."""
+    return sample_cube(command.sampler, command.n, command.space.bundles, command.seed)
+
+
+def digest(cube: Array) -> str:
+    """SHA-256 of activations."""
+    return hashlib.sha256(np.ascontiguousarray(cube).tobytes()).hexdigest()
+
+
+def _attributes(command: Command) -> dict[str, Any]:
+    """Attributes of the root."""
     versions = {name: version(name) for name in ("numpy", "scipy", "zarr", "xarray", "numba")}
     return {
         "title": "reachability cloud atlas",
@@ -312,17 +288,20 @@ def _attributes(command: Command) -> dict[str, str]:
         "unit_activation_sha256": digest(drawn_cube(command)),
         "versions": ", ".join(f"{name} {number}" for name, number in versions.items()),
         "command": command.to_json(),
+        ARRAYS: _digests(command),
     }
 
 
-def drawn_cube(command: Command) -> NDArray[np.float64]:
-    """The activations that the command draws on this machine."""
-    return sample_cube(command.sampler, command.n, command.space.bundles, command.seed)
+def _digests(command: Command) -> dict[str, str]:
+    """Digest of what describes each array, before any of them is written."""
+    import zarr
+    from zarr.storage import MemoryStore
 
-
-def digest(cube: NDArray[np.float64]) -> str:
-    """SHA-256 of activations."""
-    return hashlib.sha256(np.ascontiguousarray(cube).tobytes()).hexdigest()
+    watch = Watch(location="memory", remedy="")
+    group = zarr.create_group(CheckedStore(MemoryStore(), watch, ""), zarr_format=3)
+    for plan in array_plans(command):
+        _described(group, plan)
+    return watch.digests
 
 
 def _is_shared(chunk: Chunk) -> bool:
@@ -335,14 +314,50 @@ def _kind(dtype: Any) -> str:
     return "str" if kind.kind in "UTO" else kind.name
 
 
-# Everything of an atlas but its designs, written where it is missing or damaged.
+def _claim(location: StoreLike, command: Command, *, durable: bool = False) -> None:
+    """Write the root of a store, whole and only once: of several who try, the first succeeds.
+
+    Raises:
+        InvalidInput: The place holds something else.
+    """
+    import zarr
+    from zarr.errors import ContainsGroupError
+
+    watch = Watch(location=location, remedy=REMEDY["atlas"])
+    place = checked_place(location, watch, mode="r+", durable=durable)
+    store = _first_wins(place.store, location)
+    with suppress(ContainsGroupError):
+        zarr.create_group(store, path=place.path, zarr_format=3, attributes=_attributes(command))
 
 
-def complete(store: AtlasStore) -> None:
+def _first_wins(store: Store, location: StoreLike) -> Store:
+    """The same store, to which only what is missing is written, and nothing beside other files.
+
+    Zarr's groups have no exclusive mode, but its stores do: a key is set only if it is missing.
+    """
+    from zarr.storage import WrapperStore
+
+    class FirstWins(WrapperStore):
+        async def set(self, key: str, value: Any) -> None:
+            folder = key.rpartition("/")[0]
+            names = [name async for name in self.list_dir(folder)]
+            # In this order: files of a claim made in between are not foreign.
+            if any(map(_is_foreign, names)) and not await self.exists(key):
+                raise InvalidInput("store", location, "a new folder, or an atlas")
+            await self.set_if_not_exists(key, value)
+
+    return FirstWins(store)
+
+
+def _is_foreign(name: str) -> bool:
+    """Whether a file is anything but what a killed writer leaves behind."""
+    return not name.endswith(".partial")
+
+
+def _complete(store: AtlasStore) -> None:
     """Write what all designs share, the gaps, and the seal last, as far as they lack or err.
 
     Raises:
-        InvalidInput: Arrays of another command.
         StoreFailed: This machine draws other activations than the one that began the store.
     """
     *plans, seal = array_plans(store.command)
@@ -369,27 +384,29 @@ def _create_array(store: AtlasStore, plan: Plan) -> None:
 
     data = _drawn(store) if plan.name == CUBE else plan.data
     try:
-        array: Any = store.group.create_array(
-            plan.name,
-            shape=plan.shape,
-            dtype=plan.dtype,
-            chunks=plan.chunks,
-            fill_value=plan.fill,
-            compressors=plan.compressors(),
-            dimension_names=plan.dims,
-            attributes=plan.attrs,
-            config={"write_empty_chunks": True},
-        )
+        array = _described(store.group, plan)
     except ContainsArrayError:  # begun by another task, or by a run that was killed
         array = store.array(plan.name)
-        if array.shape != plan.shape or array.attrs.asdict() != plan.attrs:
-            allowed = "a new folder, or an atlas; it holds one that was never finished: remove it"
-            raise InvalidInput("store", store.location, allowed) from None
     if data is not None:
         array[...] = data
 
 
-def _drawn(store: AtlasStore) -> NDArray[np.float64]:
+def _described(group: zarr.Group, plan: Plan) -> Any:
+    """A new array without values."""
+    return group.create_array(
+        plan.name,
+        shape=plan.shape,
+        dtype=plan.dtype,
+        chunks=plan.chunks,
+        fill_value=plan.fill,
+        compressors=plan.compressors(),
+        dimension_names=plan.dims,
+        attributes=plan.attrs,
+        config={"write_empty_chunks": True},
+    )
+
+
+def _drawn(store: AtlasStore) -> Array:
     cube = drawn_cube(store.command)
     if digest(cube) != store.cube_digest:
         raise StoreFailed(

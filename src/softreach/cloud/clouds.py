@@ -24,14 +24,15 @@ from softreach.support import parallel
 from softreach.support.arguments import checked, dataset, flag, function, optional, path
 from softreach.support.errors import InvalidInput
 from softreach.support.files.atomic import replacing
+from softreach.support.files.damage import Watch, storage_errors
 from softreach.support.files.kinds import FileKind, Formats
-from softreach.support.files.sealed_store import Watch, storage_errors
-from softreach.support.files.store_place import (
+from softreach.support.files.stores import (
     ARRAYS,
     READING,
     REMEDY,
     check_arrays,
     checked_place,
+    list_arrays,
     opened_root,
 )
 from softreach.support.memory import check_room
@@ -162,8 +163,9 @@ def _write(cloud: xr.Dataset, path: Path) -> None:
     chunk = min(cloud.sizes["sample"], _CHUNK)
     for name in ("tip", "activation"):
         encoding[name]["chunks"] = (chunk, cloud[name].shape[1])
-    place = checked_place(path, Watch(location=path, remedy=REMEDY["cloud"]), mode="r+")
-    cloud.assign_attrs({ARRAYS: sorted(map(str, cloud.variables))}).to_zarr(
+    watch = Watch(location=path, remedy=REMEDY["cloud"])
+    place = checked_place(path, watch, mode="r+")
+    cloud.to_zarr(
         place,
         mode="w",
         zarr_format=3,
@@ -171,6 +173,7 @@ def _write(cloud: xr.Dataset, path: Path) -> None:
         encoding=encoding,
         write_empty_chunks=True,
     )
+    list_arrays(place, watch)
 
 
 @checked(path=path)

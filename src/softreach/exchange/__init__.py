@@ -1,4 +1,4 @@
-"""What other programs of the field define and compute, read and written."""
+"""Definitions and clouds of other programs of the field, read and written."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A cloud as a table: x, y, z and one activation column per bundle, with what describes it."""
+"""Clouds for other programs: tips and activations of all samples, in every format."""
 
 from __future__ import annotations
 
@@ -12,19 +12,27 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.export import ply
-from softreach.export.formats import Writers, load_library, write_by_suffix, write_vtk, write_vtu
+from softreach.export.formats import (
+    format_file,
+    load_library,
+    write_by_suffix,
+    write_ply_points,
+    write_vtk,
+    write_vtu,
+)
 from softreach.support.arguments import checked, dataset, flag, path
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
-from softreach.support.files.kinds import FileKind, Formats, Recognizes, beginning_with, text_with
+from softreach.support.files.kinds import Formats, beginning_with, text_with
 from softreach.support.palette import activation_colors
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 
 _BLOCK = 1 << 18
+_BYTES = 12  # of a number in a file: 8, or about 18 in text, which few formats are
+_MAT_LIMIT = 2**31  # bytes of one variable in a version 5 file
 
 
 class CloudTable(NamedTuple):
@@ -102,6 +110,45 @@ def column_names(bundles: Sequence[str]) -> list[str]:
     return names
 
 
+@checked(cloud=dataset("tip", "activation", what="a cloud"), path=path, overwrite=flag)
+def export_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+    """Write a cloud as .ply, .csv, .parquet, .npz, .mat, .vtu or .vtk, chosen by the suffix.
+
+    Tables have the columns x, y, z [m] and one activation per bundle, such as ``gamma_left``;
+    NPZ and MAT hold the arrays tip, activation and bundle. Clouds of arms under loads have the
+    column or array status too: 0 stable, 1 unstable, 2 no equilibrium, whose tip is NaN. Design,
+    seed, tolerance, version and units go along, except in CSV, VTU and VTK, which have no place for
+    them. PLY carries the picture's colors too.
+
+    Args:
+        cloud: tip(sample, axis) [m] and activation(sample, bundle), each in its unit.
+        path: The file; it is replaced only when the new one is complete.
+        overwrite: Whether it may replace any file, and not only a table of that format.
+
+    Raises:
+        InvalidInput: Unknown suffix, not a cloud, more than the format can hold, or something else
+            is there.
+        MissingExtra: The format needs a library that is not installed.
+        NotWritten: It cannot be written.
+    """
+    table = cloud_table(cloud)
+    takes = _BYTES * (table.tip.size + table.activation.size)
+    write_by_suffix(path, CLOUD_FILES, table, overwrite=overwrite, takes=takes)
+
+
+def path_csv(found: xr.Dataset) -> str:
+    """Activations and tip errors [m] at the points of a path, one line each, as CSV.
+
+    Args:
+        found: From `track_path`; what is beyond the end of the branch is nan.
+    """
+    names = [str(name) for name in found["bundle"].values]
+    rows = zip(found.activation.values.tolist(), found.tip_error.values.tolist(), strict=True)
+    header = ",".join([*column_names(names), "tip_error_m"])
+    lines = [header, *(",".join(f"{x:.12g}" for x in (*g, error)) for g, error in rows)]
+    return "\n".join([*lines, ""])
+
+
 def _bundle_names(activation: xr.DataArray) -> tuple[str, ...]:
     if "bundle" in activation.coords:
         return tuple(map(str, activation["bundle"].values))
@@ -130,39 +177,6 @@ def _plain(value: Any) -> str | int | float:
     return value if isinstance(value, str | int | float) else str(value)
 
 
-# Clouds for other programs: every format holds the tips and the activations of all samples.
-
-
-_BYTES = 12  # of a number in a file: 8, or about 18 in text, which few formats are
-_MAT_LIMIT = 2**31  # bytes of one variable in a version 5 file
-
-
-@checked(cloud=dataset("tip", "activation", what="a cloud"), path=path, overwrite=flag)
-def export_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
-    """Write a cloud as .ply, .csv, .parquet, .npz, .mat, .vtu or .vtk, chosen by the suffix.
-
-    Tables have the columns x, y, z [m] and one activation per bundle, such as ``gamma_left``;
-    NPZ and MAT hold the arrays tip, activation and bundle. Clouds of arms under loads have the
-    column or array status too: 0 stable, 1 unstable, 2 no equilibrium, whose tip is NaN. Design,
-    seed, tolerance, version and units go along, except in CSV, VTU and VTK, which have no place for
-    them. PLY carries the picture's colors too.
-
-    Args:
-        cloud: tip(sample, axis) [m] and activation(sample, bundle), each in its unit.
-        path: The file; it is replaced only when the new one is complete.
-        overwrite: Whether it may replace any file, and not only a table of that format.
-
-    Raises:
-        InvalidInput: Unknown suffix, not a cloud, more than the format can hold, or something else
-            is there.
-        MissingExtra: The format needs a library that is not installed.
-        NotWritten: It cannot be written.
-    """
-    table = cloud_table(cloud)
-    takes = _BYTES * (table.tip.size + table.activation.size)
-    write_by_suffix(path, CLOUD_FILES, _WRITERS, table, overwrite, takes=takes)
-
-
 def _write_ply(table: CloudTable, file: BufferedWriter) -> None:
     colors = activation_colors(table.activation)
 
@@ -174,7 +188,7 @@ def _write_ply(table: CloudTable, file: BufferedWriter) -> None:
             yield {**block, **rgb}
             start = stop
 
-    ply.write_points(file, len(table.tip), blocks(), table.metadata)
+    write_ply_points(file, len(table.tip), blocks(), table.metadata)
 
 
 def _write_csv(table: CloudTable, file: BufferedWriter) -> None:
@@ -249,43 +263,15 @@ def _point_mesh(table: CloudTable) -> Any:
     return meshio.Mesh(table.tip, cells, point_data=data)
 
 
-def _file(name: str, recognizes: Recognizes, *libraries: str) -> FileKind:
-    return FileKind(f"{name} file", recognizes, libraries, "export")
-
-
 CLOUD_FILES: Formats = {
-    ".ply": _file("a PLY", beginning_with(b"ply\n", b"ply\r")),
-    ".csv": _file("a cloud's CSV", beginning_with(b'"x","y","z",', b"x,y,z,gamma_"), "pyarrow"),
-    ".parquet": _file("a Parquet", beginning_with(b"PAR1"), "pyarrow"),
-    ".npz": _file("an NPZ", beginning_with(b"PK")),
-    ".mat": _file("a MAT", beginning_with(b"MATLAB ")),
-    ".vtu": _file("a VTU", text_with("<VTKFile", "UnstructuredGrid"), "meshio"),
-    ".vtk": _file("a VTK", beginning_with(b"# vtk DataFile"), "meshio"),
+    ".ply": format_file("a PLY", beginning_with(b"ply\n", b"ply\r"), _write_ply),
+    ".csv": format_file(
+        "a cloud's CSV", beginning_with(b'"x","y","z",', b"x,y,z,gamma_"), _write_csv, "pyarrow"
+    ),
+    ".parquet": format_file("a Parquet", beginning_with(b"PAR1"), _write_parquet, "pyarrow"),
+    ".npz": format_file("an NPZ", beginning_with(b"PK"), _write_npz),
+    ".mat": format_file("a MAT", beginning_with(b"MATLAB "), _write_mat),
+    ".vtu": format_file("a VTU", text_with("<VTKFile", "UnstructuredGrid"), _write_vtu, "meshio"),
+    ".vtk": format_file("a VTK", beginning_with(b"# vtk DataFile"), _write_vtk, "meshio"),
 }
-"""What clouds can be exported as."""
-
-_WRITERS: Writers = {
-    ".ply": _write_ply,
-    ".csv": _write_csv,
-    ".parquet": _write_parquet,
-    ".npz": _write_npz,
-    ".mat": _write_mat,
-    ".vtu": _write_vtu,
-    ".vtk": _write_vtk,
-}
-
-
-# The activations along a path as a table.
-
-
-def path_csv(found: xr.Dataset) -> str:
-    """Activations and tip errors [m] at the points of a path, one line each, as CSV.
-
-    Args:
-        found: From `track_path`; what is beyond the end of the branch is nan.
-    """
-    names = [str(name) for name in found["bundle"].values]
-    rows = zip(found.activation.values.tolist(), found.tip_error.values.tolist(), strict=True)
-    header = ",".join([*column_names(names), "tip_error_m"])
-    lines = [header, *(",".join(f"{x:.12g}" for x in (*g, error)) for g, error in rows)]
-    return "\n".join([*lines, ""])
+"""Formats of clouds."""

@@ -1,42 +1,54 @@
-"""From the suffix of a path to the function that writes it, and to the library that this needs."""
+"""Rows of the tables of formats, and the writers that clouds and surfaces share."""
 
 from __future__ import annotations
 
 import errno
 import importlib
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from io import BufferedWriter
 from os import PathLike
-from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
 
 from softreach.support.errors import MissingExtra
 from softreach.support.files.atomic import writing
-from softreach.support.files.kinds import Formats, format_of
+from softreach.support.files.kinds import FileKind, Formats, Recognizes, format_of
 
-__all__ = ["Writers", "load_library", "write_by_suffix", "write_vtk", "write_vtu"]
+__all__ = [
+    "format_file",
+    "load_library",
+    "write_by_suffix",
+    "write_ply_mesh",
+    "write_ply_points",
+    "write_vtk",
+    "write_vtu",
+]
 
-Writers = Mapping[str, Callable[[Any, BufferedWriter], None]]
-"""Suffix -> what writes a content to a file."""
+_TYPES = {"f8": "double", "f4": "float", "u1": "uchar"}
+
+
+def format_file(
+    name: str,
+    recognizes: Recognizes,
+    write: Callable[[Any, BufferedWriter], None],
+    library: str = "",
+) -> FileKind:
+    """A row of a table of formats: name, content, writer, and the library that it needs."""
+    return FileKind(f"{name} file", recognizes, (library,) if library else (), "export", write)
 
 
 def write_by_suffix(
-    path: str | PathLike[str],
-    formats: Formats,
-    writers: Writers,
-    content: Any,
-    overwrite: bool,
-    *,
-    takes: float,
+    path: str | PathLike[str], formats: Formats, content: Any, *, overwrite: bool, takes: float
 ) -> None:
     """Write the content whole, or leave what was there.
 
     Args:
         path: The file.
         formats: What can be written, by suffix.
-        writers: What writes it, by suffix.
-        content: What they write.
+        content: What their writers take.
         overwrite: Whether it may replace anything.
         takes: What the file will take of the disk, roughly [bytes].
 
@@ -47,8 +59,9 @@ def write_by_suffix(
         NotWritten: It cannot be written.
     """
     kind = format_of(path, formats)
+    assert kind.write is not None
     with writing(path, kind, takes=takes, overwrite=overwrite) as file:
-        writers[Path(path).suffix.lower()](content, file)
+        kind.write(content, file)
 
 
 def write_vtu(mesh: Any, file: BufferedWriter, **options: Any) -> None:
@@ -65,11 +78,51 @@ def write_vtk(mesh: Any, file: BufferedWriter) -> None:
     vtk, path = load_library("meshio").vtk, os.fspath(file.name)
     vtk.write(path, mesh)
     try:
-        whole = vtk.read(path).points.shape == mesh.points.shape
+        complete = vtk.read(path).points.shape == mesh.points.shape
     except Exception:  # whatever reading half a file may raise
-        whole = False
-    if not whole:
+        complete = False
+    if not complete:
         raise OSError(errno.EIO, "the file is cut off; is the disk full?")
+
+
+def write_ply_points(
+    file: BinaryIO,
+    count: int,
+    blocks: Iterable[Mapping[str, NDArray[np.generic]]],
+    description: Mapping[str, object],
+) -> None:
+    """Write a binary PLY of blocks of equally named columns as one `vertex` element.
+
+    Args:
+        file: Where to.
+        count: Rows of all blocks together.
+        blocks: Columns of float64, float32 or uint8, by name.
+        description: Goes into the header, one comment per line of text.
+    """
+    for number, block in enumerate(blocks):
+        rows = _ply_rows(block)
+        if number == 0:
+            file.write(_ply_header(count, rows.dtype, description))
+        file.write(rows.data)
+
+
+def write_ply_mesh(
+    file: BinaryIO, vertices: Mapping[str, NDArray[np.generic]], faces: NDArray[np.integer]
+) -> None:
+    """Write triangles as a binary PLY (Turk's polygon format, version 1.0).
+
+    Args:
+        file: Where to.
+        vertices: Columns of float64, float32 or uint8, by name.
+        faces: Corners, shape (f, 3).
+    """
+    rows = _ply_rows(vertices)
+    triangles = np.empty(len(faces), [("count", "u1"), ("corners", "<i4", 3)])
+    triangles["count"], triangles["corners"] = 3, faces
+    element = f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
+    file.write(_ply_header(len(rows), rows.dtype, {}, element))
+    file.write(rows.data)
+    file.write(triangles.data)
 
 
 def load_library(module: str) -> Any:
@@ -85,3 +138,29 @@ def load_library(module: str) -> Any:
         if error.name is None or error.name.partition(".")[0] != library:
             raise
         raise MissingExtra(library, "export") from error
+
+
+def _ply_rows(columns: Mapping[str, NDArray[np.generic]]) -> NDArray[np.void]:
+    fields = [(name, values.dtype.newbyteorder("<")) for name, values in columns.items()]
+    rows = np.zeros(len(next(iter(columns.values()))), fields)
+    for name, values in columns.items():
+        rows[name] = values
+    return rows
+
+
+def _ply_header(
+    count: int, fields: np.dtype[np.void], description: Mapping[str, object], further: str = ""
+) -> bytes:
+    """What stands before the rows; further elements follow the vertices."""
+    lines = ["ply", "format binary_little_endian 1.0"]
+    for key, value in description.items():
+        lines += [f"comment {key}: {_ascii(line)}" for line in str(value).splitlines()]
+    lines.append(f"element vertex {count}")
+    for name in fields.names or ():
+        lines.append(f"property {_TYPES[fields[name].str[1:]]} {name}")
+    return "\n".join([*lines, f"{further}end_header", ""]).encode("ascii")
+
+
+def _ascii(text: str) -> str:
+    r"""A PLY header is ASCII; a TOML string means the same with its letters as \\uXXXX."""
+    return "".join(c if c.isascii() else f"\\u{ord(c):04x}" for c in text if c.isprintable())

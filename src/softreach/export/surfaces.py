@@ -1,4 +1,4 @@
-"""Surfaces for other programs: parts with a name and a color, in the formats that have them."""
+"""Surfaces and arms for other programs: parts with a name and a color."""
 
 from __future__ import annotations
 
@@ -13,14 +13,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import a_manipulator
 from softreach.arm.skin import inside
-from softreach.export import ply
-from softreach.export.formats import Writers, load_library, write_by_suffix, write_vtk, write_vtu
+from softreach.export.formats import (
+    format_file,
+    load_library,
+    write_by_suffix,
+    write_ply_mesh,
+    write_vtk,
+    write_vtu,
+)
 from softreach.geometry.surface import SurfaceMesh
 from softreach.rod.arm_shape import arm_surface, bundle_surfaces
 from softreach.support.arguments import as_given, checked, dataset, flag, path, whole
-from softreach.support.arrays import Faces, as_faces, as_points
+from softreach.support.arrays import Array, Faces, as_faces, as_points
 from softreach.support.errors import InvalidInput
-from softreach.support.files.kinds import FileKind, Formats, Recognizes, beginning_with, text_with
+from softreach.support.files.kinds import Formats, beginning_with, text_with
 from softreach.support.palette import BODY, Color, bundle_color
 
 if TYPE_CHECKING:
@@ -28,15 +34,17 @@ if TYPE_CHECKING:
 
     from softreach.arm.manipulator import Manipulator
 
+
 _BYTES = 50  # of a triangle and its share of the vertices
 _Z_UP_TO_Y_UP = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
+_CLEAR = 0.45  # opacity of a body that has something inside
 
 
 class Part(NamedTuple):
     """One surface of a scene."""
 
     name: str
-    vertices: NDArray[np.float64]
+    vertices: Array
     """[m], shape (v, 3)."""
     faces: Faces
     """Shape (f, 3)."""
@@ -44,14 +52,7 @@ class Part(NamedTuple):
     opacity: float = 1.0
 
 
-def _parts_of(value: Any) -> tuple[Any, Any] | None:
-    """Vertices and faces of an object that has them."""
-    if isinstance(value, type) or not (hasattr(value, "vertices") and hasattr(value, "faces")):
-        return None
-    return value.vertices, value.faces
-
-
-def _a_mesh(name: str, value: Any) -> tuple[NDArray[np.float64], Faces]:
+def _a_mesh(name: str, value: Any) -> tuple[Array, Faces]:
     """Vertices and faces of a surface, or the pair of them."""
     allowed = "an object with vertices [m] and faces, or the pair of them"
     pair = value if isinstance(value, tuple) else _parts_of(value)
@@ -84,7 +85,7 @@ def export_mesh(
         MissingExtra: The format needs a library that is not installed.
         NotWritten: It cannot be written.
     """
-    vertices, faces = cast("tuple[NDArray[np.float64], Faces]", mesh_or_hull)
+    vertices, faces = cast("tuple[Array, Faces]", mesh_or_hull)
     if not len(faces):
         raise InvalidInput("mesh.faces", "none", "at least one triangle")
     write_parts([Part("surface", vertices, faces)], path, overwrite=overwrite)
@@ -104,7 +105,57 @@ def write_parts(
         NotWritten: It cannot be written.
     """
     takes = _BYTES * sum(len(part.faces) for part in parts)
-    write_by_suffix(path, SURFACE_FILES, _WRITERS, parts, overwrite, takes=takes)
+    write_by_suffix(path, SURFACE_FILES, parts, overwrite=overwrite, takes=takes)
+
+
+@checked(
+    arm=a_manipulator,
+    configuration=dataset("position", "directors", "extension", "Z", what="a configuration"),
+    path=path,
+    sides=whole(3, 10_000),
+    overwrite=flag,
+)
+def export_arm(
+    arm: Manipulator,
+    configuration: xr.Dataset,
+    path: str | PathLike[str],
+    *,
+    sides: int = 64,
+    overwrite: bool = False,
+) -> None:
+    """Write a deformed arm as .ply, .stl, .obj, .glb, .vtu or .vtk, chosen by the suffix.
+
+    The body is a closed tube, translucent in .glb and .ply where something lies inside. A bundle
+    that fills a sector is a closed skin as wide as its extent, half sunk into the outside of its
+    ring; a tendon is a thin tube, a chamber a tube of its radius. Parts are called ``body`` and by
+    the names of the bundles.
+
+    Args:
+        arm: The design.
+        configuration: One configuration of that arm [m].
+        path: The file; it is replaced only when the new one is complete.
+        sides: Corners of each section of the body.
+        overwrite: Whether it may replace any file, and not only a surface of that format.
+
+    Raises:
+        InvalidInput: Unknown suffix, several configurations, or something else is there.
+        MissingExtra: The format needs a library that is not installed.
+        NotWritten: It cannot be written.
+    """
+    body = arm_surface(arm, configuration, sides)
+    opacity = _CLEAR if any(inside(arm)) else 1.0
+    parts = [Part("body", body.vertices, body.faces, opacity=opacity)]
+    for index, skin in enumerate(bundle_surfaces(arm, configuration)):
+        name = _part_name(arm.bundle_names, index)
+        parts.append(Part(name, skin.vertices, skin.faces, bundle_color(index)))
+    write_parts(parts, path, overwrite=overwrite)
+
+
+def _parts_of(value: Any) -> tuple[Any, Any] | None:
+    """Vertices and faces of an object that has them."""
+    if isinstance(value, type) or not (hasattr(value, "vertices") and hasattr(value, "faces")):
+        return None
+    return value.vertices, value.faces
 
 
 def _write_ply(parts: Sequence[Part], file: BufferedWriter) -> None:
@@ -112,7 +163,7 @@ def _write_ply(parts: Sequence[Part], file: BufferedWriter) -> None:
     colors = np.concatenate([np.tile(_rgba(part), (len(part.vertices), 1)) for part in parts])
     columns = dict(zip("xyz", vertices.T, strict=True))
     columns |= dict(zip(("red", "green", "blue", "alpha"), colors.T, strict=True))
-    ply.write_mesh(file, columns, faces)
+    write_ply_mesh(file, columns, faces)
 
 
 def _write_stl(parts: Sequence[Part], file: BufferedWriter) -> None:
@@ -155,7 +206,7 @@ def _mesh(parts: Sequence[Part]) -> Any:
     return meshio.Mesh(vertices, [("triangle", faces)], cell_data={"part": [number]})
 
 
-def _joined(parts: Sequence[Part]) -> tuple[NDArray[np.float64], Faces]:
+def _joined(parts: Sequence[Part]) -> tuple[Array, Faces]:
     """Vertices and faces of all parts as one mesh."""
     starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
     faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
@@ -202,80 +253,18 @@ def _is_stl(path: Path) -> bool:
     return head.startswith(b"solid ") or (len(head) == 84 and path.stat().st_size == size)
 
 
-def _file(name: str, recognizes: Recognizes, library: str = "") -> FileKind:
-    return FileKind(f"{name} file", recognizes, (library,) if library else (), "export")
-
-
-SURFACE_FILES: Formats = {
-    ".ply": _file("a PLY", beginning_with(b"ply\n", b"ply\r")),
-    ".stl": _file("an STL", _is_stl, "trimesh"),
-    ".obj": _file("an OBJ", text_with("\nv "), "trimesh"),
-    ".glb": _file("a GLB", beginning_with(b"glTF"), "trimesh"),
-    ".vtu": _file("a VTU", text_with("<VTKFile", "UnstructuredGrid"), "meshio"),
-    ".vtk": _file("a VTK", beginning_with(b"# vtk DataFile"), "meshio"),
-}
-"""What surfaces and arms can be written as."""
-
-_WRITERS: Writers = {
-    ".ply": _write_ply,
-    ".stl": _write_stl,
-    ".obj": _write_obj,
-    ".glb": _write_glb,
-    ".vtu": _write_vtu,
-    ".vtk": _write_vtk,
-}
-
-
-# An arm for other programs: its body and every bundle as closed surfaces with names and colors.
-
-
-_CLEAR = 0.45  # opacity of a body that has something inside
-
-
-@checked(
-    arm=a_manipulator,
-    configuration=dataset("position", "directors", "extension", "Z", what="a configuration"),
-    path=path,
-    sides=whole(3, 10_000),
-    overwrite=flag,
-)
-def export_arm(
-    arm: Manipulator,
-    configuration: xr.Dataset,
-    path: str | PathLike[str],
-    *,
-    sides: int = 64,
-    overwrite: bool = False,
-) -> None:
-    """Write a deformed arm as .ply, .stl, .obj, .glb, .vtu or .vtk, chosen by the suffix.
-
-    The body is a closed tube, translucent in .glb and .ply where something lies inside. A bundle
-    that fills a sector is a closed skin as wide as its extent, half sunk into the outside of its
-    ring; a tendon is a thin tube, a chamber a tube of its radius. Parts are called ``body`` and by
-    the names of the bundles.
-
-    Args:
-        arm: The design.
-        configuration: One configuration of that arm [m].
-        path: The file; it is replaced only when the new one is complete.
-        sides: Corners of each section of the body.
-        overwrite: Whether it may replace any file, and not only a surface of that format.
-
-    Raises:
-        InvalidInput: Unknown suffix, several configurations, or something else is there.
-        MissingExtra: The format needs a library that is not installed.
-        NotWritten: It cannot be written.
-    """
-    body = arm_surface(arm, configuration, sides)
-    opacity = _CLEAR if any(inside(arm)) else 1.0
-    parts = [Part("body", body.vertices, body.faces, opacity=opacity)]
-    for index, skin in enumerate(bundle_surfaces(arm, configuration)):
-        name = _part_name(arm.bundle_names, index)
-        parts.append(Part(name, skin.vertices, skin.faces, bundle_color(index)))
-    write_parts(parts, path, overwrite=overwrite)
-
-
 def _part_name(names: tuple[str, ...], index: int) -> str:
     """The bundle's name, with its number where another part has that name."""
     taken = ("body", *names[:index])
     return names[index] if names[index] not in taken else f"{names[index]} ({index + 1})"
+
+
+SURFACE_FILES: Formats = {
+    ".ply": format_file("a PLY", beginning_with(b"ply\n", b"ply\r"), _write_ply),
+    ".stl": format_file("an STL", _is_stl, _write_stl, "trimesh"),
+    ".obj": format_file("an OBJ", text_with("\nv "), _write_obj, "trimesh"),
+    ".glb": format_file("a GLB", beginning_with(b"glTF"), _write_glb, "trimesh"),
+    ".vtu": format_file("a VTU", text_with("<VTKFile", "UnstructuredGrid"), _write_vtu, "meshio"),
+    ".vtk": format_file("a VTK", beginning_with(b"# vtk DataFile"), _write_vtk, "meshio"),
+}
+"""Formats of surfaces and arms."""

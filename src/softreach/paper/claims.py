@@ -1,4 +1,4 @@
-"""Verdicts on the statements of the paper."""
+"""Statements of the paper (`claims.toml`), the check of each, and verdicts."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from importlib.resources import files
 from typing import Any, NamedTuple
 
 Numbers = Mapping[str, Any]
-"""What a part of the report computed, by name."""
+"""Numbers that a section of the report computed, by name."""
 
 
 class Verdict(StrEnum):
-    """Whether a statement holds."""
+    """Verdict on a statement."""
 
     AGREES = "agrees"
     NEARLY = "nearly"
@@ -25,19 +25,16 @@ class Verdict(StrEnum):
 
 
 class Finding(NamedTuple):
-    """What was found."""
+    """Result of a check."""
 
     text: str
     verdict: Verdict
 
 
 def judged(text: str, agrees: bool, nearly: bool = False) -> Finding:
-    """What was found, and whether that agrees, or nearly does."""
+    """A finding whose verdict follows from whether it agrees, or nearly does."""
     verdict = Verdict.AGREES if agrees else Verdict.NEARLY if nearly else Verdict.DIFFERS
     return Finding(text, verdict)
-
-
-# What the paper says, statement by statement: `claims.toml`, and the check of each.
 
 
 @dataclass(frozen=True)
@@ -45,11 +42,11 @@ class Claim:
     """A statement of the paper and its check."""
 
     section: str
-    """Where it stands."""
+    """Its section of the paper."""
     says: str
     """The statement, in the paper's words or nearly so."""
     how: str
-    """How it is checked."""
+    """Way of its check."""
     part: str
     """The part of the report that computes what it needs."""
     check: Callable[[Numbers], Finding]

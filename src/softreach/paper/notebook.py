@@ -1,4 +1,4 @@
-"""What a part of the report found: numbers and figures, on disk as soon as they are there."""
+"""Notebook of a section of the report, on disk as soon as it is done, and sizes of its clouds."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+
 _NOTES = FileKind("what a part of the report found", text_with('"folder": null,\n "part": '))
 
 
@@ -23,7 +24,7 @@ class Picture:
     """A figure of the report."""
 
     label: str
-    """Which figure of the paper it recomputes, such as "2a"; empty for one of our own."""
+    """Number of the figure in the paper, such as "2a"; empty for one of our own."""
     name: str
     """Of its files, without suffix."""
     caption: str
@@ -84,9 +85,6 @@ class Notebook:
     @property
     def _file(self) -> Path:
         return self.folder / f"{self.part}.json"
-
-
-# Sizes of the clouds with which the paper is recomputed.
 
 
 @dataclass(frozen=True, kw_only=True)

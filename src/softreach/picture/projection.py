@@ -1,10 +1,11 @@
-"""From space to paper: orthographic views, by name or by the direction of the eye."""
+"""Orthographic views of space on paper, by name or by the direction of the camera."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
 __all__ = [
@@ -18,7 +19,6 @@ __all__ = [
     "view_axes",
 ]
 
-Array = NDArray[np.float64]
 View = str | tuple[float, float]
 
 VIEWS: dict[str, tuple[float, float]] = {

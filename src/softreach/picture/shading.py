@@ -1,4 +1,4 @@
-"""Light on a surface: a mesh drawn into a z-buffer, bright where it faces the lamp."""
+"""Lit meshes drawn into a z-buffer, and what lies inside of them, seen through."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.picture.projection import View, project
 from softreach.picture.zbuffer import ZBuffer
-
-Array = NDArray[np.float64]
+from softreach.support.arrays import Array, Index
 
 _LAMP = np.array([-0.45, 0.60, 0.66])  # over the left shoulder: right, up, toward the eye
 _AMBIENT, _DIFFUSE, _GLOSS = 0.40, 0.62, 0.08
+_SHARE = 0.55  # of what is inside, in the color of a pixel
 
 
 def draw_mesh(
@@ -63,12 +63,6 @@ def vertex_normals(points: Array, faces: NDArray[np.integer]) -> Array:
     return np.divide(total, length, out=np.zeros_like(total), where=length > 0)
 
 
-# What lies inside of something, seen through it.
-
-
-_SHARE = 0.55  # of what is inside, in the color of a pixel
-
-
 def seen_through(image: NDArray[np.uint8], within: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """An image through which another shows.
 
@@ -84,7 +78,7 @@ def seen_through(image: NDArray[np.uint8], within: NDArray[np.uint8]) -> NDArray
     return np.rint(mixed).astype(np.uint8)
 
 
-def faces_to_eye(vertices: ArrayLike, faces: ArrayLike, view: View) -> NDArray[np.int64]:
+def faces_to_eye(vertices: ArrayLike, faces: ArrayLike, view: View) -> Index:
     """Those of the faces that are seen from outside, shape (n, 3).
 
     Args:

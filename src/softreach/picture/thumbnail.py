@@ -1,4 +1,4 @@
-"""Small pictures for notebooks: what a value looks like, above its text."""
+"""Small pictures of values for notebooks, above their text, as PNG without an image library."""
 
 from __future__ import annotations
 
@@ -14,13 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.picture.projection import View, project
 from softreach.picture.shading import draw_mesh, faces_to_eye, seen_through
 from softreach.picture.zbuffer import Extent, ZBuffer
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import STEEL, Color
 
-# An image as a PNG file, without an image library.
-
-
 _COLOR_TYPES = {3: 2, 4: 6}  # channels -> RGB or RGBA
+_WIDTH = 220  # pixels
+_MARGIN = 0.03
+_MOST = 100_000  # points; more do not show at this size
+_FINE = 20_000  # faces; more are about a pixel each, whose edges need no smoothing
 
 
 def png_bytes(image: NDArray[np.uint8]) -> bytes:
@@ -41,16 +43,6 @@ def png_bytes(image: NDArray[np.uint8]) -> bytes:
     content = zlib.compress(lines.tobytes(), 9)
     parts = ((b"IHDR", header), (b"IDAT", content), (b"IEND", b""))
     return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(kind, data) for kind, data in parts)
-
-
-def _chunk(kind: bytes, data: bytes) -> bytes:
-    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-
-_WIDTH = 220  # pixels
-_MARGIN = 0.03
-_MOST = 100_000  # points; more do not show at this size
-_FINE = 20_000  # faces; more are about a pixel each, whose edges need no smoothing
 
 
 class Skin(NamedTuple):
@@ -125,7 +117,11 @@ def thumbnail(*parts: Skin | Dots, view: View = "oblique", width: int = _WIDTH) 
     return png_bytes(seen_through(buffer.rgba(), within.rgba()) if clear else buffer.rgba())
 
 
-def _square_around(seen: list[NDArray[np.float64]]) -> Extent | None:
+def _chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def _square_around(seen: list[Array]) -> Extent | None:
     """A square of the projection plane with a margin around all finite points."""
     flat = np.concatenate([points[:, :2] for points in seen]) if seen else np.empty((0, 2))
     flat = flat[np.isfinite(flat).all(axis=1)]
@@ -148,6 +144,6 @@ def _draw_skin(buffer: ZBuffer, skin: Skin, view: View) -> None:
         draw_mesh(buffer, skin.vertices, skin.faces, skin.color, view)
 
 
-def _draw_dots(buffer: ZBuffer, points: NDArray[np.float64], colors: ArrayLike) -> None:
+def _draw_dots(buffer: ZBuffer, points: Array, colors: ArrayLike) -> None:
     size = float(np.clip(0.8 * buffer.shape[1] / np.cbrt(max(len(points), 1)), 1.0, 6.0))
     buffer.draw_points(points, colors, size)

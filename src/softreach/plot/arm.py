@@ -1,4 +1,4 @@
-"""The picture of an arm, at rest and deformed: a lit tube with its fibers in color."""
+"""Pictures of arms, unloaded and deformed: lit tubes with their bundles, alone or side by side."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.skin import inside
 from softreach.picture.projection import View
@@ -26,7 +26,7 @@ from softreach.plot.style import (
 )
 from softreach.rod.arm_shape import arm_surface, bundle_skins, rest_configuration
 from softreach.support.arguments import checked, each_of, flag, instance, optional
-from softreach.support.arrays import as_stations
+from softreach.support.arrays import Array, as_stations
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import BODY, bundle_color
 
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 
     from softreach.arm.manipulator import Manipulator
 
-Array = NDArray[np.float64]
 
 _SIDES = 96
 _BULGE = 1.01  # of R2, beyond which a bundle makes the picture wider
@@ -140,18 +139,6 @@ def arm_images(
     return buffer, within if clear else None
 
 
-def _draw_body(
-    buffer: ZBuffer, arm: Manipulator, shape: xr.Dataset, view: View, fade: float
-) -> None:
-    body = arm_surface(arm, shape, _SIDES)
-    caps = 2 * _SIDES  # the last faces; apart, so that light breaks at the rim
-    for part in (body.faces[:-caps], body.faces[-caps:]):
-        draw_mesh(buffer, body.vertices / arm.length, part, BODY, view, fade)
-
-
-# Designs at rest side by side: the arm, and below it some of its cross-sections.
-
-
 class DesignPanel(NamedTuple):
     """One arm in a row of arms."""
 
@@ -214,3 +201,12 @@ def plot_designs(
         for ax in np.ravel(axes[:, 1:]):
             ax.set(ylabel="", yticklabels=[])
     return figure
+
+
+def _draw_body(
+    buffer: ZBuffer, arm: Manipulator, shape: xr.Dataset, view: View, fade: float
+) -> None:
+    body = arm_surface(arm, shape, _SIDES)
+    caps = 2 * _SIDES  # the last faces; apart, so that light breaks at the rim
+    for part in (body.faces[:-caps], body.faces[-caps:]):
+        draw_mesh(buffer, body.vertices / arm.length, part, BODY, view, fade)

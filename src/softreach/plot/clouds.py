@@ -1,4 +1,4 @@
-"""The picture of a reachability cloud: every tip a point, its color the activation."""
+"""Pictures of a reachability cloud: whole, in a slab, and in four views."""
 
 from __future__ import annotations
 
@@ -31,6 +31,7 @@ from softreach.plot.style import (
 from softreach.rod.arm_shape import rest_configuration
 from softreach.support import parallel
 from softreach.support.arguments import checked, flag, optional
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -40,7 +41,13 @@ if TYPE_CHECKING:
 
     from softreach.arm.manipulator import Manipulator
 
+
 _LARGEST = 8.0  # pixels
+_THICKNESS = 1 / 50  # of L, or of the cloud's extent
+Images = tuple[ZBuffer, ZBuffer | None]
+"""An image, and what shows through it."""
+
+_LEFT, _GAP, _RIGHT, _BOTTOM, _TOP = 0.55, 0.60, 0.12, 0.42, 0.42  # inches
 
 
 @checked(**DRAWN, cloud=POINTS, size=SIZE, key=flag)
@@ -84,9 +91,7 @@ def plot_cloud(
     return panel.ax
 
 
-def cloud_image(
-    panel: Panel, tips: NDArray[np.float64], rgb: NDArray[np.uint8], size: float | None
-) -> ZBuffer:
+def cloud_image(panel: Panel, tips: Array, rgb: NDArray[np.uint8], size: float | None) -> ZBuffer:
     """The image of points in a panel.
 
     Args:
@@ -103,22 +108,16 @@ def cloud_image(
     return buffer
 
 
-def drawn_tips(cloud: xr.Dataset) -> NDArray[np.float64]:
+def drawn_tips(cloud: xr.Dataset) -> Array:
     """Tip positions in the units of the axes, shape (sample, 3)."""
     tip = cloud["tip"].transpose("sample", "axis")
     return unit_of(tip).of(tip.values)
 
 
-def point_size(samples: int, box: NDArray[np.float64]) -> float:
+def point_size(samples: int, box: Array) -> float:
     """A diameter that closes the surface of a cloud without blurring it, in units of the box."""
     spacing = np.ptp(box, axis=0).max() / np.cbrt(max(samples, 1))
     return 0.45 * float(spacing)
-
-
-# The tips of a cloud near a plane, so that what lies inside can be seen.
-
-
-_THICKNESS = 1 / 50  # of L, or of the cloud's extent
 
 
 @checked(**DRAWN, cloud=POINTS, at=PLACE, thickness=optional(LENGTH), size=SIZE, key=flag)
@@ -175,35 +174,6 @@ def plot_slab(
         if key:
             draw_key(panel.ax, coloring.key)
     return panel.ax
-
-
-def _half(thickness: float | None, tips: NDArray[np.float64], unit: LengthUnit) -> float:
-    """Half the thickness in the units of the axes."""
-    if thickness is not None:
-        return float(unit.of(thickness)) / 2
-    return _THICKNESS / 2 * (1.0 if unit.relative else float(np.nanmax(np.ptp(tips, axis=0))))
-
-
-def _place(axis: str, middle: float, half: float, unit: LengthUnit) -> str:
-    """Which slab it is, such as |x| ≤ 0.01 L."""
-    distance = f"{axis} - {middle:.3g} {unit.symbol}" if middle else axis
-    return f"|{distance}| ≤ {half:.3g} {unit.symbol}"
-
-
-def _point_size(count: int, panel: Panel) -> float:
-    """A diameter [pixels] that closes a slice: about the mean spacing in the plane."""
-    extent = panel.extent
-    area = (extent.right - extent.left) * (extent.top - extent.bottom)
-    return float(np.clip(1.2 * np.sqrt(area / count) * panel.pixels_per_unit, 2.0, 8.0))
-
-
-# A cloud from the front, the side and the top at one scale, and obliquely in its box.
-
-
-Images = tuple[ZBuffer, ZBuffer | None]
-"""An image, and what shows through it."""
-
-_LEFT, _GAP, _RIGHT, _BOTTOM, _TOP = 0.55, 0.60, 0.12, 0.42, 0.42  # inches
 
 
 @checked(
@@ -269,9 +239,27 @@ def plot_views(
     return figure
 
 
-def _layout(
-    span: NDArray[np.float64], width: float, view: View
-) -> tuple[Figure, list[tuple[View, Axes]], float]:
+def _half(thickness: float | None, tips: Array, unit: LengthUnit) -> float:
+    """Half the thickness in the units of the axes."""
+    if thickness is not None:
+        return float(unit.of(thickness)) / 2
+    return _THICKNESS / 2 * (1.0 if unit.relative else float(np.nanmax(np.ptp(tips, axis=0))))
+
+
+def _place(axis: str, middle: float, half: float, unit: LengthUnit) -> str:
+    """Name of a slab, such as |x| ≤ 0.01 L."""
+    distance = f"{axis} - {middle:.3g} {unit.symbol}" if middle else axis
+    return f"|{distance}| ≤ {half:.3g} {unit.symbol}"
+
+
+def _point_size(count: int, panel: Panel) -> float:
+    """A diameter [pixels] that closes a slice: about the mean spacing in the plane."""
+    extent = panel.extent
+    area = (extent.right - extent.left) * (extent.top - extent.bottom)
+    return float(np.clip(1.2 * np.sqrt(area / count) * panel.pixels_per_unit, 2.0, 8.0))
+
+
+def _layout(span: Array, width: float, view: View) -> tuple[Figure, list[tuple[View, Axes]], float]:
     """Views and axes whose sizes are the spans at one scale, and the share of height above them."""
     x, y, z = span * (width - _LEFT - _GAP - _RIGHT) / (span[0] + span[1])
     height = _BOTTOM + y + _GAP + z + _TOP

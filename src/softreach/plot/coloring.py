@@ -1,4 +1,4 @@
-"""What a color says about a sample, and the key that tells the reader."""
+"""Colors of samples, and the key that explains them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.schema import activation_symbols, activation_units
-from softreach.support.arrays import as_floats
+from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import activation_colors
 
@@ -33,8 +33,6 @@ __all__ = [
     "draw_key",
 ]
 
-Array = NDArray[np.float64]
-
 COLORMAP = "viridis"
 _MISSING = 204  # light gray
 UNSTABLE = (255, 0, 200)
@@ -49,13 +47,13 @@ class BundleKey(NamedTuple):
     names: tuple[str, ...]
     colors: NDArray[np.uint8]
     symbols: tuple[str, ...]
-    """What formulas call the activation of each: γ, τ or P."""
+    """Symbol of the activation of each: γ, τ or P."""
     unstable: bool = False
     """Whether some samples are marked as unstable equilibria."""
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """What each color stands for."""
+        """Label of each color."""
         pairs = zip(self.symbols, self.names, strict=True)
         return tuple(f"|{symbol}| {name}" for symbol, name in pairs)
 
@@ -218,7 +216,7 @@ def _clipped(coloring: Coloring) -> Coloring:
 
 
 def _described(color: ArrayLike) -> str:
-    """What an array says of itself: its long name and unit."""
+    """Label of an array: its long name and unit."""
     attrs = getattr(color, "attrs", {})
     name, unit = attrs.get("long_name", ""), attrs.get("units")
     return f"{name} [{'-' if unit == '1' else unit}]" if unit else name
@@ -240,7 +238,7 @@ def _logarithmic(values: Array, label: str) -> Coloring:
     return Coloring(rgb, ScalarKey(label, low, high, logarithmic=True))
 
 
-def _scalar(values: NDArray[np.float64], label: str, low: float | None = None) -> Coloring:
+def _scalar(values: Array, label: str, low: float | None = None) -> Coloring:
     from matplotlib import colormaps
 
     finite = np.isfinite(values)
@@ -259,7 +257,7 @@ def _extend(key: ScalarKey) -> str:
 
 
 def color_map(key: ScalarKey) -> Any:
-    """What matplotlib draws a color bar of."""
+    """Scale of colors, from which matplotlib draws a color bar."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm, Normalize
 
@@ -275,7 +273,7 @@ def _patches(key: BundleKey) -> list[Any]:
 
 
 def _marks(key: BundleKey | ScalarKey) -> list[Any]:
-    """What marks unstable samples, if there are any."""
+    """Mark of unstable samples, if there are any."""
     from matplotlib.patches import Patch
 
     color = tuple(np.array(UNSTABLE) / 255)

@@ -1,4 +1,4 @@
-"""The picture of a cross-section: its layers, and the place of each bundle in it."""
+"""Picture of a cross-section: its layers, its bundles, and the key of both."""
 
 from __future__ import annotations
 
@@ -38,16 +38,15 @@ if TYPE_CHECKING:
     from softreach.arm.material import Material
 
 
-# The key of a cross-section: what its materials and bundles are called.
-
-
 _MOST = 12  # entries
 _HANDLE, _LETTER = 0.5, 0.056  # inches
 _UNITS = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (0.0, "Pa"))
+_SIZE = 2.0  # inches
+_MARGIN = 1.08
 
 
 class SectionKey(NamedTuple):
-    """What materials and bundles look like, and what they are called."""
+    """Key of a cross-section: looks and names of its materials and bundles."""
 
     handles: list[Artist]
     labels: list[str]
@@ -77,47 +76,6 @@ def section_key(arm: Manipulator, placed: Collection[PlacedBundle]) -> SectionKe
     if len(entries) > _MOST:
         labels[-1] += f" and {len(entries) - _MOST} more"
     return SectionKey(handles, labels)
-
-
-def _materials(arm: Manipulator) -> Iterator[tuple[Artist, str]]:
-    from matplotlib.patches import Patch
-
-    materials = section_materials(arm.section)
-    if len(materials) == 1 and materials[0][1].young_modulus is None:
-        return
-    for part, material in materials:
-        patch = Patch(**material_style(arm.section, material))
-        patch.set_hatch_linewidth(0.4)
-        yield patch, _material_label(part, material)
-
-
-def _bundles(arm: Manipulator, placed: Collection[PlacedBundle]) -> Iterator[tuple[Artist, str]]:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    symbols = [one.symbol for one in arm.actuators for _ in range(one.bundles)]
-    for one in placed:
-        if one.shape == "line":
-            handle: Artist = Line2D([], [], **tendon_style(one.color))
-        else:
-            lumen = one.shape == "lumen"
-            handle = Patch(**lumen_style(one.color)) if lumen else Patch(color=one.color)
-        course = "" if one.course == "along" else f", {one.course}"
-        unit = arm.bundle_units[one.index].replace("1", "-")
-        name = arm.bundle_names[one.index]
-        yield handle, f"{name}{course}: {symbols[one.index]} [{unit}]"
-
-
-def _material_label(part: str, material: Material) -> str:
-    name = material.name or part
-    if material.young_modulus is None:
-        return name
-    size, unit = next(pair for pair in _UNITS if material.young_modulus >= pair[0])
-    return f"{name}: E = {material.young_modulus / (size or 1.0):.3g} {unit}"
-
-
-_SIZE = 2.0  # inches
-_MARGIN = 1.08
 
 
 @checked(arm=MANIPULATOR, z=PLACE, ax=AX, half_width=optional(LENGTH), legend=optional(flag))
@@ -181,3 +139,40 @@ def section_reach(arm: Manipulator, z: float) -> float:
     outline = arm.outline(z)
     widest = np.max(outline.outer_ratio[outline.acts], initial=1.0)
     return float(arm.profile.radius(z)) * float(widest)
+
+
+def _materials(arm: Manipulator) -> Iterator[tuple[Artist, str]]:
+    from matplotlib.patches import Patch
+
+    materials = section_materials(arm.section)
+    if len(materials) == 1 and materials[0][1].young_modulus is None:
+        return
+    for part, material in materials:
+        patch = Patch(**material_style(arm.section, material))
+        patch.set_hatch_linewidth(0.4)
+        yield patch, _material_label(part, material)
+
+
+def _bundles(arm: Manipulator, placed: Collection[PlacedBundle]) -> Iterator[tuple[Artist, str]]:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    symbols = [one.symbol for one in arm.actuators for _ in range(one.bundles)]
+    for one in placed:
+        if one.shape == "line":
+            handle: Artist = Line2D([], [], **tendon_style(one.color))
+        else:
+            lumen = one.shape == "lumen"
+            handle = Patch(**lumen_style(one.color)) if lumen else Patch(color=one.color)
+        course = "" if one.course == "along" else f", {one.course}"
+        unit = arm.bundle_units[one.index].replace("1", "-")
+        name = arm.bundle_names[one.index]
+        yield handle, f"{name}{course}: {symbols[one.index]} [{unit}]"
+
+
+def _material_label(part: str, material: Material) -> str:
+    name = material.name or part
+    if material.young_modulus is None:
+        return name
+    size, unit = next(pair for pair in _UNITS if material.young_modulus >= pair[0])
+    return f"{name}: E = {material.young_modulus / (size or 1.0):.3g} {unit}"

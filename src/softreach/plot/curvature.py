@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.plot.lengths import LengthUnit, common_unit, unit_of
 from softreach.plot.style import AX, figure_style, small_axes
 from softreach.support.arguments import checked, dataset, mapping_of, one_of
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = ["plot_curvature"]
-
-Array = NDArray[np.float64]
 
 _COLORS = ("#2f6db5", "#e8a020")  # the paper's blue and yellow
 _SYMBOLS = {"bending": "κ", "torsion": "$u_3$", "extension": "ζ"}

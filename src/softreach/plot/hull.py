@@ -1,4 +1,4 @@
-"""The picture of a hull: its boundary as a lit surface."""
+"""Pictures of hulls: a lit surface, and the volume of alpha shapes over their radius."""
 
 from __future__ import annotations
 
@@ -66,9 +66,6 @@ def plot_hull(
         draw_mesh(buffer, vertices, hull.faces, color, view)
         panel.show(buffer)
     return panel.ax
-
-
-# How the volume of an alpha shape depends on its radius, beside the exact volume.
 
 
 @checked(

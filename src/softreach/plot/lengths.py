@@ -1,12 +1,13 @@
-"""What lengths are counted in on paper: in L where the data know L, else in meters."""
+"""Unit of lengths on paper: L where the data know L, else the meter."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -18,14 +19,14 @@ _SUPERSCRIPTS = {1: "", 2: "²", 3: "³"}
 
 
 class LengthUnit(NamedTuple):
-    """What 1 on an axis stands for, and how its label says so."""
+    """Unit of an axis, and its label."""
 
     size: float
     """[m]"""
     relative: bool
     """Whether it is L, the length of the arm."""
 
-    def of(self, meters: ArrayLike) -> NDArray[np.float64]:
+    def of(self, meters: ArrayLike) -> Array:
         """Lengths [m] as numbers on an axis."""
         return np.asarray(meters, float) / self.size
 

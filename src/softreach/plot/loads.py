@@ -1,4 +1,4 @@
-"""The picture of all equilibria of an arm: what it could do under its loads, and what it does."""
+"""Pictures of arms under loads: all equilibria, compliance of the tip, and payload curves."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.picture.projection import View, is_mirrored, project, view_axes
 from softreach.plot.arm import arm_points, draw_arms, plot_arm, shapes_of
@@ -16,7 +16,7 @@ from softreach.plot.lengths import in_lengths
 from softreach.plot.style import DRAWN, MANIPULATOR, SHAPE, figure_style, small_axes
 from softreach.rod.tip_map import TipStatus
 from softreach.support.arguments import POSITIVE, as_given, checked, flag, optional, within
-from softreach.support.arrays import as_floats
+from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from softreach.rod.loaded.all_equilibria import AllEquilibria
     from softreach.workspace.payload import LargestPayload, PayloadCurve
 
-Array = NDArray[np.float64]
 
 _STATIONS = 121
 _PALE = 0.7  # how far the colors of other stable arms go toward white
@@ -37,6 +36,9 @@ _ARROW = 26  # length of the arrow of gravity [points]
 _ALONG_SIGHT = 0.1  # part of a direction in the paper, below which an arrow says nothing
 _LEAST_WIDTH, _ENTRY = 2.6, 0.18  # of figures, and the height of an entry of the legend [inch]
 _ABOVE = 4  # the order of lines over images
+_LARGEST = 0.2  # L, the longest half axis if the force is not given
+_CORNERS = 120
+_COLOR = "tab:orange"
 
 
 def _equilibria(name: str, value: Any) -> Any:
@@ -94,87 +96,6 @@ def plot_equilibria(
         _gravity_arrow(panel, equilibria)
         _add_legend(panel.ax, own_figure=ax is None)
     return panel.ax
-
-
-def _style(equilibria: AllEquilibria, k: int) -> dict[str, Any]:
-    """How the centerline of one is drawn."""
-    stable = equilibria.status[k] == TipStatus.STABLE
-    follows = k == equilibria.followed
-    kind = ("stable" if stable else "unstable") + (" ring" if equilibria.is_ring[k] else "")
-    return {
-        "color": _FOLLOWED if follows else _STABLE if stable else _UNSTABLE,
-        "linestyle": "-" if stable else "--",
-        "linewidth": 1.4 if stable or follows else 1.0,
-        "label": f"{kind}, from the unloaded arm" if follows else kind,
-    }
-
-
-def _line(panel: Panel, points: Array, **style: Any) -> None:
-    """A curve in space, over the images."""
-    right, up, _ = project(points, panel.view).T
-    mirror = -1 if is_mirrored(panel.view) else 1
-    panel.ax.plot(mirror * right, up, zorder=_ABOVE, solid_capstyle="round", **style)
-
-
-def _circle(equilibria: AllEquilibria, k: int) -> Array:
-    """Where the tip of a ring may be [L]."""
-    assert equilibria.solver is not None
-    axis, tip = equilibria.solver.tables.axes[0], equilibria.tips[k]
-    angle = np.linspace(0.0, 2.0 * np.pi, 97)[:, None]
-    along, across = (tip @ axis) * axis, np.cross(axis, tip)
-    turned = along + np.cos(angle) * (tip - along) + np.sin(angle) * across
-    return turned / equilibria.rod.length
-
-
-def _rim(radius: float) -> Array:
-    """Of the disk that an arm of this radius is clamped to."""
-    angle = np.linspace(0.0, 2.0 * np.pi, 65)
-    return _BASE * radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-
-
-def _gravity_arrow(panel: Panel, equilibria: AllEquilibria) -> None:
-    """Where gravity pulls, or along which line the forces act that there are."""
-    if equilibria.solver is None:
-        return
-    tables = equilibria.solver.tables
-    right, up, _ = view_axes(panel.view) @ tables.axes[0]
-    if np.hypot(right, up) < _ALONG_SIGHT:
-        return
-    mirror = -1 if is_mirrored(panel.view) else 1
-    panel.ax.annotate(
-        "g" if any(tables.loads.gravity) else "force",
-        xy=(0.09, 0.86),
-        xycoords="axes fraction",
-        xytext=(-_ARROW * mirror * right, -_ARROW * up),
-        textcoords="offset points",
-        ha="center",
-        va="center",
-        fontsize=8,
-        arrowprops={"arrowstyle": "-|>", "color": "0.25", "linewidth": 1.0},
-        zorder=_ABOVE,
-    )
-
-
-def _add_legend(ax: Axes, *, own_figure: bool) -> None:
-    """One entry for each kind: under the picture where the figure is ours."""
-    handles, labels = ax.get_legend_handles_labels()
-    kinds = dict(zip(labels, handles, strict=True))
-    if not own_figure:
-        ax.legend(kinds.values(), kinds.keys())
-        return
-    figure = ax.get_figure(root=True)
-    assert figure is not None
-    width, height = figure.get_size_inches()
-    figure.set_size_inches(max(width, _LEAST_WIDTH), height + _ENTRY * len(kinds))
-    figure.legend(kinds.values(), kinds.keys(), loc="outside lower center")
-
-
-# The picture of how an arm yields at its tip: where a force of one size can push it.
-
-
-_LARGEST = 0.2  # L, the longest half axis if the force is not given
-_CORNERS = 120
-_COLOR = "tab:orange"
 
 
 @checked(
@@ -241,36 +162,6 @@ def plot_compliance(
     return ax
 
 
-def _ends(tips: Array, axes: Array) -> list[Array]:
-    """The corners of the boxes around the ellipsoids."""
-    half = np.linalg.norm(axes, axis=2)
-    return [tips - half, tips + half]
-
-
-def _outlines(tips: Array, axes: Array, view: View) -> list[Array]:
-    """What one sees of the ellipsoids {tip + A f, |f| = 1}: ellipses, shape (2, corner) each."""
-    turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS)
-    circle = np.array([np.cos(turn), np.sin(turn)])
-    mirror = np.array([-1.0 if is_mirrored(view) else 1.0, 1.0])[:, None]
-    centers = project(tips, view)[:, :2, None]
-    outlines = []
-    for center, matrix in zip(centers, axes, strict=True):
-        left, half, _ = np.linalg.svd(project(matrix.T, view).T[:2], full_matrices=False)
-        outlines.append(mirror * (center + (left * half) @ circle))
-    return outlines
-
-
-def _round_force(matrices: Array, length: float) -> float:
-    """The largest of 1, 2, 5, 10, ... [N] that keeps the ellipsoids small."""
-    softest = np.linalg.norm(matrices, ord=2, axis=(1, 2)).max()
-    most = _LARGEST * length / softest
-    power = 10.0 ** math.floor(math.log10(most))
-    return max(power * digit for digit in (1.0, 2.0, 5.0) if power * digit <= most * (1 + 1e-9))
-
-
-# How much of its reachable volume an arm keeps under a payload.
-
-
 def plot_payload_curve(
     curve: PayloadCurve,
     *,
@@ -309,3 +200,103 @@ def plot_payload_curve(
         if label is not None:
             ax.legend(loc="upper right")
     return ax
+
+
+def _style(equilibria: AllEquilibria, k: int) -> dict[str, Any]:
+    """Line style of the centerline of an equilibrium."""
+    stable = equilibria.status[k] == TipStatus.STABLE
+    follows = k == equilibria.followed
+    kind = ("stable" if stable else "unstable") + (" ring" if equilibria.is_ring[k] else "")
+    return {
+        "color": _FOLLOWED if follows else _STABLE if stable else _UNSTABLE,
+        "linestyle": "-" if stable else "--",
+        "linewidth": 1.4 if stable or follows else 1.0,
+        "label": f"{kind}, from the unloaded arm" if follows else kind,
+    }
+
+
+def _line(panel: Panel, points: Array, **style: Any) -> None:
+    """A curve in space, over the images."""
+    right, up, _ = project(points, panel.view).T
+    mirror = -1 if is_mirrored(panel.view) else 1
+    panel.ax.plot(mirror * right, up, zorder=_ABOVE, solid_capstyle="round", **style)
+
+
+def _circle(equilibria: AllEquilibria, k: int) -> Array:
+    """Circle of tips of a ring of equilibria [L]."""
+    assert equilibria.solver is not None
+    axis, tip = equilibria.solver.tables.axes[0], equilibria.tips[k]
+    angle = np.linspace(0.0, 2.0 * np.pi, 97)[:, None]
+    along, across = (tip @ axis) * axis, np.cross(axis, tip)
+    turned = along + np.cos(angle) * (tip - along) + np.sin(angle) * across
+    return turned / equilibria.rod.length
+
+
+def _rim(radius: float) -> Array:
+    """Of the disk that an arm of this radius is clamped to."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 65)
+    return _BASE * radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+
+
+def _gravity_arrow(panel: Panel, equilibria: AllEquilibria) -> None:
+    """Arrow of gravity, or along the line of the forces that there are."""
+    if equilibria.solver is None:
+        return
+    tables = equilibria.solver.tables
+    right, up, _ = view_axes(panel.view) @ tables.axes[0]
+    if np.hypot(right, up) < _ALONG_SIGHT:
+        return
+    mirror = -1 if is_mirrored(panel.view) else 1
+    panel.ax.annotate(
+        "g" if any(tables.loads.gravity) else "force",
+        xy=(0.09, 0.86),
+        xycoords="axes fraction",
+        xytext=(-_ARROW * mirror * right, -_ARROW * up),
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        fontsize=8,
+        arrowprops={"arrowstyle": "-|>", "color": "0.25", "linewidth": 1.0},
+        zorder=_ABOVE,
+    )
+
+
+def _add_legend(ax: Axes, *, own_figure: bool) -> None:
+    """One entry for each kind: under the picture where the figure is ours."""
+    handles, labels = ax.get_legend_handles_labels()
+    kinds = dict(zip(labels, handles, strict=True))
+    if not own_figure:
+        ax.legend(kinds.values(), kinds.keys())
+        return
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    width, height = figure.get_size_inches()
+    figure.set_size_inches(max(width, _LEAST_WIDTH), height + _ENTRY * len(kinds))
+    figure.legend(kinds.values(), kinds.keys(), loc="outside lower center")
+
+
+def _ends(tips: Array, axes: Array) -> list[Array]:
+    """The corners of the boxes around the ellipsoids."""
+    half = np.linalg.norm(axes, axis=2)
+    return [tips - half, tips + half]
+
+
+def _outlines(tips: Array, axes: Array, view: View) -> list[Array]:
+    """Outlines of the ellipsoids {tip + A f, |f| = 1}: ellipses, shape (2, corner) each."""
+    turn = np.linspace(0.0, 2.0 * np.pi, _CORNERS)
+    circle = np.array([np.cos(turn), np.sin(turn)])
+    mirror = np.array([-1.0 if is_mirrored(view) else 1.0, 1.0])[:, None]
+    centers = project(tips, view)[:, :2, None]
+    outlines = []
+    for center, matrix in zip(centers, axes, strict=True):
+        left, half, _ = np.linalg.svd(project(matrix.T, view).T[:2], full_matrices=False)
+        outlines.append(mirror * (center + (left * half) @ circle))
+    return outlines
+
+
+def _round_force(matrices: Array, length: float) -> float:
+    """The largest of 1, 2, 5, 10, ... [N] that keeps the ellipsoids small."""
+    softest = np.linalg.norm(matrices, ord=2, axis=(1, 2)).max()
+    most = _LARGEST * length / softest
+    power = 10.0 ** math.floor(math.log10(most))
+    return max(power * digit for digit in (1.0, 2.0, 5.0) if power * digit <= most * (1 + 1e-9))

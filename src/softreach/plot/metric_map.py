@@ -1,4 +1,4 @@
-"""What the figures of an atlas share: the axes of its two parameters, its lengths, its box."""
+"""Maps of the metrics of an atlas, and the axes of its two parameters."""
 
 from __future__ import annotations
 
@@ -7,21 +7,29 @@ import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.atlas import over_length
 from softreach.plot.coloring import COLORMAP
 from softreach.plot.style import figure_style, small_axes
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 _UNITS = {"rad": "°", "1": ""}
 _INDEXED = re.compile(r"(?<![a-z])([ERZaρθ])([0-9tc])")
+_METRICS = {
+    "volume": "$V/L^3$ (α-shape)",
+    "exact_volume": "$V/L^3$ (exact)",
+    "convex_volume": "$V_{conv}/L^3$",
+    "exact_convex_volume": "$V_{conv}/L^3$ (exact)",
+    "unreachability": "UNR (α-shape)",
+    "exact_unreachability": "UNR (exact)",
+}
+_RELATIVE = {"m": " / L", "m2": " / L²", "m3": " / L³", "1/m": " · L"}
 
 
 class SheetAxis(NamedTuple):
@@ -59,45 +67,9 @@ def box_over_length(atlas: xr.Dataset) -> Array:
     return np.array([low, high])
 
 
-def _axis(values: xr.DataArray) -> SheetAxis:
-    given = values.attrs.get("units", "1")
-    unit = _UNITS.get(given, given)
-    shown = np.degrees(values.values) if given == "rad" else values.values
-    name = _name(values)
-    return SheetAxis(f"{name} ({unit})" if unit else name, tuple(np.round(shown, 9).tolist()))
-
-
-def _name(values: xr.DataArray) -> str:
-    """The symbol of a parameter and the part that it belongs to."""
-    if "symbol" not in values.attrs:
-        return plain(str(values.name))
-    symbol = _in_math(values.attrs["symbol"])
-    return f"{symbol} of {plain(part)}" if (part := values.attrs.get("part")) else symbol
-
-
-def _in_math(symbol: str) -> str:
-    """R1/R2 with its indices set low."""
-    text = _INDEXED.sub(r"\1_\2", symbol)
-    return symbol if text == symbol else f"${text}$"
-
-
 def plain(name: str) -> str:
     """A name of the atlas as words."""
     return name.replace("_", " ")
-
-
-# Maps of the metrics of an atlas over its two parameters.
-
-
-_METRICS = {
-    "volume": "$V/L^3$ (α-shape)",
-    "exact_volume": "$V/L^3$ (exact)",
-    "convex_volume": "$V_{conv}/L^3$",
-    "exact_convex_volume": "$V_{conv}/L^3$ (exact)",
-    "unreachability": "UNR (α-shape)",
-    "exact_unreachability": "UNR (exact)",
-}
-_RELATIVE = {"m": " / L", "m2": " / L²", "m3": " / L³", "1/m": " · L"}
 
 
 def plot_metric_map(
@@ -147,10 +119,32 @@ def plot_metric_map(
 
 
 def metric_label(metric: xr.DataArray) -> str:
-    """What is drawn of a metric, in words or symbols, with what it is relative to."""
+    """Label of a metric, in words or symbols, with what it is relative to."""
     name = str(metric.name)
     relative = _RELATIVE.get(metric.attrs.get("units", "1"), "")
     return _METRICS.get(name, plain(name) + relative)
+
+
+def _axis(values: xr.DataArray) -> SheetAxis:
+    given = values.attrs.get("units", "1")
+    unit = _UNITS.get(given, given)
+    shown = np.degrees(values.values) if given == "rad" else values.values
+    name = _name(values)
+    return SheetAxis(f"{name} ({unit})" if unit else name, tuple(np.round(shown, 9).tolist()))
+
+
+def _name(values: xr.DataArray) -> str:
+    """The symbol of a parameter and the part that it belongs to."""
+    if "symbol" not in values.attrs:
+        return plain(str(values.name))
+    symbol = _in_math(values.attrs["symbol"])
+    return f"{symbol} of {plain(part)}" if (part := values.attrs.get("part")) else symbol
+
+
+def _in_math(symbol: str) -> str:
+    """R1/R2 with its indices set low."""
+    text = _INDEXED.sub(r"\1_\2", symbol)
+    return symbol if text == symbol else f"${text}$"
 
 
 def _fill(ax: Axes, across: SheetAxis, up: SheetAxis, values: Any) -> Any:
@@ -188,7 +182,7 @@ def _draw_contours(
 
 
 def _label_place(path: Array) -> list[Array]:
-    """Where on a contour, from 0 to 1 across and up, its label is far from every edge."""
+    """Place on a contour, from 0 to 1 across and up, that is far from every edge."""
     inside = path[((path > 0.1) & (path < 0.86)).all(axis=1)]
     distance = np.abs(inside - (0.5, 0.35)).sum(axis=1)
     return [inside[distance.argmin()]] if len(inside) else []

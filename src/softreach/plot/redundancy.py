@@ -1,4 +1,4 @@
-"""How differently the neighbors in a cloud are activated: D̄ over space, and its distribution."""
+"""Pictures of redundancy: activation distance D̄ in space, its distribution, and sheets."""
 
 from __future__ import annotations
 
@@ -41,6 +41,7 @@ from softreach.support.arguments import (
     whole,
     within,
 )
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -50,8 +51,12 @@ if TYPE_CHECKING:
 
     from softreach.plot.coloring import BundleKey
 
+
 _ISOLATED = 190  # light gray
 _LABEL = "mean activation distance D̄"
+_SLABS = ("front", "side")
+_MARGINS = {"left": 0.75, "right": 0.1, "bottom": 0.4, "top": 0.55, "gap": 0.12}  # inches
+_COLUMNS = ("cloud", *_SLABS, "distance")
 
 
 @checked(
@@ -147,36 +152,6 @@ def largest_distance(distances: Iterable[xr.DataArray]) -> float:
     return max((float(f.max()) for f in finite if len(f)), default=1.0) or 1.0
 
 
-def _draw_histogram(ax: Any, values: NDArray[np.float64], edges: NDArray[np.float64]) -> None:
-    finite = values[np.isfinite(values)]
-    share = 100.0 * np.histogram(finite, edges)[0] / max(len(values), 1)
-    colors = _colors(edges[:-1], edges[-1]) / 255
-    ax.bar(edges[:-1], share, np.diff(edges), align="edge", color=colors)
-    ax.set(xlabel=_LABEL, xlim=(0.0, edges[-1]), ylim=(0.0, None))
-    ax.spines[["top", "right"]].set_visible(False)
-    if len(finite):
-        median = float(np.median(finite))
-        ax.axvline(median, color="0.15", linewidth=0.8, linestyle="--")
-        text = f"median {median:.3f}\nisolated {1 - len(finite) / len(values):.2%}"
-        write_note(ax, text, 0.98, 0.98)
-
-
-def _colors(values: NDArray[np.float64], high: float) -> NDArray[np.uint8]:
-    from matplotlib import colormaps
-
-    shares = np.nan_to_num(values) / (high or 1.0)
-    colors = colormaps[COLORMAP](np.minimum(shares, 1.0), bytes=True)[:, :3]
-    return np.where(np.isnan(values)[:, None], np.uint8(_ISOLATED), colors)
-
-
-# Redundancy of several designs on one sheet: clouds, slabs of them, and D̄.
-
-
-_SLABS = ("front", "side")
-_MARGINS = {"left": 0.75, "right": 0.1, "bottom": 0.4, "top": 0.55, "gap": 0.12}  # inches
-_COLUMNS = ("cloud", *_SLABS, "distance")
-
-
 @checked(
     clouds=mapping_of(POINTS),
     distances=mapping_of(dataset(kind="DataArray")),
@@ -232,9 +207,29 @@ def plot_redundancy(
     return figure
 
 
-def _rows(
-    titles: list[str], box: NDArray[np.float64], width: float
-) -> tuple[Figure, dict[str, dict[str, Axes]]]:
+def _draw_histogram(ax: Any, values: Array, edges: Array) -> None:
+    finite = values[np.isfinite(values)]
+    share = 100.0 * np.histogram(finite, edges)[0] / max(len(values), 1)
+    colors = _colors(edges[:-1], edges[-1]) / 255
+    ax.bar(edges[:-1], share, np.diff(edges), align="edge", color=colors)
+    ax.set(xlabel=_LABEL, xlim=(0.0, edges[-1]), ylim=(0.0, None))
+    ax.spines[["top", "right"]].set_visible(False)
+    if len(finite):
+        median = float(np.median(finite))
+        ax.axvline(median, color="0.15", linewidth=0.8, linestyle="--")
+        text = f"median {median:.3f}\nisolated {1 - len(finite) / len(values):.2%}"
+        write_note(ax, text, 0.98, 0.98)
+
+
+def _colors(values: Array, high: float) -> NDArray[np.uint8]:
+    from matplotlib import colormaps
+
+    shares = np.nan_to_num(values) / (high or 1.0)
+    colors = colormaps[COLORMAP](np.minimum(shares, 1.0), bytes=True)[:, :3]
+    return np.where(np.isnan(values)[:, None], np.uint8(_ISOLATED), colors)
+
+
+def _rows(titles: list[str], box: Array, width: float) -> tuple[Figure, dict[str, dict[str, Axes]]]:
     """Axes at one scale: four columns, a row for each title."""
     x, y, z = np.ptp(box, axis=0)
     spans = {"cloud": x, "front": x, "side": y, "distance": x}

@@ -1,4 +1,4 @@
-"""The layers of a cross-section: bore, core and rings, by material."""
+"""Parts of a cross-section: bore, core and rings by material, and bundles in their colors."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.support.palette import BODY, Color, bundle_color, material_fill
 
@@ -19,7 +18,12 @@ if TYPE_CHECKING:
     from softreach.arm.material import Material
     from softreach.arm.section import Section
 
+
 _EDGE, _HATCH = "0.4", "0.55"
+_STROKE_ANGLE = np.radians(8)  # between fibers that do not run along the bundle
+_LIGHTNESS = (0.21, 0.72, 0.07)  # of red, green and blue
+_LEAN = np.radians(14)  # of oblique strokes from the inner to the outer radius
+_OVERLAP = 1e-6  # [rad] or [-], below which bundles only touch
 
 
 def draw_layers(ax: Axes, section: Section, outer: float) -> None:
@@ -66,51 +70,6 @@ def material_style(section: Section, material: Material) -> dict[str, Any]:
     known = [material.same_matter(other) for _, other in section_materials(section)]
     color, hatch = material_fill(known.index(True))
     return {"facecolor": color, "hatch": hatch, "edgecolor": _HATCH, "linewidth": 0.0}
-
-
-def _draw_material(
-    ax: Axes, section: Section, material: Material, low: float, high: float, alpha: float = 1.0
-) -> None:
-    style = material_style(section, material)
-    fill = _annulus(low, high)
-    fill.set(**{**style, "facecolor": (style["facecolor"], alpha)})
-    fill.set_hatch_linewidth(0.4)
-    edge = _annulus(low, high)
-    edge.set(facecolor="none", edgecolor=_EDGE, linewidth=0.4)
-    ax.add_patch(fill)
-    ax.add_patch(edge)
-
-
-def _draw_voids(ax: Axes, section: Section, outer: float) -> None:
-    """The bore, and gaps between rings."""
-    reached = section.bore_ratio
-    voids = [(0.0, reached)] if reached > 0 else []
-    reached = max(reached, section.inner_ratio)
-    for ring in sorted(section.rings, key=lambda one: one.inner_ratio):
-        if ring.inner_ratio > reached:
-            voids.append((reached, ring.inner_ratio))
-        reached = max(reached, ring.outer_ratio)
-    for low, high in voids:
-        void = _annulus(outer * low, outer * high)
-        void.set(facecolor="white", edgecolor=_EDGE, linewidth=0.4)
-        ax.add_patch(void)
-
-
-def _annulus(low: float, high: float) -> Patch:
-    from matplotlib.patches import Annulus, Circle
-
-    return Annulus((0, 0), high, high - low) if low > 0 else Circle((0, 0), high)
-
-
-# The bundles in a cross-section: sectors, dots and lumens in their colors.
-
-
-Array = NDArray[np.float64]
-
-_STROKE_ANGLE = np.radians(8)  # between fibers that do not run along the bundle
-_LIGHTNESS = (0.21, 0.72, 0.07)  # of red, green and blue
-_LEAN = np.radians(14)  # of oblique strokes from the inner to the outer radius
-_OVERLAP = 1e-6  # [rad] or [-], below which bundles only touch
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,6 +156,40 @@ def lumen_style(color: Color) -> dict[str, Any]:
     return {"facecolor": pale, "edgecolor": color, "linewidth": 1.4}
 
 
+def _draw_material(
+    ax: Axes, section: Section, material: Material, low: float, high: float, alpha: float = 1.0
+) -> None:
+    style = material_style(section, material)
+    fill = _annulus(low, high)
+    fill.set(**{**style, "facecolor": (style["facecolor"], alpha)})
+    fill.set_hatch_linewidth(0.4)
+    edge = _annulus(low, high)
+    edge.set(facecolor="none", edgecolor=_EDGE, linewidth=0.4)
+    ax.add_patch(fill)
+    ax.add_patch(edge)
+
+
+def _draw_voids(ax: Axes, section: Section, outer: float) -> None:
+    """The bore, and gaps between rings."""
+    reached = section.bore_ratio
+    voids = [(0.0, reached)] if reached > 0 else []
+    reached = max(reached, section.inner_ratio)
+    for ring in sorted(section.rings, key=lambda one: one.inner_ratio):
+        if ring.inner_ratio > reached:
+            voids.append((reached, ring.inner_ratio))
+        reached = max(reached, ring.outer_ratio)
+    for low, high in voids:
+        void = _annulus(outer * low, outer * high)
+        void.set(facecolor="white", edgecolor=_EDGE, linewidth=0.4)
+        ax.add_patch(void)
+
+
+def _annulus(low: float, high: float) -> Patch:
+    from matplotlib.patches import Annulus, Circle
+
+    return Annulus((0, 0), high, high - low) if low > 0 else Circle((0, 0), high)
+
+
 def _sector(one: PlacedBundle, outer: float, **style: Any) -> Wedge:
     from matplotlib.patches import Wedge
 
@@ -215,7 +208,7 @@ def _draw_stripes(ax: Axes, part: PlacedBundle, outer: float) -> None:
 
 
 def _draw_strokes(ax: Axes, one: PlacedBundle, outer: float) -> None:
-    """How its fibers run, where not along it: outwards, or leaning the way they wind."""
+    """Strokes of fibers that do not run along: outwards, or leaning the way they wind."""
     from matplotlib.collections import LineCollection
 
     lean = {"along": None, "radial": 0.0, "right-handed": _LEAN, "left-handed": -_LEAN}[one.course]
@@ -237,7 +230,7 @@ def _draw_strokes(ax: Axes, one: PlacedBundle, outer: float) -> None:
 
 
 def _contrast(color: Color) -> str:
-    """What stands out on a color."""
+    """A color that stands out on another."""
     return "white" if np.dot(color, _LIGHTNESS) < 0.55 else "0.3"
 
 
@@ -260,6 +253,6 @@ def _draw_disks(ax: Axes, lines: Collection[PlacedBundle], outer: float) -> None
 
 
 def _middle(one: PlacedBundle, outer: float) -> tuple[list[float], list[float]]:
-    """Where a tendon or the center of a lumen is."""
+    """Place of a tendon, or of the center of a lumen."""
     radius = 0.5 * outer * (one.inner_ratio + one.outer_ratio)
     return [radius * np.cos(one.center)], [radius * np.sin(one.center)]

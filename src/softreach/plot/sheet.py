@@ -23,6 +23,7 @@ from softreach.plot.metric_map import SheetAxis
 from softreach.plot.style import BOX, DPI, POINTS, WIDTH, a_view, figure_style, pyplot
 from softreach.support import parallel
 from softreach.support.arguments import checked, mapping_of
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import STEEL, activation_colors
 
@@ -31,10 +32,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
+
 Grid = NDArray[np.object_]
 Content = TypeVar("Content")
-
 _LEFT, _RIGHT, _BOTTOM, _TOP = 0.75, 0.04, 0.62, 0.08  # inches around a sheet
 
 
@@ -112,6 +112,68 @@ def plot_hull_sheet(
     return _filled_sheet(relative, image, across, up, box, view, width)
 
 
+def panel_extent(box: Array, view: View) -> Extent:
+    """Extent of a panel: tighter than a box in space, whose corners are empty.
+
+    The ellipsoid in the box reaches √Σ(hᵢ eᵢ)² along a unit vector e; a fifth more leaves room for
+    clouds that bulge beyond it.
+    """
+    middle, half = box.mean(axis=0), np.ptp(box, axis=0) / 2
+    limits = view_extent(box, view)
+    axes = view_axes(view)[:2]
+    x, y = axes @ middle
+    w, h = 1.2 * np.linalg.norm(axes * half, axis=1)
+    return Extent(
+        max(limits.left, x - w),
+        min(limits.right, x + w),
+        max(limits.bottom, y - h),
+        min(limits.top, y + h),
+    )
+
+
+@checked(clouds=mapping_of(POINTS), view=a_view, box_over_length=BOX, width=WIDTH)
+def plot_opposite_sides(
+    clouds: Mapping[str, xr.Dataset],
+    *,
+    view: View = "oblique",
+    box_over_length: ArrayLike | None = None,
+    width: float = 6.9,
+) -> Figure:
+    """Clouds from two opposing sides, one column each, with their arms at rest (figure 2b).
+
+    Args:
+        clouds: Clouds by the title of their column; each says which arm it belongs to.
+        view: Of the upper row, as in `plot_cloud`; the lower row is opposite.
+        box_over_length: What each panel shows, lower and upper corner in L [-], shape (2, 3); None
+            for all points.
+        width: Of the figure [inch].
+
+    Raises:
+        InvalidInput: No clouds, clouds of different bundles, an unknown view, or no finite tip.
+        MissingExtra: matplotlib is not installed.
+    """
+    bundles = {bundle_names(cloud) for cloud in clouds.values()}
+    if len(bundles) != 1:
+        raise InvalidInput("clouds", f"of bundles {sorted(bundles)}", "one or more of one set")
+    azimuth, elevation = view_angles(view)
+    sides = ((azimuth, elevation), (azimuth + np.pi, elevation))
+    shown = np.asarray(_around(clouds) if box_over_length is None else box_over_length, float)
+    with figure_style():
+        column = width / len(clouds)
+        figure = pyplot().figure(figsize=(width, 2 * column + 0.5))
+        panels = figure.subplots(2, len(clouds), squeeze=False)
+        figure.subplots_adjust(0.085, 0.11, 0.965, 0.86, wspace=0.45, hspace=0.34)
+        for k, (title, cloud) in enumerate(clouds.items()):
+            arm = design_of(cloud)
+            box = shown * arm.length
+            panels[0, k].set_title(f"({k + 1})  {title}", pad=4)
+            for ax, side in zip(panels[:, k], sides, strict=True):
+                plot_cloud(cloud, ax=ax, view=side, key=False, box=box)
+                plot_arm(arm, ax=ax, view=side, box=box)
+        draw_figure_key(figure, color_samples(next(iter(clouds.values()))).key, 0.09)
+    return figure
+
+
 def _filled_sheet(
     content_at: Callable[[int, int], Content | None],
     image: Callable[[Content, int], ZBuffer],
@@ -134,10 +196,10 @@ def _filled_sheet(
             return None if content is None else image(content, columns).rgba()
 
         tasks = (partial(pixels, *place) for place in np.ndindex(panels.shape))
-        for ax, found in zip(panels.ravel().tolist(), parallel.in_order(tasks), strict=True):
-            if found is not None:
+        for ax, rgba in zip(panels.ravel().tolist(), parallel.in_order(tasks), strict=True):
+            if rgba is not None:
                 # the frame of the axes and their limits stay
-                ax.imshow(found, extent=extent, interpolation="none", aspect="auto")
+                ax.imshow(rgba, extent=extent, interpolation="none", aspect="auto")
         _draw_scale(figure, panels[0, 0], view)
     return figure
 
@@ -222,71 +284,6 @@ def _draw_scale(figure: Figure, panel: Axes, view: View) -> None:
         ax.annotate("", (x, y), tuple(center), arrowprops=arrow | {"color": "0.2", "shrinkB": 0})
         x, y = center + 0.21 * inch * direction
         ax.text(x, y, name, fontsize=6, ha="center", va="center")
-
-
-def panel_extent(box: Array, view: View) -> Extent:
-    """What a panel shows: tighter than a box in space, whose corners are empty.
-
-    The ellipsoid in the box reaches √Σ(hᵢ eᵢ)² along a unit vector e; a fifth more leaves room for
-    clouds that bulge beyond it.
-    """
-    middle, half = box.mean(axis=0), np.ptp(box, axis=0) / 2
-    whole = view_extent(box, view)
-    axes = view_axes(view)[:2]
-    x, y = axes @ middle
-    w, h = 1.2 * np.linalg.norm(axes * half, axis=1)
-    return Extent(
-        max(whole.left, x - w),
-        min(whole.right, x + w),
-        max(whole.bottom, y - h),
-        min(whole.top, y + h),
-    )
-
-
-# Some clouds of an atlas from two opposing sides.
-
-
-@checked(clouds=mapping_of(POINTS), view=a_view, box_over_length=BOX, width=WIDTH)
-def plot_opposite_sides(
-    clouds: Mapping[str, xr.Dataset],
-    *,
-    view: View = "oblique",
-    box_over_length: ArrayLike | None = None,
-    width: float = 6.9,
-) -> Figure:
-    """Clouds from two opposing sides, one column each, with their arms at rest (figure 2b).
-
-    Args:
-        clouds: Clouds by the title of their column; each says which arm it belongs to.
-        view: Of the upper row, as in `plot_cloud`; the lower row is opposite.
-        box_over_length: What each panel shows, lower and upper corner in L [-], shape (2, 3); None
-            for all points.
-        width: Of the figure [inch].
-
-    Raises:
-        InvalidInput: No clouds, clouds of different bundles, an unknown view, or no finite tip.
-        MissingExtra: matplotlib is not installed.
-    """
-    bundles = {bundle_names(cloud) for cloud in clouds.values()}
-    if len(bundles) != 1:
-        raise InvalidInput("clouds", f"of bundles {sorted(bundles)}", "one or more of one set")
-    azimuth, elevation = view_angles(view)
-    sides = ((azimuth, elevation), (azimuth + np.pi, elevation))
-    shown = np.asarray(_around(clouds) if box_over_length is None else box_over_length, float)
-    with figure_style():
-        column = width / len(clouds)
-        figure = pyplot().figure(figsize=(width, 2 * column + 0.5))
-        panels = figure.subplots(2, len(clouds), squeeze=False)
-        figure.subplots_adjust(0.085, 0.11, 0.965, 0.86, wspace=0.45, hspace=0.34)
-        for k, (title, cloud) in enumerate(clouds.items()):
-            arm = design_of(cloud)
-            box = shown * arm.length
-            panels[0, k].set_title(f"({k + 1})  {title}", pad=4)
-            for ax, side in zip(panels[:, k], sides, strict=True):
-                plot_cloud(cloud, ax=ax, view=side, key=False, box=box)
-                plot_arm(arm, ax=ax, view=side, box=box)
-        draw_figure_key(figure, color_samples(next(iter(clouds.values()))).key, 0.09)
-    return figure
 
 
 def _around(clouds: Mapping[str, xr.Dataset]) -> ArrayLike:

@@ -1,4 +1,4 @@
-"""How every figure looks: light, small type, thin lines, images sharp at print size."""
+"""Style of every figure: light, small type, thin lines, images sharp at print size."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.geometry.surface import SurfaceMesh
@@ -26,7 +25,7 @@ from softreach.support.arguments import (
     path,
     within,
 )
-from softreach.support.arrays import as_floats, as_indices
+from softreach.support.arrays import Array, as_floats, as_indices
 from softreach.support.errors import InvalidInput, MissingExtra, Range
 from softreach.support.files.atomic import writing
 from softreach.support.files.kinds import PICTURES, format_of
@@ -34,6 +33,7 @@ from softreach.support.files.kinds import PICTURES, format_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
 
 DPI = 250
 """Pixels per inch of images inside figures, and of saved PNG files."""
@@ -60,6 +60,14 @@ _RC: dict[str, Any] = {
 }
 # text stays text in vector files, so that a journal can set it in its own type
 _SAVING: dict[str, Any] = {"pdf.fonttype": 42, "svg.fonttype": "none"}
+MANIPULATOR = instance(Manipulator, "a Manipulator")
+SHAPE = dataset("position", "directors", "extension", "Z", what="a configuration")
+POINTS = dataset("tip", "activation", what="a cloud")
+LENGTH = within(POSITIVE._replace(unit="m"))
+PLACE = within(Range(unit="m"))
+SIZE = optional(within(Range(0.0, 1e3, "pixels", open_low=True)))
+WIDTH = within(Range(1.0, 100.0, "inches"))
+KEY = {"key": flag}
 
 
 def pyplot() -> Any:
@@ -114,14 +122,9 @@ def save_figure(
     """
     kind, suffix = format_of(path, PICTURES), Path(path).suffix.lower()
     with pyplot().rc_context(_SAVING), writing(path, kind, overwrite=overwrite) as file:
-        whole = figure.get_figure(root=True)
-        if whole is not None:
-            whole.savefig(file, dpi=DPI, format=suffix[1:], **_encoding(suffix))
-
-
-def _encoding(suffix: str) -> dict[str, Any]:
-    """PNG at a level that takes less than half the time of the default for 5 % more bytes."""
-    return {"pil_kwargs": {"compress_level": 4}} if suffix == ".png" else {}
+        root = figure.get_figure(root=True)
+        if root is not None:
+            root.savefig(file, dpi=DPI, format=suffix[1:], **_encoding(suffix))
 
 
 def write_note(ax: Axes, text: str, right: float, up: float) -> None:
@@ -132,40 +135,11 @@ def write_note(ax: Axes, text: str, right: float, up: float) -> None:
     ax.text(right, up, text, fontsize=7, color="0.25", zorder=5, bbox=paper, **place)
 
 
-# Arguments that figures have in common.
-
-
-MANIPULATOR = instance(Manipulator, "a Manipulator")
-SHAPE = dataset("position", "directors", "extension", "Z", what="a configuration")
-POINTS = dataset("tip", "activation", what="a cloud")
-LENGTH = within(POSITIVE._replace(unit="m"))
-PLACE = within(Range(unit="m"))
-SIZE = optional(within(Range(0.0, 1e3, "pixels", open_low=True)))
-WIDTH = within(Range(1.0, 100.0, "inches"))
-
-
-def _axes(name: str, value: Any) -> Any:
-    """Axes of matplotlib, which need not be loaded to know them."""
-    if hasattr(value, "imshow") and hasattr(value, "get_figure") and not isinstance(value, type):
-        return value
-    raise InvalidInput(name, as_given(value), "axes of matplotlib, or None")
-
-
 def a_view(name: str, value: Any) -> Any:
     """A view, as `view_angles` knows it."""
     del name
     view_angles(value)
     return value
-
-
-def _box(name: str, value: Any) -> NDArray[np.float64]:
-    """A lower and an upper corner, shape (2, 3)."""
-    allowed = "a lower and an upper corner, finite numbers of shape (2, 3)"
-    corners = as_floats(name, value, allowed)
-    rising = corners.shape == (2, 3) and bool((corners[0] < corners[1]).all())
-    if rising and np.isfinite(corners).all():
-        return corners
-    raise InvalidInput(name, corners.tolist(), allowed)
 
 
 def a_surface(name: str, value: Any) -> SurfaceMesh:
@@ -183,8 +157,29 @@ def some_bundles(name: str, value: Any, arm: Manipulator) -> list[int]:
     return as_indices(name, value, arm.bundles, "bundles of the arm").tolist()
 
 
+def _encoding(suffix: str) -> dict[str, Any]:
+    """PNG at a level that takes less than half the time of the default for 5 % more bytes."""
+    return {"pil_kwargs": {"compress_level": 4}} if suffix == ".png" else {}
+
+
+def _axes(name: str, value: Any) -> Any:
+    """Axes of matplotlib, which need not be loaded to know them."""
+    if hasattr(value, "imshow") and hasattr(value, "get_figure") and not isinstance(value, type):
+        return value
+    raise InvalidInput(name, as_given(value), "axes of matplotlib, or None")
+
+
+def _box(name: str, value: Any) -> Array:
+    """A lower and an upper corner, shape (2, 3)."""
+    allowed = "a lower and an upper corner, finite numbers of shape (2, 3)"
+    corners = as_floats(name, value, allowed)
+    rising = corners.shape == (2, 3) and bool((corners[0] < corners[1]).all())
+    if rising and np.isfinite(corners).all():
+        return corners
+    raise InvalidInput(name, corners.tolist(), allowed)
+
+
 AX: Callable[[str, Any], Any] = optional(_axes)
 BOX = optional(_box)
 DRAWN = {"ax": AX, "view": a_view, "box": BOX}
-"""What figures of one panel have in common."""
-KEY = {"key": flag}
+"""Arguments of figures of one panel."""

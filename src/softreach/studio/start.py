@@ -23,7 +23,7 @@ from softreach.studio.state import StudioState
 from softreach.support.errors import InvalidInput, SoftreachError
 from softreach.support.files.atomic import replacing
 from softreach.support.files.kinds import FileKind, text_with
-from softreach.support.files.store_place import kind_of
+from softreach.support.files.stores import kind_of
 
 if TYPE_CHECKING:
     import xarray as xr

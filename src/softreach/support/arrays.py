@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from softreach.support.errors import InvalidInput
 
 __all__ = [
+    "Array",
     "Faces",
+    "Index",
     "Points",
     "as_faces",
     "as_floats",
@@ -26,6 +28,12 @@ __all__ = [
     "as_stations",
     "check_finite",
 ]
+
+Array = NDArray[np.float64]
+"""Numbers."""
+
+Index = NDArray[np.int64]
+"""Places in other arrays."""
 
 Points = NDArray[np.float64]
 """Places [m], shape (n, 3)."""

@@ -1,4 +1,4 @@
-"""How much memory and disk there is, and whether what is asked for fits."""
+"""Free memory and disk space, and checks of what is asked of them."""
 
 from __future__ import annotations
 
@@ -11,6 +11,17 @@ from softreach.support.errors import InvalidInput, in_short, warn
 __all__ = ["check_disk", "check_memory", "check_room", "free_disk", "free_memory"]
 
 _UNKNOWN = 4e9  # where the system does not say
+_CONTROL_GROUP = Path("/sys/fs/cgroup")
+_CONTROL_GROUPS = (
+    ("memory.max", "memory.current", "memory.stat", "inactive_file"),
+    (
+        "memory/memory.limit_in_bytes",
+        "memory/memory.usage_in_bytes",
+        "memory/memory.stat",
+        "total_inactive_file",
+    ),
+)
+"""Files of versions 2 and 1: limit, use, and the name and place of the cache that gives way."""
 
 
 def free_memory() -> float:
@@ -32,13 +43,16 @@ def _system() -> float:
 
 
 def _control_group() -> float:
-    """What a container leaves of its limit."""
-    folder = Path("/sys/fs/cgroup")
-    try:
-        limit = float((folder / "memory.max").read_text())
-        return limit - float((folder / "memory.current").read_text())
-    except (OSError, ValueError):  # no such group, or its limit is "max"
-        return float("inf")
+    """Memory that a container leaves of its limit, with the files that it keeps only to read."""
+    for limit, used, stat, kept in _CONTROL_GROUPS:
+        try:
+            lines = map(str.split, (_CONTROL_GROUP / stat).read_text().splitlines())
+            cache = next((float(value) for name, value in lines if name == kept), 0.0)
+            free = float((_CONTROL_GROUP / limit).read_text())
+            return free - float((_CONTROL_GROUP / used).read_text()) + cache
+        except (OSError, ValueError):  # no such group, or its limit is "max"
+            continue
+    return float("inf")
 
 
 def free_disk(path: str | os.PathLike[str]) -> float:

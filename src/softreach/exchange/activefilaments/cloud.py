@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach import schema
 from softreach.arm.manipulator import Manipulator, a_manipulator
@@ -21,6 +20,7 @@ from softreach.exchange.activefilaments.filament import Filament, filament_of
 from softreach.rod.kinematics import tip_positions
 from softreach.schema import a_cloud
 from softreach.support.arguments import checked, flag, path
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, counted, warn
 from softreach.support.files.atomic import check_place, writing
 from softreach.support.files.kinds import FileKind, Formats
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["CLOUD_PAIR", "gamma_path", "read_cloud", "write_cloud"]
-
-Array = NDArray[np.float64]
 
 _SAME = 1e-5  # of L; their fixed 100 steps of order five err by less
 _BLOCK = 1 << 16
@@ -139,7 +137,7 @@ def _is_of_pair(path: Path) -> bool:
 CLOUD_PAIR: Formats = {
     ".csv": FileKind("one of NAME.csv and NAME_gamma.csv of numbers alone", _is_of_pair)
 }
-"""What `write_cloud` writes, and replaces."""
+"""Format of `write_cloud`."""
 
 
 def _warn(arm: Manipulator, activation: Array, difference: float) -> None:
@@ -189,7 +187,7 @@ def _check_file(path: Path) -> None:
 
 
 def _reason(error: Exception) -> str:
-    """What is wrong with a table, in a few printable words."""
+    """Fault of a table, in a few printable words."""
     if isinstance(error, UnicodeDecodeError):
         return "no text"
     text = str(error).partition(";")[0] or type(error).__name__

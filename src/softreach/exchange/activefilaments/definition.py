@@ -1,20 +1,25 @@
-"""Definitions of filaments, as users of ActiveFilaments.jl write them, as designs.
-
-The source is read, not run: see `expressions` for what it may hold. A statement of another kind is
-passed over, unless the filament depends on it.
-"""
+"""Definitions of filaments, as users of ActiveFilaments.jl write them, as designs."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from os import PathLike, fspath
 from typing import Any
 
+import numpy as np
+
+from softreach.arm.along import Pieces
 from softreach.arm.manipulator import Manipulator
-from softreach.exchange.activefilaments.constructors import filament_from
-from softreach.exchange.activefilaments.expressions import Call, Unreadable, value_of
-from softreach.exchange.activefilaments.filament import arm_of
-from softreach.exchange.activefilaments.tokens import Token, refused, statements
+from softreach.exchange.activefilaments.constructors import Constructed, Unreadable, is_of_kind
+from softreach.exchange.activefilaments.filament import (
+    Angle,
+    Filament,
+    FilamentRing,
+    arm_of,
+    is_from_inside_out,
+)
 from softreach.support.arguments import checked, path
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.support.files.text import read_text
@@ -22,13 +27,12 @@ from softreach.support.files.text import read_text
 __all__ = ["read_design"]
 
 _LARGEST = 100_000  # bytes
-_BLOCKS = {
-    "for", "while", "if", "function", "macro", "let", "begin", "struct", "mutable", "try", "do",
-    "quote", "module", "baremodule", "end", "else", "elseif", "catch", "finally", "return",
-    "abstract", "primitive", "global", "local",
-}  # fmt: skip
-_PASSED_OVER = {"using", "import", "export", "@"}
-_ASSIGNMENTS = {f"{dot}{sign}=" for dot in ("", ".") for sign in ("", *"+-*/^")}
+_BOUNDS = (-5 / 3, 0.0)  # where the file has none, widened to hold the activation
+_BOUNDS_NAMES = ("γBounds", "gammaBounds", "γ_bounds", "gamma_bounds")
+_ACTIVATION = "ActivationPiecewiseGamma"
+
+Pairs = tuple[tuple[float, float], ...]
+"""(lower, upper) of each sector of a ring."""
 
 
 @checked(path=path)
@@ -47,9 +51,11 @@ def read_design(path: str | PathLike[str]) -> Manipulator:
         InvalidInput: A definition that is not such, with the number of its line, or that no arm can
             have.
     """
+    from softreach.exchange.activefilaments.julia import Julia
+
     source = fspath(path)
-    known = _definitions(source, read_text("definition", path, _LARGEST))
-    filament = filament_from(source, _the_filament(source, known), known)
+    known = Julia(source).read(read_text("definition", path, _LARGEST))
+    filament = _filament(_the_filament(source, known), known)
     try:
         return arm_of(filament)
     except InvalidDesign as error:
@@ -57,70 +63,148 @@ def read_design(path: str | PathLike[str]) -> Manipulator:
         raise InvalidInput(source, faults, "the filament of an arm that can exist") from None
 
 
-def _definitions(source: str, text: str) -> dict[str, Any]:
-    """What each name stands for at the end."""
-    known: dict[str, Any] = {}
-    for statement in statements(source, text):
-        _follow(source, statement, known)
-    return known
-
-
-def _follow(source: str, statement: list[Token], known: dict[str, Any]) -> None:
-    """Keep what a statement assigns, or that it assigns something unreadable."""
-    if statement[0].text in _PASSED_OVER:
-        return
-    if statement[0].text == "const" and len(statement) > 1:
-        statement = statement[1:]
-    first = statement[0]
-    if first.kind == "name" and first.text in _BLOCKS:
-        hint = "keep only the definition of the filament in the file"
-        raise refused(source, first, "a plain assignment", hint)
-    signs = list(_assignments(statement))
-    changes = any(token.kind == "name" and token.text.endswith("!") for token in statement)
-    plain = signs == [1] and statement[1].text == "=" and first.kind == "name"
-    if plain and not changes and statement[2:]:
-        known[first.text] = _read(source, statement[2:], known)
-    elif signs or changes:
-        changed = statement if changes else statement[: signs[-1]]
-        error = refused(source, first, "a plain assignment such as `R2 = 0.01`")
-        names = frozenset(token.text for token in statement if token.kind == "name")
-        known.update({t.text: Unreadable(error, names) for t in changed if t.kind == "name"})
-
-
-def _assignments(statement: Sequence[Token]) -> Iterator[int]:
-    """Where a statement has an `=`, `*=`, `.=`, ... that does not name an argument of a call."""
-    of_calls: list[bool] = []
-    for place, token in enumerate(statement):
-        if token.kind != "sign":
-            continue
-        if token.text in "([{":
-            named = token.touches and statement[place - 1].kind == "name"
-            of_calls.append(named and token.text == "(")
-        elif token.text in ")]}":
-            of_calls.pop()
-        elif token.text in _ASSIGNMENTS and not (of_calls and of_calls[-1]):
-            yield place
-
-
-def _read(source: str, tokens: Sequence[Token], known: dict[str, Any]) -> Any:
-    try:
-        return value_of(source, tokens, known)
-    except InvalidInput as error:
-        names = frozenset(token.text for token in tokens if token.kind == "name")
-        return Unreadable(error, names)
-
-
-def _the_filament(source: str, known: dict[str, Any]) -> Call:
+def _the_filament(source: str, known: Mapping[str, Any]) -> Constructed:
     """The one filament that is defined, or why there is none."""
-    found = [v for v in known.values() if isinstance(v, Call) and v.name == "AFilament"]
-    if len(found) == 1:
-        return found[0]
-    if found:
-        lines = " and ".join(str(call.line) for call in found)
+    filaments = [value for value in known.values() if is_of_kind(value, "AFilament")]
+    if len(filaments) == 1:
+        return filaments[0]
+    if filaments:
+        lines = " and ".join(filament.where.rpartition(" ")[2] for filament in filaments)
         raise InvalidInput(source, f"filaments in lines {lines}", "the definition of one filament")
+    _raise_unreadable(known, "AFilament")
+    allowed = "a definition with `filament = AFilament(rings; ...)`"
+    raise InvalidInput(source, "no filament", allowed)
+
+
+def _raise_unreadable(known: Mapping[str, Any], name: str) -> None:
+    """Raise why a name could not be read that was made from a constructor."""
     for value in known.values():
-        if isinstance(value, Unreadable) and "AFilament" in value.names:
+        if isinstance(value, Unreadable) and name in value.names:
             raise value.error
-    raise InvalidInput(
-        source, "no filament", "a definition with `filament = AFilament(rings; ...)`"
+
+
+def _filament(filament: Constructed, known: Mapping[str, Any]) -> Filament:
+    """The filament, with the activation that is defined beside it."""
+    _check_each(filament, filament.rings, "Ring")
+    activation = _activation(filament, known)
+    bounds = _bounds(filament, known, activation)
+    rings = [
+        _ring(ring, sectors, pairs, filament.L)
+        for ring, sectors, pairs in zip(filament.rings, activation, bounds, strict=True)
+    ]
+    if not is_from_inside_out(rings):
+        spans = ", ".join(f"{ring.inner_radius:g} to {ring.outer_radius:g}" for ring in rings)
+        raise filament.fault(spans, "rings with the innermost first and the outermost last")
+    modulus, ratio = _core(filament.innerTube, rings[0])
+    ends = np.cumsum([len(ring.bounds) for ring in rings]).tolist()
+    return Filament(
+        length=filament.L,
+        taper=filament.phi2,
+        density=filament.ρvol,
+        rings=tuple(
+            replace(ring, bundles=tuple(range(end - len(ring.bounds), end)))
+            for ring, end in zip(rings, ends, strict=True)
+        ),
+        core_modulus=modulus,
+        core_poisson_ratio=ratio,
     )
+
+
+def _check_each(of: Constructed, values: Sequence[Any], kind: str) -> None:
+    for value in values:
+        if not is_of_kind(value, kind):
+            raise of.fault(value, f"given a vector of {kind}")
+
+
+def _ring(ring: Constructed, sectors: Constructed, bounds: Pairs, length: float) -> FilamentRing:
+    return FilamentRing(
+        young_modulus=ring.mechanics.E,
+        poisson_ratio=ring.mechanics.ν,
+        inner_radius=ring.geometry.R1,
+        outer_radius=ring.geometry.R2,
+        angle=_angle(ring.architecture, length),
+        extent=sectors.σ,
+        offset=sectors.θ0,
+        bounds=bounds,
+    )
+
+
+def _angle(architecture: Constructed, length: float) -> Angle:
+    pieces = architecture.α2
+    if isinstance(pieces, float):
+        return pieces
+    if not is_of_kind(pieces, "PiecewiseStructure"):
+        raise architecture.fault(pieces, "given a number or a PiecewiseStructure")
+    ranges = pieces.piecewiseRanges
+    pairs = all(is_of_kind(ends, "a vector of numbers") and len(ends) == 2 for ends in ranges)
+    joined = [ranges[0][0], *(end for _, end in ranges)] if pairs else []
+    if not joined or [start for start, _ in ranges] != joined[:-1] or length <= 0:
+        raise pieces.fault("ranges", "pairs (Z1, Z2) that follow one another from 0 to L")
+    stations = tuple(end / length for end in joined)
+    try:
+        return Pieces(stations_over_length=stations, values=tuple(pieces.expressions))
+    except InvalidDesign as error:
+        raise pieces.fault("ranges", f"from 0 to L = {length:g}, {error}") from None
+
+
+def _core(tube: Constructed | None, innermost: FilamentRing) -> tuple[float, float]:
+    """E and ν of the inside."""
+    if tube is None:
+        return innermost.young_modulus, innermost.poisson_ratio
+    inner, outer = tube.geometry.R1, tube.geometry.R2
+    if inner != 0 or not math.isclose(outer, innermost.inner_radius, rel_tol=1e-12):
+        allowed = f"from 0 to the innermost ring, {innermost.inner_radius:g}"
+        raise tube.fault(f"{inner:g} to {outer:g}", allowed)
+    return tube.mechanics.E, tube.mechanics.ν
+
+
+def _activation(filament: Constructed, known: Mapping[str, Any]) -> list[Constructed]:
+    """The structure of the activation, the last one that is defined: one entry for each ring."""
+    activation = next(filter(_is_activation, list(known.values())[::-1]), None)
+    if activation is None:
+        _raise_unreadable(known, _ACTIVATION)
+        allowed = f"beside `activation = [{_ACTIVATION}(...)]`, one for each ring"
+        raise filament.fault("the filament", allowed)
+    for sectors in activation:
+        if len(sectors.γ) != sectors.N or not sectors.γ:
+            allowed = f"N = {sectors.N:g} of them, 1 or more"
+            raise sectors.fault(f"{len(sectors.γ)} activations", allowed)
+    if len(activation) != len(filament.rings):
+        allowed = f"{len(filament.rings)}, one for each ring"
+        raise activation[0].fault(f"{len(activation)} of them", allowed)
+    return activation
+
+
+def _is_activation(value: object) -> bool:
+    return (
+        isinstance(value, list) and bool(value) and all(is_of_kind(v, _ACTIVATION) for v in value)
+    )
+
+
+def _bounds(
+    filament: Constructed, known: Mapping[str, Any], activation: Sequence[Constructed]
+) -> list[Pairs]:
+    bounds = next((known[name] for name in _BOUNDS_NAMES if name in known), None)
+    if bounds is None:
+        low, high = _BOUNDS
+        return [tuple((min(low, γ), max(high, γ)) for γ in sectors.γ) for sectors in activation]
+    if isinstance(bounds, Unreadable):
+        raise bounds.error
+    where = Constructed(name="γBounds", where=filament.where)
+    if not isinstance(bounds, list) or len(bounds) != len(activation):
+        allowed = f"{len(activation)} tuples (lows, highs), one for each ring"
+        raise where.fault(bounds, allowed)
+    return [
+        _pairs(where, value, len(sectors.γ))
+        for value, sectors in zip(bounds, activation, strict=True)
+    ]
+
+
+def _pairs(where: Constructed, value: Any, count: int) -> Pairs:
+    allowed = f"a tuple (lows, highs) of {count} numbers each"
+    if not isinstance(value, tuple) or len(value) != 2:
+        raise where.fault(value, allowed)
+    lows, highs = value
+    if not all(is_of_kind(side, "a vector of numbers") and len(side) == count for side in value):
+        raise where.fault(f"{value}", allowed)
+    return tuple(zip(lows, highs, strict=True))

@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.actuators import FiberArchitecture
 from softreach.arm.along import AlongArm, Pieces
@@ -16,11 +15,11 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring, Section
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
 __all__ = ["Angle", "Filament", "FilamentRing", "arm_of", "filament_of", "is_from_inside_out"]
 
-Array = NDArray[np.float64]
 Angle = float | Pieces
 
 _SMALLEST_TAPER = 1e-4  # rad; below it their Θ(Z) is unstable, as their own source warns
@@ -52,12 +51,12 @@ class FilamentRing:
     scale: float = 1.0
     """Their γ over that of the arm [-]."""
     name: str = ""
-    """What the arm calls it."""
+    """Its name in the arm."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Filament:
-    """What `AFilament` holds, and the structure of its activation."""
+    """An `AFilament`, and the structure of its activation."""
 
     length: float
     """L [m]."""
@@ -74,7 +73,7 @@ class Filament:
 
     @property
     def columns(self) -> int:
-        """How many activations it has: sectors of all rings."""
+        """Number of its activations: sectors of all rings."""
         return sum(len(ring.bounds) for ring in self.rings)
 
     def to_columns(self, activation: Array) -> Array:

@@ -30,7 +30,7 @@ using ActiveFilaments
 FILAMENT_SCRIPT: Formats = {
     ".jl": FileKind("a filament's definition", text_with("using ActiveFilaments", "AFilament("))
 }
-"""What `write_design` writes, and replaces."""
+"""Format of `write_design`."""
 
 
 @checked(arm=a_manipulator, path=path, overwrite=flag)

@@ -1,4 +1,4 @@
-"""What is misprinted in the paper, found by computing with it as it is printed."""
+"""Misprints of the paper, found by computing with it as it is printed."""
 
 from __future__ import annotations
 
@@ -45,75 +45,6 @@ def misprints(settings: Settings, folder: Path, notes: Notebook) -> None:
     )
 
 
-def _of_minimal_trunk() -> tuple[float, float, float]:
-    """Its taper φ [rad], R1/R2 [-] and the helical angle of its right-handed fiber [rad]."""
-    facts, taper = describe(minimal_trunk()), np.radians(2)
-    return taper, facts.radius_ratio, float(facts.helical_angles[1])
-
-
-def _rotation(arm: Manipulator, taper: float, angle: float) -> dict[str, float]:
-    """How far the printed fiber rotation is from the integral, and near φ = 0 from its limit."""
-    from scipy.integrate import quad
-
-    rod = tip_map(arm)
-    z, radius = 0.7 * rod.length, describe(arm).base_radius
-    slope = np.tan(angle) * np.hypot(1, np.tan(taper))
-    integral = quad(lambda s: slope / float(rod.radius(s)), 0, z)[0]
-    almost = printed.rotation(radius, 1e-5, angle, z)
-    found = printed.rotation(radius, taper, angle, z)
-    limit = np.tan(angle) * z / radius
-    return {
-        "rotation": float(abs(found / integral - 1)),
-        "rotation_limit": float(abs(almost / limit - 1)),
-    }
-
-
-def _inclination(arm: Manipulator, taper: float) -> tuple[float, float]:
-    """Angle of the right-handed fiber at the base to the axis and to e_Θ, on the surface [rad].
-
-    In the plane normal to e_R, as Appendix C has it.
-    """
-    step = 1e-6 * arm.length
-    start, end = arm.outline([0.0, step]).center[:, 1]
-    around, along = describe(arm).base_radius * (end - start), step / np.cos(taper)
-    return float(np.arctan2(around, along)), float(np.arctan2(along, around))
-
-
-def _errors(ratio: float, taper: float, angle: float) -> tuple[float, ...]:
-    """How far the printed δ0, δ1 and δ3, and the corrected δ3, are from the integrals [-]."""
-    exact = ring_integrals(ratio, taper, angle, 0.5)
-    pairs = (
-        (printed.delta0(ratio, taper, angle, 0.5), 4 * exact.axial),
-        (printed.delta1(ratio, taper, angle, 0.5), 6 * exact.bending),
-        (printed.delta3(ratio, taper, angle), 6 * exact.torsion),
-        (printed.delta3(ratio, taper, angle, corrected=True), 6 * exact.torsion),
-    )
-    return tuple(float(abs(found / true - 1)) for found, true in pairs)
-
-
-def _refusal() -> str:
-    """The error that a design with R1(0) = L/12 and R2(0) = L/16 raises."""
-    arm = minimal_trunk()
-    try:
-        Manipulator.tapered(
-            length=1.0, outer_radius=1 / 16, inner_radius=1 / 12, actuators=arm.actuators
-        )
-    except InvalidDesign as error:
-        return f"refused: {error}"
-    return "accepted"
-
-
-def _volume(ratio: float, accuracy: float) -> float:
-    return reachable_set(minimal_trunk(radius_ratio=ratio), accuracy=accuracy).volume
-
-
-# What is printed, against what it must mean.
-
-
-def _misprint(words: str, is_wrong: bool) -> Finding:
-    return Finding(words, Verdict.MISPRINT if is_wrong else Verdict.AGREES)
-
-
 def radius(n: Numbers) -> Finding:
     """The inner radius: refused as printed, and what the ratio does to the volume."""
     volumes = ", ".join(f"{r}: {v:.3f}" for r, v in n["volumes"].items())
@@ -156,3 +87,69 @@ def angle(n: Numbers) -> Finding:
         f"axis and {n['from_circle_deg']:.3g}° to e_Θ; α = 0 is longitudinal, as section 2 has it"
     )
     return _misprint(words, abs(n["from_axis_deg"] - n["helical_angle_deg"]) < 1e-3)
+
+
+def _of_minimal_trunk() -> tuple[float, float, float]:
+    """Its taper φ [rad], R1/R2 [-] and the helical angle of its right-handed fiber [rad]."""
+    facts, taper = describe(minimal_trunk()), np.radians(2)
+    return taper, facts.radius_ratio, float(facts.helical_angles[1])
+
+
+def _rotation(arm: Manipulator, taper: float, angle: float) -> dict[str, float]:
+    """Errors of the printed fiber rotation: from the integral, and near φ = 0 from its limit."""
+    from scipy.integrate import quad
+
+    rod = tip_map(arm)
+    z, radius = 0.7 * rod.length, describe(arm).base_radius
+    slope = np.tan(angle) * np.hypot(1, np.tan(taper))
+    integral = quad(lambda s: slope / float(rod.radius(s)), 0, z)[0]
+    almost = printed.rotation(radius, 1e-5, angle, z)
+    found = printed.rotation(radius, taper, angle, z)
+    limit = np.tan(angle) * z / radius
+    return {
+        "rotation": float(abs(found / integral - 1)),
+        "rotation_limit": float(abs(almost / limit - 1)),
+    }
+
+
+def _inclination(arm: Manipulator, taper: float) -> tuple[float, float]:
+    """Angle of the right-handed fiber at the base to the axis and to e_Θ, on the surface [rad].
+
+    In the plane normal to e_R, as Appendix C has it.
+    """
+    step = 1e-6 * arm.length
+    start, end = arm.outline([0.0, step]).center[:, 1]
+    around, along = describe(arm).base_radius * (end - start), step / np.cos(taper)
+    return float(np.arctan2(around, along)), float(np.arctan2(along, around))
+
+
+def _errors(ratio: float, taper: float, angle: float) -> tuple[float, ...]:
+    """Errors of the printed δ0, δ1 and δ3, and of the corrected δ3, against the integrals [-]."""
+    exact = ring_integrals(ratio, taper, angle, 0.5)
+    pairs = (
+        (printed.delta0(ratio, taper, angle, 0.5), 4 * exact.axial),
+        (printed.delta1(ratio, taper, angle, 0.5), 6 * exact.bending),
+        (printed.delta3(ratio, taper, angle), 6 * exact.torsion),
+        (printed.delta3(ratio, taper, angle, corrected=True), 6 * exact.torsion),
+    )
+    return tuple(float(abs(found / true - 1)) for found, true in pairs)
+
+
+def _refusal() -> str:
+    """The error that a design with R1(0) = L/12 and R2(0) = L/16 raises."""
+    arm = minimal_trunk()
+    try:
+        Manipulator.tapered(
+            length=1.0, outer_radius=1 / 16, inner_radius=1 / 12, actuators=arm.actuators
+        )
+    except InvalidDesign as error:
+        return f"refused: {error}"
+    return "accepted"
+
+
+def _volume(ratio: float, accuracy: float) -> float:
+    return reachable_set(minimal_trunk(radius_ratio=ratio), accuracy=accuracy).volume
+
+
+def _misprint(words: str, is_wrong: bool) -> Finding:
+    return Finding(words, Verdict.MISPRINT if is_wrong else Verdict.AGREES)

@@ -29,6 +29,23 @@ def model(settings: Settings, folder: Path, notes: Notebook) -> None:
     _draw(arm, notes)
 
 
+def meeting(n: Numbers) -> Finding:
+    """Places of the fibers at the tip."""
+    words = f"at Z = L the edges of the sectors are {abs(n['gap_deg']):.2g}° apart"
+    return judged(words, abs(n["gap_deg"]) < 1.0)
+
+
+def narrowing(n: Numbers) -> Finding:
+    """Shrinking of the radius."""
+    return judged(f"{n['narrowing']:.2f}-fold", round(n["narrowing"], 1) == 6.2)
+
+
+def symmetry(n: Numbers) -> Finding:
+    """Mirror images."""
+    words = f"exchanging the helical activations mirrors the tip to within {n['asymmetry']:.1e} L"
+    return judged(words, n["asymmetry"] < 1e-9)
+
+
 def _gap(arm: Manipulator) -> float:
     """Angle between the right-handed bundle and the longitudinal one at the tip [deg]."""
     angles = arm.outline(arm.length).center[0]
@@ -37,7 +54,7 @@ def _gap(arm: Manipulator) -> float:
 
 
 def _asymmetry(arm: Manipulator, seed: int) -> float:
-    """How far tips of exchanged helical activations are from mirror images [L]."""
+    """Distance of tips of exchanged helical activations from mirror images [L]."""
     low, high = arm.bounds.T
     gamma = np.random.default_rng(seed).uniform(low, high, (2_000, 3))
     tips, others = tip_positions(arm, gamma), tip_positions(arm, gamma[:, [1, 0, 2]])
@@ -60,23 +77,3 @@ def _draw(arm: Manipulator, notes: Notebook) -> None:
     sides = [DesignPanel("front", arm), DesignPanel("back", arm, "back")]
     words = "The minimal design from the front and the back, above its cross-section at the base."
     notes.draw("1d", "figure_1d_design", words, plot_designs(sides))
-
-
-# The design: its angles, radii and symmetry.
-
-
-def meeting(n: Numbers) -> Finding:
-    """Where the fibers are at the tip."""
-    words = f"at Z = L the edges of the sectors are {abs(n['gap_deg']):.2g}° apart"
-    return judged(words, abs(n["gap_deg"]) < 1.0)
-
-
-def narrowing(n: Numbers) -> Finding:
-    """How much the radius shrinks."""
-    return judged(f"{n['narrowing']:.2f}-fold", round(n["narrowing"], 1) == 6.2)
-
-
-def symmetry(n: Numbers) -> Finding:
-    """Mirror images."""
-    words = f"exchanging the helical activations mirrors the tip to within {n['asymmetry']:.1e} L"
-    return judged(words, n["asymmetry"] < 1e-9)

@@ -7,7 +7,6 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm import designs
 from softreach.cloud.clouds import compute_cloud
@@ -15,11 +14,13 @@ from softreach.cloud.dexterity import solution_measure
 from softreach.cloud.redundancy import activation_distance, redundancy_summary, tip_density
 from softreach.paper.claims import Finding, Numbers, Verdict, judged
 from softreach.paper.notebook import Notebook, Settings
+from softreach.support.arrays import Array
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from softreach.arm.manipulator import Manipulator
+
 
 _RADIUS = 1 / 60  # L, figure 4d
 
@@ -44,73 +45,6 @@ def redundancy(settings: Settings, folder: Path, notes: Notebook) -> None:
     _draw(arms, clouds, distances, notes)
 
 
-def _cloud(name: str, arm: Manipulator, settings: Settings, notes: Notebook) -> xr.Dataset:
-    start = perf_counter()
-    cloud = compute_cloud(arm, settings.redundant_samples, settings.seed)
-    notes.note(**{f"{name}_seconds": perf_counter() - start})
-    return cloud
-
-
-def _found(cloud: xr.Dataset, distance: xr.DataArray) -> dict[str, Any]:
-    summary = redundancy_summary(cloud, distance)
-    density, measure = tip_density(cloud), solution_measure(cloud)
-    filled = density["density"].where(density["density"] > 0)
-    size = _inside(measure["solution_measure"].values)
-    front = distance.values[cloud.tip.values[distance["sample"].values, 1] < 0]
-    behind = distance.values[cloud.tip.values[distance["sample"].values, 1] > 0]
-    return {
-        "median": summary.median,
-        "quantiles": {str(k): v for k, v in summary.quantiles.items()},
-        "isolated": summary.isolated,
-        "redundant_volume": summary.redundant_volume,
-        "threshold": summary.threshold,
-        "heterogeneity": float(density.attrs["heterogeneity"]),
-        "density_front": float(filled.where(filled.y < 0).mean()),
-        "density_behind": float(filled.where(filled.y > 0).mean()),
-        "distance_front": float(np.nanmedian(front)),
-        "distance_behind": float(np.nanmedian(behind)),
-        "solution_median": float(np.median(size)),
-        "solution_low": float(np.quantile(size, 0.05)),
-        "solution_largest": float(size.max(initial=0.0)),
-    }
-
-
-def _inside(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values of cells none of whose neighbors is empty: the border cuts others."""
-    from scipy.ndimage import binary_erosion
-
-    return values[binary_erosion(values > 0)]
-
-
-def _draw(
-    arms: dict[str, Manipulator],
-    clouds: dict[str, xr.Dataset],
-    distances: dict[str, xr.DataArray],
-    notes: Notebook,
-) -> None:
-    from softreach.plot import (
-        DesignPanel,
-        plot_designs,
-        plot_distance_histograms,
-        plot_redundancy,
-    )
-
-    panels = [DesignPanel(name, arm) for name, arm in arms.items()]
-    words = "The minimal and the redundant design, above their cross-sections at the base."
-    notes.draw("4a", "figure_4a_designs", words, plot_designs(panels))
-    words = (
-        "Clouds colored by |γ| of the last longitudinal bundle (b), slices through the origin in "
-        "the frontal and the right-facing plane (c), and the mean activation-space distance (d); "
-        "isolated points are light gray."
-    )
-    notes.draw("4b-d", "figure_4bcd_redundancy", words, plot_redundancy(clouds, distances))
-    words = "Distribution of the mean activation-space distance in both clouds."
-    notes.draw("", "distances", words, plot_distance_histograms(distances))
-
-
-# The minimal and the redundant design.
-
-
 def cost(n: Numbers) -> Finding:
     """Time of the larger cloud."""
     seconds = max(n["minimal_seconds"], n["redundant_seconds"])
@@ -119,7 +53,7 @@ def cost(n: Numbers) -> Finding:
 
 
 def split(n: Numbers) -> Finding:
-    """Where the two longitudinal fibers lie."""
+    """Places of the two longitudinal fibers."""
     first, second = n["offsets_deg"]
     words = (
         "neither their places nor their extents are printed. We keep the extent of "
@@ -129,7 +63,7 @@ def split(n: Numbers) -> Finding:
 
 
 def families(n: Numbers) -> Finding:
-    """How many activations reach a place."""
+    """Number of activations that reach a place."""
     three, four = n["minimal"], n["redundant"]
     words = (
         f"three fibers: {three['solution_median']:.2f} activations reach a place (median over "
@@ -174,3 +108,67 @@ def large(n: Numbers) -> Finding:
         f"{n['minimal']['redundant_volume']:.0%}"
     )
     return judged(words, found["quantiles"]["0.95"] > 0.5 > n["minimal"]["quantiles"]["0.95"])
+
+
+def _cloud(name: str, arm: Manipulator, settings: Settings, notes: Notebook) -> xr.Dataset:
+    start = perf_counter()
+    cloud = compute_cloud(arm, settings.redundant_samples, settings.seed)
+    notes.note(**{f"{name}_seconds": perf_counter() - start})
+    return cloud
+
+
+def _found(cloud: xr.Dataset, distance: xr.DataArray) -> dict[str, Any]:
+    summary = redundancy_summary(cloud, distance)
+    density, measure = tip_density(cloud), solution_measure(cloud)
+    filled = density["density"].where(density["density"] > 0)
+    size = _inside(measure["solution_measure"].values)
+    front = distance.values[cloud.tip.values[distance["sample"].values, 1] < 0]
+    behind = distance.values[cloud.tip.values[distance["sample"].values, 1] > 0]
+    return {
+        "median": summary.median,
+        "quantiles": {str(k): v for k, v in summary.quantiles.items()},
+        "isolated": summary.isolated,
+        "redundant_volume": summary.redundant_volume,
+        "threshold": summary.threshold,
+        "heterogeneity": float(density.attrs["heterogeneity"]),
+        "density_front": float(filled.where(filled.y < 0).mean()),
+        "density_behind": float(filled.where(filled.y > 0).mean()),
+        "distance_front": float(np.nanmedian(front)),
+        "distance_behind": float(np.nanmedian(behind)),
+        "solution_median": float(np.median(size)),
+        "solution_low": float(np.quantile(size, 0.05)),
+        "solution_largest": float(size.max(initial=0.0)),
+    }
+
+
+def _inside(values: Array) -> Array:
+    """Values of cells none of whose neighbors is empty: the border cuts others."""
+    from scipy.ndimage import binary_erosion
+
+    return values[binary_erosion(values > 0)]
+
+
+def _draw(
+    arms: dict[str, Manipulator],
+    clouds: dict[str, xr.Dataset],
+    distances: dict[str, xr.DataArray],
+    notes: Notebook,
+) -> None:
+    from softreach.plot import (
+        DesignPanel,
+        plot_designs,
+        plot_distance_histograms,
+        plot_redundancy,
+    )
+
+    panels = [DesignPanel(name, arm) for name, arm in arms.items()]
+    words = "The minimal and the redundant design, above their cross-sections at the base."
+    notes.draw("4a", "figure_4a_designs", words, plot_designs(panels))
+    words = (
+        "Clouds colored by |γ| of the last longitudinal bundle (b), slices through the origin in "
+        "the frontal and the right-facing plane (c), and the mean activation-space distance (d); "
+        "isolated points are light gray."
+    )
+    notes.draw("4b-d", "figure_4bcd_redundancy", words, plot_redundancy(clouds, distances))
+    words = "Distribution of the mean activation-space distance in both clouds."
+    notes.draw("", "distances", words, plot_distance_histograms(distances))

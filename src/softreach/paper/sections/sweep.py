@@ -1,4 +1,4 @@
-"""How the reachable sets of the sweep extend: from the plane of symmetry, behind, in thickness."""
+"""Sections 3 and 4: the atlas of designs, its volumes and its curvatures (figures 2a to 3c)."""
 
 from __future__ import annotations
 
@@ -6,59 +6,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.designs import minimal_trunk
 from softreach.atlas import DesignSpace, build_atlas, open_atlas
 from softreach.paper.atlas_figures import atlas_figures
 from softreach.paper.claims import Finding, Numbers, judged
 from softreach.paper.notebook import Notebook, Settings
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.workspace import ReachableSolid, reachable_set
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 
 ASIDE = 0.3
 """From where on a place lies far from the plane of symmetry [L]."""
+
 _ACCURACY = 2e-2  # finer is not needed for what is shown
-
-
-class Shape(NamedTuple):
-    """Of one design, in L."""
-
-    aside: float
-    """Volume farther than `ASIDE` from the plane of symmetry [L³]."""
-    behind: float
-    """Volume on the helical fibers' side, y > 0 [L³]."""
-    thickness: float
-    """Mean thickness 2 V / A [L]."""
-
-
-def shapes(revolutions: Array, tapers: Array, accuracy: float) -> dict[str, list[list[float]]]:
-    """The shapes of exact reachable sets over (revolution, taper) [rad], by name."""
-    accuracy = max(accuracy, _ACCURACY)
-    found = np.array([[_shape(o, p, accuracy) for p in tapers] for o in revolutions])
-    return {name: found[..., k].tolist() for k, name in enumerate(Shape._fields)}
-
-
-def _shape(revolution: float, taper: float, accuracy: float) -> Shape:
-    reached = reachable_set(minimal_trunk(revolution, taper), accuracy=accuracy)
-    assert isinstance(reached, ReachableSolid)
-    grid, length = reached.grid, reached.arm.length
-    occupied, cell = grid["occupied"], (grid.attrs["cell"] / length) ** 3
-    return Shape(
-        aside=float((occupied & (abs(grid.x) > ASIDE * length)).sum()) * cell,
-        behind=float((occupied & (grid.y > 0)).sum()) * cell,
-        thickness=2 * reached.volume / reached.surface().area / length,
-    )
-
-
-# Sections 3 and 4: the atlas of designs, its clouds and its volumes (figures 2a to 3c).
-
-
 _STORE = "atlas.zarr"
 _SCALARS = (
     "volume",
@@ -81,6 +46,24 @@ _CAPTIONS = {
 }
 
 
+class Shape(NamedTuple):
+    """Of one design, in L."""
+
+    aside: float
+    """Volume farther than `ASIDE` from the plane of symmetry [L³]."""
+    behind: float
+    """Volume on the helical fibers' side, y > 0 [L³]."""
+    thickness: float
+    """Mean thickness 2 V / A [L]."""
+
+
+def shapes(revolutions: Array, tapers: Array, accuracy: float) -> dict[str, list[list[float]]]:
+    """The shapes of exact reachable sets over (revolution, taper) [rad], by name."""
+    accuracy = max(accuracy, _ACCURACY)
+    found = np.array([[_shape(o, p, accuracy) for p in tapers] for o in revolutions])
+    return {name: found[..., k].tolist() for k, name in enumerate(Shape._fields)}
+
+
 def swept_atlas(folder: Path) -> xr.Dataset:
     """The atlas that the sweep left in the folder of all results.
 
@@ -92,21 +75,6 @@ def swept_atlas(folder: Path) -> xr.Dataset:
     except InvalidInput as error:
         notes = folder / "figures" / "sweep.json"
         raise InvalidInput("atlas", error.value, error.allowed, f"remove {notes} too") from None
-
-
-def _swept(settings: Settings, folder: Path) -> xr.Dataset:
-    """The atlas of section 3, computed or continued: revolution from 0 to 108°, taper to 3°."""
-    turns = np.radians(np.linspace(0, 108, settings.designs))
-    tapers = np.radians(np.linspace(0, 3, settings.designs))
-    space = DesignSpace.grid(minimal_trunk(), revolution=turns, taper=tapers)
-    return build_atlas(
-        space,
-        folder / _STORE,
-        settings.samples,
-        settings.seed,
-        alpha_over_length=settings.alpha,
-        accuracy=settings.accuracy,
-    )
 
 
 def sweep(settings: Settings, folder: Path, notes: Notebook) -> None:
@@ -131,44 +99,8 @@ def sweep(settings: Settings, folder: Path, notes: Notebook) -> None:
             notes.draw(label, f"figure_{label}_{name}", words, figure)
 
 
-def _rows(values: xr.DataArray) -> Any:
-    """Numbers over (revolution, taper)."""
-    return values.transpose("revolution", "taper").values.tolist()
-
-
-# The atlas: its volumes, unreachability, shapes and curvatures.
-
-
-class _Sweep:
-    """The atlas's numbers over (revolution, taper), and where they rise."""
-
-    def __init__(self, numbers: Numbers) -> None:
-        self.numbers = numbers
-        self.revolution = numbers["revolution_deg"]
-        self.taper = numbers["taper_deg"]
-
-    def __getitem__(self, name: str) -> Array:
-        return np.array(self.numbers[name], float)
-
-    def place(self, flat: int | np.intp) -> str:
-        """A design by its number."""
-        i, j = divmod(int(flat), len(self.taper))
-        return f"Ω = {self.revolution[i]:.4g}°, φ = {self.taper[j]:.4g}°"
-
-
-def _rises(values: Array, axis: int) -> str:
-    """How many steps along an axis go up."""
-    step = np.diff(values, axis=axis)
-    return f"{int((step > 0).sum())} of {step.size}"
-
-
-def _share(values: Array, axis: int) -> float:
-    """The share of steps along an axis that go up."""
-    return float((np.diff(values, axis=axis) > 0).mean())
-
-
 def size(n: Numbers) -> Finding:
-    """How many designs and points."""
+    """Number of designs and points."""
     words = f"{n['designs']} clouds of {n['samples']:,} points, and the volume of each"
     return judged(words, n["designs"] == 256 and n["samples"] == 400_000)
 
@@ -286,11 +218,6 @@ def decline(n: Numbers) -> Finding:
     return judged(words, worst == 0, worst < 0.05)
 
 
-def _curvatures(n: Numbers) -> tuple[Array, Array, dict[float, int]]:
-    plain, tapered = np.array(n["curvature"])
-    return plain, tapered, {q: k for k, q in enumerate(n["quantiles"])}
-
-
 def curling(n: Numbers) -> Finding:
     """Curvature toward the tip."""
     plain, tapered, at = _curvatures(n)
@@ -327,3 +254,68 @@ def cover(n: Numbers) -> Finding:
         f"{1 - min(beyond, default=1.0):.0%} of its configurations"
     )
     return judged(words, bool((most >= most_plain).all() and beyond))
+
+
+def _shape(revolution: float, taper: float, accuracy: float) -> Shape:
+    reached = reachable_set(minimal_trunk(revolution, taper), accuracy=accuracy)
+    assert isinstance(reached, ReachableSolid)
+    grid, length = reached.grid, reached.arm.length
+    occupied, cell = grid["occupied"], (grid.attrs["cell"] / length) ** 3
+    return Shape(
+        aside=float((occupied & (abs(grid.x) > ASIDE * length)).sum()) * cell,
+        behind=float((occupied & (grid.y > 0)).sum()) * cell,
+        thickness=2 * reached.volume / reached.surface().area / length,
+    )
+
+
+def _swept(settings: Settings, folder: Path) -> xr.Dataset:
+    """The atlas of section 3, computed or continued: revolution from 0 to 108°, taper to 3°."""
+    turns = np.radians(np.linspace(0, 108, settings.designs))
+    tapers = np.radians(np.linspace(0, 3, settings.designs))
+    space = DesignSpace.grid(minimal_trunk(), revolution=turns, taper=tapers)
+    return build_atlas(
+        space,
+        folder / _STORE,
+        settings.samples,
+        settings.seed,
+        alpha_over_length=settings.alpha,
+        accuracy=settings.accuracy,
+    )
+
+
+def _rows(values: xr.DataArray) -> Any:
+    """Numbers over (revolution, taper)."""
+    return values.transpose("revolution", "taper").values.tolist()
+
+
+class _Sweep:
+    """The atlas's numbers over (revolution, taper), and where they rise."""
+
+    def __init__(self, numbers: Numbers) -> None:
+        self.numbers = numbers
+        self.revolution = numbers["revolution_deg"]
+        self.taper = numbers["taper_deg"]
+
+    def __getitem__(self, name: str) -> Array:
+        return np.array(self.numbers[name], float)
+
+    def place(self, flat: int | np.intp) -> str:
+        """A design by its number."""
+        i, j = divmod(int(flat), len(self.taper))
+        return f"Ω = {self.revolution[i]:.4g}°, φ = {self.taper[j]:.4g}°"
+
+
+def _rises(values: Array, axis: int) -> str:
+    """Number of steps along an axis that go up."""
+    step = np.diff(values, axis=axis)
+    return f"{int((step > 0).sum())} of {step.size}"
+
+
+def _share(values: Array, axis: int) -> float:
+    """The share of steps along an axis that go up."""
+    return float((np.diff(values, axis=axis) > 0).mean())
+
+
+def _curvatures(n: Numbers) -> tuple[Array, Array, dict[float, int]]:
+    plain, tapered = np.array(n["curvature"])
+    return plain, tapered, {q: k for k, q in enumerate(n["quantiles"])}

@@ -1,4 +1,4 @@
-"""Sections 5 and 6: whether three fibers reach every place with one activation only."""
+"""Sections 5 and 6: places that three fibers reach with several activations."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.designs import minimal_trunk
 from softreach.arm.manipulator import Manipulator
@@ -15,12 +14,12 @@ from softreach.paper.claims import Finding, Numbers, judged
 from softreach.paper.notebook import Notebook, Settings
 from softreach.paper.sections.sweep import swept_atlas
 from softreach.rod.kinematics import configuration
+from softreach.support.arrays import Array
 from softreach.workspace import ReachableCurve, ReachableSolid, ReachableSurface, reachable_set
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 
 _TARGETS = 2_000
 _LABEL = "reached more than once / %"
@@ -59,6 +58,28 @@ def uniqueness(settings: Settings, folder: Path, notes: Notebook) -> None:
     _draw(atlas.assign({_LABEL: 100 * share.assign_attrs(units="1")}), arm, pair, notes)
 
 
+def unique(n: Numbers) -> Finding:
+    """The share of the volume that several activations reach, and an example."""
+    share = np.array(n["share"], float)
+    words = (
+        f"{n['paper_share']:.2%} of the volume is reached by more than one activation at Ω = 108°, "
+        f"φ = 2°, up to {n['worst']:.1%} at Ω = {n['revolution_deg']:.4g}°, "
+        f"φ = {n['taper_deg']:.3g}°; less than 0.1 % in {int((share < 1e-3).sum())} of "
+        f"{share.size} designs. {_example(n)}"
+    )
+    alone = len(n["activations"]) < 2
+    return judged(words, alone, n["worst"] < 0.1)
+
+
+def dimension(n: Numbers) -> Finding:
+    """Sets that two fibers and one reach."""
+    words = (
+        f"two fibers sweep a surface of {n['area']:.3f} L², one fiber a curve of "
+        f"{n['curve']:.3f} L (of the minimal design, in the order of its fibers)"
+    )
+    return judged(words, min(n["area"], n["curve"]) > 1e-6)
+
+
 def _clearest_pair(reached: ReachableSolid) -> Pair:
     """Of places in the middle of what several activations reach, where these differ most."""
     grid = reached.grid
@@ -75,7 +96,7 @@ def _clearest_pair(reached: ReachableSolid) -> Pair:
 
 
 def _apart(activations: Array) -> float:
-    """How different the first and the last activation are [-]."""
+    """Distance of the first and the last activation [-]."""
     return float(np.linalg.norm(activations[0] - activations[-1]))
 
 
@@ -105,34 +126,9 @@ def _draw(atlas: xr.Dataset, arm: Manipulator, pair: Pair, notes: Notebook) -> N
     notes.draw("", "same_tip", words, ax)
 
 
-# How many activations reach a place.
-
-
-def unique(n: Numbers) -> Finding:
-    """The share of the volume that several activations reach, and an example."""
-    share = np.array(n["share"], float)
-    words = (
-        f"{n['paper_share']:.2%} of the volume is reached by more than one activation at Ω = 108°, "
-        f"φ = 2°, up to {n['worst']:.1%} at Ω = {n['revolution_deg']:.4g}°, "
-        f"φ = {n['taper_deg']:.3g}°; less than 0.1 % in {int((share < 1e-3).sum())} of "
-        f"{share.size} designs. {_example(n)}"
-    )
-    alone = len(n["activations"]) < 2
-    return judged(words, alone, n["worst"] < 0.1)
-
-
 def _example(n: Numbers) -> str:
     if len(n["activations"]) < 2:
         return "No place with two activations was found"
     rows = [", ".join(f"{g:.3f}" for g in row) for row in n["activations"]]
     tip = ", ".join(f"{x:.3f}" for x in n["tip"])
     return f"In the latter design γ = ({'); ('.join(rows)}) all reach ({tip}) m"
-
-
-def dimension(n: Numbers) -> Finding:
-    """What two fibers and one reach."""
-    words = (
-        f"two fibers sweep a surface of {n['area']:.3f} L², one fiber a curve of "
-        f"{n['curve']:.3f} L (of the minimal design, in the order of its fibers)"
-    )
-    return judged(words, min(n["area"], n["curve"]) > 1e-6)

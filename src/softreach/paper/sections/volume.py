@@ -1,4 +1,4 @@
-"""Section 4: what the volume of an α-shape has to do with the volume that can be reached."""
+"""Section 4: volume of α-shapes against the volume that can be reached."""
 
 from __future__ import annotations
 
@@ -35,21 +35,6 @@ def volume(settings: Settings, folder: Path, notes: Notebook) -> None:
     _draw(curves, notes)
 
 
-def _draw(curves: dict[str, np.ndarray], notes: Notebook) -> None:
-    from softreach.plot import plot_volume_curve
-
-    lines = {"exact": notes.numbers["exact"], "convex": notes.numbers["convex"]}
-    ax = plot_volume_curve(curves, _CURVE, length=minimal_trunk().length, **lines)
-    words = (
-        "Volume of the α-shape of the paper's design against its radius, which the paper does not "
-        "state, beside the exact volume of the reachable set and of its convex hull."
-    )
-    notes.draw("", "alpha_dependence", words, ax)
-
-
-# α-shapes and the reachable set.
-
-
 def dependence(n: Numbers) -> Finding:
     """Volume over the radius of the α-shape."""
     many = list(n["volumes"])[-1]
@@ -60,3 +45,15 @@ def dependence(n: Numbers) -> Finding:
         f"{n['exact_error']:.0e} L³"
     )
     return Finding(words, Verdict.OPEN)
+
+
+def _draw(curves: dict[str, np.ndarray], notes: Notebook) -> None:
+    from softreach.plot import plot_volume_curve
+
+    lines = {"exact": notes.numbers["exact"], "convex": notes.numbers["convex"]}
+    ax = plot_volume_curve(curves, _CURVE, length=minimal_trunk().length, **lines)
+    words = (
+        "Volume of the α-shape of the paper's design against its radius, which the paper does not "
+        "state, beside the exact volume of the reachable set and of its convex hull."
+    )
+    notes.draw("", "alpha_dependence", words, ax)

@@ -21,7 +21,32 @@ from softreach.support.files.interruption import as_a_whole, undoing
 from softreach.support.files.kinds import FileKind
 from softreach.support.memory import check_disk
 
-# Files that are on the disk, not only on their way there: what a power cut cannot take.
+try:
+    import fcntl
+except ModuleNotFoundError:  # no such locks on Windows: what a kill leaves there stays
+    fcntl = None
+
+
+REPLACED = ".replaced"
+"""Name in a scratch folder of the older folder that gives way to the new one."""
+
+_PREFIX = ".softreach-unfinished-"
+_PATIENCE = 1.0  # [s]
+
+StrPath = str | os.PathLike[str]
+_NO_ROOM = "free some space, or choose another disk"
+_NO_RIGHT = "choose a place that you may write to"
+_REMEDIES = {
+    errno.ENOSPC: _NO_ROOM,
+    errno.EDQUOT: _NO_ROOM,
+    errno.EFBIG: "choose another disk, or raise the limit on the size of files",
+    errno.EACCES: _NO_RIGHT,
+    errno.EPERM: _NO_RIGHT,
+    errno.EROFS: _NO_RIGHT,
+    errno.ENAMETOOLONG: "choose another name",
+    errno.ELOOP: "choose another name",
+    errno.ENOTDIR: "a part of its path is a file: choose another folder",
+}
 
 
 def sync_file(path: Path) -> None:
@@ -54,30 +79,6 @@ def sync_folder(path: Path) -> None:
         _sync(path)
 
 
-def _sync(path: Path) -> None:
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
-
-
-# Folders for what is being written: gone when the process ends, and after a kill with the next.
-
-
-try:
-    import fcntl
-except ModuleNotFoundError:  # no such locks on Windows: what a kill leaves there stays
-    fcntl = None
-
-
-REPLACED = ".replaced"
-"""Name in a scratch folder of the older folder that gives way to the new one."""
-
-_PREFIX = ".softreach-unfinished-"
-_PATIENCE = 1.0  # [s]
-
-
 @contextmanager
 def scratch_folder(parent: Path) -> Iterator[Path]:
     """An empty hidden folder beside the file to be written, removed at the end of the block.
@@ -92,71 +93,6 @@ def scratch_folder(parent: Path) -> Iterator[Path]:
             stack.callback(_release, lock)
             stack.enter_context(undoing(partial(_remove, folder)))
         yield folder
-
-
-def _locked_folder(parent: Path) -> tuple[Path, int | None]:
-    while True:
-        folder = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=parent))
-        with suppress(BlockingIOError, FileNotFoundError):
-            lock = _lock(folder)
-            if folder.exists():
-                return folder, lock
-            _release(lock)  # somebody took it for abandoned before it was locked
-
-
-def _remove_abandoned(parent: Path) -> None:
-    for folder in parent.glob(f"{_PREFIX}*"):
-        with suppress(OSError):
-            if (lock := _lock(folder)) is not None:
-                _put_in_place(folder)
-                _remove(folder)
-                _release(lock)
-
-
-def _put_in_place(folder: Path) -> None:
-    """Finish a replacement that was killed after it had put the older folder aside."""
-    names = {path.name for path in folder.iterdir()}
-    if REPLACED in names:
-        for name in names - {REPLACED}:
-            if not (folder.parent / name).exists():
-                (folder / name).rename(folder.parent / name)
-
-
-def _lock(folder: Path) -> int | None:
-    """A lock that ends with this process, or None where there is no such thing.
-
-    Raises:
-        BlockingIOError: Another process has it.
-    """
-    if fcntl is None:
-        return None
-    lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(lock)
-        raise
-    except OSError:  # a file system without them
-        os.close(lock)
-        return None
-    return lock
-
-
-def _release(lock: int | None) -> None:
-    if lock is not None:
-        os.close(lock)
-
-
-def _remove(folder: Path) -> None:
-    """Remove a folder into which other threads of a process that ends may still be writing."""
-    deadline = time.monotonic() + _PATIENCE
-    shutil.rmtree(folder, ignore_errors=True)
-    while folder.exists() and time.monotonic() < deadline:
-        time.sleep(0.01)
-        shutil.rmtree(folder, ignore_errors=True)
-
-
-StrPath = str | os.PathLike[str]
 
 
 def check_place(
@@ -242,26 +178,6 @@ def replacing(
             sync_folder(target.parent)
 
 
-class _WatchedFile(io.BufferedWriter):
-    """A file that remembers the first error of writing, whatever the library did about it.
-
-    Nobody writes behind its back: libraries that take the descriptor of a file lose what a full
-    disk takes only a part of.
-    """
-
-    failure: OSError | None = None
-
-    def fileno(self) -> int:
-        raise io.UnsupportedOperation("fileno")
-
-    def write(self, data: Any, /) -> int:
-        try:
-            return super().write(data)
-        except OSError as error:
-            self.failure = self.failure or error
-            raise
-
-
 @contextmanager
 def writing(
     path: StrPath,
@@ -283,6 +199,96 @@ def writing(
         yield file
         if file.failure is not None:
             raise file.failure
+
+
+def _sync(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _locked_folder(parent: Path) -> tuple[Path, int | None]:
+    while True:
+        folder = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=parent))
+        with suppress(BlockingIOError, FileNotFoundError):
+            lock = _lock(folder)
+            if folder.exists():
+                return folder, lock
+            _release(lock)  # somebody took it for abandoned before it was locked
+
+
+def _remove_abandoned(parent: Path) -> None:
+    for folder in parent.glob(f"{_PREFIX}*"):
+        with suppress(OSError):
+            if (lock := _lock(folder)) is not None:
+                _put_in_place(folder)
+                _remove(folder)
+                _release(lock)
+
+
+def _put_in_place(folder: Path) -> None:
+    """Finish a replacement that was killed after it had put the older folder aside."""
+    names = {path.name for path in folder.iterdir()}
+    if REPLACED in names:
+        for name in names - {REPLACED}:
+            if not (folder.parent / name).exists():
+                (folder / name).rename(folder.parent / name)
+
+
+def _lock(folder: Path) -> int | None:
+    """A lock that ends with this process, or None where there is no such thing.
+
+    Raises:
+        BlockingIOError: Another process has it.
+    """
+    if fcntl is None:
+        return None
+    lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(lock)
+        raise
+    except OSError:  # a file system without them
+        os.close(lock)
+        return None
+    return lock
+
+
+def _release(lock: int | None) -> None:
+    if lock is not None:
+        os.close(lock)
+
+
+def _remove(folder: Path) -> None:
+    """Remove a folder into which other threads of a process that ends may still be writing."""
+    deadline = time.monotonic() + _PATIENCE
+    shutil.rmtree(folder, ignore_errors=True)
+    while folder.exists() and time.monotonic() < deadline:
+        time.sleep(0.01)
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+class _WatchedFile(io.BufferedWriter):
+    """A file that remembers the first error of writing, whatever the library did about it.
+
+    Nobody writes behind its back: libraries that take the descriptor of a file lose what a full
+    disk takes only a part of.
+    """
+
+    failure: OSError | None = None
+
+    def fileno(self) -> int:
+        raise io.UnsupportedOperation("fileno")
+
+    def write(self, data: Any, /) -> int:
+        try:
+            return super().write(data)
+        except OSError as error:
+            self.failure = self.failure or error
+            raise
 
 
 def _resolved(path: StrPath, name: str) -> Path:
@@ -345,19 +351,6 @@ def _take_place(partial: Path, target: Path, replaced: Path) -> None:
         raise
 
 
-_WHAT_TO_DO = {
-    errno.ENOSPC: "free some space, or choose another disk",
-    errno.EDQUOT: "free some space, or choose another disk",
-    errno.EFBIG: "choose another disk, or raise the limit on the size of files",
-    errno.EACCES: "choose a place that you may write to",
-    errno.EPERM: "choose a place that you may write to",
-    errno.EROFS: "choose a place that you may write to",
-    errno.ENAMETOOLONG: "choose a shorter name",
-    errno.ENOTDIR: "a part of its path is a file: choose another folder",
-    errno.ELOOP: "its links lead in a circle: choose another name",
-}
-
-
 @contextmanager
 def _one_line(path: StrPath) -> Iterator[None]:
     """Turn what the system says into what was wrong, why, and what to do."""
@@ -368,4 +361,4 @@ def _one_line(path: StrPath) -> Iterator[None]:
     except OSError as error:
         number = error.errno or 0
         reason = error.strerror or str(error) or type(error).__name__
-        raise NotWritten(os.fspath(path), number, reason, _WHAT_TO_DO.get(number, "")) from error
+        raise NotWritten(os.fspath(path), number, reason, _REMEDIES.get(number, "")) from error

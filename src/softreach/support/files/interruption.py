@@ -1,4 +1,4 @@
-"""How a process ends in mid-work: at once, and nothing half-written stays.
+"""End of a process in mid-work: at once, and nothing half-written stays.
 
 A signal may come while a kernel runs, while Numba compiles, and with work on many threads, where an
 exception would be late, lost or caught by others. So none is raised: a thread that waits for the
@@ -19,7 +19,7 @@ from multiprocessing.connection import Connection
 from typing import NoReturn
 
 PATIENCE = 1.0
-"""How long the end waits for what must be done as a whole [s]."""
+"""Longest wait of the end for what must be done as a whole [s]."""
 
 Undo = Callable[[], object]
 
@@ -138,13 +138,10 @@ def _cleared_line(stream: int) -> str:
     return "\r\x1b[2K\x1b[?25h" if controlled and sys.platform != "win32" else ""
 
 
-# What makes a worker process end with its parent, whatever ended that.
-#
-# Here and not beside what workers compute, as it must be imported at once and before all else.
-
-
 def live_with_parent(lifeline: Connection) -> None:
     """Leave Ctrl-C to the parent and end when it has ended; a worker calls this first.
+
+    It stands here and not beside what workers compute, to be imported before all else.
 
     Args:
         lifeline: A pipe of which only the parent has the other end, and into which it sends

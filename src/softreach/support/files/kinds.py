@@ -5,9 +5,10 @@ from __future__ import annotations
 import importlib.util
 import sys
 from collections.abc import Callable, Mapping
+from io import BufferedWriter
 from os import PathLike, fspath
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from softreach.support.errors import InvalidInput, MissingExtra
 
@@ -39,6 +40,8 @@ class FileKind(NamedTuple):
     """What is imported to write it."""
     extra: str = ""
     """The extra of softreach that brings these."""
+    write: Callable[[Any, BufferedWriter], None] | None = None
+    """Writes a content to a file, where several formats take the same content."""
 
 
 Formats = Mapping[str, FileKind]
@@ -79,13 +82,9 @@ def check_installed(library: str, extra: str) -> None:
         raise MissingExtra(library, extra)
 
 
-def beginning_with(*heads: bytes, at: int = 0) -> Recognizes:
-    """Recognize files that have one of these bytes at a place near their beginning."""
-
-    def recognizes(path: Path) -> bool:
-        return _head(path)[at:].startswith(heads)
-
-    return recognizes
+def beginning_with(*heads: bytes) -> Recognizes:
+    """Recognize files that begin with one of these bytes."""
+    return lambda path: _head(path).startswith(heads)
 
 
 def text_with(*parts: str) -> Recognizes:
@@ -104,37 +103,22 @@ def _head(path: Path) -> bytes:
         return file.read(_HEAD)
 
 
-def _never(path: Path) -> bool:
-    """Nothing tells a file of bare pixels from any other."""
-    del path
-    return False
-
-
 def _picture(name: str, recognizes: Recognizes) -> FileKind:
     return FileKind(f"{name} picture", recognizes, ("matplotlib",), "plot")
 
 
-_POSTSCRIPT = _picture("a PostScript", beginning_with(b"%!PS"))
 _JPEG = _picture("a JPEG", beginning_with(b"\xff\xd8\xff"))
 _TIFF = _picture("a TIFF", beginning_with(b"II*\0", b"MM\0*"))
-_PIXELS = _picture("a raw", _never)
 
 PICTURES: Formats = {
     ".png": _picture("a PNG", beginning_with(b"\x89PNG\r\n\x1a\n")),
     ".pdf": _picture("a PDF", beginning_with(b"%PDF-")),
     ".svg": _picture("an SVG", text_with("<svg")),
-    ".svgz": _picture("a compressed SVG", beginning_with(b"\x1f\x8b")),
-    ".eps": _POSTSCRIPT,
-    ".ps": _POSTSCRIPT,
+    ".eps": _picture("a PostScript", beginning_with(b"%!PS")),
     ".jpg": _JPEG,
     ".jpeg": _JPEG,
     ".tif": _TIFF,
     ".tiff": _TIFF,
-    ".webp": _picture("a WebP", beginning_with(b"WEBP", at=8)),
-    ".gif": _picture("a GIF", beginning_with(b"GIF8")),
-    ".avif": _picture("an AVIF", beginning_with(b"ftypavi", at=4)),
-    ".pgf": _picture("a PGF", text_with("%% Creator: Matplotlib")),
-    ".raw": _PIXELS,
-    ".rgba": _PIXELS,
+    ".webp": _picture("a WebP", beginning_with(b"RIFF")),
 }
-"""What figures can be saved as."""
+"""Formats of figures."""

@@ -1,4 +1,4 @@
-"""Text that others wrote: read whole, with a limit that is told before anything is read."""
+"""Text that others wrote, read up to a limit that is checked before anything is read."""
 
 from __future__ import annotations
 
