@@ -111,15 +111,16 @@ def _chosen(queries: int | ArrayLike | None, n: int) -> Index | None:
 
 
 def _strided(count: int, n: int) -> Index:
-    """One sample of each of `count` equal parts, at a random but fixed place in it.
+    """One sample of each of `count` parts of about equal size, at a random but fixed place in it.
 
     Every k-th one would do for independent samples, but in a Sobol sequence those share leading
     bits, that is a corner of the activation box.
     """
     if not 0 <= count <= n:
         raise InvalidInput("queries", count, f"from 0 to the cloud's {n} samples, or their indices")
+    ends = np.arange(count + 1) * n // max(count, 1)
     place = np.random.default_rng(0).random(count)
-    return np.minimum((np.arange(count) + place) * (n / max(count, 1)), n - 1).astype(np.intp)
+    return ends[:-1] + (place * np.diff(ends)).astype(np.intp)
 
 
 # Where an arm is redundant, and where its tips gather: means over the cells of a grid.

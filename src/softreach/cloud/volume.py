@@ -250,6 +250,14 @@ def _in_spacings(hull: Hull, spacing: float) -> str:
 
 def _corrected(hull: Hull, quarter: Hull) -> Hull:
     """The hull with V* = 2 V(N) - V(N/4), from that of a quarter of the points."""
+    if quarter.volume == 0.0 < hull.volume:
+        warnings.warn(
+            f"no estimate of the bias: {quarter.n} points, a quarter of the cloud, have no volume "
+            f"at alpha = {hull.alpha:.4g} m; use more points or a larger alpha",
+            SoftreachWarning,
+            stacklevel=3,
+        )
+        return hull
     if quarter.alpha < QUARTER_SPACINGS * quarter.spacing:
         warnings.warn(
             f"no estimate of the bias: alpha = {_in_spacings(quarter, quarter.spacing)}, a quarter "

@@ -72,7 +72,7 @@ class _Program(NamedTuple):
     multipliers: Array
     """What each bundle's bounds cost, shape (bundles,)."""
     slope: float
-    """By how much the force would change if the place moved [N/m]."""
+    """By how much the force would change if the place moved [N/m]; NaN if it was not solved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +151,8 @@ class Growth:
         """The end, by what stopped it; by default bounds if some cost force, else the shape."""
         cost = np.abs(best.multipliers)
         limits = self._at_bound(held.gamma) & (cost > _MULTIPLIER * cost.max(initial=1e-12))
+        if stop is None and np.isnan(best.slope):
+            stop = Stop.UNFINISHED
         if stop is None:
             stop = Stop.BOUND if limits.any() else Stop.SINGULAR
         return Grown(held, stop, limits & (stop == Stop.BOUND), best.slope)
@@ -183,6 +185,8 @@ class Growth:
         found = linprog(goal, A_eq=columns, b_eq=np.zeros(3), bounds=ends, method="highs-ds")
         if found.x is None:
             found = linprog(goal, A_eq=columns, b_eq=np.zeros(3), bounds=ends, method="highs-ipm")
+        if found.x is None:
+            return _Program(np.zeros(box.bundles), 0.0, 0.0, np.zeros(box.bundles), np.nan)
         change = reach * found.x
         price = found.lower.marginals + found.upper.marginals
         return _Program(
