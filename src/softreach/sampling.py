@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.support.arguments import as_whole_number, one_of
+from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.errors import InvalidInput
 from softreach.support.memory import check_room
 
@@ -64,11 +64,11 @@ def cube_blocks(sampler: str, n: int, dim: int, seed: int, size: int) -> Iterato
 
 def check_sampler(sampler: str, n: int, dim: int, seed: int) -> None:
     """Raise InvalidInput unless the sampler exists and can spread n points."""
-    one_of(SAMPLERS)("sampler", sampler)
-    n = as_whole_number("n", n, 1)
+    as_one_of("sampler", sampler, SAMPLERS)
+    n = as_integer("n", n, 1)
     if n > _LARGEST_SHOWN:
         check_room("n", n, max(dim, 1))
-    as_whole_number("seed", seed, 0, _LARGEST_SEED)
+    as_integer("seed", seed, 0, _LARGEST_SEED)
     if dim and (advice := SAMPLERS[sampler].refusal(n, dim)) is not None:
         raise InvalidInput("n", n, advice)
 

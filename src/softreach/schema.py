@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.support.arguments import dataset
+from softreach.support.arguments import POSITIVE, as_given, as_number, dataset
 from softreach.support.errors import InvalidInput
 from softreach.support.versions import SCHEMA_VERSION, versions
 
@@ -43,6 +43,7 @@ AXES = ("x", "y", "z")
 Array = NDArray[np.float64]
 
 _CELL = 1 / 20  # of the arm's length
+_EDGES = POSITIVE._replace(unit="m")
 
 # variable -> (dimensions, unit, meaning); that of an activation follows from the arm
 _CLOUD = {
@@ -118,7 +119,7 @@ def check_cloud(cloud: xr.Dataset) -> xr.Dataset:
     import xarray as xr
 
     if not isinstance(cloud, xr.Dataset):
-        raise InvalidInput("cloud", type(cloud).__name__, "a dataset from compute_cloud")
+        raise InvalidInput("cloud", as_given(cloud), "a cloud: a dataset from compute_cloud")
     for name, (dims, _, _) in _CLOUD.items():
         if name not in cloud or cloud[name].dims != dims:
             found = cloud[name].dims if name in cloud else "missing"
@@ -275,7 +276,8 @@ def tip_cells(cloud: xr.Dataset, edge: float | None = None) -> CellGrid:
     points = tip.values
     if "status" in cloud.coords:
         points = np.where(is_stable(cloud)[:, None], points, np.nan)
-    return CellGrid.around(points, _CELL * float(tip.attrs["length"]) if edge is None else edge)
+    default = _CELL * float(tip.attrs["length"])
+    return CellGrid.around(points, default if edge is None else as_number("cell", edge, _EDGES))
 
 
 def cell_dataset(

@@ -47,7 +47,7 @@ def cloud(
     check_output("out", out, CLOUD_STORE, overwrite)
     check_disk("n", n, sample_bytes(arm.bundles) * n, out)
     start = perf_counter()
-    dataset = compute_cloud(arm, n, seed, sampler, tol=tol)
+    dataset = compute_cloud(arm, n, seed=seed, sampler=sampler, tol=tol)
     seconds = perf_counter() - start
     save_cloud(dataset, out, durable=durable, overwrite=overwrite)
     rows = {

@@ -106,7 +106,7 @@ def cloud_of(
     if is_stored(source):
         changes.refuse("left out for a stored cloud: give the design instead")
         return open_cloud(source)
-    return compute_cloud(design_from(source, changes), n, seed, sampler)
+    return compute_cloud(design_from(source, changes), n, seed=seed, sampler=sampler)
 
 
 def activation_of(text: str | None, arm: Manipulator) -> list[float]:

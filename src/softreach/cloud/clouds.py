@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,9 +20,8 @@ from softreach.rod.measured_bundles import MeasuredBundles
 from softreach.rod.stable_tips import StableTips
 from softreach.rod.tip_map import BLOCK, TipMap, tip_map
 from softreach.sampling import check_sampler, cube_blocks
-from softreach.schema import a_cloud
 from softreach.support import parallel
-from softreach.support.arguments import checked, dataset, flag, function, optional, path
+from softreach.support.arguments import as_dataset, as_flag, as_path
 from softreach.support.errors import InvalidInput
 from softreach.support.files.atomic import replacing
 from softreach.support.files.kinds import FileKind, Formats
@@ -36,7 +35,7 @@ from softreach.support.files.store_place import (
     opened_root,
 )
 from softreach.support.memory import check_room
-from softreach.support.progress import Progress, bar, silent
+from softreach.support.progress import Progress, as_progress, bar
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,13 +51,12 @@ __all__ = [
 Array = NDArray[np.float64]
 
 
-@checked(progress=optional(function))
 def compute_cloud(
     arm: Manipulator | TipMap,
     n: int = 400_000,
+    *,
     seed: int = 0,
     sampler: str = "uniform",
-    *,
     tol: float = 1e-6,
     progress: Progress | None = None,
 ) -> xr.Dataset:
@@ -89,6 +87,7 @@ def compute_cloud(
     Warns:
         SoftreachWarning: The samples take more than half of the free memory.
     """
+    report = as_progress(progress)
     rod = _of_all_bundles(tip_map(arm, tol))
     if rod.supports_unstable:
         rod.tips(rod.box.low[None])  # what all samples need, once and not on every thread
@@ -97,7 +96,8 @@ def compute_cloud(
     check_room("n", int(n), bundles + 3)
     activation, tip = np.empty((n, bundles)), np.empty((n, 3))
     status = np.empty(n if rod.supports_unstable else 0, np.int8)
-    with _shown(progress, n) as shown:
+    show_bar = progress is None and n > _LONG
+    with bar("computing tips", n) if show_bar else nullcontext(report) as shown:
         _fill(rod, activation, tip, status, sampler, seed, shown)
     cloud = schema.cloud_dataset(
         rod.arm, activation, tip, seed=int(seed), sampler=sampler, tol=rod.tol
@@ -121,7 +121,6 @@ CLOUD_STORE: Formats = {".zarr": FileKind("a stored cloud", _is_cloud)}
 """What `save_cloud` writes, and replaces."""
 
 
-@checked(cloud=a_cloud, path=path, overwrite=flag, durable=flag)
 def save_cloud(
     cloud: xr.Dataset,
     path: str | PathLike[str],
@@ -144,12 +143,11 @@ def save_cloud(
             something else is there.
         NotWritten: It cannot be written.
     """
-    schema.check_stored_cloud(cloud)
-    kind = CLOUD_STORE[".zarr"]
+    place = as_path("path", path)
+    overwrite, durable = as_flag("overwrite", overwrite), as_flag("durable", durable)
+    kind, size = CLOUD_STORE[".zarr"], schema.check_stored_cloud(cloud).nbytes
     with (
-        replacing(
-            path, kind, takes=cloud.nbytes, overwrite=overwrite, durable=durable
-        ) as partial_path,
+        replacing(place, kind, takes=size, overwrite=overwrite, durable=durable) as partial_path,
         _few_chunks_at_a_time(),
     ):
         _write(schema.storable(cloud), partial_path)
@@ -176,7 +174,6 @@ def _write(cloud: xr.Dataset, path: Path) -> None:
     )
 
 
-@checked(path=path)
 def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
     """Read a cloud that `save_cloud` wrote.
 
@@ -187,7 +184,7 @@ def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
     """
     import xarray as xr
 
-    location = fspath(path)
+    location = as_path("path", path)
     opened = opened_root(location, "cloud")
     if opened is None or "command" in opened.group.attrs:
         hint = "" if opened is None else "this is an atlas"
@@ -208,16 +205,16 @@ def _few_chunks_at_a_time() -> AbstractContextManager[object]:
     return zarr.config.set({"async.concurrency": min(4, parallel.thread_count())})
 
 
-@checked(cloud=dataset())
 def design_of(cloud: xr.Dataset) -> Manipulator:
     """The design that a cloud or configuration was computed from."""
+    cloud = as_dataset("cloud", cloud)
     return Manipulator.from_toml(cloud.attrs["design"], source="the cloud's design")
 
 
-@checked(cloud=dataset())
 def tip_map_of(cloud: xr.Dataset) -> TipMap:
     """The tip map that a cloud was computed with."""
-    return tip_map(design_of(cloud), float(cloud.attrs["tol"]))
+    arm = design_of(cloud)
+    return tip_map(arm, float(cloud.attrs["tol"]))
 
 
 def sample_bytes(bundles: int) -> int:
@@ -265,9 +262,3 @@ def _reported(task: Callable[[], object], progress: Progress, count: int) -> Non
     task()
     progress(count)
 
-
-def _shown(progress: Progress | None, n: int) -> AbstractContextManager[Progress]:
-    """The caller's callback, or a bar if the cloud is large enough to wait for."""
-    if progress is None and n > _LONG:
-        return bar("computing tips", n)
-    return nullcontext(progress or silent)

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.geometry.neighbors import mean_value_distance
 from softreach.rod.measured_bundles import activation_measures
-from softreach.schema import a_cloud, cell_dataset, check_cloud, is_stable, tip_cells
-from softreach.support.arguments import POSITIVE, checked, dataset, optional, plain, within
+from softreach.schema import cell_dataset, check_cloud, is_stable, tip_cells
+from softreach.support.arguments import as_dataset, as_number, plain
 from softreach.support.arrays import as_indices, as_shares
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.quantity import quantity
@@ -25,7 +25,6 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 
-@checked(cloud=a_cloud, radius=within(Range(0.0, unit="m")))
 def activation_distance(
     cloud: xr.Dataset, radius: float, *, queries: int | ArrayLike | None = None
 ) -> xr.DataArray:
@@ -57,6 +56,7 @@ def activation_distance(
     import xarray as xr
 
     check_cloud(cloud)
+    radius = as_number("radius", radius, Range(0.0, unit="m"))
     chosen = _chosen(queries, cloud.sizes["sample"])
     tip, activation = cloud["tip"].values, cloud["activation"].values
     if "unit" in cloud.coords:
@@ -76,7 +76,7 @@ def activation_distance(
             **cloud.attrs,
             "long_name": "mean activation-space distance D̄",
             "units": cloud["activation"].attrs.get("units", "1"),
-            "radius": float(radius),
+            "radius": radius,
         },
     )
 
@@ -95,6 +95,7 @@ def _among(
 def evaluated_samples(distance: xr.DataArray, cloud: xr.Dataset) -> Index:
     """Which samples of the cloud were evaluated."""
     n = cloud.sizes["sample"]
+    distance = as_dataset("distance", distance, kind="DataArray")
     if distance.dims != ("sample",) or "sample" not in distance.coords:
         raise InvalidInput("distance", distance.dims, "made by activation_distance")
     return as_indices("distance.sample", distance["sample"].values, n, "samples of the cloud")
@@ -126,11 +127,6 @@ def _strided(count: int, n: int) -> Index:
 # Where an arm is redundant, and where its tips gather: means over the cells of a grid.
 
 
-@checked(
-    cloud=a_cloud,
-    distance=dataset(kind="DataArray"),
-    cell=optional(within(POSITIVE._replace(unit="m"))),
-)
 def distance_map(
     cloud: xr.Dataset, distance: xr.DataArray, *, cell: float | None = None
 ) -> xr.Dataset:
@@ -166,7 +162,6 @@ def distance_map(
     ).assign_attrs(cloud.attrs)
 
 
-@checked(cloud=a_cloud, cell=optional(within(POSITIVE._replace(unit="m"))))
 def tip_density(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Dataset:
     """Local density of tips, and how uneven it is.
 
@@ -275,13 +270,6 @@ class RedundancySummary:
 _VOLUMES = ("measured_volume", "occupied_volume")
 
 
-@checked(
-    cloud=a_cloud,
-    distance=dataset(kind="DataArray"),
-    threshold=within(Range()),
-    cell=optional(within(POSITIVE._replace(unit="m"))),
-    quantiles=as_shares,
-)
 def redundancy_summary(
     cloud: xr.Dataset,
     distance: xr.DataArray,
@@ -305,19 +293,21 @@ def redundancy_summary(
     Raises:
         InvalidInput: D̄ of another cloud, or cells that are not positive or too many.
     """
-    values = distance.values[np.isfinite(distance.values)]
+    threshold = as_number("threshold", threshold)
+    shares = as_shares("quantiles", quantiles)
     grid, evaluated = tip_cells(cloud, cell), evaluated_samples(distance, cloud)
+    values = distance.values[np.isfinite(distance.values)]
     stable = is_stable(cloud)[evaluated]
     mean = grid.mean(distance.values, evaluated)
     known = np.isfinite(mean)
-    found = np.quantile(values, quantiles) if len(values) else np.full(len(quantiles), np.nan)
+    heights = np.quantile(values, shares) if len(values) else np.full(len(shares), np.nan)
     return RedundancySummary(
         evaluated=int(stable.sum()),
         isolated=_share(np.isnan(distance.values[stable])),
         median=float(np.median(values)) if len(values) else np.nan,
         median_error=_median_error(values),
-        quantiles=dict(zip(map(float, quantiles), found.tolist(), strict=True)),
-        threshold=float(threshold),
+        quantiles=dict(zip(shares.tolist(), heights.tolist(), strict=True)),
+        threshold=threshold,
         redundant_points=_share(values > threshold),
         redundant_points_error=_share_error(values > threshold),
         redundant_volume=_share(mean[known] > threshold),

@@ -16,7 +16,7 @@ from softreach.geometry.delaunay import delaunay
 from softreach.geometry.hull import Hull
 from softreach.schema import is_stable
 from softreach.support import parallel
-from softreach.support.arguments import POSITIVE, as_given, flag, plain
+from softreach.support.arguments import POSITIVE, as_flag, as_given, plain
 from softreach.support.arrays import as_floats, as_points
 from softreach.support.errors import InvalidInput, SoftreachWarning
 
@@ -75,7 +75,7 @@ def concave_hull(
     References:
         [EdelsbrunnerMuecke1994]
     """
-    flag("bias", bias)
+    bias = as_flag("bias", bias)
     positions = _positions(points)
     radius = _radius(alpha, points)
     shape, *quarter = _alpha_complexes(

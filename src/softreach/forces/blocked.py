@@ -12,16 +12,16 @@ from softreach.arm.manipulator import Manipulator
 from softreach.forces.growth import Grown, Growth
 from softreach.forces.stop import Stop
 from softreach.inverse import solve_inverse
-from softreach.inverse.request import checked_activations, checked_targets
+from softreach.inverse.request import as_activations, as_targets
 from softreach.rod.loaded import LoadedRod
 from softreach.rod.pushing_tip import PushingTip
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
-from softreach.stiffness import a_direction, unit_directions, yielding_rod
-from softreach.support.arguments import checked, function, optional, whole
-from softreach.support.arrays import as_floats
+from softreach.stiffness import yielding_rod
+from softreach.support.arguments import as_integer
+from softreach.support.arrays import as_directions, as_floats
 from softreach.support.errors import InvalidInput
-from softreach.support.progress import Progress, silent
+from softreach.support.progress import Progress, as_progress
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,7 +35,6 @@ _OF_TOL = 1e-2  # what the search may use up of the tolerance
 _MOST_STEPS = 256  # along the arm
 
 
-@checked(direction=a_direction, family=whole(1, 10_000), progress=optional(function))
 def blocked_force(
     arm: Manipulator | TipMap,
     places: ArrayLike | None,
@@ -78,18 +77,21 @@ def blocked_force(
         InvalidInput: Arguments of another shape or not finite, or fewer than three free bundles.
         InvalidDesign: A material has no Young's modulus.
     """
+    as_directions("direction", direction)
+    family = as_integer("family", family, 1, 10_000)
+    progress = as_progress(progress)
     rod = tip_map(arm, tol)
     yielding = yielding_rod(rod)
     if rod.box.dimension < 3:
         allowed = "3 or more to keep the tip in its place"
         raise InvalidInput("free bundles", rod.box.dimension, allowed)
     targets, starts = _starts(rod, places, start, family)
-    directions = unit_directions(direction, len(targets))
-    done, best = progress or silent, []
+    directions = as_directions("direction", direction, len(targets))
+    best = []
     for target, along, choice in zip(targets, directions, starts, strict=True):
         found = [_grown(yielding, along, target, gamma) for gamma in choice]
         best.append(max((one for one in found if one), key=_force, default=None))
-        done(1)
+        progress(1)
     return _dataset(yielding, targets, directions, best)
 
 
@@ -113,14 +115,14 @@ def _starts(
     if start is None:
         if places is None:
             raise InvalidInput("places", None, "given, or `start`")
-        targets = checked_targets("places", places)
+        targets = as_targets("places", places)
         solutions = solve_inverse(rod, targets, family=family)
         return targets, [one.activations for one in solutions]
     if places is None:
         gamma = rod.box.check(np.atleast_2d(as_floats("start", start)))
         return rod.tips(gamma), list(gamma[:, None])
-    targets = checked_targets("places", places)
-    gamma = rod.box.with_held(checked_activations("start", start, rod.box, len(targets)))
+    targets = as_targets("places", places)
+    gamma = rod.box.with_held(as_activations("start", start, rod.box, len(targets)))
     return targets, list(gamma[:, None])
 
 

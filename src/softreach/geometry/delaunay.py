@@ -10,7 +10,7 @@ import numpy as np
 
 from softreach.kernels.points.bowyer_watson import triangulate
 from softreach.kernels.points.spatial_sort import insertion_order
-from softreach.support.arguments import one_of
+from softreach.support.arguments import as_one_of
 from softreach.support.arrays import Points, as_points
 
 # How many dimensions a cloud of points fills, seen from the points themselves.
@@ -94,7 +94,7 @@ def delaunay(points: np.ndarray, method: Literal["auto", "numba", "qhull"] = "au
         InvalidInput: Points of another shape, or not finite; an unknown method.
     """
     points = as_points("points", points)
-    one_of(METHODS)("method", method)
+    as_one_of("method", method, METHODS)
     build = _by_qhull if method == "qhull" else _by_insertion
     tetrahedra, neighbors, duplicate_of = build(unit_scale(points)[0])
     return Delaunay(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.request import checked_activations, checked_residual, checked_targets
+from softreach.inverse.request import as_activations, as_residual, as_targets
 from softreach.inverse.roots import placed
 from softreach.inverse.solve import solve_inverse
 from softreach.rod.free_bundles import free_bundles
@@ -259,16 +259,16 @@ def track_path(
     Raises:
         InvalidInput: Arguments of another shape or not finite, or fewer than three free bundles.
     """
-    points = checked_targets("path", path)
+    points = as_targets("path", path)
     rod = measured_bundles(tip_map(arm, tol))
     if rod.box.dimension < 3:
         raise InvalidInput("free bundles", rod.box.dimension, "3 or more to follow a path in space")
     if not len(points):
         raise InvalidInput("path.shape", points.shape, "of shape (k, 3) with one point or more")
-    residual = checked_residual(residual_over_length)
+    residual = as_residual(residual_over_length)
     tracker = Continuation(free_bundles(stable_tips(rod)), residual * rod.length)
     if start is not None:
-        gamma = checked_activations("start", start, rod.box, 1)[0]
+        gamma = as_activations("start", start, rod.box, 1)[0]
         gamma = gamma / bundle_measures(rod)[rod.box.free]
         first = tracker.corrected_start(tracker.box.clip(gamma), points[0])
     else:

@@ -18,7 +18,7 @@ from softreach.rod.free_bundles import free_bundles
 from softreach.rod.measured_bundles import bundle_measures, measured_bundles
 from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap, tip_map
-from softreach.support.arguments import checked, whole
+from softreach.support.arguments import as_integer
 
 __all__ = ["PreparedMap", "prepared_map"]
 
@@ -109,7 +109,6 @@ class PreparedMap:
         return face_landmarks(self.rod)
 
 
-@checked(cells=whole(2, 256), depth=whole(0, 20))
 def prepared_map(
     arm: Manipulator | TipMap | PreparedMap,
     tol: float = 1e-6,
@@ -126,6 +125,7 @@ def prepared_map(
         depth: How often a cell is halved where det ∂r/∂γ changes sign or is uneven; once at least
             for an arm under loads.
     """
+    cells, depth = as_integer("cells", cells, 2, 256), as_integer("depth", depth, 0, 20)
     if isinstance(arm, PreparedMap):
         return arm
     rod = measured_bundles(tip_map(arm, tol))

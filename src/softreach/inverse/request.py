@@ -88,7 +88,7 @@ class Request:
         return replace(self, targets=self.targets[rows], near=self.near[rows], direction=direction)
 
 
-def checked_targets(name: str, targets: ArrayLike) -> Array:
+def as_targets(name: str, targets: ArrayLike) -> Array:
     """The targets as a (t, 3) float array.
 
     Raises:
@@ -100,7 +100,7 @@ def checked_targets(name: str, targets: ArrayLike) -> Array:
     return points
 
 
-def checked_activations(name: str, activations: ArrayLike, box: ActivationBox, count: int) -> Array:
+def as_activations(name: str, activations: ArrayLike, box: ActivationBox, count: int) -> Array:
     """An activation for each target, of the free bundles only, shape (t, dimension).
 
     Args:
@@ -120,19 +120,6 @@ def checked_activations(name: str, activations: ArrayLike, box: ActivationBox, c
     return np.ascontiguousarray(np.broadcast_to(rows, (count, m))[:, box.free])
 
 
-def checked_direction(direction: ArrayLike | None, count: int) -> Array | None:
-    """Unit vectors along the wanted tip tangents, shape (t, 3); None if there are none."""
-    if direction is None:
-        return None
-    rows = as_floats("direction", direction)
-    if rows.shape not in ((3,), (count, 3)):
-        raise InvalidInput("direction.shape", rows.shape, "of shape (3,) or (t, 3)")
-    size = np.linalg.norm(rows, axis=-1, keepdims=True)
-    if not (np.isfinite(size) & (size > 0)).all():
-        raise InvalidInput("direction", direction, "finite vectors other than zero")
-    return np.ascontiguousarray(np.broadcast_to(rows / size, (count, 3)))
-
-
-def checked_residual(residual_over_length: float) -> float:
+def as_residual(residual_over_length: float) -> float:
     """The largest |tip - target| in L, if that can be asked for."""
     return as_number("residual_over_length", residual_over_length, Range(*_RESIDUALS))

@@ -15,16 +15,16 @@ from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.proofs import SLACK, change_bounds, gap_bounds
 from softreach.inverse.request import (
     Request,
-    checked_activations,
-    checked_direction,
-    checked_residual,
-    checked_targets,
+    as_activations,
+    as_residual,
+    as_targets,
 )
 from softreach.inverse.roots import Roots, conditions, nearly_singular_roots, no_roots, roots_at
 from softreach.inverse.solutions import Solutions, Status
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
-from softreach.support.arguments import as_number, as_whole_number, checked, flag
+from softreach.support.arguments import as_flag, as_integer, as_number
+from softreach.support.arrays import as_directions
 from softreach.support.errors import InvalidInput, Range
 
 __all__ = ["solve_inverse"]
@@ -37,7 +37,6 @@ _BLOCK = 32_768  # targets at once: bounds the memory of a call
 _BRANCH_BLOCK = 131_072  # where all roots are searched, which is done in smaller sets
 
 
-@checked(prove_least=flag)
 def solve_inverse(
     arm: Manipulator | TipMap | PreparedMap,
     targets: ArrayLike,
@@ -93,20 +92,22 @@ def solve_inverse(
         InvalidInput: Arguments of another shape, not finite, or out of range; a proof where a
             direction is traded against the change.
     """
+    prove_least = as_flag("prove_least", prove_least)
     if prove_least and direction is not None:
         raise InvalidInput("prove_least", prove_least, "False where a direction is wanted")
     prepared = prepared_map(arm, tol)
-    points, box = checked_targets("targets", targets), prepared.whole.box
+    points, box = as_targets("targets", targets), prepared.whole.box
     rest = np.zeros(box.bundles) if near is None else near
+    unit = None if direction is None else as_directions("direction", direction, len(points))
     request = Request(
         targets=points,
-        residual=checked_residual(residual_over_length) * prepared.whole.length,
-        near=checked_activations("near", rest, box, len(points)) / prepared.measures[box.free],
-        direction=checked_direction(direction, len(points)),
+        residual=as_residual(residual_over_length) * prepared.whole.length,
+        near=as_activations("near", rest, box, len(points)) / prepared.measures[box.free],
+        direction=unit,
         direction_weight=as_number("direction_weight", direction_weight, Range(0.0, 1e6)),
-        family=as_whole_number("family", family, 1, 10_000),
-        seed=as_whole_number("seed", seed, 0, 2**63),
-        prove_least=bool(prove_least),
+        family=as_integer("family", family, 1, 10_000),
+        seed=as_integer("seed", seed, 0, 2**63),
+        prove_least=prove_least,
     )
     solve, size = _by_distance, _BLOCK
     if prepared.dimension > 3:

@@ -17,6 +17,7 @@ from softreach.support.errors import InvalidInput
 __all__ = [
     "Faces",
     "Points",
+    "as_directions",
     "as_faces",
     "as_floats",
     "as_indices",
@@ -123,6 +124,32 @@ def as_stations(name: str, values: object) -> NDArray[np.float64]:
     if stations.ndim > 1:
         raise InvalidInput(f"{name}.shape", stations.shape, "of shape (station,)")
     return check_finite(name, stations)
+
+
+def as_directions(name: str, values: object, count: int | None = None) -> NDArray[np.float64]:
+    """Unit vectors along vectors of any length.
+
+    Args:
+        name: What errors call them.
+        values: Shape (3,) or (n, 3).
+        count: How many there must be, of which one may stand for all; None for any number.
+
+    Returns:
+        Shape (count, 3); that of the values without a count.
+
+    Raises:
+        InvalidInput: Another shape, numbers that are not finite, or a vector without length.
+    """
+    vectors = as_floats(name, values)
+    rows = "n" if count is None else count
+    many = vectors.ndim == 2 and vectors.shape[1] == 3 and count in (None, len(vectors))
+    if vectors.shape != (3,) and not many:
+        raise InvalidInput(f"{name}.shape", vectors.shape, f"(3,) or ({rows}, 3)")
+    size = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    if not (np.isfinite(size).all() and (size > 0).all()):
+        raise InvalidInput(name, vectors, "finite vectors longer than 0")
+    units = vectors / size
+    return units if count is None else np.ascontiguousarray(np.broadcast_to(units, (count, 3)))
 
 
 def as_shares(name: str, values: object) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ from softreach.rod.tip_map import TipMap, TipStatus, tip_map
 from softreach.sampling import cube_blocks, sample_cube
 from softreach.schema import provenance
 from softreach.support import parallel
-from softreach.support.arguments import POSITIVE, checked, optional, within
+from softreach.support.arguments import POSITIVE, as_number
 from softreach.support.errors import InvalidInput
 from softreach.workspace.image import Lattice
 
@@ -30,7 +30,6 @@ _STEPS = 32  # the cone is then too wide by some percent at most
 _TRIED = 4096  # activations of a loaded arm that must all come to rest
 
 
-@checked(cell=optional(within(POSITIVE._replace(unit="m"))))
 def direction_spread(
     arm: Manipulator | TipMap,
     *,
@@ -66,8 +65,7 @@ def direction_spread(
     Raises:
         InvalidInput: An argument out of range.
     """
-    if cell is not None and not 0 < cell < np.inf:
-        raise InvalidInput("cell", cell, "a length > 0 [m]")
+    cell = None if cell is None else as_number("cell", cell, POSITIVE._replace(unit="m"))
     rod = _all_stable(tip_map(arm, tol))
     tips, directions = _tips_and_directions(rod, sample_cube("sobol", n, rod.box.bundles, seed))
     if cell is None:

@@ -15,9 +15,9 @@ from softreach.geometry.hull import convex_hull
 from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.schema import provenance
-from softreach.support.arguments import checked, function, names, optional, within
+from softreach.support.arguments import as_names, as_number
 from softreach.support.errors import InvalidInput
-from softreach.support.progress import Progress, silent
+from softreach.support.progress import Progress, as_progress
 from softreach.support.quantity import quantity
 from softreach.workspace.flux import Flux, flux_tol, grid_faces, signed_volume
 from softreach.workspace.measure import Estimate
@@ -153,9 +153,6 @@ _MEANINGS = {
 }
 
 
-@checked(
-    arm=a_manipulator, parameters=names, accuracy=within(ACCURACIES), progress=optional(function)
-)
 def volume_gradient(
     arm: Manipulator,
     parameters: str | Sequence[str],
@@ -187,23 +184,24 @@ def volume_gradient(
             that counts something, or one whose change holds or frees a bundle.
         InvalidDesign: The design has no neighbors with other values of a parameter.
     """
-    asked = tuple(parameters)
-    if not asked:
+    arm, names = a_manipulator("arm", arm), as_names("parameters", parameters)
+    accuracy, progress = as_number("accuracy", accuracy, ACCURACIES), as_progress(progress)
+    if not names:
         raise InvalidInput("parameters", "none", "the name of one or more")
-    if twice := [name for name in asked if asked.count(name) > 1]:
+    if twice := [name for name in names if names.count(name) > 1]:
         raise InvalidInput("parameters", twice[0], "given once")
-    found = find_parameters(arm, asked)
+    parameter_of = find_parameters(arm, names)
     solid = _solid(arm, accuracy)
     base = _Base(solid, accuracy)
     rows = []
-    for name in asked:
-        rows.append(base.derivatives(found[name]))
-        (progress or silent)(1)
+    for name in names:
+        rows.append(base.derivatives(parameter_of[name]))
+        progress(1)
     volume, convex = zip(*rows, strict=True)
     return VolumeGradient(
         solid=solid,
-        parameters=asked,
-        units=tuple(found[name].unit for name in asked),
+        parameters=names,
+        units=tuple(parameter_of[name].unit for name in names),
         volume=np.array([each.value for each in volume]),
         volume_error=np.array([each.error for each in volume]),
         convex_volume=np.array([each.value for each in convex]),

@@ -16,15 +16,12 @@ from softreach.rod.tip_map import TipMap, tip_map
 from softreach.support.arguments import (
     POSITIVE,
     as_given,
-    checked,
-    function,
-    optional,
+    as_number,
     plain,
-    within,
 )
 from softreach.support.errors import InvalidInput, Range, SoftreachWarning
 from softreach.support.memory import check_room, free_memory
-from softreach.support.progress import Progress, silent
+from softreach.support.progress import Progress, as_progress, silent
 from softreach.workspace import measure
 from softreach.workspace.abstract_set import ReachableSet
 from softreach.workspace.discontinuities import coarser, finer, left_out_cells, remainder
@@ -55,7 +52,7 @@ def grid_for(accuracy: float) -> int:
     return max(2, 2 * int(np.ceil(min(np.sqrt(5.0 / accuracy), most) / 2)))
 
 
-def even_cells(name: str, value: object) -> int:
+def as_even_cells(name: str, value: object) -> int:
     """A number of cells along each axis of the activation box, instead of the rule's.
 
     Raises:
@@ -118,15 +115,9 @@ T = TypeVar("T")
 
 ACCURACIES = Range(1e-6, 0.2)
 """Relative errors of a volume that can be asked for."""
+_LENGTHS, _SIZES = POSITIVE._replace(unit="m"), POSITIVE._replace(unit="bytes")
 
 
-@checked(
-    accuracy=within(ACCURACIES),
-    cell=optional(within(POSITIVE._replace(unit="m"))),
-    grid=optional(even_cells),
-    memory=optional(within(POSITIVE._replace(unit="bytes"))),
-    progress=optional(function),
-)
 def reachable_set(
     arm: Manipulator | TipMap,
     *,
@@ -183,18 +174,22 @@ def reachable_set(
     Warns:
         SoftreachWarning: The estimated error is larger than asked.
     """
+    accuracy, progress = as_number("accuracy", accuracy, ACCURACIES), as_progress(progress)
+    cell = None if cell is None else as_number("cell", cell, _LENGTHS)
+    grid = None if grid is None else as_even_cells("grid", grid)
+    memory = None if memory is None else as_number("memory", memory, _SIZES)
     rod = tip_map(arm, tol)
     m = rod.box.dimension
     if m < 3:
         return thin_set(rod)
     if m == 3:
-        found = _of_three(rod, accuracy, cell, grid, progress or silent)
+        found = _of_three(rod, accuracy, cell, grid, progress)
         finer = f"a grid above {found.cells} and a smaller cell"
     else:
-        found = _of_many(rod, accuracy, cell, grid, memory, progress or silent)
+        found = _of_many(rod, accuracy, cell, grid, memory, progress)
         finer = "a smaller cell" if cell is not None else "more memory"
     if found.volume_error > accuracy * found.volume:
-        warnings.warn(_inaccurate(found, accuracy, finer), SoftreachWarning, stacklevel=3)
+        warnings.warn(_inaccurate(found, accuracy, finer), SoftreachWarning, stacklevel=2)
     return found
 
 

@@ -46,7 +46,7 @@ def redundancy(settings: Settings, folder: Path, notes: Notebook) -> None:
 
 def _cloud(name: str, arm: Manipulator, settings: Settings, notes: Notebook) -> xr.Dataset:
     start = perf_counter()
-    cloud = compute_cloud(arm, settings.redundant_samples, settings.seed)
+    cloud = compute_cloud(arm, settings.redundant_samples, seed=settings.seed)
     notes.note(**{f"{name}_seconds": perf_counter() - start})
     return cloud
 
