@@ -120,7 +120,7 @@ def _kernels() -> set[str]:
     """Every function that is made to be called from Python, by the name of the benchmark."""
     modules = [
         importlib.import_module(f"{kernels.__name__}.{module.name}")
-        for module in pkgutil.iter_modules(kernels.__path__)
+        for module in pkgutil.walk_packages(kernels.__path__)
     ]
     return {
         f"{module.__name__.rsplit('.', 1)[1]}.{name}"

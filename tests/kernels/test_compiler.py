@@ -84,7 +84,7 @@ def test_the_command_line_announces_compilation_once(capsys):
 
 def compiled() -> Iterator[tuple[str, Dispatcher]]:
     """Every compiled function of the kernels."""
-    for module in pkgutil.iter_modules(kernels.__path__, "softreach.kernels."):
+    for module in pkgutil.walk_packages(kernels.__path__, "softreach.kernels."):
         names = vars(importlib.import_module(module.name))
         yield from (
             (f"{module.name}.{n}", f) for n, f in names.items() if isinstance(f, Dispatcher)

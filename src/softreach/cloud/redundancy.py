@@ -21,6 +21,14 @@ from softreach.support.quantity import quantity
 if TYPE_CHECKING:
     import xarray as xr
 
+__all__ = [
+    "RedundancySummary",
+    "activation_distance",
+    "distance_map",
+    "redundancy_summary",
+    "tip_density",
+]
+
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 

@@ -22,6 +22,8 @@ from softreach.support.errors import InvalidInput
 if TYPE_CHECKING:
     import xarray as xr
 
+__all__ = ["PathStatus", "track_path"]
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
