@@ -21,7 +21,7 @@ from softreach.rod.stable_tips import StableTips
 from softreach.rod.tip_map import BLOCK, TipMap, tip_map
 from softreach.sampling import check_sampler, cube_blocks
 from softreach.support import parallel
-from softreach.support.arguments import as_dataset, as_flag, as_path
+from softreach.support.arguments import as_dataset, as_flag, as_function, as_path
 from softreach.support.errors import InvalidInput
 from softreach.support.files.atomic import replacing
 from softreach.support.files.kinds import FileKind, Formats
@@ -35,7 +35,7 @@ from softreach.support.files.store_place import (
     opened_root,
 )
 from softreach.support.memory import check_room
-from softreach.support.progress import Progress, as_progress, bar
+from softreach.support.progress import Progress, bar
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -87,21 +87,19 @@ def compute_cloud(
     Warns:
         SoftreachWarning: The samples take more than half of the free memory.
     """
-    report = as_progress(progress)
+    report = None if progress is None else as_function("progress", progress)
     rod = _of_all_bundles(tip_map(arm, tol))
     if rod.supports_unstable:
         rod.tips(rod.box.low[None])  # what all samples need, once and not on every thread
     bundles = rod.box.bundles
-    check_sampler(sampler, n, bundles, seed)
-    check_room("n", int(n), bundles + 3)
+    n, seed = check_sampler(sampler, n, bundles, seed)
+    check_room("n", n, bundles + 3)
     activation, tip = np.empty((n, bundles)), np.empty((n, 3))
     status = np.empty(n if rod.supports_unstable else 0, np.int8)
-    show_bar = progress is None and n > _LONG
+    show_bar = report is None and n > _LONG
     with bar("computing tips", n) if show_bar else nullcontext(report) as shown:
-        _fill(rod, activation, tip, status, sampler, seed, shown)
-    cloud = schema.cloud_dataset(
-        rod.arm, activation, tip, seed=int(seed), sampler=sampler, tol=rod.tol
-    )
+        _fill(rod, activation, tip, status, cube_blocks(sampler, n, bundles, seed, BLOCK), shown)
+    cloud = schema.cloud_dataset(rod.arm, activation, tip, seed=seed, sampler=sampler, tol=rod.tol)
     return schema.with_status(cloud, status) if rod.supports_unstable else cloud
 
 
@@ -238,22 +236,21 @@ def _fill(
     activation: Array,
     tip: Array,
     status: NDArray[np.int8],
-    sampler: str,
-    seed: int,
-    progress: Progress,
+    cubes: Iterator[Array],
+    progress: Progress | None,
 ) -> None:
-    """Draw activations block by block and let the threads turn them into tips meanwhile."""
+    """Draw points of the unit cube in blocks and let the threads turn them into tips meanwhile."""
 
     def tasks() -> Iterator[Callable[[], object]]:
         first = 0
-        for cube in cube_blocks(sampler, len(tip), rod.box.bundles, seed, BLOCK):
+        for cube in cubes:
             block = slice(first, first := first + len(cube))
             rod.box.from_cube(cube, out=activation[block])
             task = rod.tip_task(activation[block], tip[block])
             if len(status):
                 asked = activation[block], tip[block], status[block]
                 task = partial(rod.fill_tips_and_status, *asked)
-            yield partial(_reported, task, progress, len(cube))
+            yield partial(_reported, task, progress, len(cube)) if progress else task
 
     parallel.run(tasks())
 
@@ -261,4 +258,3 @@ def _fill(
 def _reported(task: Callable[[], object], progress: Progress, count: int) -> None:
     task()
     progress(count)
-
