@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from softreach.kernels.box.box_newton import box_steps
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.damped_step import damped_steps
-from softreach.rod.tip_map import TipMap
+from softreach.rod.tip_map import BLOCK, TipMap
 
 Array = NDArray[np.float64]
 
+_FEW = BLOCK // 8
 _MOST_ITERATIONS = 60
 _FIRST_DAMPING, _LEAST_DAMPING, _LARGEST_DAMPING = 1e-2, 1e-8, 1e8
 _STALLED = 1e-12  # step, in ranges, at which a search has found a minimum that is no root
@@ -38,6 +39,18 @@ class Descent(NamedTuple):
         return Descent(self.gamma[rows], self.tip[rows], self.slope[rows], self.residual[rows])
 
 
+def linearized(rod: TipMap, gamma: Array) -> tuple[Array, Array]:
+    """Tips [m] and ∂r/∂γ [m] as `TipMap.tips_and_slopes`, for the steps of a search.
+
+    Their activations are arrays already: few of a rod without loads go past checks and threads.
+    """
+    if rod.supports_unstable or len(gamma) > _FEW:
+        return rod.tips_and_slopes(gamma)
+    tips, slopes = np.empty((len(gamma), 3)), np.empty((len(gamma), 3, gamma.shape[1]))
+    rod.fill_slopes(np.ascontiguousarray(gamma), tips, slopes)
+    return tips, slopes
+
+
 def descend(
     rod: TipMap, targets: Array, start: Array, residual: float, most: int = _MOST_ITERATIONS
 ) -> Descent:
@@ -54,7 +67,7 @@ def descend(
         most: Iterations.
     """
     scales = rod.box.scales
-    tip, slope = rod.tips_and_slopes(start)
+    tip, slope = linearized(rod, start)
     away = np.linalg.norm(tip - targets, axis=1)
     # A start without a tip leads nowhere, and a step to a place without one fails.
     found = Descent(start.copy(), tip, slope, np.where(np.isnan(away), np.inf, away))
@@ -66,7 +79,7 @@ def descend(
             break
         goal, gamma = targets[active], found.gamma[active]
         trial = _trials(rod, found.of(active), goal, damping[active])
-        tip, slope = rod.tips_and_slopes(trial)
+        tip, slope = linearized(rod, trial)
         miss = np.linalg.norm(tip - goal, axis=1)
         better = miss < found.residual[active]
         taken = active[better]
@@ -221,7 +234,7 @@ class Objective:
     def __call__(self, which: Index, gamma: Array) -> tuple[Array, Array]:
         """Values (k,) and gradients (k, m) at activations (k, m) of searches `which` (k,)."""
         if self.direction is None or not self.direction_weight:
-            return self._of_position(which, gamma, *self.rod.tips_and_slopes(gamma))
+            return self._of_position(which, gamma, *linearized(self.rod, gamma))
         motions = self.rod.tip_motions(gamma)
         value, gradient = self._of_position(which, gamma, motions.tips, motions.slopes)
         wanted, squared_weight = self.direction[which], self.direction_weight**2

@@ -114,7 +114,7 @@ def solve_inverse(
         solve = _by_least_change
     elif prepared.dimension == 3 and request.direction is None:
         solve, size = _by_branches, _BRANCH_BLOCK
-    blocks = list(parallel.blocks(len(points), size)) or [slice(0)]
+    blocks = parallel.blocks(len(points), size) or [slice(0)]
     solutions = Solutions.joined([solve(prepared, request.of(rows)) for rows in blocks])
     return solutions.in_units_of(prepared.measures)
 
@@ -126,7 +126,7 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     unstable = np.bincount(found.target[~found.stable], minlength=count)
     roots = found.where(found.stable)
     missing = roots.missing(count)
-    blocks = list(parallel.blocks(len(missing), _BLOCK)) or [slice(0)]
+    blocks = parallel.blocks(len(missing), _BLOCK) or [slice(0)]
     closest = Nearest.joined([nearest(prepared, request.of(missing[rows])) for rows in blocks])
     solutions = _solutions(prepared, request, roots, missing, closest)
     left = np.flatnonzero(_perhaps_singular(prepared, solutions))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.inverse.descent import Objective, descend, minimize
+from softreach.inverse.descent import Objective, descend, linearized, minimize
 from softreach.inverse.request import Request
 from softreach.kernels.box.box_projection import project
 from softreach.rod.tip_map import TipMap
@@ -84,7 +84,7 @@ def _searched(
 ) -> _State:
     """The searches after so many steps, or fewer where they settled."""
     n, length = len(start), rod.length
-    tip, slope = rod.tips_and_slopes(start)
+    tip, slope = linearized(rod, start)
     state = _State(
         gamma=start.copy(),
         miss=(tip - request.targets) / length,
@@ -105,17 +105,17 @@ def _advance(rod: TipMap, request: Request, state: _State, active: Index) -> Arr
     """One step of the active searches; how long it would be without proximity, in ranges."""
     gamma, near, slope = state.gamma[active], request.near[active], state.slope[active]
     trial, force = _trials(rod, near, slope, state, active)
-    tip, new_slope = rod.tips_and_slopes(trial)
-    miss = (tip - request.targets[active]) / rod.length
+    length, (tip, new_slope) = rod.length, linearized(rod, trial)
+    miss = (tip - request.targets[active]) / length
     price = np.maximum(state.price[active], 1.5 * np.linalg.norm(force, axis=1))
-    before = _merit(gamma, near, price, state.miss[active])
     linear_miss = state.miss[active] + np.einsum("nij,nj->ni", slope, trial - gamma)
-    predicted = before - _merit(trial, near, price, linear_miss)
-    gained = before - _merit(trial, near, price, miss)
+    ends, misses = np.stack([gamma, trial, trial]), (state.miss[active], linear_miss, miss)
+    before, foreseen, after = _merit(ends, near, price, np.stack(misses))
+    predicted, gained = before - foreseen, before - after
     accepted = gained >= 0.1 * predicted - 1e-15
     taken, sigma = active[accepted], state.proximity[active]
     state.gamma[taken], state.miss[taken] = trial[accepted], miss[accepted]
-    state.slope[taken] = new_slope[accepted] / rod.length
+    state.slope[taken] = new_slope[accepted] / length
     state.price[active] = price
     eased = np.where(gained >= 0.7 * predicted, 0.4 * sigma, sigma)
     state.proximity[active] = np.where(accepted, eased, 4.0 * sigma + 0.1)
@@ -139,7 +139,8 @@ def _trials(
 
 
 def _merit(gamma: Array, near: Array, price: Array, miss: Array) -> Array:
-    return 0.5 * ((gamma - near) ** 2).sum(axis=1) + price * np.linalg.norm(miss, axis=1)
+    """½|γ - near|² + price·|miss|, shape of the leading axes."""
+    return 0.5 * ((gamma - near) ** 2).sum(axis=-1) + price * np.linalg.norm(miss, axis=-1)
 
 
 # Least change with a wanted direction, among the activations that keep the tip where it is.
@@ -180,7 +181,7 @@ def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Arr
             direction_weight=part.direction_weight,
         )
         gamma[rows] = minimize(lagrangian, gamma[rows], rod.box).gamma
-        error = (rod.tips_and_slopes(gamma[rows])[0] - part.targets) / rod.length
+        error = (linearized(rod, gamma[rows])[0] - part.targets) / rod.length
         multiplier[rows] += penalty * error  # theory (40)
         residual[rows] = np.linalg.norm(error, axis=1) * rod.length
     found = descend(rod, request.targets, gamma, request.residual)
@@ -189,7 +190,7 @@ def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Arr
 
 def _multipliers(rod: TipMap, request: Request, gamma: Array) -> Array:
     """λ for which γ - near + Jᵀλ is least, at the start: those of a solution were it one."""
-    slopes = rod.tips_and_slopes(gamma)[1] / rod.length
+    slopes = linearized(rod, gamma)[1] / rod.length
     slopes = np.nan_to_num(slopes, nan=0.0)  # of a start without a tip, which leads nowhere
     inverse = np.linalg.pinv(slopes.transpose(0, 2, 1), rcond=1e-3)
     return -np.einsum("nij,nj->ni", inverse, gamma - request.near)

@@ -162,7 +162,7 @@ class Image:
 
     def _crossings(self, axis: int) -> raster.Crossings:
         p, q = (axis + 1) % 3, (axis + 2) % 3
-        blocks = list(parallel.blocks(len(self.triangles), _TRIANGLES))
+        blocks = parallel.blocks(len(self.triangles), _TRIANGLES)
         parts: list[raster.Crossings] = [raster.empty_crossings(0)] * len(blocks)
 
         def task(number: int) -> None:
@@ -250,7 +250,7 @@ def _critical_triangles(
     gaps = np.pad(left_out, [(0, 1)] * 3).ravel()  # of the cells whose least vertex this is
     largest = np.abs(stretches).max() or 1.0
     stretches = np.rint(stretches / largest * 2.0**_STRETCH_BITS)
-    blocks = list(parallel.blocks(len(vertices), max(1, _ROWS // len(star.triangles))))
+    blocks = parallel.blocks(len(vertices), max(1, _ROWS // len(star.triangles)))
     parts: list[Ints] = [np.empty((0, 5), np.int64)] * len(blocks)
 
     def task(number: int) -> None:

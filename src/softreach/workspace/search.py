@@ -75,7 +75,7 @@ def _descend(rod: TipMap, targets: Array, enough: float, found: Nearest) -> None
     running, center = _room(min(total, _TOGETHER), box.bundles)
     tips, ahead = np.empty_like(running.wanted), np.empty_like(running.slope)
     step, multiplier = np.empty_like(running.trial), np.empty_like(running.wanted)
-    begun = n = 0
+    torn, begun, n = rod.supports_unstable, 0, 0
     while begun < total or n:
         more = min(total - begun, len(tips) - n)
         new, rows = slice(n, n + more), slice(begun, begun + more)
@@ -83,11 +83,12 @@ def _descend(rod: TipMap, targets: Array, enough: float, found: Nearest) -> None
         running.trial[new], running.damping[new] = found.gamma[rows], FIRST_DAMPING
         n, begun = n + more, begun + more
         rod.fill_slopes(running.trial[:n], tips[:n], ahead[:n])
-        if rod.supports_unstable:
+        if torn:
             tips[np.isnan(tips[:n, 0]).nonzero()[0]] = NOWHERE
         n = judge(running, n, tips, ahead, targets, found, enough, *bounds)
-        problem = running.slope, running.wanted, running.softness, running.low, running.high
-        project(center[:n], *(part[:n] for part in problem), step[:n], multiplier[:n])
+        slope, wanted, softness = running.slope[:n], running.wanted[:n], running.softness[:n]
+        low, high = running.low[:n], running.high[:n]
+        project(center[:n], slope, wanted, softness, low, high, step[:n], multiplier[:n])
         next_trials(running, n, step, multiplier, found.gamma, *bounds)
     nowhere = found.distance >= NOWHERE
     found.distance[nowhere], found.tips[nowhere] = np.inf, np.nan
