@@ -9,15 +9,14 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.support.arguments import as_integer, as_one_of
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.memory import check_room
 
 __all__ = ["SAMPLERS", "check_sampler", "cube_blocks", "sample_cube"]
 
-Array = NDArray[np.float64]
 Draw = Callable[[int, int], Array]
 """(first, count) -> the points first .. first + count; called in order, without gaps."""
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.support.arguments import POSITIVE, as_given, as_number, dataset
+from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput
 from softreach.support.versions import SCHEMA_VERSION, versions
 
@@ -40,7 +41,6 @@ __all__ = [
 
 AXES = ("x", "y", "z")
 
-Array = NDArray[np.float64]
 
 _CELL = 1 / 20  # of the arm's length
 _EDGES = POSITIVE._replace(unit="m")
@@ -82,7 +82,7 @@ def with_status(cloud: xr.Dataset, status: NDArray[np.int8]) -> xr.Dataset:
     return cloud.assign_coords(status=("sample", status, about))
 
 
-def is_stable(data: xr.Dataset | xr.DataArray) -> NDArray[np.bool_]:
+def is_stable(data: xr.Dataset | xr.DataArray) -> Mask:
     """Which samples hold the arm in a stable equilibrium; all, of an arm without loads."""
     if "status" not in data.coords:
         return np.ones(data.sizes["sample"], bool)

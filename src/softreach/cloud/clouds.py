@@ -22,6 +22,7 @@ from softreach.rod.tip_map import BLOCK, TipMap, tip_map
 from softreach.sampling import check_sampler, cube_blocks
 from softreach.support import parallel
 from softreach.support.arguments import as_dataset, as_flag, as_function, as_path
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.files.atomic import replacing
 from softreach.support.files.kinds import FileKind, Formats
@@ -47,8 +48,6 @@ __all__ = [
     "save_cloud",
     "tip_map_of",
 ]
-
-Array = NDArray[np.float64]
 
 
 def compute_cloud(

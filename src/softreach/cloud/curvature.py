@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import tip_map_of
@@ -21,7 +21,7 @@ from softreach.rod.tip_map import TipMap, tip_map
 from softreach.schema import check_cloud, provenance
 from softreach.support import parallel
 from softreach.support.arguments import as_given, as_instance, as_integer
-from softreach.support.arrays import as_floats, as_shares
+from softreach.support.arrays import Array, Index, as_floats, as_shares
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -35,7 +35,6 @@ __all__ = [
     "stream_statistics",
 ]
 
-Array = NDArray[np.float64]
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 """Minimum, quartiles, maximum and the middle nine tenths."""
@@ -166,7 +165,7 @@ class _Tally:
 
     low: Array
     width: Array
-    count: NDArray[np.int64]
+    count: Index
     extremes: Array
     moments: Array
 
@@ -210,7 +209,7 @@ class _Tally:
         return self.low + first, np.sqrt(np.maximum(second - first**2, 0.0))
 
 
-def _quantiles(count: NDArray[np.int64], edges: Array, extremes: Array, shares: Array) -> Array:
+def _quantiles(count: Index, edges: Array, extremes: Array, shares: Array) -> Array:
     below = np.concatenate([[0], np.cumsum(count)]) / count.sum()
     # Empty bins make flat pieces of the distribution; its inverse jumps over them.
     rises = np.flatnonzero(np.diff(below) > 0)

@@ -14,6 +14,7 @@ from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import BLOCK
 from softreach.schema import cell_dataset, check_cloud, tip_cells
 from softreach.support import parallel
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["dexterity", "solution_measure"]
 
-Array = NDArray[np.float64]
 Signs = NDArray[np.int8]
 
 _EVEN = ("uniform", "sobol")  # a grid has too many points on its faces

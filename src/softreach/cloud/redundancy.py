@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.geometry.neighbors import mean_value_distance
 from softreach.rod.measured_bundles import activation_measures
 from softreach.schema import cell_dataset, check_cloud, is_stable, tip_cells
 from softreach.support.arguments import as_dataset, as_number, plain
-from softreach.support.arrays import as_indices, as_shares
+from softreach.support.arrays import Array, Index, Mask, as_indices, as_shares
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.quantity import quantity
 
@@ -28,9 +28,6 @@ __all__ = [
     "redundancy_summary",
     "tip_density",
 ]
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 
 def activation_distance(
@@ -90,7 +87,7 @@ def activation_distance(
 
 
 def _among(
-    stable: NDArray[np.bool_], tip: Array, activation: Array, radius: float, sample: Index
+    stable: Mask, tip: Array, activation: Array, radius: float, sample: Index
 ) -> tuple[Array, Index]:
     """D̄ and K of some samples among the stable ones; NaN and 0 of those that are not."""
     mean, others = np.full(len(sample), np.nan), np.zeros(len(sample), np.intp)
@@ -200,7 +197,7 @@ def tip_density(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Dataset:
     ).assign_attrs({**cloud.attrs, **_unevenness(count)})
 
 
-def _unevenness(count: NDArray[np.intp]) -> dict[str, float]:
+def _unevenness(count: Index) -> dict[str, float]:
     occupied = count[count > 0]
     variation, chance = occupied.std() / occupied.mean(), occupied.mean() ** -0.5
     return {
@@ -324,11 +321,11 @@ def redundancy_summary(
     )
 
 
-def _share(which: NDArray[np.bool_]) -> float:
+def _share(which: Mask) -> float:
     return float(which.mean()) if which.size else np.nan
 
 
-def _share_error(which: NDArray[np.bool_]) -> float:
+def _share_error(which: Mask) -> float:
     share = _share(which)
     return float(np.sqrt(share * (1.0 - share) / which.size)) if which.size else np.nan
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.forces.growth import Grown, Growth
@@ -19,7 +19,7 @@ from softreach.rod.tip_map import TipMap, tip_map
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 from softreach.stiffness import yielding_rod
 from softreach.support.arguments import as_integer
-from softreach.support.arrays import as_directions, as_floats
+from softreach.support.arrays import Array, as_directions, as_floats
 from softreach.support.errors import InvalidInput
 from softreach.support.progress import Progress, as_progress
 
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 __all__ = ["blocked_force"]
 
-Array = NDArray[np.float64]
 
 _MEANINGS = " ".join(f"{stop.value}={stop.name.lower()}" for stop in Stop)
 _OF_TOL = 1e-2  # what the search may use up of the tolerance

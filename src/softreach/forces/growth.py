@@ -15,16 +15,14 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.forces.stop import Stop
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.pushing_tip import PushingTip, TipResponse
+from softreach.support.arrays import Array, Mask
 
 __all__ = ["Grown", "Growth", "Held"]
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _FIRST, _LONGEST, _SHORTEST = 0.05, 0.2, 1e-7  # largest change of an activation, of its range
 _LOCAL = 1e-3  # below it the largest force is near, and bounds alone do not fix it

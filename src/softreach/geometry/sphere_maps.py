@@ -12,11 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.support.arrays import Array, Index, Mask
+
 # Triangles on the unit sphere, and their subdivision.
 
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+Indices = Index
 
 
 def icosphere(levels: int) -> tuple[Array, Indices]:
@@ -143,7 +144,7 @@ def _candidates(seen: Map, levels: int, caution: float) -> tuple[Array, bool]:
     return starts, len(triangles) < _MOST_TRIANGLES
 
 
-def _sags(images: Array, triangles: NDArray[np.intp], middles: NDArray[np.intp]) -> Array:
+def _sags(images: Array, triangles: Index, middles: Index) -> Array:
     """How far the images of the middles of sides are from the middles of their images."""
     corners = images[triangles]
     halfway = 0.5 * (corners + np.roll(corners, -1, axis=1))
@@ -228,7 +229,7 @@ def _unit(vectors: Array) -> Array:
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
-def _first_of_equals(points: Array, good: NDArray[np.bool_]) -> NDArray[np.intp]:
+def _first_of_equals(points: Array, good: Mask) -> Index:
     """The first of each group of equal points."""
     kept: list[int] = []
     for k in np.flatnonzero(good):

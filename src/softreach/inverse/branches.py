@@ -24,7 +24,6 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.inverse.nearest import local_minima
 from softreach.inverse.prepared import PreparedMap
@@ -35,11 +34,10 @@ from softreach.kernels.branches import folds, newton
 from softreach.kernels.branches.newton import CONVERGED, RUNNING, STAGNATED, Search
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
+from softreach.support.arrays import Array, Index
 
 __all__ = ["distinct", "every_branch"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _ROUNDING = 1e-13  # of a tip, in L, with room to spare
 _LARGEST, _SMALLEST = 8192, 1024  # targets solved together on a thread

@@ -15,15 +15,13 @@ from softreach.kernels.image.activation_mesh import (
     interpolation_errors,
 )
 from softreach.rod.tip_map import TipMap
+from softreach.support.arrays import Array, Index, Mask
 
 # Searches for roots near the edge of what has an equilibrium, where cells have no image.
 #
 # A cell of which some corner has no tip, or is on another branch than the rest, cannot be mapped.
 # Its corners begin searches for the targets that their linearization sees within about a cell.
 
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _REACH = 1.5  # widths of a cell within which a root is looked for
 _MOST = 16  # searches for one target
@@ -111,7 +109,7 @@ def _even_cells(cells: int, depth: int) -> tuple[Index, int]:
     return np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3), 1 << depth
 
 
-def _uneven(det: Array) -> NDArray[np.bool_]:
+def _uneven(det: Array) -> Mask:
     """Cells in which det J changes sign or nearly so: there the map folds or is about to."""
     small, large = np.abs(det).min(axis=1), np.abs(det).max(axis=1)
     return (det.min(axis=1) * det.max(axis=1) <= 0) | (small < _EVEN * large)
@@ -238,7 +236,7 @@ class _Growing:
         first_left = int(np.argmin(affordable)) if not affordable.all() else len(counts)
         return max(_LEAF, int(counts[first_left]) if first_left < len(counts) else 0)
 
-    def _close(self, open_nodes: NDArray[np.bool_]) -> None:
+    def _close(self, open_nodes: Mask) -> None:
         """Number the children of open nodes; list the items of the others for good."""
         child = np.zeros(len(open_nodes), np.int64)
         child[open_nodes] = self.nodes + 8 * np.arange(int(open_nodes.sum()))

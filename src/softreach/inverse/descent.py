@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.kernels.box.box_newton import box_steps
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.damped_step import damped_steps
 from softreach.rod.tip_map import BLOCK, TipMap
-
-Array = NDArray[np.float64]
+from softreach.support.arrays import Array, Index, Mask
 
 _FEW = BLOCK // 8
 _MOST_ITERATIONS = 60
@@ -34,7 +32,7 @@ class Descent(NamedTuple):
     residual: Array
     """|tip - target| [m], shape (n,)."""
 
-    def of(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> Descent:
+    def of(self, rows: Index | Mask) -> Descent:
         """Some of them."""
         return Descent(self.gamma[rows], self.tip[rows], self.slope[rows], self.residual[rows])
 
@@ -107,8 +105,6 @@ def _trials(rod: TipMap, at: Descent, targets: Array, damping: Array) -> Array:
 # Minima of many smooth functions of the activations inside the bounds.
 
 
-Index = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 Evaluate = Callable[[Index, Array], tuple[Array, Array]]
 """(which functions, activations (n, m)) -> values (n,), gradients (n, m)."""
 

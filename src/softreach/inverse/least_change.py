@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.inverse.descent import descend
 from softreach.inverse.nearest import Reached, first_of_each, reach
@@ -18,11 +17,10 @@ from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.sqp import constrained_minima, sequential_minima, survey
 from softreach.rod.tip_map import TipMap
+from softreach.support.arrays import Array, Index
 
 __all__ = ["least_changes"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _CANDIDATES = 300
 _STARTS, _FACE_STARTS = 14, 10

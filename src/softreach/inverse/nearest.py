@@ -6,16 +6,13 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.inverse.descent import Descent, Minima, Objective, descend, minimize
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.roots import Roots, placed
 from softreach.rod.tip_map import TipMap
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from softreach.support.arrays import Array, Index, Mask
 
 
 class Nearest(NamedTuple):
@@ -25,7 +22,7 @@ class Nearest(NamedTuple):
     """Activations [-], shape (t, m)."""
     tip: Array
     """The points [m], shape (t, 3)."""
-    converged: NDArray[np.bool_]
+    converged: Mask
     """Whether the search converged, shape (t,)."""
 
     @staticmethod

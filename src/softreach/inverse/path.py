@@ -6,7 +6,7 @@ from enum import IntEnum
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.request import as_activations, as_residual, as_targets
@@ -17,6 +17,7 @@ from softreach.rod.measured_bundles import bundle_measures, measured_bundles
 from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
+from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
 
 __all__ = ["PathStatus", "track_path"]
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _LONGEST = 0.1  # predicted change of activation in one substep, in ranges
 _SHORTEST = 1e-10  # substep at which a branch is at its end, in L

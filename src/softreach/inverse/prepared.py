@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.cells import TornCells, activation_cells, image_tree
@@ -19,10 +18,10 @@ from softreach.rod.measured_bundles import bundle_measures, measured_bundles
 from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.support.arguments import as_integer
+from softreach.support.arrays import Array
 
 __all__ = ["PreparedMap", "prepared_map"]
 
-Array = NDArray[np.float64]
 
 _CELLS = 32
 

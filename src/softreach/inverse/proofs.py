@@ -11,16 +11,13 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.kernels.box import change_bounds as dual
 from softreach.kernels.box.box_projection import project
 from softreach.kernels.box.cell_cover import near_cells
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from softreach.support.arrays import Array, Index, Mask
 
 MOST_BUNDLES = 6  # with more, halving cells proves nothing that can be afforded
 _COARSE = 70_000  # cells that all targets share
@@ -36,7 +33,7 @@ class Cells(NamedTuple):
     center: Array
     """Activation [-], shape (n, m)."""
 
-    def where(self, chosen: NDArray[np.bool_] | slice) -> Cells:
+    def where(self, chosen: Mask | slice) -> Cells:
         """Some of them."""
         return Cells(self.owner[chosen], self.center[chosen])
 

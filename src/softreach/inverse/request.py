@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.rod.activation_box import ActivationBox
 from softreach.support.arguments import as_number
-from softreach.support.arrays import as_floats, as_rows, check_finite
+from softreach.support.arrays import Array, Index, as_floats, as_rows, check_finite
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.quantity import numbers_in, shortened
 
@@ -54,9 +54,6 @@ def _is_header(line: str) -> bool:
     """Whether a line holds names: no part of it begins as a number does."""
     return not any(part.strip().startswith(tuple("+-.0123456789")) for part in line.split(","))
 
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _RESIDUALS = (1e-13, 1e-2)  # in L; below, rounding of the tips decides
 

@@ -6,16 +6,13 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.kernels.branches import newton
 from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
 from softreach.support import parallel
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from softreach.support.arrays import Array, Index, Mask
 
 
 class Roots(NamedTuple):
@@ -31,10 +28,10 @@ class Roots(NamedTuple):
     """|tip - target| [m], shape (n,)."""
     cell: Index
     """Cell of the mesh where the search began; -1 if in none, shape (n,)."""
-    stable: NDArray[np.bool_]
+    stable: Mask
     """Whether the arm can be there, shape (n,)."""
 
-    def where(self, chosen: NDArray[np.bool_] | Index) -> Roots:
+    def where(self, chosen: Mask | Index) -> Roots:
         """Those chosen by a mask or an index; themselves where a mask leaves none out."""
         if chosen.dtype == bool and chosen.all():
             return self
@@ -84,7 +81,7 @@ def roots_at(rod: TipMap, targets: Array, target: Index, gamma: Array) -> Roots:
     return Roots(target, gamma, slopes, residual, nowhere, stable)
 
 
-def placed(rod: TipMap, gamma: Array) -> tuple[Array, NDArray[np.bool_]]:
+def placed(rod: TipMap, gamma: Array) -> tuple[Array, Mask]:
     """Tips to rounding [m], (n, 3), and whether the arm can be there, (n,).
 
     `TipMap.tips` of loaded arms ends the search for an equilibrium within a part of `tol` that is

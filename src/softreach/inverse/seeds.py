@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.kernels.branches.spread import choose_apart
 from softreach.rod.never_at_rest import none_stable
 from softreach.rod.tip_map import TipMap
 from softreach.sampling import sample_cube
+from softreach.support.arrays import Array, Index
 
 __all__ = ["Landmarks", "face_landmarks", "landmarks"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _MOST = 150_000  # landmarks on a grid of the box
 _DIMENSIONS = 6  # from which on a grid is too coarse to be worth more than a low-discrepancy set

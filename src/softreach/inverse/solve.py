@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.branches import distinct, every_branch
@@ -24,13 +24,11 @@ from softreach.inverse.solutions import Solutions, Status
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_flag, as_integer, as_number
-from softreach.support.arrays import as_directions
+from softreach.support.arrays import Array, Index, Mask, as_directions
 from softreach.support.errors import InvalidInput, Range
 
 __all__ = ["solve_inverse"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _NEARLY = 1e-2  # gap in L at which a target may have a root where ∂r/∂γ is nearly singular
 _BLOCK = 32_768  # targets at once: bounds the memory of a call
@@ -141,7 +139,7 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     return replace(solutions, unstable=unstable)
 
 
-def _perhaps_singular(prepared: PreparedMap, solutions: Solutions) -> NDArray[np.bool_]:
+def _perhaps_singular(prepared: PreparedMap, solutions: Solutions) -> Mask:
     """Which targets may have roots that only a search of nearly singular ones finds.
 
     Those not proved to be out of reach; where nothing is proved, those that are nearly reached.

@@ -5,15 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.inverse.descent import Objective, descend, linearized, minimize
 from softreach.inverse.request import Request
 from softreach.kernels.box.box_projection import project
 from softreach.rod.tip_map import TipMap
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from softreach.support.arrays import Array, Index
 
 _LONGEST_STEP = 0.5  # in ranges
 _SOFTNESS = 1e-9  # of the linearized target, in |J|²

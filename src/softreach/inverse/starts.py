@@ -5,16 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.kernels.branches import candidates
+from softreach.support.arrays import Array, Index
 
 __all__ = ["Starts", "spatial_order", "starts_from_cells", "with_torn_cells"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _ROOM = candidates.MOST_STARTS + 4096  # starts that are gathered before they are copied
 _PLACES = 32  # along each axis, when targets are put in order

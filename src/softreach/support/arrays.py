@@ -15,7 +15,10 @@ from numpy.typing import NDArray
 from softreach.support.errors import InvalidInput
 
 __all__ = [
+    "Array",
     "Faces",
+    "Index",
+    "Mask",
     "Points",
     "as_directions",
     "as_faces",
@@ -27,6 +30,15 @@ __all__ = [
     "as_stations",
     "check_finite",
 ]
+
+Array = NDArray[np.float64]
+"""Numbers."""
+
+Index = NDArray[np.int64]
+"""Places in other arrays."""
+
+Mask = NDArray[np.bool_]
+"""Which of several things."""
 
 Points = NDArray[np.float64]
 """Places [m], shape (n, 3)."""
@@ -48,7 +60,7 @@ _KINDS = {
 }
 
 
-def as_floats(name: str, values: object, allowed: str = _NUMBERS) -> NDArray[np.float64]:
+def as_floats(name: str, values: object, allowed: str = _NUMBERS) -> Array:
     """The values as a float array in memory order, of any shape; NaN and infinity are numbers.
 
     Args:
@@ -72,7 +84,7 @@ def as_floats(name: str, values: object, allowed: str = _NUMBERS) -> NDArray[np.
     raise InvalidInput(name, _described(values, array), allowed)
 
 
-def as_rows(name: str, values: object, columns: int, allowed: str) -> NDArray[np.float64]:
+def as_rows(name: str, values: object, columns: int, allowed: str) -> Array:
     """Finite numbers of shape (n, columns).
 
     Raises:
@@ -97,7 +109,7 @@ def as_points(name: str, values: object) -> Points:
     return as_rows(name, points, 3, allowed)
 
 
-def check_finite(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def check_finite(name: str, values: Array) -> Array:
     """The array itself, if no number in it is NaN or infinite.
 
     Raises:
@@ -114,7 +126,7 @@ def check_finite(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
     raise InvalidInput(f"{name}[{wrong[0]}]", found, "finite numbers", hint)
 
 
-def as_stations(name: str, values: object) -> NDArray[np.float64]:
+def as_stations(name: str, values: object) -> Array:
     """Finite numbers of shape (station,), of which one may stand alone.
 
     Raises:
@@ -126,7 +138,7 @@ def as_stations(name: str, values: object) -> NDArray[np.float64]:
     return check_finite(name, stations)
 
 
-def as_directions(name: str, values: object, count: int | None = None) -> NDArray[np.float64]:
+def as_directions(name: str, values: object, count: int | None = None) -> Array:
     """Unit vectors along vectors of any length.
 
     Args:
@@ -152,7 +164,7 @@ def as_directions(name: str, values: object, count: int | None = None) -> NDArra
     return units if count is None else np.ascontiguousarray(np.broadcast_to(units, (count, 3)))
 
 
-def as_shares(name: str, values: object) -> NDArray[np.float64]:
+def as_shares(name: str, values: object) -> Array:
     """Numbers from 0 to 1, shape (k,), one at least.
 
     Raises:
@@ -164,7 +176,7 @@ def as_shares(name: str, values: object) -> NDArray[np.float64]:
     raise InvalidInput(name, values, "one number from 0 to 1 or more of them, shape (k,)")
 
 
-def as_indices(name: str, values: object, count: int, what: str) -> NDArray[np.intp]:
+def as_indices(name: str, values: object, count: int, what: str) -> Index:
     """Indices from 0 to count - 1, shape (k,).
 
     Args:

@@ -14,6 +14,7 @@ from softreach.geometry.surface import Surface, compact_surface
 from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import MissingExtra
 from softreach.workspace.crossings import Crossings
 from softreach.workspace.image import Image, Lattice
@@ -26,9 +27,6 @@ if TYPE_CHECKING:
 # A solid as cells that are reached, and where its boundary cuts the edges between them.
 
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 _STARTS = 4  # crossings nearby from which places are searched
 _CORNERS = np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 _CHUNK = 1 << 16
@@ -40,7 +38,7 @@ class ReachedCells:
 
     rod: TipMap
     lattice: Lattice
-    reached: NDArray[np.bool_]
+    reached: Mask
     """Whether the centers of the cells are reached."""
     gamma: Array
     """Activations that reach them, meaningless elsewhere, shape (cells, bundles)."""
@@ -51,7 +49,7 @@ class ReachedCells:
         """1 at centers that are reached and 0 elsewhere; no orientation, 0."""
         return self.reached.astype(np.int32), np.zeros(self.reached.shape, np.int32)
 
-    def counts_at(self, points: Array) -> NDArray[np.int64]:
+    def counts_at(self, points: Array) -> Index:
         """1 for points that are reached [m], 0 for others, shape (n,)."""
         return (self.distance(points) <= ENOUGH * self.lattice.cell).astype(np.int64)
 
@@ -75,7 +73,7 @@ class ReachedCells:
             found = nearest_tips(self.rod, start[left], points[left], enough)
             out[left] = np.minimum(out[left], found.distance)
 
-    def _starts_inside(self, points: Array) -> Iterator[tuple[NDArray[np.bool_], Array]]:
+    def _starts_inside(self, points: Array) -> Iterator[tuple[Mask, Array]]:
         """Which points have a reached center at a corner of their cube, and where to start."""
         at = self.lattice.coordinates(points)
         for corner in (np.rint(at), *(np.floor(at) + corner for corner in _CORNERS)):
@@ -86,7 +84,7 @@ class ReachedCells:
             )
             yield within & self.reached.ravel()[cells], self.gamma[cells]
 
-    def boundary_crossings(self, axis: int) -> tuple[tuple[Ints, Ints, Ints], Array]:
+    def boundary_crossings(self, axis: int) -> tuple[tuple[Index, Index, Index], Array]:
         """Where the boundary cuts the edges between cell centers along an axis.
 
         Returns:
@@ -191,7 +189,7 @@ _PLACES = np.array([[1, 1, 1], [8, 1, 1], [1, 8, 1], [1, 1, 8]], float)
 _PLACES /= _PLACES.sum(axis=1, keepdims=True)
 
 
-def _small_triangles() -> tuple[Ints, Ints]:
+def _small_triangles() -> tuple[Index, Index]:
     """Barycentric places of the corners, times `_PARTS`, and the triangles between them."""
     steps = [(i, j) for i in range(_PARTS + 1) for j in range(_PARTS + 1 - i)]
     number = {step: k for k, step in enumerate(steps)}
@@ -232,7 +230,7 @@ def outer_sheets(rod: TipMap, image: Image) -> Surface:
     return Surface(vertices=vertices, faces=faces)
 
 
-def _outer_triangles(image: Image) -> Ints:
+def _outer_triangles(image: Image) -> Index:
     """Vertices of the triangles at the boundary, with the inside behind them, shape (n, 3)."""
     lattice, triangles = image.lattice, image.triangles[:, :3]
     corners = lattice.origin + image.vertices[triangles] * (lattice.cell / image.unit)
@@ -244,7 +242,7 @@ def _outer_triangles(image: Image) -> Ints:
     return turned[(senses != 0).any(axis=1)]
 
 
-def _senses(image: Image, corners: Array, place: Array) -> Ints:
+def _senses(image: Image, corners: Array, place: Array) -> Index:
     """1 where only what is behind a triangle is reached, -1 before it; 0 inside and outside."""
     normals = _cross(corners)
     away = _ASIDE * image.lattice.cell * normals / np.linalg.norm(normals, axis=1, keepdims=True)
@@ -257,7 +255,7 @@ def _cross(corners: Array) -> Array:
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
-def _divided(corners: Ints, width: int) -> tuple[Ints, NDArray[np.int32]]:
+def _divided(corners: Index, width: int) -> tuple[Index, NDArray[np.int32]]:
     """Triangles cut into as many along each edge as `_PARTS`.
 
     Args:

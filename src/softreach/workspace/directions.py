@@ -6,7 +6,6 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.tip_map import TipMap, TipStatus, tip_map
@@ -14,6 +13,7 @@ from softreach.sampling import cube_blocks, sample_cube
 from softreach.schema import provenance
 from softreach.support import parallel
 from softreach.support.arguments import POSITIVE, as_number
+from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidInput
 from softreach.workspace.image import Lattice
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["direction_spread"]
 
-Array = NDArray[np.float64]
 
 _BLOCK = 1 << 15
 _PER_CELL = 64  # samples in a cell of the bounding box, on average
@@ -117,7 +116,7 @@ def _tips_and_directions(rod: TipMap, cube: Array) -> tuple[Array, Array]:
     return tips, directions
 
 
-def _cones(directions: Array, starts: NDArray[np.intp]) -> Array:
+def _cones(directions: Array, starts: Index) -> Array:
     """Solid angle [sr] of a small cone around each run of unit vectors, shape (runs,)."""
     sizes = np.diff(starts, append=len(directions))
     axis = np.add.reduceat(directions, starts) / sizes[:, None]
@@ -137,7 +136,7 @@ def _unit(vectors: Array) -> Array:
     return vectors / np.linalg.norm(vectors, axis=1, keepdims=True).clip(1e-300)
 
 
-def _dataset(lattice: Lattice, angle: Array, samples: NDArray[np.int64]) -> xr.Dataset:
+def _dataset(lattice: Lattice, angle: Array, samples: Index) -> xr.Dataset:
     import xarray as xr
 
     dims = ("x", "y", "z")

@@ -13,11 +13,8 @@ from numpy.typing import NDArray
 
 from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap
+from softreach.support.arrays import Array, Index, Mask
 from softreach.workspace.image import Image
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-Ints = NDArray[np.int64]
 
 _SUSPECT = 2.5  # times the shorter neighbor; where stability ends like √x it is 2.4
 _KEPT = 0.5  # of its length that a torn edge keeps, however often it is halved
@@ -25,7 +22,7 @@ _HALVINGS = 12
 _NOISE = 10.0  # times the tolerance, in which tips of neighbors may differ by errors alone
 
 
-def left_out_cells(rod: TipMap, tips: Array, cells: int) -> Bools:
+def left_out_cells(rod: TipMap, tips: Array, cells: int) -> Mask:
     """Cells of a grid with a corner that is not stable, or with an edge that is torn.
 
     An edge between stable corners is suspect if its tips are more than 2.5 times as far apart as
@@ -47,7 +44,7 @@ def left_out_cells(rod: TipMap, tips: Array, cells: int) -> Bools:
     if not rod.supports_unstable:
         return np.zeros((cells,) * m, bool)
     field = tips.reshape(*(cells + 1,) * m, 3)
-    lost: Bools = np.any(corner_values(~np.isfinite(field[..., 0])), axis=-1)
+    lost: Mask = np.any(corner_values(~np.isfinite(field[..., 0])), axis=-1)
     for axis in range(m):
         torn = _torn_edges(rod, field, axis)
         others = [other for other in range(m) if other != axis]
@@ -70,7 +67,7 @@ def corner_values(values: NDArray, axes: list[int] | None = None) -> NDArray:
     return np.stack(corners, axis=-1)
 
 
-def coarser(left_out: Bools) -> Bools:
+def coarser(left_out: Mask) -> Mask:
     """Cells of twice the edge of which a part is left out."""
     for axis in range(left_out.ndim):
         halves = np.moveaxis(left_out, axis, 0)
@@ -78,14 +75,14 @@ def coarser(left_out: Bools) -> Bools:
     return left_out
 
 
-def finer(cells: Bools) -> Bools:
+def finer(cells: Mask) -> Mask:
     """The same of cells of half the edge."""
     for axis in range(cells.ndim):
         cells = np.repeat(cells, 2, axis)
     return cells
 
 
-def _torn_edges(rod: TipMap, field: Array, axis: int) -> Bools:
+def _torn_edges(rod: TipMap, field: Array, axis: int) -> Mask:
     """Edges along an axis that are torn, in the order of the grid."""
     apart = np.linalg.norm(np.diff(field, axis=axis), axis=-1)  # NaN where an end is not stable
     suspect = np.argwhere(_suspects(apart, axis) & (apart > _NOISE * rod.tol * rod.length))
@@ -94,7 +91,7 @@ def _torn_edges(rod: TipMap, field: Array, axis: int) -> Bools:
     return torn
 
 
-def _suspects(apart: Array, axis: int) -> Bools:
+def _suspects(apart: Array, axis: int) -> Mask:
     """Edges far longer than the shorter neighbor; those that have none are suspect as well."""
     rows = np.moveaxis(apart, axis, 0)
     none = np.full((1, *rows.shape[1:]), np.nan)
@@ -104,7 +101,7 @@ def _suspects(apart: Array, axis: int) -> Bools:
     return np.moveaxis(found, 0, axis)
 
 
-def _stay_apart(rod: TipMap, edges: Ints, axis: int, field: Array) -> Bools:
+def _stay_apart(rod: TipMap, edges: Index, axis: int, field: Array) -> Mask:
     """Whether the tips of edges, given by their first vertex, stay apart as these are halved."""
     m, cells = edges.shape[1], field.shape[0] - 1
     step = np.eye(m, dtype=int)[axis]
@@ -143,9 +140,7 @@ class Remainder(NamedTuple):
     """Some of the tips [m], shape (n, 3)."""
 
 
-def remainder(
-    rod: TipMap, image: Image, stretches: Array, left_out: NDArray[np.bool_]
-) -> Remainder:
+def remainder(rod: TipMap, image: Image, stretches: Array, left_out: Mask) -> Remainder:
     """What cells with a stable corner reach although they are left out, by eight places in each.
 
     A place counts with the |det J| of the cell's corners, the median of those that are stable, if

@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 from softreach.geometry.surface import Surface
 from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap
+from softreach.support.arrays import Array, Index
 
 # The six faces of the box of three free bundles: nodes, tips, and what flows through them.
-
-
-Array = NDArray[np.float64]
 
 
 class FaceNodes(NamedTuple):
@@ -27,7 +25,7 @@ class FaceNodes(NamedTuple):
     """Of each node, shape (n,); they add up to 1 on each face."""
     sense: Array
     """1 on faces at 1, -1 on those at 0: where the cross product of sides points, shape (n,)."""
-    axis: NDArray[np.int64]
+    axis: Index
     """Which axis the face is normal to, shape (n,)."""
 
     def area_vectors(self, slopes: Array) -> Array:
@@ -174,7 +172,7 @@ def face_image(rod: TipMap, cells: int = _CELLS) -> Surface | None:
     return found
 
 
-def _face_triangles(cube: NDArray[np.float64], cells: int) -> NDArray[np.int32]:
+def _face_triangles(cube: Array, cells: int) -> NDArray[np.int32]:
     """Two triangles for every square of the grid on the faces, oriented outwards."""
     number = np.full((cells + 1,) * 3, -1, np.int32)
     number[tuple(np.rint(cube * cells).astype(int).T)] = np.arange(len(cube))

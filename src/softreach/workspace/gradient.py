@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters
@@ -16,6 +15,7 @@ from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap, tip_map
 from softreach.schema import provenance
 from softreach.support.arguments import as_names, as_number
+from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidInput
 from softreach.support.progress import Progress, as_progress
 from softreach.support.quantity import quantity
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 # Corners of the convex hull of an image, and what moving them does to its volume.
 
-
-Array = NDArray[np.float64]
 
 _MOST_CELLS = 48  # of a grid of which all vertices are looked at
 _MOST_FACE_CELLS = 84  # of one of which those on the faces are
@@ -74,7 +72,7 @@ def _corners(rod: TipMap, cube: Array) -> HullCorners:
     return HullCorners(cube[_rows_of(hull.vertices, tips)], area)
 
 
-def _rows_of(some: Array, every: Array) -> NDArray[np.int64]:
+def _rows_of(some: Array, every: Array) -> Index:
     """Where in a list of points some of them are; one place for those that come twice."""
     from scipy.spatial import KDTree  # lazily
 

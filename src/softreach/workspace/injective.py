@@ -11,10 +11,10 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.geometry.hull import convex_hull
 from softreach.rod.tip_map import TipMap
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.progress import Progress
 from softreach.workspace.discontinuities import corner_values
 from softreach.workspace.flux import box_slopes, grid_faces, signed_volume
@@ -25,10 +25,6 @@ from softreach.workspace.solid import ReachableSolid
 
 # Windows of the box in which no two activations lead to one place.
 
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 _LIMIT = 0.8  # of 1, for slopes between the samples
 _POWERS = 6
@@ -68,7 +64,7 @@ class RegularWindows:
         worst = outer[np.argpartition(stretch, min(_WORST, len(outer) - 1))[:_WORST]]
         return not self._are_regular(np.zeros(len(worst), np.int64), worst).all()
 
-    def hold(self, low: Array, high: Array) -> tuple[Bools, Bools]:
+    def hold(self, low: Array, high: Array) -> tuple[Mask, Mask]:
         """Whether such windows hold boxes, and whether the smallest that might hold one is none.
 
         Args:
@@ -88,14 +84,14 @@ class RegularWindows:
         found[held] = self._are_regular(size[held], vertex[held])
         return found, held & ~found & (size == 0)
 
-    def _are_regular(self, size: Ints, vertex: Ints) -> Bools:
+    def _are_regular(self, size: Index, vertex: Index) -> Mask:
         asked = np.zeros(self._known.shape, bool)
         asked[size, vertex] = True
         number, at = np.nonzero(asked & (self._known == _UNKNOWN))
         self._known[number, at] = np.where(self._judge(self._sizes[number], at), _YES, _NO)
         return self._known[size, vertex] == _YES
 
-    def _judge(self, width: Ints, vertex: Ints) -> Bools:
+    def _judge(self, width: Index, vertex: Index) -> Mask:
         n = self._cells
         center = np.stack(np.unravel_index(vertex, (n + 1,) * 3), axis=-1)
         left, stretch, right = np.linalg.svd(self._slopes[vertex])
@@ -175,7 +171,7 @@ def faces_meet(rod: TipMap, slopes: Array) -> bool | None:
     return True
 
 
-def _each_once(first: Ints, second: Ints, size: int) -> tuple[Ints, Ints, Ints]:
+def _each_once(first: Index, second: Index, size: int) -> tuple[Index, Index, Index]:
     """Numbers below `size` that occur in pairs, and where among them the pairs are found."""
     used = np.zeros(size, bool)
     used[first] = used[second] = True
@@ -190,7 +186,7 @@ def _largest_bend(slopes: Array) -> Array:
     return _FACE_MARGIN * n * np.array(found)
 
 
-def _patches(rod: TipMap, which: Ints, side: int) -> _Patches:
+def _patches(rod: TipMap, which: Index, side: int) -> _Patches:
     """Patches by number: face, row and column."""
     face, row, column = which // side**2, which // side % side, which % side
     axis, at, rows = face // 2, (face % 2).astype(float), np.arange(len(which))
@@ -201,7 +197,7 @@ def _patches(rod: TipMap, which: Ints, side: int) -> _Patches:
     return _Patches(center, half, *box_slopes(rod, center))
 
 
-def _parted(patches: _Patches, a: Ints, b: Ints, bend: Array) -> NDArray[np.bool_]:
+def _parted(patches: _Patches, a: Index, b: Index, bend: Array) -> Mask:
     """Whether a plane parts the images of two patches, shape (pairs,).
 
     Tried are planes along either of them, and across the line between their centers.
@@ -229,13 +225,13 @@ def _normals(patches: _Patches) -> Array:
     return np.cross(first, patches.slopes[rows, :, (axis + 2) % 3])
 
 
-def _hull(patches: _Patches, a: Ints, b: Ints) -> tuple[Array, Array]:
+def _hull(patches: _Patches, a: Index, b: Index) -> tuple[Array, Array]:
     """Lowest and highest corner of the boxes that hold both patches, shape (pairs, 3) each."""
     low, high = patches.center - patches.half, patches.center + patches.half
     return np.minimum(low[a], low[b]), np.maximum(high[a], high[b])
 
 
-def _halved(first: Ints, second: Ints, side: int) -> tuple[Ints, Ints]:
+def _halved(first: Index, second: Index, side: int) -> tuple[Index, Index]:
     """All pairs of the quarters of two patches, each once."""
     a, b = (_quarters(each, side) for each in (first, second))
     pairs = np.stack(np.broadcast_arrays(a[:, :, None], b[:, None, :]), axis=-1).reshape(-1, 2)
@@ -243,7 +239,7 @@ def _halved(first: Ints, second: Ints, side: int) -> tuple[Ints, Ints]:
     return pairs[:, 0], pairs[:, 1]
 
 
-def _quarters(which: Ints, side: int) -> Ints:
+def _quarters(which: Index, side: int) -> Index:
     face, row, column = which // side**2, which // side % side, which % side
     rows = 2 * row[:, None] + np.array([0, 0, 1, 1])
     columns = 2 * column[:, None] + np.array([0, 1, 0, 1])

@@ -6,15 +6,15 @@ from collections.abc import Callable
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.geometry.hull import convex_hull
 from softreach.rod.tip_map import TipMap
+from softreach.support.arrays import Array, Index
 from softreach.workspace.crossings import Crossings
 from softreach.workspace.flux import signed_volume
 from softreach.workspace.image import Image, Spans
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 _LEFT = 0.35  # of what is removed; for four bundles 0.28 to 0.34 of it were found wrong
@@ -216,17 +216,14 @@ def _mean(image: Image, quantity: Callable[[Spans], ArrayLike]) -> Array:
 # Volume from the lengths of lines of sight through cell centers, and how sure it is.
 
 
-Ints = NDArray[np.int64]
-
-
 class Runs(NamedTuple):
     """Stretches of lines of sight that are reached, line by line, upwards; in cells."""
 
-    line: Ints
+    line: Index
     """Which line, (i, j) as i · width + j over the other two axes, shape (n,)."""
-    first: Ints
+    first: Index
     """Number of the first center, shape (n,)."""
-    last: Ints
+    last: Index
     """Number of the last center, shape (n,)."""
     start: Array
     """Where it begins, before its first center, shape (n,)."""

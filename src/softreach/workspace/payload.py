@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.schema import provenance
 from softreach.support.arguments import as_number
-from softreach.support.arrays import as_floats
+from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidDesign, InvalidInput, Range
 from softreach.support.progress import Progress, as_progress
 from softreach.support.quantity import quantity
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 __all__ = ["LargestPayload", "PayloadCurve", "payload_curve"]
 
-Array = NDArray[np.float64]
 
 _USUAL = (0.0, 0.5, 1.0, 2.0, 4.0)  # payloads over the one that bends the arm by about a third
 _DOUBLINGS = 6  # of the largest payload, in search of one that is too heavy

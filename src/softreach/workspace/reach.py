@@ -8,7 +8,6 @@ from functools import partial
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.never_at_rest import too_heavy
@@ -19,6 +18,7 @@ from softreach.support.arguments import (
     as_number,
     plain,
 )
+from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput, Range, SoftreachWarning
 from softreach.support.memory import check_room, free_memory
 from softreach.support.progress import Progress, as_progress, silent
@@ -34,8 +34,6 @@ from softreach.workspace.thin import thin_set
 
 # How finely a reachable set is resolved: cells of the activation box, and cells in space.
 
-
-Array = NDArray[np.float64]
 
 _MOST_VERTICES = 3.3e6  # of the activation grid
 _OF_VERTEX = 8  # doubles that a vertex of the grid takes at least
@@ -285,7 +283,7 @@ class _Grid(NamedTuple):
     """[m], shape ((n + 1)³, 3)."""
     stretches: Array
     """det J, shape ((n + 1)³,)."""
-    left_out: NDArray[np.bool_]
+    left_out: Mask
     """Cells without an image, shape (n, n, n)."""
 
     def image(self, lattice: Lattice, progress: Progress = silent) -> Image:
@@ -349,7 +347,7 @@ def _overlaps(
     )
 
 
-def _reached(tips: Array, left_out: NDArray[np.bool_]) -> Array:
+def _reached(tips: Array, left_out: Mask) -> Array:
     """Tips of the corners of cells that are not left out [m], shape (n, 3).
 
     Raises:

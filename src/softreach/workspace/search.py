@@ -7,7 +7,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.kernels.box.bounded_descent import (
     FIRST_DAMPING,
@@ -21,13 +20,12 @@ from softreach.kernels.image.space_claims import claim_corners
 from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import BLOCK, TipMap
 from softreach.support import parallel
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.progress import Progress, silent
 from softreach.workspace.image import Lattice
 
 # From targets in space to the nearest tips within reach, by descent from given activations.
 
-
-Array = NDArray[np.float64]
 
 _TOGETHER = BLOCK // 16  # searches that one thread runs side by side
 
@@ -102,8 +100,6 @@ def _room(count: int, m: int) -> tuple[Running, Array]:
     return Running(*integers, *numbers, *rest), np.zeros((count, m))
 
 
-Ints = NDArray[np.int64]
-
 ENOUGH = 1e-3
 """Distance at which a place counts as reached, in cells."""
 _CHUNK = 1 << 16  # places searched for at a time
@@ -133,7 +129,7 @@ class Flood:
         self.steps = np.array([ny * nz, nz, 1])
 
     @property
-    def reached(self) -> NDArray[np.bool_]:
+    def reached(self) -> Mask:
         """Of the lattice's shape."""
         return (self.gap == 0.0).reshape(self.lattice.shape)
 
@@ -143,7 +139,7 @@ class Flood:
         inside = self.reached[2:-2, 2:-2, 2:-2]
         return int(np.count_nonzero(inside)) == int(np.count_nonzero(self.gap == 0.0))
 
-    def centers(self, cells: Ints) -> Array:
+    def centers(self, cells: Index) -> Array:
         """Places [m] of cells given by flat index, shape (n, 3)."""
         index = np.stack(np.unravel_index(cells, self.lattice.shape), axis=-1)
         return self.lattice.origin + self.lattice.cell * index
@@ -154,7 +150,7 @@ class Flood:
         self._search(cells, starts)
         self.grow(cells[self.gap[cells] == 0.0])
 
-    def _improved(self, gamma: Array, tips: Array) -> tuple[Ints, Array]:
+    def _improved(self, gamma: Array, tips: Array) -> tuple[Index, Array]:
         """Centers around tips that one of them is clearly closer to than `gap`, and which."""
         at = self.lattice.coordinates(tips)
         within = ((at >= 0) & (at < np.array(self.lattice.shape) - 1)).all(axis=1)
@@ -163,7 +159,7 @@ class Flood:
         cells = np.flatnonzero(owner >= 0)
         return cells, gamma[owner[cells]]
 
-    def grow(self, cells: Ints) -> None:
+    def grow(self, cells: Index) -> None:
         """Search the neighbors of reached cells from there, and theirs, until none is new."""
         while len(cells):
             fresh = []
@@ -174,7 +170,7 @@ class Flood:
                 fresh.append(neighbors[self.gap[neighbors] == 0.0])
             cells = np.unique(np.concatenate(fresh)) if fresh else cells[:0]
 
-    def _frontier(self, cells: Ints) -> Iterator[tuple[Ints, Ints]]:
+    def _frontier(self, cells: Index) -> Iterator[tuple[Index, Index]]:
         """Neighbors of cells that are not reached, and the cell each is a neighbor of."""
         for step in (*self.steps, *-self.steps):
             neighbors = cells + step
@@ -183,7 +179,7 @@ class Flood:
                 part = open_[first : first + _CHUNK]
                 yield neighbors[part], cells[part]
 
-    def _search(self, cells: Ints, starts: Array) -> None:
+    def _search(self, cells: Index, starts: Array) -> None:
         """Search for centers, and keep what comes closer."""
         cell = self.lattice.cell
         for first in range(0, len(cells), _CHUNK):
