@@ -49,6 +49,9 @@ __all__ = [
     "tip_map_of",
 ]
 
+_CHUNK = 1 << 19  # samples of a stored array that are held at once
+_LONG = 5_000_000  # samples from which a bar is worth showing
+
 
 def compute_cloud(
     arm: Manipulator | TipMap,
@@ -102,22 +105,6 @@ def compute_cloud(
     return schema.with_status(cloud, status) if rod.supports_unstable else cloud
 
 
-def _is_cloud(path: Path) -> bool:
-    """Whether a folder holds a stored cloud and nothing else."""
-    try:
-        about = json.loads((path / "zarr.json").read_bytes())["attributes"]
-        names = {entry.name for entry in path.iterdir()} - {"zarr.json"}
-        inside = (entry.name for name in names for entry in (path / name).iterdir())
-        only = set(inside) <= {"zarr.json", "c"}
-        return only and {"tip", "activation"} <= names and {"sampler", "tol"} <= about.keys()
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return False
-
-
-CLOUD_STORE: Formats = {".zarr": FileKind("a stored cloud", _is_cloud)}
-"""What `save_cloud` writes, and replaces."""
-
-
 def save_cloud(
     cloud: xr.Dataset,
     path: str | PathLike[str],
@@ -150,27 +137,6 @@ def save_cloud(
         _write(schema.storable(cloud), partial_path)
 
 
-def _write(cloud: xr.Dataset, path: Path) -> None:
-    """Write all variables, with a checksum for each chunk, also for those of NaN alone."""
-    from zarr.codecs import Crc32cCodec, ZstdCodec
-
-    encoding: dict[Hashable, Any] = {
-        name: {"compressors": (ZstdCodec(level=0), Crc32cCodec())} for name in cloud.variables
-    }
-    chunk = min(cloud.sizes["sample"], _CHUNK)
-    for name in ("tip", "activation"):
-        encoding[name]["chunks"] = (chunk, cloud[name].shape[1])
-    place = checked_place(path, Watch(location=path, remedy=REMEDY["cloud"]), mode="r+")
-    cloud.assign_attrs({ARRAYS: sorted(map(str, cloud.variables))}).to_zarr(
-        place,
-        mode="w",
-        zarr_format=3,
-        consolidated=False,
-        encoding=encoding,
-        write_empty_chunks=True,
-    )
-
-
 def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
     """Read a cloud that `save_cloud` wrote.
 
@@ -195,13 +161,6 @@ def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
         return schema.check_stored_cloud(cloud)
 
 
-def _few_chunks_at_a_time() -> AbstractContextManager[object]:
-    """Zarr holds three copies of each chunk in flight, and has ten in flight by default."""
-    import zarr
-
-    return zarr.config.set({"async.concurrency": min(4, parallel.thread_count())})
-
-
 def design_of(cloud: xr.Dataset) -> Manipulator:
     """The design that a cloud or configuration was computed from."""
     cloud = as_dataset("cloud", cloud)
@@ -217,17 +176,6 @@ def tip_map_of(cloud: xr.Dataset) -> TipMap:
 def sample_bytes(bundles: int) -> int:
     """What a sample takes: its tip, its activation and its status."""
     return 8 * (3 + bundles) + 1
-
-
-def _of_all_bundles(rod: TipMap) -> TipMap:
-    """The map of every bundle, in its own unit, of which this one may be a restriction."""
-    while isinstance(rod, FreeBundles | MeasuredBundles | StableTips):
-        rod = rod.whole
-    return rod
-
-
-_CHUNK = 1 << 19  # samples of a stored array that are held at once
-_LONG = 5_000_000  # samples from which a bar is worth showing
 
 
 def _fill(
@@ -257,3 +205,54 @@ def _fill(
 def _reported(task: Callable[[], object], progress: Progress, count: int) -> None:
     task()
     progress(count)
+
+
+def _of_all_bundles(rod: TipMap) -> TipMap:
+    """The map of every bundle, in its own unit, of which this one may be a restriction."""
+    while isinstance(rod, FreeBundles | MeasuredBundles | StableTips):
+        rod = rod.whole
+    return rod
+
+
+def _is_cloud(path: Path) -> bool:
+    """Whether a folder holds a stored cloud and nothing else."""
+    try:
+        about = json.loads((path / "zarr.json").read_bytes())["attributes"]
+        names = {entry.name for entry in path.iterdir()} - {"zarr.json"}
+        inside = (entry.name for name in names for entry in (path / name).iterdir())
+        only = set(inside) <= {"zarr.json", "c"}
+        return only and {"tip", "activation"} <= names and {"sampler", "tol"} <= about.keys()
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return False
+
+
+CLOUD_STORE: Formats = {".zarr": FileKind("a stored cloud", _is_cloud)}
+"""What `save_cloud` writes, and replaces."""
+
+
+def _write(cloud: xr.Dataset, path: Path) -> None:
+    """Write all variables, with a checksum for each chunk, also for those of NaN alone."""
+    from zarr.codecs import Crc32cCodec, ZstdCodec
+
+    encoding: dict[Hashable, Any] = {
+        name: {"compressors": (ZstdCodec(level=0), Crc32cCodec())} for name in cloud.variables
+    }
+    chunk = min(cloud.sizes["sample"], _CHUNK)
+    for name in ("tip", "activation"):
+        encoding[name]["chunks"] = (chunk, cloud[name].shape[1])
+    place = checked_place(path, Watch(location=path, remedy=REMEDY["cloud"]), mode="r+")
+    cloud.assign_attrs({ARRAYS: sorted(map(str, cloud.variables))}).to_zarr(
+        place,
+        mode="w",
+        zarr_format=3,
+        consolidated=False,
+        encoding=encoding,
+        write_empty_chunks=True,
+    )
+
+
+def _few_chunks_at_a_time() -> AbstractContextManager[object]:
+    """Zarr holds three copies of each chunk in flight, and has ten in flight by default."""
+    import zarr
+
+    return zarr.config.set({"async.concurrency": min(4, parallel.thread_count())})

@@ -29,6 +29,9 @@ __all__ = [
     "tip_density",
 ]
 
+THRESHOLD = 0.25  # between a minimal arm's D̄ of some 0.05 and a redundant one's of order 1
+_VOLUMES = ("measured_volume", "occupied_volume")
+
 
 def activation_distance(
     cloud: xr.Dataset, radius: float, *, queries: int | ArrayLike | None = None
@@ -84,52 +87,6 @@ def activation_distance(
             "radius": radius,
         },
     )
-
-
-def _among(
-    stable: Mask, tip: Array, activation: Array, radius: float, sample: Index
-) -> tuple[Array, Index]:
-    """D̄ and K of some samples among the stable ones; NaN and 0 of those that are not."""
-    mean, others = np.full(len(sample), np.nan), np.zeros(len(sample), np.intp)
-    asked, number = stable[sample], np.cumsum(stable) - 1
-    found = mean_value_distance(tip[stable], activation[stable], radius, number[sample[asked]])
-    mean[asked], others[asked] = found
-    return mean, others
-
-
-def evaluated_samples(distance: xr.DataArray, cloud: xr.Dataset) -> Index:
-    """Which samples of the cloud were evaluated."""
-    n = cloud.sizes["sample"]
-    distance = as_dataset("distance", distance, kind="DataArray")
-    if distance.dims != ("sample",) or "sample" not in distance.coords:
-        raise InvalidInput("distance", distance.dims, "made by activation_distance")
-    return as_indices("distance.sample", distance["sample"].values, n, "samples of the cloud")
-
-
-def _chosen(queries: int | ArrayLike | None, n: int) -> Index | None:
-    """Indices of the samples to be evaluated; None for all."""
-    if queries is None:
-        return None
-    count = plain(queries)
-    if isinstance(count, int) and not isinstance(count, bool):
-        return _strided(count, n)
-    return as_indices("queries", queries, n, "samples of the cloud")
-
-
-def _strided(count: int, n: int) -> Index:
-    """One sample of each of `count` parts of about equal size, at a random but fixed place in it.
-
-    Every k-th one would do for independent samples, but in a Sobol sequence those share leading
-    bits, that is a corner of the activation box.
-    """
-    if not 0 <= count <= n:
-        raise InvalidInput("queries", count, f"from 0 to the cloud's {n} samples, or their indices")
-    ends = np.arange(count + 1) * n // max(count, 1)
-    place = np.random.default_rng(0).random(count)
-    return ends[:-1] + (place * np.diff(ends)).astype(np.intp)
-
-
-# Where an arm is redundant, and where its tips gather: means over the cells of a grid.
 
 
 def distance_map(
@@ -197,20 +154,50 @@ def tip_density(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Dataset:
     ).assign_attrs({**cloud.attrs, **_unevenness(count)})
 
 
-def _unevenness(count: Index) -> dict[str, float]:
-    occupied = count[count > 0]
-    variation, chance = occupied.std() / occupied.mean(), occupied.mean() ** -0.5
-    return {
-        "coefficient_of_variation": float(variation),
-        "chance": float(chance),
-        "heterogeneity": float(np.sqrt(max(variation**2 - chance**2, 0.0))),
-    }
+def redundancy_summary(
+    cloud: xr.Dataset,
+    distance: xr.DataArray,
+    *,
+    threshold: float = THRESHOLD,
+    cell: float | None = None,
+    quantiles: Sequence[float] = (0.05, 0.25, 0.75, 0.95),
+) -> RedundancySummary:
+    """Median and quantiles of D̄, isolated points, and where it exceeds a threshold.
 
+    Points gather where the arm goes often, so shares of points and of volume differ. The volume is
+    that of grid cells: evaluate enough points that `measured_volume` is near `occupied_volume`.
 
-# Redundancy in numbers: how far activations differ, and for what share of the places.
+    Args:
+        cloud: The cloud that D̄ was computed from.
+        distance: D̄ from `activation_distance`.
+        threshold: The D̄ [-] above which a place counts as redundant.
+        cell: Edge of the grid cells [m]; None for L/20.
+        quantiles: Probabilities.
 
-
-THRESHOLD = 0.25  # between a minimal arm's D̄ of some 0.05 and a redundant one's of order 1
+    Raises:
+        InvalidInput: D̄ of another cloud, or cells that are not positive or too many.
+    """
+    threshold = as_number("threshold", threshold)
+    shares = as_shares("quantiles", quantiles)
+    grid, evaluated = tip_cells(cloud, cell), evaluated_samples(distance, cloud)
+    values = distance.values[np.isfinite(distance.values)]
+    stable = is_stable(cloud)[evaluated]
+    mean = grid.mean(distance.values, evaluated)
+    known = np.isfinite(mean)
+    heights = np.quantile(values, shares) if len(values) else np.full(len(shares), np.nan)
+    return RedundancySummary(
+        evaluated=int(stable.sum()),
+        isolated=_share(np.isnan(distance.values[stable])),
+        median=float(np.median(values)) if len(values) else np.nan,
+        median_error=_median_error(values),
+        quantiles=dict(zip(shares.tolist(), heights.tolist(), strict=True)),
+        threshold=threshold,
+        redundant_points=_share(values > threshold),
+        redundant_points_error=_share_error(values > threshold),
+        redundant_volume=_share(mean[known] > threshold),
+        measured_volume=int(known.sum()) * grid.volume,
+        occupied_volume=int(np.count_nonzero(grid.count())) * grid.volume,
+    )
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -272,53 +259,57 @@ class RedundancySummary:
         )
 
 
-_VOLUMES = ("measured_volume", "occupied_volume")
+def _among(
+    stable: Mask, tip: Array, activation: Array, radius: float, sample: Index
+) -> tuple[Array, Index]:
+    """D̄ and K of some samples among the stable ones; NaN and 0 of those that are not."""
+    mean, others = np.full(len(sample), np.nan), np.zeros(len(sample), np.intp)
+    asked, number = stable[sample], np.cumsum(stable) - 1
+    found = mean_value_distance(tip[stable], activation[stable], radius, number[sample[asked]])
+    mean[asked], others[asked] = found
+    return mean, others
 
 
-def redundancy_summary(
-    cloud: xr.Dataset,
-    distance: xr.DataArray,
-    *,
-    threshold: float = THRESHOLD,
-    cell: float | None = None,
-    quantiles: Sequence[float] = (0.05, 0.25, 0.75, 0.95),
-) -> RedundancySummary:
-    """Median and quantiles of D̄, isolated points, and where it exceeds a threshold.
+def evaluated_samples(distance: xr.DataArray, cloud: xr.Dataset) -> Index:
+    """Which samples of the cloud were evaluated."""
+    n = cloud.sizes["sample"]
+    distance = as_dataset("distance", distance, kind="DataArray")
+    if distance.dims != ("sample",) or "sample" not in distance.coords:
+        raise InvalidInput("distance", distance.dims, "made by activation_distance")
+    return as_indices("distance.sample", distance["sample"].values, n, "samples of the cloud")
 
-    Points gather where the arm goes often, so shares of points and of volume differ. The volume is
-    that of grid cells: evaluate enough points that `measured_volume` is near `occupied_volume`.
 
-    Args:
-        cloud: The cloud that D̄ was computed from.
-        distance: D̄ from `activation_distance`.
-        threshold: The D̄ [-] above which a place counts as redundant.
-        cell: Edge of the grid cells [m]; None for L/20.
-        quantiles: Probabilities.
+def _chosen(queries: int | ArrayLike | None, n: int) -> Index | None:
+    """Indices of the samples to be evaluated; None for all."""
+    if queries is None:
+        return None
+    count = plain(queries)
+    if isinstance(count, int) and not isinstance(count, bool):
+        return _strided(count, n)
+    return as_indices("queries", queries, n, "samples of the cloud")
 
-    Raises:
-        InvalidInput: D̄ of another cloud, or cells that are not positive or too many.
+
+def _strided(count: int, n: int) -> Index:
+    """One sample of each of `count` parts of about equal size, at a random but fixed place in it.
+
+    Every k-th one would do for independent samples, but in a Sobol sequence those share leading
+    bits, that is a corner of the activation box.
     """
-    threshold = as_number("threshold", threshold)
-    shares = as_shares("quantiles", quantiles)
-    grid, evaluated = tip_cells(cloud, cell), evaluated_samples(distance, cloud)
-    values = distance.values[np.isfinite(distance.values)]
-    stable = is_stable(cloud)[evaluated]
-    mean = grid.mean(distance.values, evaluated)
-    known = np.isfinite(mean)
-    heights = np.quantile(values, shares) if len(values) else np.full(len(shares), np.nan)
-    return RedundancySummary(
-        evaluated=int(stable.sum()),
-        isolated=_share(np.isnan(distance.values[stable])),
-        median=float(np.median(values)) if len(values) else np.nan,
-        median_error=_median_error(values),
-        quantiles=dict(zip(shares.tolist(), heights.tolist(), strict=True)),
-        threshold=threshold,
-        redundant_points=_share(values > threshold),
-        redundant_points_error=_share_error(values > threshold),
-        redundant_volume=_share(mean[known] > threshold),
-        measured_volume=int(known.sum()) * grid.volume,
-        occupied_volume=int(np.count_nonzero(grid.count())) * grid.volume,
-    )
+    if not 0 <= count <= n:
+        raise InvalidInput("queries", count, f"from 0 to the cloud's {n} samples, or their indices")
+    ends = np.arange(count + 1) * n // max(count, 1)
+    place = np.random.default_rng(0).random(count)
+    return ends[:-1] + (place * np.diff(ends)).astype(np.intp)
+
+
+def _unevenness(count: Index) -> dict[str, float]:
+    occupied = count[count > 0]
+    variation, chance = occupied.std() / occupied.mean(), occupied.mean() ** -0.5
+    return {
+        "coefficient_of_variation": float(variation),
+        "chance": float(chance),
+        "heterogeneity": float(np.sqrt(max(variation**2 - chance**2, 0.0))),
+    }
 
 
 def _share(which: Mask) -> float:

@@ -16,7 +16,6 @@ from softreach.support.arrays import Array, Faces, Index, Mask, Points
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
-
 _NEIGHBORS = 16  # with 4, distances to long triangles came out up to a cell too large
 
 
@@ -104,9 +103,6 @@ def surface_area(vertices: Points, faces: Faces) -> float:
     a, b, c = np.moveaxis(scaled[faces], 1, 0)
     twice = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
     return float(np.ldexp(twice / 2.0, 2 * exponent))
-
-
-# The curves in which a plane across an axis cuts a surface of triangles.
 
 
 def plane_cut(surface: Surface, axis: int, at: float) -> list[Array]:

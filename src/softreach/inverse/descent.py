@@ -19,34 +19,14 @@ _MOST_ITERATIONS = 60
 _FIRST_DAMPING, _LEAST_DAMPING, _LARGEST_DAMPING = 1e-2, 1e-8, 1e8
 _STALLED = 1e-12  # step, in ranges, at which a search has found a minimum that is no root
 
+Evaluate = Callable[[Index, Array], tuple[Array, Array]]
+"""(which functions, activations (n, m)) -> values (n,), gradients (n, m)."""
 
-class Descent(NamedTuple):
-    """Where searches ended."""
-
-    gamma: Array
-    """Activations [-], shape (n, m)."""
-    tip: Array
-    """Their tips [m], shape (n, 3)."""
-    slope: Array
-    """∂r/∂γ there [m], shape (n, 3, m)."""
-    residual: Array
-    """|tip - target| [m], shape (n,)."""
-
-    def of(self, rows: Index | Mask) -> Descent:
-        """Some of them."""
-        return Descent(self.gamma[rows], self.tip[rows], self.slope[rows], self.residual[rows])
-
-
-def linearized(rod: TipMap, gamma: Array) -> tuple[Array, Array]:
-    """Tips [m] and ∂r/∂γ [m] as `TipMap.tips_and_slopes`, for the steps of a search.
-
-    Their activations are arrays already: few of a rod without loads go past checks and threads.
-    """
-    if rod.supports_unstable or len(gamma) > _FEW:
-        return rod.tips_and_slopes(gamma)
-    tips, slopes = np.empty((len(gamma), 3)), np.empty((len(gamma), 3, gamma.shape[1]))
-    rod.fill_slopes(np.ascontiguousarray(gamma), tips, slopes)
-    return tips, slopes
+_MOST_NEWTON_STEPS = 80
+_DIFFERENCE = 1e-6  # step of the differences of gradients, in ranges
+_STEP_TOL = 1e-10  # step at which a search has converged, in ranges
+_VALUE_TOL = 1e-14  # relative increase of a value that is rounding
+_LARGEST_NEWTON_DAMPING = 1e8  # at which a search stagnates
 
 
 def descend(
@@ -96,45 +76,6 @@ def descend(
     return found
 
 
-def _trials(rod: TipMap, at: Descent, targets: Array, damping: Array) -> Array:
-    """The end of each step."""
-    miss, softness = (at.tip - targets) / rod.length, damping * at.residual / rod.length
-    return damped_steps(rod.box, at.gamma, miss, at.slope / rod.length, softness)[0]
-
-
-# Minima of many smooth functions of the activations inside the bounds.
-
-
-Evaluate = Callable[[Index, Array], tuple[Array, Array]]
-"""(which functions, activations (n, m)) -> values (n,), gradients (n, m)."""
-
-_MOST_NEWTON_STEPS = 80
-_DIFFERENCE = 1e-6  # step of the differences of gradients, in ranges
-_STEP_TOL = 1e-10  # step at which a search has converged, in ranges
-_VALUE_TOL = 1e-14  # relative increase of a value that is rounding
-_LARGEST_NEWTON_DAMPING = 1e8  # at which a search stagnates
-
-
-class Minima(NamedTuple):
-    """Local minima."""
-
-    gamma: Array
-    """Where [-], shape (n, m)."""
-    value: Array
-    """The functions there, shape (n,)."""
-    converged: Mask
-    """Whether the last step was negligible, shape (n,)."""
-
-
-class _Expansion(NamedTuple):
-    """Functions to second order about a point each."""
-
-    value: Array
-    gradient: Array
-    hessian: Array
-    """NaN where it was not asked for."""
-
-
 def minimize(evaluate: Evaluate, start: Array, box: ActivationBox) -> Minima:
     """Minimize function i from start i, by damped Newton within the bounds.
 
@@ -166,43 +107,6 @@ def minimize(evaluate: Evaluate, start: Array, box: ActivationBox) -> Minima:
         converged[active] = still
         active = active[~still & (damping[active] < _LARGEST_NEWTON_DAMPING)]
     return Minima(gamma, value, converged)
-
-
-def _next_damping(damping: Array, accepted: Mask) -> Array:
-    eased = np.where(damping > 1e-6, 0.1 * damping, 0.0)
-    return np.where(accepted, eased, np.maximum(10 * damping, 1e-3))
-
-
-def _expanded(
-    evaluate: Evaluate, which: Index, gamma: Array, scales: Array, curved: Mask
-) -> _Expansion:
-    """Values, gradients and, where `curved`, Hessians: gradients a step away along each axis.
-
-    One call evaluates all: rods are computed in blocks that cost the same full or not.
-    """
-    n, m = gamma.shape
-    k = int(curved.sum())
-    displaced = np.repeat(gamma[curved, None], m, axis=1)
-    displaced[:, np.arange(m), np.arange(m)] += _DIFFERENCE * scales
-    value, gradient = evaluate(
-        np.concatenate([which, np.repeat(which[curved], m)]),
-        np.concatenate([gamma, displaced.reshape(k * m, m)]),
-    )
-    change = gradient[n:].reshape(k, m, m) - gradient[:n][curved, None]
-    hessian = np.full((n, m, m), np.nan)
-    hessian[curved] = change / (_DIFFERENCE * scales)[:, None]
-    torn = np.isfinite(value[:n]) & curved & np.isnan(hessian).any(axis=(1, 2))
-    hessian[torn] = _cautious(gradient[:n][torn], scales)
-    return _Expansion(value[:n], gradient[:n], hessian)
-
-
-def _cautious(gradient: Array, scales: Array) -> Array:
-    """In place of a Hessian, next to where a function ends: steps down of a tenth of the ranges."""
-    size = np.abs(gradient * scales).max(axis=1, initial=0.0)
-    return (10.0 * size / scales[:, None] ** 2).T[:, :, None] * np.eye(len(scales))
-
-
-# What a search for activations minimizes: miss of the target, change, error of direction.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -256,6 +160,95 @@ class Objective:
             value += 0.5 * _squares(change)
             gradient += change
         return value, gradient
+
+
+def linearized(rod: TipMap, gamma: Array) -> tuple[Array, Array]:
+    """Tips [m] and ∂r/∂γ [m] as `TipMap.tips_and_slopes`, for the steps of a search.
+
+    Their activations are arrays already: few of a rod without loads go past checks and threads.
+    """
+    if rod.supports_unstable or len(gamma) > _FEW:
+        return rod.tips_and_slopes(gamma)
+    tips, slopes = np.empty((len(gamma), 3)), np.empty((len(gamma), 3, gamma.shape[1]))
+    rod.fill_slopes(np.ascontiguousarray(gamma), tips, slopes)
+    return tips, slopes
+
+
+class Descent(NamedTuple):
+    """Where searches ended."""
+
+    gamma: Array
+    """Activations [-], shape (n, m)."""
+    tip: Array
+    """Their tips [m], shape (n, 3)."""
+    slope: Array
+    """∂r/∂γ there [m], shape (n, 3, m)."""
+    residual: Array
+    """|tip - target| [m], shape (n,)."""
+
+    def of(self, rows: Index | Mask) -> Descent:
+        """Some of them."""
+        return Descent(self.gamma[rows], self.tip[rows], self.slope[rows], self.residual[rows])
+
+
+class Minima(NamedTuple):
+    """Local minima."""
+
+    gamma: Array
+    """Where [-], shape (n, m)."""
+    value: Array
+    """The functions there, shape (n,)."""
+    converged: Mask
+    """Whether the last step was negligible, shape (n,)."""
+
+
+def _trials(rod: TipMap, at: Descent, targets: Array, damping: Array) -> Array:
+    """The end of each step."""
+    miss, softness = (at.tip - targets) / rod.length, damping * at.residual / rod.length
+    return damped_steps(rod.box, at.gamma, miss, at.slope / rod.length, softness)[0]
+
+
+class _Expansion(NamedTuple):
+    """Functions to second order about a point each."""
+
+    value: Array
+    gradient: Array
+    hessian: Array
+    """NaN where it was not asked for."""
+
+
+def _next_damping(damping: Array, accepted: Mask) -> Array:
+    eased = np.where(damping > 1e-6, 0.1 * damping, 0.0)
+    return np.where(accepted, eased, np.maximum(10 * damping, 1e-3))
+
+
+def _expanded(
+    evaluate: Evaluate, which: Index, gamma: Array, scales: Array, curved: Mask
+) -> _Expansion:
+    """Values, gradients and, where `curved`, Hessians: gradients a step away along each axis.
+
+    One call evaluates all: rods are computed in blocks that cost the same full or not.
+    """
+    n, m = gamma.shape
+    k = int(curved.sum())
+    displaced = np.repeat(gamma[curved, None], m, axis=1)
+    displaced[:, np.arange(m), np.arange(m)] += _DIFFERENCE * scales
+    value, gradient = evaluate(
+        np.concatenate([which, np.repeat(which[curved], m)]),
+        np.concatenate([gamma, displaced.reshape(k * m, m)]),
+    )
+    change = gradient[n:].reshape(k, m, m) - gradient[:n][curved, None]
+    hessian = np.full((n, m, m), np.nan)
+    hessian[curved] = change / (_DIFFERENCE * scales)[:, None]
+    torn = np.isfinite(value[:n]) & curved & np.isnan(hessian).any(axis=(1, 2))
+    hessian[torn] = _cautious(gradient[:n][torn], scales)
+    return _Expansion(value[:n], gradient[:n], hessian)
+
+
+def _cautious(gradient: Array, scales: Array) -> Array:
+    """In place of a Hessian, next to where a function ends: steps down of a tenth of the ranges."""
+    size = np.abs(gradient * scales).max(axis=1, initial=0.0)
+    return (10.0 * size / scales[:, None] ** 2).T[:, :, None] * np.eye(len(scales))
 
 
 def _squares(rows: Array) -> Array:

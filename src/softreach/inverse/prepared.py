@@ -10,7 +10,7 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.cells import TornCells, activation_cells, image_tree
 from softreach.inverse.proofs import CoarseCells
-from softreach.inverse.seeds import Landmarks, face_landmarks, landmarks
+from softreach.inverse.seeds import Seeds, face_seeds, seeds
 from softreach.kernels.branches.space_tree import SpaceTree
 from softreach.kernels.image.activation_mesh import ActivationMesh
 from softreach.rod.free_bundles import free_bundles
@@ -28,7 +28,7 @@ _CELLS = 32
 
 @dataclass(frozen=True)
 class PreparedMap:
-    """A tip map with cells, tree and landmarks, each computed when first needed.
+    """A tip map with cells, tree and seeds, each computed when first needed.
 
     Changes of activation are compared throughout, so that it counts them in their measures.
     """
@@ -93,9 +93,9 @@ class PreparedMap:
         return image_tree(self.mesh)
 
     @cached_property
-    def landmarks(self) -> Landmarks:
+    def seeds(self) -> Seeds:
         """Where searches for a minimum begin."""
-        return landmarks(self.rod)
+        return seeds(self.rod)
 
     @cached_property
     def coarse_cells(self) -> CoarseCells:
@@ -103,9 +103,9 @@ class PreparedMap:
         return CoarseCells(self.rod)
 
     @cached_property
-    def face_landmarks(self) -> Landmarks:
+    def face_seeds(self) -> Seeds:
         """Where searches begin for places on the boundary of the reachable set."""
-        return face_landmarks(self.rod)
+        return face_seeds(self.rod)
 
 
 def prepared_map(

@@ -14,6 +14,17 @@ from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
 
+_EFFORTS = ((500, 20, 0.1), (2000, 100, 0.08))
+"""Seeds near the target, most starts from them, their least distance in ranges."""
+
+_BLOCK = 500  # targets at once
+_MOST_ITERATIONS = 60
+_LONGEST_STEP = 0.3  # in ranges
+_OUTSIDE = 0.05  # how far a search may leave the bounds, in ranges
+_LEAST_DAMPING = 1e-3
+_CONVERGED = 1e-9  # step, in ranges
+_FIRST_RETURNS, _RETURNS = 4, 2  # steps down to the floor of the valley
+
 
 class Roots(NamedTuple):
     """Activations of the free bundles, each a root for one of the targets."""
@@ -115,36 +126,6 @@ def conditions(slope: Array) -> Array:
         return sigma[:, 0] / sigma[:, -1]
 
 
-def _closed_form(slope: Array) -> tuple[Array, Array]:
-    smallest, condition = np.empty(len(slope)), np.empty(len(slope))
-    newton.conditions(slope, smallest, condition)
-    return smallest, condition
-
-
-# Newton's method where ∂r/∂γ is nearly singular, for three free bundles.
-#
-# Near a full circle two singular values of J vanish together. The residual then says little about
-# the distance from a root: on the way it has to rise, and a search that never lets it does not
-# arrive. Steps are judged by the natural test instead, |J⁻¹ F(trial)| < |J⁻¹ F(γ)|, which is
-# invariant under any linear change of the residual.
-#
-# The roots lie in a curved valley: along one direction the tip moves millions of times as far as
-# along the others, and a straight step leaves the valley's floor. So each step ends with a few of
-# Newton's method along that direction alone.
-
-
-_EFFORTS = ((500, 20, 0.1), (2000, 100, 0.08))
-"""Landmarks near the target, most starts from them, their least distance in ranges."""
-_BLOCK = 500  # targets at once
-
-_MOST_ITERATIONS = 60
-_LONGEST_STEP = 0.3  # in ranges
-_OUTSIDE = 0.05  # how far a search may leave the bounds, in ranges
-_LEAST_DAMPING = 1e-3
-_CONVERGED = 1e-9  # step, in ranges
-_FIRST_RETURNS, _RETURNS = 4, 2  # steps down to the floor of the valley
-
-
 def nearly_singular_roots(prepared: PreparedMap, request: Request, rows: Index) -> Roots:
     """Roots for some of the targets, those that no other search found, sorted by target."""
     roots = no_roots(prepared.rod)
@@ -152,21 +133,23 @@ def nearly_singular_roots(prepared: PreparedMap, request: Request, rows: Index) 
         left = np.setdiff1d(rows, roots.target)
         for first in range(0, len(left), _BLOCK):
             part = left[first : first + _BLOCK]
-            near = prepared.landmarks.nearest(request.targets[part], neighbors)
-            owner, start = prepared.landmarks.starts(near, most, apart)
+            near = prepared.seeds.nearest(request.targets[part], neighbors)
+            owner, start = prepared.seeds.starts(near, most, apart)
             roots = roots.joined(_from_starts(prepared.rod, request, part[owner], start))
     return roots
 
 
-def _from_starts(rod: TipMap, request: Request, owner: Index, start: Array) -> Roots:
-    """Roots from starts."""
-    gamma = natural_newton(rod, request.targets[owner], start, request.residual)
-    found = roots_at(rod, request.targets, owner, gamma)
-    return found.where(found.residual <= request.residual)
+def affine_invariant_newton(rod: TipMap, targets: Array, start: Array, residual: float) -> Array:
+    """Ends of searches by affine-invariant Newton, inside the bounds; a root or not.
 
+    Near a full circle two singular values of J vanish together. The residual then says little about
+    the distance from a root: on the way it has to rise, and a search that never lets it does not
+    arrive. Steps are judged by the natural test instead, |J⁻¹ F(trial)| < |J⁻¹ F(γ)|, which is
+    invariant under any linear change of the residual.
 
-def natural_newton(rod: TipMap, targets: Array, start: Array, residual: float) -> Array:
-    """Where each search ends, inside the bounds; whether at a root is for the caller to see.
+    The roots lie in a curved valley: along one direction the tip moves millions of times as far as
+    along the others, and a straight step leaves the valley's floor. So each step ends with a few of
+    Newton's method along that direction alone.
 
     Args:
         rod: The tip map of three free bundles.
@@ -201,6 +184,19 @@ def natural_newton(rod: TipMap, targets: Array, start: Array, residual: float) -
         end = (size <= _CONVERGED) | (near & ~accepted) | (damping[active] < _LEAST_DAMPING)
         active = active[~end]
     return box.clip(gamma)
+
+
+def _closed_form(slope: Array) -> tuple[Array, Array]:
+    smallest, condition = np.empty(len(slope)), np.empty(len(slope))
+    newton.conditions(slope, smallest, condition)
+    return smallest, condition
+
+
+def _from_starts(rod: TipMap, request: Request, owner: Index, start: Array) -> Roots:
+    """Roots from starts."""
+    gamma = affine_invariant_newton(rod, request.targets[owner], start, request.residual)
+    found = roots_at(rod, request.targets, owner, gamma)
+    return found.where(found.residual <= request.residual)
 
 
 class _Valley(NamedTuple):

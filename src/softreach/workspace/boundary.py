@@ -23,13 +23,83 @@ from softreach.workspace.search import ENOUGH, nearest_tips
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
-
-# A solid as cells that are reached, and where its boundary cuts the edges between them.
-
-
 _STARTS = 4  # crossings nearby from which places are searched
 _CORNERS = np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 _CHUNK = 1 << 16
+_BAND = 2.5  # cells from the boundary beyond which the field is constant
+_CLOSEST = 1e-3  # cells: a center on the boundary itself would make triangles without area
+_ASIDE = 0.02  # cells beside a triangle where is looked for the inside
+_PARTS = 4  # into which each edge of a triangle of the grid is divided
+
+# Barycentric, of the places on a triangle that are looked at: where sheets cross, one is outside.
+_PLACES = np.array([[1, 1, 1], [8, 1, 1], [1, 8, 1], [1, 1, 8]], float)
+_PLACES /= _PLACES.sum(axis=1, keepdims=True)
+
+
+def boundary_surface(image: Image | ReachedCells, field: Array, volume: float) -> Surface:
+    """The closed surface around a volume where the field is constant, by marching cubes.
+
+    The image of a grid is a little small where it is convex: a small offset, the same everywhere,
+    gives the surface the extrapolated volume.
+
+    Raises:
+        MissingExtra: scikit-image is not installed.
+    """
+    surface = _level_set(image, field, 0.0)
+    if surface.area == 0.0:
+        return surface
+    offset = (volume - surface.volume) / (surface.area * image.lattice.cell)
+    return _level_set(image, field, float(np.clip(offset, -0.5, 0.5)))
+
+
+def critical_surface(image: Image) -> Surface:
+    """All critical triangles: the boundary of the image, and folds and walls inside it."""
+    vertices, faces = compact_surface(image.vertices, image.triangles[:, :3])
+    lattice = image.lattice
+    placed = lattice.origin + vertices * (lattice.cell / image.unit)
+    return Surface(vertices=placed, faces=faces)
+
+
+def outer_sheets(rod: TipMap, image: Image) -> Surface:
+    """The critical triangles of which some place has the image on one side only, made finer.
+
+    Their corners lie where the map puts them, so on faces of the box they are on the boundary to
+    the tolerance of the tips: rims are sharp, and parts of any thinness whole. Where sheets cross,
+    some triangles reach a little into the inside: the surface is not a closed one.
+
+    Args:
+        rod: The tip map, of three free bundles.
+        image: Of the grid of cubes over its activation box.
+
+    Returns:
+        Triangles whose normals point outwards.
+    """
+    cells = round(len(image.vertices) ** (1 / 3)) - 1
+    triangles = _outer_triangles(image)
+    nodes = np.stack(np.unravel_index(triangles, (cells + 1,) * 3), axis=-1)
+    keys, faces = _divided(nodes * _PARTS, cells * _PARTS + 1)
+    tips = stable_tips(rod).tips(rod.box.from_free_cube(keys / (cells * _PARTS)))
+    known = np.asarray(np.isfinite(tips).all(axis=1))
+    vertices, faces = compact_surface(tips, faces[known[faces].all(axis=1)])
+    return Surface(vertices=vertices, faces=faces)
+
+
+def signed_field(image: Image | ReachedCells) -> Array:
+    """Distance of the cell centers to the boundary in cells, negative inside, up to 2.5.
+
+    Along each axis the boundary is located to rounding between two centers. A plane that cuts the
+    axes at distances a, b, c is 1/√(1/a² + 1/b² + 1/c²) away: linear interpolation between centers
+    gives the crossings back, to second order in the cell on a curved boundary.
+
+    Returns:
+        Of the lattice's shape.
+    """
+    inverse_square = np.zeros(image.lattice.shape)
+    for axis in range(3):
+        inverse_square += _axis_distances(image, axis) ** -2
+    with np.errstate(divide="ignore"):
+        distance = np.clip(inverse_square**-0.5, _CLOSEST, _BAND)
+    return np.where(image.counts[0] > 0, -distance, distance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,36 +176,6 @@ class ReachedCells:
         return KDTree(self.crossings.points(every, self.crossings.place))
 
 
-_BAND = 2.5  # cells from the boundary beyond which the field is constant
-_CLOSEST = 1e-3  # cells: a center on the boundary itself would make triangles without area
-
-
-def critical_surface(image: Image) -> Surface:
-    """All critical triangles: the boundary of the image, and folds and walls inside it."""
-    vertices, faces = compact_surface(image.vertices, image.triangles[:, :3])
-    lattice = image.lattice
-    placed = lattice.origin + vertices * (lattice.cell / image.unit)
-    return Surface(vertices=placed, faces=faces)
-
-
-def signed_field(image: Image | ReachedCells) -> Array:
-    """Distance of the cell centers to the boundary in cells, negative inside, up to 2.5.
-
-    Along each axis the boundary is located to rounding between two centers. A plane that cuts the
-    axes at distances a, b, c is 1/√(1/a² + 1/b² + 1/c²) away: linear interpolation between centers
-    gives the crossings back, to second order in the cell on a curved boundary.
-
-    Returns:
-        Of the lattice's shape.
-    """
-    inverse_square = np.zeros(image.lattice.shape)
-    for axis in range(3):
-        inverse_square += _axis_distances(image, axis) ** -2
-    with np.errstate(divide="ignore"):
-        distance = np.clip(inverse_square**-0.5, _CLOSEST, _BAND)
-    return np.where(image.counts[0] > 0, -distance, distance)
-
-
 def _axis_distances(image: Image | ReachedCells, axis: int) -> Array:
     """Distance to the boundary along an axis, in cells; infinite beyond two of them."""
     distance = np.full(image.lattice.shape, np.inf)
@@ -146,22 +186,6 @@ def _axis_distances(image: Image | ReachedCells, axis: int) -> Array:
         away = np.abs(behind - step).clip(_CLOSEST)
         np.minimum.at(distance, tuple(shifted), away)
     return distance
-
-
-def boundary_surface(image: Image | ReachedCells, field: Array, volume: float) -> Surface:
-    """The closed surface around a volume where the field is constant, by marching cubes.
-
-    The image of a grid is a little small where it is convex: a small offset, the same everywhere,
-    gives the surface the extrapolated volume.
-
-    Raises:
-        MissingExtra: scikit-image is not installed.
-    """
-    surface = _level_set(image, field, 0.0)
-    if surface.area == 0.0:
-        return surface
-    offset = (volume - surface.volume) / (surface.area * image.lattice.cell)
-    return _level_set(image, field, float(np.clip(offset, -0.5, 0.5)))
 
 
 def _level_set(image: Image | ReachedCells, field: Array, level: float) -> Surface:
@@ -179,16 +203,6 @@ def _level_set(image: Image | ReachedCells, field: Array, level: float) -> Surfa
     return Surface(vertices=lattice.origin + lattice.cell * vertices.astype(float), faces=faces)
 
 
-# The boundary of a rasterized image as the sheets it consists of: faces of the box, and folds.
-
-
-_ASIDE = 0.02  # cells beside a triangle where is looked for the inside
-_PARTS = 4  # into which each edge of a triangle of the grid is divided
-# Barycentric, of the places on a triangle that are looked at: where sheets cross, one is outside.
-_PLACES = np.array([[1, 1, 1], [8, 1, 1], [1, 8, 1], [1, 1, 8]], float)
-_PLACES /= _PLACES.sum(axis=1, keepdims=True)
-
-
 def _small_triangles() -> tuple[Index, Index]:
     """Barycentric places of the corners, times `_PARTS`, and the triangles between them."""
     steps = [(i, j) for i in range(_PARTS + 1) for j in range(_PARTS + 1 - i)]
@@ -204,30 +218,6 @@ def _small_triangles() -> tuple[Index, Index]:
 
 
 _STEPS, _SMALL = _small_triangles()
-
-
-def outer_sheets(rod: TipMap, image: Image) -> Surface:
-    """The critical triangles of which some place has the image on one side only, made finer.
-
-    Their corners lie where the map puts them, so on faces of the box they are on the boundary to
-    the tolerance of the tips: rims are sharp, and parts of any thinness whole. Where sheets cross,
-    some triangles reach a little into the inside: the surface is not a closed one.
-
-    Args:
-        rod: The tip map, of three free bundles.
-        image: Of the grid of cubes over its activation box.
-
-    Returns:
-        Triangles whose normals point outwards.
-    """
-    cells = round(len(image.vertices) ** (1 / 3)) - 1
-    triangles = _outer_triangles(image)
-    nodes = np.stack(np.unravel_index(triangles, (cells + 1,) * 3), axis=-1)
-    keys, faces = _divided(nodes * _PARTS, cells * _PARTS + 1)
-    tips = stable_tips(rod).tips(rod.box.from_free_cube(keys / (cells * _PARTS)))
-    known = np.asarray(np.isfinite(tips).all(axis=1))
-    vertices, faces = compact_surface(tips, faces[known[faces].all(axis=1)])
-    return Surface(vertices=vertices, faces=faces)
 
 
 def _outer_triangles(image: Image) -> Index:

@@ -13,7 +13,76 @@ from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index
 
-# The six faces of the box of three free bundles: nodes, tips, and what flows through them.
+_TOL = 1e-11  # in L: there are few nodes, so that steps may be short
+_ROUGH_TOL = 1e-9  # where a raster decides the error, and under loads, where each tip costs much
+_NODES = (8, 12, 16, 24, 32)
+_CELLS = 96  # along each edge of the box: an arm that bends by half a turn moves 2 degrees a cell
+
+
+def signed_volume(rod: TipMap, nodes: int | None = None) -> Flux:
+    """The signed volume of the image of three free bundles.
+
+    By Gauss and Legendre's rule on the faces, as the map is smooth: its error falls faster than any
+    power of the number of nodes. They are added until tips are no more exact than the rule.
+
+    Args:
+        rod: The tip map.
+        nodes: Along each side, for this and two thirds of it alone, instead of as many as it needs;
+            tips are then less exact.
+
+    Returns:
+        Value and error are NaN if a node has no stable equilibrium.
+    """
+    rod = rod.refined(flux_tol(rod) if nodes is None else _ROUGH_TOL)
+    counts = _NODES if nodes is None else (2 * nodes // 3, nodes)
+    found, change = _flux(rod, counts[0]), np.inf
+    for count in counts[1:]:
+        rough, found = found, _flux(rod, count)
+        change = abs(found.value - rough.value)
+        if nodes is None and not change > found.error:  # NaN too
+            break
+    return found._replace(error=change + found.error)
+
+
+class Flux(NamedTuple):
+    """∫ det J dγ by the divergence theorem, theory (81), and what it was computed from."""
+
+    value: float
+    """Signed volume [m³]: below zero if the map turns the orientation over."""
+    error: float
+    """How far off it may be: half as many nodes or so, and the error of the tips [m³]."""
+    faces: FaceNodes
+    """Nodes on the faces of the unit cube of the free bundles."""
+    area: Array
+    """Area vectors of the nodes, with their weights [m²], shape (n, 3)."""
+
+
+def flux_tol(rod: TipMap) -> float:
+    """Largest tip error on the faces, in L."""
+    return min(rod.tol, _ROUGH_TOL if rod.supports_unstable else _TOL)
+
+
+def face_image(rod: TipMap, cells: int = _CELLS) -> Surface | None:
+    """The closed image of the surface of the box of three free bundles, oriented outwards.
+
+    Its vertices lie on the boundary to the tolerance of the tips, and so do its edges where the box
+    has edges: sharp rims stay sharp, and parts of any thinness stay whole.
+
+    Args:
+        rod: A tip map that is one to one inside the box.
+        cells: Of the grid along each edge of the box.
+
+    Returns:
+        None if some activation on the faces has no stable equilibrium.
+    """
+    cube = grid_faces(cells)
+    tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
+    if not np.isfinite(tips).all():
+        return None
+    found = Surface(vertices=tips, faces=_face_triangles(cube, cells))
+    if found.volume < 0:  # the map turns the box over
+        found = Surface(vertices=tips, faces=found.faces[:, ::-1].copy())
+    return found
 
 
 class FaceNodes(NamedTuple):
@@ -84,54 +153,6 @@ def _on_faces(ticks: Array, weights: Array) -> FaceNodes:
     return FaceNodes(cube, all_weights, sense, axis)
 
 
-_TOL = 1e-11  # in L: there are few nodes, so that steps may be short
-_ROUGH_TOL = 1e-9  # where a raster decides the error, and under loads, where each tip costs much
-_NODES = (8, 12, 16, 24, 32)
-
-
-class Flux(NamedTuple):
-    """∫ det J dγ by the divergence theorem, theory (81), and what it was computed from."""
-
-    value: float
-    """Signed volume [m³]: below zero if the map turns the orientation over."""
-    error: float
-    """How far off it may be: half as many nodes or so, and the error of the tips [m³]."""
-    faces: FaceNodes
-    """Nodes on the faces of the unit cube of the free bundles."""
-    area: Array
-    """Area vectors of the nodes, with their weights [m²], shape (n, 3)."""
-
-
-def flux_tol(rod: TipMap) -> float:
-    """Largest tip error on the faces, in L."""
-    return min(rod.tol, _ROUGH_TOL if rod.supports_unstable else _TOL)
-
-
-def signed_volume(rod: TipMap, nodes: int | None = None) -> Flux:
-    """The signed volume of the image of three free bundles.
-
-    By Gauss and Legendre's rule on the faces, as the map is smooth: its error falls faster than any
-    power of the number of nodes. They are added until tips are no more exact than the rule.
-
-    Args:
-        rod: The tip map.
-        nodes: Along each side, for this and two thirds of it alone, instead of as many as it needs;
-            tips are then less exact.
-
-    Returns:
-        Value and error are NaN if a node has no stable equilibrium.
-    """
-    rod = rod.refined(flux_tol(rod) if nodes is None else _ROUGH_TOL)
-    counts = _NODES if nodes is None else (2 * nodes // 3, nodes)
-    found, change = _flux(rod, counts[0]), np.inf
-    for count in counts[1:]:
-        rough, found = found, _flux(rod, count)
-        change = abs(found.value - rough.value)
-        if nodes is None and not change > found.error:  # NaN too
-            break
-    return found._replace(error=change + found.error)
-
-
 def _flux(rod: TipMap, nodes: int) -> Flux:
     """By one rule; the error is that of the tips alone."""
     faces = gauss_faces(nodes)
@@ -141,35 +162,6 @@ def _flux(rod: TipMap, nodes: int) -> Flux:
     value = float(((tips - tips.mean(axis=0)) * area).sum()) / 3.0
     moved = rod.tol * rod.length * float(np.linalg.norm(area, axis=1).sum())
     return Flux(value, moved, faces, area)
-
-
-# The boundary of what a one-to-one map fills: the image of the six faces of the activation box.
-
-
-_CELLS = 96  # along each edge of the box: an arm that bends by half a turn moves 2 degrees a cell
-
-
-def face_image(rod: TipMap, cells: int = _CELLS) -> Surface | None:
-    """The closed image of the surface of the box of three free bundles, oriented outwards.
-
-    Its vertices lie on the boundary to the tolerance of the tips, and so do its edges where the box
-    has edges: sharp rims stay sharp, and parts of any thinness stay whole.
-
-    Args:
-        rod: A tip map that is one to one inside the box.
-        cells: Of the grid along each edge of the box.
-
-    Returns:
-        None if some activation on the faces has no stable equilibrium.
-    """
-    cube = grid_faces(cells)
-    tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
-    if not np.isfinite(tips).all():
-        return None
-    found = Surface(vertices=tips, faces=_face_triangles(cube, cells))
-    if found.volume < 0:  # the map turns the box over
-        found = Surface(vertices=tips, faces=found.faces[:, ::-1].copy())
-    return found
 
 
 def _face_triangles(cube: Array, cells: int) -> NDArray[np.int32]:

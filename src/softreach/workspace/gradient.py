@@ -28,119 +28,11 @@ from softreach.workspace.solid import ReachableSolid
 if TYPE_CHECKING:
     import xarray as xr
 
-
-# Corners of the convex hull of an image, and what moving them does to its volume.
-
-
 _MOST_CELLS = 48  # of a grid of which all vertices are looked at
 _MOST_FACE_CELLS = 84  # of one of which those on the faces are
-
-
-class HullCorners(NamedTuple):
-    """Activations whose tips are the corners of a convex hull."""
-
-    cube: Array
-    """In the unit cube of the free bundles, shape (n, 3)."""
-    area: Array
-    """∂V_convex/∂r of each corner [m²], shape (n, 3)."""
-
-
-def hull_corners(solid: ReachableSolid) -> dict[int, HullCorners]:
-    """Corners of the hulls of images of some grids, by their number of cells along each axis.
-
-    Where the image folds, vertices inside the box may be corners as well as those on its faces.
-    """
-    folds = solid.route != "flux"
-    most = _MOST_CELLS if folds else _MOST_FACE_CELLS
-    grids = (most // 2, 3 * most // 4, most)
-    return {n: _corners(solid.tip_map, _grid(n) if folds else grid_faces(n)) for n in grids}
-
-
-def _grid(cells: int) -> Array:
-    return np.indices((cells + 1,) * 3).reshape(3, -1).T / cells
-
-
-def _corners(rod: TipMap, cube: Array) -> HullCorners:
-    tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
-    hull = convex_hull(tips)
-    area = np.zeros_like(hull.vertices)
-    corners = (hull.vertices - hull.vertices.mean(axis=0))[hull.faces]
-    for k in range(3):
-        # The volume is a sum of triple products over 6: linear in each corner.
-        share = np.cross(corners[:, (k + 1) % 3], corners[:, (k + 2) % 3]) / 6.0
-        np.add.at(area, hull.faces[:, k], share)
-    return HullCorners(cube[_rows_of(hull.vertices, tips)], area)
-
-
-def _rows_of(some: Array, every: Array) -> Index:
-    """Where in a list of points some of them are; one place for those that come twice."""
-    from scipy.spatial import KDTree  # lazily
-
-    return np.asarray(KDTree(every).query(some)[1], np.int64)
-
-
 _STEP = 3e-3  # of a parameter, for what is smooth to the tolerance of tips
 _RASTER_STEP = 2e-2  # for what is rasterized, which is rough
 _ROUGHNESS = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # fourth differences: nothing smooth is left
-
-
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class VolumeGradient:
-    """How volume, convex volume and unreachability change with parameters of a design."""
-
-    solid: ReachableSolid
-    """What the design itself reaches."""
-    parameters: tuple[str, ...]
-    """Names of the parameters."""
-    units: tuple[str, ...]
-    """Unit of each parameter."""
-    volume: Array
-    """∂V/∂p [m³ per unit of the parameter], shape (parameter,)."""
-    volume_error: Array
-    """How far off they may be."""
-    convex_volume: Array
-    """Derivatives of the volume of the convex hull [m³ per unit], shape (parameter,)."""
-    convex_volume_error: Array
-    """How far off they may be."""
-
-    @property
-    def route(self) -> str:
-        """What the volume and its derivatives come from, as `ReachableSolid.route`."""
-        return self.solid.route
-
-    @property
-    def unreachability(self) -> Array:
-        """Derivatives of 1 - V / V_convex [1 per unit], shape (parameter,)."""
-        volume, convex = self.solid.volume, self.solid.convex_volume
-        return (volume * self.convex_volume / convex - self.volume) / convex
-
-    @property
-    def unreachability_error(self) -> Array:
-        """How far off they may be."""
-        volume, convex = self.solid.volume, self.solid.convex_volume
-        return (volume * self.convex_volume_error / convex + self.volume_error) / convex
-
-    def to_dataset(self) -> xr.Dataset:
-        """All derivatives with their errors over `parameter`, and where they come from."""
-        import xarray as xr
-
-        numbers = {
-            name: ("parameter", getattr(self, name), {"units": unit, "long_name": meaning})
-            for name, (unit, meaning) in _MEANINGS.items()
-        }
-        coordinates = {"parameter": list(self.parameters), "unit": ("parameter", list(self.units))}
-        attrs = {**provenance(self.solid.arm), "route": self.route}
-        return xr.Dataset(numbers, coordinates, attrs)
-
-    def __repr__(self) -> str:
-        rows = zip(self.parameters, self.units, self.volume, self.volume_error, strict=True)
-        lines = [
-            f"∂V/∂({name}) = {quantity(value, f'm³/{unit}' if unit != '1' else 'm³', error)}"
-            for name, unit, value, error in rows
-        ]
-        return "\n  ".join([f"VolumeGradient: route {self.route}", *lines])
-
-
 _MEANINGS = {
     "volume": ("m3 per unit", "derivative of the reachable volume"),
     "volume_error": ("m3 per unit", "error of the derivative of the reachable volume"),
@@ -205,6 +97,106 @@ def volume_gradient(
         convex_volume=np.array([each.value for each in convex]),
         convex_volume_error=np.array([each.error for each in convex]),
     )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class VolumeGradient:
+    """How volume, convex volume and unreachability change with parameters of a design."""
+
+    solid: ReachableSolid
+    """What the design itself reaches."""
+    parameters: tuple[str, ...]
+    """Names of the parameters."""
+    units: tuple[str, ...]
+    """Unit of each parameter."""
+    volume: Array
+    """∂V/∂p [m³ per unit of the parameter], shape (parameter,)."""
+    volume_error: Array
+    """How far off they may be."""
+    convex_volume: Array
+    """Derivatives of the volume of the convex hull [m³ per unit], shape (parameter,)."""
+    convex_volume_error: Array
+    """How far off they may be."""
+
+    @property
+    def route(self) -> str:
+        """What the volume and its derivatives come from, as `ReachableSolid.route`."""
+        return self.solid.route
+
+    @property
+    def unreachability(self) -> Array:
+        """Derivatives of 1 - V / V_convex [1 per unit], shape (parameter,)."""
+        volume, convex = self.solid.volume, self.solid.convex_volume
+        return (volume * self.convex_volume / convex - self.volume) / convex
+
+    @property
+    def unreachability_error(self) -> Array:
+        """How far off they may be."""
+        volume, convex = self.solid.volume, self.solid.convex_volume
+        return (volume * self.convex_volume_error / convex + self.volume_error) / convex
+
+    def to_dataset(self) -> xr.Dataset:
+        """All derivatives with their errors over `parameter`, and where they come from."""
+        import xarray as xr
+
+        numbers = {
+            name: ("parameter", getattr(self, name), {"units": unit, "long_name": meaning})
+            for name, (unit, meaning) in _MEANINGS.items()
+        }
+        coordinates = {"parameter": list(self.parameters), "unit": ("parameter", list(self.units))}
+        attrs = {**provenance(self.solid.arm), "route": self.route}
+        return xr.Dataset(numbers, coordinates, attrs)
+
+    def __repr__(self) -> str:
+        rows = zip(self.parameters, self.units, self.volume, self.volume_error, strict=True)
+        lines = [
+            f"∂V/∂({name}) = {quantity(value, f'm³/{unit}' if unit != '1' else 'm³', error)}"
+            for name, unit, value, error in rows
+        ]
+        return "\n  ".join([f"VolumeGradient: route {self.route}", *lines])
+
+
+def hull_corners(solid: ReachableSolid) -> dict[int, HullCorners]:
+    """Corners of the hulls of images of some grids, by their number of cells along each axis.
+
+    Where the image folds, vertices inside the box may be corners as well as those on its faces.
+    """
+    folds = solid.route != "flux"
+    most = _MOST_CELLS if folds else _MOST_FACE_CELLS
+    grids = (most // 2, 3 * most // 4, most)
+    return {n: _corners(solid.tip_map, _grid(n) if folds else grid_faces(n)) for n in grids}
+
+
+class HullCorners(NamedTuple):
+    """Activations whose tips are the corners of a convex hull."""
+
+    cube: Array
+    """In the unit cube of the free bundles, shape (n, 3)."""
+    area: Array
+    """∂V_convex/∂r of each corner [m²], shape (n, 3)."""
+
+
+def _grid(cells: int) -> Array:
+    return np.indices((cells + 1,) * 3).reshape(3, -1).T / cells
+
+
+def _corners(rod: TipMap, cube: Array) -> HullCorners:
+    tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
+    hull = convex_hull(tips)
+    area = np.zeros_like(hull.vertices)
+    corners = (hull.vertices - hull.vertices.mean(axis=0))[hull.faces]
+    for k in range(3):
+        # The volume is a sum of triple products over 6: linear in each corner.
+        share = np.cross(corners[:, (k + 1) % 3], corners[:, (k + 2) % 3]) / 6.0
+        np.add.at(area, hull.faces[:, k], share)
+    return HullCorners(cube[_rows_of(hull.vertices, tips)], area)
+
+
+def _rows_of(some: Array, every: Array) -> Index:
+    """Where in a list of points some of them are; one place for those that come twice."""
+    from scipy.spatial import KDTree  # lazily
+
+    return np.asarray(KDTree(every).query(some)[1], np.int64)
 
 
 def _solid(arm: Manipulator, accuracy: float) -> ReachableSolid:

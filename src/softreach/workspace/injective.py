@@ -23,13 +23,106 @@ from softreach.workspace.image import Image, Lattice, image_of
 from softreach.workspace.measure import Estimate, extrapolated
 from softreach.workspace.solid import ReachableSolid
 
-# Windows of the box in which no two activations lead to one place.
-
-
 _LIMIT = 0.8  # of 1, for slopes between the samples
 _POWERS = 6
 _WORST = 100  # vertices of the boundary that are looked at first
 _UNKNOWN, _NO, _YES = -1, 0, 1
+_FIRST = 4  # patches along each side of a face to begin with
+_HALVINGS = 6
+_MOST_PAIRS = 200_000
+_FACE_MARGIN = 1.25  # on differences of slopes, for those between the vertices
+_CELLS = (4, 8, 16)  # along each axis; the first finds nearly every fold, for next to nothing
+_MARGIN = 1.5  # on second differences, for those between the vertices
+
+
+def is_injective(rod: TipMap) -> bool:
+    """Whether the map of a box of three free bundles is found to be one to one.
+
+    False means that it is not or that this is not clear. Arms that may lose their stability are not
+    judged: what is stable between samples is not known.
+    """
+    if rod.supports_unstable or rod.box.dimension != 3:
+        return False
+    for cells in _CELLS:
+        slopes = _grid_slopes(rod, cells)
+        stretch = np.linalg.det(slopes)
+        if not stretch.min() * stretch.max() > 0.0:
+            return False
+        if cells == _CELLS[0] or not _keeps_sign(stretch):
+            continue
+        meet = faces_meet(rod, slopes)
+        if meet is not None:
+            return not meet
+    return False
+
+
+def solid_by_flux(
+    rod: TipMap, cells: int, lattice_for: Callable[[Array], Lattice], progress: Progress
+) -> ReachableSolid:
+    """The solid of a tip map that is one to one; it is rasterized when a question needs it.
+
+    Args:
+        rod: The tip map.
+        cells: Of the activation grid along each axis, even: for the convex hull and the raster.
+        lattice_for: The lattice to rasterize on, for the tips that it must hold.
+        progress: Called with the number of grid vertices done since its last call.
+    """
+    flux = signed_volume(rod)
+    places = grid_faces(cells)
+    tips = rod.tips(rod.box.from_free_cube(places))
+    lattice = lattice_for(tips)
+    convex = _convex_volume(tips, places * cells)
+    progress(len(places))
+    volume = abs(flux.value)
+    return ReachableSolid(
+        tip_map=rod,
+        cells=cells,
+        volume=volume,
+        volume_error=flux.error,
+        convex_volume=convex.value,
+        convex_volume_error=convex.error,
+        multiplicity={1: volume},
+        multiplicity_error=0.0,
+        fold_volume=0.0,
+        fold_volume_error=0.0,
+        route="flux",
+        rasterize=partial(_rasterized, rod, cells, lattice),
+    )
+
+
+def faces_meet(rod: TipMap, slopes: Array) -> bool | None:
+    """Whether images of different points of the boundary of the box of three bundles may meet.
+
+    Pairs of patches of the six faces are halved until each is settled: by a plane between both
+    images, or because a window of the box that holds both patches is mapped one to one.
+
+    Args:
+        rod: The tip map.
+        slopes: ∂r/∂x at a grid of the unit cube [m], shape (n + 1, n + 1, n + 1, 3, 3).
+
+    Returns:
+        None if the grid is too coarse to tell.
+    """
+    windows, bend = RegularWindows(slopes), _largest_bend(slopes)
+    if windows.any_hopeless():
+        return None
+    side = _FIRST
+    first, second = np.triu_indices(6 * side * side)
+    for _ in range(_HALVINGS):
+        which, a, b = _each_once(first, second, 6 * side * side)
+        patches = _patches(rod, which, side)
+        left = ~_parted(patches, a, b, bend)
+        first, second, a, b = first[left], second[left], a[left], b[left]
+        regular, hopeless = windows.hold(*_hull(patches, a, b))
+        if hopeless.any():
+            return None
+        first, second = _halved(first[~regular], second[~regular], side)
+        side *= 2
+        if not len(first):
+            return False
+        if len(first) > _MOST_PAIRS:
+            return True
+    return True
 
 
 class RegularWindows:
@@ -114,15 +207,6 @@ def _spectral_bound(matrices: Array) -> Array:
     return ((matrices @ vector) / vector).max(axis=(1, 2))
 
 
-# Whether the images of two different points of the boundary of a box meet.
-
-
-_FIRST = 4  # patches along each side of a face to begin with
-_HALVINGS = 6
-_MOST_PAIRS = 200_000
-_FACE_MARGIN = 1.25  # on differences of slopes, for those between the vertices
-
-
 class _Patches(NamedTuple):
     """Squares on the faces of the unit cube, seen from their centers."""
 
@@ -134,41 +218,6 @@ class _Patches(NamedTuple):
     """Images of the centers [m], shape (n, 3)."""
     slopes: Array
     """∂r/∂x there [m], shape (n, 3, 3)."""
-
-
-def faces_meet(rod: TipMap, slopes: Array) -> bool | None:
-    """Whether images of different points of the boundary of the box of three bundles may meet.
-
-    Pairs of patches of the six faces are halved until each is settled: by a plane between both
-    images, or because a window of the box that holds both patches is mapped one to one.
-
-    Args:
-        rod: The tip map.
-        slopes: ∂r/∂x at a grid of the unit cube [m], shape (n + 1, n + 1, n + 1, 3, 3).
-
-    Returns:
-        None if the grid is too coarse to tell.
-    """
-    windows, bend = RegularWindows(slopes), _largest_bend(slopes)
-    if windows.any_hopeless():
-        return None
-    side = _FIRST
-    first, second = np.triu_indices(6 * side * side)
-    for _ in range(_HALVINGS):
-        which, a, b = _each_once(first, second, 6 * side * side)
-        patches = _patches(rod, which, side)
-        left = ~_parted(patches, a, b, bend)
-        first, second, a, b = first[left], second[left], a[left], b[left]
-        regular, hopeless = windows.hold(*_hull(patches, a, b))
-        if hopeless.any():
-            return None
-        first, second = _halved(first[~regular], second[~regular], side)
-        side *= 2
-        if not len(first):
-            return False
-        if len(first) > _MOST_PAIRS:
-            return True
-    return True
 
 
 def _each_once(first: Index, second: Index, size: int) -> tuple[Index, Index, Index]:
@@ -246,31 +295,6 @@ def _quarters(which: Index, side: int) -> Index:
     return (face[:, None] * 2 * side + rows) * 2 * side + columns
 
 
-_CELLS = (4, 8, 16)  # along each axis; the first finds nearly every fold, for next to nothing
-_MARGIN = 1.5  # on second differences, for those between the vertices
-
-
-def is_one_to_one(rod: TipMap) -> bool:
-    """Whether the map of a box of three free bundles is found to be one to one.
-
-    False means that it is not or that this is not clear. Arms that may lose their stability are not
-    judged: what is stable between samples is not known.
-    """
-    if rod.supports_unstable or rod.box.dimension != 3:
-        return False
-    for cells in _CELLS:
-        slopes = _grid_slopes(rod, cells)
-        stretch = np.linalg.det(slopes)
-        if not stretch.min() * stretch.max() > 0.0:
-            return False
-        if cells == _CELLS[0] or not _keeps_sign(stretch):
-            continue
-        meet = faces_meet(rod, slopes)
-        if meet is not None:
-            return not meet
-    return False
-
-
 def _grid_slopes(rod: TipMap, cells: int) -> Array:
     """∂r/∂x at the vertices of a grid of the unit cube, (cells + 1, cells + 1, cells + 1, 3, 3)."""
     cube = np.indices((cells + 1,) * 3).reshape(3, -1).T / cells
@@ -289,43 +313,6 @@ def _keeps_sign(stretch: Array) -> bool:
         curved += np.pad(second, [(int(other == axis),) * 2 for other in range(3)], "edge")
     least = np.abs(corner_values(stretch)).min(axis=-1)
     return bool((least > _MARGIN / 8.0 * corner_values(curved).max(axis=-1)).all())
-
-
-# The solid that three bundles reach where no place is reached twice: all from the boundary.
-
-
-def solid_by_flux(
-    rod: TipMap, cells: int, lattice_for: Callable[[Array], Lattice], progress: Progress
-) -> ReachableSolid:
-    """The solid of a tip map that is one to one; it is rasterized when a question needs it.
-
-    Args:
-        rod: The tip map.
-        cells: Of the activation grid along each axis, even: for the convex hull and the raster.
-        lattice_for: The lattice to rasterize on, for the tips that it must hold.
-        progress: Called with the number of grid vertices done since its last call.
-    """
-    flux = signed_volume(rod)
-    places = grid_faces(cells)
-    tips = rod.tips(rod.box.from_free_cube(places))
-    lattice = lattice_for(tips)
-    convex = _convex_volume(tips, places * cells)
-    progress(len(places))
-    volume = abs(flux.value)
-    return ReachableSolid(
-        tip_map=rod,
-        cells=cells,
-        volume=volume,
-        volume_error=flux.error,
-        convex_volume=convex.value,
-        convex_volume_error=convex.error,
-        multiplicity={1: volume},
-        multiplicity_error=0.0,
-        fold_volume=0.0,
-        fold_volume_error=0.0,
-        route="flux",
-        rasterize=partial(_rasterized, rod, cells, lattice),
-    )
 
 
 def _convex_volume(tips: Array, vertices: Array) -> Estimate:

@@ -16,7 +16,6 @@ from softreach.workspace.flux import signed_volume
 from softreach.workspace.image import Image, Spans
 
 T = TypeVar("T")
-
 _LEFT = 0.35  # of what is removed; for four bundles 0.28 to 0.34 of it were found wrong
 _NODES = 24  # Gauss nodes along each side of a face; two thirds of them tell the error
 
@@ -211,9 +210,6 @@ def _mean(image: Image, quantity: Callable[[Spans], ArrayLike]) -> Array:
     size = max(len(row) for row in rows)
     mean = sum(np.pad(row, (0, size - len(row))) for row in rows) / 3.0
     return np.squeeze(mean * image.lattice.cell**3)
-
-
-# Volume from the lengths of lines of sight through cell centers, and how sure it is.
 
 
 class Runs(NamedTuple):
