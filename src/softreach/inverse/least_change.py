@@ -126,9 +126,7 @@ def _searched_again(
     start = np.concatenate([start[chosen], found.gamma[rows]])
     at = descend(rod, request.targets[owner], start, request.residual)
     hit = at.residual <= request.residual
-    gamma, residual = sqp(
-        rod, request.of(owner[hit]), at.gamma[hit], penalty=_HIGH_PENALTY
-    )
+    gamma, residual = sqp(rod, request.of(owner[hit]), at.gamma[hit], penalty=_HIGH_PENALTY)
     count = len(request.targets)
     owner = np.concatenate([np.arange(count), owner[hit], owner[hit]])
     gamma = np.concatenate([found.gamma, at.gamma[hit], gamma])

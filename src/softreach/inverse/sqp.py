@@ -40,8 +40,8 @@ def sqp(
         rod: The tip map.
         request: A target for each start, and what to stay near to.
         start: Where to begin, inside the bounds [-], shape (n, m).
-        penalty: Least penalty. A high one keeps a search near the target once it is there, as it must
-            where the target lies next to a fold or to the boundary of the reachable set.
+        penalty: Least penalty. A high one keeps a search near the target once it is there, as it
+            must where the target lies next to a fold or to the boundary of the reachable set.
         settled: Step at which a search ends, in ranges.
         most: Iterations.
 
@@ -57,8 +57,8 @@ def survey(rod: TipMap, request: Request, start: Array, most: int) -> tuple[Arra
     """Where searches as those of `sqp` are after a few steps, and what they promise.
 
     Returns:
-        Activations [-], shape (n, m), and what each search minimizes, ½|γ - near|² and the penalty of
-        the miss, shape (n,).
+        Activations [-], shape (n, m), and what each search minimizes, ½|γ - near|² and the penalty
+        of the miss, shape (n,).
     """
     state = _searched(rod, request, start, 0.0, 1e-6, most)
     return state.gamma, _merit(state.gamma, request.near, state.penalty, state.miss)

@@ -1,4 +1,4 @@
-"""The largest force of a tip that is held in its place: the blocked force."""
+"""Forces that a tip can exert: the blocked force, the largest of a tip fixed in its place."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
-from softreach.forces.growth import Grown, Growth
-from softreach.forces.stop import Stop
+from softreach.force_growth import Grown, Growth, Stop
 from softreach.inverse import solve_inverse
 from softreach.inverse.request import as_activations, as_targets
 from softreach.rod.loaded import LoadedRod
@@ -26,7 +25,7 @@ from softreach.support.progress import Progress, as_progress
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["blocked_force"]
+__all__ = ["Stop", "blocked_force"]
 
 
 _MEANINGS = " ".join(f"{stop.value}={stop.name.lower()}" for stop in Stop)
@@ -104,7 +103,7 @@ class _Best(NamedTuple):
 
 
 def _force(one: _Best) -> float:
-    return one.end.held.force
+    return one.end.fixed.force
 
 
 def _starts(
@@ -133,9 +132,9 @@ def _grown(rod: LoadedRod, direction: Array, place: Array, start: Array) -> _Bes
         end = growth.grown()
         if end is None or growth.first is None:
             return None
-        error = pushing.error(*end.held)
+        error = pushing.error(*end.fixed)
         if error <= 0.5 * allowed or pushing.steps >= _MOST_STEPS:
-            settles = pushing.settles(*end.held)
+            settles = pushing.settles(*end.fixed)
             return _Best(growth.first.gamma, end, error + growth.residual, settles)
         pushing = pushing.finer()
 
@@ -155,9 +154,9 @@ def _dataset(
     status, limit = np.full(n, Stop.NO_START, np.int8), np.zeros((n, bundles), bool)
     settles = np.zeros(n, bool)
     for k, one in _rows(best):
-        force[k], status[k], limit[k] = one.end.held.force, one.end.stop, one.end.limits
+        force[k], status[k], limit[k] = one.end.fixed.force, one.end.stop, one.end.limits
         error[k] = one.end.slope * one.tip_error
-        activation[k], begun[k], settles[k] = one.end.held.gamma, one.start, one.settles
+        activation[k], begun[k], settles[k] = one.end.fixed.gamma, one.start, one.settles
     units = activation_attributes(rod.arm)
     acting = np.array(rod.loads.tip_force) - force[:, None] * directions
     return xr.Dataset(

@@ -11,17 +11,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import IntEnum
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from softreach.forces.stop import Stop
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.pushing_tip import PushingTip, TipResponse
 from softreach.support.arrays import Array, Mask
 
-__all__ = ["Grown", "Growth", "Held"]
+__all__ = ["FixedTip", "Grown", "Growth", "Stop"]
 
 
 _FIRST, _LONGEST, _SHORTEST = 0.05, 0.2, 1e-7  # largest change of an activation, of its range
@@ -37,7 +37,22 @@ _NEAR_LOSS = 0.1  # margin of stability below which what cannot be followed has 
 _MULTIPLIER = 1e-4  # of the largest one, below which a bound does not count
 
 
-class Held(NamedTuple):
+class Stop(IntEnum):
+    """Why a force grows no further."""
+
+    BOUND = 0
+    """Bundles are at their bounds."""
+    SINGULAR = 1
+    """No change of activations lets it grow: the arm has a singular shape."""
+    UNSTABLE = 2
+    """The arm would lose its stability."""
+    NO_START = 3
+    """No stable activation that was found puts the tip at the place."""
+    UNFINISHED = 4
+    """The search took too many steps; the force is reached, and may grow further."""
+
+
+class FixedTip(NamedTuple):
     """A tip at its place, pushing."""
 
     gamma: Array
@@ -50,7 +65,7 @@ class Held(NamedTuple):
 class Grown(NamedTuple):
     """The end of a growth."""
 
-    held: Held
+    fixed: FixedTip
     stop: Stop
     limits: Mask
     """Which bundles are at a bound that keeps the force from growing, shape (bundles,)."""
@@ -79,7 +94,7 @@ class Growth:
 
     Args:
         pushing: The tip that pushes.
-        place: Where it is held [m], shape (3,).
+        place: Where it is fixed [m], shape (3,).
         start: Activations near those that put it there without force, shape (bundles,).
         residual: How far off its place the tip may be [m].
     """
@@ -100,12 +115,12 @@ class Growth:
         return self.pushing.respond(self.box.clip(self.start), 0.0)
 
     @cached_property
-    def first(self) -> Held | None:
+    def first(self) -> FixedTip | None:
         """The tip at its place without force; None if it is not there or not stable."""
         if not np.isfinite(self._begun.tip).all():
             return None
-        held = self._corrected(self.box.clip(self.start), 0.0, 0.0, self._begun)
-        return held if held and self._is_stable(held) else None
+        fixed = self._corrected(self.box.clip(self.start), 0.0, 0.0, self._begun)
+        return fixed if fixed and self._is_stable(fixed) else None
 
     @cached_property
     def unit(self) -> float:
@@ -114,68 +129,68 @@ class Growth:
 
     def grown(self) -> Grown | None:
         """The end of the growth; None without a start."""
-        held, reach, unstable = self.first, _FIRST, False
-        if held is None:
+        fixed, reach, unstable = self.first, _FIRST, False
+        if fixed is None:
             return None
         for _ in range(_MOST_STEPS):
-            best = self._program(held, reach)
+            best = self._program(fixed, reach)
             if best.rate <= _NO_GROWTH:
-                return self._end(held, best)
-            tried = self._tried(held, best)
-            share = (tried.force - held.force) / best.force if tried else 0.0
-            stable = self._is_stable(tried) if tried else held.response.margin > _NEAR_LOSS
+                return self._end(fixed, best)
+            tried = self._tried(fixed, best)
+            share = (tried.force - fixed.force) / best.force if tried else 0.0
+            stable = self._is_stable(tried) if tried else fixed.response.margin > _NEAR_LOSS
             if tried is None or not stable or share < _REJECTED:
                 reach, unstable = 0.5 * reach, not stable
             else:
-                held, unstable = tried, False
+                fixed, unstable = tried, False
                 reach *= 0.5 if share < _CURVED else 2.0 if share > _STRAIGHT else 1.0
                 reach = min(reach, _LONGEST)
             if reach < (_SHORTEST if unstable else self._shortest):
                 break
         else:
-            return self._end(held, self._program(held, _LOCAL), Stop.UNFINISHED)
+            return self._end(fixed, self._program(fixed, _LOCAL), Stop.UNFINISHED)
         if unstable:
-            return self._end(held, self._program(held, _LOCAL), Stop.UNSTABLE)
+            return self._end(fixed, self._program(fixed, _LOCAL), Stop.UNSTABLE)
         if self.box.dimension > 3:
-            held = self._polished(held)
-        return self._end(held, self._program(held, _LOCAL))
+            fixed = self._polished(fixed)
+        return self._end(fixed, self._program(fixed, _LOCAL))
 
     @property
     def _shortest(self) -> float:
         """The step below which nothing is gained by further ones."""
         return _LOCAL if self.box.dimension > 3 else _TURNING
 
-    def _end(self, held: Held, best: _Program, stop: Stop | None = None) -> Grown:
+    def _end(self, fixed: FixedTip, best: _Program, stop: Stop | None = None) -> Grown:
         """The end, by what stopped it; by default bounds if some cost force, else the shape."""
         cost = np.abs(best.multipliers)
-        limits = self._at_bound(held.gamma) & (cost > _MULTIPLIER * cost.max(initial=1e-12))
+        limits = self._at_bound(fixed.gamma) & (cost > _MULTIPLIER * cost.max(initial=1e-12))
         if stop is None and np.isnan(best.slope):
             stop = Stop.UNFINISHED
         if stop is None:
             stop = Stop.BOUND if limits.any() else Stop.SINGULAR
-        return Grown(held, stop, limits & (stop == Stop.BOUND), best.slope)
+        return Grown(fixed, stop, limits & (stop == Stop.BOUND), best.slope)
 
-    def _tried(self, held: Held, best: _Program) -> Held | None:
+    def _tried(self, fixed: FixedTip, best: _Program) -> FixedTip | None:
         """The tip back at its place after a step, if it can be."""
-        gamma, force = self.box.clip(held.gamma + best.gamma), held.force + best.force
-        return self._corrected(gamma, force, self.unit, held.response)
+        gamma, force = self.box.clip(fixed.gamma + best.gamma), fixed.force + best.force
+        return self._corrected(gamma, force, self.unit, fixed.response)
 
-    def _is_stable(self, held: Held) -> bool:
-        return self.pushing.is_stable(held.gamma, held.force, held.response)
+    def _is_stable(self, fixed: FixedTip) -> bool:
+        return self.pushing.is_stable(fixed.gamma, fixed.force, fixed.response)
 
-    def _program(self, held: Held, reach: float) -> _Program:
+    def _program(self, fixed: FixedTip, reach: float) -> _Program:
         """The change that lets the force grow most while no activation changes by more.
 
         Args:
-            held: Where it begins.
+            fixed: Where it begins.
             reach: Largest change of each activation, of its range.
         """
         from scipy.optimize import linprog
 
         box, length = self.box, self.pushing.rod.length
-        columns = self._columns(held.response, self.unit)
-        lowest = np.maximum(-1.0, (box.low - held.gamma) / box.scales / reach)
-        highest = np.minimum(1.0, (box.high - held.gamma) / box.scales / reach)
+        columns = self._columns(fixed.response, self.unit)
+        lowest = np.maximum(-1.0, (box.low - fixed.gamma) / box.scales / reach)
+        highest = np.minimum(1.0, (box.high - fixed.gamma) / box.scales / reach)
         most = _FARTHEST / max(float(np.linalg.norm(columns[:, -1])), 1e-12) / reach
         ends = [*zip(np.minimum(lowest, 0.0), np.maximum(highest, 0.0), strict=True), (0.0, most)]
         goal = np.zeros(box.bundles + 1)
@@ -207,7 +222,9 @@ class Growth:
         room = np.minimum(gamma - box.low, box.high - gamma) / box.scales
         return box.is_free & (room <= _AT_BOUND)
 
-    def _corrected(self, gamma: Array, force: float, unit: float, near: TipResponse) -> Held | None:
+    def _corrected(
+        self, gamma: Array, force: float, unit: float, near: TipResponse
+    ) -> FixedTip | None:
         """The tip put to its place by Newton's method; None if it does not come there.
 
         Bundles that begin at a bound stay there, if enough others are left.
@@ -228,7 +245,7 @@ class Growth:
             if not np.isfinite(missing).all():
                 return None
             if np.linalg.norm(missing) <= self.residual:
-                return Held(gamma, force, response) if force >= 0 else None
+                return FixedTip(gamma, force, response) if force >= 0 else None
             columns, near = self._columns(response, unit), response
             step = self._bounded_step(gamma, moves, columns, missing / length)
             gamma = self.box.clip(gamma + step[:-1] * self.box.scales)
@@ -251,15 +268,15 @@ class Growth:
             open_ = open_ & ~over
         return step
 
-    def _polished(self, held: Held) -> Held:
+    def _polished(self, fixed: FixedTip) -> FixedTip:
         """The largest force near one that the bounds alone do not fix, by quadratic programs."""
         from scipy.optimize import minimize
 
         box, length = self.box, self.pushing.rod.length
-        x = np.append(box.to_cube(held.gamma[None])[0], held.force / self.unit)
+        x = np.append(box.to_cube(fixed.gamma[None])[0], fixed.force / self.unit)
         at = _remembered(
             lambda x: self.pushing.respond(
-                box.low + x[:-1] * box.scales, x[-1] * self.unit, held.response
+                box.low + x[:-1] * box.scales, x[-1] * self.unit, fixed.response
             )
         )
         gradient = np.append(np.zeros(box.bundles), -1.0)
@@ -277,10 +294,10 @@ class Growth:
             options={"ftol": 1e-10, "maxiter": 25},
         )
         gamma = box.clip(box.low + found.x[:-1] * box.scales)
-        better = self._corrected(gamma, float(found.x[-1]) * self.unit, self.unit, held.response)
-        if better is None or better.force < held.force:
-            return held
-        return better if self._is_stable(better) else held
+        better = self._corrected(gamma, float(found.x[-1]) * self.unit, self.unit, fixed.response)
+        if better is None or better.force < fixed.force:
+            return fixed
+        return better if self._is_stable(better) else fixed
 
 
 def _remembered(respond: Callable[[Array], TipResponse]) -> Callable[[Array], TipResponse]:
