@@ -12,7 +12,7 @@ from softreach.kernels.box.box_newton import box_steps
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.damped_step import damped_steps
 from softreach.rod.tip_map import BLOCK, TipMap
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array, Index, Mask, rows
 
 _FEW = BLOCK // 8
 _MOST_ITERATIONS = 60
@@ -56,7 +56,7 @@ def descend(
         if not len(active):
             break
         goal, gamma = targets[active], found.gamma[active]
-        trial = _trials(rod, found.of(active), goal, damping[active])
+        trial = _trials(rod, rows(found, active), goal, damping[active])
         tip, slope = linearized(rod, trial)
         miss = np.linalg.norm(tip - goal, axis=1)
         better = miss < found.residual[active]
@@ -185,10 +185,6 @@ class Descent(NamedTuple):
     """∂r/∂γ there [m], shape (n, 3, m)."""
     residual: Array
     """|tip - target| [m], shape (n,)."""
-
-    def of(self, rows: Index | Mask) -> Descent:
-        """Some of them."""
-        return Descent(self.gamma[rows], self.tip[rows], self.slope[rows], self.residual[rows])
 
 
 class Minima(NamedTuple):

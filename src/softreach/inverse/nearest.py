@@ -98,17 +98,6 @@ class Nearest(NamedTuple):
     converged: Mask
     """Whether the search converged, shape (t,)."""
 
-    @staticmethod
-    def joined(parts: list[Nearest]) -> Nearest:
-        """Those of consecutive blocks of targets."""
-        return (
-            parts[0] if len(parts) == 1 else Nearest(*map(np.concatenate, zip(*parts, strict=True)))
-        )
-
-    def of(self, rows: Index) -> Nearest:
-        """Those of some of the targets."""
-        return Nearest(self.gamma[rows], self.tip[rows], self.converged[rows])
-
 
 class Reached(NamedTuple):
     """The best place found for each target."""

@@ -19,7 +19,7 @@ from softreach.kernels.box.box_projection import project
 from softreach.kernels.box.cell_cover import near_cells
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array, Index, rows
 
 MOST_BUNDLES = 6  # with more, halving cells proves nothing that can be afforded
 _COARSE = 70_000  # cells that all targets share
@@ -105,10 +105,6 @@ class Cells(NamedTuple):
     center: Array
     """Activation [-], shape (n, m)."""
 
-    def where(self, chosen: Mask | slice) -> Cells:
-        """Some of them."""
-        return Cells(self.owner[chosen], self.center[chosen])
-
 
 class Linearized(NamedTuple):
     """The tip map in cells."""
@@ -172,7 +168,7 @@ def least_of_cells(
             [
                 bound(part, linearized(rod, half, part.center))
                 for first in range(0, len(owner), _BLOCK)
-                for part in (cells.where(slice(first, first + _BLOCK)),)
+                for part in (rows(cells, slice(first, first + _BLOCK)),)
             ]
         )
         spent += np.bincount(owner, minlength=count)
@@ -180,7 +176,7 @@ def least_of_cells(
         left = np.bincount(owner[open_cells], minlength=count)
         hopeless = open_cells & (spent + 2 * left > most)[owner]
         np.minimum.at(least, owner[hopeless], found[hopeless])
-        half, cells = _halved(rod, half, cells.where(open_cells & ~hopeless))
+        half, cells = _halved(rod, half, rows(cells, open_cells & ~hopeless))
     return least
 
 

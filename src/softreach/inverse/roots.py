@@ -12,7 +12,7 @@ from softreach.inverse.request import Request
 from softreach.kernels.branches import newton
 from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
 from softreach.support import parallel
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array, Index, Mask, joined, rows
 
 _EFFORTS = ((500, 20, 0.1), (2000, 100, 0.08))
 """Seeds near the target, most starts from them, their least distance in ranges."""
@@ -42,19 +42,6 @@ class Roots(NamedTuple):
     stable: Mask
     """Whether the arm can be there, shape (n,)."""
 
-    def where(self, chosen: Mask | Index) -> Roots:
-        """Those chosen by a mask or an index; themselves where a mask leaves none out."""
-        if chosen.dtype == bool and chosen.all():
-            return self
-        return Roots(
-            self.target[chosen],
-            self.gamma[chosen],
-            self.slope[chosen],
-            self.residual[chosen],
-            self.cell[chosen],
-            self.stable[chosen],
-        )
-
     def joined(self, other: Roots) -> Roots:
         """Both, sorted by target as each of them is."""
         return Roots.sorted_by_target([self, other]) if len(other.target) else self
@@ -62,8 +49,8 @@ class Roots(NamedTuple):
     @staticmethod
     def sorted_by_target(parts: list[Roots]) -> Roots:
         """All of them, sorted by target."""
-        everything = Roots(*map(np.concatenate, zip(*parts, strict=True)))
-        return everything.where(np.argsort(everything.target, kind="stable"))
+        everything = joined(parts)
+        return rows(everything, np.argsort(everything.target, kind="stable"))
 
     def missing(self, targets: int) -> Index:
         """Which of so many targets have no stable root."""
@@ -126,11 +113,11 @@ def conditions(slope: Array) -> Array:
         return sigma[:, 0] / sigma[:, -1]
 
 
-def nearly_singular_roots(prepared: PreparedMap, request: Request, rows: Index) -> Roots:
+def nearly_singular_roots(prepared: PreparedMap, request: Request, chosen: Index) -> Roots:
     """Roots for some of the targets, those that no other search found, sorted by target."""
     roots = no_roots(prepared.rod)
     for neighbors, most, apart in _EFFORTS:
-        left = np.setdiff1d(rows, roots.target)
+        left = np.setdiff1d(chosen, roots.target)
         for first in range(0, len(left), _BLOCK):
             part = left[first : first + _BLOCK]
             near = prepared.seeds.nearest(request.targets[part], neighbors)
@@ -196,7 +183,7 @@ def _from_starts(rod: TipMap, request: Request, owner: Index, start: Array) -> R
     """Roots from starts."""
     gamma = affine_invariant_newton(rod, request.targets[owner], start, request.residual)
     found = roots_at(rod, request.targets, owner, gamma)
-    return found.where(found.residual <= request.residual)
+    return rows(found, found.residual <= request.residual)
 
 
 class _Valley(NamedTuple):

@@ -24,7 +24,7 @@ from softreach.inverse.solutions import Solutions, Status
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_flag, as_integer, as_number
-from softreach.support.arrays import Array, Index, Mask, as_directions
+from softreach.support.arrays import Array, Index, Mask, as_directions, joined, rows
 from softreach.support.errors import InvalidInput, Range
 
 __all__ = ["solve_inverse"]
@@ -113,7 +113,7 @@ def solve_inverse(
     elif prepared.dimension == 3 and request.direction is None:
         solve, size = _by_branches, _BRANCH_BLOCK
     blocks = parallel.blocks(len(points), size) or [slice(0)]
-    solutions = Solutions.joined([solve(prepared, request.of(rows)) for rows in blocks])
+    solutions = Solutions.joined([solve(prepared, request.of(block)) for block in blocks])
     return solutions.in_units_of(prepared.measures)
 
 
@@ -122,10 +122,10 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     found = every_branch(prepared, request)
     count = len(request.targets)
     unstable = np.bincount(found.target[~found.stable], minlength=count)
-    roots = found.where(found.stable)
+    roots = rows(found, found.stable)
     missing = roots.missing(count)
     blocks = parallel.blocks(len(missing), _BLOCK) or [slice(0)]
-    closest = Nearest.joined([nearest(prepared, request.of(missing[rows])) for rows in blocks])
+    closest = joined([nearest(prepared, request.of(missing[block])) for block in blocks])
     solutions = _solutions(prepared, request, roots, missing, closest)
     left = np.flatnonzero(_perhaps_singular(prepared, solutions))
     if len(left):
@@ -133,7 +133,7 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
         if len(late.target):
             roots = roots.joined(late)
             again = roots.missing(count)
-            closest = closest.of(np.flatnonzero(np.isin(missing, again)))
+            closest = rows(closest, np.isin(missing, again))
             bounds = solutions.gap_bounds
             solutions = _solutions(prepared, request, roots, again, closest, bounds)
     return replace(solutions, unstable=unstable)
@@ -160,7 +160,7 @@ def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
 
 def _stable_roots(prepared: PreparedMap, request: Request) -> Roots:
     found = every_branch(prepared, request)
-    return found.where(found.stable)
+    return rows(found, found.stable)
 
 
 def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
@@ -207,7 +207,7 @@ def _solutions(
     rod, count = prepared.rod, len(request.targets)
     at_closest = roots_at(rod, request.targets, missing, closest.gamma)
     hit = at_closest.residual <= request.residual
-    roots = roots.joined(at_closest.where(hit))
+    roots = roots.joined(rows(at_closest, hit))
     statuses = np.full(count, Status.REACHED, np.int8)
     out, far = missing[~hit], at_closest.residual[~hit]
     bounds = np.zeros(count)

@@ -6,8 +6,10 @@ objects are none, though NumPy would convert many of them; nor are masked entrie
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any
+from operator import itemgetter
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +31,8 @@ __all__ = [
     "as_shares",
     "as_stations",
     "check_finite",
+    "joined",
+    "rows",
 ]
 
 Array = NDArray[np.float64]
@@ -58,6 +62,24 @@ _KINDS = {
     "U": "text",
     "V": "records",
 }
+
+
+Table = TypeVar("Table", bound=tuple[NDArray[Any], ...])
+"""A named tuple of arrays of one length: its columns."""
+
+
+def rows(table: Table, chosen: Mask | Index | slice) -> Table:
+    """Some rows of a table; the table itself where a mask leaves none out."""
+    if isinstance(chosen, np.ndarray) and chosen.dtype == bool and chosen.all():
+        return table
+    return type(table)(*map(itemgetter(chosen), table))
+
+
+def joined(tables: Sequence[Table]) -> Table:
+    """The rows of tables, of one at least, one table after the other."""
+    if len(tables) == 1:
+        return tables[0]
+    return type(tables[0])(*map(np.concatenate, zip(*tables, strict=True)))
 
 
 def as_floats(name: str, values: object, allowed: str = _NUMBERS) -> Array:

@@ -12,6 +12,7 @@ from softreach.geometry.surface import Surface
 from softreach.rod.stable_tips import stable_tips
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index
+from softreach.workspace.grid import cube_grid
 
 _TOL = 1e-11  # in L: there are few nodes, so that steps may be short
 _ROUGH_TOL = 1e-9  # where a raster decides the error, and under loads, where each tip costs much
@@ -120,9 +121,8 @@ def gauss_faces(nodes: int) -> FaceNodes:
 
 def grid_faces(cells: int) -> Array:
     """Vertices of a grid of cells^3 boxes that lie on the faces of the unit cube, each once."""
-    inside = np.indices((cells + 1,) * 3).reshape(3, -1).T
-    outer = ((inside == 0) | (inside == cells)).any(axis=1)
-    return inside[outer] / cells
+    cube = cube_grid(cells)
+    return cube[((cube == 0.0) | (cube == 1.0)).any(axis=1)]
 
 
 def box_slopes(rod: TipMap, cube: Array) -> tuple[Array, Array]:

@@ -20,6 +20,7 @@ from softreach.support.errors import InvalidInput
 from softreach.support.progress import Progress, as_progress
 from softreach.support.quantity import quantity
 from softreach.workspace.flux import Flux, flux_tol, grid_faces, signed_volume
+from softreach.workspace.grid import cube_grid
 from softreach.workspace.measure import Estimate
 from softreach.workspace.reach import ACCURACIES, rasterized_set, reachable_set
 from softreach.workspace.shifts import Shifts, shifts_along
@@ -164,7 +165,7 @@ def hull_corners(solid: ReachableSolid) -> dict[int, HullCorners]:
     folds = solid.route != "flux"
     most = _MOST_CELLS if folds else _MOST_FACE_CELLS
     grids = (most // 2, 3 * most // 4, most)
-    return {n: _corners(solid.tip_map, _grid(n) if folds else grid_faces(n)) for n in grids}
+    return {n: _corners(solid.tip_map, cube_grid(n) if folds else grid_faces(n)) for n in grids}
 
 
 class HullCorners(NamedTuple):
@@ -174,10 +175,6 @@ class HullCorners(NamedTuple):
     """In the unit cube of the free bundles, shape (n, 3)."""
     area: Array
     """∂V_convex/∂r of each corner [m²], shape (n, 3)."""
-
-
-def _grid(cells: int) -> Array:
-    return np.indices((cells + 1,) * 3).reshape(3, -1).T / cells
 
 
 def _corners(rod: TipMap, cube: Array) -> HullCorners:

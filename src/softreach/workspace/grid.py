@@ -81,6 +81,11 @@ def _largest(rod: TipMap, stretch: Array) -> float:
     return float(stretch.max(initial=0.0))
 
 
+def cube_grid(cells: int) -> Array:
+    """Vertices of a grid of cells³ boxes over the unit cube, in C order, shape (n, 3)."""
+    return np.indices((cells + 1,) * 3).reshape(3, -1).T / cells
+
+
 def corners_of(cells: Mask) -> Mask:
     """Vertices of a grid that are corners of some of its cells."""
     for axis in range(cells.ndim):

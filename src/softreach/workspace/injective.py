@@ -12,15 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softreach.geometry.hull import convex_hull
 from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.progress import Progress
 from softreach.workspace.discontinuities import corner_values
 from softreach.workspace.flux import box_slopes, grid_faces, signed_volume
-from softreach.workspace.grid import grid_stretches, grid_tips
+from softreach.workspace.grid import cube_grid, grid_stretches, grid_tips
 from softreach.workspace.image import Image, Lattice, image_of
-from softreach.workspace.measure import Estimate, extrapolated
+from softreach.workspace.measure import Estimate, extrapolated_hull
 from softreach.workspace.solid import ReachableSolid
 
 _LIMIT = 0.8  # of 1, for slopes between the samples
@@ -297,7 +296,7 @@ def _quarters(which: Index, side: int) -> Index:
 
 def _grid_slopes(rod: TipMap, cells: int) -> Array:
     """∂r/∂x at the vertices of a grid of the unit cube, (cells + 1, cells + 1, cells + 1, 3, 3)."""
-    cube = np.indices((cells + 1,) * 3).reshape(3, -1).T / cells
+    cube = cube_grid(cells)
     return box_slopes(rod, cube)[1].reshape(*(cells + 1,) * 3, 3, 3)
 
 
@@ -318,8 +317,7 @@ def _keeps_sign(stretch: Array) -> bool:
 def _convex_volume(tips: Array, vertices: Array) -> Estimate:
     """From all vertices on the faces and from every second one, as from images of grids."""
     second = (np.rint(vertices) % 2 == 0).all(axis=1)
-    fine, coarse = (Estimate(convex_hull(each).volume, 0.0) for each in (tips, tips[second]))
-    return extrapolated(fine, coarse)
+    return extrapolated_hull(tips, tips[second])
 
 
 def _rasterized(rod: TipMap, cells: int, lattice: Lattice) -> Image:

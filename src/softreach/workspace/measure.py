@@ -130,11 +130,16 @@ def _of_each(
 
 
 def convex_volume(fine: Image, coarse: Image) -> Estimate:
-    """Volume of the convex hull of the image [m³]: its corners are corners of critical triangles.
+    """Volume of the convex hull of the image [m³]: from corners of critical triangles."""
+    return extrapolated_hull(_corners(fine), _corners(coarse))
+
+
+def extrapolated_hull(points: Array, fewer: Array) -> Estimate:
+    """Volume of the convex hull [m³] from mapped vertices, and from those of half as fine a grid.
 
     The hull of mapped vertices lies inside that of the image by O(1/n²), which is removed.
     """
-    value, rough = (Estimate(_hull_volume(_corners(image)), 0.0) for image in (fine, coarse))
+    value, rough = (Estimate(_hull_volume(places), 0.0) for places in (points, fewer))
     return extrapolated(value, rough)
 
 
