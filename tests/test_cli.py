@@ -177,7 +177,7 @@ class TestCloud:
         facts = printed_json(capsys, "cloud", "minimal_trunk", *options, "--taper-deg", "1")
         arm = changed(sr.designs.minimal_trunk(), {"taper": np.radians(1)})
         cloud = sr.open_cloud("a.zarr")
-        assert cloud.identical(sr.compute_cloud(arm, 512, 3, "sobol"))
+        assert cloud.identical(sr.compute_cloud(arm, 512, seed=3, sampler="sobol"))
         assert facts["samples"] == 512
         assert facts["highest_tip_L"] == pytest.approx(float(cloud.tip[:, 2].max()))
 

@@ -16,7 +16,7 @@ from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.workspace import ReachableSolid, reachable_set
 from softreach.workspace.flux import signed_volume
-from softreach.workspace.injective import is_one_to_one
+from softreach.workspace.injective import is_injective
 from softreach.workspace.reach import rasterized_set
 from tests.bodies import rubber
 
@@ -132,7 +132,7 @@ def test_where_a_map_is_one_to_one_the_flux_is_the_volume(name):
 def test_a_ramp_that_lies_on_itself_is_not_one_to_one_though_it_has_no_fold(rise):
     turns = 1.15
     rod = Mapped(around(turns, rise))
-    assert not is_one_to_one(rod)
+    assert not is_injective(rod)
     found = solid(rod, accuracy=0.02)
     assert found.route == "raster"
     twice = np.pi * 3.0 * (turns - 1.0) * (1.0 - rise)
@@ -142,8 +142,8 @@ def test_a_ramp_that_lies_on_itself_is_not_one_to_one_though_it_has_no_fold(rise
 
 
 def test_faces_that_overlap_a_little_are_told_from_those_that_do_not_touch():
-    assert is_one_to_one(Mapped(around(0.95, 0.0)))
-    assert not is_one_to_one(Mapped(around(1.01, 0.0)))
+    assert is_injective(Mapped(around(0.95, 0.0)))
+    assert not is_injective(Mapped(around(1.01, 0.0)))
 
 
 def test_a_fold_is_found_before_anything_is_believed():
@@ -162,8 +162,8 @@ def test_a_fold_at_one_corner_is_found():
 
         return Mapped(of)
 
-    assert not is_one_to_one(dented(0.001))
-    assert is_one_to_one(dented(-0.6))
+    assert not is_injective(dented(0.001))
+    assert is_injective(dented(-0.6))
 
 
 def narrowed(arm: Manipulator, low: float, high: float) -> Manipulator:
@@ -225,7 +225,7 @@ def test_the_paper_s_design_folds_in_a_corner_and_is_rasterized():
 
 def test_loaded_arms_are_always_rasterized():
     rod = tip_map(rubber(ONE_TO_ONE["minimal trunk"], Loads(payload=1e-6)))
-    assert not is_one_to_one(rod)
+    assert not is_injective(rod)
 
 
 def test_nothing_is_rasterized_until_it_is_asked_for():

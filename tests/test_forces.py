@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
+from scipy.optimize import OptimizeResult, minimize
 
 import softreach as sr
 from softreach.arm.loads import Loads
@@ -46,6 +46,18 @@ def test_the_force_balances_the_tip_at_its_place(arm, direction):
         assert rod.status(gamma)[0] == TipStatus.STABLE
         assert (rod.box.excess(gamma) <= 0).all()
     assert (found.force.values > 0).all()
+
+
+def test_where_no_linear_program_is_solved_the_search_is_unfinished(monkeypatch):
+    def unsolved(*args, **options):
+        return OptimizeResult(x=None, lower=OptimizeResult(marginals=None))
+
+    monkeypatch.setattr("scipy.optimize.linprog", unsolved)
+    found = blocked_force(LOADED, None, SIDE, start=START[:1])
+    assert found.status.values.tolist() == [Stop.UNFINISHED]
+    assert found.force.values.tolist() == [0.0]
+    assert np.isnan(found.force_error.values).all()
+    assert not found.limit.values.any()
 
 
 def test_the_bundles_named_are_at_their_bounds():

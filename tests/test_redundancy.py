@@ -69,6 +69,14 @@ def test_a_number_of_queries_takes_one_sample_of_each_equal_part(strewn):
     )
 
 
+@pytest.mark.parametrize("queries", [7, 3000, 3999])
+def test_a_number_of_queries_that_does_not_divide_the_cloud_takes_no_sample_twice(strewn, queries):
+    sample = activation_distance(strewn, 0.02, queries=queries).sample.values
+    assert len(np.unique(sample)) == queries
+    ends = np.arange(queries + 1) * 4000 // queries
+    assert ((ends[:-1] <= sample) & (sample < ends[1:])).all()
+
+
 @pytest.mark.parametrize("queries", [0, [], np.empty(0, int)])
 def test_no_queries_give_nothing(strewn, queries):
     assert activation_distance(strewn, 0.02, queries=queries).sizes == {"sample": 0}

@@ -137,6 +137,13 @@ def test_where_the_quarter_is_too_sparse_there_is_no_estimate_but_a_warning():
     assert hull.volume_corrected is None
 
 
+def test_a_quarter_of_fewer_than_four_points_gives_no_estimate():
+    with pytest.warns(SoftreachWarning, match=r"no estimate of the bias: 3 points"):
+        hull = concave_hull(in_ball(15), alpha=10.0, bias=True)
+    assert hull.volume > 0.0
+    assert hull.volume_corrected is None
+
+
 def test_the_curve_equals_the_hulls(tips):
     alphas = np.array([[0.2, 0.3], [0.5, np.inf]])
     curve = volume_curve(tips, alphas)

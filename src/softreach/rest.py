@@ -11,7 +11,6 @@ from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.tip_map import TipStatus
-from softreach.support.arguments import checked
 from softreach.support.errors import InvalidInput
 
 __all__ = ["Rest", "rest"]
@@ -33,7 +32,6 @@ class Rest:
     """Whether the equilibrium is stable."""
 
 
-@checked(arm=a_manipulator)
 def rest(arm: Manipulator, *, tol: float = 1e-6) -> Rest:
     """The arm at rest under its loads.
 
@@ -45,6 +43,7 @@ def rest(arm: Manipulator, *, tol: float = 1e-6) -> Rest:
         InvalidInput: An arm without loads, or with loads too heavy to be followed along it.
         InvalidDesign: The activation at rest would shorten the arm to nothing.
     """
+    arm = a_manipulator("arm", arm)
     if arm.loads is None:
         raise InvalidInput("loads", None, "given", "arm.replace(loads=Loads(...)) gives some")
     activation = np.clip(0.0, *arm.bounds.T)

@@ -9,15 +9,14 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from softreach.support.arguments import as_whole_number, one_of
+from softreach.support.arguments import as_integer, as_one_of
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.memory import check_room
 
 __all__ = ["SAMPLERS", "check_sampler", "cube_blocks", "sample_cube"]
 
-Array = NDArray[np.float64]
 Draw = Callable[[int, int], Array]
 """(first, count) -> the points first .. first + count; called in order, without gaps."""
 
@@ -49,28 +48,32 @@ def sample_cube(sampler: str, n: int, dim: int, seed: int = 0) -> Array:
         InvalidInput: An unknown sampler, an n that the sampler cannot spread, or more points than
             fit into memory.
     """
-    check_sampler(sampler, n, dim, seed)
+    n, seed = check_sampler(sampler, n, dim, seed)
     check_room("n", n, dim)
     return next(cube_blocks(sampler, n, dim, seed, size=n))
 
 
 def cube_blocks(sampler: str, n: int, dim: int, seed: int, size: int) -> Iterator[Array]:
-    """The points of `sample_cube` in consecutive blocks of at most `size`."""
-    check_sampler(sampler, n, dim, seed)
+    """The points of `sample_cube`, of checked arguments, in consecutive blocks up to `size`."""
     draw = SAMPLERS[sampler].begin(n, dim, seed) if dim else _nothing
     for first in range(0, n, size):
         yield draw(first, min(size, n - first))
 
 
-def check_sampler(sampler: str, n: int, dim: int, seed: int) -> None:
-    """Raise InvalidInput unless the sampler exists and can spread n points."""
-    one_of(SAMPLERS)("sampler", sampler)
-    n = as_whole_number("n", n, 1)
+def check_sampler(sampler: str, n: int, dim: int, seed: int) -> tuple[int, int]:
+    """The n and the seed of a sampler.
+
+    Raises:
+        InvalidInput: There is no such sampler, or it cannot spread n points.
+    """
+    as_one_of("sampler", sampler, SAMPLERS)
+    n = as_integer("n", n, 1)
     if n > _LARGEST_SHOWN:
         check_room("n", n, max(dim, 1))
-    as_whole_number("seed", seed, 0, _LARGEST_SEED)
+    seed = as_integer("seed", seed, 0, _LARGEST_SEED)
     if dim and (advice := SAMPLERS[sampler].refusal(n, dim)) is not None:
         raise InvalidInput("n", n, advice)
+    return n, seed
 
 
 def _nothing(first: int, count: int) -> Array:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.support.arguments import dataset
+from softreach.support.arguments import POSITIVE, as_given, as_number, dataset
+from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput
 from softreach.support.versions import SCHEMA_VERSION, versions
 
@@ -40,9 +41,9 @@ __all__ = [
 
 AXES = ("x", "y", "z")
 
-Array = NDArray[np.float64]
 
 _CELL = 1 / 20  # of the arm's length
+_EDGES = POSITIVE._replace(unit="m")
 
 # variable -> (dimensions, unit, meaning); that of an activation follows from the arm
 _CLOUD = {
@@ -81,7 +82,7 @@ def with_status(cloud: xr.Dataset, status: NDArray[np.int8]) -> xr.Dataset:
     return cloud.assign_coords(status=("sample", status, about))
 
 
-def is_stable(data: xr.Dataset | xr.DataArray) -> NDArray[np.bool_]:
+def is_stable(data: xr.Dataset | xr.DataArray) -> Mask:
     """Which samples hold the arm in a stable equilibrium; all, of an arm without loads."""
     if "status" not in data.coords:
         return np.ones(data.sizes["sample"], bool)
@@ -126,7 +127,7 @@ def check_cloud(cloud: xr.Dataset) -> xr.Dataset:
     import xarray as xr
 
     if not isinstance(cloud, xr.Dataset):
-        raise InvalidInput("cloud", type(cloud).__name__, "a dataset from compute_cloud")
+        raise InvalidInput("cloud", as_given(cloud), "a cloud: a dataset from compute_cloud")
     for name, (dims, _, _) in _CLOUD.items():
         if name not in cloud or cloud[name].dims != dims:
             found = cloud[name].dims if name in cloud else "missing"
@@ -291,7 +292,8 @@ def tip_cells(cloud: xr.Dataset, edge: float | None = None) -> CellGrid:
     points = tip.values
     if "status" in cloud.coords:
         points = np.where(is_stable(cloud)[:, None], points, np.nan)
-    return CellGrid.around(points, _CELL * float(tip.attrs["length"]) if edge is None else edge)
+    default = _CELL * float(tip.attrs["length"])
+    return CellGrid.around(points, default if edge is None else as_number("cell", edge, _EDGES))
 
 
 def cell_dataset(

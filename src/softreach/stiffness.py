@@ -13,10 +13,9 @@ from softreach.cloud.clouds import tip_map_of
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import BLOCK, TipMap
-from softreach.schema import AXES, a_cloud, check_cloud
+from softreach.schema import AXES, check_cloud
 from softreach.support import parallel
-from softreach.support.arguments import checked
-from softreach.support.arrays import as_floats
+from softreach.support.arrays import as_directions, as_floats
 from softreach.support.errors import InvalidDesign, InvalidInput
 
 if TYPE_CHECKING:
@@ -115,12 +114,11 @@ def stiffness_along(compliance: ArrayLike, direction: ArrayLike) -> Array:
         InvalidInput: Another shape, or a direction without length.
     """
     matrices = _checked_compliance(compliance)
-    d = unit_directions(direction, len(matrices))
+    d = as_directions("direction", direction, len(matrices))
     with np.errstate(divide="ignore"):
         return 1.0 / np.einsum("na,nab,nb->n", d, matrices, d)
 
 
-@checked(cloud=a_cloud)
 def cloud_compliance(cloud: xr.Dataset) -> xr.Dataset:
     """The compliance of the tip at each sample of a cloud.
 
@@ -170,37 +168,6 @@ def cloud_compliance(cloud: xr.Dataset) -> xr.Dataset:
         {"axis": list(AXES), "force": list(AXES)},
         cloud.attrs,
     )
-
-
-def unit_directions(direction: ArrayLike, n: int) -> Array:
-    """Directions as unit vectors, one for each of n, shape (n, 3).
-
-    Args:
-        direction: Of any length, shape (3,) or (n, 3).
-        n: How many.
-
-    Raises:
-        InvalidInput: Another shape, or a direction without length.
-    """
-    d = a_direction("direction", direction)
-    if d.shape not in ((3,), (n, 3)):
-        raise InvalidInput("direction.shape", d.shape, f"(3,) or ({n}, 3)")
-    return np.broadcast_to(d / np.linalg.norm(d, axis=-1, keepdims=True), (n, 3))
-
-
-def a_direction(name: str, value: object) -> Array:
-    """Vectors that have a direction, shape (3,) or (n, 3).
-
-    Raises:
-        InvalidInput: Another shape, numbers that are not finite, or no length.
-    """
-    vectors = as_floats(name, value)
-    if vectors.shape[-1:] != (3,) or vectors.ndim > 2:
-        raise InvalidInput(f"{name}.shape", vectors.shape, "(3,) or (n, 3)")
-    size = np.linalg.norm(vectors, axis=-1)
-    if not (np.isfinite(size).all() and (size > 0).all()):
-        raise InvalidInput(name, vectors, "finite vectors longer than 0")
-    return vectors
 
 
 def _checked_compliance(compliance: ArrayLike) -> Array:

@@ -104,7 +104,7 @@ def test_a_larger_activation_is_never_proved_to_be_least(monkeypatch):
     gamma = activations(arm, 6, "interior", seed=3)
     targets, near = tip_positions(arm, gamma), np.zeros_like(gamma)
     least = changes(solve_inverse(prepared, targets))
-    monkeypatch.setattr(least_bound, "_MOST_CELLS", 10_000)
+    monkeypatch.setattr(least_bound, "_MOST_LEAST_CELLS", 10_000)
     bounds = least_bound.change_bounds(
         prepared.rod, prepared.coarse_cells, targets, near, least + 0.01
     )

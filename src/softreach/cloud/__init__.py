@@ -1,5 +1,7 @@
 """Reachability clouds, and everything asked of their samples."""
 
+import lazy_loader
+
 from softreach.cloud.clouds import (
     compute_cloud,
     design_of,
@@ -9,3 +11,7 @@ from softreach.cloud.clouds import (
 )
 
 __all__ = ["compute_cloud", "design_of", "open_cloud", "save_cloud", "tip_map_of"]
+
+__getattr__, _, _ = lazy_loader.attach(
+    __name__, submodules=["curvature", "dexterity", "redundancy", "volume"]
+)

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,9 +19,9 @@ from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import BLOCK, TipMap
 from softreach.rod.view import View
 from softreach.sampling import check_sampler, cube_blocks
-from softreach.schema import a_cloud
 from softreach.support import parallel
-from softreach.support.arguments import checked, dataset, flag, function, optional, path
+from softreach.support.arguments import as_dataset, as_flag, as_function, as_path
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.files.atomic import replacing
 from softreach.support.files.damage import Watch, storage_errors
@@ -36,7 +36,7 @@ from softreach.support.files.stores import (
     opened_root,
 )
 from softreach.support.memory import check_room
-from softreach.support.progress import Progress, bar, silent
+from softreach.support.progress import Progress, bar
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,16 +49,16 @@ __all__ = [
     "tip_map_of",
 ]
 
-Array = NDArray[np.float64]
+_CHUNK = 1 << 19  # samples of a stored array that are held at once
+_LONG = 5_000_000  # samples from which a bar is worth showing
 
 
-@checked(progress=optional(function))
 def compute_cloud(
     arm: Manipulator | TipMap,
     n: int = 400_000,
+    *,
     seed: int = 0,
     sampler: str = "uniform",
-    *,
     tol: float = 1e-6,
     progress: Progress | None = None,
 ) -> xr.Dataset:
@@ -89,37 +89,20 @@ def compute_cloud(
     Warns:
         SoftreachWarning: The samples take more than half of the free memory.
     """
+    report = None if progress is None else as_function("progress", progress)
     rod = _of_all_bundles(tip_map(arm, tol))
     bundles = rod.box.bundles
-    check_sampler(sampler, n, bundles, seed)
-    check_room("n", int(n), bundles + 3)
+    n, seed = check_sampler(sampler, n, bundles, seed)
+    check_room("n", n, bundles + 3)
     activation, tip = np.empty((n, bundles)), np.empty((n, 3))
     status = np.empty(n if rod.supports_unstable else 0, np.int8)
-    with _shown(progress, n) as shown:
-        _fill(rod, activation, tip, status, sampler, seed, shown)
-    cloud = schema.cloud_dataset(
-        rod.arm, activation, tip, seed=int(seed), sampler=sampler, tol=rod.tol
-    )
+    show_bar = report is None and n > _LONG
+    with bar("computing tips", n) if show_bar else nullcontext(report) as shown:
+        _fill(rod, activation, tip, status, cube_blocks(sampler, n, bundles, seed, BLOCK), shown)
+    cloud = schema.cloud_dataset(rod.arm, activation, tip, seed=seed, sampler=sampler, tol=rod.tol)
     return schema.with_status(cloud, status) if rod.supports_unstable else cloud
 
 
-def _is_cloud(path: Path) -> bool:
-    """Whether a folder holds a stored cloud and nothing else."""
-    try:
-        about = json.loads((path / "zarr.json").read_bytes())["attributes"]
-        names = {entry.name for entry in path.iterdir()} - {"zarr.json"}
-        inside = (entry.name for name in names for entry in (path / name).iterdir())
-        only = set(inside) <= {"zarr.json", "c"}
-        return only and {"tip", "activation"} <= names and {"sampler", "tol"} <= about.keys()
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return False
-
-
-CLOUD_STORE: Formats = {".zarr": FileKind("a stored cloud", _is_cloud)}
-"""What `save_cloud` writes, and replaces."""
-
-
-@checked(cloud=a_cloud, path=path, overwrite=flag, durable=flag)
 def save_cloud(
     cloud: xr.Dataset,
     path: str | PathLike[str],
@@ -142,15 +125,104 @@ def save_cloud(
             something else is there.
         NotWritten: It cannot be written.
     """
-    schema.check_stored_cloud(cloud)
-    kind = CLOUD_STORE[".zarr"]
+    place = as_path("path", path)
+    overwrite, durable = as_flag("overwrite", overwrite), as_flag("durable", durable)
+    kind, size = CLOUD_STORE[".zarr"], schema.check_stored_cloud(cloud).nbytes
     with (
-        replacing(
-            path, kind, takes=cloud.nbytes, overwrite=overwrite, durable=durable
-        ) as partial_path,
+        replacing(place, kind, takes=size, overwrite=overwrite, durable=durable) as partial_path,
         _few_chunks_at_a_time(),
     ):
         _write(schema.storable(cloud), partial_path)
+
+
+def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
+    """Read a cloud that `save_cloud` wrote.
+
+    Raises:
+        InvalidInput: There is no such store, or it holds something else.
+        DamagedStore: It is not what was written; which array and chunk, and what to do.
+        StoreFailed: It cannot be read.
+    """
+    import xarray as xr
+
+    location = as_path("path", path)
+    opened = opened_root(location, "cloud")
+    if opened is None or "command" in opened.group.attrs:
+        hint = "" if opened is None else "this is an atlas"
+        raise InvalidInput("cloud", location, "a Zarr store written by softreach", hint)
+    opened.watch.required = lambda _: True
+    with _few_chunks_at_a_time(), storage_errors(f"{location} cannot be read"):
+        check_arrays(opened)
+        with xr.open_zarr(opened.place, **READING) as stored:
+            cloud = stored.load()
+        cloud.attrs.pop(ARRAYS, None)
+        return schema.check_stored_cloud(cloud)
+
+
+def design_of(cloud: xr.Dataset) -> Manipulator:
+    """The design that a cloud or configuration was computed from."""
+    cloud = as_dataset("cloud", cloud)
+    return Manipulator.from_toml(cloud.attrs["design"], source="the cloud's design")
+
+
+def tip_map_of(cloud: xr.Dataset) -> TipMap:
+    """The tip map that a cloud was computed with."""
+    arm = design_of(cloud)
+    return tip_map(arm, float(cloud.attrs["tol"]))
+
+
+def sample_bytes(bundles: int) -> int:
+    """What a sample takes: its tip, its activation and its status."""
+    return 8 * (3 + bundles) + 1
+
+
+def _fill(
+    rod: TipMap,
+    activation: Array,
+    tip: Array,
+    status: NDArray[np.int8],
+    cubes: Iterator[Array],
+    progress: Progress | None,
+) -> None:
+    """Draw points of the unit cube in blocks and let the threads turn them into tips meanwhile."""
+
+    def tasks() -> Iterator[Callable[[], object]]:
+        first = 0
+        for cube in cubes:
+            block = slice(first, first := first + len(cube))
+            rod.box.from_cube(cube, out=activation[block])
+            kept = status[block] if len(status) else None
+            task = partial(rod.fill, activation[block], tip[block], status=kept)
+            yield partial(_reported, task, progress, len(cube)) if progress else task
+
+    rod.prepare()
+    parallel.run(tasks())
+
+
+def _reported(task: Callable[[], object], progress: Progress, count: int) -> None:
+    task()
+    progress(count)
+
+
+def _of_all_bundles(rod: TipMap) -> TipMap:
+    """The map of every bundle, in its own unit, of which this one may be a restriction."""
+    return rod.base if isinstance(rod, View) else rod
+
+
+def _is_cloud(path: Path) -> bool:
+    """Whether a folder holds a stored cloud and nothing else."""
+    try:
+        about = json.loads((path / "zarr.json").read_bytes())["attributes"]
+        names = {entry.name for entry in path.iterdir()} - {"zarr.json"}
+        inside = (entry.name for name in names for entry in (path / name).iterdir())
+        only = set(inside) <= {"zarr.json", "c"}
+        return only and {"tip", "activation"} <= names and {"sampler", "tol"} <= about.keys()
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return False
+
+
+CLOUD_STORE: Formats = {".zarr": FileKind("a stored cloud", _is_cloud)}
+"""What `save_cloud` writes, and replaces."""
 
 
 def _write(cloud: xr.Dataset, path: Path) -> None:
@@ -176,95 +248,8 @@ def _write(cloud: xr.Dataset, path: Path) -> None:
     list_arrays(place, watch)
 
 
-@checked(path=path)
-def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
-    """Read a cloud that `save_cloud` wrote.
-
-    Raises:
-        InvalidInput: There is no such store, or it holds something else.
-        DamagedStore: It is not what was written; which array and chunk, and what to do.
-        StoreFailed: It cannot be read.
-    """
-    import xarray as xr
-
-    location = fspath(path)
-    opened = opened_root(location, "cloud")
-    if opened is None or "command" in opened.group.attrs:
-        hint = "" if opened is None else "this is an atlas"
-        raise InvalidInput("cloud", location, "a Zarr store written by softreach", hint)
-    opened.watch.required = lambda _: True
-    with _few_chunks_at_a_time(), storage_errors(f"{location} cannot be read"):
-        check_arrays(opened)
-        with xr.open_zarr(opened.place, **READING) as stored:
-            cloud = stored.load()
-        cloud.attrs.pop(ARRAYS, None)
-        return schema.check_stored_cloud(cloud)
-
-
 def _few_chunks_at_a_time() -> AbstractContextManager[object]:
     """Zarr holds three copies of each chunk in flight, and has ten in flight by default."""
     import zarr
 
     return zarr.config.set({"async.concurrency": min(4, parallel.thread_count())})
-
-
-@checked(cloud=dataset())
-def design_of(cloud: xr.Dataset) -> Manipulator:
-    """The design that a cloud or configuration was computed from."""
-    return Manipulator.from_toml(cloud.attrs["design"], source="the cloud's design")
-
-
-@checked(cloud=dataset())
-def tip_map_of(cloud: xr.Dataset) -> TipMap:
-    """The tip map that a cloud was computed with."""
-    return tip_map(design_of(cloud), float(cloud.attrs["tol"]))
-
-
-def sample_bytes(bundles: int) -> int:
-    """What a sample takes: its tip, its activation and its status."""
-    return 8 * (3 + bundles) + 1
-
-
-def _of_all_bundles(rod: TipMap) -> TipMap:
-    """The map of every bundle, in its own unit, of which this one may be a restriction."""
-    return rod.base if isinstance(rod, View) else rod
-
-
-_CHUNK = 1 << 19  # samples of a stored array that are held at once
-_LONG = 5_000_000  # samples from which a bar is worth showing
-
-
-def _fill(
-    rod: TipMap,
-    activation: Array,
-    tip: Array,
-    status: NDArray[np.int8],
-    sampler: str,
-    seed: int,
-    progress: Progress,
-) -> None:
-    """Draw activations block by block and let the threads turn them into tips meanwhile."""
-
-    def tasks() -> Iterator[Callable[[], object]]:
-        first = 0
-        for cube in cube_blocks(sampler, len(tip), rod.box.bundles, seed, BLOCK):
-            block = slice(first, first := first + len(cube))
-            rod.box.from_cube(cube, out=activation[block])
-            told = status[block] if len(status) else None
-            task = partial(rod.fill, activation[block], tip[block], status=told)
-            yield partial(_reported, task, progress, len(cube))
-
-    rod.prepare()
-    parallel.run(tasks())
-
-
-def _reported(task: Callable[[], object], progress: Progress, count: int) -> None:
-    task()
-    progress(count)
-
-
-def _shown(progress: Progress | None, n: int) -> AbstractContextManager[Progress]:
-    """The caller's callback, or a bar if the cloud is large enough to wait for."""
-    if progress is None and n > _LONG:
-        return bar("computing tips", n)
-    return nullcontext(progress or silent)

@@ -8,20 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import tip_map_of
 from softreach.rod.rods import tip_map
-from softreach.rod.tip_map import Strains, TipMap, an_arm
+from softreach.rod.tip_map import Strains, TipMap
 from softreach.rod.view import stable_tips
-from softreach.schema import a_cloud, provenance
+from softreach.schema import check_cloud, provenance
 from softreach.support import parallel
-from softreach.support.arguments import as_given, checked, whole
-from softreach.support.arrays import as_floats, as_shares
+from softreach.support.arguments import as_given, as_instance, as_integer
+from softreach.support.arrays import Array, Index, as_floats, as_shares
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -35,7 +35,6 @@ __all__ = [
     "stream_statistics",
 ]
 
-Array = NDArray[np.float64]
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 """Minimum, quartiles, maximum and the middle nine tenths."""
@@ -47,17 +46,10 @@ QUANTITIES = {
 }
 """Quantity -> unit and meaning."""
 
+_MOST = 1 << 24  # bins, and stations
 _AT_A_TIME = 1 << 19  # samples times stations whose strains stay in the cache
 
 
-def _blocks(name: str, value: object) -> object:
-    """Arrays that come one after the other."""
-    if isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping | Set | type):
-        return value
-    raise InvalidInput(name, as_given(value), "an iterable of arrays of shape (n, bundles)")
-
-
-@checked(cloud=a_cloud, bins=whole(1, 1 << 24), quantiles=as_shares)
 def curvature_statistics(
     cloud: xr.Dataset,
     stations: ArrayLike | None = None,
@@ -88,13 +80,12 @@ def curvature_statistics(
     Raises:
         InvalidInput: Stations off the arm, or bins or quantiles out of range.
     """
-    activation = cloud["activation"].transpose("sample", "bundle").values
+    activation = check_cloud(cloud)["activation"].values
     return stream_statistics(
         tip_map_of(cloud), [activation], stations, bins=bins, quantiles=quantiles
     )
 
 
-@checked(activations=_blocks, bins=whole(1, 1 << 24), quantiles=as_shares)
 def stream_statistics(
     arm: Manipulator | TipMap,
     activations: Iterable[Array],
@@ -115,24 +106,34 @@ def stream_statistics(
     Raises:
         InvalidInput: As for `curvature_statistics`; also no activations at all.
     """
+    bins = as_integer("bins", bins, 1, _MOST)
+    shares = as_shares("quantiles", quantiles)
+    blocks = _blocks("activations", activations)
     rod = stable_tips(tip_map(arm))
     asked = distal_stations(rod) if stations is None else stations
     z = rod.check_stations(np.atleast_1d(as_floats("stations", asked)), ascending=False)
     ranges = rod.strain_range(z)._asdict()
     tallies = {name: _Tally.between(ranges[name], bins) for name in QUANTITIES}
-    for strains in _strains(rod, activations, z):
+    for strains in _strains(rod, blocks, z):
         for k in range(len(z)):
             for name, values in _at_station(strains, k).items():
                 tallies[name].add(k, values)
     if not tallies["bending"].count.any():
         raise InvalidInput("activations", "none", "at least one sample")
-    return _dataset(rod, z, tallies, quantiles)
+    return _dataset(rod, z, tallies, shares)
 
 
-@checked(arm=an_arm, count=whole(1, 1 << 24))
 def distal_stations(arm: Manipulator | TipMap, count: int = 6) -> Array:
     """Even stations from the middle of the arm to its tip, both included, Z [m] (figure 3c)."""
-    return np.linspace(0.5, 1.0, count) * arm.length
+    arm = as_instance("arm", arm, (Manipulator, TipMap), "a Manipulator or a TipMap")
+    return np.linspace(0.5, 1.0, as_integer("count", count, 1, _MOST)) * arm.length
+
+
+def _blocks(name: str, value: Any) -> Iterable[Array]:
+    """Arrays that come one after the other."""
+    if isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping | Set | type):
+        return value
+    raise InvalidInput(name, as_given(value), "an iterable of arrays of shape (n, bundles)")
 
 
 def _strains(rod: TipMap, activations: Iterable[Array], z: Array) -> Iterator[Strains]:
@@ -164,7 +165,7 @@ class _Tally:
 
     low: Array
     width: Array
-    count: NDArray[np.int64]
+    count: Index
     extremes: Array
     moments: Array
 
@@ -197,7 +198,7 @@ class _Tally:
         """Ends of the bins, shape (station, bin + 1)."""
         return self.low[:, None] + self.width[:, None] * np.arange(self.count.shape[1] + 1)
 
-    def quantiles(self, shares: Sequence[float]) -> Array:
+    def quantiles(self, shares: Array) -> Array:
         """Quantiles, linear within a bin and inside the extremes, shape (station, quantile)."""
         rows = zip(self.count, self.edges, self.extremes, strict=True)
         return np.array([_quantiles(*row, shares) for row in rows])
@@ -208,9 +209,7 @@ class _Tally:
         return self.low + first, np.sqrt(np.maximum(second - first**2, 0.0))
 
 
-def _quantiles(
-    count: NDArray[np.int64], edges: Array, extremes: Array, shares: Sequence[float]
-) -> Array:
+def _quantiles(count: Index, edges: Array, extremes: Array, shares: Array) -> Array:
     below = np.concatenate([[0], np.cumsum(count)]) / count.sum()
     # Empty bins make flat pieces of the distribution; its inverse jumps over them.
     rises = np.flatnonzero(np.diff(below) > 0)
@@ -218,9 +217,7 @@ def _quantiles(
     return np.clip(np.interp(shares, below[corners], edges[corners]), *extremes)
 
 
-def _dataset(
-    rod: TipMap, z: Array, tallies: dict[str, _Tally], quantiles: Sequence[float]
-) -> xr.Dataset:
+def _dataset(rod: TipMap, z: Array, tallies: dict[str, _Tally], quantiles: Array) -> xr.Dataset:
     import xarray as xr
 
     variables = {}
@@ -237,7 +234,7 @@ def _dataset(
         }
     coordinates = {
         "Z": ("station", z, {"units": "m", "long_name": "station before activation"}),
-        "quantile": np.asarray(quantiles, float),
+        "quantile": quantiles,
     }
     samples = int(tallies["bending"].count[0].sum())
     attrs = {**provenance(rod.arm), "length": rod.length, "samples": samples}

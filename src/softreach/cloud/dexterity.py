@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from softreach.cloud.clouds import tip_map_of
 from softreach.rod.tip_map import BLOCK
 from softreach.rod.view import stable_tips
-from softreach.schema import a_cloud, cell_dataset, check_cloud, tip_cells
+from softreach.schema import cell_dataset, check_cloud, tip_cells
 from softreach.support import parallel
-from softreach.support.arguments import POSITIVE, checked, optional, within
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -22,13 +22,11 @@ if TYPE_CHECKING:
 
 __all__ = ["dexterity", "solution_measure"]
 
-Array = NDArray[np.float64]
 Signs = NDArray[np.int8]
 
 _EVEN = ("uniform", "sobol")  # a grid has too many points on its faces
 
 
-@checked(cloud=a_cloud)
 def dexterity(cloud: xr.Dataset) -> xr.Dataset:
     """Manipulability, condition number and orientation of the tip map at each sample.
 
@@ -71,7 +69,6 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
     return result
 
 
-@checked(cloud=a_cloud, cell=optional(within(POSITIVE._replace(unit="m"))))
 def solution_measure(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Dataset:
     """How many activations reach each place: a number, or the size of the family of solutions.
 

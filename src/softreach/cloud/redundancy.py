@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.geometry.neighbors import mean_value_distance
 from softreach.rod.view import activation_measures
-from softreach.schema import a_cloud, cell_dataset, check_cloud, is_stable, tip_cells
-from softreach.support.arguments import POSITIVE, checked, dataset, optional, plain, within
-from softreach.support.arrays import as_indices, as_shares
+from softreach.schema import cell_dataset, check_cloud, is_stable, tip_cells
+from softreach.support.arguments import as_dataset, as_number, plain
+from softreach.support.arrays import Array, Index, Mask, as_indices, as_shares
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.quantity import quantity
 
@@ -29,11 +29,10 @@ __all__ = [
     "tip_density",
 ]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+THRESHOLD = 0.25  # between a minimal arm's D̄ of some 0.05 and a redundant one's of order 1
+_VOLUMES = ("measured_volume", "occupied_volume")
 
 
-@checked(cloud=a_cloud, radius=within(Range(0.0, unit="m")))
 def activation_distance(
     cloud: xr.Dataset, radius: float, *, queries: int | ArrayLike | None = None
 ) -> xr.DataArray:
@@ -65,6 +64,7 @@ def activation_distance(
     import xarray as xr
 
     check_cloud(cloud)
+    radius = as_number("radius", radius, Range(0.0, unit="m"))
     chosen = _chosen(queries, cloud.sizes["sample"])
     tip, activation = cloud["tip"].values, cloud["activation"].values
     if "unit" in cloud.coords:
@@ -84,60 +84,11 @@ def activation_distance(
             **cloud.attrs,
             "long_name": "mean activation-space distance D̄",
             "units": cloud["activation"].attrs.get("units", "1"),
-            "radius": float(radius),
+            "radius": radius,
         },
     )
 
 
-def _among(
-    stable: NDArray[np.bool_], tip: Array, activation: Array, radius: float, sample: Index
-) -> tuple[Array, Index]:
-    """D̄ and K of some samples among the stable ones; NaN and 0 of those that are not."""
-    mean, others = np.full(len(sample), np.nan), np.zeros(len(sample), np.intp)
-    asked, number = stable[sample], np.cumsum(stable) - 1
-    found = mean_value_distance(tip[stable], activation[stable], radius, number[sample[asked]])
-    mean[asked], others[asked] = found
-    return mean, others
-
-
-def evaluated_samples(distance: xr.DataArray, cloud: xr.Dataset) -> Index:
-    """Which samples of the cloud were evaluated."""
-    n = cloud.sizes["sample"]
-    if distance.dims != ("sample",) or "sample" not in distance.coords:
-        raise InvalidInput("distance", distance.dims, "made by activation_distance")
-    return as_indices("distance.sample", distance["sample"].values, n, "samples of the cloud")
-
-
-def _chosen(queries: int | ArrayLike | None, n: int) -> Index | None:
-    """Indices of the samples to be evaluated; None for all."""
-    if queries is None:
-        return None
-    count = plain(queries)
-    if isinstance(count, int) and not isinstance(count, bool):
-        return _strided(count, n)
-    return as_indices("queries", queries, n, "samples of the cloud")
-
-
-def _strided(count: int, n: int) -> Index:
-    """One sample of each of `count` equal parts, at a random but fixed place in it.
-
-    Every k-th one would do for independent samples, but in a Sobol sequence those share leading
-    bits, that is a corner of the activation box.
-    """
-    if not 0 <= count <= n:
-        raise InvalidInput("queries", count, f"from 0 to the cloud's {n} samples, or their indices")
-    place = np.random.default_rng(0).random(count)
-    return np.minimum((np.arange(count) + place) * (n / max(count, 1)), n - 1).astype(np.intp)
-
-
-# Where an arm is redundant, and where its tips gather: means over the cells of a grid.
-
-
-@checked(
-    cloud=a_cloud,
-    distance=dataset(kind="DataArray"),
-    cell=optional(within(POSITIVE._replace(unit="m"))),
-)
 def distance_map(
     cloud: xr.Dataset, distance: xr.DataArray, *, cell: float | None = None
 ) -> xr.Dataset:
@@ -173,7 +124,6 @@ def distance_map(
     ).assign_attrs(cloud.attrs)
 
 
-@checked(cloud=a_cloud, cell=optional(within(POSITIVE._replace(unit="m"))))
 def tip_density(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Dataset:
     """Local density of tips, and how uneven it is.
 
@@ -204,20 +154,50 @@ def tip_density(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Dataset:
     ).assign_attrs({**cloud.attrs, **_unevenness(count)})
 
 
-def _unevenness(count: NDArray[np.intp]) -> dict[str, float]:
-    occupied = count[count > 0]
-    variation, chance = occupied.std() / occupied.mean(), occupied.mean() ** -0.5
-    return {
-        "coefficient_of_variation": float(variation),
-        "chance": float(chance),
-        "heterogeneity": float(np.sqrt(max(variation**2 - chance**2, 0.0))),
-    }
+def redundancy_summary(
+    cloud: xr.Dataset,
+    distance: xr.DataArray,
+    *,
+    threshold: float = THRESHOLD,
+    cell: float | None = None,
+    quantiles: Sequence[float] = (0.05, 0.25, 0.75, 0.95),
+) -> RedundancySummary:
+    """Median and quantiles of D̄, isolated points, and where it exceeds a threshold.
 
+    Points gather where the arm goes often, so shares of points and of volume differ. The volume is
+    that of grid cells: evaluate enough points that `measured_volume` is near `occupied_volume`.
 
-# Redundancy in numbers: how far activations differ, and for what share of the places.
+    Args:
+        cloud: The cloud that D̄ was computed from.
+        distance: D̄ from `activation_distance`.
+        threshold: The D̄ [-] above which a place counts as redundant.
+        cell: Edge of the grid cells [m]; None for L/20.
+        quantiles: Probabilities.
 
-
-THRESHOLD = 0.25  # between a minimal arm's D̄ of some 0.05 and a redundant one's of order 1
+    Raises:
+        InvalidInput: D̄ of another cloud, or cells that are not positive or too many.
+    """
+    threshold = as_number("threshold", threshold)
+    shares = as_shares("quantiles", quantiles)
+    grid, evaluated = tip_cells(cloud, cell), evaluated_samples(distance, cloud)
+    values = distance.values[np.isfinite(distance.values)]
+    stable = is_stable(cloud)[evaluated]
+    mean = grid.mean(distance.values, evaluated)
+    known = np.isfinite(mean)
+    heights = np.quantile(values, shares) if len(values) else np.full(len(shares), np.nan)
+    return RedundancySummary(
+        evaluated=int(stable.sum()),
+        isolated=_share(np.isnan(distance.values[stable])),
+        median=float(np.median(values)) if len(values) else np.nan,
+        median_error=_median_error(values),
+        quantiles=dict(zip(shares.tolist(), heights.tolist(), strict=True)),
+        threshold=threshold,
+        redundant_points=_share(values > threshold),
+        redundant_points_error=_share_error(values > threshold),
+        redundant_volume=_share(mean[known] > threshold),
+        measured_volume=int(known.sum()) * grid.volume,
+        occupied_volume=int(np.count_nonzero(grid.count())) * grid.volume,
+    )
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -279,65 +259,64 @@ class RedundancySummary:
         )
 
 
-_VOLUMES = ("measured_volume", "occupied_volume")
+def _among(
+    stable: Mask, tip: Array, activation: Array, radius: float, sample: Index
+) -> tuple[Array, Index]:
+    """D̄ and K of some samples among the stable ones; NaN and 0 of those that are not."""
+    mean, others = np.full(len(sample), np.nan), np.zeros(len(sample), np.intp)
+    asked, number = stable[sample], np.cumsum(stable) - 1
+    found = mean_value_distance(tip[stable], activation[stable], radius, number[sample[asked]])
+    mean[asked], others[asked] = found
+    return mean, others
 
 
-@checked(
-    cloud=a_cloud,
-    distance=dataset(kind="DataArray"),
-    threshold=within(Range()),
-    cell=optional(within(POSITIVE._replace(unit="m"))),
-    quantiles=as_shares,
-)
-def redundancy_summary(
-    cloud: xr.Dataset,
-    distance: xr.DataArray,
-    *,
-    threshold: float = THRESHOLD,
-    cell: float | None = None,
-    quantiles: Sequence[float] = (0.05, 0.25, 0.75, 0.95),
-) -> RedundancySummary:
-    """Median and quantiles of D̄, isolated points, and where it exceeds a threshold.
+def evaluated_samples(distance: xr.DataArray, cloud: xr.Dataset) -> Index:
+    """Which samples of the cloud were evaluated."""
+    n = cloud.sizes["sample"]
+    distance = as_dataset("distance", distance, kind="DataArray")
+    if distance.dims != ("sample",) or "sample" not in distance.coords:
+        raise InvalidInput("distance", distance.dims, "made by activation_distance")
+    return as_indices("distance.sample", distance["sample"].values, n, "samples of the cloud")
 
-    Points gather where the arm goes often, so shares of points and of volume differ. The volume is
-    that of grid cells: evaluate enough points that `measured_volume` is near `occupied_volume`.
 
-    Args:
-        cloud: The cloud that D̄ was computed from.
-        distance: D̄ from `activation_distance`.
-        threshold: The D̄ [-] above which a place counts as redundant.
-        cell: Edge of the grid cells [m]; None for L/20.
-        quantiles: Probabilities.
+def _chosen(queries: int | ArrayLike | None, n: int) -> Index | None:
+    """Indices of the samples to be evaluated; None for all."""
+    if queries is None:
+        return None
+    count = plain(queries)
+    if isinstance(count, int) and not isinstance(count, bool):
+        return _strided(count, n)
+    return as_indices("queries", queries, n, "samples of the cloud")
 
-    Raises:
-        InvalidInput: D̄ of another cloud, or cells that are not positive or too many.
+
+def _strided(count: int, n: int) -> Index:
+    """One sample of each of `count` parts of about equal size, at a random but fixed place in it.
+
+    Every k-th one would do for independent samples, but in a Sobol sequence those share leading
+    bits, that is a corner of the activation box.
     """
-    values = distance.values[np.isfinite(distance.values)]
-    grid, evaluated = tip_cells(cloud, cell), evaluated_samples(distance, cloud)
-    stable = is_stable(cloud)[evaluated]
-    mean = grid.mean(distance.values, evaluated)
-    known = np.isfinite(mean)
-    found = np.quantile(values, quantiles) if len(values) else np.full(len(quantiles), np.nan)
-    return RedundancySummary(
-        evaluated=int(stable.sum()),
-        isolated=_share(np.isnan(distance.values[stable])),
-        median=float(np.median(values)) if len(values) else np.nan,
-        median_error=_median_error(values),
-        quantiles=dict(zip(map(float, quantiles), found.tolist(), strict=True)),
-        threshold=float(threshold),
-        redundant_points=_share(values > threshold),
-        redundant_points_error=_share_error(values > threshold),
-        redundant_volume=_share(mean[known] > threshold),
-        measured_volume=int(known.sum()) * grid.volume,
-        occupied_volume=int(np.count_nonzero(grid.count())) * grid.volume,
-    )
+    if not 0 <= count <= n:
+        raise InvalidInput("queries", count, f"from 0 to the cloud's {n} samples, or their indices")
+    ends = np.arange(count + 1) * n // max(count, 1)
+    place = np.random.default_rng(0).random(count)
+    return ends[:-1] + (place * np.diff(ends)).astype(np.intp)
 
 
-def _share(which: NDArray[np.bool_]) -> float:
+def _unevenness(count: Index) -> dict[str, float]:
+    occupied = count[count > 0]
+    variation, chance = occupied.std() / occupied.mean(), occupied.mean() ** -0.5
+    return {
+        "coefficient_of_variation": float(variation),
+        "chance": float(chance),
+        "heterogeneity": float(np.sqrt(max(variation**2 - chance**2, 0.0))),
+    }
+
+
+def _share(which: Mask) -> float:
     return float(which.mean()) if which.size else np.nan
 
 
-def _share_error(which: NDArray[np.bool_]) -> float:
+def _share_error(which: Mask) -> float:
     share = _share(which)
     return float(np.sqrt(share * (1.0 - share) / which.size)) if which.size else np.nan
 

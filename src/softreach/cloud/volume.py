@@ -15,7 +15,7 @@ from softreach.geometry.delaunay import delaunay
 from softreach.geometry.hull import Hull
 from softreach.schema import is_stable
 from softreach.support import parallel
-from softreach.support.arguments import POSITIVE, as_given, flag, plain
+from softreach.support.arguments import POSITIVE, as_flag, as_given, plain
 from softreach.support.arrays import as_floats, as_points
 from softreach.support.errors import InvalidInput, warn
 
@@ -74,7 +74,7 @@ def concave_hull(
     References:
         [EdelsbrunnerMuecke1994]
     """
-    flag("bias", bias)
+    bias = as_flag("bias", bias)
     positions = _positions(points)
     radius = _radius(alpha, points)
     shape, *quarter = _alpha_complexes(
@@ -247,6 +247,12 @@ def _in_spacings(hull: Hull, spacing: float) -> str:
 
 def _corrected(hull: Hull, quarter: Hull) -> Hull:
     """The hull with V* = 2 V(N) - V(N/4), from that of a quarter of the points."""
+    if quarter.volume == 0.0 < hull.volume:
+        warn(
+            f"no estimate of the bias: {quarter.n} points, a quarter of the cloud, have no volume "
+            f"at alpha = {hull.alpha:.4g} m; use more points or a larger alpha"
+        )
+        return hull
     if quarter.alpha < QUARTER_SPACINGS * quarter.spacing:
         warn(
             f"no estimate of the bias: alpha = {_in_spacings(quarter, quarter.spacing)}, a quarter "

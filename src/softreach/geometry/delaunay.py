@@ -10,14 +10,58 @@ import numpy as np
 
 from softreach.kernels.points.bowyer_watson import triangulate
 from softreach.kernels.points.spatial_sort import insertion_order
-from softreach.support.arguments import one_of
+from softreach.support.arguments import as_one_of
 from softreach.support.arrays import Points, as_points
-
-# How many dimensions a cloud of points fills, seen from the points themselves.
-
 
 _SAMPLED = 512
 _NEIGHBORS = 16
+FINEST = 200  # bits below the largest coordinate that `kernels.predicates` may see
+_FEW = 1000  # of which even those on a curve are soon triangulated
+METHODS = ("auto", "numba", "qhull")
+
+
+def delaunay(points: np.ndarray, method: Literal["auto", "numba", "qhull"] = "auto") -> Delaunay:
+    """Triangulate a cloud of points.
+
+    ``"numba"`` (which ``"auto"`` means) inserts one point after the other with exact predicates
+    and is right for any input, see `softreach.kernels.points.bowyer_watson`. ``"qhull"`` is
+    SciPy's, several
+    times slower; among near-duplicate or cospherical points it may leave some out.
+
+    Coordinates smaller than 2^-200 of the largest count as zero.
+
+    Args:
+        points: Positions [m], shape (n, 3).
+        method: Who triangulates.
+
+    Raises:
+        InvalidInput: Points of another shape, or not finite; an unknown method.
+    """
+    points = as_points("points", points)
+    as_one_of("method", method, METHODS)
+    build = _by_qhull if method == "qhull" else _by_insertion
+    tetrahedra, neighbors, duplicate_of = build(unit_scale(points)[0])
+    return Delaunay(
+        points=points, tetrahedra=tetrahedra, neighbors=neighbors, duplicate_of=duplicate_of
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Delaunay:
+    """Tetrahedra whose circumscribed spheres hold no other point.
+
+    Points in one plane, on one line or fewer than four give no tetrahedra at all; nor do more than
+    some hundreds on a curve in space, of which nearly every pair would have an edge.
+    """
+
+    points: Points
+    """Positions [m], shape (n, 3)."""
+    tetrahedra: np.ndarray
+    """Vertices as indices of points, positively oriented, shape (m, 4)."""
+    neighbors: np.ndarray
+    """Neighbor i shares the face opposite vertex i; -1 outside the hull. Shape (m, 4)."""
+    duplicate_of: np.ndarray
+    """For each point itself, or the equal point that stands for it; shape (n,)."""
 
 
 def lies_on_curve(points: Points) -> bool:
@@ -51,55 +95,6 @@ def local_dimension(points: Points) -> float:
     distance = np.asarray(KDTree(distinct).query(distinct[chosen], k=_NEIGHBORS + 1)[0])[:, 1:]
     growth = np.log(distance[:, -1:] / distance[:, :-1]).sum()
     return float(count * (_NEIGHBORS - 1) / growth) if growth > 0 else 0.0  # one sets the scale
-
-
-FINEST = 200  # bits below the largest coordinate that `kernels.predicates` may see
-_FEW = 1000  # of which even those on a curve are soon triangulated
-METHODS = ("auto", "numba", "qhull")
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Delaunay:
-    """Tetrahedra whose circumscribed spheres hold no other point.
-
-    Points in one plane, on one line or fewer than four give no tetrahedra at all; nor do more than
-    some hundreds on a curve in space, of which nearly every pair would have an edge.
-    """
-
-    points: Points
-    """Positions [m], shape (n, 3)."""
-    tetrahedra: np.ndarray
-    """Vertices as indices of points, positively oriented, shape (m, 4)."""
-    neighbors: np.ndarray
-    """Neighbor i shares the face opposite vertex i; -1 outside the hull. Shape (m, 4)."""
-    duplicate_of: np.ndarray
-    """For each point itself, or the equal point that stands for it; shape (n,)."""
-
-
-def delaunay(points: np.ndarray, method: Literal["auto", "numba", "qhull"] = "auto") -> Delaunay:
-    """Triangulate a cloud of points.
-
-    ``"numba"`` (which ``"auto"`` means) inserts one point after the other with exact predicates
-    and is right for any input, see `softreach.kernels.points.bowyer_watson`. ``"qhull"`` is
-    SciPy's, several
-    times slower; among near-duplicate or cospherical points it may leave some out.
-
-    Coordinates smaller than 2^-200 of the largest count as zero.
-
-    Args:
-        points: Positions [m], shape (n, 3).
-        method: Who triangulates.
-
-    Raises:
-        InvalidInput: Points of another shape, or not finite; an unknown method.
-    """
-    points = as_points("points", points)
-    one_of(METHODS)("method", method)
-    build = _by_qhull if method == "qhull" else _by_insertion
-    tetrahedra, neighbors, duplicate_of = build(unit_scale(points)[0])
-    return Delaunay(
-        points=points, tetrahedra=tetrahedra, neighbors=neighbors, duplicate_of=duplicate_of
-    )
 
 
 def unit_scale(points: Points) -> tuple[Points, int]:

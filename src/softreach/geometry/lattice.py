@@ -8,13 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.support.arrays import as_points
+from softreach.support.arrays import Array, Index, as_points
 from softreach.support.errors import InvalidInput
 
 __all__ = ["CellGrid"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 _MOST_CELLS = 1 << 26
 

@@ -7,7 +7,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.kernels.points.neighbor_sums import (
     PLACE_BITS,
@@ -19,13 +18,11 @@ from softreach.kernels.points.neighbor_sums import (
     window_keys,
 )
 from softreach.support import parallel
-from softreach.support.arrays import as_points
+from softreach.support.arrays import Array, Index, as_points
 from softreach.support.errors import InvalidInput
 
 __all__ = ["mean_value_distance"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 BLOCK = 1 << 14  # queries that one thread takes at a time
 _CELLS = 2.0 ** (PLACE_BITS - 1)  # along an axis; the other half of the keys is room for windows
@@ -80,7 +77,7 @@ def mean_value_distance(
 class _Sample(NamedTuple):
     """Points sorted by key, each component contiguous."""
 
-    keys: NDArray[np.int64]
+    keys: Index
     """Shape (n,)."""
     points: Array
     """Shape (3, n); the last axis runs along the columns."""
@@ -140,7 +137,7 @@ class _Columns:
             cubes += ((points[:, axis] - low) / one + 1.0).astype(np.int64)
         return np.flatnonzero(wanted.ravel()[cubes])
 
-    def windows(self, keys: NDArray[np.int64], along: Array) -> NDArray[np.int64]:
+    def windows(self, keys: Index, along: Array) -> Index:
         """First and last key of what each query can reach in its own column, shape (2, q)."""
         first_last = np.empty((2, len(keys)), np.int64)
         scale = 1.0 / self.widths[2]

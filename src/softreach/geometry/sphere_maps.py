@@ -12,11 +12,30 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-# Triangles on the unit sphere, and their subdivision.
+from softreach.support.arrays import Array, Index, Mask
 
+Indices = Index
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+Map = Callable[[Array], Array]
+"""Images of unit vectors (n, 3), unit vectors of the same shape."""
+
+_MOST_LEVELS = 16
+_MOST_TRIANGLES = 200_000
+_MOST_STARTS = 1000  # of triangles that are not flat
+
+_FLAT = 2.5
+"""Least altitude of a flat image, in sags of the one that it was cut from, of which it has 1/4."""
+
+_TURNS = 30
+_WIDEST = 0.3  # Newton step [rad]
+_DIFFERENCE = 3e-6  # of numerical derivatives [rad]
+_SETTLED = 1e-9  # Newton step [rad] of a root that was reached, if the map is well conditioned
+_RESIDUAL = 1e-11
+_SAME = 1e-6  # [rad]
+_POLAR, _AROUND = 24, 5
+_SAMPLES = 8192
+_BISECTIONS = 60
+_OFF_AXIS = 1e-6
 
 
 def icosphere(levels: int) -> tuple[Array, Indices]:
@@ -62,29 +81,6 @@ def quartered(points: Array, triangles: Indices) -> tuple[Array, Indices]:
     ab, bc, ca = (len(points) + which.reshape(-1, 3)).T
     cut = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
     return np.concatenate([points, middles]), np.concatenate([np.stack(t, axis=1) for t in cut])
-
-
-# Where a map of the unit sphere to itself takes a given value: all places, by subdivision.
-#
-# Triangles are quartered until their images are nearly flat or keep clear of the value. How far an
-# image is from flat is measured where a side is halved. What is left is the start of Newton's
-# method.
-
-
-Map = Callable[[Array], Array]
-"""Images of unit vectors (n, 3), unit vectors of the same shape."""
-
-_MOST_LEVELS = 16
-_MOST_TRIANGLES = 200_000
-_MOST_STARTS = 1000  # of triangles that are not flat
-_FLAT = 2.5
-"""Least altitude of a flat image, in sags of the one that it was cut from, of which it has 1/4."""
-_TURNS = 30
-_WIDEST = 0.3  # Newton step [rad]
-_DIFFERENCE = 3e-6  # of numerical derivatives [rad]
-_SETTLED = 1e-9  # Newton step [rad] of a root that was reached, if the map is well conditioned
-_RESIDUAL = 1e-11
-_SAME = 1e-6  # [rad]
 
 
 class Roots(NamedTuple):
@@ -143,7 +139,7 @@ def _candidates(seen: Map, levels: int, caution: float) -> tuple[Array, bool]:
     return starts, len(triangles) < _MOST_TRIANGLES
 
 
-def _sags(images: Array, triangles: NDArray[np.intp], middles: NDArray[np.intp]) -> Array:
+def _sags(images: Array, triangles: Index, middles: Index) -> Array:
     """How far the images of the middles of sides are from the middles of their images."""
     corners = images[triangles]
     halfway = 0.5 * (corners + np.roll(corners, -1, axis=1))
@@ -228,19 +224,13 @@ def _unit(vectors: Array) -> Array:
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
-def _first_of_equals(points: Array, good: NDArray[np.bool_]) -> NDArray[np.intp]:
+def _first_of_equals(points: Array, good: Mask) -> Index:
     """The first of each group of equal points."""
     kept: list[int] = []
     for k in np.flatnonzero(good):
         if all(np.linalg.norm(points[k] - points[j]) > _SAME for j in kept):
             kept.append(int(k))
     return np.array(kept, np.intp)
-
-
-_POLAR, _AROUND = 24, 5
-_SAMPLES = 8192
-_BISECTIONS = 60
-_OFF_AXIS = 1e-6
 
 
 class Rings(NamedTuple):

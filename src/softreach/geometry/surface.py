@@ -11,12 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.geometry.delaunay import unit_scale
 from softreach.kernels.points.point_distances import distances_to_faces
-from softreach.support.arrays import Faces, Points
+from softreach.support.arrays import Array, Faces, Index, Mask, Points
 
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
-
-Array = NDArray[np.float64]
 
 _NEIGHBORS = 16  # with 4, distances to long triangles came out up to a cell too large
 
@@ -75,7 +73,7 @@ class Surface:
         return KDTree(self.vertices)
 
     @cached_property
-    def _incidence(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _incidence(self) -> tuple[Index, Index]:
         """Faces around each vertex, one after the other, and where each vertex's begin."""
         corners = self.faces.ravel()
         ends = np.cumsum(np.bincount(corners, minlength=len(self.vertices)))
@@ -107,9 +105,6 @@ def surface_area(vertices: Points, faces: Faces) -> float:
     return float(np.ldexp(twice / 2.0, 2 * exponent))
 
 
-# The curves in which a plane across an axis cuts a surface of triangles.
-
-
 def plane_cut(surface: Surface, axis: int, at: float) -> list[Array]:
     """Cut a surface by the plane where one coordinate has a value.
 
@@ -135,7 +130,7 @@ def plane_cut(surface: Surface, axis: int, at: float) -> list[Array]:
     return [places[curve] for curve in _chained(ends.reshape(-1, 2), len(edges))]
 
 
-def _pieces(faces: NDArray[np.integer], above: NDArray[np.bool_]) -> NDArray[np.integer]:
+def _pieces(faces: NDArray[np.integer], above: Mask) -> NDArray[np.integer]:
     """Of each triangle that is cut, its two edges that are, as vertices, shape (n, 2, 2)."""
     count = above[faces].sum(axis=1)
     cut = faces[(count == 1) | (count == 2)]
@@ -162,7 +157,7 @@ def _walk(
     place: int,
     pieces: NDArray[np.integer],
     touching: list[list[int]],
-    used: NDArray[np.bool_],
+    used: Mask,
 ) -> list[int]:
     """From a place along pieces that are not used yet, as far as they go."""
     curve = [place]

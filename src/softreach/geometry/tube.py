@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.geometry.surface import Surface
+from softreach.support.arrays import Array, Faces, Index
 from softreach.support.errors import InvalidInput
 
 __all__ = ["grid_faces", "joined", "ribbon_surface", "tube_surface"]
-
-Array = NDArray[np.float64]
-Faces = NDArray[np.int64]
 
 
 def tube_surface(
@@ -116,11 +114,11 @@ def _tube_faces(stations: int, sides: int) -> Faces:
     return np.concatenate([walls, first_cap, last_cap])
 
 
-def _grid(index: NDArray[np.int64]) -> NDArray[np.int64]:
+def _grid(index: Index) -> Index:
     """The quads of a grid of vertices, turning from the first axis to the second."""
     corners = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
     return np.column_stack([corner.ravel() for corner in corners])
 
 
-def _halves(quads: NDArray[np.int64]) -> Faces:
+def _halves(quads: Index) -> Faces:
     return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])

@@ -24,7 +24,6 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.inverse.nearest import local_minima
 from softreach.inverse.prepared import PreparedMap
@@ -35,11 +34,10 @@ from softreach.kernels.branches import folds, newton
 from softreach.kernels.branches.newton import CONVERGED, RUNNING, STAGNATED, Search
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
+from softreach.support.arrays import Array, Index, rows
 
 __all__ = ["distinct", "every_branch"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _ROUNDING = 1e-13  # of a tip, in L, with room to spare
 _LARGEST, _SMALLEST = 8192, 1024  # targets solved together on a thread
@@ -70,9 +68,11 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
     prepared.prepare_branches()
     sets = _sets(spatial_order(request.targets), _set_size(prepared, count))
     if prepared.branch_map.supports_unstable or len(sets) == 1:
-        parts = [_branches_of(prepared, request, rows) for rows in sets]
+        parts = [_branches_of(prepared, request, chosen) for chosen in sets]
     else:
-        parts = list(parallel.in_order(partial(_alone, prepared, request, rows) for rows in sets))
+        parts = list(
+            parallel.in_order(partial(_alone, prepared, request, chosen) for chosen in sets)
+        )
     return Roots.sorted_by_target(parts)
 
 
@@ -96,25 +96,25 @@ def _set_size(prepared: PreparedMap, count: int) -> int:
     return min(_LARGEST, max(_SMALLEST, -(-count // (_SHARES * parallel.thread_count()))))
 
 
-def _alone(prepared: PreparedMap, request: Request, rows: Index) -> Roots:
+def _alone(prepared: PreparedMap, request: Request, chosen: Index) -> Roots:
     """The roots of some of the targets, on this thread only."""
     with parallel.undivided():
-        return _branches_of(prepared, request, rows)
+        return _branches_of(prepared, request, chosen)
 
 
-def _branches_of(prepared: PreparedMap, request: Request, rows: Index) -> Roots:
-    """The roots of some of the targets, sorted by their places in `rows`."""
-    some = request.of(rows)
-    starts = starts_from_cells(prepared, some, np.arange(len(rows)))
+def _branches_of(prepared: PreparedMap, request: Request, chosen: Index) -> Roots:
+    """The roots of some of the targets, sorted by their places in `chosen`."""
+    some = request.of(chosen)
+    starts = starts_from_cells(prepared, some, np.arange(len(chosen)))
     if len(prepared.torn_cells.tip):
         starts = with_torn_cells(prepared, some, starts)
     roots = _newton(prepared, some, starts)
     # Where the quadratics say that nothing leads there, look once more without believing them.
-    again = starts_from_cells(prepared, some, roots.missing(len(rows)), with_root=False)
+    again = starts_from_cells(prepared, some, roots.missing(len(chosen)), with_root=False)
     roots = distinct(prepared, some, roots.joined(_newton(prepared, some, again)))
     roots = _with_partners(prepared, some, roots)
-    roots = roots.joined(_singular_roots(prepared, some, roots.missing(len(rows))))
-    return roots._replace(target=rows[roots.target])
+    roots = roots.joined(_singular_roots(prepared, some, roots.missing(len(chosen))))
+    return roots._replace(target=chosen[roots.target])
 
 
 def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
@@ -143,7 +143,7 @@ def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
         starts.cell[converged],
         stable,
     )
-    return roots.where(residual <= request.residual)
+    return rows(roots, residual <= request.residual)
 
 
 def _improved(rod: TipMap, goal: Array, starts: Starts) -> Array:
@@ -207,7 +207,7 @@ def _with_partners(prepared: PreparedMap, request: Request, roots: Roots) -> Roo
 
 def _partner_starts(prepared: PreparedMap, roots: Roots) -> Starts:
     """Near the second preimage of every root that has a fold near, once for each overshoot."""
-    roots = roots.where(roots.cell >= 0)
+    roots = rows(roots, roots.cell >= 0)
     box, parts = prepared.rod.box, [Starts.empty(0)]
     margin = _OUTSIDE * box.widths  # a start moved to the bounds may be short of the other root
     for overshoot in _OVERSHOOTS:
@@ -217,9 +217,9 @@ def _partner_starts(prepared: PreparedMap, roots: Roots) -> Starts:
         folds.second_preimages(
             prepared.mesh, *known, _PARTNER_RANGE, overshoot, *bounds, start, near
         )
-        roots, unknown = roots.where(near), np.zeros((int(near.sum()), 3, 3))
+        roots, unknown = rows(roots, near), np.zeros((int(near.sum()), 3, 3))
         parts.append(Starts(roots.target, roots.cell, start[near], unknown))
-    return Starts.joined(parts).by_target()
+    return Starts.by_target(parts)
 
 
 def distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
@@ -233,15 +233,15 @@ def distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
     newton.merge_equal(offsets, *compared, smallest, rounding, single)
     kept = np.ones(len(roots.target), bool)
     kept[several] = single
-    return roots.where(kept)
+    return rows(roots, kept)
 
 
-def _singular_roots(prepared: PreparedMap, request: Request, rows: Index) -> Roots:
+def _singular_roots(prepared: PreparedMap, request: Request, chosen: Index) -> Roots:
     """Step 8: what descent finds for targets where Newton's method found nothing."""
-    starts = starts_from_cells(prepared, request, rows)
+    starts = starts_from_cells(prepared, request, chosen)
     by_position = Request(
         targets=request.targets[starts.target], residual=request.residual, near=starts.gamma
     )
     gamma = local_minima(prepared.rod, by_position, starts.gamma).gamma
     roots = roots_at(prepared.rod, request.targets, starts.target, gamma)
-    return distinct(prepared, request, roots.where(roots.residual <= request.residual))
+    return distinct(prepared, request, rows(roots, roots.residual <= request.residual))

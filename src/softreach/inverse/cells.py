@@ -1,4 +1,4 @@
-"""The activation box of three bundles in cells, finer where the tip map folds."""
+"""The activation box of three bundles in cells, and an octree over their images."""
 
 from __future__ import annotations
 
@@ -15,23 +15,72 @@ from softreach.kernels.image.activation_mesh import (
     interpolation_errors,
 )
 from softreach.rod.tip_map import TipMap
-
-# Searches for roots near the edge of what has an equilibrium, where cells have no image.
-#
-# A cell of which some corner has no tip, or is on another branch than the rest, cannot be mapped.
-# Its corners begin searches for the targets that their linearization sees within about a cell.
-
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from softreach.support.arrays import Array, Index, Mask
 
 _REACH = 1.5  # widths of a cell within which a root is looked for
 _MOST = 16  # searches for one target
 _AT_ONCE = 1 << 20  # pairs of a target and a vertex
+_CORNERS = corner_bits(3)
+_EVEN = 0.3  # ratio of det J at a cell's corners below which the cell is cut in eight
+_TORN = 0.05  # interpolation error in L beyond which corners are taken to be on different branches
+_MOST_CELLS = 300_000
+_LEAF = 24  # a node with no more tetrahedra is not divided
+_MOST_LEVELS = 10
+_MOST_ITEMS = 8_000_000
+_OCTANTS = np.array([[o >> 2 & 1, o >> 1 & 1, o & 1] for o in range(8)])
+
+
+def activation_cells(rod: TipMap, cells: int, depth: int = 0) -> tuple[ActivationMesh, TornCells]:
+    """Cells of the activation box with tips and Jacobians at their corners; those without apart.
+
+    Args:
+        rod: A tip map of three bundles, each free to move.
+        cells: Cells along each axis of the box.
+        depth: How often a cell may be halved where det J is uneven or changes sign.
+    """
+    lattice = _Lattice(rod, cells << depth)
+    low, width = _even_cells(cells, depth)
+    kept: list[Index] = []
+    total = len(low)
+    for level in range(depth + 1):
+        corner = lattice.vertices(low[:, None] + width * _CORNERS)
+        uneven = _uneven(lattice.det[corner]) if level < depth else np.zeros(len(low), bool)
+        if total + 7 * int(uneven.sum()) > _MOST_CELLS:
+            uneven[:] = False
+        kept.append(corner[~uneven])
+        total += 7 * int(uneven.sum())
+        width //= 2
+        low = (low[uneven, None] + width * _CORNERS).reshape(-1, 3)
+    corner = np.concatenate(kept)
+    mesh, torn = _mesh(lattice, corner), np.zeros(len(corner), bool)
+    if rod.supports_unstable:
+        torn = ~np.isfinite(lattice.det[corner]).all(axis=1)
+        torn |= mesh.interpolation_error > _TORN * rod.length
+    if torn.any():
+        mesh = _mesh(lattice, corner[~torn])
+    return mesh, _torn(lattice, corner[torn], cells)
+
+
+def image_tree(mesh: ActivationMesh) -> SpaceTree:
+    """Divide space until few tetrahedra remain in each place."""
+    planes = np.empty((6 * len(mesh.corner), 4, 4))
+    face_planes(mesh, 1e-9 * float(np.nanmax(mesh.tip) - np.nanmin(mesh.tip)), planes)
+    boxes = np.repeat(_image_boxes(mesh), 6, axis=0)
+    low = boxes[:, 0].min(axis=0)
+    size = float((boxes[:, 1].max(axis=0) - low).max())
+    growing = _Growing(planes, boxes, low, size)
+    for _ in range(_MOST_LEVELS):
+        if not growing.divide():
+            break
+    return growing.finished()
 
 
 class TornCells(NamedTuple):
-    """Vertices of cells without an image, those that have a tip."""
+    """Vertices of cells without an image, those that have a tip.
+
+    A cell of which some corner has no tip, or is on another branch than the rest, cannot be mapped.
+    Its corners begin searches for the targets that their linearization sees within about a cell.
+    """
 
     gamma: Array
     """Activations [-], shape (n, 3)."""
@@ -68,50 +117,13 @@ class TornCells(NamedTuple):
         return np.nonzero(near)[0], vertex[near]
 
 
-_CORNERS = corner_bits(3)
-_EVEN = 0.3  # ratio of det J at a cell's corners below which the cell is cut in eight
-_TORN = 0.05  # interpolation error in L beyond which corners are taken to be on different branches
-_MOST_CELLS = 300_000
-
-
-def activation_cells(rod: TipMap, cells: int, depth: int = 0) -> tuple[ActivationMesh, TornCells]:
-    """Cells of the activation box with tips and Jacobians at their corners; those without apart.
-
-    Args:
-        rod: A tip map of three bundles, each free to move.
-        cells: Cells along each axis of the box.
-        depth: How often a cell may be halved where det J is uneven or changes sign.
-    """
-    lattice = _Lattice(rod, cells << depth)
-    low, width = _even_cells(cells, depth)
-    kept: list[Index] = []
-    total = len(low)
-    for level in range(depth + 1):
-        corner = lattice.vertices(low[:, None] + width * _CORNERS)
-        uneven = _uneven(lattice.det[corner]) if level < depth else np.zeros(len(low), bool)
-        if total + 7 * int(uneven.sum()) > _MOST_CELLS:
-            uneven[:] = False
-        kept.append(corner[~uneven])
-        total += 7 * int(uneven.sum())
-        width //= 2
-        low = (low[uneven, None] + width * _CORNERS).reshape(-1, 3)
-    corner = np.concatenate(kept)
-    mesh, torn = _mesh(lattice, corner), np.zeros(len(corner), bool)
-    if rod.supports_unstable:
-        torn = ~np.isfinite(lattice.det[corner]).all(axis=1)
-        torn |= mesh.interpolation_error > _TORN * rod.length
-    if torn.any():
-        mesh = _mesh(lattice, corner[~torn])
-    return mesh, _torn(lattice, corner[torn], cells)
-
-
 def _even_cells(cells: int, depth: int) -> tuple[Index, int]:
     """First corners of the coarsest cells, in steps of the finest lattice, and their width."""
     axis = np.arange(cells) << depth
     return np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3), 1 << depth
 
 
-def _uneven(det: Array) -> NDArray[np.bool_]:
+def _uneven(det: Array) -> Mask:
     """Cells in which det J changes sign or nearly so: there the map folds or is about to."""
     small, large = np.abs(det).min(axis=1), np.abs(det).max(axis=1)
     return (det.min(axis=1) * det.max(axis=1) <= 0) | (small < _EVEN * large)
@@ -168,29 +180,6 @@ def _mesh(lattice: _Lattice, corner: Index) -> ActivationMesh:
     return ActivationMesh(*vertices, corner, error, remainder, change)
 
 
-# An octree over the images of the activation cells, so that a target costs no search.
-
-
-_LEAF = 24  # a node with no more tetrahedra is not divided
-_MOST_LEVELS = 10
-_MOST_ITEMS = 8_000_000
-_OCTANTS = np.array([[o >> 2 & 1, o >> 1 & 1, o & 1] for o in range(8)])
-
-
-def image_tree(mesh: ActivationMesh) -> SpaceTree:
-    """Divide space until few tetrahedra remain in each place."""
-    planes = np.empty((6 * len(mesh.corner), 4, 4))
-    face_planes(mesh, 1e-9 * float(np.nanmax(mesh.tip) - np.nanmin(mesh.tip)), planes)
-    boxes = np.repeat(_image_boxes(mesh), 6, axis=0)
-    low = boxes[:, 0].min(axis=0)
-    size = float((boxes[:, 1].max(axis=0) - low).max())
-    growing = _Growing(planes, boxes, low, size)
-    for _ in range(_MOST_LEVELS):
-        if not growing.divide():
-            break
-    return growing.finished()
-
-
 def _image_boxes(mesh: ActivationMesh) -> Array:
     images = mesh.tip[mesh.corner]
     error = mesh.interpolation_error[:, None]
@@ -238,7 +227,7 @@ class _Growing:
         first_left = int(np.argmin(affordable)) if not affordable.all() else len(counts)
         return max(_LEAF, int(counts[first_left]) if first_left < len(counts) else 0)
 
-    def _close(self, open_nodes: NDArray[np.bool_]) -> None:
+    def _close(self, open_nodes: Mask) -> None:
         """Number the children of open nodes; list the items of the others for good."""
         child = np.zeros(len(open_nodes), np.int64)
         child[open_nodes] = self.nodes + 8 * np.arange(int(open_nodes.sum()))

@@ -7,34 +7,25 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.kernels.box.box_newton import box_steps
 from softreach.rod.activation_box import ActivationBox, damped_steps
-from softreach.rod.tip_map import TipMap
+from softreach.rod.tip_map import BLOCK, TipMap
+from softreach.support.arrays import Array, Index, Mask, rows
 
-Array = NDArray[np.float64]
-
+_FEW = BLOCK // 8
 _MOST_ITERATIONS = 60
 _FIRST_DAMPING, _LEAST_DAMPING, _LARGEST_DAMPING = 1e-2, 1e-8, 1e8
 _STALLED = 1e-12  # step, in ranges, at which a search has found a minimum that is no root
 
+Evaluate = Callable[[Index, Array], tuple[Array, Array]]
+"""(which functions, activations (n, m)) -> values (n,), gradients (n, m)."""
 
-class Descent(NamedTuple):
-    """Where searches ended."""
-
-    gamma: Array
-    """Activations [-], shape (n, m)."""
-    tip: Array
-    """Their tips [m], shape (n, 3)."""
-    slope: Array
-    """∂r/∂γ there [m], shape (n, 3, m)."""
-    residual: Array
-    """|tip - target| [m], shape (n,)."""
-
-    def of(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> Descent:
-        """Some of them."""
-        return Descent(self.gamma[rows], self.tip[rows], self.slope[rows], self.residual[rows])
+_MOST_NEWTON_STEPS = 80
+_DIFFERENCE = 1e-6  # step of the differences of gradients, in ranges
+_STEP_TOL = 1e-10  # step at which a search has converged, in ranges
+_VALUE_TOL = 1e-14  # relative increase of a value that is rounding
+_LARGEST_NEWTON_DAMPING = 1e8  # at which a search stagnates
 
 
 def descend(
@@ -53,7 +44,7 @@ def descend(
         most: Iterations.
     """
     scales = rod.box.scales
-    tip, slope = rod.tips_and_slopes(start)
+    tip, slope = linearized(rod, start)
     away = np.linalg.norm(tip - targets, axis=1)
     # A start without a tip leads nowhere, and a step to a place without one fails.
     found = Descent(start.copy(), tip, slope, np.where(np.isnan(away), np.inf, away))
@@ -64,8 +55,8 @@ def descend(
         if not len(active):
             break
         goal, gamma = targets[active], found.gamma[active]
-        trial = _trials(rod, found.of(active), goal, damping[active])
-        tip, slope = rod.tips_and_slopes(trial)
+        trial = _trials(rod, rows(found, active), goal, damping[active])
+        tip, slope = linearized(rod, trial)
         miss = np.linalg.norm(tip - goal, axis=1)
         better = miss < found.residual[active]
         taken = active[better]
@@ -82,47 +73,6 @@ def descend(
         end |= (damping[active] > _LARGEST_DAMPING) | (stay[active] > 4)
         active = active[~end]
     return found
-
-
-def _trials(rod: TipMap, at: Descent, targets: Array, damping: Array) -> Array:
-    """The end of each step."""
-    miss, softness = (at.tip - targets) / rod.length, damping * at.residual / rod.length
-    return damped_steps(rod.box, at.gamma, miss, at.slope / rod.length, softness)[0]
-
-
-# Minima of many smooth functions of the activations inside the bounds.
-
-
-Index = NDArray[np.int64]
-Mask = NDArray[np.bool_]
-Evaluate = Callable[[Index, Array], tuple[Array, Array]]
-"""(which functions, activations (n, m)) -> values (n,), gradients (n, m)."""
-
-_MOST_NEWTON_STEPS = 80
-_DIFFERENCE = 1e-6  # step of the differences of gradients, in ranges
-_STEP_TOL = 1e-10  # step at which a search has converged, in ranges
-_VALUE_TOL = 1e-14  # relative increase of a value that is rounding
-_LARGEST_NEWTON_DAMPING = 1e8  # at which a search stagnates
-
-
-class Minima(NamedTuple):
-    """Local minima."""
-
-    gamma: Array
-    """Where [-], shape (n, m)."""
-    value: Array
-    """The functions there, shape (n,)."""
-    converged: Mask
-    """Whether the last step was negligible, shape (n,)."""
-
-
-class _Expansion(NamedTuple):
-    """Functions to second order about a point each."""
-
-    value: Array
-    gradient: Array
-    hessian: Array
-    """NaN where it was not asked for."""
 
 
 def minimize(evaluate: Evaluate, start: Array, box: ActivationBox) -> Minima:
@@ -158,6 +108,110 @@ def minimize(evaluate: Evaluate, start: Array, box: ActivationBox) -> Minima:
     return Minima(gamma, value, converged)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Objective:
+    """½ |γ - near|² + λ·c + ½ μ |c|² + ½ w² |d3 - direction|² with the miss c = (tip - target)/L.
+
+    Theory (40). Without near and λ its minimum is the nearest reachable point; with near and the
+    right λ it is the least change that reaches the target (an augmented Lagrangian).
+    """
+
+    rod: TipMap
+    targets: Array
+    """One for each search [m], shape (n, 3)."""
+    penalty: float = 1.0
+    """μ [-]."""
+    multiplier: Array | None = None
+    """λ, shape (n, 3)."""
+    near: Array | None = None
+    """Shape (n, m) [-]; None for no term of change."""
+    direction: Array | None = None
+    """Unit vectors, shape (n, 3); None for no term of direction."""
+    direction_weight: float = 0.0
+    """w [-]."""
+
+    def __call__(self, which: Index, gamma: Array) -> tuple[Array, Array]:
+        """Values (k,) and gradients (k, m) at activations (k, m) of searches `which` (k,)."""
+        if self.direction is None or not self.direction_weight:
+            return self._of_position(which, gamma, *linearized(self.rod, gamma))
+        motions = self.rod.tip_motions(gamma)
+        value, gradient = self._of_position(which, gamma, motions.tips, motions.slopes)
+        wanted, squared_weight = self.direction[which], self.direction_weight**2
+        value += 0.5 * squared_weight * _squares(motions.directions - wanted)
+        # ∂d3 = ω × d3, so that ½|d3 - e|² changes by -(ω × d3)·e = -ω·(d3 × e)
+        turn = np.cross(motions.directions, wanted)
+        gradient -= squared_weight * np.einsum("nij,ni->nj", motions.rotations, turn)
+        return value, gradient
+
+    def _of_position(
+        self, which: Index, gamma: Array, tips: Array, slopes: Array
+    ) -> tuple[Array, Array]:
+        """Value and gradient of all terms but that of the direction."""
+        miss = (tips - self.targets[which]) / self.rod.length
+        force = self.penalty * miss
+        value = 0.5 * self.penalty * _squares(miss)
+        if self.multiplier is not None:
+            force += self.multiplier[which]
+            value += np.einsum("ni,ni->n", self.multiplier[which], miss)
+        gradient = np.einsum("ni,nij->nj", force, slopes / self.rod.length)
+        if self.near is not None:
+            change = gamma - self.near[which]
+            value += 0.5 * _squares(change)
+            gradient += change
+        return value, gradient
+
+
+def linearized(rod: TipMap, gamma: Array) -> tuple[Array, Array]:
+    """Tips [m] and ∂r/∂γ [m] as `TipMap.tips_and_slopes`, for the steps of a search.
+
+    Their activations are arrays already: few of a rod without loads go past checks and threads.
+    """
+    if rod.supports_unstable or len(gamma) > _FEW:
+        return rod.tips_and_slopes(gamma)
+    tips, slopes = np.empty((len(gamma), 3)), np.empty((len(gamma), 3, gamma.shape[1]))
+    rod.fill(np.ascontiguousarray(gamma), tips, slopes)
+    return tips, slopes
+
+
+class Descent(NamedTuple):
+    """Where searches ended."""
+
+    gamma: Array
+    """Activations [-], shape (n, m)."""
+    tip: Array
+    """Their tips [m], shape (n, 3)."""
+    slope: Array
+    """∂r/∂γ there [m], shape (n, 3, m)."""
+    residual: Array
+    """|tip - target| [m], shape (n,)."""
+
+
+class Minima(NamedTuple):
+    """Local minima."""
+
+    gamma: Array
+    """Where [-], shape (n, m)."""
+    value: Array
+    """The functions there, shape (n,)."""
+    converged: Mask
+    """Whether the last step was negligible, shape (n,)."""
+
+
+def _trials(rod: TipMap, at: Descent, targets: Array, damping: Array) -> Array:
+    """The end of each step."""
+    miss, softness = (at.tip - targets) / rod.length, damping * at.residual / rod.length
+    return damped_steps(rod.box, at.gamma, miss, at.slope / rod.length, softness)[0]
+
+
+class _Expansion(NamedTuple):
+    """Functions to second order about a point each."""
+
+    value: Array
+    gradient: Array
+    hessian: Array
+    """NaN where it was not asked for."""
+
+
 def _next_damping(damping: Array, accepted: Mask) -> Array:
     eased = np.where(damping > 1e-6, 0.1 * damping, 0.0)
     return np.where(accepted, eased, np.maximum(10 * damping, 1e-3))
@@ -190,62 +244,6 @@ def _cautious(gradient: Array, scales: Array) -> Array:
     """In place of a Hessian, next to where a function ends: steps down of a tenth of the ranges."""
     size = np.abs(gradient * scales).max(axis=1, initial=0.0)
     return (10.0 * size / scales[:, None] ** 2).T[:, :, None] * np.eye(len(scales))
-
-
-# What a search for activations minimizes: miss of the target, change, error of direction.
-
-
-@dataclass(frozen=True, kw_only=True)
-class Objective:
-    """½ |γ - near|² + λ·c + ½ μ |c|² + ½ w² |d3 - direction|² with the miss c = (tip - target)/L.
-
-    Theory (40). Without near and λ its minimum is the nearest reachable point; with near and the
-    right λ it is the least change that reaches the target (an augmented Lagrangian).
-    """
-
-    rod: TipMap
-    targets: Array
-    """One for each search [m], shape (n, 3)."""
-    penalty: float = 1.0
-    """μ [-]."""
-    multiplier: Array | None = None
-    """λ, shape (n, 3)."""
-    near: Array | None = None
-    """Shape (n, m) [-]; None for no term of change."""
-    direction: Array | None = None
-    """Unit vectors, shape (n, 3); None for no term of direction."""
-    direction_weight: float = 0.0
-    """w [-]."""
-
-    def __call__(self, which: Index, gamma: Array) -> tuple[Array, Array]:
-        """Values (k,) and gradients (k, m) at activations (k, m) of searches `which` (k,)."""
-        if self.direction is None or not self.direction_weight:
-            return self._of_position(which, gamma, *self.rod.tips_and_slopes(gamma))
-        motions = self.rod.tip_motions(gamma)
-        value, gradient = self._of_position(which, gamma, motions.tips, motions.slopes)
-        wanted, squared_weight = self.direction[which], self.direction_weight**2
-        value += 0.5 * squared_weight * _squares(motions.directions - wanted)
-        # ∂d3 = ω × d3, so that ½|d3 - e|² changes by -(ω × d3)·e = -ω·(d3 × e)
-        turn = np.cross(motions.directions, wanted)
-        gradient -= squared_weight * np.einsum("nij,ni->nj", motions.rotations, turn)
-        return value, gradient
-
-    def _of_position(
-        self, which: Index, gamma: Array, tips: Array, slopes: Array
-    ) -> tuple[Array, Array]:
-        """Value and gradient of all terms but that of the direction."""
-        miss = (tips - self.targets[which]) / self.rod.length
-        force = self.penalty * miss
-        value = 0.5 * self.penalty * _squares(miss)
-        if self.multiplier is not None:
-            force += self.multiplier[which]
-            value += np.einsum("ni,ni->n", self.multiplier[which], miss)
-        gradient = np.einsum("ni,nij->nj", force, slopes / self.rod.length)
-        if self.near is not None:
-            change = gamma - self.near[which]
-            value += 0.5 * _squares(change)
-            gradient += change
-        return value, gradient
 
 
 def _squares(rows: Array) -> Array:

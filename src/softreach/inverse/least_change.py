@@ -1,7 +1,7 @@
 """More bundles than the target needs: of all activations that reach it, those that change least.
 
 Local minima of |γ - near| among the activations that reach a target are found from many starts:
-`near` itself, landmarks near the target that change little and lie apart, and whatever reached the
+`near` itself, seeds near the target that change little and lie apart, and whatever reached the
 target otherwise. The least of them is the answer.
 """
 
@@ -10,26 +10,24 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.inverse.descent import descend
 from softreach.inverse.nearest import Reached, first_of_each, reach
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
-from softreach.inverse.sqp import constrained_minima, sequential_minima, survey
+from softreach.inverse.sqp import constrained_minima, sqp, survey
 from softreach.rod.tip_map import TipMap
+from softreach.support.arrays import Array, Index
 
 __all__ = ["least_changes"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _CANDIDATES = 300
 _STARTS, _FACE_STARTS = 14, 10
 _APART = 0.15
 _SURVEY = 5  # steps after which searches are compared
 _SURVIVORS, _MERGED = 6, 0.05  # searches of a target that go on, and how far they are apart
-_PRICE_OF_CARE = 1e4
+_HIGH_PENALTY = 1e4
 _EQUAL = 1e-6  # difference of activations below which they are one
 _POLISHED, _MOST_POLISHING = 1e-9, 300
 _BLOCK = 4096  # targets at once: bounds the memory of their candidates
@@ -95,7 +93,7 @@ def _least_change(prepared: PreparedMap, request: Request, known: Array | None) 
     owner, start = _promising(prepared, request, *_starts(prepared, request))
     if known is not None:
         owner, start = np.concatenate([owner, np.arange(count)]), np.concatenate([start, known])
-    gamma, residual = sequential_minima(prepared.rod, request.of(owner), start)
+    gamma, residual = sqp(prepared.rod, request.of(owner), start)
     best = _least(owner, gamma, residual, request)
     found = Reached(gamma[best], residual[best])
     left = np.flatnonzero(found.residual > request.residual)
@@ -103,13 +101,13 @@ def _least_change(prepared: PreparedMap, request: Request, known: Array | None) 
     found.gamma[left], found.residual[left] = more
     # Where some search lost its target, the target lies next to a fold or a boundary.
     lost = np.bincount(owner, residual > request.residual, count) > 0
-    found = _with_care(prepared, request, found, np.flatnonzero(lost), owner, start)
+    found = _searched_again(prepared, request, found, np.flatnonzero(lost), owner, start)
     return _polished(prepared, request, found)
 
 
 def _polished(prepared: PreparedMap, request: Request, found: Reached) -> Reached:
     """The best once more, until its steps are negligible; kept where that changes less."""
-    gamma, residual = sequential_minima(
+    gamma, residual = sqp(
         prepared.rod, request, found.gamma, settled=_POLISHED, most=_MOST_POLISHING
     )
     owner = np.tile(np.arange(len(gamma)), 2)
@@ -119,7 +117,7 @@ def _polished(prepared: PreparedMap, request: Request, found: Reached) -> Reache
     return Reached(gamma[best], residual[best])
 
 
-def _with_care(
+def _searched_again(
     prepared: PreparedMap, request: Request, found: Reached, rows: Index, owner: Index, start: Array
 ) -> Reached:
     """Search once more for some targets: first for them, then for less change without leaving."""
@@ -128,9 +126,7 @@ def _with_care(
     start = np.concatenate([start[chosen], found.gamma[rows]])
     at = descend(rod, request.targets[owner], start, request.residual)
     hit = at.residual <= request.residual
-    gamma, residual = sequential_minima(
-        rod, request.of(owner[hit]), at.gamma[hit], price=_PRICE_OF_CARE
-    )
+    gamma, residual = sqp(rod, request.of(owner[hit]), at.gamma[hit], penalty=_HIGH_PENALTY)
     count = len(request.targets)
     owner = np.concatenate([np.arange(count), owner[hit], owner[hit]])
     gamma = np.concatenate([found.gamma, at.gamma[hit], gamma])
@@ -148,10 +144,10 @@ def _least(owner: Index, gamma: Array, residual: Array, request: Request) -> Ind
 
 
 def _starts(prepared: PreparedMap, request: Request) -> tuple[Index, Array]:
-    """The activation to stay near to, and landmarks near the target that change little."""
+    """The activation to stay near to, and seeds near the target that change little."""
     owners = [np.arange(len(request.targets))]
     starts = [prepared.rod.box.clip(request.near)]
-    for marks, most in ((prepared.landmarks, _STARTS), (prepared.face_landmarks, _FACE_STARTS)):
+    for marks, most in ((prepared.seeds, _STARTS), (prepared.face_seeds, _FACE_STARTS)):
         gamma = marks.nearest(request.targets, _CANDIDATES)
         order = ((gamma - request.near[:, None]) ** 2).sum(axis=2).argsort(axis=1, kind="stable")
         gamma = np.take_along_axis(gamma, order[:, :, None], axis=1)
@@ -172,7 +168,7 @@ def _promising(
     # A row for every target, filled up with its best, which is chosen once.
     places = first[:, None] + np.arange(counts.max(initial=0))
     places = np.where(places < (first + counts)[:, None], places, first[:, None])
-    return prepared.landmarks.starts(gamma[order[places]], _SURVIVORS, _MERGED)
+    return prepared.seeds.starts(gamma[order[places]], _SURVIVORS, _MERGED)
 
 
 def _turned(prepared: PreparedMap, request: Request, known: Array) -> Array:

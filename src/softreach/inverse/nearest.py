@@ -6,42 +6,19 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.inverse.descent import Descent, Minima, Objective, descend, minimize
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.roots import Roots, placed
 from softreach.rod.tip_map import TipMap
+from softreach.support.arrays import Array, Index, Mask
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-
-
-class Nearest(NamedTuple):
-    """The nearest reachable points that were found."""
-
-    gamma: Array
-    """Activations [-], shape (t, m)."""
-    tip: Array
-    """The points [m], shape (t, 3)."""
-    converged: NDArray[np.bool_]
-    """Whether the search converged, shape (t,)."""
-
-    @staticmethod
-    def joined(parts: list[Nearest]) -> Nearest:
-        """Those of consecutive blocks of targets."""
-        return (
-            parts[0] if len(parts) == 1 else Nearest(*map(np.concatenate, zip(*parts, strict=True)))
-        )
-
-    def of(self, rows: Index) -> Nearest:
-        """Those of some of the targets."""
-        return Nearest(self.gamma[rows], self.tip[rows], self.converged[rows])
+_SEED = 1
 
 
 def nearest(prepared: PreparedMap, request: Request, known: Roots | None = None) -> Nearest:
-    """The best local minimum found from landmarks for each target: of distance, and of direction.
+    """The best local minimum found from seeds for each target: of distance, and of direction.
 
     Args:
         prepared: The tip map.
@@ -51,7 +28,7 @@ def nearest(prepared: PreparedMap, request: Request, known: Roots | None = None)
     rod, targets = prepared.rod, request.targets
     if not len(targets):
         return Nearest(request.near, targets, np.empty(0, bool))
-    target, start = prepared.landmarks.starts(prepared.landmarks.nearest(targets))
+    target, start = prepared.seeds.starts(prepared.seeds.nearest(targets))
     if known is not None:
         target = np.concatenate([target, known.target])
         start = np.concatenate([start, known.gamma])
@@ -68,57 +45,13 @@ def nearest_from(rod: TipMap, request: Request, gamma: Array) -> Nearest:
     return Nearest(minima.gamma, placed(rod, minima.gamma)[0], minima.converged)
 
 
-def local_minima(rod: TipMap, request: Request, start: Array) -> Minima:
-    """A local minimum of the distance to target i (and direction i) from start i, (n, m)."""
-    objective = Objective(
-        rod=rod,
-        targets=request.targets,
-        direction=request.direction,
-        direction_weight=request.direction_weight,
-    )
-    return minimize(objective, start, rod.box)
-
-
-# An activation that reaches each target, whatever the number of bundles, with growing effort.
-#
-# Most targets are reached from the landmark whose tip is nearest. The rest lie where the map is
-# singular or on the boundary of the reachable set, which is the image of faces of the box on which
-# few bundles are free: these are searched from many landmarks, on such faces too, that lie apart.
-
-
-class _Effort(NamedTuple):
-    """How many searches a target that is still left is worth."""
-
-    neighbors: int
-    """Landmarks looked at."""
-    starts: int
-    """Most searches from them."""
-    apart: float
-    """Their least distance, in ranges."""
-    random: int
-    """Searches from anywhere."""
-
-
-_EFFORTS = (
-    _Effort(neighbors=1, starts=1, apart=0.0, random=0),
-    _Effort(neighbors=24, starts=4, apart=0.15, random=0),
-    _Effort(neighbors=128, starts=24, apart=0.1, random=8),
-    _Effort(neighbors=1000, starts=150, apart=0.05, random=100),
-)
-_SEED = 1
-
-
-class Reached(NamedTuple):
-    """The best place found for each target."""
-
-    gamma: Array
-    """Activations [-], shape (t, m)."""
-    residual: Array
-    """|tip - target| [m], shape (t,)."""
-
-
 def reach(prepared: PreparedMap, request: Request, start: Array) -> Reached:
-    """The activation found whose tip is nearest to each target.
+    """The activation found whose tip is nearest to each target, with growing effort.
+
+    Most targets are reached from the seed whose tip is nearest. The rest lie where the map is
+    singular or on the boundary of the reachable set, which is the image of faces of the box on
+    which few bundles are free: these are searched from many seeds, on such faces too, that lie
+    apart.
 
     Args:
         prepared: The tip map.
@@ -144,13 +77,65 @@ def reach(prepared: PreparedMap, request: Request, start: Array) -> Reached:
     return Reached(gamma, residual)
 
 
+def local_minima(rod: TipMap, request: Request, start: Array) -> Minima:
+    """A local minimum of the distance to target i (and direction i) from start i, (n, m)."""
+    objective = Objective(
+        rod=rod,
+        targets=request.targets,
+        direction=request.direction,
+        direction_weight=request.direction_weight,
+    )
+    return minimize(objective, start, rod.box)
+
+
+class Nearest(NamedTuple):
+    """The nearest reachable points that were found."""
+
+    gamma: Array
+    """Activations [-], shape (t, m)."""
+    tip: Array
+    """The points [m], shape (t, 3)."""
+    converged: Mask
+    """Whether the search converged, shape (t,)."""
+
+
+class Reached(NamedTuple):
+    """The best place found for each target."""
+
+    gamma: Array
+    """Activations [-], shape (t, m)."""
+    residual: Array
+    """|tip - target| [m], shape (t,)."""
+
+
+class _Effort(NamedTuple):
+    """How many searches a target that is still left is worth."""
+
+    neighbors: int
+    """Seeds looked at."""
+    starts: int
+    """Most searches from them."""
+    apart: float
+    """Their least distance, in ranges."""
+    random: int
+    """Searches from anywhere."""
+
+
+_EFFORTS = (
+    _Effort(neighbors=1, starts=1, apart=0.0, random=0),
+    _Effort(neighbors=24, starts=4, apart=0.15, random=0),
+    _Effort(neighbors=128, starts=24, apart=0.1, random=8),
+    _Effort(neighbors=1000, starts=150, apart=0.05, random=100),
+)
+
+
 def _searched(
     prepared: PreparedMap, request: Request, effort: _Effort, anywhere: Array
 ) -> tuple[Index, Descent]:
-    """Searches from landmarks all over the box, from those on its faces, and from anywhere."""
+    """Searches from seeds all over the box, from those on its faces, and from anywhere."""
     count = len(request.targets)
     owners, starts = [np.repeat(np.arange(count), len(anywhere))], [np.tile(anywhere, (count, 1))]
-    for marks in (prepared.landmarks, prepared.face_landmarks):
+    for marks in (prepared.seeds, prepared.face_seeds):
         near = marks.nearest(request.targets, effort.neighbors)
         owner, start = marks.starts(near, effort.starts, effort.apart)
         owners.append(owner)

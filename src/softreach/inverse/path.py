@@ -6,25 +6,23 @@ from enum import IntEnum
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.request import checked_activations, checked_residual, checked_targets
+from softreach.inverse.request import as_activations, as_residual, as_targets
 from softreach.inverse.roots import placed
 from softreach.inverse.solve import solve_inverse
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import free_bundles, measured_bundles, stable_tips
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
+from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["PathStatus", "track_path"]
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _LONGEST = 0.1  # predicted change of activation in one substep, in ranges
 _SHORTEST = 1e-10  # substep at which a branch is at its end, in L
@@ -34,6 +32,59 @@ _FOLDED = 1e-3  # smallest singular value at the end of a branch that is a fold,
 _AT_BOUND = 1e-9  # in ranges
 _MOST_CORRECTIONS = 10
 _SINGULAR = 1e-10  # singular values below this part of the largest do not count
+
+
+def track_path(
+    arm: Manipulator | TipMap,
+    path: ArrayLike,
+    start: ArrayLike | None = None,
+    *,
+    residual_over_length: float = 1e-10,
+    tol: float = 1e-6,
+) -> xr.Dataset:
+    """Follow a path of tip positions, straight between its points, on one branch.
+
+    Each substep is predicted by the Jacobian and corrected by Newton's method; it is halved while
+    the correction is large, while det J changes sign (three free bundles), while a bound is
+    overstepped or while there is no stable equilibrium. With more free bundles the change of
+    activation is least in every substep, and bundles wait at their bounds.
+
+    Args:
+        arm: A design with three free bundles or more, or its tip map.
+        path: Tip positions in order [m], shape (k, 3).
+        start: Activation to begin with [-], shape (bundles,); it is corrected to the first point.
+            By default the best-conditioned of all solutions there.
+        residual_over_length: Largest |tip - point|, in L.
+        tol: Largest error of the tips themselves, in L. A tip map keeps its own.
+
+    Returns:
+        Dataset over `point` with `activation` [-] and `tip_error` [m], NaN beyond the end of the
+        branch, and `status` (`PathStatus`); `end_activation` and `end_position` are the last on
+        the branch, `end_length` the length of path up to there and `end_length_error` how much
+        farther the branch may go [m]; the attributes name how it ended: `end` ("" if the whole
+        path is followed, else `fold`, `bound`, `unstable` or `no_start`), `end_bundle` and
+        `end_bound`.
+
+    Raises:
+        InvalidInput: Arguments of another shape or not finite, or fewer than three free bundles.
+    """
+    points = as_targets("path", path)
+    rod = measured_bundles(tip_map(arm, tol))
+    if rod.box.dimension < 3:
+        raise InvalidInput("free bundles", rod.box.dimension, "3 or more to follow a path in space")
+    if not len(points):
+        raise InvalidInput("path.shape", points.shape, "of shape (k, 3) with one point or more")
+    residual = as_residual(residual_over_length)
+    tracker = Continuation(free_bundles(stable_tips(rod)), residual * rod.length)
+    if start is not None:
+        gamma = as_activations("start", start, rod.box, 1)[0]
+        gamma = gamma / rod.measures[rod.box.free]
+        first = tracker.corrected_start(tracker.box.clip(gamma), points[0])
+    else:
+        first = _best_start(rod, tracker, points[0], residual)
+    followed, end = ([], None) if first is None else _followed(tracker, first, points)
+    asked = {"tol": rod.tol, "residual_over_length": residual}
+    return _dataset(rod, points, followed, end).assign_attrs(asked)
 
 
 class PathStatus(IntEnum):
@@ -51,41 +102,7 @@ class PathStatus(IntEnum):
     """Beyond a loss of stability: there the arm leaps to another equilibrium as the load grows."""
 
 
-class BranchPoint(NamedTuple):
-    """An activation with the tip map linearized there."""
-
-    gamma: Array
-    """Activation of the free bundles [-], shape (m,)."""
-    tip: Array
-    """Tip [m], shape (3,)."""
-    slope: Array
-    """∂r/∂γ [m], shape (3, m)."""
-
-
-class BranchEnd(NamedTuple):
-    """How far a branch was followed."""
-
-    status: PathStatus
-    point: BranchPoint
-    """The last point on it."""
-    bundle: int = -1
-    """The bundle at its bound."""
-    upper: bool = False
-    """Which bound that is."""
-    done: float = 0.0
-    """The part of the way to the next point that was followed [-]."""
-    error: float = 0.0
-    """How much farther the branch may go [m]."""
-
-
-class _Substep(NamedTuple):
-    """A substep: where it led, or by how much to shorten it, or the end of the branch."""
-
-    point: BranchPoint | None = None
-    shorten: float = 1.0
-    end: BranchEnd | None = None
-    torn: bool = False
-    """Whether it met a place without a stable equilibrium."""
+_MEANINGS = " ".join(f"{status.value}={status.name.lower()}" for status in PathStatus)
 
 
 class Continuation:
@@ -215,68 +232,46 @@ class Continuation:
         return float(np.clip(part.min(), 1e-6, 0.9999))
 
 
+class BranchPoint(NamedTuple):
+    """An activation with the tip map linearized there."""
+
+    gamma: Array
+    """Activation of the free bundles [-], shape (m,)."""
+    tip: Array
+    """Tip [m], shape (3,)."""
+    slope: Array
+    """∂r/∂γ [m], shape (3, m)."""
+
+
+class BranchEnd(NamedTuple):
+    """How far a branch was followed."""
+
+    status: PathStatus
+    point: BranchPoint
+    """The last point on it."""
+    bundle: int = -1
+    """The bundle at its bound."""
+    upper: bool = False
+    """Which bound that is."""
+    done: float = 0.0
+    """The part of the way to the next point that was followed [-]."""
+    error: float = 0.0
+    """How much farther the branch may go [m]."""
+
+
+class _Substep(NamedTuple):
+    """A substep: where it led, or by how much to shorten it, or the end of the branch."""
+
+    point: BranchPoint | None = None
+    shorten: float = 1.0
+    end: BranchEnd | None = None
+    torn: bool = False
+    """Whether it met a place without a stable equilibrium."""
+
+
 def _least_norm(slope: Array, moving: Mask) -> Array:
     """Pseudoinverse of the Jacobian of the moving bundles, shape (m, 3): theory (39)."""
     return np.asarray(np.linalg.pinv(slope * moving, rcond=_SINGULAR), np.float64)
-
-
-# Activations that follow a path of tip positions continuously, on one branch of solutions.
-
-
-_MEANINGS = " ".join(f"{status.value}={status.name.lower()}" for status in PathStatus)
-
-
-def track_path(
-    arm: Manipulator | TipMap,
-    path: ArrayLike,
-    start: ArrayLike | None = None,
-    *,
-    residual_over_length: float = 1e-10,
-    tol: float = 1e-6,
-) -> xr.Dataset:
-    """Follow a path of tip positions, straight between its points, on one branch.
-
-    Each substep is predicted by the Jacobian and corrected by Newton's method; it is halved while
-    the correction is large, while det J changes sign (three free bundles), while a bound is
-    overstepped or while there is no stable equilibrium. With more free bundles the change of
-    activation is least in every substep, and bundles wait at their bounds.
-
-    Args:
-        arm: A design with three free bundles or more, or its tip map.
-        path: Tip positions in order [m], shape (k, 3).
-        start: Activation to begin with [-], shape (bundles,); it is corrected to the first point.
-            By default the best-conditioned of all solutions there.
-        residual_over_length: Largest |tip - point|, in L.
-        tol: Largest error of the tips themselves, in L. A tip map keeps its own.
-
-    Returns:
-        Dataset over `point` with `activation` [-] and `tip_error` [m], NaN beyond the end of the
-        branch, and `status` (`PathStatus`); `end_activation` and `end_position` are the last on
-        the branch, `end_length` the length of path up to there and `end_length_error` how much
-        farther the branch may go [m]; the attributes name how it ended: `end` ("" if the whole
-        path is followed, else `fold`, `bound`, `unstable` or `no_start`), `end_bundle` and
-        `end_bound`.
-
-    Raises:
-        InvalidInput: Arguments of another shape or not finite, or fewer than three free bundles.
-    """
-    points = checked_targets("path", path)
-    rod = measured_bundles(tip_map(arm, tol))
-    if rod.box.dimension < 3:
-        raise InvalidInput("free bundles", rod.box.dimension, "3 or more to follow a path in space")
-    if not len(points):
-        raise InvalidInput("path.shape", points.shape, "of shape (k, 3) with one point or more")
-    residual = checked_residual(residual_over_length)
-    tracker = Continuation(free_bundles(stable_tips(rod)), residual * rod.length)
-    if start is not None:
-        gamma = checked_activations("start", start, rod.box, 1)[0]
-        gamma = gamma / rod.measures[rod.box.free]
-        first = tracker.corrected_start(tracker.box.clip(gamma), points[0])
-    else:
-        first = _best_start(rod, tracker, points[0], residual)
-    followed, end = ([], None) if first is None else _followed(tracker, first, points)
-    asked = {"tol": rod.tol, "residual_over_length": residual}
-    return _dataset(rod, points, followed, end).assign_attrs(asked)
 
 
 def _best_start(

@@ -6,29 +6,28 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.cells import TornCells, activation_cells, image_tree
 from softreach.inverse.proofs import CoarseCells
-from softreach.inverse.seeds import Landmarks, face_landmarks, landmarks
+from softreach.inverse.seeds import Seeds, face_seeds, seeds
 from softreach.kernels.branches.space_tree import SpaceTree
 from softreach.kernels.image.activation_mesh import ActivationMesh
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import free_bundles, measured_bundles, stable_tips
-from softreach.support.arguments import checked, whole
+from softreach.support.arguments import as_integer
+from softreach.support.arrays import Array
 
 __all__ = ["PreparedMap", "prepared_map"]
 
-Array = NDArray[np.float64]
 
 _CELLS = 32
 
 
 @dataclass(frozen=True)
 class PreparedMap:
-    """A tip map with cells, tree and landmarks, each computed when first needed.
+    """A tip map with cells, tree and seeds, each computed when first needed.
 
     Changes of activation are compared throughout, so that it counts them in their measures.
     """
@@ -93,9 +92,9 @@ class PreparedMap:
         return image_tree(self.mesh)
 
     @cached_property
-    def landmarks(self) -> Landmarks:
+    def seeds(self) -> Seeds:
         """Where searches for a minimum begin."""
-        return landmarks(self.rod)
+        return seeds(self.rod)
 
     @cached_property
     def coarse_cells(self) -> CoarseCells:
@@ -103,12 +102,11 @@ class PreparedMap:
         return CoarseCells(self.rod)
 
     @cached_property
-    def face_landmarks(self) -> Landmarks:
+    def face_seeds(self) -> Seeds:
         """Where searches begin for places on the boundary of the reachable set."""
-        return face_landmarks(self.rod)
+        return face_seeds(self.rod)
 
 
-@checked(cells=whole(2, 256), depth=whole(0, 20))
 def prepared_map(
     arm: Manipulator | TipMap | PreparedMap,
     tol: float = 1e-6,
@@ -125,6 +123,7 @@ def prepared_map(
         depth: How often a cell is halved where det ∂r/∂γ changes sign or is uneven; once at least
             for an arm under loads.
     """
+    cells, depth = as_integer("cells", cells, 2, 256), as_integer("depth", depth, 0, 20)
     if isinstance(arm, PreparedMap):
         return arm
     rod = measured_bundles(tip_map(arm, tol))

@@ -1,4 +1,6 @@
-"""Branch and bound: cells of the activation box, halved until a bound on each says enough.
+"""Proofs by branch and bound: no activation comes nearer to a target, or changes less.
+
+Cells of the activation box are halved until a bound on each says enough.
 
 On a cell with center c and half widths h the tip lies within an error of its linearization at c,
 `TipMap.linearization_errors`. What that says of a cell is for the caller to bound.
@@ -11,21 +13,88 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.kernels.box import change_bounds as dual
 from softreach.kernels.box.box_projection import project
 from softreach.kernels.box.cell_cover import near_cells
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from softreach.support.arrays import Array, Index, rows
 
 MOST_BUNDLES = 6  # with more, halving cells proves nothing that can be afforded
 _COARSE = 70_000  # cells that all targets share
 _ROUNDING = 1e-12  # of tips, in L
 _BLOCK = 16_384  # cells at once
+_ENOUGH = 0.2  # of the gap of the best place: a bound that large ends the search
+_MOST_EXCLUSION_CELLS = 20_000  # examined for one target
+_MOST_OF_THREE = 4_000  # the same with three bundles or fewer, where a proof needs far fewer
+_TARGET_BLOCK = 10  # targets at once
+_SOFTNESS = 1e-6  # of the linear problem that says in which direction the target lies
+SLACK = 1e-6  # by which a bound may fall short of the change that it proves to be least
+_AIM = 0.9 * SLACK  # where a search ends: rounding is not to decide
+_MOST_LEAST_CELLS = 100_000  # examined for one target
+_REQUEST_BLOCK = 16  # targets at once
+
+
+def gap_bounds(rod: TipMap, coarse: CoarseCells, targets: Array, gap: Array) -> Array:
+    """A lower bound of the distance of each target from everything that the box reaches.
+
+    The distance of a target p from the linear image of a cell with center c and half widths h is
+    n·(p - r(c)) - Σ hj |n·Jj| at least, for any unit vector n, and its distance from the image no
+    smaller than that by more than the error of the linearization.
+
+    Args:
+        rod: The tip map.
+        coarse: Its cells.
+        targets: Shape (t, 3) [m].
+        gap: How near to each the best place known is [m], shape (t,).
+
+    Returns:
+        Bounds [m], shape (t,); 0 where nothing is proved.
+    """
+    if rod.box.dimension == 0:
+        return gap.copy()  # one place is reached
+    bounds = np.maximum(np.linalg.norm(targets, axis=1) - rod.farthest(), 0.0)
+
+    def prove(rows: slice) -> None:
+        proved = _exclusion_of_block(rod, coarse, targets[rows], gap[rows])
+        bounds[rows] = np.maximum(bounds[rows], proved)
+
+    parallel.run(partial(prove, rows) for rows in parallel.blocks(len(targets), _TARGET_BLOCK))
+    return np.minimum(bounds, gap)
+
+
+def change_bounds(
+    rod: TipMap, coarse: CoarseCells, targets: Array, near: Array, change: Array
+) -> Array:
+    """A lower bound of |γ - near| over all activations that reach each target.
+
+    Where tips lie within e of their linearization at the center c of a cell, every activation x of
+    the cell that reaches p has |A x - b| <= e with A = J(c) and b = p - r(c) + A c. The least
+    change under this condition alone is bounded from below by its dual of three unknowns,
+    `kernels.change_bounds`.
+
+    Args:
+        rod: The tip map.
+        coarse: Its cells.
+        targets: Shape (t, 3) [m].
+        near: Shape (t, m) [-].
+        change: |γ - near| of the best activation known [-], shape (t,).
+
+    Returns:
+        Shape (t,) [-]: at least `change - SLACK` where that one is proved to be the least.
+    """
+    # No activation within the bounds is nearer than the one nearest to `near`, wherever its tip.
+    bounds = np.linalg.norm(near - rod.box.clip(near), axis=1)
+    if rod.box.dimension <= MOST_BUNDLES and np.isfinite(rod.linearization_error(coarse.half)):
+        enough = np.maximum(change - _AIM, 0.0)
+
+        def prove(rows: slice) -> None:
+            proved = _least_of_block(rod, coarse, targets[rows], near[rows], enough[rows])
+            bounds[rows] = np.maximum(bounds[rows], proved)
+
+        parallel.run(partial(prove, rows) for rows in parallel.blocks(len(targets), _REQUEST_BLOCK))
+    return np.minimum(bounds, change)
 
 
 class Cells(NamedTuple):
@@ -35,10 +104,6 @@ class Cells(NamedTuple):
     """Number of the target, ascending, shape (n,)."""
     center: Array
     """Activation [-], shape (n, m)."""
-
-    def where(self, chosen: NDArray[np.bool_] | slice) -> Cells:
-        """Some of them."""
-        return Cells(self.owner[chosen], self.center[chosen])
 
 
 class Linearized(NamedTuple):
@@ -103,7 +168,7 @@ def least_of_cells(
             [
                 bound(part, linearized(rod, half, part.center))
                 for first in range(0, len(owner), _BLOCK)
-                for part in (cells.where(slice(first, first + _BLOCK)),)
+                for part in (rows(cells, slice(first, first + _BLOCK)),)
             ]
         )
         spent += np.bincount(owner, minlength=count)
@@ -111,7 +176,7 @@ def least_of_cells(
         left = np.bincount(owner[open_cells], minlength=count)
         hopeless = open_cells & (spent + 2 * left > most)[owner]
         np.minimum.at(least, owner[hopeless], found[hopeless])
-        half, cells = _halved(rod, half, cells.where(open_cells & ~hopeless))
+        half, cells = _halved(rod, half, rows(cells, open_cells & ~hopeless))
     return least
 
 
@@ -135,44 +200,6 @@ def _halved(rod: TipMap, half: Array, cells: Cells) -> tuple[Array, Cells]:
     center[0::2, axis] -= half[axis]
     center[1::2, axis] += half[axis]
     return half, Cells(np.repeat(cells.owner, 2), center)
-
-
-# Proof that a target is out of reach: a lower bound of its distance from the reachable set.
-#
-# The distance of a target p from the linear image of a cell with center c and half widths h is n·(p
-# - r(c)) - Σ hj |n·Jj| at least, for any unit vector n, and its distance from the image no smaller
-# than that by more than the error of the linearization.
-
-
-_ENOUGH = 0.2  # of the gap of the best place: a bound that large ends the search
-_MOST_EXCLUSION_CELLS = 20_000  # examined for one target
-_MOST_OF_THREE = 4_000  # the same with three bundles or fewer, where a proof needs far fewer
-_TARGET_BLOCK = 10  # targets at once
-_SOFTNESS = 1e-6  # of the linear problem that says in which direction the target lies
-
-
-def gap_bounds(rod: TipMap, coarse: CoarseCells, targets: Array, gap: Array) -> Array:
-    """A lower bound of the distance of each target from everything that the box reaches.
-
-    Args:
-        rod: The tip map.
-        coarse: Its cells.
-        targets: Shape (t, 3) [m].
-        gap: How near to each the best place known is [m], shape (t,).
-
-    Returns:
-        Bounds [m], shape (t,); 0 where nothing is proved.
-    """
-    if rod.box.dimension == 0:
-        return gap.copy()  # one place is reached
-    bounds = np.maximum(np.linalg.norm(targets, axis=1) - rod.farthest(), 0.0)
-
-    def prove(rows: slice) -> None:
-        proved = _exclusion_of_block(rod, coarse, targets[rows], gap[rows])
-        bounds[rows] = np.maximum(bounds[rows], proved)
-
-    parallel.run(partial(prove, rows) for rows in parallel.blocks(len(targets), _TARGET_BLOCK))
-    return np.minimum(bounds, gap)
 
 
 def _exclusion_of_block(rod: TipMap, coarse: CoarseCells, targets: Array, gap: Array) -> Array:
@@ -211,48 +238,6 @@ def _distances(targets: Array, at: Linearized) -> Array:
     linear = np.einsum("ni,ni->n", normal, away)
     linear -= np.abs(np.einsum("ni,nij->nj", normal, slopes)).sum(axis=1)
     return linear - at.errors
-
-
-# Proof that no activation changes less: a lower bound of |γ - near| over all that reach a target.
-#
-# Where tips lie within e of their linearization at the center c of a cell, every activation x of
-# the cell that reaches p has |A x - b| <= e with A = J(c) and b = p - r(c) + A c. The least change
-# under this condition alone is bounded from below by its dual of three unknowns,
-# `kernels.change_bounds`.
-
-
-SLACK = 1e-6  # by which a bound may fall short of the change that it proves to be least
-_AIM = 0.9 * SLACK  # where a search ends: rounding is not to decide
-_MOST_LEAST_CELLS = 100_000  # examined for one target
-_REQUEST_BLOCK = 16  # targets at once
-
-
-def change_bounds(
-    rod: TipMap, coarse: CoarseCells, targets: Array, near: Array, change: Array
-) -> Array:
-    """A lower bound of |γ - near| over all activations that reach each target.
-
-    Args:
-        rod: The tip map.
-        coarse: Its cells.
-        targets: Shape (t, 3) [m].
-        near: Shape (t, m) [-].
-        change: |γ - near| of the best activation known [-], shape (t,).
-
-    Returns:
-        Shape (t,) [-]: at least `change - SLACK` where that one is proved to be the least.
-    """
-    # No activation within the bounds is nearer than the one nearest to `near`, wherever its tip.
-    bounds = np.linalg.norm(near - rod.box.clip(near), axis=1)
-    if rod.box.dimension <= MOST_BUNDLES and np.isfinite(rod.linearization_error(coarse.half)):
-        enough = np.maximum(change - _AIM, 0.0)
-
-        def prove(rows: slice) -> None:
-            proved = _least_of_block(rod, coarse, targets[rows], near[rows], enough[rows])
-            bounds[rows] = np.maximum(bounds[rows], proved)
-
-        parallel.run(partial(prove, rows) for rows in parallel.blocks(len(targets), _REQUEST_BLOCK))
-    return np.minimum(bounds, change)
 
 
 def _least_of_block(

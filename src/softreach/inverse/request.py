@@ -5,19 +5,82 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.rod.activation_box import ActivationBox
 from softreach.support.arguments import as_number
-from softreach.support.arrays import as_floats, as_rows, check_finite
+from softreach.support.arrays import Array, Index, as_floats, as_rows, check_finite
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.quantity import numbers_in, shortened
 
-# Positions from a table in text: the columns x, y, z of a CSV file.
-
-
 FARTHEST = 1e100
 """How far a target may lie [m]: squares of larger distances leave the range of numbers."""
+
+_RESIDUALS = (1e-13, 1e-2)  # in L; below, rounding of the tips decides
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """Targets, and which activations to prefer where there is a choice."""
+
+    targets: Array
+    """Where the tip should be [m], shape (t, 3)."""
+    residual: float
+    """Largest |tip - target| of a solution [m]."""
+    near: Array
+    """Activations of the free bundles to stay near to [-], shape (t, dimension)."""
+    direction: Array | None = None
+    """Wanted tip tangents, unit vectors, shape (t, 3)."""
+    direction_weight: float = 0.0
+    """What |d3 - direction| counts for, against |γ - near| or a distance in L [-]."""
+    family: int = 1
+    """Activations wanted for each target where there are infinitely many."""
+    seed: int = 0
+    """Seed of the random activations that the others stay near to."""
+    prove_least: bool = False
+    """Whether to bound the change of all activations that reach a target from below."""
+
+    def of(self, rows: slice | Index) -> Request:
+        """The request for some of the targets."""
+        direction = None if self.direction is None else self.direction[rows]
+        return replace(self, targets=self.targets[rows], near=self.near[rows], direction=direction)
+
+
+def as_targets(name: str, targets: ArrayLike) -> Array:
+    """The targets as a (t, 3) float array.
+
+    Raises:
+        InvalidInput: Another shape, or values that are not finite or beyond 1e100 m.
+    """
+    points = as_rows(name, targets, 3, "of shape (t, 3), positions in m")
+    if points.size and (far := np.abs(points).max()) > FARTHEST:
+        raise InvalidInput(name, f"up to {far:g} m", f"within {FARTHEST:g} m")
+    return points
+
+
+def as_activations(name: str, activations: ArrayLike, box: ActivationBox, count: int) -> Array:
+    """An activation for each target, of the free bundles only, shape (t, dimension).
+
+    Args:
+        name: What the argument is called.
+        activations: Of all bundles [-], shape (bundles,) or (t, bundles).
+        box: The bounds of all bundles.
+        count: Number of targets t.
+
+    Raises:
+        InvalidInput: Another shape, or values that are not finite.
+    """
+    m = box.bundles
+    rows = as_floats(name, activations)
+    if rows.shape not in ((m,), (count, m)):
+        raise InvalidInput(f"{name}.shape", rows.shape, f"of shape ({m},), or ({count}, {m})")
+    check_finite(name, rows)
+    return np.ascontiguousarray(np.broadcast_to(rows, (count, m))[:, box.free])
+
+
+def as_residual(residual_over_length: float) -> float:
+    """The largest |tip - target| in L, if that can be asked for."""
+    return as_number("residual_over_length", residual_over_length, Range(*_RESIDUALS))
 
 
 def positions_in(text: str, source: str) -> list[list[float]]:
@@ -53,86 +116,3 @@ def position_in(name: str, text: str) -> list[float]:
 def _is_header(line: str) -> bool:
     """Whether a line holds names: no part of it begins as a number does."""
     return not any(part.strip().startswith(tuple("+-.0123456789")) for part in line.split(","))
-
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-
-_RESIDUALS = (1e-13, 1e-2)  # in L; below, rounding of the tips decides
-
-
-@dataclass(frozen=True, kw_only=True)
-class Request:
-    """Targets, and which activations to prefer where there is a choice."""
-
-    targets: Array
-    """Where the tip should be [m], shape (t, 3)."""
-    residual: float
-    """Largest |tip - target| of a solution [m]."""
-    near: Array
-    """Activations of the free bundles to stay near to [-], shape (t, dimension)."""
-    direction: Array | None = None
-    """Wanted tip tangents, unit vectors, shape (t, 3)."""
-    direction_weight: float = 0.0
-    """What |d3 - direction| counts for, against |γ - near| or a distance in L [-]."""
-    family: int = 1
-    """Activations wanted for each target where there are infinitely many."""
-    seed: int = 0
-    """Seed of the random activations that the others stay near to."""
-    prove_least: bool = False
-    """Whether to bound the change of all activations that reach a target from below."""
-
-    def of(self, rows: slice | Index) -> Request:
-        """The request for some of the targets."""
-        direction = None if self.direction is None else self.direction[rows]
-        return replace(self, targets=self.targets[rows], near=self.near[rows], direction=direction)
-
-
-def checked_targets(name: str, targets: ArrayLike) -> Array:
-    """The targets as a (t, 3) float array.
-
-    Raises:
-        InvalidInput: Another shape, or values that are not finite or beyond 1e100 m.
-    """
-    points = as_rows(name, targets, 3, "of shape (t, 3), positions in m")
-    if points.size and (far := np.abs(points).max()) > FARTHEST:
-        raise InvalidInput(name, f"up to {far:g} m", f"within {FARTHEST:g} m")
-    return points
-
-
-def checked_activations(name: str, activations: ArrayLike, box: ActivationBox, count: int) -> Array:
-    """An activation for each target, of the free bundles only, shape (t, dimension).
-
-    Args:
-        name: What the argument is called.
-        activations: Of all bundles [-], shape (bundles,) or (t, bundles).
-        box: The bounds of all bundles.
-        count: Number of targets t.
-
-    Raises:
-        InvalidInput: Another shape, or values that are not finite.
-    """
-    m = box.bundles
-    rows = as_floats(name, activations)
-    if rows.shape not in ((m,), (count, m)):
-        raise InvalidInput(f"{name}.shape", rows.shape, f"of shape ({m},), or ({count}, {m})")
-    check_finite(name, rows)
-    return np.ascontiguousarray(np.broadcast_to(rows, (count, m))[:, box.free])
-
-
-def checked_direction(direction: ArrayLike | None, count: int) -> Array | None:
-    """Unit vectors along the wanted tip tangents, shape (t, 3); None if there are none."""
-    if direction is None:
-        return None
-    rows = as_floats("direction", direction)
-    if rows.shape not in ((3,), (count, 3)):
-        raise InvalidInput("direction.shape", rows.shape, "of shape (3,) or (t, 3)")
-    size = np.linalg.norm(rows, axis=-1, keepdims=True)
-    if not (np.isfinite(size) & (size > 0)).all():
-        raise InvalidInput("direction", direction, "finite vectors other than zero")
-    return np.ascontiguousarray(np.broadcast_to(rows / size, (count, 3)))
-
-
-def checked_residual(residual_over_length: float) -> float:
-    """The largest |tip - target| in L, if that can be asked for."""
-    return as_number("residual_over_length", residual_over_length, Range(*_RESIDUALS))

@@ -6,16 +6,24 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.kernels.branches import newton
 from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
 from softreach.support import parallel
+from softreach.support.arrays import Array, Index, Mask, joined, rows
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+_EFFORTS = ((500, 20, 0.1), (2000, 100, 0.08))
+"""Seeds near the target, most starts from them, their least distance in ranges."""
+
+_BLOCK = 500  # targets at once
+_MOST_ITERATIONS = 60
+_LONGEST_STEP = 0.3  # in ranges
+_OUTSIDE = 0.05  # how far a search may leave the bounds, in ranges
+_LEAST_DAMPING = 1e-3
+_CONVERGED = 1e-9  # step, in ranges
+_FIRST_RETURNS, _RETURNS = 4, 2  # steps down to the floor of the valley
 
 
 class Roots(NamedTuple):
@@ -31,21 +39,8 @@ class Roots(NamedTuple):
     """|tip - target| [m], shape (n,)."""
     cell: Index
     """Cell of the mesh where the search began; -1 if in none, shape (n,)."""
-    stable: NDArray[np.bool_]
+    stable: Mask
     """Whether the arm can be there, shape (n,)."""
-
-    def where(self, chosen: NDArray[np.bool_] | Index) -> Roots:
-        """Those chosen by a mask or an index; themselves where a mask leaves none out."""
-        if chosen.dtype == bool and chosen.all():
-            return self
-        return Roots(
-            self.target[chosen],
-            self.gamma[chosen],
-            self.slope[chosen],
-            self.residual[chosen],
-            self.cell[chosen],
-            self.stable[chosen],
-        )
 
     def joined(self, other: Roots) -> Roots:
         """Both, sorted by target as each of them is."""
@@ -54,8 +49,8 @@ class Roots(NamedTuple):
     @staticmethod
     def sorted_by_target(parts: list[Roots]) -> Roots:
         """All of them, sorted by target."""
-        everything = Roots(*map(np.concatenate, zip(*parts, strict=True)))
-        return everything.where(np.argsort(everything.target, kind="stable"))
+        everything = joined(parts)
+        return rows(everything, np.argsort(everything.target, kind="stable"))
 
     def missing(self, targets: int) -> Index:
         """Which of so many targets have no stable root."""
@@ -84,7 +79,7 @@ def roots_at(rod: TipMap, targets: Array, target: Index, gamma: Array) -> Roots:
     return Roots(target, gamma, slopes, residual, nowhere, stable)
 
 
-def placed(rod: TipMap, gamma: Array) -> tuple[Array, NDArray[np.bool_]]:
+def placed(rod: TipMap, gamma: Array) -> tuple[Array, Mask]:
     """Tips to rounding [m], (n, 3), and whether the arm can be there, (n,).
 
     `TipMap.tips` of loaded arms ends the search for an equilibrium within a part of `tol` that is
@@ -119,58 +114,30 @@ def conditions(slope: Array) -> Array:
         return sigma[:, 0] / sigma[:, -1]
 
 
-def _closed_form(slope: Array) -> tuple[Array, Array]:
-    smallest, condition = np.empty(len(slope)), np.empty(len(slope))
-    newton.conditions(slope, smallest, condition)
-    return smallest, condition
-
-
-# Newton's method where ∂r/∂γ is nearly singular, for three free bundles.
-#
-# Near a full circle two singular values of J vanish together. The residual then says little about
-# the distance from a root: on the way it has to rise, and a search that never lets it does not
-# arrive. Steps are judged by the natural test instead, |J⁻¹ F(trial)| < |J⁻¹ F(γ)|, which is
-# invariant under any linear change of the residual.
-#
-# The roots lie in a curved valley: along one direction the tip moves millions of times as far as
-# along the others, and a straight step leaves the valley's floor. So each step ends with a few of
-# Newton's method along that direction alone.
-
-
-_EFFORTS = ((500, 20, 0.1), (2000, 100, 0.08))
-"""Landmarks near the target, most starts from them, their least distance in ranges."""
-_BLOCK = 500  # targets at once
-
-_MOST_ITERATIONS = 60
-_LONGEST_STEP = 0.3  # in ranges
-_OUTSIDE = 0.05  # how far a search may leave the bounds, in ranges
-_LEAST_DAMPING = 1e-3
-_CONVERGED = 1e-9  # step, in ranges
-_FIRST_RETURNS, _RETURNS = 4, 2  # steps down to the floor of the valley
-
-
-def nearly_singular_roots(prepared: PreparedMap, request: Request, rows: Index) -> Roots:
+def nearly_singular_roots(prepared: PreparedMap, request: Request, chosen: Index) -> Roots:
     """Roots for some of the targets, those that no other search found, sorted by target."""
     roots = no_roots(prepared.rod)
     for neighbors, most, apart in _EFFORTS:
-        left = np.setdiff1d(rows, roots.target)
+        left = np.setdiff1d(chosen, roots.target)
         for first in range(0, len(left), _BLOCK):
             part = left[first : first + _BLOCK]
-            near = prepared.landmarks.nearest(request.targets[part], neighbors)
-            owner, start = prepared.landmarks.starts(near, most, apart)
+            near = prepared.seeds.nearest(request.targets[part], neighbors)
+            owner, start = prepared.seeds.starts(near, most, apart)
             roots = roots.joined(_from_starts(prepared.rod, request, part[owner], start))
     return roots
 
 
-def _from_starts(rod: TipMap, request: Request, owner: Index, start: Array) -> Roots:
-    """Roots from starts."""
-    gamma = natural_newton(rod, request.targets[owner], start, request.residual)
-    found = roots_at(rod, request.targets, owner, gamma)
-    return found.where(found.residual <= request.residual)
+def affine_invariant_newton(rod: TipMap, targets: Array, start: Array, residual: float) -> Array:
+    """Ends of searches by affine-invariant Newton, inside the bounds; a root or not.
 
+    Near a full circle two singular values of J vanish together. The residual then says little about
+    the distance from a root: on the way it has to rise, and a search that never lets it does not
+    arrive. Steps are judged by the natural test instead, |J⁻¹ F(trial)| < |J⁻¹ F(γ)|, which is
+    invariant under any linear change of the residual.
 
-def natural_newton(rod: TipMap, targets: Array, start: Array, residual: float) -> Array:
-    """Where each search ends, inside the bounds; whether at a root is for the caller to see.
+    The roots lie in a curved valley: along one direction the tip moves millions of times as far as
+    along the others, and a straight step leaves the valley's floor. So each step ends with a few of
+    Newton's method along that direction alone.
 
     Args:
         rod: The tip map of three free bundles.
@@ -205,6 +172,19 @@ def natural_newton(rod: TipMap, targets: Array, start: Array, residual: float) -
         end = (size <= _CONVERGED) | (near & ~accepted) | (damping[active] < _LEAST_DAMPING)
         active = active[~end]
     return box.clip(gamma)
+
+
+def _closed_form(slope: Array) -> tuple[Array, Array]:
+    smallest, condition = np.empty(len(slope)), np.empty(len(slope))
+    newton.conditions(slope, smallest, condition)
+    return smallest, condition
+
+
+def _from_starts(rod: TipMap, request: Request, owner: Index, start: Array) -> Roots:
+    """Roots from starts."""
+    gamma = affine_invariant_newton(rod, request.targets[owner], start, request.residual)
+    found = roots_at(rod, request.targets, owner, gamma)
+    return rows(found, found.residual <= request.residual)
 
 
 class _Valley(NamedTuple):

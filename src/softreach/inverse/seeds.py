@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.kernels.branches.spread import choose_apart
 from softreach.rod.tip_map import TipMap, no_stable_equilibrium
 from softreach.sampling import sample_cube
+from softreach.support.arrays import Array, Index
 
-__all__ = ["Landmarks", "face_landmarks", "landmarks"]
+__all__ = ["Seeds", "face_seeds", "seeds"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
-_MOST = 150_000  # landmarks on a grid of the box
+_MOST = 150_000  # seeds on a grid of the box
 _DIMENSIONS = 6  # from which on a grid is too coarse to be worth more than a low-discrepancy set
 _SOBOL = 1 << 17
 _FACE_DIMENSION = 2  # of faces whose images bound the reachable set
@@ -25,7 +23,7 @@ _STARTS = 3
 _APART = 0.15  # of the ranges: two starts lead to different minima
 
 
-class Landmarks:
+class Seeds:
     """Activations with known tips."""
 
     def __init__(self, gamma: Array, tip: Array, scales: Array) -> None:
@@ -65,8 +63,8 @@ class Landmarks:
         return np.nonzero(chosen)[0], candidates[chosen]
 
 
-def landmarks(rod: TipMap) -> Landmarks:
-    """Landmarks on a grid over the box, or a low-discrepancy set where a grid is too coarse."""
+def seeds(rod: TipMap) -> Seeds:
+    """Seeds on a grid over the box, or a low-discrepancy set where a grid is too coarse."""
     box, m = rod.box, rod.box.dimension
     if m == 0:
         gamma = np.empty((1, 0))
@@ -80,8 +78,8 @@ def landmarks(rod: TipMap) -> Landmarks:
     return found
 
 
-def face_landmarks(rod: TipMap) -> Landmarks:
-    """Landmarks at corners of the box, on edges, and on faces with two free bundles."""
+def face_seeds(rod: TipMap) -> Seeds:
+    """Seeds at corners of the box, on edges, and on faces with two free bundles."""
     box, m = rod.box, rod.box.dimension
     rng, count = np.random.default_rng(_SEED), _MOST_ON_FACES
     corner = rng.integers(0, 2, (count, m)).astype(float)
@@ -91,10 +89,10 @@ def face_landmarks(rod: TipMap) -> Landmarks:
     return _with_tips(rod, gamma)
 
 
-def _with_tips(rod: TipMap, gamma: Array) -> Landmarks:
-    """Landmarks at those activations that have a stable equilibrium."""
+def _with_tips(rod: TipMap, gamma: Array) -> Seeds:
+    """Seeds at those activations that have a stable equilibrium."""
     tip = rod.tips(gamma)
     if rod.supports_unstable:
         known = np.isfinite(tip[:, 0])
         gamma, tip = gamma[known], tip[known]
-    return Landmarks(gamma, tip, rod.box.scales)
+    return Seeds(gamma, tip, rod.box.scales)

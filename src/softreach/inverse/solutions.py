@@ -12,15 +12,13 @@ from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import counted
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["Solution", "Solutions", "Status"]
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 
 class Status(IntEnum):
@@ -118,7 +116,7 @@ class Solutions(Sequence[Solution]):
 
     In the unit of the activations; where units differ, each counts in its own range.
     """
-    least_proved: NDArray[np.bool_]
+    least_proved: Mask
     """Whether the first activation of a target is proved to change least, to 1e-6, shape (t,)."""
     unstable: Index
     """Activations found that end in an unstable equilibrium and are left out, shape (t,)."""

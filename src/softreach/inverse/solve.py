@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.inverse.branches import distinct, every_branch
@@ -15,29 +15,26 @@ from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.proofs import SLACK, change_bounds, gap_bounds
 from softreach.inverse.request import (
     Request,
-    checked_activations,
-    checked_direction,
-    checked_residual,
-    checked_targets,
+    as_activations,
+    as_residual,
+    as_targets,
 )
 from softreach.inverse.roots import Roots, conditions, nearly_singular_roots, no_roots, roots_at
 from softreach.inverse.solutions import Solutions, Status
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
-from softreach.support.arguments import as_number, as_whole_number, checked, flag
+from softreach.support.arguments import as_flag, as_integer, as_number
+from softreach.support.arrays import Array, Index, Mask, as_directions, joined, rows
 from softreach.support.errors import InvalidInput, Range
 
 __all__ = ["solve_inverse"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _NEARLY = 1e-2  # gap in L at which a target may have a root where ∂r/∂γ is nearly singular
 _BLOCK = 32_768  # targets at once: bounds the memory of a call
 _BRANCH_BLOCK = 131_072  # where all roots are searched, which is done in smaller sets
 
 
-@checked(prove_least=flag)
 def solve_inverse(
     arm: Manipulator | TipMap | PreparedMap,
     targets: ArrayLike,
@@ -93,28 +90,30 @@ def solve_inverse(
         InvalidInput: Arguments of another shape, not finite, or out of range; a proof where a
             direction is traded against the change.
     """
+    prove_least = as_flag("prove_least", prove_least)
     if prove_least and direction is not None:
         raise InvalidInput("prove_least", prove_least, "False where a direction is wanted")
     prepared = prepared_map(arm, tol)
-    points, box = checked_targets("targets", targets), prepared.whole.box
+    points, box = as_targets("targets", targets), prepared.whole.box
     rest = np.zeros(box.bundles) if near is None else near
+    unit = None if direction is None else as_directions("direction", direction, len(points))
     request = Request(
         targets=points,
-        residual=checked_residual(residual_over_length) * prepared.whole.length,
-        near=checked_activations("near", rest, box, len(points)) / prepared.measures[box.free],
-        direction=checked_direction(direction, len(points)),
+        residual=as_residual(residual_over_length) * prepared.whole.length,
+        near=as_activations("near", rest, box, len(points)) / prepared.measures[box.free],
+        direction=unit,
         direction_weight=as_number("direction_weight", direction_weight, Range(0.0, 1e6)),
-        family=as_whole_number("family", family, 1, 10_000),
-        seed=as_whole_number("seed", seed, 0, 2**63),
-        prove_least=bool(prove_least),
+        family=as_integer("family", family, 1, 10_000),
+        seed=as_integer("seed", seed, 0, 2**63),
+        prove_least=prove_least,
     )
     solve, size = _by_distance, _BLOCK
     if prepared.dimension > 3:
         solve = _by_least_change
     elif prepared.dimension == 3 and request.direction is None:
         solve, size = _by_branches, _BRANCH_BLOCK
-    blocks = list(parallel.blocks(len(points), size)) or [slice(0)]
-    solutions = Solutions.joined([solve(prepared, request.of(rows)) for rows in blocks])
+    blocks = parallel.blocks(len(points), size) or [slice(0)]
+    solutions = Solutions.joined([solve(prepared, request.of(block)) for block in blocks])
     return solutions.in_units_of(prepared.measures)
 
 
@@ -123,10 +122,10 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     found = every_branch(prepared, request)
     count = len(request.targets)
     unstable = np.bincount(found.target[~found.stable], minlength=count)
-    roots = found.where(found.stable)
+    roots = rows(found, found.stable)
     missing = roots.missing(count)
-    blocks = list(parallel.blocks(len(missing), _BLOCK)) or [slice(0)]
-    closest = Nearest.joined([nearest(prepared, request.of(missing[rows])) for rows in blocks])
+    blocks = parallel.blocks(len(missing), _BLOCK) or [slice(0)]
+    closest = joined([nearest(prepared, request.of(missing[block])) for block in blocks])
     solutions = _solutions(prepared, request, roots, missing, closest)
     left = np.flatnonzero(_perhaps_singular(prepared, solutions))
     if len(left):
@@ -134,13 +133,13 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
         if len(late.target):
             roots = roots.joined(late)
             again = roots.missing(count)
-            closest = closest.of(np.flatnonzero(np.isin(missing, again)))
+            closest = rows(closest, np.isin(missing, again))
             bounds = solutions.gap_bounds
             solutions = _solutions(prepared, request, roots, again, closest, bounds)
     return replace(solutions, unstable=unstable)
 
 
-def _perhaps_singular(prepared: PreparedMap, solutions: Solutions) -> NDArray[np.bool_]:
+def _perhaps_singular(prepared: PreparedMap, solutions: Solutions) -> Mask:
     """Which targets may have roots that only a search of nearly singular ones finds.
 
     Those not proved to be out of reach; where nothing is proved, those that are nearly reached.
@@ -161,7 +160,7 @@ def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
 
 def _stable_roots(prepared: PreparedMap, request: Request) -> Roots:
     found = every_branch(prepared, request)
-    return found.where(found.stable)
+    return rows(found, found.stable)
 
 
 def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
@@ -208,7 +207,7 @@ def _solutions(
     rod, count = prepared.rod, len(request.targets)
     at_closest = roots_at(rod, request.targets, missing, closest.gamma)
     hit = at_closest.residual <= request.residual
-    roots = roots.joined(at_closest.where(hit))
+    roots = roots.joined(rows(at_closest, hit))
     statuses = np.full(count, Status.REACHED, np.int8)
     out, far = missing[~hit], at_closest.residual[~hit]
     bounds = np.zeros(count)

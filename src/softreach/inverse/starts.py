@@ -5,16 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.kernels.branches import candidates
+from softreach.support.arrays import Array, Index, joined, rows
 
 __all__ = ["Starts", "spatial_order", "starts_from_cells", "with_torn_cells"]
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _ROOM = candidates.MOST_STARTS + 4096  # starts that are gathered before they are copied
 _PLACES = 32  # along each axis, when targets are put in order
@@ -39,62 +37,44 @@ class Starts(NamedTuple):
         return Starts(target, cell, np.empty((room, 3)), np.empty((room, 3, 3)))
 
     @staticmethod
-    def joined(parts: list[Starts]) -> Starts:
-        """All of them, one part after the other."""
-        return Starts(
-            np.concatenate([part.target for part in parts]),
-            np.concatenate([part.cell for part in parts]),
-            np.concatenate([part.gamma for part in parts]),
-            np.concatenate([part.inverse for part in parts]),
-        )
-
-    def first(self, count: int) -> Starts:
-        """A copy of so many."""
-        return Starts(
-            self.target[:count].copy(),
-            self.cell[:count].copy(),
-            self.gamma[:count].copy(),
-            self.inverse[:count].copy(),
-        )
-
-    def by_target(self) -> Starts:
+    def by_target(parts: list[Starts]) -> Starts:
         """All of them, sorted by target."""
-        order = np.argsort(self.target, kind="stable")
-        return Starts(self.target[order], self.cell[order], self.gamma[order], self.inverse[order])
+        everything = joined(parts)
+        return rows(everything, np.argsort(everything.target, kind="stable"))
 
 
 def starts_from_cells(
-    prepared: PreparedMap, request: Request, rows: Index, with_root: bool = True
+    prepared: PreparedMap, request: Request, chosen: Index, with_root: bool = True
 ) -> Starts:
     """Starts for some of the targets, sorted by target.
 
     Args:
         prepared: The tip map, with its cells and their tree.
         request: What is asked; targets that follow each other are best near to each other.
-        rows: Numbers of the targets, ascending.
+        chosen: Numbers of the targets, ascending.
         with_root: Whether to leave out tetrahedra whose quadratic does not reach the target.
     """
     parts = [Starts.empty(0)]
-    if not len(prepared.mesh.corner) or not len(rows):
+    if not len(prepared.mesh.corner) or not len(chosen):
         return parts[0]
-    box, targets = prepared.rod.box, request.targets[rows]
+    box, targets = prepared.rod.box, request.targets[chosen]
     low, high, out = box.low.copy(), box.high.copy(), Starts.empty(_ROOM)
     first = 0
-    while first < len(rows):
+    while first < len(chosen):
         done, found = candidates.find_starts(
             prepared.mesh, prepared.tree, targets[first:], low, high, with_root, *out
         )
-        part = out.first(found)
-        parts.append(part._replace(target=rows[part.target + first]))
+        part = rows(out, np.arange(found))
+        parts.append(part._replace(target=chosen[part.target + first]))
         first += done
-    return Starts.joined(parts)
+    return joined(parts)
 
 
 def with_torn_cells(prepared: PreparedMap, request: Request, starts: Starts) -> Starts:
     """The starts, and more from corners of cells that have no image."""
     target, gamma = prepared.torn_cells.starts(request.targets)
     nowhere, unknown = np.full(len(target), -1), np.zeros((len(target), 3, 3))
-    return Starts.joined([starts, Starts(target, nowhere, gamma, unknown)]).by_target()
+    return Starts.by_target([starts, Starts(target, nowhere, gamma, unknown)])
 
 
 def spatial_order(points: Array) -> Index:

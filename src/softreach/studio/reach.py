@@ -277,7 +277,7 @@ class _Work(NamedTuple):
         fitting = level_in_memory(self.rod.box.bundles, budget.memory, level)
         short = f"{1 << fitting:,} of {1 << level:,} samples: more do not fit into the free memory"
         tol = self.quality.tol
-        cloud = compute_cloud(self.arm, 1 << fitting, 0, "sobol", tol=tol, progress=budget)
+        cloud = compute_cloud(self.arm, 1 << fitting, sampler="sobol", tol=tol, progress=budget)
         return Reach(
             arm=self.arm,
             cloud=cloud,

@@ -1,11 +1,12 @@
-"""Arguments of public functions: checked and converted in one place, so refused in one way.
+"""Arguments of public functions, converted in their first lines and so refused in one way.
 
-`checked` stands above a function and says what each argument must be::
+A converter takes the argument's name and value, then what is allowed, and returns what the function
+goes on with::
 
-    @checked(n=whole(1), seed=whole(0), tol=optional(number(0.0)))
+    n = as_integer("n", n, 1)
+    cell = None if cell is None else as_number("cell", cell, POSITIVE)
 
-A converter takes the argument's name and value, and returns what the function gets. Those of arrays
-are in `softreach.support.arrays`.
+Those of arrays are in `softreach.support.arrays`, that of callbacks is `progress.as_progress`.
 """
 
 from __future__ import annotations
@@ -24,7 +25,18 @@ from softreach.support.errors import InvalidInput, Range
 __all__ = [
     "POSITIVE",
     "Converter",
+    "as_dataset",
+    "as_flag",
+    "as_function",
+    "as_given",
+    "as_instance",
+    "as_integer",
+    "as_name_or_index",
+    "as_names",
     "as_number",
+    "as_one_of",
+    "as_path",
+    "as_text",
     "as_whole_number",
     "checked",
     "dataset",
@@ -32,6 +44,7 @@ __all__ = [
     "flag",
     "function",
     "instance",
+    "integer",
     "mapping_of",
     "name_or_index",
     "names",
@@ -44,14 +57,183 @@ __all__ = [
     "within",
 ]
 
+POSITIVE = Range(0.0, open_low=True)
+"""Finite numbers above zero."""
+
+
+def as_number(name: str, value: object, allowed: Range = Range()) -> float:  # noqa: B008
+    """A real number in a range as a float.
+
+    Args:
+        name: What errors call it.
+        value: A number of Python or NumPy; no truth value, no text.
+        allowed: The range.
+
+    Raises:
+        InvalidInput: Anything else.
+    """
+    found = plain(value)
+    if isinstance(found, Real) and not isinstance(found, bool) and allowed.admits(found):
+        return float(found)
+    raise InvalidInput(name, as_given(value), allowed.text)
+
+
+def as_integer(name: str, value: object, low: int = 0, high: float = math.inf) -> int:
+    """A whole number from `low` to `high` as an int.
+
+    Raises:
+        InvalidInput: Anything else, 2.0 too.
+    """
+    found = plain(value)
+    if isinstance(found, Integral) and not isinstance(found, bool) and low <= int(found) <= high:
+        return int(found)
+    limits = f"{low:,} or more" if high == math.inf else f"from {low:,} to {high:,}"
+    raise InvalidInput(name, as_given(value), f"a whole number, {limits}")
+
+
+def as_flag(name: str, value: object) -> bool:
+    """True or False.
+
+    Raises:
+        InvalidInput: Anything else, even if Python takes it for true.
+    """
+    found = plain(value)
+    if isinstance(found, bool):
+        return found
+    raise InvalidInput(name, as_given(value), "True or False")
+
+
+def as_text(name: str, value: object) -> str:
+    """Text of any length.
+
+    Raises:
+        InvalidInput: Anything else.
+    """
+    if isinstance(value, str):
+        return value
+    raise InvalidInput(name, as_given(value), "text")
+
+
+def as_path(name: str, value: object) -> str:
+    """A path as text.
+
+    Raises:
+        InvalidInput: Neither text nor a path, or one that no file can have.
+    """
+    found = os.fspath(value) if isinstance(value, os.PathLike) else value
+    if isinstance(found, str) and found and "\0" not in found:
+        return found
+    raise InvalidInput(name, as_given(value), "a path: text that is not empty, or a pathlib.Path")
+
+
+def as_one_of(name: str, value: object, words: Iterable[str]) -> str:
+    """One of some words.
+
+    Raises:
+        InvalidInput: Anything else.
+    """
+    if isinstance(value, str) and value in words:
+        return value
+    raise InvalidInput(name, as_given(value), f"one of {', '.join(words)}")
+
+
+def as_names(name: str, value: object) -> tuple[str, ...]:
+    """One name or a sequence of names.
+
+    Raises:
+        InvalidInput: Anything else.
+    """
+    if isinstance(value, str):
+        return (value,)
+    if isinstance(value, list | tuple | Mapping) and all(isinstance(one, str) for one in value):
+        return tuple(value)
+    raise InvalidInput(name, as_given(value), "a name, or a list or tuple of names")
+
+
+def as_name_or_index(name: str, value: object) -> str | int:
+    """Text or a whole number; which there are is known elsewhere.
+
+    Raises:
+        InvalidInput: Anything else.
+    """
+    found = plain(value)
+    if isinstance(found, str | int) and not isinstance(found, bool):
+        return found
+    raise InvalidInput(name, as_given(value), "a name or an index")
+
+
+def as_instance(name: str, value: Any, kind: type | tuple[type, ...], what: str) -> Any:
+    """An object of a class; `what` names it: "a Manipulator".
+
+    Raises:
+        InvalidInput: Anything else.
+    """
+    if isinstance(value, kind):
+        return value
+    raise InvalidInput(name, as_given(value), what)
+
+
+def as_function(name: str, value: object) -> Callable[..., Any]:
+    """What can be called.
+
+    Raises:
+        InvalidInput: Anything else.
+    """
+    if callable(value):
+        return value
+    raise InvalidInput(name, as_given(value), "a function")
+
+
+def as_dataset(
+    name: str, value: Any, *variables: str, kind: str = "Dataset", what: str = ""
+) -> Any:
+    """An `xarray.Dataset` (or another `kind`) that has some variables.
+
+    Args:
+        name: What errors call it.
+        value: The dataset.
+        variables: Names of the variables.
+        kind: Name of the class in xarray.
+        what: What errors ask for, such as "a cloud".
+
+    Raises:
+        InvalidInput: Anything else.
+    """
+    with_variables = f" with {', '.join(variables)}" if variables else ""
+    allowed = f"{what or f'an xarray.{kind}'}{with_variables}"
+    xarray = sys.modules.get("xarray")  # who has a dataset has imported it
+    if xarray is None or not isinstance(value, getattr(xarray, kind)):
+        raise InvalidInput(name, as_given(value), allowed)
+    if missing := [variable for variable in variables if variable not in value]:
+        raise InvalidInput(name, f"a {kind} without {', '.join(missing)}", allowed)
+    return value
+
+
+def plain(value: Any) -> Any:
+    """A value of Python for a scalar of NumPy or an array of no dimensions; others as they are."""
+    if getattr(value, "ndim", 1) == 0 and hasattr(value, "item"):
+        return value if getattr(value, "mask", False) else value.item()
+    return value
+
+
+def as_given(value: object) -> object:
+    """A value as errors show it: text in quotes, so that '1' does not look like 1."""
+    if isinstance(value, str | bytes):
+        return repr(value)
+    return f"the class {value.__name__}" if isinstance(value, type) else value
+
+
+# Converters as values, for `checked`: it goes with its last use, and these with it.
+
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
 Converter = Callable[[str, Any], Any]
 """(name, value) -> what the function gets; raises InvalidInput."""
 
-POSITIVE = Range(0.0, open_low=True)
-"""Finite numbers above zero."""
+flag, text, path, names, function = as_flag, as_text, as_path, as_names, as_function
+name_or_index, as_whole_number = as_name_or_index, as_integer
 
 
 def checked(**converters: Converter) -> Callable[[Callable[P, R]], Callable[P, R]]:
@@ -61,9 +243,9 @@ def checked(**converters: Converter) -> Callable[[Callable[P, R]], Callable[P, R
     """
 
     def around(wrapped: Callable[P, R]) -> Callable[P, R]:
-        names = tuple(inspect.signature(wrapped).parameters)
-        assert converters.keys() <= set(names)
-        in_order = [(name, converters.get(name)) for name in names]
+        arguments = tuple(inspect.signature(wrapped).parameters)
+        assert converters.keys() <= set(arguments)
+        in_order = [(name, converters.get(name)) for name in arguments]
 
         @functools.wraps(wrapped)
         def wrapper(*args: P.args, **options: P.kwargs) -> R:
@@ -90,31 +272,27 @@ def within(allowed: Range) -> Converter:
     return lambda name, value: as_number(name, value, allowed)
 
 
-def whole(low: int, high: float = math.inf) -> Converter:
-    """A whole number from `low` to `high`, as an int."""
-    return lambda name, value: as_whole_number(name, value, low, high)
+def integer(low: int, high: float = math.inf) -> Converter:
+    """An integer from `low` to `high`, as an int."""
+    return lambda name, value: as_integer(name, value, low, high)
+
+
+whole = integer
 
 
 def one_of(words: Iterable[str]) -> Converter:
     """One of some words."""
-
-    def convert(name: str, value: object) -> str:
-        if isinstance(value, str) and value in words:
-            return value
-        raise InvalidInput(name, as_given(value), f"one of {', '.join(words)}")
-
-    return convert
+    return lambda name, value: as_one_of(name, value, words)
 
 
 def instance(kind: type | tuple[type, ...], what: str) -> Converter:
     """An object of a class; `what` names it: "a Manipulator"."""
+    return lambda name, value: as_instance(name, value, kind, what)
 
-    def convert(name: str, value: object) -> object:
-        if isinstance(value, kind):
-            return value
-        raise InvalidInput(name, as_given(value), what)
 
-    return convert
+def dataset(*variables: str, kind: str = "Dataset", what: str = "") -> Converter:
+    """An `xarray.Dataset` (or another `kind`) that has some variables."""
+    return lambda name, value: as_dataset(name, value, *variables, kind=kind, what=what)
 
 
 def each_of(convert: Converter) -> Converter:
@@ -137,141 +315,3 @@ def mapping_of(convert: Converter) -> Converter:
         raise InvalidInput(name, as_given(value), "a dictionary whose keys are names")
 
     return convert_all
-
-
-def dataset(*variables: str, kind: str = "Dataset", what: str = "") -> Converter:
-    """An `xarray.Dataset` (or another `kind`) that has some variables.
-
-    Args:
-        variables: Their names.
-        kind: Name of the class in xarray.
-        what: What errors ask for, such as "a cloud".
-    """
-    names = f" with {', '.join(variables)}" if variables else ""
-    allowed = f"{what or f'an xarray.{kind}'}{names}"
-
-    def convert(name: str, value: Any) -> Any:
-        xarray = sys.modules.get("xarray")  # who has a dataset has imported it
-        if xarray is None or not isinstance(value, getattr(xarray, kind)):
-            raise InvalidInput(name, as_given(value), allowed)
-        if missing := [one for one in variables if one not in value]:
-            raise InvalidInput(name, f"a {kind} without {', '.join(missing)}", allowed)
-        return value
-
-    return convert
-
-
-def flag(name: str, value: object) -> bool:
-    """True or False.
-
-    Raises:
-        InvalidInput: Anything else, even if Python takes it for true.
-    """
-    found = plain(value)
-    if isinstance(found, bool):
-        return found
-    raise InvalidInput(name, as_given(value), "True or False")
-
-
-def text(name: str, value: object) -> str:
-    """Text of any length.
-
-    Raises:
-        InvalidInput: Anything else.
-    """
-    if isinstance(value, str):
-        return value
-    raise InvalidInput(name, as_given(value), "text")
-
-
-def path(name: str, value: object) -> str:
-    """A path as text.
-
-    Raises:
-        InvalidInput: Neither text nor a path, or one that no file can have.
-    """
-    found = os.fspath(value) if isinstance(value, os.PathLike) else value
-    if isinstance(found, str) and found and "\0" not in found:
-        return found
-    raise InvalidInput(name, as_given(value), "a path: text that is not empty, or a pathlib.Path")
-
-
-def name_or_index(name: str, value: object) -> str | int:
-    """Text or a whole number; which there are is known elsewhere.
-
-    Raises:
-        InvalidInput: Anything else.
-    """
-    found = plain(value)
-    if isinstance(found, str | int) and not isinstance(found, bool):
-        return found
-    raise InvalidInput(name, as_given(value), "a name or an index")
-
-
-def names(name: str, value: object) -> tuple[str, ...]:
-    """One name or a sequence of names.
-
-    Raises:
-        InvalidInput: Anything else.
-    """
-    if isinstance(value, str):
-        return (value,)
-    if isinstance(value, list | tuple | Mapping) and all(isinstance(one, str) for one in value):
-        return tuple(value)
-    raise InvalidInput(name, as_given(value), "a name, or a list or tuple of names")
-
-
-def function(name: str, value: object) -> Callable[..., Any]:
-    """What can be called.
-
-    Raises:
-        InvalidInput: Anything else.
-    """
-    if callable(value):
-        return value
-    raise InvalidInput(name, as_given(value), "a function")
-
-
-def as_number(name: str, value: object, allowed: Range = Range()) -> float:  # noqa: B008
-    """A real number in a range as a float.
-
-    Args:
-        name: What errors call it.
-        value: A number of Python or NumPy; no truth value, no text.
-        allowed: The range.
-
-    Raises:
-        InvalidInput: Anything else.
-    """
-    found = plain(value)
-    if isinstance(found, Real) and not isinstance(found, bool) and allowed.admits(found):
-        return float(found)
-    raise InvalidInput(name, as_given(value), allowed.text)
-
-
-def as_whole_number(name: str, value: object, low: int = 0, high: float = math.inf) -> int:
-    """A whole number from `low` to `high` as an int.
-
-    Raises:
-        InvalidInput: Anything else, 2.0 too.
-    """
-    found = plain(value)
-    whole_one = isinstance(found, Integral) and not isinstance(found, bool)
-    if whole_one and low <= int(found) <= high:
-        return int(found)
-    limits = f"{low:,} or more" if high == math.inf else f"from {low:,} to {high:,}"
-    raise InvalidInput(name, as_given(value), f"a whole number, {limits}")
-
-
-def plain(value: Any) -> Any:
-    """A value of Python for a scalar of NumPy or an array of no dimensions; others as they are."""
-    if getattr(value, "ndim", 1) == 0 and hasattr(value, "item"):
-        return value if getattr(value, "mask", False) else value.item()
-    return value
-
-
-def as_given(value: object) -> object:
-    """A value as errors show it: text in quotes, so that '1' does not look like 1."""
-    if isinstance(value, str | bytes):
-        return repr(value)
-    return f"the class {value.__name__}" if isinstance(value, type) else value

@@ -6,8 +6,10 @@ objects are none, though NumPy would convert many of them; nor are masked entrie
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any
+from operator import itemgetter
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +20,9 @@ __all__ = [
     "Array",
     "Faces",
     "Index",
+    "Mask",
     "Points",
+    "as_directions",
     "as_faces",
     "as_floats",
     "as_indices",
@@ -27,6 +31,8 @@ __all__ = [
     "as_shares",
     "as_stations",
     "check_finite",
+    "joined",
+    "rows",
 ]
 
 Array = NDArray[np.float64]
@@ -34,6 +40,9 @@ Array = NDArray[np.float64]
 
 Index = NDArray[np.int64]
 """Places in other arrays."""
+
+Mask = NDArray[np.bool_]
+"""Which of several things."""
 
 Points = NDArray[np.float64]
 """Places [m], shape (n, 3)."""
@@ -55,7 +64,25 @@ _KINDS = {
 }
 
 
-def as_floats(name: str, values: object, allowed: str = _NUMBERS) -> NDArray[np.float64]:
+Table = TypeVar("Table", bound=tuple[NDArray[Any], ...])
+"""A named tuple of arrays of one length: its columns."""
+
+
+def rows(table: Table, chosen: Mask | Index | slice) -> Table:
+    """Some rows of a table; the table itself where a mask leaves none out."""
+    if isinstance(chosen, np.ndarray) and chosen.dtype == bool and chosen.all():
+        return table
+    return type(table)(*map(itemgetter(chosen), table))
+
+
+def joined(tables: Sequence[Table]) -> Table:
+    """The rows of tables, of one at least, one table after the other."""
+    if len(tables) == 1:
+        return tables[0]
+    return type(tables[0])(*map(np.concatenate, zip(*tables, strict=True)))
+
+
+def as_floats(name: str, values: object, allowed: str = _NUMBERS) -> Array:
     """The values as a float array in memory order, of any shape; NaN and infinity are numbers.
 
     Args:
@@ -79,7 +106,7 @@ def as_floats(name: str, values: object, allowed: str = _NUMBERS) -> NDArray[np.
     raise InvalidInput(name, _described(values, array), allowed)
 
 
-def as_rows(name: str, values: object, columns: int, allowed: str) -> NDArray[np.float64]:
+def as_rows(name: str, values: object, columns: int, allowed: str) -> Array:
     """Finite numbers of shape (n, columns).
 
     Raises:
@@ -104,7 +131,7 @@ def as_points(name: str, values: object) -> Points:
     return as_rows(name, points, 3, allowed)
 
 
-def check_finite(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
+def check_finite(name: str, values: Array) -> Array:
     """The array itself, if no number in it is NaN or infinite.
 
     Raises:
@@ -121,7 +148,7 @@ def check_finite(name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
     raise InvalidInput(f"{name}[{wrong[0]}]", found, "finite numbers", hint)
 
 
-def as_stations(name: str, values: object) -> NDArray[np.float64]:
+def as_stations(name: str, values: object) -> Array:
     """Finite numbers of shape (station,), of which one may stand alone.
 
     Raises:
@@ -133,7 +160,33 @@ def as_stations(name: str, values: object) -> NDArray[np.float64]:
     return check_finite(name, stations)
 
 
-def as_shares(name: str, values: object) -> NDArray[np.float64]:
+def as_directions(name: str, values: object, count: int | None = None) -> Array:
+    """Unit vectors along vectors of any length.
+
+    Args:
+        name: What errors call them.
+        values: Shape (3,) or (n, 3).
+        count: How many there must be, of which one may stand for all; None for any number.
+
+    Returns:
+        Shape (count, 3); that of the values without a count.
+
+    Raises:
+        InvalidInput: Another shape, numbers that are not finite, or a vector without length.
+    """
+    vectors = as_floats(name, values)
+    rows = "n" if count is None else count
+    many = vectors.ndim == 2 and vectors.shape[1] == 3 and count in (None, len(vectors))
+    if vectors.shape != (3,) and not many:
+        raise InvalidInput(f"{name}.shape", vectors.shape, f"(3,) or ({rows}, 3)")
+    size = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    if not (np.isfinite(size).all() and (size > 0).all()):
+        raise InvalidInput(name, vectors, "finite vectors longer than 0")
+    units = vectors / size
+    return units if count is None else np.ascontiguousarray(np.broadcast_to(units, (count, 3)))
+
+
+def as_shares(name: str, values: object) -> Array:
     """Numbers from 0 to 1, shape (k,), one at least.
 
     Raises:
@@ -145,7 +198,7 @@ def as_shares(name: str, values: object) -> NDArray[np.float64]:
     raise InvalidInput(name, values, "one number from 0 to 1 or more of them, shape (k,)")
 
 
-def as_indices(name: str, values: object, count: int, what: str) -> NDArray[np.intp]:
+def as_indices(name: str, values: object, count: int, what: str) -> Index:
     """Indices from 0 to count - 1, shape (k,).
 
     Args:

@@ -6,7 +6,7 @@ import os
 import shutil
 from pathlib import Path
 
-from softreach.support.errors import InvalidInput, in_short, warn
+from softreach.support.errors import InvalidInput, warn
 
 __all__ = ["check_disk", "check_memory", "check_room", "free_disk", "free_memory"]
 
@@ -84,8 +84,9 @@ def check_memory(name: str, value: object, needed: float) -> None:
 
 def check_room(name: str, rows: int, columns: int) -> None:
     """As `check_memory`, for a number of rows, each of so many doubles."""
-    shown = in_short(f"{rows:,}") if rows < 10**30 else "a number beyond 1e30"
-    check_memory(name, shown, 8 * columns * rows)
+    if (needed := 8 * columns * rows) > _NOTICED:
+        shown = f"{rows:,}" if rows < 10**30 else "a number beyond 1e30"
+        check_memory(name, shown, needed)
 
 
 def check_disk(name: str, value: object, needed: float, path: str | os.PathLike[str]) -> None:

@@ -33,10 +33,10 @@ def thread_count() -> int:
     return os.cpu_count() or 1
 
 
-def blocks(total: int, size: int) -> Iterator[slice]:
+def blocks(total: int, size: int) -> list[slice]:
     """Consecutive slices of at most ``size`` that cover ``range(total)``."""
-    for start in range(0, total, size):
-        yield slice(start, min(start + size, total))
+    starts = range(0, total, size)
+    return list(map(slice, starts, (*starts[1:], total)))
 
 
 def run(tasks: Iterable[Callable[[], object]]) -> None:

@@ -1,4 +1,4 @@
-"""What long work reports while it runs."""
+"""Progress of long work: callbacks, and a bar on a terminal."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-__all__ = ["Progress", "bar", "hidden", "silent"]
+from softreach.support.arguments import as_function
+
+__all__ = ["Progress", "as_progress", "bar", "hidden", "silent"]
 
 hidden = False
 """No bars, even on a terminal; `softreach --quiet` sets it."""
@@ -18,6 +20,15 @@ Progress = Callable[[int], None]
 def silent(done: int) -> None:
     """Report nothing."""
     del done
+
+
+def as_progress(progress: object) -> Progress:
+    """The callback of a caller; one that reports nothing for None.
+
+    Raises:
+        InvalidInput: It cannot be called.
+    """
+    return silent if progress is None else as_function("progress", progress)
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import version
 
@@ -11,12 +12,7 @@ SCHEMA_VERSION = 2
 """Of the names, dimensions and units of datasets."""
 
 
-def versions() -> dict[str, object]:
+@cache  # looking the version up takes a millisecond
+def versions() -> Mapping[str, object]:
     """Attributes that say what wrote a dataset."""
-    return {"softreach_version": _of_package(), "schema_version": SCHEMA_VERSION}
-
-
-@cache
-def _of_package() -> str:
-    """Looking it up takes a millisecond."""
-    return version("softreach")
+    return {"softreach_version": version("softreach"), "schema_version": SCHEMA_VERSION}

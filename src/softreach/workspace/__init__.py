@@ -1,5 +1,7 @@
 """The reachable set as the image of the activation box: volume, multiplicity, folds, surface."""
 
+import lazy_loader
+
 from softreach.geometry.surface import Surface
 from softreach.workspace.abstract_set import ReachableSet
 from softreach.workspace.directions import direction_spread
@@ -23,3 +25,5 @@ __all__ = [
     "reachable_set",
     "volume_gradient",
 ]
+
+__getattr__, _, _ = lazy_loader.attach(__name__, submodules=["payload"])

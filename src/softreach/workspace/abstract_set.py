@@ -6,11 +6,12 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.tip_map import TipMap
 from softreach.schema import provenance
+from softreach.support.arrays import Array
 from softreach.support.errors import counted
 from softreach.support.quantity import quantity
 
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Number", "ReachableSet"]
 
-Array = NDArray[np.float64]
 
 _POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 

@@ -14,6 +14,7 @@ from softreach.geometry.surface import Surface, compact_surface
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
 from softreach.support import parallel
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import MissingExtra
 from softreach.workspace.crossings import Crossings
 from softreach.workspace.image import Image, Lattice
@@ -22,132 +23,17 @@ from softreach.workspace.search import ENOUGH, nearest_tips
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
-
-# A solid as cells that are reached, and where its boundary cuts the edges between them.
-
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 _STARTS = 4  # crossings nearby from which places are searched
 _CORNERS = np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 _CHUNK = 1 << 16
-
-
-@dataclass(frozen=True, eq=False)
-class ReachedCells:
-    """What `Image` is for three free bundles, for more of them: asked by search."""
-
-    rod: TipMap
-    lattice: Lattice
-    reached: NDArray[np.bool_]
-    """Whether the centers of the cells are reached."""
-    gamma: Array
-    """Activations that reach them, meaningless elsewhere, shape (cells, bundles)."""
-    crossings: Crossings
-
-    @property
-    def counts(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """1 at centers that are reached and 0 elsewhere; no orientation, 0."""
-        return self.reached.astype(np.int32), np.zeros(self.reached.shape, np.int32)
-
-    def counts_at(self, points: Array) -> NDArray[np.int64]:
-        """1 for points that are reached [m], 0 for others, shape (n,)."""
-        return (self.distance(points) <= ENOUGH * self.lattice.cell).astype(np.int64)
-
-    def distance(self, points: Array) -> Array:
-        """Distance from points to the nearest tip that searches find [m], shape (n,)."""
-        out = np.full(len(points), np.inf)
-        if not len(self.crossings.edges.cell):
-            return out
-        for block in parallel.blocks(len(points), _CHUNK):
-            self._search(points[block], out[block])
-        return out
-
-    def _search(self, points: Array, out: Array) -> None:
-        """Lower distances by what searches find, until they are 0 or there is no other start."""
-        enough = ENOUGH * self.lattice.cell
-        near = self._tree.query(points, k=_STARTS)[1]
-        near = np.minimum(near, len(self.crossings.edges.cell) - 1)  # where there are fewer
-        starts = [self.crossings.beyond[near[:, k]] for k in range(_STARTS)]
-        for known, start in [*self._starts_inside(points), *((None, start) for start in starts)]:
-            left = np.flatnonzero((out > enough) & (True if known is None else known))
-            found = nearest_tips(self.rod, start[left], points[left], enough)
-            out[left] = np.minimum(out[left], found.distance)
-
-    def _starts_inside(self, points: Array) -> Iterator[tuple[NDArray[np.bool_], Array]]:
-        """Which points have a reached center at a corner of their cube, and where to start."""
-        at = self.lattice.coordinates(points)
-        for corner in (np.rint(at), *(np.floor(at) + corner for corner in _CORNERS)):
-            index = corner.astype(np.int64)
-            within = ((index >= 0) & (index < self.lattice.shape)).all(axis=1)
-            cells = np.ravel_multi_index(
-                tuple(np.where(within, i, 0) for i in index.T), self.reached.shape
-            )
-            yield within & self.reached.ravel()[cells], self.gamma[cells]
-
-    def boundary_crossings(self, axis: int) -> tuple[tuple[Ints, Ints, Ints], Array]:
-        """Where the boundary cuts the edges between cell centers along an axis.
-
-        Returns:
-            The centers just before the boundary, as an index of arrays of the lattice's shape, and
-            how far behind them it lies, in cells, 0 to 1, shape (n,).
-        """
-        edges = self.crossings.edges
-        which = np.flatnonzero(edges.axis == axis)
-        place, up = self.crossings.place[which], edges.sense[which] > 0
-        index = [np.array(i) for i in np.unravel_index(edges.cell[which], self.lattice.shape)]
-        index[axis] = np.where(up, index[axis], index[axis] - 1)
-        return (index[0], index[1], index[2]), np.where(up, place, 1.0 - place)
-
-    @cached_property
-    def _tree(self) -> KDTree:
-        from scipy.spatial import KDTree
-
-        every = np.arange(len(self.crossings.edges.cell))
-        return KDTree(self.crossings.points(every, self.crossings.place))
-
-
 _BAND = 2.5  # cells from the boundary beyond which the field is constant
 _CLOSEST = 1e-3  # cells: a center on the boundary itself would make triangles without area
+_ASIDE = 0.02  # cells beside a triangle where is looked for the inside
+_PARTS = 4  # into which each edge of a triangle of the grid is divided
 
-
-def critical_surface(image: Image) -> Surface:
-    """All critical triangles: the boundary of the image, and folds and walls inside it."""
-    vertices, faces = compact_surface(image.vertices, image.triangles[:, :3])
-    lattice = image.lattice
-    placed = lattice.origin + vertices * (lattice.cell / image.unit)
-    return Surface(vertices=placed, faces=faces)
-
-
-def signed_field(image: Image | ReachedCells) -> Array:
-    """Distance of the cell centers to the boundary in cells, negative inside, up to 2.5.
-
-    Along each axis the boundary is located to rounding between two centers. A plane that cuts the
-    axes at distances a, b, c is 1/√(1/a² + 1/b² + 1/c²) away: linear interpolation between centers
-    gives the crossings back, to second order in the cell on a curved boundary.
-
-    Returns:
-        Of the lattice's shape.
-    """
-    inverse_square = np.zeros(image.lattice.shape)
-    for axis in range(3):
-        inverse_square += _axis_distances(image, axis) ** -2
-    with np.errstate(divide="ignore"):
-        distance = np.clip(inverse_square**-0.5, _CLOSEST, _BAND)
-    return np.where(image.counts[0] > 0, -distance, distance)
-
-
-def _axis_distances(image: Image | ReachedCells, axis: int) -> Array:
-    """Distance to the boundary along an axis, in cells; infinite beyond two of them."""
-    distance = np.full(image.lattice.shape, np.inf)
-    index, behind = image.boundary_crossings(axis)
-    for step in (-1, 0, 1, 2):
-        shifted = list(index)
-        shifted[axis] = index[axis] + step
-        away = np.abs(behind - step).clip(_CLOSEST)
-        np.minimum.at(distance, tuple(shifted), away)
-    return distance
+# Barycentric, of the places on a triangle that are looked at: where sheets cross, one is outside.
+_PLACES = np.array([[1, 1, 1], [8, 1, 1], [1, 8, 1], [1, 1, 8]], float)
+_PLACES /= _PLACES.sum(axis=1, keepdims=True)
 
 
 def boundary_surface(image: Image | ReachedCells, field: Array, volume: float) -> Surface:
@@ -166,46 +52,12 @@ def boundary_surface(image: Image | ReachedCells, field: Array, volume: float) -
     return _level_set(image, field, float(np.clip(offset, -0.5, 0.5)))
 
 
-def _level_set(image: Image | ReachedCells, field: Array, level: float) -> Surface:
-    """Where the field, in cells, has a value."""
-    try:
-        from skimage.measure import marching_cubes
-    except ImportError as error:
-        raise MissingExtra("scikit-image", "surface") from error
-    if not (field < level).any():
-        return Surface(vertices=np.empty((0, 3)), faces=np.empty((0, 3), np.int32))
-    vertices, faces, _, _ = marching_cubes(
-        field, level, gradient_direction="descent", allow_degenerate=False
-    )
+def critical_surface(image: Image) -> Surface:
+    """All critical triangles: the boundary of the image, and folds and walls inside it."""
+    vertices, faces = compact_surface(image.vertices, image.triangles[:, :3])
     lattice = image.lattice
-    return Surface(vertices=lattice.origin + lattice.cell * vertices.astype(float), faces=faces)
-
-
-# The boundary of a rasterized image as the sheets it consists of: faces of the box, and folds.
-
-
-_ASIDE = 0.02  # cells beside a triangle where is looked for the inside
-_PARTS = 4  # into which each edge of a triangle of the grid is divided
-# Barycentric, of the places on a triangle that are looked at: where sheets cross, one is outside.
-_PLACES = np.array([[1, 1, 1], [8, 1, 1], [1, 8, 1], [1, 1, 8]], float)
-_PLACES /= _PLACES.sum(axis=1, keepdims=True)
-
-
-def _small_triangles() -> tuple[Ints, Ints]:
-    """Barycentric places of the corners, times `_PARTS`, and the triangles between them."""
-    steps = [(i, j) for i in range(_PARTS + 1) for j in range(_PARTS + 1 - i)]
-    number = {step: k for k, step in enumerate(steps)}
-    inner = [(i, j) for i, j in steps if i + j < _PARTS]
-    up = [(number[i, j], number[i + 1, j], number[i, j + 1]) for i, j in inner]
-    down = [
-        (number[i + 1, j], number[i + 1, j + 1], number[i, j + 1])
-        for i, j in inner
-        if i + j < _PARTS - 1
-    ]
-    return np.array([(_PARTS - i - j, i, j) for i, j in steps]), np.array(up + down)
-
-
-_STEPS, _SMALL = _small_triangles()
+    placed = lattice.origin + vertices * (lattice.cell / image.unit)
+    return Surface(vertices=placed, faces=faces)
 
 
 def outer_sheets(rod: TipMap, image: Image) -> Surface:
@@ -232,7 +84,143 @@ def outer_sheets(rod: TipMap, image: Image) -> Surface:
     return Surface(vertices=vertices, faces=faces)
 
 
-def _outer_triangles(image: Image) -> Ints:
+def signed_field(image: Image | ReachedCells) -> Array:
+    """Distance of the cell centers to the boundary in cells, negative inside, up to 2.5.
+
+    Along each axis the boundary is located to rounding between two centers. A plane that cuts the
+    axes at distances a, b, c is 1/√(1/a² + 1/b² + 1/c²) away: linear interpolation between centers
+    gives the crossings back, to second order in the cell on a curved boundary.
+
+    Returns:
+        Of the lattice's shape.
+    """
+    inverse_square = np.zeros(image.lattice.shape)
+    for axis in range(3):
+        inverse_square += _axis_distances(image, axis) ** -2
+    with np.errstate(divide="ignore"):
+        distance = np.clip(inverse_square**-0.5, _CLOSEST, _BAND)
+    return np.where(image.counts[0] > 0, -distance, distance)
+
+
+@dataclass(frozen=True, eq=False)
+class ReachedCells:
+    """What `Image` is for three free bundles, for more of them: asked by search."""
+
+    rod: TipMap
+    lattice: Lattice
+    reached: Mask
+    """Whether the centers of the cells are reached."""
+    gamma: Array
+    """Activations that reach them, meaningless elsewhere, shape (cells, bundles)."""
+    crossings: Crossings
+
+    @property
+    def counts(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """1 at centers that are reached and 0 elsewhere; no orientation, 0."""
+        return self.reached.astype(np.int32), np.zeros(self.reached.shape, np.int32)
+
+    def counts_at(self, points: Array) -> Index:
+        """1 for points that are reached [m], 0 for others, shape (n,)."""
+        return (self.distance(points) <= ENOUGH * self.lattice.cell).astype(np.int64)
+
+    def distance(self, points: Array) -> Array:
+        """Distance from points to the nearest tip that searches find [m], shape (n,)."""
+        out = np.full(len(points), np.inf)
+        if not len(self.crossings.edges.cell):
+            return out
+        for block in parallel.blocks(len(points), _CHUNK):
+            self._search(points[block], out[block])
+        return out
+
+    def _search(self, points: Array, out: Array) -> None:
+        """Lower distances by what searches find, until they are 0 or there is no other start."""
+        enough = ENOUGH * self.lattice.cell
+        near = self._tree.query(points, k=_STARTS)[1]
+        near = np.minimum(near, len(self.crossings.edges.cell) - 1)  # where there are fewer
+        starts = [self.crossings.beyond[near[:, k]] for k in range(_STARTS)]
+        for known, start in [*self._starts_inside(points), *((None, start) for start in starts)]:
+            left = np.flatnonzero((out > enough) & (True if known is None else known))
+            found = nearest_tips(self.rod, start[left], points[left], enough)
+            out[left] = np.minimum(out[left], found.distance)
+
+    def _starts_inside(self, points: Array) -> Iterator[tuple[Mask, Array]]:
+        """Which points have a reached center at a corner of their cube, and where to start."""
+        at = self.lattice.coordinates(points)
+        for corner in (np.rint(at), *(np.floor(at) + corner for corner in _CORNERS)):
+            index = corner.astype(np.int64)
+            within = ((index >= 0) & (index < self.lattice.shape)).all(axis=1)
+            cells = np.ravel_multi_index(
+                tuple(np.where(within, i, 0) for i in index.T), self.reached.shape
+            )
+            yield within & self.reached.ravel()[cells], self.gamma[cells]
+
+    def boundary_crossings(self, axis: int) -> tuple[tuple[Index, Index, Index], Array]:
+        """Where the boundary cuts the edges between cell centers along an axis.
+
+        Returns:
+            The centers just before the boundary, as an index of arrays of the lattice's shape, and
+            how far behind them it lies, in cells, 0 to 1, shape (n,).
+        """
+        edges = self.crossings.edges
+        which = np.flatnonzero(edges.axis == axis)
+        place, up = self.crossings.place[which], edges.sense[which] > 0
+        index = [np.array(i) for i in np.unravel_index(edges.cell[which], self.lattice.shape)]
+        index[axis] = np.where(up, index[axis], index[axis] - 1)
+        return (index[0], index[1], index[2]), np.where(up, place, 1.0 - place)
+
+    @cached_property
+    def _tree(self) -> KDTree:
+        from scipy.spatial import KDTree
+
+        every = np.arange(len(self.crossings.edges.cell))
+        return KDTree(self.crossings.points(every, self.crossings.place))
+
+
+def _axis_distances(image: Image | ReachedCells, axis: int) -> Array:
+    """Distance to the boundary along an axis, in cells; infinite beyond two of them."""
+    distance = np.full(image.lattice.shape, np.inf)
+    index, behind = image.boundary_crossings(axis)
+    for step in (-1, 0, 1, 2):
+        shifted = list(index)
+        shifted[axis] = index[axis] + step
+        away = np.abs(behind - step).clip(_CLOSEST)
+        np.minimum.at(distance, tuple(shifted), away)
+    return distance
+
+
+def _level_set(image: Image | ReachedCells, field: Array, level: float) -> Surface:
+    """Where the field, in cells, has a value."""
+    try:
+        from skimage.measure import marching_cubes
+    except ImportError as error:
+        raise MissingExtra("scikit-image", "surface") from error
+    if not (field < level).any():
+        return Surface(vertices=np.empty((0, 3)), faces=np.empty((0, 3), np.int32))
+    vertices, faces, _, _ = marching_cubes(
+        field, level, gradient_direction="descent", allow_degenerate=False
+    )
+    lattice = image.lattice
+    return Surface(vertices=lattice.origin + lattice.cell * vertices.astype(float), faces=faces)
+
+
+def _small_triangles() -> tuple[Index, Index]:
+    """Barycentric places of the corners, times `_PARTS`, and the triangles between them."""
+    steps = [(i, j) for i in range(_PARTS + 1) for j in range(_PARTS + 1 - i)]
+    number = {step: k for k, step in enumerate(steps)}
+    inner = [(i, j) for i, j in steps if i + j < _PARTS]
+    up = [(number[i, j], number[i + 1, j], number[i, j + 1]) for i, j in inner]
+    down = [
+        (number[i + 1, j], number[i + 1, j + 1], number[i, j + 1])
+        for i, j in inner
+        if i + j < _PARTS - 1
+    ]
+    return np.array([(_PARTS - i - j, i, j) for i, j in steps]), np.array(up + down)
+
+
+_STEPS, _SMALL = _small_triangles()
+
+
+def _outer_triangles(image: Image) -> Index:
     """Vertices of the triangles at the boundary, with the inside behind them, shape (n, 3)."""
     lattice, triangles = image.lattice, image.triangles[:, :3]
     corners = lattice.origin + image.vertices[triangles] * (lattice.cell / image.unit)
@@ -244,7 +232,7 @@ def _outer_triangles(image: Image) -> Ints:
     return turned[(senses != 0).any(axis=1)]
 
 
-def _senses(image: Image, corners: Array, place: Array) -> Ints:
+def _senses(image: Image, corners: Array, place: Array) -> Index:
     """1 where only what is behind a triangle is reached, -1 before it; 0 inside and outside."""
     normals = _cross(corners)
     away = _ASIDE * image.lattice.cell * normals / np.linalg.norm(normals, axis=1, keepdims=True)
@@ -257,7 +245,7 @@ def _cross(corners: Array) -> Array:
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
-def _divided(corners: Ints, width: int) -> tuple[Ints, NDArray[np.int32]]:
+def _divided(corners: Index, width: int) -> tuple[Index, NDArray[np.int32]]:
     """Triangles cut into as many along each edge as `_PARTS`.
 
     Args:

@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.rod.tip_map import TipMap
+from softreach.support.arrays import Array, Index, Mask
 from softreach.workspace.image import Lattice
 from softreach.workspace.search import ENOUGH, Flood, nearest_tips
 
 __all__ = ["Crossings", "Edges", "boundary_edges"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _PROBE = 0.01  # cells: how closely crossings are enclosed
 _ROUNDS = 24
@@ -25,15 +23,15 @@ _STEEP = 0.02  # cosine below which the tangent plane does not tell where it is 
 class Edges(NamedTuple):
     """Pairs of neighboring centers of which one is reached."""
 
-    cell: Ints
+    cell: Index
     """The center that is reached, as a flat index, shape (n,)."""
-    axis: Ints
+    axis: Index
     """Along which axis the other lies, shape (n,)."""
-    sense: Ints
+    sense: Index
     """On which side, 1 or -1, shape (n,)."""
 
 
-def boundary_edges(reached: NDArray[np.bool_]) -> Edges:
+def boundary_edges(reached: Mask) -> Edges:
     """All edges of a lattice that the boundary cuts."""
     flat, parts = np.arange(reached.size).reshape(reached.shape), []
     for axis in range(3):
@@ -89,14 +87,14 @@ class Crossings:
         found.enclose(np.arange(n))
         return found
 
-    def points(self, which: Ints, t: Array) -> Array:
+    def points(self, which: Index, t: Array) -> Array:
         """Places on edges, t cells from the reached center [m], shape (n, 3)."""
         lattice, edges = self.lattice, self.edges
         index = np.stack(np.unravel_index(edges.cell[which], lattice.shape), axis=-1).astype(float)
         index[np.arange(len(which)), edges.axis[which]] += edges.sense[which] * t
         return lattice.origin + lattice.cell * index
 
-    def enclose(self, which: Ints) -> None:
+    def enclose(self, which: Index) -> None:
         """Bring `low` and `high` together on some of the edges."""
         guess = np.ones(len(which), bool)  # whether to trust the tangent plane
         for _ in range(_ROUNDS):
@@ -116,7 +114,7 @@ class Crossings:
             self.place[which[lied]] = 0.5 * (self.low[which[lied]] + self.high[which[lied]])
             guess = ~reached | lied
 
-    def _try(self, which: Ints, t: Array, start: Array) -> NDArray[np.bool_]:
+    def _try(self, which: Index, t: Array, start: Array) -> Mask:
         """Search for places on edges; whether they are reached."""
         cell = self.lattice.cell
         found = nearest_tips(self.rod, start, self.points(which, t), ENOUGH * cell)
@@ -127,7 +125,7 @@ class Crossings:
         self._cut(no, found.tips[~reached])
         return reached
 
-    def _cut(self, which: Ints, tips: Array | None = None) -> None:
+    def _cut(self, which: Index, tips: Array | None = None) -> None:
         """Where planes through the tips nearest to `high`, square to the way, cut the edges."""
         if tips is None:
             tips = self.rod.tips(self.beyond[which])
@@ -139,7 +137,7 @@ class Crossings:
         back = np.where(along > _STEEP, distance / along.clip(_STEEP), 0.5 * (high - low))
         self.place[which] = np.clip(high - back, low, high)
 
-    def advance(self, which: Ints, start: Array, by: float) -> Array:
+    def advance(self, which: Index, start: Array, by: float) -> Array:
         """Search beyond crossings from other activations; by how many cells each moved outward."""
         before = self.place[which].copy()
         target = np.minimum(before + by, 1.0)

@@ -6,7 +6,6 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.rods import tip_map
@@ -14,7 +13,8 @@ from softreach.rod.tip_map import TipMap, TipStatus
 from softreach.sampling import cube_blocks, sample_cube
 from softreach.schema import provenance
 from softreach.support import parallel
-from softreach.support.arguments import POSITIVE, checked, optional, within
+from softreach.support.arguments import POSITIVE, as_number
+from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidInput
 from softreach.workspace.image import Lattice
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 __all__ = ["direction_spread"]
 
-Array = NDArray[np.float64]
 
 _BLOCK = 1 << 15
 _PER_CELL = 64  # samples in a cell of the bounding box, on average
@@ -31,7 +30,6 @@ _STEPS = 32  # the cone is then too wide by some percent at most
 _TRIED = 4096  # activations of a loaded arm that must all come to rest
 
 
-@checked(cell=optional(within(POSITIVE._replace(unit="m"))))
 def direction_spread(
     arm: Manipulator | TipMap,
     *,
@@ -67,8 +65,7 @@ def direction_spread(
     Raises:
         InvalidInput: An argument out of range.
     """
-    if cell is not None and not 0 < cell < np.inf:
-        raise InvalidInput("cell", cell, "a length > 0 [m]")
+    cell = None if cell is None else as_number("cell", cell, POSITIVE._replace(unit="m"))
     rod = _all_stable(tip_map(arm, tol))
     tips, directions = _tips_and_directions(rod, sample_cube("sobol", n, rod.box.bundles, seed))
     if cell is None:
@@ -120,7 +117,7 @@ def _tips_and_directions(rod: TipMap, cube: Array) -> tuple[Array, Array]:
     return tips, directions
 
 
-def _cones(directions: Array, starts: NDArray[np.intp]) -> Array:
+def _cones(directions: Array, starts: Index) -> Array:
     """Solid angle [sr] of a small cone around each run of unit vectors, shape (runs,)."""
     sizes = np.diff(starts, append=len(directions))
     axis = np.add.reduceat(directions, starts) / sizes[:, None]
@@ -140,7 +137,7 @@ def _unit(vectors: Array) -> Array:
     return vectors / np.linalg.norm(vectors, axis=1, keepdims=True).clip(1e-300)
 
 
-def _dataset(lattice: Lattice, angle: Array, samples: NDArray[np.int64]) -> xr.Dataset:
+def _dataset(lattice: Lattice, angle: Array, samples: Index) -> xr.Dataset:
     import xarray as xr
 
     dims = ("x", "y", "z")

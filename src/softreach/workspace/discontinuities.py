@@ -13,19 +13,19 @@ from numpy.typing import NDArray
 
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
+from softreach.support.arrays import Array, Index, Mask
 from softreach.workspace.image import Image
-
-Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-Ints = NDArray[np.int64]
 
 _SUSPECT = 2.5  # times the shorter neighbor; where stability ends like √x it is 2.4
 _KEPT = 0.5  # of its length that a torn edge keeps, however often it is halved
 _HALVINGS = 12
 _NOISE = 10.0  # times the tolerance, in which tips of neighbors may differ by errors alone
+_INSIDE = np.stack(np.meshgrid(*[[0.25, 0.75]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+_MOST = 20_000  # cells looked into
+_TAKEN = 1.5
 
 
-def left_out_cells(rod: TipMap, tips: Array, cells: int) -> Bools:
+def left_out_cells(rod: TipMap, tips: Array, cells: int) -> Mask:
     """Cells of a grid with a corner that is not stable, or with an edge that is torn.
 
     An edge between stable corners is suspect if its tips are more than 2.5 times as far apart as
@@ -47,7 +47,7 @@ def left_out_cells(rod: TipMap, tips: Array, cells: int) -> Bools:
     if not rod.supports_unstable:
         return np.zeros((cells,) * m, bool)
     field = tips.reshape(*(cells + 1,) * m, 3)
-    lost: Bools = np.any(corner_values(~np.isfinite(field[..., 0])), axis=-1)
+    lost: Mask = np.any(corner_values(~np.isfinite(field[..., 0])), axis=-1)
     for axis in range(m):
         torn = _torn_edges(rod, field, axis)
         others = [other for other in range(m) if other != axis]
@@ -55,97 +55,7 @@ def left_out_cells(rod: TipMap, tips: Array, cells: int) -> Bools:
     return lost
 
 
-def corner_values(values: NDArray, axes: list[int] | None = None) -> NDArray:
-    """Values at the corners of cells, on a last axis, from values at the vertices of a grid.
-
-    Args:
-        values: At the vertices.
-        axes: Along which the cells extend; all by default.
-    """
-    corners = [values]
-    for axis in range(values.ndim) if axes is None else axes:
-        n = values.shape[axis]
-        ends = np.arange(n - 1), np.arange(1, n)
-        corners = [np.take(corner, end, axis) for corner in corners for end in ends]
-    return np.stack(corners, axis=-1)
-
-
-def coarser(left_out: Bools) -> Bools:
-    """Cells of twice the edge of which a part is left out."""
-    for axis in range(left_out.ndim):
-        halves = np.moveaxis(left_out, axis, 0)
-        left_out = np.moveaxis(halves[::2] | halves[1::2], 0, axis)
-    return left_out
-
-
-def finer(cells: Bools) -> Bools:
-    """The same of cells of half the edge."""
-    for axis in range(cells.ndim):
-        cells = np.repeat(cells, 2, axis)
-    return cells
-
-
-def _torn_edges(rod: TipMap, field: Array, axis: int) -> Bools:
-    """Edges along an axis that are torn, in the order of the grid."""
-    apart = np.linalg.norm(np.diff(field, axis=axis), axis=-1)  # NaN where an end is not stable
-    suspect = np.argwhere(_suspects(apart, axis) & (apart > _NOISE * rod.tol * rod.length))
-    torn = np.zeros(apart.shape, bool)
-    torn[tuple(suspect[_stay_apart(rod, suspect, axis, field)].T)] = True
-    return torn
-
-
-def _suspects(apart: Array, axis: int) -> Bools:
-    """Edges far longer than the shorter neighbor; those that have none are suspect as well."""
-    rows = np.moveaxis(apart, axis, 0)
-    none = np.full((1, *rows.shape[1:]), np.nan)
-    neighbor = np.fmin(np.concatenate([none, rows[:-1]]), np.concatenate([rows[1:], none]))
-    with np.errstate(invalid="ignore"):
-        found = np.isfinite(rows) & ~(rows <= _SUSPECT * neighbor)
-    return np.moveaxis(found, 0, axis)
-
-
-def _stay_apart(rod: TipMap, edges: Ints, axis: int, field: Array) -> Bools:
-    """Whether the tips of edges, given by their first vertex, stay apart as these are halved."""
-    m, cells = edges.shape[1], field.shape[0] - 1
-    step = np.eye(m, dtype=int)[axis]
-    low, high = edges / cells, (edges + step) / cells
-    at_low, at_high = field[tuple(edges.T)], field[tuple((edges + step).T)]
-    first = np.linalg.norm(at_high - at_low, axis=1)
-    torn, open_ = np.zeros(len(edges), bool), np.arange(len(edges))
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low[open_] + high[open_])
-        tips = stable_tips(rod).tips(rod.box.from_free_cube(middle))
-        down = np.linalg.norm(tips - at_low[open_], axis=1)
-        up = np.linalg.norm(at_high[open_] - tips, axis=1)
-        torn[open_[np.isnan(down)]] = True
-        below = down >= up
-        high[open_[below]], at_high[open_[below]] = middle[below], tips[below]
-        low[open_[~below]], at_low[open_[~below]] = middle[~below], tips[~below]
-        open_ = open_[np.maximum(down, up) > _KEPT * first[open_]]  # NaN is decided
-    torn[open_] = True
-    return torn
-
-
-# What the tip reaches from the stable parts of cells that are left out of an image.
-
-
-_INSIDE = np.stack(np.meshgrid(*[[0.25, 0.75]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-_MOST = 20_000  # cells looked into
-_TAKEN = 1.5
-
-
-class Remainder(NamedTuple):
-    """What cells that are left out still reach."""
-
-    volume: float
-    """Outside the image [m³], right to a half of itself."""
-    tips: Array
-    """Some of the tips [m], shape (n, 3)."""
-
-
-def remainder(
-    rod: TipMap, image: Image, stretches: Array, left_out: NDArray[np.bool_]
-) -> Remainder:
+def remainder(rod: TipMap, image: Image, stretches: Array, left_out: Mask) -> Remainder:
     """What cells with a stable corner reach although they are left out, by eight places in each.
 
     A place counts with the |det J| of the cell's corners, the median of those that are stable, if
@@ -175,3 +85,83 @@ def remainder(
     swept = float((stretch * counted.reshape(-1, 8).mean(axis=1)).sum())
     each = rod.box.volume / cells**3 * len(cut) / max(len(looked), 1)
     return Remainder(_TAKEN * swept * each, tips[stable])
+
+
+class Remainder(NamedTuple):
+    """What cells that are left out still reach."""
+
+    volume: float
+    """Outside the image [m³], right to a half of itself."""
+    tips: Array
+    """Some of the tips [m], shape (n, 3)."""
+
+
+def corner_values(values: NDArray, axes: list[int] | None = None) -> NDArray:
+    """Values at the corners of cells, on a last axis, from values at the vertices of a grid.
+
+    Args:
+        values: At the vertices.
+        axes: Along which the cells extend; all by default.
+    """
+    corners = [values]
+    for axis in range(values.ndim) if axes is None else axes:
+        n = values.shape[axis]
+        ends = np.arange(n - 1), np.arange(1, n)
+        corners = [np.take(corner, end, axis) for corner in corners for end in ends]
+    return np.stack(corners, axis=-1)
+
+
+def coarser(left_out: Mask) -> Mask:
+    """Cells of twice the edge of which a part is left out."""
+    for axis in range(left_out.ndim):
+        halves = np.moveaxis(left_out, axis, 0)
+        left_out = np.moveaxis(halves[::2] | halves[1::2], 0, axis)
+    return left_out
+
+
+def finer(cells: Mask) -> Mask:
+    """The same of cells of half the edge."""
+    for axis in range(cells.ndim):
+        cells = np.repeat(cells, 2, axis)
+    return cells
+
+
+def _torn_edges(rod: TipMap, field: Array, axis: int) -> Mask:
+    """Edges along an axis that are torn, in the order of the grid."""
+    apart = np.linalg.norm(np.diff(field, axis=axis), axis=-1)  # NaN where an end is not stable
+    suspect = np.argwhere(_suspects(apart, axis) & (apart > _NOISE * rod.tol * rod.length))
+    torn = np.zeros(apart.shape, bool)
+    torn[tuple(suspect[_stay_apart(rod, suspect, axis, field)].T)] = True
+    return torn
+
+
+def _suspects(apart: Array, axis: int) -> Mask:
+    """Edges far longer than the shorter neighbor; those that have none are suspect as well."""
+    rows = np.moveaxis(apart, axis, 0)
+    none = np.full((1, *rows.shape[1:]), np.nan)
+    neighbor = np.fmin(np.concatenate([none, rows[:-1]]), np.concatenate([rows[1:], none]))
+    with np.errstate(invalid="ignore"):
+        found = np.isfinite(rows) & ~(rows <= _SUSPECT * neighbor)
+    return np.moveaxis(found, 0, axis)
+
+
+def _stay_apart(rod: TipMap, edges: Index, axis: int, field: Array) -> Mask:
+    """Whether the tips of edges, given by their first vertex, stay apart as these are halved."""
+    m, cells = edges.shape[1], field.shape[0] - 1
+    step = np.eye(m, dtype=int)[axis]
+    low, high = edges / cells, (edges + step) / cells
+    at_low, at_high = field[tuple(edges.T)], field[tuple((edges + step).T)]
+    first = np.linalg.norm(at_high - at_low, axis=1)
+    torn, open_ = np.zeros(len(edges), bool), np.arange(len(edges))
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low[open_] + high[open_])
+        tips = stable_tips(rod).tips(rod.box.from_free_cube(middle))
+        down = np.linalg.norm(tips - at_low[open_], axis=1)
+        up = np.linalg.norm(at_high[open_] - tips, axis=1)
+        torn[open_[np.isnan(down)]] = True
+        below = down >= up
+        high[open_[below]], at_high[open_[below]] = middle[below], tips[below]
+        low[open_[~below]], at_low[open_[~below]] = middle[~below], tips[~below]
+        open_ = open_[np.maximum(down, up) > _KEPT * first[open_]]  # NaN is decided
+    torn[open_] = True
+    return torn

@@ -12,11 +12,79 @@ from softreach.geometry.surface import Surface
 from softreach.rod.rods import refined
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
+from softreach.support.arrays import Array, Index
+from softreach.workspace.grid import cube_grid
 
-# The six faces of the box of three free bundles: nodes, tips, and what flows through them.
+_TOL = 1e-11  # in L: there are few nodes, so that steps may be short
+_ROUGH_TOL = 1e-9  # where a raster decides the error, and under loads, where each tip costs much
+_NODES = (8, 12, 16, 24, 32)
+_CELLS = 96  # along each edge of the box: an arm that bends by half a turn moves 2 degrees a cell
 
 
-Array = NDArray[np.float64]
+def signed_volume(rod: TipMap, nodes: int | None = None) -> Flux:
+    """The signed volume of the image of three free bundles.
+
+    By Gauss and Legendre's rule on the faces, as the map is smooth: its error falls faster than any
+    power of the number of nodes. They are added until tips are no more exact than the rule.
+
+    Args:
+        rod: The tip map.
+        nodes: Along each side, for this and two thirds of it alone, instead of as many as it needs;
+            tips are then less exact.
+
+    Returns:
+        Value and error are NaN if a node has no stable equilibrium.
+    """
+    rod = refined(rod, flux_tol(rod) if nodes is None else _ROUGH_TOL)
+    counts = _NODES if nodes is None else (2 * nodes // 3, nodes)
+    found, change = _flux(rod, counts[0]), np.inf
+    for count in counts[1:]:
+        rough, found = found, _flux(rod, count)
+        change = abs(found.value - rough.value)
+        if nodes is None and not change > found.error:  # NaN too
+            break
+    return found._replace(error=change + found.error)
+
+
+class Flux(NamedTuple):
+    """∫ det J dγ by the divergence theorem, theory (81), and what it was computed from."""
+
+    value: float
+    """Signed volume [m³]: below zero if the map turns the orientation over."""
+    error: float
+    """How far off it may be: half as many nodes or so, and the error of the tips [m³]."""
+    faces: FaceNodes
+    """Nodes on the faces of the unit cube of the free bundles."""
+    area: Array
+    """Area vectors of the nodes, with their weights [m²], shape (n, 3)."""
+
+
+def flux_tol(rod: TipMap) -> float:
+    """Largest tip error on the faces, in L."""
+    return min(rod.tol, _ROUGH_TOL if rod.supports_unstable else _TOL)
+
+
+def face_image(rod: TipMap, cells: int = _CELLS) -> Surface | None:
+    """The closed image of the surface of the box of three free bundles, oriented outwards.
+
+    Its vertices lie on the boundary to the tolerance of the tips, and so do its edges where the box
+    has edges: sharp rims stay sharp, and parts of any thinness stay whole.
+
+    Args:
+        rod: A tip map that is one to one inside the box.
+        cells: Of the grid along each edge of the box.
+
+    Returns:
+        None if some activation on the faces has no stable equilibrium.
+    """
+    cube = grid_faces(cells)
+    tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
+    if not np.isfinite(tips).all():
+        return None
+    found = Surface(vertices=tips, faces=_face_triangles(cube, cells))
+    if found.volume < 0:  # the map turns the box over
+        found = Surface(vertices=tips, faces=found.faces[:, ::-1].copy())
+    return found
 
 
 class FaceNodes(NamedTuple):
@@ -28,7 +96,7 @@ class FaceNodes(NamedTuple):
     """Of each node, shape (n,); they add up to 1 on each face."""
     sense: Array
     """1 on faces at 1, -1 on those at 0: where the cross product of sides points, shape (n,)."""
-    axis: NDArray[np.int64]
+    axis: Index
     """Which axis the face is normal to, shape (n,)."""
 
     def area_vectors(self, slopes: Array) -> Array:
@@ -54,9 +122,8 @@ def gauss_faces(nodes: int) -> FaceNodes:
 
 def grid_faces(cells: int) -> Array:
     """Vertices of a grid of cells^3 boxes that lie on the faces of the unit cube, each once."""
-    inside = np.indices((cells + 1,) * 3).reshape(3, -1).T
-    outer = ((inside == 0) | (inside == cells)).any(axis=1)
-    return inside[outer] / cells
+    cube = cube_grid(cells)
+    return cube[((cube == 0.0) | (cube == 1.0)).any(axis=1)]
 
 
 def box_slopes(rod: TipMap, cube: Array) -> tuple[Array, Array]:
@@ -87,54 +154,6 @@ def _on_faces(ticks: Array, weights: Array) -> FaceNodes:
     return FaceNodes(cube, all_weights, sense, axis)
 
 
-_TOL = 1e-11  # in L: there are few nodes, so that steps may be short
-_ROUGH_TOL = 1e-9  # where a raster decides the error, and under loads, where each tip costs much
-_NODES = (8, 12, 16, 24, 32)
-
-
-class Flux(NamedTuple):
-    """∫ det J dγ by the divergence theorem, theory (81), and what it was computed from."""
-
-    value: float
-    """Signed volume [m³]: below zero if the map turns the orientation over."""
-    error: float
-    """How far off it may be: half as many nodes or so, and the error of the tips [m³]."""
-    faces: FaceNodes
-    """Nodes on the faces of the unit cube of the free bundles."""
-    area: Array
-    """Area vectors of the nodes, with their weights [m²], shape (n, 3)."""
-
-
-def flux_tol(rod: TipMap) -> float:
-    """Largest tip error on the faces, in L."""
-    return min(rod.tol, _ROUGH_TOL if rod.supports_unstable else _TOL)
-
-
-def signed_volume(rod: TipMap, nodes: int | None = None) -> Flux:
-    """The signed volume of the image of three free bundles.
-
-    By Gauss and Legendre's rule on the faces, as the map is smooth: its error falls faster than any
-    power of the number of nodes. They are added until tips are no more exact than the rule.
-
-    Args:
-        rod: The tip map.
-        nodes: Along each side, for this and two thirds of it alone, instead of as many as it needs;
-            tips are then less exact.
-
-    Returns:
-        Value and error are NaN if a node has no stable equilibrium.
-    """
-    rod = refined(rod, flux_tol(rod) if nodes is None else _ROUGH_TOL)
-    counts = _NODES if nodes is None else (2 * nodes // 3, nodes)
-    found, change = _flux(rod, counts[0]), np.inf
-    for count in counts[1:]:
-        rough, found = found, _flux(rod, count)
-        change = abs(found.value - rough.value)
-        if nodes is None and not change > found.error:  # NaN too
-            break
-    return found._replace(error=change + found.error)
-
-
 def _flux(rod: TipMap, nodes: int) -> Flux:
     """By one rule; the error is that of the tips alone."""
     faces = gauss_faces(nodes)
@@ -146,36 +165,7 @@ def _flux(rod: TipMap, nodes: int) -> Flux:
     return Flux(value, moved, faces, area)
 
 
-# The boundary of what a one-to-one map fills: the image of the six faces of the activation box.
-
-
-_CELLS = 96  # along each edge of the box: an arm that bends by half a turn moves 2 degrees a cell
-
-
-def face_image(rod: TipMap, cells: int = _CELLS) -> Surface | None:
-    """The closed image of the surface of the box of three free bundles, oriented outwards.
-
-    Its vertices lie on the boundary to the tolerance of the tips, and so do its edges where the box
-    has edges: sharp rims stay sharp, and parts of any thinness stay whole.
-
-    Args:
-        rod: A tip map that is one to one inside the box.
-        cells: Of the grid along each edge of the box.
-
-    Returns:
-        None if some activation on the faces has no stable equilibrium.
-    """
-    cube = grid_faces(cells)
-    tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
-    if not np.isfinite(tips).all():
-        return None
-    found = Surface(vertices=tips, faces=_face_triangles(cube, cells))
-    if found.volume < 0:  # the map turns the box over
-        found = Surface(vertices=tips, faces=found.faces[:, ::-1].copy())
-    return found
-
-
-def _face_triangles(cube: NDArray[np.float64], cells: int) -> NDArray[np.int32]:
+def _face_triangles(cube: Array, cells: int) -> NDArray[np.int32]:
     """Two triangles for every square of the grid on the faces, oriented outwards."""
     number = np.full((cells + 1,) * 3, -1, np.int32)
     number[tuple(np.rint(cube * cells).astype(int).T)] = np.arange(len(cube))

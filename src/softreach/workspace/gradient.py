@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, find_parameters
@@ -16,11 +15,13 @@ from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap
 from softreach.rod.view import stable_tips
 from softreach.schema import provenance
-from softreach.support.arguments import checked, function, names, optional, within
+from softreach.support.arguments import as_names, as_number
+from softreach.support.arrays import Array, Index
 from softreach.support.errors import InvalidInput
-from softreach.support.progress import Progress, silent
+from softreach.support.progress import Progress, as_progress
 from softreach.support.quantity import quantity
 from softreach.workspace.flux import Flux, flux_tol, grid_faces, signed_volume
+from softreach.workspace.grid import cube_grid
 from softreach.workspace.measure import Estimate
 from softreach.workspace.reach import ACCURACIES, rasterized_set, reachable_set
 from softreach.workspace.shifts import Shifts, shifts_along
@@ -29,62 +30,75 @@ from softreach.workspace.solid import ReachableSolid
 if TYPE_CHECKING:
     import xarray as xr
 
-
-# Corners of the convex hull of an image, and what moving them does to its volume.
-
-
-Array = NDArray[np.float64]
-
 _MOST_CELLS = 48  # of a grid of which all vertices are looked at
 _MOST_FACE_CELLS = 84  # of one of which those on the faces are
-
-
-class HullCorners(NamedTuple):
-    """Activations whose tips are the corners of a convex hull."""
-
-    cube: Array
-    """In the unit cube of the free bundles, shape (n, 3)."""
-    area: Array
-    """∂V_convex/∂r of each corner [m²], shape (n, 3)."""
-
-
-def hull_corners(solid: ReachableSolid) -> dict[int, HullCorners]:
-    """Corners of the hulls of images of some grids, by their number of cells along each axis.
-
-    Where the image folds, vertices inside the box may be corners as well as those on its faces.
-    """
-    folds = solid.route != "flux"
-    most = _MOST_CELLS if folds else _MOST_FACE_CELLS
-    grids = (most // 2, 3 * most // 4, most)
-    return {n: _corners(solid.tip_map, _grid(n) if folds else grid_faces(n)) for n in grids}
-
-
-def _grid(cells: int) -> Array:
-    return np.indices((cells + 1,) * 3).reshape(3, -1).T / cells
-
-
-def _corners(rod: TipMap, cube: Array) -> HullCorners:
-    tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
-    hull = convex_hull(tips)
-    area = np.zeros_like(hull.vertices)
-    corners = (hull.vertices - hull.vertices.mean(axis=0))[hull.faces]
-    for k in range(3):
-        # The volume is a sum of triple products over 6: linear in each corner.
-        share = np.cross(corners[:, (k + 1) % 3], corners[:, (k + 2) % 3]) / 6.0
-        np.add.at(area, hull.faces[:, k], share)
-    return HullCorners(cube[_rows_of(hull.vertices, tips)], area)
-
-
-def _rows_of(some: Array, every: Array) -> NDArray[np.int64]:
-    """Where in a list of points some of them are; one place for those that come twice."""
-    from scipy.spatial import KDTree  # lazily
-
-    return np.asarray(KDTree(every).query(some)[1], np.int64)
-
-
 _STEP = 3e-3  # of a parameter, for what is smooth to the tolerance of tips
 _RASTER_STEP = 2e-2  # for what is rasterized, which is rough
 _ROUGHNESS = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # fourth differences: nothing smooth is left
+_MEANINGS = {
+    "volume": ("m3 per unit", "derivative of the reachable volume"),
+    "volume_error": ("m3 per unit", "error of the derivative of the reachable volume"),
+    "convex_volume": ("m3 per unit", "derivative of the convex hull's volume"),
+    "convex_volume_error": ("m3 per unit", "error of the derivative of the convex hull's volume"),
+    "unreachability": ("1 per unit", "derivative of the unreachability"),
+    "unreachability_error": ("1 per unit", "error of the derivative of the unreachability"),
+}
+
+
+def volume_gradient(
+    arm: Manipulator,
+    parameters: str | Sequence[str],
+    *,
+    accuracy: float = 3e-3,
+    progress: Progress | None = None,
+) -> VolumeGradient:
+    """Derivatives of the reachable volume by design parameters, for three free bundles.
+
+    The images of the six faces of the activation box move with the design: what they sweep is the
+    change of the signed volume, theory (83), and is exact to seven digits or so. That is all where
+    the map is one to one. Where the image folds or overlaps, the derivative of the rest that is
+    rasterized is added, from differences between neighboring designs; it is by far the larger part
+    of the error stated. Where cells are left out of the box, for lack of a stable equilibrium,
+    everything is from such differences.
+
+    The convex hull changes with its corners, theory (84). Its volume, as that of the reachable set,
+    has kinks where the touched places jump; there the derivative is that of one side.
+
+    Args:
+        arm: The design.
+        parameters: Names as in atlases: `taper`, `revolution`, `rings[0].inner_ratio`,
+            `left.offset`, and the bounds of activations, `lower`, `upper` or `left.lower[1]`.
+        accuracy: As for `reachable_set`: of the convex hull, and of what is rasterized.
+        progress: Called with 1 for each parameter done.
+
+    Raises:
+        InvalidInput: Other than three free bundles, no parameters, one that the design lacks or
+            that counts something, or one whose change holds or frees a bundle.
+        InvalidDesign: The design has no neighbors with other values of a parameter.
+    """
+    arm, names = a_manipulator("arm", arm), as_names("parameters", parameters)
+    accuracy, progress = as_number("accuracy", accuracy, ACCURACIES), as_progress(progress)
+    if not names:
+        raise InvalidInput("parameters", "none", "the name of one or more")
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise InvalidInput("parameters", twice[0], "given once")
+    parameter_of = find_parameters(arm, names)
+    solid = _solid(arm, accuracy)
+    base = _Base(solid, accuracy)
+    rows = []
+    for name in names:
+        rows.append(base.derivatives(parameter_of[name]))
+        progress(1)
+    volume, convex = zip(*rows, strict=True)
+    return VolumeGradient(
+        solid=solid,
+        parameters=names,
+        units=tuple(parameter_of[name].unit for name in names),
+        volume=np.array([each.value for each in volume]),
+        volume_error=np.array([each.error for each in volume]),
+        convex_volume=np.array([each.value for each in convex]),
+        convex_volume_error=np.array([each.error for each in convex]),
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -144,72 +158,43 @@ class VolumeGradient:
         return "\n  ".join([f"VolumeGradient: route {self.route}", *lines])
 
 
-_MEANINGS = {
-    "volume": ("m3 per unit", "derivative of the reachable volume"),
-    "volume_error": ("m3 per unit", "error of the derivative of the reachable volume"),
-    "convex_volume": ("m3 per unit", "derivative of the convex hull's volume"),
-    "convex_volume_error": ("m3 per unit", "error of the derivative of the convex hull's volume"),
-    "unreachability": ("1 per unit", "derivative of the unreachability"),
-    "unreachability_error": ("1 per unit", "error of the derivative of the unreachability"),
-}
+def hull_corners(solid: ReachableSolid) -> dict[int, HullCorners]:
+    """Corners of the hulls of images of some grids, by their number of cells along each axis.
 
-
-@checked(
-    arm=a_manipulator, parameters=names, accuracy=within(ACCURACIES), progress=optional(function)
-)
-def volume_gradient(
-    arm: Manipulator,
-    parameters: str | Sequence[str],
-    *,
-    accuracy: float = 3e-3,
-    progress: Progress | None = None,
-) -> VolumeGradient:
-    """Derivatives of the reachable volume by design parameters, for three free bundles.
-
-    The images of the six faces of the activation box move with the design: what they sweep is the
-    change of the signed volume, theory (83), and is exact to seven digits or so. That is all where
-    the map is one to one. Where the image folds or overlaps, the derivative of the rest that is
-    rasterized is added, from differences between neighboring designs; it is by far the larger part
-    of the error stated. Where cells are left out of the box, for lack of a stable equilibrium,
-    everything is from such differences.
-
-    The convex hull changes with its corners, theory (84). Its volume, as that of the reachable set,
-    has kinks where the touched places jump; there the derivative is that of one side.
-
-    Args:
-        arm: The design.
-        parameters: Names as in atlases: `taper`, `revolution`, `rings[0].inner_ratio`,
-            `left.offset`, and the bounds of activations, `lower`, `upper` or `left.lower[1]`.
-        accuracy: As for `reachable_set`: of the convex hull, and of what is rasterized.
-        progress: Called with 1 for each parameter done.
-
-    Raises:
-        InvalidInput: Other than three free bundles, no parameters, one that the design lacks or
-            that counts something, or one whose change holds or frees a bundle.
-        InvalidDesign: The design has no neighbors with other values of a parameter.
+    Where the image folds, vertices inside the box may be corners as well as those on its faces.
     """
-    asked = tuple(parameters)
-    if not asked:
-        raise InvalidInput("parameters", "none", "the name of one or more")
-    if twice := [name for name in asked if asked.count(name) > 1]:
-        raise InvalidInput("parameters", twice[0], "given once")
-    found = find_parameters(arm, asked)
-    solid = _solid(arm, accuracy)
-    base = _Base(solid, accuracy)
-    rows = []
-    for name in asked:
-        rows.append(base.derivatives(found[name]))
-        (progress or silent)(1)
-    volume, convex = zip(*rows, strict=True)
-    return VolumeGradient(
-        solid=solid,
-        parameters=asked,
-        units=tuple(found[name].unit for name in asked),
-        volume=np.array([each.value for each in volume]),
-        volume_error=np.array([each.error for each in volume]),
-        convex_volume=np.array([each.value for each in convex]),
-        convex_volume_error=np.array([each.error for each in convex]),
-    )
+    folds = solid.route != "flux"
+    most = _MOST_CELLS if folds else _MOST_FACE_CELLS
+    grids = (most // 2, 3 * most // 4, most)
+    return {n: _corners(solid.tip_map, cube_grid(n) if folds else grid_faces(n)) for n in grids}
+
+
+class HullCorners(NamedTuple):
+    """Activations whose tips are the corners of a convex hull."""
+
+    cube: Array
+    """In the unit cube of the free bundles, shape (n, 3)."""
+    area: Array
+    """∂V_convex/∂r of each corner [m²], shape (n, 3)."""
+
+
+def _corners(rod: TipMap, cube: Array) -> HullCorners:
+    tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
+    hull = convex_hull(tips)
+    area = np.zeros_like(hull.vertices)
+    corners = (hull.vertices - hull.vertices.mean(axis=0))[hull.faces]
+    for k in range(3):
+        # The volume is a sum of triple products over 6: linear in each corner.
+        share = np.cross(corners[:, (k + 1) % 3], corners[:, (k + 2) % 3]) / 6.0
+        np.add.at(area, hull.faces[:, k], share)
+    return HullCorners(cube[_rows_of(hull.vertices, tips)], area)
+
+
+def _rows_of(some: Array, every: Array) -> Index:
+    """Where in a list of points some of them are; one place for those that come twice."""
+    from scipy.spatial import KDTree  # lazily
+
+    return np.asarray(KDTree(every).query(some)[1], np.int64)
 
 
 def _solid(arm: Manipulator, accuracy: float) -> ReachableSolid:

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.kernels.image.contour import stretches
 from softreach.rod.rods import refined
 from softreach.rod.tip_map import TipMap, no_stable_equilibrium
 from softreach.rod.view import stable_tips
+from softreach.support.arrays import Array, Mask
 from softreach.support.parallel import blocks
 from softreach.support.progress import Progress, silent
 
 __all__ = ["corners_of", "every_second", "grid_stretches", "grid_tips", "image_measure"]
 
-Array = NDArray[np.float64]
 
 _BLOCK = 1 << 16  # vertices
 _TOL = 1e-9  # far fewer evaluations than on the grids: their steps may be short
@@ -48,7 +47,7 @@ def grid_tips(rod: TipMap, cells: int, progress: Progress = silent) -> Array:
     return tips
 
 
-def grid_stretches(rod: TipMap, tips: Array, cells: int, left_out: NDArray[np.bool_]) -> Array:
+def grid_stretches(rod: TipMap, tips: Array, cells: int, left_out: Mask) -> Array:
     """det J of three free bundles at the vertices of a grid, for tips in m per unit of activation.
 
     From differences of the tips, and by J itself where these might have the wrong sign, as well as
@@ -82,7 +81,12 @@ def _largest(rod: TipMap, stretch: Array) -> float:
     return float(stretch.max(initial=0.0))
 
 
-def corners_of(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def cube_grid(cells: int) -> Array:
+    """Vertices of a grid of cells³ boxes over the unit cube, in C order, shape (n, 3)."""
+    return np.indices((cells + 1,) * 3).reshape(3, -1).T / cells
+
+
+def corners_of(cells: Mask) -> Mask:
     """Vertices of a grid that are corners of some of its cells."""
     for axis in range(cells.ndim):
         none = np.zeros_like(np.take(cells, [0], axis))

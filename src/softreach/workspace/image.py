@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from softreach.kernels.image import contour, point_cover, raster
 from softreach.support import parallel
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.memory import check_memory
 from softreach.support.progress import Progress, silent
 
 __all__ = ["Image", "Lattice", "Spans", "image_of"]
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _STRETCH_BITS = 50  # of the largest det J: sums of four are exact in any order
 _BYTES = 16  # of a cell: two counts, and what questions make of them
@@ -60,15 +59,15 @@ class Lattice(NamedTuple):
 class Spans(NamedTuple):
     """Pieces of lines of sight between crossings, line by line, upwards."""
 
-    column: Ints
+    column: Index
     """Which line, (i, j) as i · width + j over the two axes that follow, cyclically."""
     start: Array
     """Where it begins, in cells."""
     length: Array
     """How long it is, in cells; 0 after the last crossing of a line."""
-    cover: Ints
+    cover: Index
     """Number of activations that reach it."""
-    degree: Ints
+    degree: Index
     """Those of which the map keeps the orientation minus those that it turns over."""
 
 
@@ -81,7 +80,7 @@ class Image:
     """Whole units to a cell: vertices are rounded to cell / unit."""
     vertices: Array
     """Mapped vertices in these units from the lattice's origin, shape (n, 3)."""
-    triangles: Ints
+    triangles: Index
     """Critical triangles, as `kernels.contour.critical_triangles` lists them."""
 
     @cached_property
@@ -115,7 +114,7 @@ class Image:
         raster.add_counts(self._crossings(2), counts, degrees)
         return counts.reshape(shape), degrees.reshape(shape)
 
-    def counts_at(self, points: Array) -> NDArray[np.int64]:
+    def counts_at(self, points: Array) -> Index:
         """Cover counts at any points [m], exactly but for rounding to units, shape (n,).
 
         As `counts`, but nowhere below zero.
@@ -134,11 +133,11 @@ class Image:
         return np.maximum(out, 0)
 
     @cached_property
-    def _bins(self) -> tuple[Ints, Ints]:
+    def _bins(self) -> tuple[Index, Index]:
         shape = self.lattice.shape[:2]
         return point_cover.bin_triangles(self.vertices, self.triangles, self.unit, shape)
 
-    def boundary_crossings(self, axis: int) -> tuple[tuple[Ints, Ints, Ints], Array]:
+    def boundary_crossings(self, axis: int) -> tuple[tuple[Index, Index, Index], Array]:
         """Where the boundary of the image cuts the edges between cell centers along an axis.
 
         Returns:
@@ -162,7 +161,7 @@ class Image:
 
     def _crossings(self, axis: int) -> raster.Crossings:
         p, q = (axis + 1) % 3, (axis + 2) % 3
-        blocks = list(parallel.blocks(len(self.triangles), _TRIANGLES))
+        blocks = parallel.blocks(len(self.triangles), _TRIANGLES)
         parts: list[raster.Crossings] = [raster.empty_crossings(0)] * len(blocks)
 
         def task(number: int) -> None:
@@ -177,12 +176,12 @@ class Image:
         return raster.joined_crossings(parts)
 
 
-def _starts(*keys: Ints) -> NDArray[np.bool_]:
+def _starts(*keys: Index) -> Mask:
     """Where a sorted list of keys changes."""
     return np.any([np.diff(key, prepend=-1) != 0 for key in keys], axis=0)
 
 
-def _running_sums(values: Ints, starts: NDArray[np.bool_]) -> Ints:
+def _running_sums(values: Index, starts: Mask) -> Index:
     """Cumulative sums that begin anew at every start."""
     total = np.cumsum(values)
     at = np.flatnonzero(starts)
@@ -197,7 +196,7 @@ def image_of(
     lattice: Lattice,
     progress: Progress = silent,
     *,
-    left_out: NDArray[np.bool_] | None = None,
+    left_out: Mask | None = None,
 ) -> Image:
     """The image of a grid of boxes whose vertices go to `points`.
 
@@ -223,7 +222,7 @@ def image_of(
     )
 
 
-def _unit(scaled: Array, left_out: NDArray[np.bool_]) -> float:
+def _unit(scaled: Array, left_out: Mask) -> float:
     """The largest power of two for which the kernels' determinants are exact."""
     grid = scaled.reshape(*(n + 1 for n in left_out.shape), 3)
     steps = [_longest_edge(grid, left_out, axis) for axis in range(3)]
@@ -231,7 +230,7 @@ def _unit(scaled: Array, left_out: NDArray[np.bool_]) -> float:
     return 2.0 ** np.floor(contour.EXACT_BITS - 1 - np.log2(longest))
 
 
-def _longest_edge(grid: Array, left_out: NDArray[np.bool_], axis: int) -> float:
+def _longest_edge(grid: Array, left_out: Mask, axis: int) -> float:
     """The largest change of a coordinate along edges of the boxes that have an image."""
     steps = np.abs(np.diff(grid, axis=axis))
     if not left_out.any():
@@ -244,14 +243,14 @@ def _longest_edge(grid: Array, left_out: NDArray[np.bool_], axis: int) -> float:
 
 
 def _critical_triangles(
-    vertices: Array, stretches: Array, left_out: NDArray[np.bool_], progress: Progress
-) -> Ints:
+    vertices: Array, stretches: Array, left_out: Mask, progress: Progress
+) -> Index:
     star, axes = contour.stars(left_out.shape), np.array(left_out.shape)
     gaps = np.pad(left_out, [(0, 1)] * 3).ravel()  # of the cells whose least vertex this is
     largest = np.abs(stretches).max() or 1.0
     stretches = np.rint(stretches / largest * 2.0**_STRETCH_BITS)
-    blocks = list(parallel.blocks(len(vertices), max(1, _ROWS // len(star.triangles))))
-    parts: list[Ints] = [np.empty((0, 5), np.int64)] * len(blocks)
+    blocks = parallel.blocks(len(vertices), max(1, _ROWS // len(star.triangles)))
+    parts: list[Index] = [np.empty((0, 5), np.int64)] * len(blocks)
 
     def task(number: int) -> None:
         first, last = blocks[number].start, blocks[number].stop

@@ -11,133 +11,82 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from softreach.geometry.hull import convex_hull
 from softreach.rod.tip_map import TipMap
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.progress import Progress
 from softreach.workspace.discontinuities import corner_values
 from softreach.workspace.flux import box_slopes, grid_faces, signed_volume
-from softreach.workspace.grid import grid_stretches, grid_tips
+from softreach.workspace.grid import cube_grid, grid_stretches, grid_tips
 from softreach.workspace.image import Image, Lattice, image_of
-from softreach.workspace.measure import Estimate, extrapolated
+from softreach.workspace.measure import Estimate, extrapolated_hull
 from softreach.workspace.solid import ReachableSolid
-
-# Windows of the box in which no two activations lead to one place.
-
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Bools = NDArray[np.bool_]
 
 _LIMIT = 0.8  # of 1, for slopes between the samples
 _POWERS = 6
 _WORST = 100  # vertices of the boundary that are looked at first
 _UNKNOWN, _NO, _YES = -1, 0, 1
-
-
-class RegularWindows:
-    """Cubes of 2 w cells around vertices of a grid in which the map is one to one; w = 1, 2, 4, ...
-
-    Theory (82): with J0 = U Σ Vᵀ in the middle, E is the largest |Σ⁻¹Uᵀ (J - J0) V| in the window,
-    entry by entry. If its spectral radius is below 1 every matrix within these bounds is regular,
-    that of the mean value theorem too, which takes the difference of two activations to that of
-    their tips [Neumaier1990].
-
-    Args:
-        slopes: ∂r/∂x at the grid of the unit cube, shape (n + 1, n + 1, n + 1, 3, 3).
-    """
-
-    def __init__(self, slopes: Array) -> None:
-        self._cells = len(slopes) - 1
-        self._slopes = slopes.reshape(-1, 3, 3)
-        self._sizes = 2 ** np.arange(int(np.log2(self._cells)))
-        self._known = np.full((len(self._sizes), len(self._slopes)), _UNKNOWN, np.int8)
-        corners = 2 * np.indices((2, 2, 2)).reshape(3, -1).T - 1
-        self._offsets = np.concatenate([corners, np.eye(3, dtype=int), -np.eye(3, dtype=int)])
-
-    def any_hopeless(self) -> bool:
-        """Whether the map is not known to be one to one even in small windows at the boundary.
-
-        Looked at are those where the map is flattest.
-        """
-        n = self._cells
-        vertex = np.indices((n + 1,) * 3).reshape(3, -1)
-        outer = np.flatnonzero(((vertex == 0) | (vertex == n)).any(axis=0))
-        stretch = np.abs(np.linalg.det(self._slopes[outer]))
-        worst = outer[np.argpartition(stretch, min(_WORST, len(outer) - 1))[:_WORST]]
-        return not self._are_regular(np.zeros(len(worst), np.int64), worst).all()
-
-    def hold(self, low: Array, high: Array) -> tuple[Bools, Bools]:
-        """Whether such windows hold boxes, and whether the smallest that might hold one is none.
-
-        Args:
-            low: Lowest corners of the boxes in the unit cube, shape (n, 3).
-            high: Highest corners.
-
-        Returns:
-            Two arrays of shape (n,).
-        """
-        n = self._cells
-        center = np.rint(0.5 * n * (low + high)).astype(np.int64)
-        reach = np.maximum(n * high - center, center - n * low).max(axis=1)
-        size = np.searchsorted(self._sizes, reach - 1e-9)
-        held = size < len(self._sizes)
-        vertex = (center[:, 0] * (n + 1) + center[:, 1]) * (n + 1) + center[:, 2]
-        found = np.zeros(len(low), bool)
-        found[held] = self._are_regular(size[held], vertex[held])
-        return found, held & ~found & (size == 0)
-
-    def _are_regular(self, size: Ints, vertex: Ints) -> Bools:
-        asked = np.zeros(self._known.shape, bool)
-        asked[size, vertex] = True
-        number, at = np.nonzero(asked & (self._known == _UNKNOWN))
-        self._known[number, at] = np.where(self._judge(self._sizes[number], at), _YES, _NO)
-        return self._known[size, vertex] == _YES
-
-    def _judge(self, width: Ints, vertex: Ints) -> Bools:
-        n = self._cells
-        center = np.stack(np.unravel_index(vertex, (n + 1,) * 3), axis=-1)
-        left, stretch, right = np.linalg.svd(self._slopes[vertex])
-        back = np.swapaxes(left, 1, 2) / stretch[:, :, None]
-        largest = np.zeros((len(vertex), 3, 3))
-        for offset in self._offsets:
-            other = np.clip(center + offset * width[:, None], 0, n)
-            at = (other[:, 0] * (n + 1) + other[:, 1]) * (n + 1) + other[:, 2]
-            change = self._slopes[at] - self._slopes[vertex]
-            np.maximum(largest, np.abs(back @ change @ np.swapaxes(right, 1, 2)), out=largest)
-        return _spectral_bound(largest) < _LIMIT
-
-
-def _spectral_bound(matrices: Array) -> Array:
-    """An upper bound of the spectral radius of matrices without negative entries (Collatz)."""
-    vector = np.ones((len(matrices), 3, 1))
-    for _ in range(_POWERS):
-        vector = matrices @ vector
-        vector = vector / vector.max(axis=1, keepdims=True, initial=1e-300) + 1e-6
-    return ((matrices @ vector) / vector).max(axis=(1, 2))
-
-
-# Whether the images of two different points of the boundary of a box meet.
-
-
 _FIRST = 4  # patches along each side of a face to begin with
 _HALVINGS = 6
 _MOST_PAIRS = 200_000
 _FACE_MARGIN = 1.25  # on differences of slopes, for those between the vertices
+_CELLS = (4, 8, 16)  # along each axis; the first finds nearly every fold, for next to nothing
+_MARGIN = 1.5  # on second differences, for those between the vertices
 
 
-class _Patches(NamedTuple):
-    """Squares on the faces of the unit cube, seen from their centers."""
+def is_injective(rod: TipMap) -> bool:
+    """Whether the map of a box of three free bundles is found to be one to one.
 
-    center: Array
-    """Shape (n, 3)."""
-    half: Array
-    """Half widths along the three axes, one of them 0, shape (n, 3)."""
-    tips: Array
-    """Images of the centers [m], shape (n, 3)."""
-    slopes: Array
-    """∂r/∂x there [m], shape (n, 3, 3)."""
+    False means that it is not or that this is not clear. Arms that may lose their stability are not
+    judged: what is stable between samples is not known.
+    """
+    if rod.supports_unstable or rod.box.dimension != 3:
+        return False
+    for cells in _CELLS:
+        slopes = _grid_slopes(rod, cells)
+        stretch = np.linalg.det(slopes)
+        if not stretch.min() * stretch.max() > 0.0:
+            return False
+        if cells == _CELLS[0] or not _keeps_sign(stretch):
+            continue
+        meet = faces_meet(rod, slopes)
+        if meet is not None:
+            return not meet
+    return False
+
+
+def solid_by_flux(
+    rod: TipMap, cells: int, lattice_for: Callable[[Array], Lattice], progress: Progress
+) -> ReachableSolid:
+    """The solid of a tip map that is one to one; it is rasterized when a question needs it.
+
+    Args:
+        rod: The tip map.
+        cells: Of the activation grid along each axis, even: for the convex hull and the raster.
+        lattice_for: The lattice to rasterize on, for the tips that it must hold.
+        progress: Called with the number of grid vertices done since its last call.
+    """
+    flux = signed_volume(rod)
+    places = grid_faces(cells)
+    tips = rod.tips(rod.box.from_free_cube(places))
+    lattice = lattice_for(tips)
+    convex = _convex_volume(tips, places * cells)
+    progress(len(places))
+    volume = abs(flux.value)
+    return ReachableSolid(
+        tip_map=rod,
+        cells=cells,
+        volume=volume,
+        volume_error=flux.error,
+        convex_volume=convex.value,
+        convex_volume_error=convex.error,
+        multiplicity={1: volume},
+        multiplicity_error=0.0,
+        fold_volume=0.0,
+        fold_volume_error=0.0,
+        route="flux",
+        rasterize=partial(_rasterized, rod, cells, lattice),
+    )
 
 
 def faces_meet(rod: TipMap, slopes: Array) -> bool | None:
@@ -175,7 +124,102 @@ def faces_meet(rod: TipMap, slopes: Array) -> bool | None:
     return True
 
 
-def _each_once(first: Ints, second: Ints, size: int) -> tuple[Ints, Ints, Ints]:
+class RegularWindows:
+    """Cubes of 2 w cells around vertices of a grid in which the map is one to one; w = 1, 2, 4, ...
+
+    Theory (82): with J0 = U Σ Vᵀ in the middle, E is the largest |Σ⁻¹Uᵀ (J - J0) V| in the window,
+    entry by entry. If its spectral radius is below 1 every matrix within these bounds is regular,
+    that of the mean value theorem too, which takes the difference of two activations to that of
+    their tips [Neumaier1990].
+
+    Args:
+        slopes: ∂r/∂x at the grid of the unit cube, shape (n + 1, n + 1, n + 1, 3, 3).
+    """
+
+    def __init__(self, slopes: Array) -> None:
+        self._cells = len(slopes) - 1
+        self._slopes = slopes.reshape(-1, 3, 3)
+        self._sizes = 2 ** np.arange(int(np.log2(self._cells)))
+        self._known = np.full((len(self._sizes), len(self._slopes)), _UNKNOWN, np.int8)
+        corners = 2 * np.indices((2, 2, 2)).reshape(3, -1).T - 1
+        self._offsets = np.concatenate([corners, np.eye(3, dtype=int), -np.eye(3, dtype=int)])
+
+    def any_hopeless(self) -> bool:
+        """Whether the map is not known to be one to one even in small windows at the boundary.
+
+        Looked at are those where the map is flattest.
+        """
+        n = self._cells
+        vertex = np.indices((n + 1,) * 3).reshape(3, -1)
+        outer = np.flatnonzero(((vertex == 0) | (vertex == n)).any(axis=0))
+        stretch = np.abs(np.linalg.det(self._slopes[outer]))
+        worst = outer[np.argpartition(stretch, min(_WORST, len(outer) - 1))[:_WORST]]
+        return not self._are_regular(np.zeros(len(worst), np.int64), worst).all()
+
+    def hold(self, low: Array, high: Array) -> tuple[Mask, Mask]:
+        """Whether such windows hold boxes, and whether the smallest that might hold one is none.
+
+        Args:
+            low: Lowest corners of the boxes in the unit cube, shape (n, 3).
+            high: Highest corners.
+
+        Returns:
+            Two arrays of shape (n,).
+        """
+        n = self._cells
+        center = np.rint(0.5 * n * (low + high)).astype(np.int64)
+        reach = np.maximum(n * high - center, center - n * low).max(axis=1)
+        size = np.searchsorted(self._sizes, reach - 1e-9)
+        held = size < len(self._sizes)
+        vertex = (center[:, 0] * (n + 1) + center[:, 1]) * (n + 1) + center[:, 2]
+        found = np.zeros(len(low), bool)
+        found[held] = self._are_regular(size[held], vertex[held])
+        return found, held & ~found & (size == 0)
+
+    def _are_regular(self, size: Index, vertex: Index) -> Mask:
+        asked = np.zeros(self._known.shape, bool)
+        asked[size, vertex] = True
+        number, at = np.nonzero(asked & (self._known == _UNKNOWN))
+        self._known[number, at] = np.where(self._judge(self._sizes[number], at), _YES, _NO)
+        return self._known[size, vertex] == _YES
+
+    def _judge(self, width: Index, vertex: Index) -> Mask:
+        n = self._cells
+        center = np.stack(np.unravel_index(vertex, (n + 1,) * 3), axis=-1)
+        left, stretch, right = np.linalg.svd(self._slopes[vertex])
+        back = np.swapaxes(left, 1, 2) / stretch[:, :, None]
+        largest = np.zeros((len(vertex), 3, 3))
+        for offset in self._offsets:
+            other = np.clip(center + offset * width[:, None], 0, n)
+            at = (other[:, 0] * (n + 1) + other[:, 1]) * (n + 1) + other[:, 2]
+            change = self._slopes[at] - self._slopes[vertex]
+            np.maximum(largest, np.abs(back @ change @ np.swapaxes(right, 1, 2)), out=largest)
+        return _spectral_bound(largest) < _LIMIT
+
+
+def _spectral_bound(matrices: Array) -> Array:
+    """An upper bound of the spectral radius of matrices without negative entries (Collatz)."""
+    vector = np.ones((len(matrices), 3, 1))
+    for _ in range(_POWERS):
+        vector = matrices @ vector
+        vector = vector / vector.max(axis=1, keepdims=True, initial=1e-300) + 1e-6
+    return ((matrices @ vector) / vector).max(axis=(1, 2))
+
+
+class _Patches(NamedTuple):
+    """Squares on the faces of the unit cube, seen from their centers."""
+
+    center: Array
+    """Shape (n, 3)."""
+    half: Array
+    """Half widths along the three axes, one of them 0, shape (n, 3)."""
+    tips: Array
+    """Images of the centers [m], shape (n, 3)."""
+    slopes: Array
+    """∂r/∂x there [m], shape (n, 3, 3)."""
+
+
+def _each_once(first: Index, second: Index, size: int) -> tuple[Index, Index, Index]:
     """Numbers below `size` that occur in pairs, and where among them the pairs are found."""
     used = np.zeros(size, bool)
     used[first] = used[second] = True
@@ -190,7 +234,7 @@ def _largest_bend(slopes: Array) -> Array:
     return _FACE_MARGIN * n * np.array(found)
 
 
-def _patches(rod: TipMap, which: Ints, side: int) -> _Patches:
+def _patches(rod: TipMap, which: Index, side: int) -> _Patches:
     """Patches by number: face, row and column."""
     face, row, column = which // side**2, which // side % side, which % side
     axis, at, rows = face // 2, (face % 2).astype(float), np.arange(len(which))
@@ -201,7 +245,7 @@ def _patches(rod: TipMap, which: Ints, side: int) -> _Patches:
     return _Patches(center, half, *box_slopes(rod, center))
 
 
-def _parted(patches: _Patches, a: Ints, b: Ints, bend: Array) -> NDArray[np.bool_]:
+def _parted(patches: _Patches, a: Index, b: Index, bend: Array) -> Mask:
     """Whether a plane parts the images of two patches, shape (pairs,).
 
     Tried are planes along either of them, and across the line between their centers.
@@ -229,13 +273,13 @@ def _normals(patches: _Patches) -> Array:
     return np.cross(first, patches.slopes[rows, :, (axis + 2) % 3])
 
 
-def _hull(patches: _Patches, a: Ints, b: Ints) -> tuple[Array, Array]:
+def _hull(patches: _Patches, a: Index, b: Index) -> tuple[Array, Array]:
     """Lowest and highest corner of the boxes that hold both patches, shape (pairs, 3) each."""
     low, high = patches.center - patches.half, patches.center + patches.half
     return np.minimum(low[a], low[b]), np.maximum(high[a], high[b])
 
 
-def _halved(first: Ints, second: Ints, side: int) -> tuple[Ints, Ints]:
+def _halved(first: Index, second: Index, side: int) -> tuple[Index, Index]:
     """All pairs of the quarters of two patches, each once."""
     a, b = (_quarters(each, side) for each in (first, second))
     pairs = np.stack(np.broadcast_arrays(a[:, :, None], b[:, None, :]), axis=-1).reshape(-1, 2)
@@ -243,41 +287,16 @@ def _halved(first: Ints, second: Ints, side: int) -> tuple[Ints, Ints]:
     return pairs[:, 0], pairs[:, 1]
 
 
-def _quarters(which: Ints, side: int) -> Ints:
+def _quarters(which: Index, side: int) -> Index:
     face, row, column = which // side**2, which // side % side, which % side
     rows = 2 * row[:, None] + np.array([0, 0, 1, 1])
     columns = 2 * column[:, None] + np.array([0, 1, 0, 1])
     return (face[:, None] * 2 * side + rows) * 2 * side + columns
 
 
-_CELLS = (4, 8, 16)  # along each axis; the first finds nearly every fold, for next to nothing
-_MARGIN = 1.5  # on second differences, for those between the vertices
-
-
-def is_one_to_one(rod: TipMap) -> bool:
-    """Whether the map of a box of three free bundles is found to be one to one.
-
-    False means that it is not or that this is not clear. Arms that may lose their stability are not
-    judged: what is stable between samples is not known.
-    """
-    if rod.supports_unstable or rod.box.dimension != 3:
-        return False
-    for cells in _CELLS:
-        slopes = _grid_slopes(rod, cells)
-        stretch = np.linalg.det(slopes)
-        if not stretch.min() * stretch.max() > 0.0:
-            return False
-        if cells == _CELLS[0] or not _keeps_sign(stretch):
-            continue
-        meet = faces_meet(rod, slopes)
-        if meet is not None:
-            return not meet
-    return False
-
-
 def _grid_slopes(rod: TipMap, cells: int) -> Array:
     """∂r/∂x at the vertices of a grid of the unit cube, (cells + 1, cells + 1, cells + 1, 3, 3)."""
-    cube = np.indices((cells + 1,) * 3).reshape(3, -1).T / cells
+    cube = cube_grid(cells)
     return box_slopes(rod, cube)[1].reshape(*(cells + 1,) * 3, 3, 3)
 
 
@@ -295,48 +314,10 @@ def _keeps_sign(stretch: Array) -> bool:
     return bool((least > _MARGIN / 8.0 * corner_values(curved).max(axis=-1)).all())
 
 
-# The solid that three bundles reach where no place is reached twice: all from the boundary.
-
-
-def solid_by_flux(
-    rod: TipMap, cells: int, lattice_for: Callable[[Array], Lattice], progress: Progress
-) -> ReachableSolid:
-    """The solid of a tip map that is one to one; it is rasterized when a question needs it.
-
-    Args:
-        rod: The tip map.
-        cells: Of the activation grid along each axis, even: for the convex hull and the raster.
-        lattice_for: The lattice to rasterize on, for the tips that it must hold.
-        progress: Called with the number of grid vertices done since its last call.
-    """
-    flux = signed_volume(rod)
-    places = grid_faces(cells)
-    tips = rod.tips(rod.box.from_free_cube(places))
-    lattice = lattice_for(tips)
-    convex = _convex_volume(tips, places * cells)
-    progress(len(places))
-    volume = abs(flux.value)
-    return ReachableSolid(
-        tip_map=rod,
-        cells=cells,
-        volume=volume,
-        volume_error=flux.error,
-        convex_volume=convex.value,
-        convex_volume_error=convex.error,
-        multiplicity={1: volume},
-        multiplicity_error=0.0,
-        fold_volume=0.0,
-        fold_volume_error=0.0,
-        route="flux",
-        rasterize=partial(_rasterized, rod, cells, lattice),
-    )
-
-
 def _convex_volume(tips: Array, vertices: Array) -> Estimate:
     """From all vertices on the faces and from every second one, as from images of grids."""
     second = (np.rint(vertices) % 2 == 0).all(axis=1)
-    fine, coarse = (Estimate(convex_hull(each).volume, 0.0) for each in (tips, tips[second]))
-    return extrapolated(fine, coarse)
+    return extrapolated_hull(tips, tips[second])
 
 
 def _rasterized(rod: TipMap, cells: int, lattice: Lattice) -> Image:

@@ -6,17 +6,16 @@ from collections.abc import Callable
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.geometry.hull import convex_hull
 from softreach.rod.tip_map import TipMap
+from softreach.support.arrays import Array, Index
 from softreach.workspace.crossings import Crossings
 from softreach.workspace.flux import signed_volume
 from softreach.workspace.image import Image, Spans
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
-
 _LEFT = 0.35  # of what is removed; for four bundles 0.28 to 0.34 of it were found wrong
 _NODES = 24  # Gauss nodes along each side of a face; two thirds of them tell the error
 
@@ -131,11 +130,16 @@ def _of_each(
 
 
 def convex_volume(fine: Image, coarse: Image) -> Estimate:
-    """Volume of the convex hull of the image [m³]: its corners are corners of critical triangles.
+    """Volume of the convex hull of the image [m³]: from corners of critical triangles."""
+    return extrapolated_hull(_corners(fine), _corners(coarse))
+
+
+def extrapolated_hull(points: Array, fewer: Array) -> Estimate:
+    """Volume of the convex hull [m³] from mapped vertices, and from those of half as fine a grid.
 
     The hull of mapped vertices lies inside that of the image by O(1/n²), which is removed.
     """
-    value, rough = (Estimate(_hull_volume(_corners(image)), 0.0) for image in (fine, coarse))
+    value, rough = (Estimate(_hull_volume(places), 0.0) for places in (points, fewer))
     return extrapolated(value, rough)
 
 
@@ -213,20 +217,14 @@ def _mean(image: Image, quantity: Callable[[Spans], ArrayLike]) -> Array:
     return np.squeeze(mean * image.lattice.cell**3)
 
 
-# Volume from the lengths of lines of sight through cell centers, and how sure it is.
-
-
-Ints = NDArray[np.int64]
-
-
 class Runs(NamedTuple):
     """Stretches of lines of sight that are reached, line by line, upwards; in cells."""
 
-    line: Ints
+    line: Index
     """Which line, (i, j) as i · width + j over the other two axes, shape (n,)."""
-    first: Ints
+    first: Index
     """Number of the first center, shape (n,)."""
-    last: Ints
+    last: Index
     """Number of the last center, shape (n,)."""
     start: Array
     """Where it begins, before its first center, shape (n,)."""

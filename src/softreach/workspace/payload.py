@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.schema import provenance
-from softreach.support.arguments import as_number, checked, function, optional
-from softreach.support.arrays import as_floats
-from softreach.support.errors import InvalidDesign, InvalidInput
-from softreach.support.progress import Progress, silent
+from softreach.support.arguments import as_number
+from softreach.support.arrays import Array, as_floats
+from softreach.support.errors import InvalidDesign, InvalidInput, Range
+from softreach.support.progress import Progress, as_progress
 from softreach.support.quantity import quantity
 from softreach.workspace.reach import ACCURACIES, reachable_set
 
@@ -23,13 +23,11 @@ if TYPE_CHECKING:
 
 __all__ = ["LargestPayload", "PayloadCurve", "payload_curve"]
 
-Array = NDArray[np.float64]
 
 _USUAL = (0.0, 0.5, 1.0, 2.0, 4.0)  # payloads over the one that bends the arm by about a third
 _DOUBLINGS = 6  # of the largest payload, in search of one that is too heavy
 
 
-@checked(arm=a_manipulator, progress=optional(function))
 def payload_curve(
     arm: Manipulator,
     payloads: ArrayLike | None = None,
@@ -58,16 +56,15 @@ def payload_curve(
     Warns:
         SoftreachWarning: The estimated error of a volume is larger than asked.
     """
-    _check(arm)
-    given = _usual_payloads(arm) if payloads is None else as_floats("payloads", payloads).ravel()
-    if not (np.isfinite(given) & (given >= 0)).all():
-        raise InvalidInput("payloads", given, "finite masses of 0 or more [kg]")
-    as_number("accuracy", accuracy, ACCURACIES)
-    masses = np.unique(np.append(given, 0.0))
-    done, volumes = progress or silent, []
+    _check(a_manipulator("arm", arm))
+    masses = _usual_payloads(arm) if payloads is None else as_floats("payloads", payloads).ravel()
+    if not (np.isfinite(masses) & (masses >= 0)).all():
+        raise InvalidInput("payloads", masses, "finite masses of 0 or more [kg]")
+    accuracy, progress = as_number("accuracy", accuracy, ACCURACIES), as_progress(progress)
+    masses, volumes = np.unique(np.append(masses, 0.0)), []
     for mass in masses:
         volumes.append(_volume(arm, float(mass), accuracy, tol))
-        done(1)
+        progress(1)
     value, error, lost = np.array(volumes).T
     return PayloadCurve(arm, masses, value, error, lost, accuracy, tol)
 
@@ -141,10 +138,8 @@ class PayloadCurve:
         Raises:
             InvalidInput: A share or accuracy out of range, or one that no payload undercuts.
         """
-        if not 0 < share < 1:
-            raise InvalidInput("share", share, "between 0 and 1")
-        if not 1e-4 <= accuracy <= 0.5:
-            raise InvalidInput("accuracy", accuracy, "1e-4 to 0.5")
+        share = as_number("share", share, Range(0.0, 1.0, open_low=True, open_high=True))
+        accuracy = as_number("accuracy", accuracy, Range(1e-4, 0.5))
         low, high = self._bracket(share)
         low, high = _narrowed(lambda mass: self._share(mass) - share, low, high, accuracy)
         below, above = self._at(low), self._at(high)
@@ -252,8 +247,6 @@ def _volume(arm: Manipulator, mass: float, accuracy: float, tol: float) -> _Volu
 
 
 def _check(arm: Manipulator) -> None:
-    if not isinstance(arm, Manipulator):
-        raise InvalidInput("arm", f"{arm!r:.80}", "a Manipulator")
     if arm.loads is None or not any(arm.loads.gravity):
         hint = "pass arm.replace(loads=Loads(gravity=(0, 0, -9.81)))"
         raise InvalidInput(

@@ -7,7 +7,6 @@ from functools import partial
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.rods import tip_map
@@ -15,117 +14,34 @@ from softreach.rod.tip_map import TipMap, loads_too_heavy
 from softreach.support.arguments import (
     POSITIVE,
     as_given,
-    checked,
-    function,
-    optional,
+    as_number,
     plain,
-    within,
 )
-from softreach.support.errors import InvalidInput, Range, warn
+from softreach.support.arrays import Array, Mask
+from softreach.support.errors import InvalidInput, Range
 from softreach.support.memory import check_room, free_memory
-from softreach.support.progress import Progress, silent
+from softreach.support.progress import Progress, as_progress, silent
 from softreach.workspace import measure
 from softreach.workspace.abstract_set import ReachableSet
 from softreach.workspace.discontinuities import coarser, finer, left_out_cells, remainder
 from softreach.workspace.grid import corners_of, every_second, grid_stretches, grid_tips
 from softreach.workspace.image import Image, Lattice, image_of
-from softreach.workspace.injective import is_one_to_one, solid_by_flux
+from softreach.workspace.injective import is_injective, solid_by_flux
 from softreach.workspace.redundant import lost_share, searched_set, smallest_memory
 from softreach.workspace.solid import ReachableSolid
 from softreach.workspace.thin import thin_set
 
-# How finely a reachable set is resolved: cells of the activation box, and cells in space.
-
-
-Array = NDArray[np.float64]
-
 _MOST_VERTICES = 3.3e6  # of the activation grid
 _OF_VERTEX = 8  # doubles that a vertex of the grid takes at least
 _MOST_CELLS = 2.0**26
-
-
-def grid_for(accuracy: float) -> int:
-    """The rule for n: even, within what memory and patience hold.
-
-    Args:
-        accuracy: Relative error of the volume.
-    """
-    most = np.cbrt(_MOST_VERTICES) - 1.0
-    return max(2, 2 * int(np.ceil(min(np.sqrt(5.0 / accuracy), most) / 2)))
-
-
-def even_cells(name: str, value: object) -> int:
-    """A number of cells along each axis of the activation box, instead of the rule's.
-
-    Raises:
-        InvalidInput: It is odd, less than 2, or more than fits into memory.
-    """
-    cells = plain(value)
-    if isinstance(cells, int) and cells >= 2 and cells % 2 == 0:
-        check_room(name, (cells + 1) ** 3, _OF_VERTEX)
-        return cells
-    raise InvalidInput(name, as_given(value), "an even number of cells, 2 or more")
-
-
-def lattice_for(tips: Array, *, cell: float | None, accuracy: float) -> Lattice:
-    """Cells in space around tips.
-
-    Args:
-        tips: [m], shape (n, 3).
-        cell: Edge of a cell [m]; by the rule for h if None.
-        accuracy: Relative error of the volume that the rule is for.
-
-    Raises:
-        InvalidInput: Cells so small that memory does not hold them.
-    """
-    sides = np.ptp(tips, axis=0)
-    if cell is not None:
-        smallest = float(np.cbrt(np.prod(sides) / _MOST_CELLS))
-        if not smallest <= cell < np.inf:  # NaN too
-            raise InvalidInput(
-                "cell", cell, f"at least {smallest:.3g} m for {_MOST_CELLS:.0g} cells"
-            )
-        return Lattice.around(tips, float(cell))
-    wanted = np.sqrt(accuracy / 30.0) * np.cbrt(np.prod(sides))
-    # An image that is almost flat would need countless cells along it.
-    return Lattice.around(tips, float(max(wanted, sides.max() / 1024.0)))
-
-
-def is_settled(found: ReachableSolid, accuracy: float) -> bool:
-    """Whether a finer grid would hardly change the volume or how much of it is reached twice."""
-    return found.volume_error <= accuracy * found.volume
-
-
-def is_worthwhile(found: ReachableSolid, accuracy: float) -> bool:
-    """Whether grids that memory holds may be fine enough.
-
-    Where cells are left out the error falls as 1/n, as fast as n grows and no faster.
-    """
-    cells = 2 * found.cells
-    while found.lost_share > 0.0 and found.volume_error > accuracy * found.volume * (
-        cells / found.cells
-    ):
-        cells *= 2
-    return _fits(cells)
-
-
-def _fits(cells: int) -> bool:
-    return (cells + 1) ** 3 <= _MOST_VERTICES
-
-
 T = TypeVar("T")
 
 ACCURACIES = Range(1e-6, 0.2)
 """Relative errors of a volume that can be asked for."""
 
+_LENGTHS, _SIZES = POSITIVE._replace(unit="m"), POSITIVE._replace(unit="bytes")
 
-@checked(
-    accuracy=within(ACCURACIES),
-    cell=optional(within(POSITIVE._replace(unit="m"))),
-    grid=optional(even_cells),
-    memory=optional(within(POSITIVE._replace(unit="bytes"))),
-    progress=optional(function),
-)
+
 def reachable_set(
     arm: Manipulator | TipMap,
     *,
@@ -182,61 +98,23 @@ def reachable_set(
     Warns:
         SoftreachWarning: The estimated error is larger than asked.
     """
+    accuracy, progress = as_number("accuracy", accuracy, ACCURACIES), as_progress(progress)
+    cell = None if cell is None else as_number("cell", cell, _LENGTHS)
+    grid = None if grid is None else as_even_cells("grid", grid)
+    memory = None if memory is None else as_number("memory", memory, _SIZES)
     rod = tip_map(arm, tol)
     m = rod.box.dimension
     if m < 3:
         return thin_set(rod)
     if m == 3:
-        found = _of_three(rod, accuracy, cell, grid, progress or silent)
+        found = _of_three(rod, accuracy, cell, grid, progress)
         finer = f"a grid above {found.cells} and a smaller cell"
     else:
-        found = _of_many(rod, accuracy, cell, grid, memory, progress or silent)
+        found = _of_many(rod, accuracy, cell, grid, memory, progress)
         finer = "a smaller cell" if cell is not None else "more memory"
     if found.volume_error > accuracy * found.volume:
         warn(_inaccurate(found, accuracy, finer))
     return found
-
-
-def _of_three(
-    rod: TipMap, accuracy: float, cell: float | None, grid: int | None, progress: Progress
-) -> ReachableSolid:
-    cells = grid if grid is not None else grid_for(accuracy)
-    if is_one_to_one(rod):
-        return solid_by_flux(
-            rod, cells, partial(lattice_for, cell=cell, accuracy=accuracy), progress
-        )
-    found = rasterized_set(rod, cells, cell, accuracy, progress)
-    while grid is None and not is_settled(found, accuracy) and is_worthwhile(found, accuracy):
-        found = rasterized_set(rod, 2 * found.cells, cell, accuracy, progress)
-    return found
-
-
-def _of_many(
-    rod: TipMap,
-    accuracy: float,
-    cell: float | None,
-    grid: int | None,
-    memory: float | None,
-    progress: Progress,
-) -> ReachableSolid:
-    if grid is not None:
-        raise InvalidInput("grid", grid, "for three free bundles only", "pass `cell` instead")
-    memory = max(free_memory() / 4.0, smallest_memory(rod)) if memory is None else memory
-    if not smallest_memory(rod) <= memory < np.inf:
-        raise InvalidInput("memory", memory, f"at least {smallest_memory(rod):.3g} bytes")
-    found = searched_set(rod, accuracy, cell, memory, progress)
-    return ReachableSolid(
-        tip_map=rod,
-        cells=0,
-        volume=found.volume.value,
-        volume_error=found.volume.error,
-        convex_volume=found.convex_volume.value,
-        convex_volume_error=found.convex_volume.error,
-        lost_share=lost_share(rod),
-        route="search",
-        rasterize=partial(_known, found.cells),
-        **_NO_OVERLAPS._asdict(),
-    )
 
 
 def rasterized_set(
@@ -277,6 +155,117 @@ def rasterized_set(
     )
 
 
+def as_even_cells(name: str, value: object) -> int:
+    """A number of cells along each axis of the activation box, instead of the rule's.
+
+    Raises:
+        InvalidInput: It is odd, less than 2, or more than fits into memory.
+    """
+    cells = plain(value)
+    if isinstance(cells, int) and cells >= 2 and cells % 2 == 0:
+        check_room(name, (cells + 1) ** 3, _OF_VERTEX)
+        return cells
+    raise InvalidInput(name, as_given(value), "an even number of cells, 2 or more")
+
+
+def grid_for(accuracy: float) -> int:
+    """The rule for n: even, within what memory and patience hold.
+
+    Args:
+        accuracy: Relative error of the volume.
+    """
+    most = np.cbrt(_MOST_VERTICES) - 1.0
+    return max(2, 2 * int(np.ceil(min(np.sqrt(5.0 / accuracy), most) / 2)))
+
+
+def lattice_for(tips: Array, *, cell: float | None, accuracy: float) -> Lattice:
+    """Cells in space around tips.
+
+    Args:
+        tips: [m], shape (n, 3).
+        cell: Edge of a cell [m]; by the rule for h if None.
+        accuracy: Relative error of the volume that the rule is for.
+
+    Raises:
+        InvalidInput: Cells so small that memory does not hold them.
+    """
+    sides = np.ptp(tips, axis=0)
+    if cell is not None:
+        smallest = float(np.cbrt(np.prod(sides) / _MOST_CELLS))
+        if not smallest <= cell < np.inf:  # NaN too
+            raise InvalidInput(
+                "cell", cell, f"at least {smallest:.3g} m for {_MOST_CELLS:.0g} cells"
+            )
+        return Lattice.around(tips, float(cell))
+    wanted = np.sqrt(accuracy / 30.0) * np.cbrt(np.prod(sides))
+    # An image that is almost flat would need countless cells along it.
+    return Lattice.around(tips, float(max(wanted, sides.max() / 1024.0)))
+
+
+def is_settled(found: ReachableSolid, accuracy: float) -> bool:
+    """Whether a finer grid would hardly change the volume or how much of it is reached twice."""
+    return found.volume_error <= accuracy * found.volume
+
+
+def is_worthwhile(found: ReachableSolid, accuracy: float) -> bool:
+    """Whether grids that memory holds may be fine enough.
+
+    Where cells are left out the error falls as 1/n, as fast as n grows and no faster.
+    """
+    cells = 2 * found.cells
+    while found.lost_share > 0.0 and found.volume_error > accuracy * found.volume * (
+        cells / found.cells
+    ):
+        cells *= 2
+    return _fits(cells)
+
+
+def _fits(cells: int) -> bool:
+    return (cells + 1) ** 3 <= _MOST_VERTICES
+
+
+def _of_three(
+    rod: TipMap, accuracy: float, cell: float | None, grid: int | None, progress: Progress
+) -> ReachableSolid:
+    cells = grid if grid is not None else grid_for(accuracy)
+    if is_injective(rod):
+        return solid_by_flux(
+            rod, cells, partial(lattice_for, cell=cell, accuracy=accuracy), progress
+        )
+    found = rasterized_set(rod, cells, cell, accuracy, progress)
+    while grid is None and not is_settled(found, accuracy) and is_worthwhile(found, accuracy):
+        found = rasterized_set(rod, 2 * found.cells, cell, accuracy, progress)
+    return found
+
+
+def _of_many(
+    rod: TipMap,
+    accuracy: float,
+    cell: float | None,
+    grid: int | None,
+    memory: float | None,
+    progress: Progress,
+) -> ReachableSolid:
+    if grid is not None:
+        raise InvalidInput("grid", grid, "for three free bundles only", "pass `cell` instead")
+    memory = max(free_memory() / 4.0, smallest_memory(rod)) if memory is None else memory
+    if not smallest_memory(rod) <= memory < np.inf:
+        raise InvalidInput("memory", memory, f"at least {smallest_memory(rod):.3g} bytes")
+    found = searched_set(rod, accuracy, cell, memory, progress)
+    return ReachableSolid(
+        tip_map=rod,
+        cells=0,
+        volume=found.volume.value,
+        volume_error=found.volume.error,
+        convex_volume=found.convex_volume.value,
+        convex_volume_error=found.convex_volume.error,
+        lost_share=lost_share(rod),
+        route="search",
+        rasterize=partial(_known, found.cells),
+        **_NO_OVERLAPS._asdict(),
+    )
+
+
 def _known(image: T) -> T:
     """What there is already where it might be made when asked for."""
     return image
@@ -289,7 +278,7 @@ class _Grid(NamedTuple):
     """[m], shape ((n + 1)³, 3)."""
     stretches: Array
     """det J, shape ((n + 1)³,)."""
-    left_out: NDArray[np.bool_]
+    left_out: Mask
     """Cells without an image, shape (n, n, n)."""
 
     def image(self, lattice: Lattice, progress: Progress = silent) -> Image:
@@ -319,6 +308,7 @@ class _Overlaps(NamedTuple):
 
 
 _NO_OVERLAPS = _Overlaps({}, np.nan, np.nan, np.nan)
+
 
 _Measures = tuple[measure.Estimate, measure.Estimate, _Overlaps]
 """Volume, volume of the convex hull, overlaps."""
@@ -353,7 +343,7 @@ def _overlaps(
     )
 
 
-def _reached(tips: Array, left_out: NDArray[np.bool_]) -> Array:
+def _reached(tips: Array, left_out: Mask) -> Array:
     """Tips of the corners of cells that are not left out [m], shape (n, 3).
 
     Raises:

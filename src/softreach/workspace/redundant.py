@@ -12,13 +12,13 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.geometry.hull import convex_hull
 from softreach.rod.tip_map import TipMap, no_stable_equilibrium
 from softreach.rod.view import stable_tips
 from softreach.sampling import cube_blocks
 from softreach.support import parallel
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import InvalidInput
 from softreach.support.progress import Progress
 from softreach.workspace.boundary import ReachedCells
@@ -29,7 +29,6 @@ from softreach.workspace.search import ENOUGH, Flood
 
 __all__ = ["Searched", "lost_share", "searched_set", "smallest_memory"]
 
-Array = NDArray[np.float64]
 
 _SAMPLES = 1 << 14  # of the box, for the share that is lost
 _CLOUD = 1 << 16  # tips in a cloud that searches start from
@@ -193,7 +192,7 @@ def _swept(flood: Flood) -> tuple[Crossings, float]:
     return crossings, gain
 
 
-def _reach_further(flood: Flood, crossings: Crossings, beyond: NDArray[np.int64]) -> None:
+def _reach_further(flood: Flood, crossings: Crossings, beyond: Index) -> None:
     """Note that the far ends of edges are reached after all."""
     gamma = crossings.gamma[beyond]
     flood.add(gamma, crossings.points(beyond, crossings.low[beyond]))
@@ -212,7 +211,7 @@ def _hull(crossings: Crossings, tips: Array) -> Estimate:
     )
 
 
-def _not_among(flood: Flood, tips: Array) -> NDArray[np.bool_]:
+def _not_among(flood: Flood, tips: Array) -> Mask:
     """Which tips are not between eight centers that are reached, where no hull has a corner."""
     cubes = flood.reached
     for axis in range(3):

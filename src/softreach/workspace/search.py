@@ -7,7 +7,6 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.kernels.box.bounded_descent import (
     FIRST_DAMPING,
@@ -21,91 +20,15 @@ from softreach.kernels.image.space_claims import claim_corners
 from softreach.rod.tip_map import BLOCK, TipMap
 from softreach.rod.view import stable_tips
 from softreach.support import parallel
+from softreach.support.arrays import Array, Index, Mask
 from softreach.support.progress import Progress, silent
 from softreach.workspace.image import Lattice
 
-# From targets in space to the nearest tips within reach, by descent from given activations.
-
-
-Array = NDArray[np.float64]
-
 _TOGETHER = BLOCK // 16  # searches that one thread runs side by side
-
-
-class Nearest(NamedTuple):
-    """Where searches ended: local minima of the distance, one for each target."""
-
-    gamma: Array
-    """Activations within the bounds, shape (n, bundles)."""
-    tips: Array
-    """Their tips [m], shape (n, 3)."""
-    distance: Array
-    """From tip to target [m], shape (n,); infinite where a search began without a stable
-    equilibrium."""
-
-
-def nearest_tips(rod: TipMap, start: Array, targets: Array, enough: float) -> Nearest:
-    """The activations whose tips come closest to targets, as far as a descent from `start` finds.
-
-    Only stable equilibria are taken.
-
-    Args:
-        rod: The tip map.
-        start: Where to begin, within the bounds, shape (n, bundles).
-        targets: Places [m], shape (n, 3).
-        enough: Distance at which a target counts as reached [m].
-    """
-    rod, gamma = stable_tips(rod), np.ascontiguousarray(start)
-    found = Nearest(gamma.copy(), np.empty_like(targets), np.empty(len(targets)))
-
-    def task(block: slice) -> None:
-        parts = (found.gamma[block], found.tips[block], found.distance[block])
-        _descend(rod, targets[block], enough, Nearest(*parts))
-
-    # Searches that end make room for others; only the last of a task run by a few.
-    rod.prepare()
-    share = max(_TOGETHER, -(-len(targets) // parallel.thread_count()))
-    parallel.run(partial(task, block) for block in parallel.blocks(len(targets), share))
-    return found
-
-
-def _descend(rod: TipMap, targets: Array, enough: float, found: Nearest) -> None:
-    """Damped Gauss and Newton steps that stay within the bounds; on the calling thread."""
-    total, box = len(targets), rod.box
-    bounds = box.low, box.high, box.scales
-    running, center = _room(min(total, _TOGETHER), box.bundles)
-    tips, ahead = np.empty_like(running.wanted), np.empty_like(running.slope)
-    step, multiplier = np.empty_like(running.trial), np.empty_like(running.wanted)
-    begun = n = 0
-    while begun < total or n:
-        more = min(total - begun, len(tips) - n)
-        new, rows = slice(n, n + more), slice(begun, begun + more)
-        running.row[new], running.steps[new] = np.arange(begun, begun + more), 0
-        running.trial[new], running.damping[new] = found.gamma[rows], FIRST_DAMPING
-        n, begun = n + more, begun + more
-        rod.fill(running.trial[:n], tips[:n], ahead[:n])
-        if rod.supports_unstable:
-            tips[np.isnan(tips[:n, 0]).nonzero()[0]] = NOWHERE
-        n = judge(running, n, tips, ahead, targets, found, enough, *bounds)
-        problem = running.slope, running.wanted, running.softness, running.low, running.high
-        project(center[:n], *(part[:n] for part in problem), step[:n], multiplier[:n])
-        next_trials(running, n, step, multiplier, found.gamma, *bounds)
-    nowhere = found.distance >= NOWHERE
-    found.distance[nowhere], found.tips[nowhere] = np.inf, np.nan
-
-
-def _room(count: int, m: int) -> tuple[Running, Array]:
-    """Place for as many searches side by side, and where their steps are centered."""
-    integers = np.zeros(count, np.int64), np.zeros(count, np.int64)
-    numbers = [np.zeros(shape) for shape in ((count,), (count,), (count, 3, m), (count, 3))]
-    rest = [np.zeros(shape) for shape in ((count,), (count, m), (count, m), (count, m))]
-    return Running(*integers, *numbers, *rest), np.zeros((count, m))
-
-
-Ints = NDArray[np.int64]
 
 ENOUGH = 1e-3
 """Distance at which a place counts as reached, in cells."""
+
 _CHUNK = 1 << 16  # places searched for at a time
 _CLEARLY = 0.02  # cells by which a tip must be closer to start another search
 
@@ -133,7 +56,7 @@ class Flood:
         self.steps = np.array([ny * nz, nz, 1])
 
     @property
-    def reached(self) -> NDArray[np.bool_]:
+    def reached(self) -> Mask:
         """Of the lattice's shape."""
         return (self.gap == 0.0).reshape(self.lattice.shape)
 
@@ -143,7 +66,7 @@ class Flood:
         inside = self.reached[2:-2, 2:-2, 2:-2]
         return int(np.count_nonzero(inside)) == int(np.count_nonzero(self.gap == 0.0))
 
-    def centers(self, cells: Ints) -> Array:
+    def centers(self, cells: Index) -> Array:
         """Places [m] of cells given by flat index, shape (n, 3)."""
         index = np.stack(np.unravel_index(cells, self.lattice.shape), axis=-1)
         return self.lattice.origin + self.lattice.cell * index
@@ -154,7 +77,7 @@ class Flood:
         self._search(cells, starts)
         self.grow(cells[self.gap[cells] == 0.0])
 
-    def _improved(self, gamma: Array, tips: Array) -> tuple[Ints, Array]:
+    def _improved(self, gamma: Array, tips: Array) -> tuple[Index, Array]:
         """Centers around tips that one of them is clearly closer to than `gap`, and which."""
         at = self.lattice.coordinates(tips)
         within = ((at >= 0) & (at < np.array(self.lattice.shape) - 1)).all(axis=1)
@@ -163,7 +86,7 @@ class Flood:
         cells = np.flatnonzero(owner >= 0)
         return cells, gamma[owner[cells]]
 
-    def grow(self, cells: Ints) -> None:
+    def grow(self, cells: Index) -> None:
         """Search the neighbors of reached cells from there, and theirs, until none is new."""
         while len(cells):
             fresh = []
@@ -174,7 +97,7 @@ class Flood:
                 fresh.append(neighbors[self.gap[neighbors] == 0.0])
             cells = np.unique(np.concatenate(fresh)) if fresh else cells[:0]
 
-    def _frontier(self, cells: Ints) -> Iterator[tuple[Ints, Ints]]:
+    def _frontier(self, cells: Index) -> Iterator[tuple[Index, Index]]:
         """Neighbors of cells that are not reached, and the cell each is a neighbor of."""
         for step in (*self.steps, *-self.steps):
             neighbors = cells + step
@@ -183,7 +106,7 @@ class Flood:
                 part = open_[first : first + _CHUNK]
                 yield neighbors[part], cells[part]
 
-    def _search(self, cells: Ints, starts: Array) -> None:
+    def _search(self, cells: Index, starts: Array) -> None:
         """Search for centers, and keep what comes closer."""
         cell = self.lattice.cell
         for first in range(0, len(cells), _CHUNK):
@@ -197,3 +120,74 @@ class Flood:
             self.gap[some[closer]] = gap[closer]
             self.gamma[some[closer]] = found.gamma[closer]
             self.progress(len(some))
+
+
+def nearest_tips(rod: TipMap, start: Array, targets: Array, enough: float) -> Nearest:
+    """The activations whose tips come closest to targets, as far as a descent from `start` finds.
+
+    Only stable equilibria are taken.
+
+    Args:
+        rod: The tip map.
+        start: Where to begin, within the bounds, shape (n, bundles).
+        targets: Places [m], shape (n, 3).
+        enough: Distance at which a target counts as reached [m].
+    """
+    rod, gamma = stable_tips(rod), np.ascontiguousarray(start)
+    found = Nearest(gamma.copy(), np.empty_like(targets), np.empty(len(targets)))
+
+    def task(block: slice) -> None:
+        parts = (found.gamma[block], found.tips[block], found.distance[block])
+        _descend(rod, targets[block], enough, Nearest(*parts))
+
+    # Searches that end make room for others; only the last of a task run by a few.
+    share = max(_TOGETHER, -(-len(targets) // parallel.thread_count()))
+    rod.prepare()
+    parallel.run(partial(task, block) for block in parallel.blocks(len(targets), share))
+    return found
+
+
+class Nearest(NamedTuple):
+    """Where searches ended: local minima of the distance, one for each target."""
+
+    gamma: Array
+    """Activations within the bounds, shape (n, bundles)."""
+    tips: Array
+    """Their tips [m], shape (n, 3)."""
+    distance: Array
+    """From tip to target [m], shape (n,); infinite where a search began without a stable
+    equilibrium."""
+
+
+def _descend(rod: TipMap, targets: Array, enough: float, found: Nearest) -> None:
+    """Damped Gauss and Newton steps that stay within the bounds; on the calling thread."""
+    total, box = len(targets), rod.box
+    bounds = box.low, box.high, box.scales
+    running, center = _room(min(total, _TOGETHER), box.bundles)
+    tips, ahead = np.empty_like(running.wanted), np.empty_like(running.slope)
+    step, multiplier = np.empty_like(running.trial), np.empty_like(running.wanted)
+    torn, begun, n = rod.supports_unstable, 0, 0
+    while begun < total or n:
+        more = min(total - begun, len(tips) - n)
+        new, rows = slice(n, n + more), slice(begun, begun + more)
+        running.row[new], running.steps[new] = np.arange(begun, begun + more), 0
+        running.trial[new], running.damping[new] = found.gamma[rows], FIRST_DAMPING
+        n, begun = n + more, begun + more
+        rod.fill(running.trial[:n], tips[:n], ahead[:n])
+        if torn:
+            tips[np.isnan(tips[:n, 0]).nonzero()[0]] = NOWHERE
+        n = judge(running, n, tips, ahead, targets, found, enough, *bounds)
+        slope, wanted, softness = running.slope[:n], running.wanted[:n], running.softness[:n]
+        low, high = running.low[:n], running.high[:n]
+        project(center[:n], slope, wanted, softness, low, high, step[:n], multiplier[:n])
+        next_trials(running, n, step, multiplier, found.gamma, *bounds)
+    nowhere = found.distance >= NOWHERE
+    found.distance[nowhere], found.tips[nowhere] = np.inf, np.nan
+
+
+def _room(count: int, m: int) -> tuple[Running, Array]:
+    """Place for as many searches side by side, and where their steps are centered."""
+    integers = np.zeros(count, np.int64), np.zeros(count, np.int64)
+    numbers = [np.zeros(shape) for shape in ((count,), (count,), (count, 3, m), (count, 3))]
+    rest = [np.zeros(shape) for shape in ((count,), (count, m), (count, m), (count, m))]
+    return Running(*integers, *numbers, *rest), np.zeros((count, m))

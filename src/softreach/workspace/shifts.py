@@ -6,16 +6,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.parameters import Parameter, changed
 from softreach.arm.tables import check_extension
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput
 
 __all__ = ["Shifts", "shifts_along"]
 
-Array = NDArray[np.float64]
 
 _SCALES = {"m": 0.1, "rad": 0.1}
 """Of parameters that are 0, by their unit; lengths in L."""

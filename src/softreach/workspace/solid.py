@@ -8,12 +8,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.geometry.surface import Surface
 from softreach.rod.tip_map import TipMap
 from softreach.schema import provenance
-from softreach.support.arrays import as_points
+from softreach.support.arrays import Array, Mask, as_points
 from softreach.support.errors import MissingExtra
 from softreach.support.quantity import quantity
 from softreach.workspace.abstract_set import Number, ReachableSet
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 __all__ = ["ReachableSolid", "Route"]
 
-Array = NDArray[np.float64]
 Route = Literal["flux", "raster", "search"]
 
 _ROUTES = {
@@ -130,7 +129,7 @@ class ReachableSolid(ReachableSet):
         """
         return self._sheets
 
-    def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
+    def contains(self, points: ArrayLike) -> Mask:
         """Whether points are reachable: whether a mapped simplex of the grid covers them.
 
         For more than three free bundles, whether a search within the bounds ends on them, to a

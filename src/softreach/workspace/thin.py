@@ -7,13 +7,13 @@ from functools import cached_property
 from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from softreach.geometry.hull import convex_hull
 from softreach.geometry.surface import Surface, compact_surface
 from softreach.kernels.box.simplices import chains, corner_steps
 from softreach.rod.tip_map import TipMap
-from softreach.support.arrays import as_points
+from softreach.support.arrays import Array, Mask, as_points
 from softreach.support.quantity import quantity
 from softreach.workspace.abstract_set import Number, ReachableSet
 from softreach.workspace.discontinuities import coarser, corner_values, finer, left_out_cells
@@ -22,7 +22,6 @@ from softreach.workspace.measure import Estimate
 
 __all__ = ["ReachableCurve", "ReachablePoint", "ReachableSurface", "thin_set"]
 
-Array = NDArray[np.float64]
 
 # Cells of the grids of a surface and of a curve, for distances and pictures.
 _SURFACE_CELLS, _CURVE_CELLS = 128, 1024
@@ -116,7 +115,7 @@ class ReachableCurve(ReachableSet):
     path: Array = field(repr=False)
     """Points along the curve [m], from the lower bound to the upper one, shape (cells + 1, 3); NaN
     where there is no stable equilibrium."""
-    left_out: NDArray[np.bool_] = field(repr=False)
+    left_out: Mask = field(repr=False)
     """Which pieces between neighboring points are left out, shape (cells,)."""
     volume: float = field(init=False, default=0.0)
     volume_error: float = field(init=False, default=0.0)
@@ -213,7 +212,7 @@ def thin_set(rod: TipMap) -> ReachableSet:
     return _KINDS[rod.box.dimension].of(rod)
 
 
-def _measure(rod: TipMap, tips: Array, left_out: NDArray[np.bool_]) -> Estimate:
+def _measure(rod: TipMap, tips: Array, left_out: Mask) -> Estimate:
     """Length or area of the image, and by how much fewer Gauss nodes change it.
 
     Where cells are left out, it is that of the others and an estimate of the rest.
@@ -225,7 +224,7 @@ def _measure(rod: TipMap, tips: Array, left_out: NDArray[np.bool_]) -> Estimate:
     return _of_cells(tips, left_out)
 
 
-def _of_cells(tips: Array, left_out: NDArray[np.bool_]) -> Estimate:
+def _of_cells(tips: Array, left_out: Mask) -> Estimate:
     """Length or area of the cells of a grid that are not left out, as chords or triangles.
 
     What they err by, O(1/n²), is removed as far as the cells tell that a grid of half as many holds

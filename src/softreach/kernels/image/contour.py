@@ -17,6 +17,7 @@ tetrahedra share their faces to the last bit, and flat ones cover nothing.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -46,6 +47,7 @@ class Star(NamedTuple):
     """The apexes of triangle i are those from ranges[i] to ranges[i + 1]; (t + 1,)."""
 
 
+@lru_cache(maxsize=16)
 def stars(cells: tuple[int, int, int]) -> Star:
     """Triangles of the Freudenthal triangulation of a grid of boxes."""
     steps, faces = corner_steps(cells), chains(3, 2)

@@ -112,7 +112,7 @@ def large(n: Numbers) -> Finding:
 
 def _cloud(name: str, arm: Manipulator, settings: Settings, notes: Notebook) -> xr.Dataset:
     start = perf_counter()
-    cloud = compute_cloud(arm, settings.redundant_samples, settings.seed)
+    cloud = compute_cloud(arm, settings.redundant_samples, seed=settings.seed)
     notes.note(**{f"{name}_seconds": perf_counter() - start})
     return cloud
 

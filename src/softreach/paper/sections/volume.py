@@ -23,7 +23,7 @@ def volume(settings: Settings, folder: Path, notes: Notebook) -> None:
     arm = minimal_trunk()
     reached = reachable_set(arm, accuracy=settings.accuracy)
     sizes = (settings.samples // 16, settings.samples)
-    clouds = {n: compute_cloud(arm, n, settings.seed).tip for n in sizes}
+    clouds = {n: compute_cloud(arm, n, seed=settings.seed).tip for n in sizes}
     notes.note(
         exact=reached.volume,
         exact_error=reached.volume_error,

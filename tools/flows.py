@@ -1,0 +1,157 @@
+"""Calls, functions and files of softreach that a repeated question passes through.
+
+    python -m tools.flows [FLOW ...] [--functions]
+
+Each flow is asked once, so that all is compiled and prepared, and counted when it is asked again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import threading
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import CodeType, FrameType
+
+os.environ.setdefault("SOFTREACH_NUM_THREADS", "1")
+
+import numpy as np
+
+import softreach as sr
+
+SOURCE = str(Path(sr.__file__).parent)
+
+Flow = Callable[[], Callable[[], object]]
+"""Sets the scene, and returns the question that is counted."""
+
+
+@dataclass(frozen=True)
+class Passage:
+    """What a question passes through."""
+
+    calls: Counter[CodeType]
+
+    @property
+    def files(self) -> int:
+        """Number of files."""
+        return len({code.co_filename for code in self.calls})
+
+    def most_called(self, count: int) -> list[str]:
+        """The functions called most, with their calls."""
+        return [
+            f"{calls:10,} {Path(code.co_filename).relative_to(SOURCE)}:{code.co_qualname}"
+            for code, calls in self.calls.most_common(count)
+        ]
+
+
+def passage(question: Callable[[], object]) -> Passage:
+    """Count the calls of a question into the source of softreach, on all threads."""
+    calls: Counter[CodeType] = Counter()
+
+    def note(frame: FrameType, event: str, _: object) -> None:
+        if event == "call" and frame.f_code.co_filename.startswith(SOURCE):
+            calls[frame.f_code] += 1
+
+    threading.setprofile(note)
+    sys.setprofile(note)
+    try:
+        question()
+    finally:
+        sys.setprofile(None)
+        threading.setprofile(None)
+    return Passage(calls)
+
+
+def free_cloud() -> Callable[[], object]:
+    """A cloud of 64 samples of an arm without loads."""
+    arm = sr.designs.minimal_trunk()
+    return lambda: sr.compute_cloud(arm, 64)
+
+
+def loaded_cloud() -> Callable[[], object]:
+    """A cloud of 64 samples of an arm under a tip force."""
+    arm = sr.designs.lce_arm().replace(loads=sr.Loads(payload=0.001))
+    return lambda: sr.compute_cloud(arm, 64)
+
+
+def _five_bundles() -> sr.Manipulator:
+    return sr.designs.redundant_trunk().split("longitudinal 1", 2)
+
+
+def _inverse(arm: sr.Manipulator) -> Callable[[], object]:
+    targets = sr.compute_cloud(arm, 64).tip.values[:4]
+    return lambda: sr.solve_inverse(arm, targets)
+
+
+def inverse_of_three() -> Callable[[], object]:
+    """Four targets of three bundles."""
+    return _inverse(sr.designs.minimal_trunk())
+
+
+def inverse_of_five() -> Callable[[], object]:
+    """Four targets of five bundles."""
+    return _inverse(_five_bundles())
+
+
+def reach_by_flux() -> Callable[[], object]:
+    """The reachable set of a map that is injective."""
+    arm = sr.designs.minimal_trunk().with_bounds((-0.9, -0.3))
+    return lambda: sr.reachable_set(arm)
+
+
+def reach_by_raster() -> Callable[[], object]:
+    """The reachable set of three bundles whose map folds."""
+    arm = sr.designs.minimal_trunk()
+    return lambda: sr.reachable_set(arm, grid=8)
+
+
+def reach_by_search() -> Callable[[], object]:
+    """The reachable set of five bundles."""
+    arm = _five_bundles()
+    return lambda: sr.reachable_set(arm, accuracy=0.1)
+
+
+def slider() -> Callable[[], object]:
+    """One slider of the studio."""
+    raise NotImplementedError("not counted yet")
+
+
+FLOWS: dict[str, Flow] = {
+    "cloud": free_cloud,
+    "cloud, loaded": loaded_cloud,
+    "inverse, three bundles": inverse_of_three,
+    "inverse, five bundles": inverse_of_five,
+    "reach, flux": reach_by_flux,
+    "reach, raster": reach_by_raster,
+    "reach, search": reach_by_search,
+    "slider": slider,
+}
+
+
+def main() -> None:
+    """Print a line for each flow."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("flows", nargs="*", help=f"of {', '.join(FLOWS)}; all by default")
+    parser.add_argument("--functions", type=int, default=0, help="list so many most called ones")
+    options = parser.parse_args()
+    print(f"{'flow':24} {'calls':>8} {'functions':>10} {'files':>6}")
+    for name in options.flows or FLOWS:
+        try:
+            question = FLOWS[name]()
+        except NotImplementedError as reason:
+            print(f"{name:24} {reason}")
+            continue
+        question()
+        counted = passage(question)
+        print(f"{name:24} {counted.calls.total():8,} {len(counted.calls):10} {counted.files:6}")
+        for line in counted.most_called(options.functions):
+            print(line)
+
+
+if __name__ == "__main__":
+    np.seterr(all="ignore")
+    main()
