@@ -18,7 +18,7 @@ from softreach.support.arguments import (
     plain,
 )
 from softreach.support.arrays import Array, Mask
-from softreach.support.errors import InvalidInput, Range
+from softreach.support.errors import InvalidInput, Range, warn
 from softreach.support.memory import check_room, free_memory
 from softreach.support.progress import Progress, as_progress, silent
 from softreach.workspace import measure
