@@ -9,7 +9,7 @@ import pytest
 from softreach.support.errors import SoftreachError
 from tests.abuse.bad_values import BAD, without
 from tests.abuse.public_calls import CALLS, UNTRIED, Call
-from tests.abuse.refusals import within_budget
+from tests.abuse.refusals import within_memory
 from tests.test_names import FUNCTIONS, parameters
 
 
@@ -35,7 +35,7 @@ def answer(name: str, call: Call, argument: str, value: object) -> str:
 def test_an_argument_takes_what_it_is_meant_for_or_refuses_in_one_line(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)  # what is written when an argument is right goes nowhere else
     call = CALLS[name]
-    with within_budget():
+    with within_memory():
         answers = {
             f"{argument} = {what}": answer(name, call, argument, value)
             for argument, (kind, fine) in call.arguments(name).items()

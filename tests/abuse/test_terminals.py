@@ -158,7 +158,6 @@ def test_a_backend_that_does_not_exist_is_named(monkeypatch):
 START = f"{sys.executable} -m softreach"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "code", "error"),
     [

@@ -13,8 +13,6 @@ from benchmarks.bench_cold import COMMANDS, ROOT, Cold, measured, recorded
 from softreach import kernels
 from softreach.kernels.parts import KernelDispatcher
 
-pytestmark = pytest.mark.slow
-
 ROD = {"rod._tips"}
 SLOPES = ROD | {"jacobian._jacobians"}
 HULL = {
