@@ -35,8 +35,7 @@ from softreach.rod import tip_map
 
 arm = sr.designs.redundant_trunk()
 gamma = np.random.default_rng(0).uniform(-5 / 3, 0, (500, 4))
-shape = sr.configuration(arm, gamma[:50])
-results = (*tip_map(arm).tip_twists(gamma), sr.tip_positions(arm, gamma), shape.position.values)
+results = (*tip_map(arm).tip_twists(gamma), sr.tip_positions(arm, gamma))
 for values in results:
     print(hashlib.sha256(values.tobytes()).hexdigest())
 """

@@ -217,7 +217,7 @@ def test_a_state_is_saved_loaded_and_linked_and_tabs_stay_apart(tab, tmp_path, s
         "the page looks from where the first one did",
     )
     page.close()
-    tab.wait(lambda: set(studio.sessions) == known, "the session of the closed tab ends")
+    tab.wait(lambda: set(studio.sessions) <= known, "the session of the closed tab ends")
 
 
 def test_tabs_stay_apart(tab, browser, studio):
