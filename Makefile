@@ -11,7 +11,7 @@ help:
 	@echo "make test    set up, then run every check and test"
 	@echo "make quick   format, lint, layers, types and the fast tests: for every edit"
 	@echo "make test-all  as make test, with the large sizes"
-	@echo "make record  every test, one by one, and which are slow into tests/durations.json"
+	@echo "make record  every test; which are slow goes into tests/durations.json"
 	@echo "make check   format, lint, types, layers, documentation"
 	@echo "make bench   the benchmarks; writes docs/benchmarks.md"
 	@echo "make atlas   the paper's 16 x 16 designs of 400,000 points into out/; can be interrupted"
@@ -57,7 +57,7 @@ fast: setup
 
 # Renews the list of slow tests, which `make quick` leaves out; on an idle machine.
 record: setup browser
-	$(BIN)/python -m pytest -q --record
+	$(TESTS) --record
 
 check: lint types
 	$(BIN)/python -m zensical build --strict --clean

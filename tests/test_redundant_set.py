@@ -99,7 +99,7 @@ def test_tips_of_faces_of_every_dimension_are_inside_to_a_part_of_a_cell(five):
     [
         pytest.param(six_bundles(), 1e-2, id="six at 1 %"),
         pytest.param(twelve_bundles(), 5e-2, id="twelve at 5 %"),
-        pytest.param(five_bundles(), 3e-3, id="five at the default"),
+        pytest.param(five_bundles(), 3e-3, id="five at the default", marks=pytest.mark.large),
     ],
 )
 def test_many_bundles_keep_the_accuracy_asked(arm, accuracy):

@@ -100,7 +100,7 @@ def test_the_signed_volume_grows_at_a_bound_by_what_the_face_sweeps():
     assert signed_volume(rod).value * swept > 0
 
 
-@pytest.mark.parametrize("name", ["revolution", "lower"])
+@pytest.mark.parametrize("name", [pytest.param("revolution", marks=pytest.mark.large), "lower"])
 def test_where_the_image_folds_finer_rasters_agree_within_the_error(name):
     arm = designs.minimal_trunk(np.radians(75), np.radians(3))
     found = volume_gradient(arm, name)
