@@ -97,7 +97,9 @@ class Tab:
 
     def choose(self, label: str, option: str) -> None:
         """Pick an option of a menu."""
-        menu = self.page.locator(f"xpath=//label[normalize-space()='{label}']/following::input[1]")
+        menu = self.page.locator(
+            f"xpath=//label[normalize-space()='{label}']/following::input[1] >> visible=true"
+        )
         menu.click()
         self.page.get_by_role("option", name=option, exact=True).click()
 

@@ -20,7 +20,9 @@ def cells(tab):
 
 def take(tab, name):
     known = len(tab.session.snapshots.all)
-    tab.page.locator("xpath=//label[normalize-space()='name']/following::input[1]").fill(name)
+    tab.page.locator(
+        "xpath=//label[normalize-space()='name']/following::input[1] >> visible=true"
+    ).fill(name)
     tab.page.wait_for_timeout(200)
     tab.press("Take snapshot")
     tab.wait(lambda: len(tab.session.snapshots.all) > known, "the snapshot is taken")
@@ -75,7 +77,9 @@ def test_snapshots_are_taken_compared_saved_restored_and_deleted(tab, tmp_path):
     take(tab, struck)
     tab.wait(lambda: struck in [row[0] for row in cells(tab)], "the name is shown as it is")
     assert tab.page.locator(".struck").count() == 0
-    tab.page.locator("xpath=//label[normalize-space()='name']/following::input[1]").fill("wide")
+    tab.page.locator(
+        "xpath=//label[normalize-space()='name']/following::input[1] >> visible=true"
+    ).fill("wide")
     tab.page.wait_for_timeout(200)
     tab.press("Take snapshot")
     tab.page.get_by_text("snapshot name = wide").wait_for()

@@ -23,11 +23,12 @@ def loads_tab(tab):
 
 def field(tab, label, number=1):
     return tab.page.locator(
-        f"xpath=//label[normalize-space()='{label}']/following::input[{number}]"
+        f"xpath=//label[normalize-space()='{label}']/following::input[{number}] >> visible=true"
     )
 
 
 def typed(tab, label, text):
+    tab.settle()  # what follows from the change before shows in the fields too
     place = field(tab, label)
     place.fill(text)
     place.press("Enter")

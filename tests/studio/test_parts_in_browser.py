@@ -17,7 +17,9 @@ def become(tab, condition, what):
 
 
 def field_of(tab, label):
-    return tab.page.locator(f"xpath=//label[normalize-space()='{label}']/following::input[1]")
+    return tab.page.locator(
+        f"xpath=//label[normalize-space()='{label}']/following::input[1] >> visible=true"
+    )
 
 
 def typed(tab, label, text):
