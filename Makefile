@@ -4,12 +4,14 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: help setup demo test browser quick fast-rooms fast-rest check lint types format bench atlas paper docs lock clean
+.PHONY: help setup demo test test-all browser quick fast record check lint types format bench atlas paper docs lock clean
 
 help:
 	@echo "make demo    set up, then compute the paper's design into out/"
 	@echo "make test    set up, then run every check and test"
 	@echo "make quick   format, lint, layers, types and the fast tests: for every edit"
+	@echo "make test-all  as make test, with the large sizes"
+	@echo "make record  every test; which are slow goes into tests/durations.json"
 	@echo "make check   format, lint, types, layers, documentation"
 	@echo "make bench   the benchmarks; writes docs/benchmarks.md"
 	@echo "make atlas   the paper's 16 x 16 designs of 400,000 points into out/; can be interrupted"
@@ -30,9 +32,14 @@ $(READY): requirements.lock pyproject.toml
 demo: setup
 	$(BIN)/softreach demo --out out
 
-# Files of tests side by side, up to four on as many cores.
+# Tests side by side, up to four on as many cores.
+TESTS := $(BIN)/python -m pytest -q --numprocesses auto --maxprocesses 4 --dist worksteal --max-worker-restart 0
+
 test: check browser
-	$(BIN)/python -m pytest -q --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
+	$(TESTS)
+
+test-all: check browser
+	$(TESTS) -m "large or not large"
 
 # The studio is tested in a real browser. Only root installs one; whoever has none is told at the end
 # of the tests what to type.
@@ -41,15 +48,16 @@ browser:
 		|| { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq chromium >/dev/null; } \
 		|| true
 
-# For every edit: types and fast tests side by side. What is not fast is marked slow.
+# For every edit: types and fast tests side by side.
 quick: lint
-	$(MAKE) --no-print-directory -j3 --output-sync=target types fast-rooms fast-rest
+	$(MAKE) --no-print-directory -j2 --output-sync=target types fast
 
-fast-rooms: setup
-	$(BIN)/python -m pytest -q -m "not slow" $(wildcard tests/*/)
+fast: setup
+	$(BIN)/python -m pytest -q --quick tests
 
-fast-rest: setup
-	$(BIN)/python -m pytest -q -m "not slow" $(wildcard tests/test_*.py)
+# Renews the list of slow tests, which `make quick` leaves out; on an idle machine.
+record: setup browser
+	$(TESTS) --record
 
 check: lint types
 	$(BIN)/python -m zensical build --strict --clean

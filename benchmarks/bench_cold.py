@@ -39,8 +39,8 @@ class Cold(NamedTuple):
     """CPU seconds of compilation by kernel called from Python."""
     compiled: dict[str, int]
     """How often each function was compiled, callees and those of Numba included."""
-    used: dict[str, int]
-    """For how many sets of types each kernel called from Python was compiled or loaded."""
+    used: dict[str, list[str]]
+    """The types for which each kernel called from Python was compiled or loaded."""
 
 
 def measured(name: str, folder: Path, *options: str) -> Cold:
@@ -117,14 +117,14 @@ def _record(arguments: list[str]) -> Cold:
     return Cold(time.process_time(), compilation.seconds, compilation.compiled, _used())
 
 
-def _used() -> dict[str, int]:
-    """Every kernel that was called from Python, and for how many sets of types."""
+def _used() -> dict[str, list[str]]:
+    """Every kernel that was called from Python, and for what types."""
     from numba.core.dispatcher import Dispatcher
 
     modules = [module for name, module in sys.modules.items() if "softreach.kernels." in name]
     functions = {id(f): f for module in modules for f in vars(module).values()}.values()
     kernels = [f for f in functions if isinstance(f, Dispatcher) and f.overloads]
-    return {_name(f.py_func): len(f.overloads) for f in kernels}
+    return {_name(f.py_func): sorted(map(str, f.overloads)) for f in kernels}
 
 
 def _name(function: Any) -> str:

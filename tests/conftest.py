@@ -1,4 +1,4 @@
-"""Shared fixtures, what is slow by its nature, and what is said of tests that were skipped."""
+"""Shared fixtures, and what is said of tests that were skipped."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from hypothesis import HealthCheck, settings
 from softreach.arm import designs
 from softreach.arm.manipulator import Manipulator
 from tests.browser import MISSING, browser  # noqa: F401  (a fixture)
+
+pytest_plugins = ["tests.durations"]
 
 settings.register_profile(
     "ci",
@@ -34,13 +36,6 @@ def trunk() -> Manipulator:
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(7)
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Whatever asks for a browser is slow."""
-    for item in items:
-        if "browser" in getattr(item, "fixturenames", ()):
-            item.add_marker(pytest.mark.slow)
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)

@@ -59,7 +59,6 @@ def test_help_of_every_command_teaches_with_an_example_that_parses(command, caps
     assert bound.arguments
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("words", [[], ["-h"], ["--help"], ["-q"]], ids=" ".join)
 def test_help_lists_every_command_with_what_it_does(words):
     command = [sys.executable, "-m", "softreach", *words]  # nothing is imported before
@@ -92,7 +91,6 @@ def test_the_version_is_that_of_the_package(capsys):
         "from softreach.cli.app import run; run(['nonsense'])",
     ],
 )
-@pytest.mark.slow
 def test_importing_and_helping_load_no_heavy_library(code):
     script = f"{code}\nimport sys; print(*sys.modules, file=sys.stderr)"
     done = subprocess.run(
@@ -102,7 +100,6 @@ def test_importing_and_helping_load_no_heavy_library(code):
     assert not HEAVY & loaded
 
 
-@pytest.mark.slow
 def test_the_installed_command_ends_with_the_exit_code():
     command = [sys.executable, "-m", "softreach", "design", "nowhere.toml"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -235,7 +232,6 @@ class TestShow:
             ["--out", "a.pdf", "--color", "longitudinal", "--activation=-1,0,-0.5"],
         ],
     )
-    @pytest.mark.slow
     def test_the_picture_is_where_it_says(self, stored, folder, capsys, options):
         plt = pytest.importorskip("matplotlib.pyplot")
         assert run(["show", stored, *options]) == 0
@@ -262,7 +258,6 @@ class TestExport:
 
 
 @pytest.mark.parametrize("output", ["table", "json"])
-@pytest.mark.slow
 def test_the_demo_writes_every_file_it_names(output, folder, capsys):
     plt = pytest.importorskip("matplotlib.pyplot")
     pytest.importorskip("trimesh")

@@ -46,7 +46,6 @@ def test_what_is_right_handed_and_contracts_turns_the_tip_clockwise(actuator, ac
     np.testing.assert_array_equal(np.sign(np.round(twist, 9)), sign)
 
 
-@pytest.mark.slow
 def test_the_picture_in_the_documentation_is_the_one_that_is_drawn(tmp_path):
     from tools.conventions import conventions_figure
 

@@ -46,7 +46,6 @@ def on_page(page: Path) -> str:
 
 @pytest.mark.filterwarnings("always::softreach.support.errors.SoftreachWarning")
 @pytest.mark.parametrize("page", PAGES, ids=on_page)
-@pytest.mark.slow
 def test_everything_on_a_page_runs_and_prints_what_it_says(page, tmp_path, monkeypatch):
     plt = pytest.importorskip("matplotlib.pyplot")
     monkeypatch.chdir(tmp_path)

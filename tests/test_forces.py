@@ -115,7 +115,6 @@ def largest_by_optimizer(arm, place, direction, gamma, force):
     return found.x[-1] * force if np.linalg.norm(gap(found.x)) < 1e-6 else 0.0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arm", "start"), [(LOADED, START[1:]), (MANY, MANY_START)], ids=["three", "four"]
 )
@@ -129,7 +128,6 @@ def test_no_optimizer_finds_a_larger_force(arm, start):
     assert other <= force * (1 + 1e-4)
 
 
-@pytest.mark.slow
 def test_it_is_the_largest_over_all_activations_that_reach_the_place():
     place = sr.tip_positions(LOADED, START[:1])
     solution = sr.solve_inverse(LOADED, place)[0]

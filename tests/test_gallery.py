@@ -27,7 +27,6 @@ def parsed(text: str) -> tuple[float, float, str]:
     return float(found[1] + power), float(found[2] + power), found[4]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", QUICK)
 def test_the_numbers_on_the_page_are_those_of_the_exact_set(name):
     for text, again in zip(ROWS[name], measured(name), strict=True):

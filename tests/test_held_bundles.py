@@ -82,7 +82,6 @@ def test_the_tip_map_of_an_arm_without_held_bundles_is_itself_that_of_its_free_o
     assert free_bundles(rod) is rod
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("bundle", range(4))
 def test_one_of_four_bundles_held_at_rest_leaves_every_solution_of_the_arm_without_it(bundle):
     four = designs.redundant_trunk(np.radians(36), np.radians(3))
@@ -107,7 +106,6 @@ def test_one_of_four_bundles_held_at_rest_leaves_every_solution_of_the_arm_witho
     assert np.allclose(found.gaps, expected.gaps, atol=1e-7)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("bundle", range(4))
 def test_every_activation_is_found_with_one_of_four_bundles_held_anywhere(bundle):
     arm = holding(designs.redundant_trunk(np.radians(36), np.radians(3)), {bundle: -0.45})
@@ -121,7 +119,6 @@ def test_every_activation_is_found_with_one_of_four_bundles_held_anywhere(bundle
     assert (found.counts != finer.counts).mean() < 2e-3
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("pair", [(0, 1), (1, 3), (3, 4)])
 def test_five_bundles_with_two_held_are_a_problem_of_three(pair):
     arm = holding(five_bundles(), dict(zip(pair, (-0.2, -0.9), strict=True)))
@@ -179,7 +176,6 @@ def test_an_arm_that_cannot_move_reaches_one_place(trunk):
     assert np.array_equal(away.nearest, tip[0])
 
 
-@pytest.mark.slow
 def test_a_direction_is_weighed_with_the_position_by_the_free_bundles():
     arm = holding(designs.redundant_trunk(), {1: -0.5})
     gamma = in_box(arm, 1)

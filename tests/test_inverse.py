@@ -40,7 +40,6 @@ def folded() -> Manipulator:
 
 
 @pytest.mark.parametrize(("revolution", "taper"), DESIGNS)
-@pytest.mark.slow
 def test_every_random_tip_is_solved_back_to_its_activation(revolution, taper):
     arm = trunk_at(revolution, taper)
     gamma = random_activations(arm, 3000)
@@ -91,7 +90,6 @@ def coincident_activations(arm: Manipulator) -> tuple[np.ndarray, np.ndarray]:
     return np.array([a for a, _ in pairs]), np.array([b for _, b in pairs])
 
 
-@pytest.mark.slow
 def test_two_activations_with_one_tip_are_both_found(folded):
     one, other = coincident_activations(folded)
     assert len(one) >= 5
@@ -134,7 +132,6 @@ def test_a_target_on_a_fold_is_solved_to_the_root_of_the_tolerance(folded):
     assert miss_of_original(solutions, fold).max() < 10 * np.sqrt(1e-10)
 
 
-@pytest.mark.slow
 def test_a_finer_search_finds_the_same_number_of_solutions(folded):
     targets = tip_positions(folded, random_activations(folded, 2000, seed=3))
     coarse, fine = (
@@ -328,7 +325,6 @@ def least_norm_by_slsqp(arm, target, near, starts):
 
 
 @pytest.mark.parametrize("near", [None, [-0.8, -0.2, -1.0, -0.5]])
-@pytest.mark.slow
 def test_four_bundles_change_as_little_as_scipy_finds(near):
     arm = designs.redundant_trunk()
     gamma = random_activations(arm, 6)

@@ -50,7 +50,6 @@ def checked(part, numbers, words):
     return claim.check(numbers)
 
 
-@pytest.mark.slow
 def test_every_figure_of_the_paper_is_there_as_png_and_pdf(folder):
     pictures = [p for part in reproduce.PARTS for p in notebook(folder, part)["pictures"]]
     labels = {picture["label"] for picture in pictures}
@@ -61,7 +60,6 @@ def test_every_figure_of_the_paper_is_there_as_png_and_pdf(folder):
             assert path.read_bytes().startswith(head)
 
 
-@pytest.mark.slow
 def test_every_statement_finds_its_numbers(folder):
     for claim in CLAIMS:
         found = claim.check(notebook(folder, claim.part)["numbers"])
@@ -69,7 +67,6 @@ def test_every_statement_finds_its_numbers(folder):
         assert not re.search(r"\bnan\b|\binf\b", found.text), (claim.says, found.text)
 
 
-@pytest.mark.slow
 def test_only_what_the_paper_leaves_out_stays_open(folder):
     left_open = [
         claim.says
@@ -81,7 +78,6 @@ def test_only_what_the_paper_leaves_out_stays_open(folder):
     assert "two independent longitudinal" in split
 
 
-@pytest.mark.slow
 def test_what_does_not_depend_on_the_size_of_clouds_agrees(folder):
     for part, words, verdict in (
         ("model", "6.2-fold", Verdict.AGREES),
@@ -125,7 +121,6 @@ def reversed_rows(values):
         ("Two fibers", {"area": 0.0}, Verdict.DIFFERS),
     ],
 )
-@pytest.mark.slow
 def test_verdicts_follow_the_numbers(folder, words, change, verdict):
     (part,) = {claim.part for claim in CLAIMS if words in claim.says}
     numbers = notebook(folder, part)["numbers"]
@@ -133,7 +128,6 @@ def test_verdicts_follow_the_numbers(folder, words, change, verdict):
     assert checked(part, numbers | changed, words).verdict == verdict
 
 
-@pytest.mark.slow
 def test_both_activations_of_the_example_reach_the_same_tip(folder):
     from softreach.arm.designs import minimal_trunk
     from softreach.rod.kinematics import tip_positions
@@ -146,7 +140,6 @@ def test_both_activations_of_the_example_reach_the_same_tip(folder):
     np.testing.assert_allclose(tips, [found["tip"]] * len(tips), rtol=0, atol=2e-6)
 
 
-@pytest.mark.slow
 def test_a_finished_report_is_only_written_again(folder, small, monkeypatch):
     before = (folder / "quick" / "report.html").read_text()
     monkeypatch.setattr(reproduce, "PARTS", dict.fromkeys(reproduce.PARTS))  # nothing to call

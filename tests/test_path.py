@@ -31,7 +31,6 @@ def test_the_image_of_a_line_is_followed_back(trunk, images):
     assert np.abs(track.activation.values - gamma).max() < 1e-6
 
 
-@pytest.mark.slow
 def test_a_path_forth_and_back_ends_where_it_began(trunk, images):
     path = np.concatenate([images[1], images[1][::-1]])
     track = track_path(trunk, path, start=BEGIN)

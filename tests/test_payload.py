@@ -14,8 +14,6 @@ from softreach.cli.app import run
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.workspace.payload import payload_curve
 
-pytestmark = pytest.mark.slow
-
 HANGING = sr.designs.lce_arm().replace(loads=Loads(gravity=(0, 0, 9.81)))
 
 

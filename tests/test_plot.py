@@ -179,7 +179,6 @@ class TestFigures:
             plot_cloud(cloud.isel(sample=slice(0)))
 
     @pytest.mark.parametrize("suffix", ["png", "pdf", "svg"])
-    @pytest.mark.slow
     def test_figures_are_saved_small_and_whole(self, suffix, trunk, cloud, bent, tmp_path):
         figure = plot_views(cloud, trunk, bent, color=2)
         save_figure(figure, tmp_path / f"views.{suffix}")

@@ -17,8 +17,6 @@ from softreach.rod.arm_shape import arm_surface, rest_configuration
 from softreach.support.errors import InvalidInput
 
 plt = pytest.importorskip("matplotlib.pyplot")
-pytestmark = pytest.mark.slow
-
 LENGTH = 0.3
 OBLIQUE = "oblique"
 

@@ -115,7 +115,6 @@ def test_a_second_way_to_every_place_shows_as_its_distance():
     np.testing.assert_allclose(found, 5.0)
 
 
-@pytest.mark.slow
 def test_minimal_and_redundant_trunk_differ_as_in_the_paper():
     found = {}
     for design in (designs.minimal_trunk, designs.redundant_trunk):

@@ -73,7 +73,6 @@ def test_five_bundles_reach_what_monte_carlo_says(five):
     assert abs(rough.volume - 0.44292) < rough.volume_error + 3e-4
 
 
-@pytest.mark.slow
 def test_random_places_are_inside_as_often_as_the_volume_says(five):
     box = np.array([five.grid[axis].values[[0, -1]] for axis in "xyz"])
     places = np.random.default_rng(0).uniform(box[:, 0], box[:, 1], (40_000, 3))
@@ -99,17 +98,15 @@ def test_tips_of_faces_of_every_dimension_are_inside_to_a_part_of_a_cell(five):
     [
         pytest.param(six_bundles(), 1e-2, id="six at 1 %"),
         pytest.param(twelve_bundles(), 5e-2, id="twelve at 5 %"),
-        pytest.param(five_bundles(), 3e-3, id="five at the default", marks=pytest.mark.slow),
+        pytest.param(five_bundles(), 3e-3, id="five at the default", marks=pytest.mark.large),
     ],
 )
-@pytest.mark.slow
 def test_many_bundles_keep_the_accuracy_asked(arm, accuracy):
     found = solid(arm, accuracy=accuracy, memory=5e8)
     assert 0 < found.volume_error <= accuracy * found.volume
     assert found.volume < found.convex_volume + found.convex_volume_error
 
 
-@pytest.mark.slow
 def test_more_bundles_reach_more():
     # Of six bundles one held at 0 leaves a part of what all reach.
     six = solid(six_bundles(), accuracy=3e-2)

@@ -100,8 +100,7 @@ def test_the_signed_volume_grows_at_a_bound_by_what_the_face_sweeps():
     assert signed_volume(rod).value * swept > 0
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["revolution", "lower"])
+@pytest.mark.parametrize("name", [pytest.param("revolution", marks=pytest.mark.large), "lower"])
 def test_where_the_image_folds_finer_rasters_agree_within_the_error(name):
     arm = designs.minimal_trunk(np.radians(75), np.radians(3))
     found = volume_gradient(arm, name)
@@ -166,7 +165,6 @@ def test_a_bound_that_would_free_a_held_bundle_is_refused():
         volume_gradient(held, first)
 
 
-@pytest.mark.slow
 def test_loaded_arms_have_derivatives_too():
     arm = designs.lce_arm().replace(loads=Loads(gravity=(0, 0, 9.81)))
     found = volume_gradient(arm, "upper", accuracy=0.02)

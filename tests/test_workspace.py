@@ -65,7 +65,6 @@ def test_the_best_design_reaches_0691_and_little_of_it_twice(best):
     assert sum(best.multiplicity.values()) == pytest.approx(best.volume)
 
 
-@pytest.mark.slow
 def test_doubled_resolutions_agree_within_the_errors(best, folded):
     for coarse in (best, folded):
         cell = coarse.grid.attrs["cell"] / 2
@@ -98,7 +97,6 @@ def test_volume_is_the_integral_of_det_j_minus_what_is_covered_again(folded):
     assert integral - again == pytest.approx(folded.volume, rel=2e-3)
 
 
-@pytest.mark.slow
 def test_a_cloud_lies_inside_to_one_cell(best, folded):
     for found in (best, folded):
         tips = compute_cloud(found.arm, n=400_000).tip.values
@@ -152,7 +150,6 @@ def test_the_image_of_a_part_of_the_box_lies_within(best, trunk):
     assert best.distance(outside).max(initial=0.0) < best.grid.attrs["cell"]
 
 
-@pytest.mark.slow
 def test_the_surface_is_closed_outward_and_holds_the_volume(best, folded):
     for found in (best, folded):
         surface = found.surface()
@@ -222,7 +219,6 @@ def redundant() -> ReachableSolid:
     return solid(designs.redundant_trunk(), accuracy=1e-2)
 
 
-@pytest.mark.slow
 def test_four_bundles_reach_at_least_what_three_of_them_do(redundant):
     for held in range(4):
         for end in (0, 1):
@@ -235,7 +231,6 @@ def test_four_bundles_reach_at_least_what_three_of_them_do(redundant):
     assert redundant.multiplicity == {}
 
 
-@pytest.mark.slow
 def test_four_bundles_agree_with_smaller_cells_within_the_error(redundant):
     fine = solid(redundant.arm, accuracy=1e-2, cell=redundant.grid.attrs["cell"] / 2)
     assert abs(fine.volume - redundant.volume) < redundant.volume_error
@@ -244,14 +239,12 @@ def test_four_bundles_agree_with_smaller_cells_within_the_error(redundant):
     assert np.isnan([fine.fold_volume, fine.fold_volume_error, fine.multiplicity_error]).all()
 
 
-@pytest.mark.slow
 def test_a_cloud_of_four_bundles_lies_inside_to_one_cell(redundant):
     tips = compute_cloud(redundant.arm, n=400_000).tip.values
     outside = tips[~redundant.contains(tips)]
     assert redundant.distance(outside).max() < redundant.grid.attrs["cell"]
 
 
-@pytest.mark.slow
 def test_two_free_bundles_sweep_an_area(trunk):
     arm = trunk.with_bounds(((-1.0, 0.0), (-1.0, 0.0), (-0.5, -0.5)))
     sheet = reachable_set(arm)
@@ -390,7 +383,6 @@ def counted(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     return counts
 
 
-@pytest.mark.slow
 def test_the_cone_of_three_bundles_closes_with_the_cell_and_that_of_four_stays(trunk):
     def shrinks(arm: Manipulator) -> float:
         """Median cone in cells of 0.1 m over that in cells of 0.05 m."""

@@ -1,20 +1,20 @@
-"""A call of every public function that works, and what is asked of each argument."""
+"""A call of every public function that works, and the kind of each of its arguments."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cache
-from typing import NamedTuple
+from pathlib import Path
+from tempfile import mkdtemp
 
 import numpy as np
 
 import softreach as sr
-import softreach.arm.parameters
-import softreach.exchange.activefilaments
-from softreach import atlas
 from softreach.atlas import DesignSpace
+from tests.test_names import FUNCTIONS, parameters
 
-__all__ = ["CALLS", "UNTRIED", "Argument", "Call", "bad"]
+__all__ = ["CALLS", "UNTRIED", "Call"]
 
 ARM = sr.designs.minimal_trunk()
 MATERIAL = sr.Material(young_modulus=1e6, density=1000.0)
@@ -27,6 +27,14 @@ TIP = sr.tip_positions(ARM, GAMMA)
 def cloud():
     """64 samples."""
     return sr.compute_cloud(ARM, 64)
+
+
+@cache
+def exchanged():
+    """That cloud as a file of the other program."""
+    path = Path(mkdtemp()) / "cloud.csv"
+    sr.exchange.activefilaments.write_cloud(cloud(), path)
+    return path
 
 
 @cache
@@ -99,586 +107,239 @@ def statistics():
     return sr.curvature.curvature_statistics(cloud())
 
 
-class Argument(NamedTuple):
-    """What is asked of an argument."""
+NAMES = {
+    "arm": "arm base material rod space",
+    "dataset": "ax cloud configuration distance equilibria figure grid hull mesh_or_hull",
+    "array": """activation activation_bounds activations alphas box box_over_length bundles
+        compliance direction near payloads places points quantiles queries shard start stations
+        stations_over_length targets z""",
+    "number": """accuracy alpha alpha_over_length at cell convex direction_weight exact force
+        half_width high length memory radius radius_ratio residual_over_length revolution size
+        taper thickness threshold tol width""",
+    "whole number": "bins cells count depth family n seed segments sides",
+    "word": "color fiber method metric name quantity sampler view",
+    "words": "metrics names panels parameters",
+    "flag": """bias durable keep_clouds keep_extent key legend overwrite prove_least rest smallest
+        warn""",
+    "path": "atlas path store",
+    "function": "executor progress",
+    "text": "source text",
+    "mapping": "clouds curves distances statistics values where",
+}
+"""Kinds of arguments, keys of `BAD`, with the names that have them unless a call says otherwise."""
 
-    kind: str
-    """A key of `BAD`."""
-    fine: tuple[str, ...] = ()
-    """Names of values there that are right for this argument after all."""
+KINDS = {name: kind for kind, names in NAMES.items() for name in names.split()}
+
+FINE = {
+    "progress": {"a function", "a class"},
+    "color": {"a number"},
+    "fiber": {"a number"},
+    "alpha": {"infinity"},
+}
+"""Bad values of a kind that are right for an argument; None is so where it is the default."""
 
 
-class Call(NamedTuple):
+@dataclass(frozen=True)
+class Call:
     """A function with arguments of which all are right."""
 
-    function: Callable
-    good: Callable[[], Mapping[str, object]]
-    asked: Mapping[str, Argument]
+    good: Callable[[], Mapping[str, object]] = dict
+    """The arguments that it must be given."""
+
+    function: Callable | None = None
+    """Where it is not the public one, such as a method of an arm."""
+
+    kinds: Mapping[str, str] = field(default_factory=dict)
+    """Kinds of arguments that mean something else here."""
+
+    fine: Mapping[str, set[str]] = field(default_factory=dict)
+    """As `FINE`, here."""
+
+    said: str = ""
+    """What errors may name instead of the argument."""
+
+    def arguments(self, name: str) -> dict[str, tuple[str, set[str]]]:
+        """Kind and fine values of every argument, of the function with this name."""
+        signature = parameters(self.function or FUNCTIONS[name])
+        found = {}
+        for argument, parameter in signature.items():
+            if parameter.kind is not parameter.VAR_KEYWORD:
+                fine = self.fine.get(argument, FINE.get(argument, set()))
+                fine = fine | {"none"} if parameter.default is None else fine
+                found[argument] = self.kinds.get(argument) or KINDS[argument], fine
+        return found | {
+            name: (kind, set()) for name, kind in self.kinds.items() if name not in found
+        }
 
 
-def bad(kind: str, *fine: str) -> Argument:
-    """An argument of a kind."""
-    return Argument(kind, fine)
-
-
-DATA, FLAG, NUMBER = bad("dataset"), bad("flag"), bad("number")
-TOL, BOX = bad("number"), bad("array", "none")
-OPTIONAL_DATA, OPTIONAL_NUMBER = bad("dataset", "none"), bad("number", "none")
-ARRAY, WHOLE, WORD, PATH = bad("array"), bad("whole number"), bad("word"), bad("path")
-PROGRESS = bad("function", "none", "a function", "a class")
-AX, VIEW, SIZE = bad("dataset", "none"), WORD, OPTIONAL_NUMBER
-COLOR = bad("word", "a number")
-ANY_ARM = bad("arm")
-
-SOME = {"arm": ARM, "activations": GAMMA}
-DRAWN = {"ax": AX, "view": VIEW, "box": BOX}
-POINTS = {"arm": ANY_ARM, "activations": ARRAY, "tol": TOL}
-
-TRUNK = {name: NUMBER for name in ("revolution", "taper", "length", "radius_ratio")} | {
-    "material": bad("arm", "none")
-}
+MANY = {"seven dimensions", "seven columns"}
+"""Arrays that count as lists of numbers."""
 
 CALLS: dict[str, Call] = {
-    "arm.describe": Call(sr.describe, lambda: {"arm": ARM}, {"arm": ANY_ARM}),
-    "arm.named_material": Call(
-        sr.arm.named_material, lambda: {"name": "steel"}, {"name": bad("word")}
-    ),
-    "arm.designs.minimal_trunk": Call(
-        sr.designs.minimal_trunk,
-        dict,
-        TRUNK,
-    ),
-    "arm.designs.redundant_trunk": Call(
-        sr.designs.redundant_trunk,
-        dict,
-        TRUNK,
-    ),
-    "arm.designs.three_tendon_robot": Call(
-        sr.designs.three_tendon_robot, dict, {"segments": WHOLE}
-    ),
-    "arm.parameters.changed": Call(
-        sr.arm.parameters.changed,
-        lambda: {"arm": ARM, "values": {"taper": 0.01}},
-        {"arm": ANY_ARM, "values": bad("mapping")},
-    ),
-    "arm.parameters.find_parameter": Call(
-        sr.arm.parameters.find_parameter,
-        lambda: {"arm": ARM, "name": "taper"},
-        {"arm": ANY_ARM, "name": WORD},
-    ),
+    "arm.describe": Call(lambda: dict(arm=ARM)),
+    "arm.named_material": Call(lambda: dict(name="steel")),
+    "arm.designs.minimal_trunk": Call(),
+    "arm.designs.redundant_trunk": Call(),
+    "arm.designs.three_tendon_robot": Call(),
+    "arm.parameters.changed": Call(lambda: dict(arm=ARM, values={"taper": 0.01}), said="parameter"),
+    "arm.parameters.find_parameter": Call(lambda: dict(arm=ARM, name="taper"), said="parameter"),
     "arm.parameters.find_parameters": Call(
-        sr.arm.parameters.find_parameters,
-        lambda: {"arm": ARM, "names": ("taper",)},
-        {"arm": ANY_ARM, "names": bad("words")},
+        lambda: dict(arm=ARM, names=("taper",)), said="parameter"
     ),
-    "arm.parameters.parameters": Call(
-        sr.arm.parameters.parameters, lambda: {"arm": ARM}, {"arm": ANY_ARM}
-    ),
-    "arm.Manipulator.from_toml": Call(
-        sr.Manipulator.from_toml, lambda: {"text": ARM.to_toml()}, {"text": bad("text")}
-    ),
-    "arm.Manipulator.load": Call(sr.Manipulator.load, dict, {"path": PATH}),
-    "arm.Manipulator.save": Call(
-        ARM.save, lambda: {"path": "missing/x.toml"}, {"path": PATH, "overwrite": FLAG}
-    ),
-    "arm.Manipulator.outline": Call(ARM.outline, lambda: {"z": [0.0]}, {"z": ARRAY}),
-    "arm.Manipulator.split": Call(
-        ARM.split,
-        lambda: {"fiber": "left", "count": 2},
-        {"fiber": bad("word", "a number"), "count": WHOLE, "keep_extent": FLAG},
-    ),
+    "arm.parameters.parameters": Call(lambda: dict(arm=ARM)),
+    "arm.Manipulator.from_toml": Call(lambda: dict(text=ARM.to_toml())),
+    "arm.Manipulator.load": Call(),
+    "arm.Manipulator.save": Call(lambda: dict(path="missing/x.toml"), function=ARM.save),
+    "arm.Manipulator.outline": Call(lambda: dict(z=[0.0]), function=ARM.outline),
+    "arm.Manipulator.split": Call(lambda: dict(fiber="left", count=2), function=ARM.split),
     "arm.Manipulator.with_bounds": Call(
-        ARM.with_bounds, lambda: {"activation_bounds": (-1.0, 0.0)}, {"activation_bounds": ARRAY}
+        lambda: dict(activation_bounds=(-1.0, 0.0)), function=ARM.with_bounds
     ),
     "arm.Profile.radius": Call(
-        ARM.profile.radius,
-        lambda: {"z": [0.0]},
-        {"z": bad("array", "seven dimensions", "seven columns", "NaN", "infinity")},
+        lambda: dict(z=[0.0]), function=ARM.profile.radius, fine={"z": MANY | {"NaN", "infinity"}}
     ),
     "cloud.compute_cloud": Call(
-        sr.compute_cloud,
-        lambda: {"arm": ARM, "n": 4},
-        {
-            "arm": ANY_ARM,
-            "n": WHOLE,
-            "seed": bad("whole number", "a number of 400 digits"),
-            "sampler": WORD,
-            "tol": TOL,
-            "progress": PROGRESS,
-        },
+        lambda: dict(arm=ARM, n=4), fine={"seed": {"a number of 400 digits"}}
     ),
-    "cloud.design_of": Call(sr.cloud.design_of, lambda: {"cloud": cloud()}, {"cloud": DATA}),
-    "cloud.tip_map_of": Call(sr.cloud.tip_map_of, lambda: {"cloud": cloud()}, {"cloud": DATA}),
-    "cloud.save_cloud": Call(
-        sr.save_cloud,
-        lambda: {"cloud": cloud(), "path": "missing/x.zarr"},
-        {"cloud": DATA, "path": PATH, "overwrite": FLAG, "durable": FLAG},
-    ),
-    "cloud.open_cloud": Call(sr.open_cloud, dict, {"path": PATH}),
-    "curvature.curvature_statistics": Call(
-        sr.curvature.curvature_statistics,
-        lambda: {"cloud": cloud()},
-        {
-            "cloud": DATA,
-            "stations": bad("array", "none"),
-            "bins": WHOLE,
-            "quantiles": ARRAY,
-        },
-    ),
+    "cloud.design_of": Call(lambda: dict(cloud=cloud())),
+    "cloud.tip_map_of": Call(lambda: dict(cloud=cloud())),
+    "cloud.save_cloud": Call(lambda: dict(cloud=cloud(), path="missing/x.zarr")),
+    "cloud.open_cloud": Call(),
+    "curvature.curvature_statistics": Call(lambda: dict(cloud=cloud())),
     "curvature.stream_statistics": Call(
-        sr.curvature.stream_statistics,
-        lambda: {"arm": ARM, "activations": [GAMMA]},
-        {
-            "arm": ANY_ARM,
-            "activations": bad("mapping", "a list"),
-            "stations": bad("array", "none"),
-            "bins": WHOLE,
-            "quantiles": ARRAY,
-        },
+        lambda: dict(arm=ARM, activations=[GAMMA]),
+        kinds=dict(activations="mapping"),
+        fine={"activations": {"a list"}},
     ),
-    "curvature.distal_stations": Call(
-        sr.curvature.distal_stations, lambda: {"arm": ARM}, {"arm": ANY_ARM, "count": WHOLE}
-    ),
-    "dexterity.dexterity": Call(
-        sr.dexterity.dexterity, lambda: {"cloud": cloud()}, {"cloud": DATA}
-    ),
-    "dexterity.solution_measure": Call(
-        sr.dexterity.solution_measure,
-        lambda: {"cloud": cloud()},
-        {"cloud": DATA, "cell": OPTIONAL_NUMBER},
-    ),
-    "exchange.activefilaments.design_script": Call(
-        sr.exchange.activefilaments.design_script, lambda: {"arm": ARM}, {"arm": ANY_ARM}
-    ),
-    "exchange.activefilaments.gamma_path": Call(
-        sr.exchange.activefilaments.gamma_path, dict, {"path": PATH}
-    ),
+    "curvature.distal_stations": Call(lambda: dict(arm=ARM)),
+    "dexterity.dexterity": Call(lambda: dict(cloud=cloud())),
+    "dexterity.solution_measure": Call(lambda: dict(cloud=cloud())),
+    "exchange.activefilaments.design_script": Call(lambda: dict(arm=ARM)),
+    "exchange.activefilaments.gamma_path": Call(),
     "exchange.activefilaments.read_cloud": Call(
-        sr.exchange.activefilaments.read_cloud,
-        lambda: {"arm": ARM, "path": "missing.csv"},
-        {"arm": ANY_ARM, "path": PATH, "tol": TOL},
+        lambda: dict(arm=ARM, path=exchanged()), said="file"
     ),
-    "exchange.activefilaments.read_design": Call(
-        sr.exchange.activefilaments.read_design, dict, {"path": PATH}
-    ),
-    "exchange.activefilaments.write_cloud": Call(
-        sr.exchange.activefilaments.write_cloud,
-        lambda: {"cloud": cloud(), "path": "missing/x.csv"},
-        {"cloud": DATA, "path": PATH, "overwrite": FLAG},
-    ),
+    "exchange.activefilaments.read_design": Call(),
+    "exchange.activefilaments.write_cloud": Call(lambda: dict(cloud=cloud(), path="missing/x.csv")),
     "exchange.activefilaments.write_design": Call(
-        sr.exchange.activefilaments.write_design,
-        lambda: {"arm": sr.designs.filament(), "path": "missing/x.jl"},
-        {"arm": ANY_ARM, "path": PATH, "overwrite": FLAG},
+        lambda: dict(arm=sr.designs.filament(), path="missing/x.jl")
     ),
-    "export.export_arm": Call(
-        sr.export.export_arm,
-        lambda: {"arm": ARM, "configuration": shape(), "path": "missing/x.stl"},
-        {"arm": ANY_ARM, "configuration": DATA, "path": PATH, "overwrite": FLAG, "sides": WHOLE},
-    ),
-    "export.export_cloud": Call(
-        sr.export.export_cloud,
-        lambda: {"cloud": cloud(), "path": "missing/x.csv"},
-        {"cloud": DATA, "path": PATH, "overwrite": FLAG},
-    ),
-    "export.export_mesh": Call(
-        sr.export.export_mesh,
-        lambda: {"mesh_or_hull": hull(), "path": "missing/x.stl"},
-        {"mesh_or_hull": DATA, "path": PATH, "overwrite": FLAG},
-    ),
-    "forces.blocked_force": Call(
-        sr.forces.blocked_force,
-        lambda: {"arm": HEAVY, "places": TIP, "direction": (1.0, 0.0, 0.0)},
-        {
-            "arm": ANY_ARM,
-            "places": ARRAY,
-            "direction": ARRAY,
-            "start": bad("array", "none"),
-            "family": WHOLE,
-            "tol": TOL,
-            "progress": PROGRESS,
-        },
-    ),
-    "inverse.prepared_map": Call(
-        sr.inverse.prepared_map,
-        lambda: {"arm": ARM},
-        {"arm": ANY_ARM, "tol": TOL, "cells": WHOLE, "depth": WHOLE},
-    ),
-    "inverse.solve_inverse": Call(
-        sr.solve_inverse,
-        lambda: {"arm": ARM, "targets": TIP},
-        {
-            "arm": ANY_ARM,
-            "targets": ARRAY,
-            "residual_over_length": NUMBER,
-            "near": bad("array", "none"),
-            "direction": bad("array", "none"),
-            "direction_weight": NUMBER,
-            "family": WHOLE,
-            "prove_least": FLAG,
-            "seed": WHOLE,
-            "tol": TOL,
-        },
-    ),
-    "path.track_path": Call(
-        sr.track_path,
-        lambda: {"arm": ARM, "path": TIP},
-        {
-            "arm": ANY_ARM,
-            "path": ARRAY,
-            "start": bad("array", "none"),
-            "residual_over_length": NUMBER,
-            "tol": TOL,
-        },
-    ),
-    "payload.payload_curve": Call(
-        sr.payload_curve,
-        lambda: {"arm": HEAVY, "payloads": [0.1]},
-        {
-            "arm": ANY_ARM,
-            "payloads": bad("array", "none", "seven dimensions", "seven columns"),
-            "accuracy": NUMBER,
-            "tol": TOL,
-            "progress": PROGRESS,
-        },
-    ),
-    "plot.plot_arm": Call(
-        sr.plot.plot_arm,
-        lambda: {"arm": ARM},
-        {
-            "arm": ANY_ARM,
-            "configuration": OPTIONAL_DATA,
-            **DRAWN,
-            "rest": FLAG,
-            "bundles": bad("array", "none"),
-        },
-    ),
-    "plot.plot_cloud": Call(
-        sr.plot.plot_cloud,
-        lambda: {"cloud": cloud()},
-        {"cloud": DATA, **DRAWN, "color": COLOR, "size": SIZE, "key": FLAG},
-    ),
+    "export.export_arm": Call(lambda: dict(arm=ARM, configuration=shape(), path="missing/x.stl")),
+    "export.export_cloud": Call(lambda: dict(cloud=cloud(), path="missing/x.csv")),
+    "export.export_mesh": Call(lambda: dict(mesh_or_hull=hull(), path="missing/x.stl")),
+    "forces.blocked_force": Call(lambda: dict(arm=HEAVY, places=TIP, direction=(1.0, 0.0, 0.0))),
+    "inverse.prepared_map": Call(lambda: dict(arm=ARM)),
+    "inverse.solve_inverse": Call(lambda: dict(arm=ARM, targets=TIP)),
+    "path.track_path": Call(lambda: dict(arm=ARM, path=TIP), kinds=dict(path="array")),
+    "payload.payload_curve": Call(lambda: dict(arm=HEAVY, payloads=[0.1]), fine={"payloads": MANY}),
+    "plot.plot_arm": Call(lambda: dict(arm=ARM)),
+    "plot.plot_cloud": Call(lambda: dict(cloud=cloud())),
     "plot.plot_compliance": Call(
-        sr.plot.plot_compliance,
-        lambda: {"arm": ARM, "configuration": shape(), "compliance": np.eye(3)},
-        {
-            "arm": ANY_ARM,
-            "configuration": DATA,
-            "compliance": ARRAY,
-            **DRAWN,
-            "force": OPTIONAL_NUMBER,
-            "rest": FLAG,
-        },
+        lambda: dict(arm=ARM, configuration=shape(), compliance=np.eye(3))
     ),
-    "plot.plot_cross_section": Call(
-        sr.plot.plot_cross_section,
-        lambda: {"arm": ARM},
-        {
-            "arm": ANY_ARM,
-            "z": NUMBER,
-            "ax": AX,
-            "bundles": bad("array", "none"),
-            "half_width": OPTIONAL_NUMBER,
-            "legend": bad("flag", "none"),
-        },
-    ),
-    "plot.plot_curvature": Call(
-        sr.plot.plot_curvature,
-        lambda: {"statistics": {"a": statistics()}},
-        {"statistics": bad("mapping"), "ax": AX, "quantity": WORD},
-    ),
-    "plot.plot_designs": Call(
-        sr.plot.plot_designs,
-        lambda: {"panels": [sr.plot.DesignPanel("a", ARM)]},
-        {"panels": bad("words"), "stations_over_length": ARRAY, "width": OPTIONAL_NUMBER},
-    ),
-    "plot.plot_distance": Call(
-        sr.plot.plot_distance,
-        lambda: {"cloud": cloud(), "distance": distance()},
-        {
-            "cloud": DATA,
-            "distance": DATA,
-            **DRAWN,
-            "high": OPTIONAL_NUMBER,
-            "size": SIZE,
-            "key": FLAG,
-        },
-    ),
-    "plot.plot_distance_histograms": Call(
-        sr.plot.plot_distance_histograms,
-        lambda: {"distances": {"a": distance()}},
-        {"distances": bad("mapping"), "bins": WHOLE, "width": NUMBER},
-    ),
-    "plot.plot_equilibria": Call(
-        sr.plot.plot_equilibria, lambda: {"equilibria": equilibria()}, {"equilibria": DATA, **DRAWN}
-    ),
+    "plot.plot_cross_section": Call(lambda: dict(arm=ARM), kinds=dict(z="number")),
+    "plot.plot_curvature": Call(lambda: dict(statistics={"a": statistics()})),
+    "plot.plot_designs": Call(lambda: dict(panels=[sr.plot.DesignPanel("a", ARM)])),
+    "plot.plot_distance": Call(lambda: dict(cloud=cloud(), distance=distance())),
+    "plot.plot_distance_histograms": Call(lambda: dict(distances={"a": distance()})),
+    "plot.plot_equilibria": Call(lambda: dict(equilibria=equilibria())),
     "plot.plot_hull": Call(
-        sr.plot.plot_hull,
-        lambda: {"hull": hull()},
-        {"hull": DATA, **DRAWN, "length": OPTIONAL_NUMBER, "color": ARRAY},
+        lambda: dict(hull=hull()), kinds=dict(color="array"), fine={"color": set()}
     ),
-    "plot.plot_opposite_sides": Call(
-        sr.plot.plot_opposite_sides,
-        lambda: {"clouds": {"a": cloud()}},
-        {"clouds": bad("mapping"), "view": VIEW, "box_over_length": BOX, "width": NUMBER},
-    ),
+    "plot.plot_opposite_sides": Call(lambda: dict(clouds={"a": cloud()})),
     "plot.plot_redundancy": Call(
-        sr.plot.plot_redundancy,
-        lambda: {"clouds": {"a": cloud()}, "distances": {"a": distance()}},
-        {
-            "clouds": bad("mapping"),
-            "distances": bad("mapping"),
-            "bundles": bad("mapping", "none", "a dictionary"),
-            "thickness": OPTIONAL_NUMBER,
-            "width": NUMBER,
-        },
+        lambda: dict(clouds={"a": cloud()}, distances={"a": distance()}),
+        kinds=dict(bundles="mapping"),
+        fine={"bundles": {"a dictionary"}},
     ),
-    "plot.plot_slab": Call(
-        sr.plot.plot_slab,
-        lambda: {"cloud": cloud(), "thickness": 1.0},
-        {
-            "cloud": DATA,
-            **DRAWN,
-            "at": NUMBER,
-            "thickness": OPTIONAL_NUMBER,
-            "color": COLOR,
-            "size": SIZE,
-            "key": FLAG,
-        },
-    ),
-    "plot.plot_slice": Call(
-        sr.plot.plot_slice,
-        lambda: {"grid": grid()},
-        {"grid": DATA, "ax": AX, "view": VIEW, "at": NUMBER, "key": FLAG},
-    ),
-    "plot.plot_slices": Call(
-        sr.plot.plot_slices,
-        lambda: {"grid": grid()},
-        {"grid": DATA, "at": ARRAY, "width": NUMBER},
-    ),
-    "plot.plot_views": Call(
-        sr.plot.plot_views,
-        lambda: {"cloud": cloud()},
-        {
-            "cloud": DATA,
-            "arm": bad("arm", "none"),
-            "configuration": OPTIONAL_DATA,
-            "view": VIEW,
-            "color": COLOR,
-            "size": SIZE,
-            "width": NUMBER,
-        },
-    ),
-    "plot.plot_volume_curve": Call(
-        sr.plot.plot_volume_curve,
-        lambda: {"curves": {"a": [1.0]}, "alphas": [0.1]},
-        {
-            "curves": bad("mapping"),
-            "alphas": ARRAY,
-            "ax": AX,
-            "length": OPTIONAL_NUMBER,
-            "exact": OPTIONAL_NUMBER,
-            "convex": OPTIONAL_NUMBER,
-        },
-    ),
-    "plot.save_figure": Call(
-        sr.plot.save_figure,
-        lambda: {"figure": figure(), "path": "missing/x.png"},
-        {"figure": DATA, "path": PATH, "overwrite": FLAG},
-    ),
-    "redundancy.activation_distance": Call(
-        sr.activation_distance,
-        lambda: {"cloud": cloud(), "radius": 0.1},
-        {"cloud": DATA, "radius": NUMBER, "queries": bad("array", "none")},
-    ),
-    "redundancy.distance_map": Call(
-        sr.redundancy.distance_map,
-        lambda: {"cloud": cloud(), "distance": distance()},
-        {"cloud": DATA, "distance": DATA, "cell": OPTIONAL_NUMBER},
-    ),
-    "redundancy.redundancy_summary": Call(
-        sr.redundancy.redundancy_summary,
-        lambda: {"cloud": cloud(), "distance": distance()},
-        {
-            "cloud": DATA,
-            "distance": DATA,
-            "threshold": NUMBER,
-            "cell": OPTIONAL_NUMBER,
-            "quantiles": ARRAY,
-        },
-    ),
-    "redundancy.tip_density": Call(
-        sr.redundancy.tip_density,
-        lambda: {"cloud": cloud()},
-        {"cloud": DATA, "cell": OPTIONAL_NUMBER},
-    ),
-    "rest.rest": Call(sr.rest.rest, lambda: {"arm": HEAVY}, {"arm": ANY_ARM, "tol": TOL}),
-    "rod.configuration": Call(
-        sr.configuration,
-        lambda: {"arm": ARM, "activation": GAMMA},
-        {"arm": ANY_ARM, "activation": ARRAY, "stations": ARRAY, "tol": TOL},
-    ),
-    "rod.equilibria": Call(sr.equilibria, lambda: {**SOME, "arm": HEAVY}, POINTS),
-    "rod.free_bundles": Call(
-        sr.rod.free_bundles, lambda: {"rod": sr.rod.tip_map(ARM)}, {"rod": ANY_ARM}
-    ),
-    "rod.tip_jacobian": Call(sr.tip_jacobian, lambda: SOME, POINTS),
-    "rod.tip_map": Call(
-        sr.rod.tip_map, lambda: {"arm": ARM}, {"arm": ANY_ARM, "tol": TOL, "warn": FLAG}
-    ),
-    "rod.tip_positions": Call(sr.tip_positions, lambda: SOME, POINTS),
-    "rod.TipMap.tips": Call(
-        sr.rod.tip_map(ARM).tips, lambda: {"activations": GAMMA}, {"activations": ARRAY}
-    ),
+    "plot.plot_slab": Call(lambda: dict(cloud=cloud(), thickness=1.0)),
+    "plot.plot_slice": Call(lambda: dict(grid=grid())),
+    "plot.plot_slices": Call(lambda: dict(grid=grid()), kinds=dict(at="array")),
+    "plot.plot_views": Call(lambda: dict(cloud=cloud())),
+    "plot.plot_volume_curve": Call(lambda: dict(curves={"a": [1.0]}, alphas=[0.1]), said="radii"),
+    "plot.save_figure": Call(lambda: dict(figure=figure(), path="missing/x.png")),
+    "redundancy.activation_distance": Call(lambda: dict(cloud=cloud(), radius=0.1)),
+    "redundancy.distance_map": Call(lambda: dict(cloud=cloud(), distance=distance())),
+    "redundancy.redundancy_summary": Call(lambda: dict(cloud=cloud(), distance=distance())),
+    "redundancy.tip_density": Call(lambda: dict(cloud=cloud())),
+    "rest.rest": Call(lambda: dict(arm=HEAVY)),
+    "rod.configuration": Call(lambda: dict(arm=ARM, activation=GAMMA)),
+    "rod.equilibria": Call(lambda: dict(arm=HEAVY, activations=GAMMA)),
+    "rod.free_bundles": Call(lambda: dict(rod=sr.rod.tip_map(ARM))),
+    "rod.tip_jacobian": Call(lambda: dict(arm=ARM, activations=GAMMA)),
+    "rod.tip_map": Call(lambda: dict(arm=ARM)),
+    "rod.tip_positions": Call(lambda: dict(arm=ARM, activations=GAMMA)),
+    "rod.TipMap.tips": Call(lambda: dict(activations=GAMMA), function=sr.rod.tip_map(ARM).tips),
     "rod.TipMap.frames": Call(
-        sr.rod.tip_map(ARM).frames,
-        lambda: {"activations": GAMMA, "stations": [0.5]},
-        {"activations": ARRAY, "stations": ARRAY},
+        lambda: dict(activations=GAMMA, stations=[0.5]), function=sr.rod.tip_map(ARM).frames
     ),
-    "rod.TipMap.refined": Call(sr.rod.tip_map(ARM).refined, dict, {"tol": TOL}),
-    "stiffness.cloud_compliance": Call(
-        sr.stiffness.cloud_compliance, lambda: {"cloud": cloud()}, {"cloud": DATA}
-    ),
+    "rod.TipMap.refined": Call(function=sr.rod.tip_map(ARM).refined),
+    "stiffness.cloud_compliance": Call(lambda: dict(cloud=cloud())),
     "stiffness.principal_compliances": Call(
-        sr.stiffness.principal_compliances,
-        lambda: {"compliance": np.eye(3)[None]},
-        {"compliance": bad("array", "NaN")},
+        lambda: dict(compliance=np.eye(3)[None]), fine={"compliance": {"NaN"}}
     ),
     "stiffness.stiffness_along": Call(
-        sr.stiffness.stiffness_along,
-        lambda: {"compliance": np.eye(3)[None], "direction": (0.0, 0.0, 1.0)},
-        {"compliance": bad("array", "NaN"), "direction": ARRAY},
+        lambda: dict(compliance=np.eye(3)[None], direction=(0.0, 0.0, 1.0)),
+        fine={"compliance": {"NaN"}},
     ),
-    "stiffness.tip_compliance": Call(
-        sr.stiffness.tip_compliance, lambda: {**SOME, "arm": HEAVY}, POINTS
-    ),
-    "volume.concave_hull": Call(
-        sr.concave_hull,
-        lambda: {"points": cloud().tip, "alpha": 0.5},
-        {
-            "points": ARRAY,
-            "alpha": bad("number", "none", "infinity"),
-            "bias": FLAG,
-            "method": WORD,
-        },
-    ),
-    "volume.convex_hull": Call(sr.convex_hull, lambda: {"points": TIP}, {"points": ARRAY}),
-    "volume.unreachability": Call(
-        sr.volume.unreachability,
-        lambda: {"points": cloud().tip, "alpha": 0.5},
-        {"points": ARRAY, "alpha": bad("number", "none", "infinity"), "method": WORD},
-    ),
+    "stiffness.tip_compliance": Call(lambda: dict(arm=HEAVY, activations=GAMMA)),
+    "volume.concave_hull": Call(lambda: dict(points=cloud().tip, alpha=0.5)),
+    "volume.convex_hull": Call(lambda: dict(points=TIP)),
+    "volume.unreachability": Call(lambda: dict(points=cloud().tip, alpha=0.5)),
     "volume.volume_curve": Call(
-        sr.volume.volume_curve,
-        lambda: {"points": cloud().tip, "alphas": [0.1]},
-        {
-            "points": ARRAY,
-            "alphas": bad("array", "seven dimensions", "seven columns", "infinity"),
-            "method": WORD,
-        },
+        lambda: dict(points=cloud().tip, alphas=[0.1]), fine={"alphas": MANY | {"infinity"}}
     ),
-    "workspace.direction_spread": Call(
-        sr.workspace.direction_spread,
-        lambda: {"arm": ARM, "n": 64},
-        {"arm": ANY_ARM, "n": WHOLE, "cell": OPTIONAL_NUMBER, "seed": WHOLE, "tol": TOL},
-    ),
+    "workspace.direction_spread": Call(lambda: dict(arm=ARM, n=64)),
     "workspace.reachable_set": Call(
-        sr.reachable_set,
-        lambda: {"arm": ARM, "accuracy": 0.2},
-        {
-            "arm": ANY_ARM,
-            "accuracy": NUMBER,
-            "cell": OPTIONAL_NUMBER,
-            "grid": bad("whole number", "none"),
-            "tol": TOL,
-            "memory": OPTIONAL_NUMBER,
-            "progress": PROGRESS,
-        },
-    ),
-    "atlas.DesignSpace.grid": Call(
-        DesignSpace.grid,
-        lambda: {"base": ARM, "taper": [0.0, 0.02]},
-        {"base": ANY_ARM, "taper": ARRAY},
-    ),
-    "atlas.DesignSpace.listed": Call(
-        DesignSpace.listed,
-        lambda: {"base": ARM, "taper": [0.0, 0.02]},
-        {"base": ANY_ARM, "taper": ARRAY},
-    ),
-    "atlas.DesignSpace.sampled": Call(
-        DesignSpace.sampled,
-        lambda: {"base": ARM, "count": 4, "taper": (0.0, 0.02)},
-        {
-            "base": ANY_ARM,
-            "count": WHOLE,
-            "method": WORD,
-            "seed": WHOLE,
-            "taper": ARRAY,
-        },
-    ),
-    "atlas.atlas_cloud": Call(
-        lambda atlas, at: sr.atlas.atlas_cloud(atlas, taper=at),
-        lambda: {"atlas": built(), "at": 0.0},
-        {"atlas": PATH, "at": NUMBER},
-    ),
-    "atlas.atlas_design": Call(
-        lambda atlas, at: sr.atlas.atlas_design(atlas, taper=at),
-        lambda: {"atlas": built(), "at": 0.0},
-        {"atlas": PATH, "at": NUMBER},
-    ),
-    "atlas.atlas_status": Call(atlas.atlas_status, lambda: {"atlas": built()}, {"atlas": PATH}),
-    "atlas.best_designs": Call(
-        atlas.best_designs,
-        lambda: {"atlas": built(), "metric": "z_max"},
-        {
-            "atlas": PATH,
-            "metric": WORD,
-            "smallest": FLAG,
-            "where": bad("mapping", "none"),
-            "count": bad("whole number", "a number of 400 digits", "a number of 5000 digits"),
-        },
-    ),
-    "atlas.build_atlas": Call(
-        sr.build_atlas,
-        lambda: {"space": family(), "store": {}, "n": 10, "metrics": ["extent"]},
-        {
-            "space": ANY_ARM,
-            "store": PATH,
-            "n": WHOLE,
-            "seed": WHOLE,
-            "sampler": WORD,
-            "metrics": bad("words"),
-            "alpha_over_length": NUMBER,
-            "accuracy": NUMBER,
-            "tol": TOL,
-            "keep_clouds": FLAG,
-            "executor": bad("function", "none", "a function"),
-            "shard": bad("array"),
-            "durable": FLAG,
-            "progress": PROGRESS,
-        },
-    ),
-    "atlas.open_atlas": Call(sr.open_atlas, lambda: {"store": stored()}, {"store": PATH}),
-    "atlas.over_length": Call(
-        atlas.over_length,
-        lambda: {"atlas": built(), "metric": "z_max"},
-        {"atlas": bad("dataset"), "metric": bad("word")},
-    ),
-    "atlas.verify_atlas": Call(atlas.verify_atlas, lambda: {"store": stored()}, {"store": PATH}),
-    "atlas.worker_processes": Call(
-        atlas.worker_processes, lambda: {"count": 1}, {"count": bad("whole number")}
-    ),
-    "workspace.ReachableSet.distance": Call(
-        lambda points: reached().distance(points), lambda: {"points": TIP}, {"points": ARRAY}
-    ),
-    "workspace.ReachableSolid.contains": Call(
-        lambda points: reached().contains(points), lambda: {"points": TIP}, {"points": ARRAY}
+        lambda: dict(arm=ARM, accuracy=0.2), kinds=dict(grid="whole number")
     ),
     "workspace.volume_gradient": Call(
-        sr.volume_gradient,
-        lambda: {"arm": ARM, "parameters": "taper", "accuracy": 0.2},
-        {"arm": ANY_ARM, "parameters": bad("words"), "accuracy": NUMBER, "progress": PROGRESS},
+        lambda: dict(arm=ARM, parameters="taper", accuracy=0.2), said="parameter"
     ),
+    "workspace.ReachableSet.distance": Call(
+        lambda: dict(points=TIP), function=lambda points: reached().distance(points)
+    ),
+    "workspace.ReachableSolid.contains": Call(
+        lambda: dict(points=TIP), function=lambda points: reached().contains(points)
+    ),
+    "atlas.DesignSpace.grid": Call(
+        lambda: dict(base=ARM, taper=[0.0, 0.02]),
+        function=DesignSpace.grid,
+        kinds=dict(taper="array"),
+    ),
+    "atlas.DesignSpace.listed": Call(
+        lambda: dict(base=ARM, taper=[0.0, 0.02]),
+        function=DesignSpace.listed,
+        kinds=dict(taper="array"),
+    ),
+    "atlas.DesignSpace.sampled": Call(
+        lambda: dict(base=ARM, count=4, taper=(0.0, 0.02)),
+        function=DesignSpace.sampled,
+        kinds=dict(taper="array"),
+    ),
+    "atlas.atlas_cloud": Call(
+        lambda: dict(atlas=built(), taper=0.0),
+        kinds=dict(taper="number"),
+    ),
+    "atlas.atlas_design": Call(
+        lambda: dict(atlas=built(), taper=0.0),
+        kinds=dict(taper="number"),
+    ),
+    "atlas.atlas_status": Call(lambda: dict(atlas=built())),
+    "atlas.best_designs": Call(
+        lambda: dict(atlas=built(), metric="z_max"),
+        fine={"count": {"a number of 400 digits", "a number of 5000 digits"}},
+    ),
+    "atlas.build_atlas": Call(
+        lambda: dict(space=family(), store={}, n=10, metrics=["extent"]),
+        fine={"executor": {"a function"}},
+    ),
+    "atlas.open_atlas": Call(lambda: dict(store=stored())),
+    "atlas.over_length": Call(
+        lambda: dict(atlas=built(), metric="z_max"), kinds=dict(atlas="dataset")
+    ),
+    "atlas.verify_atlas": Call(lambda: dict(store=stored())),
+    "atlas.worker_processes": Call(lambda: dict(count=1)),
 }
 """By the names of `tests.test_names`."""
 

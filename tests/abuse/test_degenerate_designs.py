@@ -10,7 +10,7 @@ import pytest
 import softreach as sr
 from softreach.arm.designs import minimal_trunk
 from softreach.geometry.delaunay import local_dimension
-from tests.abuse.refusals import raised_by, within_budget
+from tests.abuse.refusals import raised_by, within_memory
 from tests.laws import arm_of
 
 TRUNK = minimal_trunk()
@@ -73,7 +73,7 @@ DESIGNS: dict[str, sr.Manipulator] = {
 
 @pytest.mark.parametrize("arm", DESIGNS.values(), ids=DESIGNS.keys())
 def test_a_degenerate_design_has_finite_tips_within_its_reach(arm):
-    with within_budget():
+    with within_memory():
         cloud = sr.compute_cloud(arm, 64, sampler="boundary")
         longest = 1.0 + np.abs(arm.bounds).sum()
         assert np.isfinite(cloud.tip.values).all()
@@ -87,7 +87,7 @@ def test_a_degenerate_design_survives_its_file(arm):
 
 @pytest.mark.parametrize("arm", DESIGNS.values(), ids=DESIGNS.keys())
 def test_a_degenerate_design_describes_itself(arm):
-    with within_budget():
+    with within_memory():
         assert "L" in repr(arm)
         sr.describe(arm)
 
@@ -121,14 +121,14 @@ def test_the_reachable_volume_over_l_cubed_does_not_depend_on_l(length):
 @pytest.mark.parametrize("sampler", ["uniform", "boundary"])
 def test_the_tips_of_one_bundle_lie_on_a_curve_that_has_no_volume(arm, sampler):
     tip = sr.compute_cloud(arm, 5_000, sampler=sampler).tip
-    with within_budget():
+    with within_memory():
         hull = sr.concave_hull(tip)
     assert (hull.volume, len(hull.faces), hull.regions) == (0.0, 0, 0)
 
 
 def test_a_curve_reaches_nothing_of_its_convex_hull():
     tip = sr.compute_cloud(frozen(1, 2), 5_000).tip
-    with within_budget():
+    with within_memory():
         assert sr.volume.unreachability(tip) == 1.0
 
 
@@ -153,7 +153,7 @@ def test_points_near_any_curve_are_triangulated_within_the_budget_or_not_at_all(
         "moment curve": np.stack([t, t**2, t**3], axis=1),
     }[curve]
     points = points + jitter * np.random.default_rng(1).standard_normal(points.shape)
-    with within_budget():
+    with within_memory():
         assert sr.concave_hull(points, 0.01).volume == pytest.approx(0.0, abs=1e-9)
 
 
@@ -161,7 +161,7 @@ def test_points_near_any_curve_are_triangulated_within_the_budget_or_not_at_all(
 def test_many_points_that_crowd_near_a_curve_are_told_before_they_cost(jitter):
     tip = sr.compute_cloud(frozen(1, 2), 20_000).tip.values
     points = tip + jitter * np.random.default_rng(1).standard_normal(tip.shape)
-    with within_budget():
+    with within_memory():
         assert sr.concave_hull(points, 0.05).volume == pytest.approx(0.0, abs=1e-15)
 
 
@@ -170,14 +170,14 @@ def test_a_hundred_copies_of_each_tip_but_for_rounding_have_its_volume():
     crowd = np.repeat(tip, 100, axis=0)
     crowd = crowd + 1e-12 * np.random.default_rng(1).standard_normal(crowd.shape)
     alone = sr.concave_hull(tip, 0.5).volume
-    with within_budget():
+    with within_memory():
         assert sr.concave_hull(crowd, 0.5).volume == pytest.approx(alone, rel=1e-6)
 
 
 def test_the_surface_of_a_ball_is_no_curve_and_keeps_its_volume():
     points = np.random.default_rng(0).standard_normal((5_000, 3))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
-    with within_budget():
+    with within_memory():
         assert sr.concave_hull(points, 1.1).volume == pytest.approx(4 / 3 * np.pi, rel=5e-3)
 
 

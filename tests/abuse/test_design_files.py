@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import softreach as sr
 from softreach.arm.design_file.schema import json_schema
 from softreach.support.errors import InvalidDesign, SoftreachError
-from tests.abuse.refusals import raised_by, refusal_of, within_budget
+from tests.abuse.refusals import raised_by, refusal_of, within_memory
 
 TRUNK = sr.designs.minimal_trunk().to_toml()
 SOME = settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -127,7 +127,7 @@ TEXTS = {
 
 @pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS.keys())
 def test_a_text_that_is_no_design_is_refused_in_a_few_lines(text):
-    with within_budget(), pytest.raises(SoftreachError) as caught:
+    with within_memory(), pytest.raises(SoftreachError) as caught:
         sr.Manipulator.from_toml(text)
     assert len(str(caught.value)) < 10_000
     assert all(len(line) < 800 for line in str(caught.value).splitlines())

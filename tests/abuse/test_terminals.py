@@ -125,7 +125,6 @@ def test_colors_and_terminals_that_are_asked_for_change_no_word(variable, stream
     assert "\x1b" not in printed(err)
 
 
-@pytest.mark.slow
 def test_a_backend_that_does_not_exist_is_named():
     script = "from softreach.plot.style import pyplot; pyplot()"
     environment = os.environ | {"MPLBACKEND": "nonsense"}
@@ -137,7 +136,6 @@ def test_a_backend_that_does_not_exist_is_named():
 START = f"{sys.executable} -m softreach"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "code", "error"),
     [

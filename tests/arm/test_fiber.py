@@ -62,7 +62,6 @@ def test_replacing_an_angle_by_a_revolution_and_back():
 
 
 @given(arm=arms())
-@pytest.mark.slow
 def test_revolution_and_helical_angle_say_the_same(arm):
     facts = describe(arm)
     by_angle = tuple(
@@ -85,7 +84,6 @@ def test_bounds_are_one_pair_where_all_bundles_share_it():
 
 
 @given(arm=arms())
-@pytest.mark.slow
 def test_an_outline_turns_by_the_revolution(arm):
     start, end = arm.outline([0.0, arm.length]).center
     each = np.repeat(describe(arm).revolutions, [fiber.bundles for fiber in arm.fibers])
@@ -110,7 +108,6 @@ def test_the_longitudinal_fiber_split_in_two_is_the_paper_s_redundant_design(tru
 
 
 @given(st.integers(1, 6), st.booleans(), st.floats(-3, 3))
-@pytest.mark.slow
 def test_the_parts_lie_side_by_side_about_the_original(count, keep_extent, revolution):
     whole = arm_of(FiberArchitecture(revolution=revolution, offset=0.7, extent=0.1))
     arm = whole.split(0, count, keep_extent=keep_extent)

@@ -105,7 +105,6 @@ def test_a_cloud_of_a_loaded_arm_says_which_samples_are_stable(trunk):
     assert "status" not in sr.compute_cloud(trunk, n=10)
 
 
-@pytest.mark.slow
 def test_weight_shrinks_to_nothing_with_stiffness(trunk):
     volumes = [
         sr.reachable_set(rubber(trunk, sr.Loads(gravity=(9.81, 0, 0)), young=young), accuracy=0.02)
@@ -116,7 +115,6 @@ def test_weight_shrinks_to_nothing_with_stiffness(trunk):
     assert stiff < 0.02 * soft
 
 
-@pytest.mark.slow
 def test_the_inverse_of_a_loaded_arm_finds_what_was_drawn(trunk):
     arm = rubber(trunk, sr.Loads(gravity=(9.81, 0, 0), payload=0.1))
     cloud = sr.compute_cloud(arm, n=30, seed=4)

@@ -119,7 +119,6 @@ def test_the_text_of_a_design_is_written_once(trunk):
     assert trunk.replace().to_toml() == trunk.to_toml()
 
 
-@pytest.mark.slow
 def test_the_arm_needs_no_library_of_checks():
     code = "import sys, softreach.arm.design_file.schema; assert 'pydantic' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -134,7 +134,6 @@ def test_the_range_of_curvature_is_that_of_all_activations(trunk, bounds):
 
 
 @given(arm=arms())
-@pytest.mark.slow
 def test_a_summary_is_that_of_the_parts(arm):
     facts = describe(arm)
     assert facts.base_radius == arm.profile.outer_radius

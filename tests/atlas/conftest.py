@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 import xarray as xr
 
@@ -21,11 +19,3 @@ def paper(tmp_path_factory) -> xr.Dataset:
 def whole(tmp_path_factory) -> xr.Dataset:
     """The atlas of the subprocesses, without interruption."""
     return build16(tmp_path_factory.mktemp("atlas") / "whole.zarr").load()
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what asks these atlases as slow: they take seconds to build."""
-    for item in items:
-        asked = {"paper", "whole"} & set(getattr(item, "fixturenames", ()))
-        if asked and item.path.is_relative_to(Path(__file__).parent):
-            item.add_marker("slow")

@@ -29,7 +29,7 @@ SCRIPT = """
 """
 
 
-PATIENCE = 300.0  # seconds that a script may take on a loaded machine
+PATIENCE = 1200.0  # seconds that a script may take on a loaded machine
 
 
 scope: dict = {}

@@ -15,7 +15,6 @@ from softreach.cli.app import run
 from tests.atlas.families import SMALL, command, gapped_space
 
 
-@pytest.mark.slow
 def test_every_figure_is_written_as_png_and_pdf(paper, tmp_path, capsys):
     pytest.importorskip("matplotlib")
     atlas_command.figures(paper.encoding["source"], out=tmp_path, panels=2)

@@ -25,7 +25,6 @@ def test_shards_share_a_store_and_together_make_the_whole(whole, tmp_path):
         build16(store, shard=(2, 2))
 
 
-@pytest.mark.slow
 def test_shards_may_start_at_the_same_moment(whole, tmp_path):
     store = tmp_path / "a.zarr"
     body = "build(sys.argv[1], shard=(int(sys.argv[2]), 2))"
@@ -59,7 +58,6 @@ def deadly(body: str, always: bool = False) -> str:
     return f"ALWAYS = {always}\n" + textwrap.dedent(DEADLY) + textwrap.dedent(body)
 
 
-@pytest.mark.slow
 def test_worker_processes_survive_the_death_of_one(whole, tmp_path):
     store = tmp_path / "a.zarr"
     body = """
@@ -71,7 +69,6 @@ def test_worker_processes_survive_the_death_of_one(whole, tmp_path):
     assert_same(open_atlas(store).load(), whole)
 
 
-@pytest.mark.slow
 def test_a_design_that_kills_its_workers_is_given_up_and_the_rest_goes_on(tmp_path):
     store = tmp_path / "a.zarr"
     body = """
@@ -85,7 +82,6 @@ def test_a_design_that_kills_its_workers_is_given_up_and_the_rest_goes_on(tmp_pa
     assert (status.done, status.messages) == (15, {3: "its worker died repeatedly"})
 
 
-@pytest.mark.slow
 def test_dask_workers_survive_the_death_of_one(whole, tmp_path):
     pytest.importorskip("distributed")
     store = tmp_path / "a.zarr"
@@ -113,7 +109,6 @@ echo Submitted batch job 1
 """
 
 
-@pytest.mark.slow
 def test_workers_may_come_from_a_job_queue(whole, tmp_path, monkeypatch):
     """A SLURM of this machine stands in for a cluster."""
     pytest.importorskip("dask_jobqueue")
@@ -144,7 +139,6 @@ def test_workers_may_come_from_a_job_queue(whole, tmp_path, monkeypatch):
     assert_same(open_atlas(tmp_path / "a.zarr").load(), whole)
 
 
-@pytest.mark.slow
 def test_workers_refuse_a_store_in_the_memory_of_another_process():
     from zarr.storage import MemoryStore
 

@@ -234,7 +234,6 @@ def test_lambdas_are_refused_in_one_line_where_workers_compute_them(tmp_path):
     assert (atlas.mean_height == 0).all()
 
 
-@pytest.mark.slow
 def test_worker_processes_compute_metrics_of_ones_own(tmp_path):
     options = SMALL | {"metrics": ("convex", MEAN_HEIGHT)}
     alone = build_atlas(small_space(), tmp_path / "a.zarr", **options).load()

@@ -18,7 +18,6 @@ from tests.atlas.scripts import build16, ended, run_script
 from tests.laws import of_length
 
 
-@pytest.mark.slow
 def test_three_kills_leave_the_same_numbers_as_no_kill(whole, tmp_path):
     store = tmp_path / "killed.zarr"
     body = """
@@ -123,7 +122,6 @@ def test_a_failing_design_is_recorded_and_tried_again_later(tmp_path, monkeypatc
     assert atlas_status(store).messages == {}
 
 
-@pytest.mark.slow
 def test_a_full_disk_costs_one_line_and_the_rest_can_be_resumed(tmp_path):
     store = tmp_path / "a.zarr"
     body = """

@@ -76,7 +76,6 @@ def begun(tmp_path_factory) -> Begun:
     return Begun(stored_files(place), store.count)
 
 
-@pytest.mark.slow
 def test_a_creator_killed_at_any_write_leaves_a_store_that_another_completes(begun, tmp_path):
     def dies():
         raise Interrupted
@@ -94,7 +93,6 @@ def test_a_creator_killed_at_any_write_leaves_a_store_that_another_completes(beg
         assert stored_files(place) == begun.files
 
 
-@pytest.mark.slow
 def test_whoever_overtakes_a_creator_between_two_writes_keeps_its_designs(begun, tmp_path):
     asked = command(gapped_space(), **TINY)
     sizes = asked.profile_sizes
@@ -116,7 +114,6 @@ def test_whoever_overtakes_a_creator_between_two_writes_keeps_its_designs(begun,
         assert begun.files.items() <= stored_files(place).items()
 
 
-@pytest.mark.slow
 def test_of_two_different_commands_at_one_moment_one_is_refused(begun, tmp_path):
     def begin(store, n):
         try:
@@ -134,7 +131,6 @@ def test_of_two_different_commands_at_one_moment_one_is_refused(begun, tmp_path)
         assert AtlasStore.open(place).command.n == accepted[0]
 
 
-@pytest.mark.slow
 def test_many_creators_may_start_at_one_moment(begun, tmp_path):
     start = Barrier(8)
 

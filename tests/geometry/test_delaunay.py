@@ -89,7 +89,6 @@ def test_cells_of_small_random_clouds_equal_those_of_qhull(n, seed):
 
 
 @every_degenerate
-@pytest.mark.slow
 def test_degenerate_clouds_give_an_exact_delaunay_triangulation(name):
     mesh = delaunay(DEGENERATE[name])
     assert_adjacency(mesh)

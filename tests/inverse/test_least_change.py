@@ -46,7 +46,6 @@ def least_from_many_starts(
     return best
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("design", [designs.redundant_trunk, six_bundles])
 @pytest.mark.parametrize("place", ["interior", "edges"])
 def test_no_search_from_many_starts_finds_less(design, place):
@@ -71,7 +70,6 @@ def test_a_local_minimum_larger_than_the_activation_drawn_is_left(bundles, seed,
     assert changes(found)[0] <= np.linalg.norm(gamma) * (1 + 1e-9)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("place", ["interior", "faces", "edges", "corners"])
 def test_four_bundles_are_proved_to_change_least(place):
     arm = designs.redundant_trunk()

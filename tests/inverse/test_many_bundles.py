@@ -59,7 +59,6 @@ def test_every_tip_of_an_activation_inside_the_box_is_reached(design, place):
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.slow
 def test_every_tip_of_a_random_design_is_reached(seed):
     arm = random_design(4 + 2 * seed, seed)
     for place in PLACES:
@@ -130,7 +129,6 @@ def test_no_tip_is_farther_from_the_base_than_the_longest_arm():
         assert np.linalg.norm(rod.tips(rod.box.corners()), axis=1).max() <= rod.farthest()
 
 
-@pytest.mark.slow
 def test_a_gap_is_never_smaller_than_its_proved_bound():
     from scipy.spatial import KDTree
 
@@ -173,7 +171,6 @@ def curling() -> Manipulator:
     )
 
 
-@pytest.mark.slow
 def test_three_bundles_that_curl_past_a_full_circle_are_solved_back():
     arm = curling()
     gamma = np.array([[0.0935, -0.788, -0.5483], [-0.57375, 0.22242, -0.29914]])

@@ -59,7 +59,6 @@ def test_a_start_knows_the_inverse_of_the_jacobian_there(seed):
 
 @given(seed=SEEDS)
 @settings(max_examples=5)
-@pytest.mark.slow
 def test_both_roots_of_a_fold_have_a_start(seed):
     rng = np.random.default_rng(seed)
     fold = random_fold(rng)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -23,7 +22,6 @@ def listed(tree: SpaceTree, point: np.ndarray) -> np.ndarray:
 
 @given(seed=SEEDS)
 @settings(max_examples=5)
-@pytest.mark.slow
 def test_the_tetrahedron_of_every_activation_is_listed_where_its_tip_is(seed):
     rng = np.random.default_rng(seed)
     f = random_quadratic(rng, bend=0.05)

@@ -116,6 +116,5 @@ def test_sorosim_has_the_same_equilibria(number):
     np.testing.assert_allclose(angles, case.angles, atol=5e-3)
 
 
-@pytest.mark.slow
 def test_every_twentieth_of_sorosims_equilibria_is_found():
     assert max(sorosim.deviation(case) for case in sorosim.cases()[::20]) < 0.65e-3

@@ -45,8 +45,7 @@ def test_their_number_is_odd_and_one_is_the_branch_of_the_unloaded_arm(gravity, 
         assert every.status[k] == branch.status[0]
 
 
-@pytest.mark.parametrize("load", [12.0, 25.0])
-@pytest.mark.slow
+@pytest.mark.parametrize("load", [12.0, pytest.param(25.0, marks=pytest.mark.large)])
 def test_no_random_start_of_a_chain_of_links_comes_to_another(load):
     """Newton's method on the energy of a chain, from shapes with random bending."""
     arm = trunk(load)

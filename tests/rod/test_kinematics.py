@@ -124,7 +124,6 @@ def test_no_tip_is_farther_from_the_base_than_the_stretched_length(arm):
 
 @settings(max_examples=10)
 @given(arm=arms())
-@pytest.mark.slow
 def test_tips_equal_an_independent_integrator(arm):
     gamma = in_box(arm, 3)
     expected = [integrated_tip(arm, g) for g in gamma]

@@ -102,7 +102,6 @@ ARMS = {
 
 
 @pytest.mark.parametrize(("arm", "activation", "loads"), ARMS.values(), ids=ARMS.keys())
-@pytest.mark.slow
 def test_arms_of_all_kinds_rest_where_a_shooting_from_the_base_puts_them(arm, activation, loads):
     arm = arm.replace(loads=loads)
     found = LoadedRod(arm, 1e-8)

@@ -73,7 +73,6 @@ def differences(f, gamma, step):
 
 
 @of_kinds
-@pytest.mark.slow
 def test_a_shooting_from_the_base_finds_the_same_rod(loads):
     found = loaded(loads)
     stations = np.array([0.0, 0.3, 0.5, 0.9, 1.0])

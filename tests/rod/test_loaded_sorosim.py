@@ -48,7 +48,6 @@ def of_file(case):
     return np.delete(case.place, 7, axis=0)
 
 
-@pytest.mark.slow
 def test_all_of_sorosim_s_equilibria_are_those_of_the_branch_and_stable():
     """As far as rounded wrenches and SoRoSim's strains are right: a thousandth of the length."""
     cases = sorosim.cases()
@@ -99,7 +98,6 @@ def left_over(slopes, apart):
 
 
 @pytest.mark.parametrize("row", [50, 150, 250, 300, 450])
-@pytest.mark.slow
 def test_what_is_left_of_the_differences_is_the_rounding_of_places(row):
     """With the wrenches within their rounding, and the strains linear on each half as SoRoSim's."""
     case = sorosim.cases()[row]

@@ -150,7 +150,6 @@ def moments(chain, direction):
         (TRUNK, 25.0, ANY[0]),
     ],
 )
-@pytest.mark.slow
 def test_every_equilibrium_has_the_index_of_its_energy(arm, load, gamma):
     """Stable ones have none, and the sign of the tangents at the base is that of the index."""
     arm = weighed(arm, load)

@@ -63,7 +63,6 @@ def differences(f: Callable[[np.ndarray], np.ndarray], gamma: np.ndarray, step: 
 
 
 @given(arm=arms())
-@pytest.mark.slow
 def test_tips_are_those_of_an_independent_integrator(make, arm):
     if make is not FreeRod:
         pytest.skip("its integrator is in tests/rod/test_loaded_rod.py")

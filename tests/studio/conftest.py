@@ -22,9 +22,18 @@ def studio() -> Iterator[Studio]:
         yield running
 
 
-@pytest.fixture(scope="module")
-def tab(browser, studio) -> Iterator[Tab]:
-    """One tab for a whole module: opening one takes seconds."""
+@pytest.fixture(scope="session")
+def page(browser, studio) -> Iterator[Tab]:
+    """The tab of all journeys: opening one takes seconds."""
     opened = Tab(browser, studio)
     yield opened
     opened.close()
+
+
+@pytest.fixture
+def tab(page, studio) -> Iterator[Tab]:
+    """That tab as it was opened; whatever a test does in it, its console stays clean."""
+    page.reset(studio.start)
+    yield page
+    page.settle()
+    assert page.errors == []

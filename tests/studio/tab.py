@@ -8,18 +8,24 @@ from pathlib import Path
 
 import numpy as np
 
-from softreach.studio import Studio
+from softreach.studio import Start, Studio
 from softreach.studio.session import Session
 
-PATIENCE = 90.0  # a loaded machine compiles shaders slowly
+PATIENCE = 600.0  # [s] a loaded machine compiles shaders slowly
+SIZE = 900, 560
+HARMLESS = (
+    "Tried to update non-existent component",  # it was removed before the page heard of it
+    "Unable to preventDefault inside passive event listener",
+)
+"""Errors of viser's in the console."""
 
 
 class Tab:
     """One page and its session."""
 
-    def __init__(self, browser, studio: Studio, *, width: int = 900, height: int = 560) -> None:
+    def __init__(self, browser, studio: Studio, size: tuple[int, int] = SIZE) -> None:
         self.context = browser.new_context(
-            viewport={"width": width, "height": height}, accept_downloads=True
+            viewport={"width": size[0], "height": size[1]}, accept_downloads=True
         )
         self.requests: list[str] = []
         self.errors: list[str] = []
@@ -37,10 +43,20 @@ class Tab:
         self.settle()
 
     def _console(self, message) -> None:
-        # Of what was removed before the page heard that it was there: harmless, and viser's.
-        late = message.text.startswith("Tried to update non-existent component")
-        if message.type == "error" and not late:
+        if message.type == "error" and not message.text.startswith(HARMLESS):
             self.errors.append(message.text)
+
+    def reset(self, start: Start) -> None:
+        """Leave nothing of the test before but what stands in no state."""
+        self.settle()
+        self.errors.clear()
+        self.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})
+        self.session.quality = start.quality
+        self.session.update(lambda _: start.state)
+        self.session.look_from("oblique")
+        self.session.end_step()
+        self.settle()
+        self.open("Design")
 
     def close(self) -> None:
         self.settle()  # viser warns of what is drawn for a tab that is gone
@@ -81,7 +97,9 @@ class Tab:
 
     def choose(self, label: str, option: str) -> None:
         """Pick an option of a menu."""
-        menu = self.page.locator(f"xpath=//label[normalize-space()='{label}']/following::input[1]")
+        menu = self.page.locator(
+            f"xpath=//label[normalize-space()='{label}']/following::input[1] >> visible=true"
+        )
         menu.click()
         self.page.get_by_role("option", name=option, exact=True).click()
 

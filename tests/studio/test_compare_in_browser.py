@@ -12,12 +12,6 @@ from softreach.arm.parameters import changed
 TRUNK = designs.minimal_trunk()
 
 
-@pytest.fixture(scope="module")
-def compare_tab(tab):
-    tab.open("Compare")
-    return tab
-
-
 def cells(tab):
     """Texts of the table, row by row."""
     text = "tables => tables.flatMap(t => [...t.rows].map(r => [...r.cells].map(c => c.innerText)))"
@@ -26,7 +20,9 @@ def cells(tab):
 
 def take(tab, name):
     known = len(tab.session.snapshots.all)
-    tab.page.locator("xpath=//label[normalize-space()='name']/following::input[1]").fill(name)
+    tab.page.locator(
+        "xpath=//label[normalize-space()='name']/following::input[1] >> visible=true"
+    ).fill(name)
     tab.page.wait_for_timeout(200)
     tab.press("Take snapshot")
     tab.wait(lambda: len(tab.session.snapshots.all) > known, "the snapshot is taken")
@@ -37,8 +33,8 @@ def become(tab, **values):
     tab.settle()
 
 
-def test_snapshots_stand_side_by_side_with_their_numbers_and_differences(compare_tab):
-    tab = compare_tab
+def test_snapshots_are_taken_compared_saved_restored_and_deleted(tab, tmp_path):
+    tab.open("Compare")
     first = tab.session.reach.volume
     take(tab, "wide")
     become(tab, taper=0.01, revolution=1.0)
@@ -57,16 +53,10 @@ def test_snapshots_stand_side_by_side_with_their_numbers_and_differences(compare
     )
     assert now[0] == "now"
 
-
-def test_the_row_of_the_present_design_follows_it(compare_tab):
-    tab = compare_tab
     become(tab, taper=0.02)
     wanted = f"{tab.session.reach.volume:.4f}"
     tab.wait(lambda: cells(tab)[-1][1].startswith(wanted), "the row shows the new volume")
 
-
-def test_a_snapshot_is_restored_and_the_restoring_undone(compare_tab):
-    tab = compare_tab
     before = tab.session.state.design
     tab.choose("snapshot", "wide")
     tab.press("Restore")
@@ -76,30 +66,24 @@ def test_a_snapshot_is_restored_and_the_restoring_undone(compare_tab):
     tab.wait(lambda: tab.session.state.design == before, "the restoring is undone")
     tab.settle()
 
-
-def test_the_table_is_saved(compare_tab, tmp_path):
-    file = compare_tab.save("Save table (CSV)", tmp_path)
+    file = tab.save("Save table (CSV)", tmp_path)
     with file.open(encoding="utf-8-sig", newline="") as text:
         rows = list(csv.DictReader(text))
     assert [row["design"] for row in rows] == ["wide", "design 1", "now"]
-    measured = compare_tab.session.snapshots.named("wide").numbers.size.value
+    measured = tab.session.snapshots.named("wide").numbers.size.value
     assert float(rows[0]["volume [L³]"]) == measured
 
-
-def test_a_name_that_is_taken_is_refused_and_one_with_markup_is_text(compare_tab):
-    tab = compare_tab
     struck = "<b class=struck>x"
     take(tab, struck)
     tab.wait(lambda: struck in [row[0] for row in cells(tab)], "the name is shown as it is")
     assert tab.page.locator(".struck").count() == 0
-    tab.page.locator("xpath=//label[normalize-space()='name']/following::input[1]").fill("wide")
+    tab.page.locator(
+        "xpath=//label[normalize-space()='name']/following::input[1] >> visible=true"
+    ).fill("wide")
     tab.page.wait_for_timeout(200)
     tab.press("Take snapshot")
     tab.page.get_by_text("snapshot name = wide").wait_for()
 
-
-def test_a_snapshot_is_deleted(compare_tab):
-    tab = compare_tab
     tab.choose("snapshot", "design 1")
     tab.press("Delete")
     tab.wait(lambda: tab.session.snapshots.named("design 1") is None, "the snapshot is gone")

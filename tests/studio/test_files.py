@@ -41,7 +41,6 @@ def store(trunk, tmp_path_factory):
     return path
 
 
-@pytest.mark.slow
 def test_files_are_those_of_the_librarys_own_writers(fine, tmp_path):
     state = StudioState(design=fine.arm).showing(level=14)
     export_cloud(fine.cloud, tmp_path / "cloud.ply")
@@ -53,7 +52,6 @@ def test_files_are_those_of_the_librarys_own_writers(fine, tmp_path):
 
 
 @pytest.mark.parametrize("color", ["rgb", "bundle 1", "manipulability", "multiplicity"])
-@pytest.mark.slow
 def test_a_figure_shows_the_points_and_colors_of_the_page(fine, color, monkeypatch):
     from softreach import plot
 

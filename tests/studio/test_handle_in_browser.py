@@ -11,7 +11,7 @@ import softreach as sr
 from softreach.studio import StudioState
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def inverse_tab(tab):
     tab.page.set_viewport_size({"width": 1366, "height": 768})  # else notices cover the tip
     tab.open("Inverse")
@@ -63,7 +63,7 @@ FOLDED = (-0.48, -0.16, -1.23)
 START = (-0.7, -0.4, -0.9)
 
 
-def test_the_arm_follows_a_drag_of_its_tip_on_its_branch(inverse_tab):
+def test_the_arm_follows_a_drag_of_its_tip_on_its_branch_and_the_others_are_ghosts(inverse_tab):
     tab = inverse_tab
     begin = pose(tab, START)
     end = sr.tip_positions(tab.session.state.design, [(-0.6, -0.55, -0.8)])[0]
@@ -86,8 +86,6 @@ def test_the_arm_follows_a_drag_of_its_tip_on_its_branch(inverse_tab):
     path = sr.track_path(state.design, [begin, state.target], START)
     np.testing.assert_allclose(path.activation.values[-1], state.activation, atol=1e-3)
 
-
-def test_where_the_drag_rests_the_other_branches_are_ghosts(inverse_tab):
     tab = inverse_tab
     answer = tab.session.answer
     held = np.abs(answer.activations - tab.session.state.activation).max(axis=1)

@@ -7,15 +7,11 @@ import threading
 import time
 import weakref
 
-import pytest
-
 import softreach.studio.app
 import softreach.studio.reach as stages
 from softreach.arm.parameters import changed
 from softreach.studio.session import Session
 from tests.studio.sockets import PATIENCE, connected, page, until
-
-pytestmark = pytest.mark.slow
 
 
 def own_threads() -> int:

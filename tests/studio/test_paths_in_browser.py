@@ -139,10 +139,6 @@ def test_an_animation_is_written_with_progress_and_can_be_canceled(tab, tmp_path
     tab.page.get_by_text("path.gif is written").wait_for()
 
 
-def test_the_console_stays_clean(tab):
-    assert tab.errors == []
-
-
 def lowest(tab, points, count=2):
     """Points of those given that appear low in the canvas."""
     return [point for point in points[:2000] if tab.projected(point)[1] > 0.65][:count]

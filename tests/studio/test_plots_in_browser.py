@@ -105,10 +105,6 @@ def test_names_in_a_chart_are_text(tab):
     folder.remove()
 
 
-def test_the_console_stays_clean(tab):
-    assert tab.errors == []
-
-
 def ink(tab) -> str:
     """What the first chart shows."""
     return tab.page.locator(".uplot canvas").first.evaluate("canvas => canvas.toDataURL()")

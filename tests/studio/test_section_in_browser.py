@@ -97,7 +97,3 @@ def test_the_areas_of_sections_sum_up_to_the_volume(tab):
     middles, width = (edges[1:] + edges[:-1]) / 2, edges[1] - edges[0]
     areas = [enclosed_area(plane_cut(surface, 2, at), 2) for at in middles]
     assert abs(sum(areas) * width / length**3 - reach.volume) < 0.02 * reach.volume
-
-
-def test_the_console_stays_clean(tab):
-    assert tab.errors == []

@@ -68,7 +68,7 @@ def test_a_page_from_elsewhere_gets_no_data(server):
     address = page_url(server).replace("http", "ws")
     version = [f"viser-v{viser.__version__}"]
     with connect(address, subprotocols=version, max_size=None) as ours:
-        assert ours.recv(timeout=10)
+        assert ours.recv(timeout=600)
     with (
         pytest.raises(InvalidStatus, match="403"),
         connect(address, subprotocols=version, origin="https://elsewhere.example"),
@@ -77,7 +77,7 @@ def test_a_page_from_elsewhere_gets_no_data(server):
 
 
 def test_the_address_of_the_client_build_is_a_plain_page(server):
-    with socket.create_connection(("127.0.0.1", server.get_port()), timeout=10) as line:
+    with socket.create_connection(("127.0.0.1", server.get_port()), timeout=600) as line:
         line.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
         assert line.recv(20).startswith(b"HTTP/1.1 200")
 
@@ -94,7 +94,7 @@ def test_only_a_plain_host_is_named_as_a_place_to_connect_to(host, named):
 
 
 def test_the_page_is_served_with_rules_and_not_to_be_framed(server):
-    line = HTTPConnection("127.0.0.1", server.get_port(), timeout=10)
+    line = HTTPConnection("127.0.0.1", server.get_port(), timeout=600)
     line.request("GET", "/")
     headers = line.getresponse().headers
     line.close()
@@ -119,7 +119,7 @@ def guarded():
 
 
 def answer(server, path, headers):
-    line = HTTPConnection("127.0.0.1", server.get_port(), timeout=10)
+    line = HTTPConnection("127.0.0.1", server.get_port(), timeout=600)
     line.request("GET", path, headers=headers)
     found = line.getresponse()
     found.read()
@@ -155,7 +155,7 @@ def test_without_the_token_there_is_no_socket(guarded):
     cookie = answer(guarded, "/?token=secret", {}).headers["Set-Cookie"].split(";")[0]
     shown = {"Cookie": cookie}
     with connect(address, subprotocols=version, max_size=None, additional_headers=shown) as ours:
-        assert ours.recv(timeout=10)
+        assert ours.recv(timeout=600)
 
 
 def test_a_number_that_is_no_port_is_refused_in_one_line():

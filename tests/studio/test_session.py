@@ -12,8 +12,6 @@ from softreach.studio.reach import cloud_points
 from softreach.studio.session import Session
 from tests.studio.sockets import page
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture
 def session(studio) -> Iterator[Session]:

@@ -27,8 +27,7 @@ def opened(browser, tmp_path_factory):
 
         def opened(kind: str) -> Tab:
             if kind not in tabs:
-                width, height = SIZES[kind]
-                tabs[kind] = Tab(browser, studio, width=width, height=height)
+                tabs[kind] = Tab(browser, studio, SIZES[kind])
                 tabs[kind].session.update(lambda s: s.showing(level=14))
             return tabs[kind]
 
@@ -61,6 +60,16 @@ def test_all_eleven_tabs_stand_in_one_line_within_the_window(opened, kind):
         return len(places) >= 11 and one_line and right <= SIZES[kind][0] + 0.5
 
     tab.wait(fit, "the page is laid out, all tabs in one line")
+
+
+def test_the_arm_is_in_sight_in_the_window_of_a_laptop(opened):
+    tab = opened("laptop")
+    tab.settle()
+    width, height = SIZES["laptop"]
+    assert tab.page.evaluate("document.documentElement.scrollWidth") <= width
+    places = in_canvas(tab, [(0, 0, z) for z in (0.0, 0.5, 1.0)])
+    assert (places > 0).all()
+    assert (places < (width, height)).all()
 
 
 def test_arm_and_map_are_in_sight_above_the_sheet_of_a_phone(opened):

@@ -1,0 +1,77 @@
+"""How long each test takes, for `make quick`: it leaves out what took over a tenth of a second.
+
+`pytest --record` writes `durations.json` after a run of all tests: the seconds of each such test
+function with its slowest fixture; the slowest of its cases counts.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from time import perf_counter
+
+import pytest
+
+FILE = Path(__file__).with_suffix(".json")
+SLOW = 0.1  # [s]
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--quick", action="store_true", help="only tests that are not slow")
+    parser.addoption("--record", action="store_true", help="write which tests are slow")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.pluginmanager.register(Durations(), "durations")
+
+
+def function_of(nodeid: str) -> str:
+    """A test without its case."""
+    return nodeid.partition("[")[0]
+
+
+class Durations:
+    """Measures tests, or leaves out those that are known to be slow."""
+
+    def __init__(self) -> None:
+        self.fixtures: dict[object, float] = {}
+        self.tests: dict[str, float] = {}
+
+    def pytest_collection_modifyitems(
+        self, config: pytest.Config, items: list[pytest.Item]
+    ) -> None:
+        if config.getoption("quick"):
+            slow = json.loads(FILE.read_text("utf-8"))
+            left_out = [item for item in items if function_of(item.nodeid) in slow]
+            items[:] = [item for item in items if function_of(item.nodeid) not in slow]
+            config.hook.pytest_deselected(items=left_out)
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_fixture_setup(self, fixturedef: pytest.FixtureDef) -> Iterator[None]:
+        """A fixture that several tests share is as slow for each: any may be the first to ask."""
+        begin = perf_counter()
+        result = yield
+        self.fixtures[fixturedef] = perf_counter() - begin
+        return result
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_teardown(self, item: pytest.Item) -> Iterator[None]:
+        defined = getattr(item, "_fixtureinfo", None)
+        shared = defined.name2fixturedefs.values() if defined else ()
+        longest = max((self.fixtures.get(d[-1], 0.0) for d in shared), default=0.0)
+        item.user_properties.append(("fixtures", longest))
+        return (yield)
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Of a call, or of the end of a test, which knows its fixtures."""
+        seconds = dict(report.user_properties).get("fixtures", 0.0)
+        seconds = report.duration if report.when == "call" else seconds
+        name = function_of(report.nodeid)
+        self.tests[name] = max(seconds, self.tests.get(name, 0.0))
+
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        config = session.config
+        if config.getoption("record") and not hasattr(config, "workerinput"):
+            slow = {name: round(s, 1) for name, s in sorted(self.tests.items()) if s > SLOW}
+            FILE.write_text(json.dumps(slow, indent=0) + "\n", "utf-8")
