@@ -8,14 +8,17 @@ Each flow is asked once, so that all is compiled and prepared, and counted when 
 from __future__ import annotations
 
 import argparse
+import itertools
 import os
 import sys
 import threading
 from collections import Counter
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from types import CodeType, FrameType
+from typing import Any
 
 os.environ.setdefault("SOFTREACH_NUM_THREADS", "1")
 
@@ -39,6 +42,11 @@ class Passage:
     def files(self) -> int:
         """Number of files."""
         return len({code.co_filename for code in self.calls})
+
+    def files_in(self, room: str) -> int:
+        """Number of files of one room, such as "studio"."""
+        folder = str(Path(SOURCE) / room)
+        return len({c.co_filename for c in self.calls if c.co_filename.startswith(folder)})
 
     def most_called(self, count: int) -> list[str]:
         """The functions called most, with their calls."""
@@ -115,9 +123,41 @@ def reach_by_search() -> Callable[[], object]:
     return lambda: sr.reachable_set(arm, accuracy=0.1)
 
 
+_OPEN = ExitStack()
+"""Servers that a flow needs until all is counted."""
+
+
+def _moved_slider(change: Callable[[Any, float], Any]) -> Callable[[], object]:
+    """A settled tab of the studio, without its widgets, whose state is changed to and fro."""
+    from tests.studio.sockets import page
+
+    from softreach.studio import Quality, Start, Studio, StudioState
+
+    quality = Quality(coarse_level=14, fine_level=15, coarse_accuracy=0.05, fine_accuracy=0.02)
+    state = StudioState(design=sr.designs.minimal_trunk()).showing(level=14)
+    studio = _OPEN.enter_context(Studio(Start(state=state, quality=quality)))
+    session = _OPEN.enter_context(page(studio))
+    session.panels = []
+    values = itertools.cycle((0.02, 0.03))
+
+    def question() -> None:
+        value = next(values)
+        session.update(lambda state: change(state, value), by_widget=True)
+        assert session.settle()
+
+    return question
+
+
 def slider() -> Callable[[], object]:
-    """One slider of the studio."""
-    raise NotImplementedError("not counted yet")
+    """One slider of a design in the studio, until its fine cloud is drawn."""
+    from softreach.arm.parameters import changed
+
+    return _moved_slider(lambda s, taper: s.replace(design=changed(s.design, {"taper": taper})))
+
+
+def activation_slider() -> Callable[[], object]:
+    """One slider of an activation in the studio, until the arm is drawn."""
+    return _moved_slider(lambda s, pull: s.replace(activation=(-10 * pull, -0.2, -0.3)))
 
 
 FLOWS: dict[str, Flow] = {
@@ -129,6 +169,7 @@ FLOWS: dict[str, Flow] = {
     "reach, raster": reach_by_raster,
     "reach, search": reach_by_search,
     "slider": slider,
+    "slider, activation": activation_slider,
 }
 
 
@@ -138,18 +179,20 @@ def main() -> None:
     parser.add_argument("flows", nargs="*", help=f"of {', '.join(FLOWS)}; all by default")
     parser.add_argument("--functions", type=int, default=0, help="list so many most called ones")
     options = parser.parse_args()
-    print(f"{'flow':24} {'calls':>8} {'functions':>10} {'files':>6}")
-    for name in options.flows or FLOWS:
-        try:
-            question = FLOWS[name]()
-        except NotImplementedError as reason:
-            print(f"{name:24} {reason}")
-            continue
-        question()
-        counted = passage(question)
-        print(f"{name:24} {counted.calls.total():8,} {len(counted.calls):10} {counted.files:6}")
-        for line in counted.most_called(options.functions):
-            print(line)
+    print(f"{'flow':24} {'calls':>8} {'functions':>10} {'files':>6} {'studio':>6}")
+    with _OPEN:
+        for name in options.flows or FLOWS:
+            try:
+                question = FLOWS[name]()
+            except NotImplementedError as reason:
+                print(f"{name:24} {reason}")
+                continue
+            question()
+            counted = passage(question)
+            numbers = counted.calls.total(), len(counted.calls), counted.files
+            print("{:24} {:8,} {:10} {:6}".format(name, *numbers), counted.files_in("studio"))
+            for line in counted.most_called(options.functions):
+                print(line)
 
 
 if __name__ == "__main__":

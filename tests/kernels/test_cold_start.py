@@ -150,4 +150,5 @@ def _of_readme() -> list[str]:
     """The commands in the README that end by themselves, whatever their number of samples."""
     text = re.sub(r" --n \d+", "", (ROOT / "README.md").read_text(encoding="utf-8"))
     lines = [line.split("#")[0] for line in text.splitlines() if line.startswith("softreach ")]
-    return [" ".join(line.split()[1:]) for line in lines]
+    commands = [" ".join(line.split()[1:]) for line in lines]
+    return [command for command in commands if not command.startswith("studio")]

@@ -61,6 +61,8 @@ class Job(ABC):
     """Attributes of the state that decide the result, such as "appearance.arm"."""
     only_with: ClassVar[str] = ""
     """Attribute of the state without which there is nothing to do; "" for none."""
+    shown_plot: ClassVar[str] = ""
+    """Plot without which there is nothing to do either."""
 
     def __init__(self, session: Session) -> None:
         """Work for a session, which it reads, and where it leaves its results."""
@@ -76,6 +78,8 @@ class Job(ABC):
     def part_of(cls, state: StudioState) -> object:
         """The part of a state that decides the result; None where there is nothing to do."""
         if not cls.depends_on or (cls.only_with and not attrgetter(cls.only_with)(state)):
+            return None
+        if cls.shown_plot and cls.shown_plot not in state.appearance.plots.shown:
             return None
         return attrgetter(*cls.depends_on)(state)
 

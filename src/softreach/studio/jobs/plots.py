@@ -5,7 +5,6 @@ from __future__ import annotations
 from softreach.studio.plots import PLOTS
 from softreach.studio.plots.plot import Plot, Source
 from softreach.studio.session import Job
-from softreach.studio.state import StudioState
 from softreach.studio.work import StaleCheck
 
 
@@ -14,12 +13,7 @@ def _job_of(plot: type[Plot]) -> type[Job]:
         """Computes one plot while it is shown."""
 
         depends_on = plot.depends_on
-
-        @classmethod
-        def part_of(cls, state: StudioState) -> object:
-            """Its attributes, while it is shown."""
-            shown = plot.name in state.appearance.plots.shown
-            return super().part_of(state) if shown else None
+        shown_plot = plot.name
 
         def run(self, check: StaleCheck) -> None:
             """Compute it, and show each result."""
