@@ -205,15 +205,15 @@ CALLS: dict[str, Call] = {
     "cloud.tip_map_of": Call(lambda: dict(cloud=cloud())),
     "cloud.save_cloud": Call(lambda: dict(cloud=cloud(), path="missing/x.zarr")),
     "cloud.open_cloud": Call(),
-    "curvature.curvature_statistics": Call(lambda: dict(cloud=cloud())),
-    "curvature.stream_statistics": Call(
+    "cloud.curvature.curvature_statistics": Call(lambda: dict(cloud=cloud())),
+    "cloud.curvature.stream_statistics": Call(
         lambda: dict(arm=ARM, activations=[GAMMA]),
         kinds=dict(activations="mapping"),
         fine={"activations": {"a list"}},
     ),
-    "curvature.distal_stations": Call(lambda: dict(arm=ARM)),
-    "dexterity.dexterity": Call(lambda: dict(cloud=cloud())),
-    "dexterity.solution_measure": Call(lambda: dict(cloud=cloud())),
+    "cloud.curvature.distal_stations": Call(lambda: dict(arm=ARM)),
+    "cloud.dexterity.dexterity": Call(lambda: dict(cloud=cloud())),
+    "cloud.dexterity.solution_measure": Call(lambda: dict(cloud=cloud())),
     "exchange.activefilaments.design_script": Call(lambda: dict(arm=ARM)),
     "exchange.activefilaments.gamma_path": Call(),
     "exchange.activefilaments.read_cloud": Call(
@@ -230,8 +230,10 @@ CALLS: dict[str, Call] = {
     "forces.blocked_force": Call(lambda: dict(arm=HEAVY, places=TIP, direction=(1.0, 0.0, 0.0))),
     "inverse.prepared_map": Call(lambda: dict(arm=ARM)),
     "inverse.solve_inverse": Call(lambda: dict(arm=ARM, targets=TIP)),
-    "path.track_path": Call(lambda: dict(arm=ARM, path=TIP), kinds=dict(path="array")),
-    "payload.payload_curve": Call(lambda: dict(arm=HEAVY, payloads=[0.1]), fine={"payloads": MANY}),
+    "inverse.path.track_path": Call(lambda: dict(arm=ARM, path=TIP), kinds=dict(path="array")),
+    "workspace.payload.payload_curve": Call(
+        lambda: dict(arm=HEAVY, payloads=[0.1]), fine={"payloads": MANY}
+    ),
     "plot.plot_arm": Call(lambda: dict(arm=ARM)),
     "plot.plot_cloud": Call(lambda: dict(cloud=cloud())),
     "plot.plot_compliance": Call(
@@ -258,10 +260,10 @@ CALLS: dict[str, Call] = {
     "plot.plot_views": Call(lambda: dict(cloud=cloud())),
     "plot.plot_volume_curve": Call(lambda: dict(curves={"a": [1.0]}, alphas=[0.1]), said="radii"),
     "plot.save_figure": Call(lambda: dict(figure=figure(), path="missing/x.png")),
-    "redundancy.activation_distance": Call(lambda: dict(cloud=cloud(), radius=0.1)),
-    "redundancy.distance_map": Call(lambda: dict(cloud=cloud(), distance=distance())),
-    "redundancy.redundancy_summary": Call(lambda: dict(cloud=cloud(), distance=distance())),
-    "redundancy.tip_density": Call(lambda: dict(cloud=cloud())),
+    "cloud.redundancy.activation_distance": Call(lambda: dict(cloud=cloud(), radius=0.1)),
+    "cloud.redundancy.distance_map": Call(lambda: dict(cloud=cloud(), distance=distance())),
+    "cloud.redundancy.redundancy_summary": Call(lambda: dict(cloud=cloud(), distance=distance())),
+    "cloud.redundancy.tip_density": Call(lambda: dict(cloud=cloud())),
     "rest.rest": Call(lambda: dict(arm=HEAVY)),
     "rod.configuration": Call(lambda: dict(arm=ARM, activation=GAMMA)),
     "rod.equilibria": Call(lambda: dict(arm=HEAVY, activations=GAMMA)),
@@ -271,9 +273,9 @@ CALLS: dict[str, Call] = {
     "rod.tip_positions": Call(lambda: dict(arm=ARM, activations=GAMMA)),
     "rod.TipMap.tips": Call(lambda: dict(activations=GAMMA), function=sr.rod.tip_map(ARM).tips),
     "rod.TipMap.frames": Call(
-        lambda: dict(activations=GAMMA, stations=[0.5]), function=sr.rod.tip_map(ARM).frames
+        lambda: dict(activations=GAMMA, stations=[0.5]),
+        function=lambda activations, stations: sr.rod.tip_map(ARM).frames(activations, stations),
     ),
-    "rod.TipMap.refined": Call(function=sr.rod.tip_map(ARM).refined),
     "stiffness.cloud_compliance": Call(lambda: dict(cloud=cloud())),
     "stiffness.principal_compliances": Call(
         lambda: dict(compliance=np.eye(3)[None]), fine={"compliance": {"NaN"}}
@@ -283,10 +285,10 @@ CALLS: dict[str, Call] = {
         fine={"compliance": {"NaN"}},
     ),
     "stiffness.tip_compliance": Call(lambda: dict(arm=HEAVY, activations=GAMMA)),
-    "volume.concave_hull": Call(lambda: dict(points=cloud().tip, alpha=0.5)),
-    "volume.convex_hull": Call(lambda: dict(points=TIP)),
-    "volume.unreachability": Call(lambda: dict(points=cloud().tip, alpha=0.5)),
-    "volume.volume_curve": Call(
+    "cloud.volume.concave_hull": Call(lambda: dict(points=cloud().tip, alpha=0.5)),
+    "cloud.volume.convex_hull": Call(lambda: dict(points=TIP)),
+    "cloud.volume.unreachability": Call(lambda: dict(points=cloud().tip, alpha=0.5)),
+    "cloud.volume.volume_curve": Call(
         lambda: dict(points=cloud().tip, alphas=[0.1]), fine={"alphas": MANY | {"infinity"}}
     ),
     "workspace.direction_spread": Call(lambda: dict(arm=ARM, n=64)),

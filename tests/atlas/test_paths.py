@@ -69,7 +69,7 @@ def test_the_best_design_is_found_under_a_constraint_on_a_path(tmp_path):
 
 def test_the_command_line_writes_the_unit_behind_the_path(tmp_path, capsys):
     store = str(tmp_path / "a.zarr")
-    assert run(["atlas", "build", store, *BUILD, "--metrics", "extent", "--alpha", "0.5L"]) == 0
+    assert run(["atlas", "build", store, *BUILD, "--metrics", "extent"]) == 0
     assert open_atlas(store)["status"].dims == (MODULUS, END)
     capsys.readouterr()
     where = ("--where", f"{MODULUS}_pa>=1.5e5", "--where", f"{END}<=0.6")

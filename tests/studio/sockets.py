@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from softreach.studio import Studio
 from softreach.studio.session import Session
 
-PATIENCE = 60.0  # [s] on a loaded machine
+PATIENCE = 600.0  # [s] on a loaded machine
 
 
 def until(condition: Callable[[], object]) -> None:

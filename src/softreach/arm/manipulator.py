@@ -93,6 +93,7 @@ class Manipulator:
         """
         faults = list(_kind_faults(actuators))
         bundles = None if faults else sum(actuator.bundles for actuator in actuators)
+        faults += _inner_radius_faults(plain(inner_radius), plain(outer_radius))
         profile = _part_or_faults(
             faults, LinearTaper, length=length, outer_radius=outer_radius, taper=taper
         )
@@ -102,7 +103,6 @@ class Manipulator:
             "density": density,
         }
         material = _part_or_faults(faults, Material, **matter)
-        faults += _inner_radius_faults(plain(inner_radius), profile)
         if activation_bounds is not None:
             faults += bounds_faults(activation_bounds, bundles)
         if faults or profile is None or material is None:
@@ -327,16 +327,14 @@ def _part_or_faults(faults: list[Fault], kind: type[Made], **values: Any) -> Mad
         return None
 
 
-def _inner_radius_faults(inner: Any, profile: LinearTaper | None) -> list[Fault]:
+def _inner_radius_faults(inner: Any, outer: Any) -> list[Fault]:
     """Faults of the radius where the ring of fibers begins."""
     allowed = Range(0.0, unit="m")
     if not allowed.admits(inner):
         return [Fault("inner_radius", inner, allowed)]
-    if profile is None or inner < profile.outer_radius:
+    if not allowed.admits(outer) or inner < outer:
         return []
-    return [
-        Fault("inner_radius", inner, f"must be below outer_radius = {profile.outer_radius:g} m")
-    ]
+    return [Fault("inner_radius", inner, f"must be below outer_radius = {outer:g} m")]
 
 
 def _part_faults(arm: Manipulator) -> Iterator[Fault]:
