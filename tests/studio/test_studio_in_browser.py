@@ -13,6 +13,7 @@ from softreach.arm.parameters import changed, find_parameter
 from softreach.arm.summary import describe
 from softreach.atlas import DesignSpace, build_atlas
 from softreach.studio import Studio, StudioState
+from softreach.studio.jobs.inverse import SolveInverse
 from softreach.studio.start import start_on_store
 from softreach.studio.state import Slice
 from softreach.studio.tabs.inverse import InversePanel
@@ -100,7 +101,7 @@ def test_a_click_on_the_cloud_is_a_target_whose_other_solutions_are_ghosts(tab):
     tab.page.get_by_label("clicks set the target").uncheck()
 
     tab.open("Inverse")
-    tab.session.aim(np.array([0.0, 0.0, 1.5]))
+    tab.session.job(SolveInverse).aim(np.array([0.0, 0.0, 1.5]))
     tab.settle()
     assert len(tab.session.answer) == 0
     tab.page.get_by_text("out of reach").wait_for()
