@@ -128,7 +128,9 @@ def _used() -> dict[str, list[str]]:
 
 
 def _name(function: Any) -> str:
-    return f"{function.__module__}.{function.__name__}".removeprefix("softreach.kernels.")
+    module = function.__module__
+    file = module.rsplit(".", 1)[1] if module.startswith("softreach.kernels.") else module
+    return f"{file}.{function.__name__}"
 
 
 if __name__ == "__main__":

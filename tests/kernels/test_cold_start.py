@@ -13,11 +13,11 @@ from benchmarks.bench_cold import COMMANDS, ROOT, Cold, measured, recorded
 from softreach import kernels
 from softreach.kernels.parts import KernelDispatcher
 
-ROD = {"rod._tips"}
+ROD = {"tips._tips"}
 SLOPES = ROD | {"jacobian._jacobians"}
 HULL = {
     "spatial_sort._sort_keys",
-    "delaunay._insert",
+    "bowyer_watson._insert",
     "alpha.measure_cells",
     "alpha.boundary_faces",
     "alpha.join_regions",

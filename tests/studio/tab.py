@@ -50,6 +50,7 @@ class Tab:
         """Leave nothing of the test before but what stands in no state."""
         self.settle()
         self.errors.clear()
+        self.page.mouse.move(1, 1)  # off whatever the test before left it on
         self.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})
         self.session.quality = start.quality
         self.session.update(lambda _: start.state)
@@ -71,6 +72,11 @@ class Tab:
                 self.page.wait_for_timeout(30)
 
     def settle(self) -> None:
+        """Wait until the page has sent what it holds back, and the session has done its work.
+
+        Of changes of two widgets within 50 ms the page sends only the last.
+        """
+        self.page.evaluate("new Promise(done => setTimeout(done, 120))")
         assert self.session.settle(PATIENCE)
 
     def open(self, name: str) -> None:

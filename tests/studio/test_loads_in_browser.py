@@ -70,7 +70,8 @@ def test_loads_are_put_on_shown_refused_saved_and_taken_off(loads_tab, tmp_path)
     unstable = (reach.status == TipStatus.UNSTABLE).sum()
     tab.wait(lambda: len(tab.drawn("/unstable").points) == unstable, "they are marked")
 
-    tab.page.get_by_text("a stable equilibrium").last.wait_for()
+    tab.open("Activation")  # it tells the posture
+    tab.page.get_by_text("a stable equilibrium").locator("visible=true").wait_for()
     arm, cloud = tab.session.state.design, tab.session.reach.cloud
     pulled = cloud.activation.values[5]
     tab.session.update(lambda s: s.replace(activation=tuple(pulled)))
@@ -87,12 +88,13 @@ def test_loads_are_put_on_shown_refused_saved_and_taken_off(loads_tab, tmp_path)
         tab.session.update(lambda s, lost=lost: s.replace(activation=tuple(lost)))
         tab.settle()
         assert tab.session.posture == status
-        tab.page.get_by_text(words).last.wait_for()
+        tab.page.get_by_text(words).locator("visible=true").wait_for()
     assert not tab.drawn("/arm/0")
     tab.session.update(lambda s: s.replace(activation=()))
     tab.settle()
     assert tab.drawn("/arm/0")
 
+    tab.open("Loads")
     before = loads(tab)
     for text in ("-5", "1000000000"):
         typed(tab, "payload [g]", text)

@@ -6,12 +6,23 @@ import gc
 import threading
 import time
 import weakref
+from collections.abc import Iterator
+
+import pytest
 
 import softreach.studio.app
 import softreach.studio.reach as stages
 from softreach.arm.parameters import changed
+from softreach.studio import Studio
 from softreach.studio.session import Session
 from tests.studio.sockets import PATIENCE, connected, page, until
+
+
+@pytest.fixture(scope="module")
+def studio(studio) -> Iterator[Studio]:
+    """A studio without the tab that all journeys share, which would be counted."""
+    with Studio(studio.start) as running:
+        yield running
 
 
 def own_threads() -> int:

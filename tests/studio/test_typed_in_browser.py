@@ -16,6 +16,7 @@ def field(tab, label):
 
 def typed(tab, label, text, enter=True):
     """Key by key, as a person types."""
+    tab.settle()
     place = field(tab, label)
     place.scroll_into_view_if_needed()
     place.click()
@@ -41,8 +42,9 @@ def test_numbers_are_kept_to_the_last_digit(tab):
         ],
         [("extent σ [deg]", "extent", "2.5e-1", np.radians(0.25))],
     ):
-        places = [typed(tab, label, text) for label, _, text, _ in numbers]
+        places = []
         for label, name, text, wanted in numbers:
+            places.append(typed(tab, label, text))
             tab.wait(lambda n=name, w=wanted: abs(value(tab, n) - w) < 1e-15, f"{label} is {text}")
         tab.settle()
         tab.page.wait_for_timeout(300)
