@@ -50,7 +50,7 @@ def random_design(bundles: int, seed: int):
 def hard_designs() -> Iterator:
     """Arms whose tips were missed once: they curl past a full circle or have many bundles."""
     import softreach as sr
-    from benchmarks.bench_workspace import family_arm
+    from benchmarks.tasks import family_arm
 
     yield sr.Manipulator.tapered(
         length=1.0,

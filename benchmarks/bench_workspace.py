@@ -17,6 +17,7 @@ import pytest
 
 import softreach as sr
 from benchmarks.memory import peak_bytes, reset_peak
+from benchmarks.tasks import family_arm
 from softreach.rod.rods import tip_map
 from softreach.workspace import reachable_set
 
@@ -160,38 +161,6 @@ def many(name: str, accuracy: float) -> tuple[int, float, float, float, int]:
         found = reachable_set(arm, accuracy=accuracy)
     wall = time.perf_counter() - start
     return arm.bundles, found.volume, found.volume_error, wall, peak_bytes() - before
-
-
-def family_arm(name: str) -> sr.Manipulator:
-    """Designs with five, six and twelve bundles."""
-    families, inner, poisson, high = {
-        "five": (((0, 50, 90, 3), (-90, 30, 20, 2)), 0.05, 0.5, 0.0),
-        "six": (((90, 40, 90, 3), (-90, 40, 30, 3)), 0.03, 0.4, 0.1),
-        "twelve": (
-            ((90, 25, 0, 3), (-90, 25, 20, 3), (0, 25, 40, 3), (45, 25, 60, 3)),
-            0.03,
-            0.4,
-            0.1,
-        ),
-    }[name]
-    fibers = tuple(
-        sr.FiberArchitecture(
-            revolution=math.radians(turn),
-            extent=math.radians(extent),
-            offset=math.radians(offset),
-            bundles=bundles,
-        )
-        for turn, extent, offset, bundles in families
-    )
-    return sr.Manipulator.tapered(
-        length=1.0,
-        outer_radius=0.06,
-        inner_radius=inner,
-        taper=math.radians(1),
-        poisson_ratio=poisson,
-        actuators=fibers,
-        activation_bounds=(-1.2, high),
-    )
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 import tempfile
@@ -11,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["PARTS", "Results", "Task"]
+__all__ = ["PARTS", "Results", "Task", "family_arm"]
 
 Results = dict[str, np.ndarray]
 Task = Callable[[], Results]
@@ -65,7 +66,6 @@ def kernel_tasks() -> dict[str, Task]:
 
 def workspace_tasks() -> dict[str, Task]:
     """The exact reachable set."""
-    from benchmarks.bench_workspace import family_arm
     from softreach.workspace import reachable_set
 
     def numbers(arm: Any, accuracy: float) -> Task:
@@ -131,8 +131,13 @@ def inverse_tasks() -> dict[str, Task]:
 def redundancy_tasks() -> dict[str, Task]:
     """Questions asked of a cloud."""
     import softreach as sr
-    from softreach.cloud.curvature import curvature_statistics
-    from softreach.cloud.dexterity import dexterity
+
+    try:
+        from softreach.cloud.curvature import curvature_statistics
+        from softreach.cloud.dexterity import dexterity
+    except ImportError:  # an earlier version
+        from softreach.curvature import curvature_statistics  # type: ignore[no-redef]
+        from softreach.dexterity import dexterity  # type: ignore[no-redef]
 
     cloud = sr.compute_cloud(sr.designs.redundant_trunk(), 200_000)
     large = sr.compute_cloud(sr.designs.minimal_trunk(), 2_000_000)
@@ -242,6 +247,40 @@ PARTS: dict[str, Callable[[], dict[str, Task]]] = {
     "pictures": picture_tasks,
     "studio": studio_tasks,
 }
+
+
+def family_arm(name: str) -> Any:
+    """Designs with five, six and twelve bundles."""
+    import softreach as sr
+
+    families, inner, poisson, high = {
+        "five": (((0, 50, 90, 3), (-90, 30, 20, 2)), 0.05, 0.5, 0.0),
+        "six": (((90, 40, 90, 3), (-90, 40, 30, 3)), 0.03, 0.4, 0.1),
+        "twelve": (
+            ((90, 25, 0, 3), (-90, 25, 20, 3), (0, 25, 40, 3), (45, 25, 60, 3)),
+            0.03,
+            0.4,
+            0.1,
+        ),
+    }[name]
+    fibers = tuple(
+        sr.FiberArchitecture(
+            revolution=math.radians(turn),
+            extent=math.radians(extent),
+            offset=math.radians(offset),
+            bundles=bundles,
+        )
+        for turn, extent, offset, bundles in families
+    )
+    return sr.Manipulator.tapered(
+        length=1.0,
+        outer_radius=0.06,
+        inner_radius=inner,
+        taper=math.radians(1),
+        poisson_ratio=poisson,
+        actuators=fibers,
+        activation_bounds=(-1.2, high),
+    )
 
 
 def _trunk(revolution: float, taper: float) -> Any:
