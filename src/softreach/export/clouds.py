@@ -131,8 +131,8 @@ def export_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: boo
         MissingExtra: The format needs a library that is not installed.
         NotWritten: It cannot be written.
     """
-    table = cloud_table(a_cloud("cloud", cloud))
     path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
+    table = cloud_table(a_cloud("cloud", cloud))
     takes = _BYTES * (table.tip.size + table.activation.size)
     write_by_suffix(path, CLOUD_FILES, table, overwrite=overwrite, takes=takes)
 
