@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.support.arguments import POSITIVE, as_given, as_number, dataset
+from softreach.support.arguments import POSITIVE, as_dataset, as_given, as_number
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput
 from softreach.support.versions import SCHEMA_VERSION, versions
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 __all__ = [
     "AXES",
     "a_cloud",
+    "a_configuration",
     "activation_attributes",
     "activation_symbols",
     "activation_units",
@@ -114,8 +115,15 @@ def configuration_dataset(
     return xr.Dataset(variables, coordinates, provenance(arm))
 
 
-a_cloud = dataset(what="a cloud")
-"""An argument that looks like a cloud; `check_cloud` looks closer."""
+def a_cloud(name: str, value: object) -> xr.Dataset:
+    """A dataset that looks like a cloud; `check_cloud` looks closer."""
+    return as_dataset(name, value, "tip", "activation", what="a cloud")
+
+
+def a_configuration(name: str, value: object) -> xr.Dataset:
+    """A dataset that looks like a configuration."""
+    variables = "position", "directors", "extension", "Z"
+    return as_dataset(name, value, *variables, what="a configuration")
 
 
 def check_cloud(cloud: xr.Dataset) -> xr.Dataset:

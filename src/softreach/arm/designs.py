@@ -19,7 +19,7 @@ from softreach.arm.material import Material, named_material
 from softreach.arm.number import fields_of
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring, Section
-from softreach.support.arguments import checked, instance, optional, whole, within
+from softreach.support.arguments import as_instance, as_integer, as_number
 
 __all__ = [
     "elephant_trunk",
@@ -34,16 +34,7 @@ __all__ = [
 
 _PAPER_EXTENT = math.radians(48)
 
-_checked_trunk = checked(
-    revolution=within(fields_of(FiberArchitecture)["revolution"].allowed),
-    taper=within(fields_of(LinearTaper)["taper"].allowed),
-    length=within(fields_of(LinearTaper)["length"].allowed),
-    radius_ratio=within(fields_of(Ring)["inner_ratio"].allowed),
-    material=optional(instance(Material, "a Material, or None")),
-)
 
-
-@_checked_trunk
 def minimal_trunk(
     revolution: float = math.radians(108),
     taper: float = math.radians(2),
@@ -66,6 +57,13 @@ def minimal_trunk(
         material: What all of the arm is made of; None for an incompressible one whose Young's
             modulus cancels.
     """
+    turn, body = fields_of(FiberArchitecture)["revolution"], fields_of(LinearTaper)
+    revolution = as_number("revolution", revolution, turn.allowed)
+    taper = as_number("taper", taper, body["taper"].allowed)
+    length = as_number("length", length, body["length"].allowed)
+    radius_ratio = as_number("radius_ratio", radius_ratio, fields_of(Ring)["inner_ratio"].allowed)
+    if material is not None:
+        as_instance("material", material, Material, "a Material, or None")
     helices = (
         FiberArchitecture(
             name="left", revolution=-revolution, offset=math.radians(66), extent=_PAPER_EXTENT
@@ -77,7 +75,6 @@ def minimal_trunk(
     return _trunk((*helices, _longitudinal(270)), taper, length, radius_ratio, material)
 
 
-@_checked_trunk
 def redundant_trunk(
     revolution: float = math.radians(108),
     taper: float = math.radians(2),
@@ -197,7 +194,6 @@ def filament() -> Manipulator:
     )
 
 
-@checked(segments=whole(1, 2))
 def three_tendon_robot(*, segments: int = 1) -> Manipulator:
     """A nitinol wire of 0.2 m a segment with three parallel tendons for each.
 
@@ -212,6 +208,7 @@ def three_tendon_robot(*, segments: int = 1) -> Manipulator:
     Raises:
         InvalidInput: Another number of segments.
     """
+    segments = as_integer("segments", segments, 1, 2)
     names = ("tendon",) if segments == 1 else ("proximal", "distal")
     tendons = tuple(
         Tendon(

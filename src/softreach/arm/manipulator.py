@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from os import PathLike, fspath
+from os import PathLike
 from typing import Any, Self, TypeVar
 
 import numpy as np
@@ -19,7 +19,15 @@ from softreach.arm.loads import Loads
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.section import Ring, Section, name_faults
-from softreach.support.arguments import as_given, checked, flag, instance, path, plain, text, whole
+from softreach.support.arguments import (
+    as_flag,
+    as_given,
+    as_instance,
+    as_integer,
+    as_path,
+    as_text,
+    plain,
+)
 from softreach.support.arrays import as_stations
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
 from softreach.support.files.atomic import writing
@@ -132,7 +140,6 @@ class Manipulator:
         shares = zip(self.actuators, np.split(pairs, ends)[:-1], strict=True)
         return self.replace(actuators=tuple(one.with_bounds(share) for one, share in shares))
 
-    @checked(count=whole(1, 1000), keep_extent=flag)
     def split(self, fiber: str | int, count: int, *, keep_extent: bool = True) -> Self:
         """Replace an architecture of one bundle by `count` independent ones beside each other.
 
@@ -154,6 +161,8 @@ class Manipulator:
         Raises:
             InvalidInput: No such architecture, one of several bundles, or a count below 1.
         """
+        count = as_integer("count", count, 1, 1000)
+        keep_extent = as_flag("keep_extent", keep_extent)
         index = self._fiber_index(fiber)
         original = self.actuators[index]
         assert isinstance(original, SectorActuator)
@@ -163,14 +172,13 @@ class Manipulator:
         )
 
     @classmethod
-    @checked(text=text, source=text)
     def from_toml(cls, text: str, source: str = "design") -> Self:
         """A design from the text of a file; `source` is what errors call it.
 
         Raises:
             InvalidDesign: The text's faults, all of them, in the file's own names and units.
         """
-        parts = design_file.parse(text, source)
+        parts = design_file.parse(as_text("text", text), as_text("source", source))
         try:
             return cls(**parts._asdict())
         except InvalidDesign as error:
@@ -189,7 +197,6 @@ class Manipulator:
         return design_file.render(self.profile, self.section, self.actuators, self.loads)
 
     @classmethod
-    @checked(path=path)
     def load(cls, path: str | PathLike[str]) -> Self:
         """Read a design file (TOML, lengths in m, angles in degrees).
 
@@ -197,9 +204,9 @@ class Manipulator:
             InvalidDesign: The file's faults, all of them, in the file's own names and units.
             InvalidInput: No file that can be read, or no text in UTF-8.
         """
-        return cls.from_toml(design_file.text_of(path), source=fspath(path))
+        source = as_path("path", path)
+        return cls.from_toml(design_file.text_of(source), source=source)
 
-    @checked(path=path, overwrite=flag)
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write a design file; an older one is replaced.
 
@@ -212,6 +219,7 @@ class Manipulator:
             NotWritten: It cannot be written.
             InvalidDesign: The design has no text; see `to_toml`.
         """
+        path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
         text = self.to_toml()
         with writing(path, design_file.DESIGN_FILE[".toml"], overwrite=overwrite) as stream:
             stream.write(text.encode())
@@ -311,8 +319,9 @@ class Manipulator:
         raise InvalidInput("fiber", as_given(fiber), allowed)
 
 
-a_manipulator = instance(Manipulator, "a Manipulator")
-"""An argument that is a design."""
+def a_manipulator(name: str, value: object) -> Manipulator:
+    """An argument that is a design."""
+    return as_instance(name, value, Manipulator, "a Manipulator")
 
 
 Made = TypeVar("Made")

@@ -13,7 +13,7 @@ from typing import Any
 
 from softreach.arm.number import number
 from softreach.arm.part import Part
-from softreach.support.arguments import checked, text
+from softreach.support.arguments import as_text
 from softreach.support.errors import InvalidInput
 
 __all__ = [
@@ -96,7 +96,6 @@ def material_record(name: str) -> MaterialRecord:
     return library[name]
 
 
-@checked(name=text)
 def named_material(name: str) -> Material:
     """A material of the library.
 
@@ -106,7 +105,7 @@ def named_material(name: str) -> Material:
     Raises:
         InvalidInput: No material has this name.
     """
-    return material_record(name).material
+    return material_record(as_text("name", name)).material
 
 
 @cache

@@ -18,7 +18,6 @@ from softreach.arm.loads import GRAVITY, Loads
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.section import Stiffness
 from softreach.arm.tables import both_sides, check_extension, extension_range
-from softreach.support.arguments import checked
 from softreach.support.errors import Fault, InvalidDesign
 
 __all__ = [
@@ -82,14 +81,13 @@ class DesignSummary:
     """Limits that the design touches, each with its number."""
 
 
-@checked(arm=a_manipulator)
 def describe(arm: Manipulator) -> DesignSummary:
     """Everything that `softreach design` prints.
 
     Raises:
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
     """
-    check_extension(arm)
+    check_extension(a_manipulator("arm", arm))
     tip_radius = float(arm.profile.radius(arm.length))
     body = arm.profile, arm.section
     return DesignSummary(

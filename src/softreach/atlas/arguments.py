@@ -1,4 +1,4 @@
-"""Arguments of the functions of an atlas: converters for `checked`."""
+"""Arguments of the functions of an atlas, converted as `support.arguments` does."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from softreach.support.arguments import as_given, as_number, path, plain
+from softreach.support.arguments import as_given, as_number, as_path, plain
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput
 
@@ -27,7 +27,7 @@ def a_store(name: str, value: object) -> Any:
         InvalidInput: Neither text nor a path nor a Zarr store.
     """
     if isinstance(value, str | os.PathLike):
-        return path(name, value)
+        return as_path(name, value)
     if any(isinstance(value, kind) for kind in _zarr_stores()):
         return value
     if isinstance(value, dict) and all(hasattr(one, "to_bytes") for one in value.values()):

@@ -20,15 +20,7 @@ from softreach.atlas.space import DesignSpace
 from softreach.atlas.store import DONE, GAP, UNSTABLE, AtlasStore
 from softreach.rod.tip_map import check_tol
 from softreach.sampling import check_sampler
-from softreach.support.arguments import (
-    POSITIVE,
-    checked,
-    flag,
-    function,
-    instance,
-    optional,
-    within,
-)
+from softreach.support.arguments import POSITIVE, as_flag, as_function, as_instance, as_number
 from softreach.support.errors import counted, warn
 from softreach.support.memory import check_disk, check_memory
 from softreach.support.progress import Progress, bar
@@ -47,19 +39,6 @@ _FILES = 4  # of a design without tips: status, message, metrics, curvature
 _HELD = 700  # bytes of memory of a sample and its share of the triangulation
 
 
-@checked(
-    space=instance(DesignSpace, "a DesignSpace"),
-    store=a_store,
-    metrics=lambda name, value: chosen_metrics(value),
-    alpha_over_length=within(POSITIVE),
-    accuracy=within(ACCURACIES),
-    tol=lambda name, value: check_tol(value),
-    keep_clouds=flag,
-    executor=an_executor,
-    shard=shard_of,
-    durable=flag,
-    progress=optional(function),
-)
 def build_atlas(
     space: DesignSpace,
     store: StoreLike,
@@ -129,7 +108,13 @@ def build_atlas(
         SoftreachWarning: There are gaps, failed or damaged designs, or designs whose points are too
             sparse for the radius.
     """
-    chosen = chosen_metrics(metrics)
+    as_instance("space", space, DesignSpace, "a DesignSpace")
+    store, chosen, tol = a_store("store", store), chosen_metrics(metrics), check_tol(tol)
+    alpha_over_length = as_number("alpha_over_length", alpha_over_length, POSITIVE)
+    accuracy, shard = as_number("accuracy", accuracy, ACCURACIES), shard_of("shard", shard)
+    keep_clouds, durable = as_flag("keep_clouds", keep_clouds), as_flag("durable", durable)
+    executor = an_executor("executor", executor)
+    progress = None if progress is None else as_function("progress", progress)
     check_names(chosen, space)
     numbers = range(shard[0], space.size, shard[1])
     check_sampler(sampler, n, 0, seed)

@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from softreach.support.arguments import instance, text
+from softreach.support.arguments import as_instance, as_text
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, SoftreachError
 
@@ -62,11 +62,11 @@ class Metric:
     """When NaN is the right answer; empty if never. A design with any other NaN has failed."""
 
     def __post_init__(self) -> None:
-        if not text("name of the metric", self.name).isidentifier():
+        if not as_text("name of the metric", self.name).isidentifier():
             raise InvalidInput("name of the metric", self.name, "letters, digits and underscores")
         for field in ("unit", "meaning", "nan_if"):
-            text(f"{field} of metric {self.name}", getattr(self, field))
-        instance((tuple, list), "a tuple")(f"needs of metric {self.name}", self.needs)
+            as_text(f"{field} of metric {self.name}", getattr(self, field))
+        as_instance(f"needs of metric {self.name}", self.needs, (tuple, list), "a tuple")
         object.__setattr__(self, "needs", tuple(self.needs))
         if not all(isinstance(need, Need) for need in self.needs):
             allowed = f"some of Need.{', Need.'.join(Need.__members__)}"

@@ -11,7 +11,7 @@ from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from multiprocessing.connection import wait
 from typing import Any
 
-from softreach.support.arguments import checked, whole
+from softreach.support.arguments import as_integer
 from softreach.support.files.interruption import PATIENCE, as_a_whole, live_with_parent
 
 __all__ = ["WORKERS", "LocalProcesses", "Workers", "worker_processes"]
@@ -23,7 +23,6 @@ Workers = Callable[[], Executor]
 """Starts a pool; called again when a dead worker has broken the one before."""
 
 
-@checked(count=whole(*WORKERS))
 def worker_processes(count: int) -> Workers:
     """Worker processes on this machine, restarted if one dies.
 
@@ -35,6 +34,7 @@ def worker_processes(count: int) -> Workers:
     Raises:
         InvalidInput: Not a whole number from 1 to 1,024.
     """
+    count = as_integer("count", count, *WORKERS)
     return lambda: LocalProcesses(count)
 
 

@@ -26,16 +26,7 @@ from softreach.atlas.store import (
 )
 from softreach.rod.rods import tip_map
 from softreach.schema import cloud_dataset, with_status
-from softreach.support.arguments import (
-    as_number,
-    as_whole_number,
-    checked,
-    flag,
-    mapping_of,
-    optional,
-    text,
-    whole,
-)
+from softreach.support.arguments import as_flag, as_integer, as_mapping, as_number, as_text
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -68,7 +59,6 @@ class AtlasStatus:
     """Why designs failed, cannot exist, are nowhere stable or are damaged: number -> message."""
 
 
-@checked(atlas=an_atlas)
 def atlas_status(atlas: AtlasLike) -> AtlasStatus:
     """Number of designs of an atlas that are done, and faults of the others.
 
@@ -88,11 +78,10 @@ def atlas_status(atlas: AtlasLike) -> AtlasStatus:
         opened = opened_atlas(atlas)
         status = opened["status"].values.ravel()
         return _counted(status, _messages(opened, np.isin(status, (*TOLD, DAMAGED))), False)
-    store = AtlasStore.open(atlas, "r")
+    store = AtlasStore.open(an_atlas("atlas", atlas), "r")
     return _verified(store, tips=_is_small(store))
 
 
-@checked(store=a_store)
 def verify_atlas(store: StoreLike) -> AtlasStatus:
     """Read all of an atlas and check it: what is damaged, and how much is done.
 
@@ -105,10 +94,9 @@ def verify_atlas(store: StoreLike) -> AtlasStatus:
         InvalidInput: There is no atlas.
         DamagedStore: What all designs share is damaged.
     """
-    return _verified(AtlasStore.open(store, "r"), tips=True)
+    return _verified(AtlasStore.open(a_store("store", store), "r"), tips=True)
 
 
-@checked(atlas=an_atlas)
 def atlas_design(atlas: AtlasLike, **at: float) -> Manipulator:
     """The design at, or nearest to, these parameters.
 
@@ -124,7 +112,6 @@ def atlas_design(atlas: AtlasLike, **at: float) -> Manipulator:
     return command_of(opened).design(int(_nearest(opened[["number"]], at)["number"]))
 
 
-@checked(atlas=an_atlas)
 def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
     """The cloud of the design at, or nearest to, these parameters, like those of `compute_cloud`.
 
@@ -158,13 +145,6 @@ def atlas_cloud(atlas: AtlasLike, **at: float) -> xr.Dataset:
     return cloud_dataset(arm, activation, tip, **drawn)
 
 
-@checked(
-    atlas=an_atlas,
-    metric=text,
-    smallest=flag,
-    where=optional(mapping_of(an_interval)),
-    count=whole(1),
-)
 def best_designs(
     atlas: AtlasLike,
     metric: str,
@@ -188,13 +168,14 @@ def best_designs(
     Raises:
         InvalidInput: No such metric or parameter, or an argument of another kind.
     """
-    opened = opened_atlas(atlas)
+    metric, smallest = as_text("metric", metric), as_flag("smallest", smallest)
+    limits = {} if where is None else as_mapping("where", where, an_interval)
+    count, opened = as_integer("count", count, 1), opened_atlas(atlas)
     dims = opened["status"].dims
     numbers = [name for name in opened.data_vars if opened[name].dims == dims]
     _check_known(metric, [str(name) for name in numbers if opened[name].dtype.kind == "f"])
     stacked = opened[[*numbers, *_parameters(opened)]].stack(rank=dims, create_index=False)
     allowed = np.isfinite(stacked[metric].values)
-    limits: Any = where or {}  # open ends are infinite by now
     for name, (low, high) in limits.items():
         _check_known(name, [str(known) for known in stacked.variables])
         values = stacked[name].values
@@ -247,7 +228,7 @@ def _nearest(atlas: xr.Dataset, at: Mapping[str, float]) -> xr.Dataset:
         raise InvalidInput("parameters", ", ".join(at) or "none", f"all of {', '.join(dims)}")
     if "design" in at:
         last = atlas.sizes["design"] - 1
-        return atlas.isel(design=as_whole_number("design", at["design"], 0, last))
+        return atlas.isel(design=as_integer("design", at["design"], 0, last))
     place = {name: as_number(name, value) for name, value in at.items()}
     return atlas.sel(place, method="nearest")
 

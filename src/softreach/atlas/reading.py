@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.atlas.arguments import a_store
+from softreach.atlas.arguments import a_store, an_atlas
 from softreach.atlas.command import Command
 from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import DAMAGED, FAILED, GAP, KNOWN, PER_DESIGN, UNSTABLE, AtlasStore
-from softreach.support.arguments import checked, dataset, text
+from softreach.support.arguments import as_dataset, as_text
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, counted, warn
 from softreach.support.files.damage import Chunk, storage_errors
@@ -86,7 +86,6 @@ def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] 
     return Contents(status=status, messages=messages, tables=tables)
 
 
-@checked(store=a_store)
 def open_atlas(store: StoreLike) -> xr.Dataset:
     """An atlas with a dimension for each parameter, so that ``atlas.volume.sel(taper=...)`` works.
 
@@ -109,7 +108,7 @@ def open_atlas(store: StoreLike) -> xr.Dataset:
     Warns:
         SoftreachWarning: Designs are damaged; they are NaN, and their status says so.
     """
-    return _opened(store, metrics=True)
+    return _opened(a_store("store", store), metrics=True)
 
 
 def opened_atlas(atlas: AtlasLike, *, metrics: bool = True) -> xr.Dataset:
@@ -124,11 +123,8 @@ def opened_atlas(atlas: AtlasLike, *, metrics: bool = True) -> xr.Dataset:
     """
     import xarray as xr
 
-    if not isinstance(atlas, xr.Dataset):
-        return _opened(atlas, metrics=metrics)
-    if "command" not in atlas.attrs:
-        raise InvalidInput("atlas", type(atlas).__name__, "a store, or a dataset from open_atlas")
-    return atlas
+    atlas = an_atlas("atlas", atlas)
+    return atlas if isinstance(atlas, xr.Dataset) else _opened(atlas, metrics=metrics)
 
 
 def command_of(atlas: xr.Dataset) -> Command:
@@ -136,7 +132,6 @@ def command_of(atlas: xr.Dataset) -> Command:
     return Command.from_json(atlas.attrs["command"])
 
 
-@checked(atlas=dataset("length", what="an atlas"), metric=text)
 def over_length(atlas: xr.Dataset, metric: str) -> xr.DataArray:
     """A metric relative to each design's own length: V / L³, heights over L, curvatures times L.
 
@@ -144,7 +139,8 @@ def over_length(atlas: xr.Dataset, metric: str) -> xr.DataArray:
         atlas: From `open_atlas`.
         metric: Which one; without a length in its unit it stays as it is.
     """
-    if metric not in atlas:
+    atlas = as_dataset("atlas", atlas, "length", what="an atlas")
+    if as_text("metric", metric) not in atlas:
         raise InvalidInput("metric", metric, f"one of {', '.join(map(str, atlas.data_vars))}")
     values = atlas[metric]
     power = _POWERS.get(values.attrs.get("units", "1"), 0)

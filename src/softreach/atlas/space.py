@@ -15,7 +15,7 @@ from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters import Parameter, changed, find_parameter, find_parameters, parameters
 from softreach.arm.tables import check_extension
 from softreach.atlas.arguments import column
-from softreach.support.arguments import as_whole_number, checked, one_of, whole
+from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import as_floats, check_finite
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.support.progress import Progress, silent
@@ -64,7 +64,6 @@ class DesignSpace:
             raise fault
 
     @classmethod
-    @checked(base=a_manipulator)
     def grid(cls, base: Manipulator, **values: ArrayLike) -> Self:
         """Every combination of the values.
 
@@ -77,13 +76,11 @@ class DesignSpace:
         return cls(base=base, parameters=_plain(values), layout="grid")
 
     @classmethod
-    @checked(base=a_manipulator)
     def listed(cls, base: Manipulator, **values: ArrayLike) -> Self:
         """The first values of all parameters make a design, the second ones the next, and so on."""
         return cls(base=base, parameters=_plain(values), layout="list")
 
     @classmethod
-    @checked(base=a_manipulator, count=whole(1, _MOST), method=one_of(("sobol", "latin")))
     def sampled(
         cls,
         base: Manipulator,
@@ -102,7 +99,9 @@ class DesignSpace:
             seed: Of the sampler.
             **ranges: Parameter -> lower and upper end [SI units].
         """
-        seed = as_whole_number("seed", seed)
+        a_manipulator("base", base)
+        as_one_of("method", method, ("sobol", "latin"))
+        count, seed = as_integer("count", count, 1, _MOST), as_integer("seed", seed)
         if not ranges:
             return cls(base=base, parameters=())
         cube = _spread(count, len(ranges), method, seed)
@@ -144,7 +143,7 @@ class DesignSpace:
 
     def place(self, index: int) -> tuple[int, ...]:
         """Place of the design with this number, along each dimension."""
-        number = as_whole_number("number of the design", index, 0, self.size - 1)
+        number = as_integer("number of the design", index, 0, self.size - 1)
         return tuple(map(int, np.unravel_index(number, self.shape)))
 
     def values(self, index: int) -> dict[str, float]:

@@ -209,9 +209,9 @@ def figures(
     from softreach.atlas import open_atlas
     from softreach.paper.atlas_figures import atlas_figures
     from softreach.plot.style import pyplot, save_figure
-    from softreach.support.arguments import as_whole_number
+    from softreach.support.arguments import as_integer
 
-    as_whole_number("panels", panels, 1)
+    as_integer("panels", panels, 1)
     for suffix in ("png", "pdf"):  # tried by a name that any of them may have
         check_picture(out / f"clouds.{suffix}", overwrite)
     for name, figure in atlas_figures(open_atlas(store), panels):
@@ -256,9 +256,9 @@ def _executor(
     if workers is not None:
         refuse("left out with --workers", scheduler=scheduler, scheduler_file=scheduler_file)
         from softreach.atlas.processes import WORKERS, worker_processes
-        from softreach.support.arguments import as_whole_number
+        from softreach.support.arguments import as_integer
 
-        return worker_processes(as_whole_number("workers", workers, *WORKERS))
+        return worker_processes(as_integer("workers", workers, *WORKERS))
     if scheduler is not None:
         refuse("left out with --scheduler", scheduler_file=scheduler_file)
     elif scheduler_file is None:

@@ -20,7 +20,8 @@ from softreach.export.formats import (
     write_vtk,
     write_vtu,
 )
-from softreach.support.arguments import checked, dataset, flag, path
+from softreach.schema import a_cloud
+from softreach.support.arguments import as_flag, as_path
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.files.kinds import Formats, beginning_with, text_with
@@ -110,7 +111,6 @@ def column_names(bundles: Sequence[str]) -> list[str]:
     return names
 
 
-@checked(cloud=dataset("tip", "activation", what="a cloud"), path=path, overwrite=flag)
 def export_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write a cloud as .ply, .csv, .parquet, .npz, .mat, .vtu or .vtk, chosen by the suffix.
 
@@ -131,7 +131,8 @@ def export_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: boo
         MissingExtra: The format needs a library that is not installed.
         NotWritten: It cannot be written.
     """
-    table = cloud_table(cloud)
+    path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
+    table = cloud_table(a_cloud("cloud", cloud))
     takes = _BYTES * (table.tip.size + table.activation.size)
     write_by_suffix(path, CLOUD_FILES, table, overwrite=overwrite, takes=takes)
 

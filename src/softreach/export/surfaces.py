@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from io import BufferedWriter
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,7 +23,8 @@ from softreach.export.formats import (
 )
 from softreach.geometry.surface import SurfaceMesh
 from softreach.rod.arm_shape import arm_surface, bundle_surfaces
-from softreach.support.arguments import as_given, checked, dataset, flag, path, whole
+from softreach.schema import a_configuration
+from softreach.support.arguments import as_flag, as_given, as_integer, as_path
 from softreach.support.arrays import Array, Faces, as_faces, as_points
 from softreach.support.errors import InvalidInput
 from softreach.support.files.kinds import Formats, beginning_with, text_with
@@ -63,7 +64,6 @@ def _a_mesh(name: str, value: Any) -> tuple[Array, Faces]:
     return points, as_faces(f"{name}.faces", faces, len(points))
 
 
-@checked(mesh_or_hull=_a_mesh, path=path, overwrite=flag)
 def export_mesh(
     mesh_or_hull: SurfaceMesh | tuple[ArrayLike, ArrayLike],
     path: str | PathLike[str],
@@ -85,7 +85,8 @@ def export_mesh(
         MissingExtra: The format needs a library that is not installed.
         NotWritten: It cannot be written.
     """
-    vertices, faces = cast("tuple[Array, Faces]", mesh_or_hull)
+    vertices, faces = _a_mesh("mesh_or_hull", mesh_or_hull)
+    path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
     if not len(faces):
         raise InvalidInput("mesh.faces", "none", "at least one triangle")
     write_parts([Part("surface", vertices, faces)], path, overwrite=overwrite)
@@ -108,13 +109,6 @@ def write_parts(
     write_by_suffix(path, SURFACE_FILES, parts, overwrite=overwrite, takes=takes)
 
 
-@checked(
-    arm=a_manipulator,
-    configuration=dataset("position", "directors", "extension", "Z", what="a configuration"),
-    path=path,
-    sides=whole(3, 10_000),
-    overwrite=flag,
-)
 def export_arm(
     arm: Manipulator,
     configuration: xr.Dataset,
@@ -142,7 +136,9 @@ def export_arm(
         MissingExtra: The format needs a library that is not installed.
         NotWritten: It cannot be written.
     """
-    body = arm_surface(arm, configuration, sides)
+    arm, configuration = a_manipulator("arm", arm), a_configuration("configuration", configuration)
+    path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
+    body = arm_surface(arm, configuration, as_integer("sides", sides, 3, 10_000))
     opacity = _CLEAR if any(inside(arm)) else 1.0
     parts = [Part("body", body.vertices, body.faces, opacity=opacity)]
     for index, skin in enumerate(bundle_surfaces(arm, configuration)):

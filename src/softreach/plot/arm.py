@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.skin import inside
 from softreach.picture.projection import View
 from softreach.picture.shading import draw_mesh, faces_to_eye
@@ -16,16 +17,15 @@ from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.cross_section import plot_cross_section, section_reach
 from softreach.plot.lengths import in_lengths
 from softreach.plot.style import (
-    DRAWN,
-    MANIPULATOR,
-    SHAPE,
     WIDTH,
     figure_style,
+    panel_arguments,
     pyplot,
     some_bundles,
 )
 from softreach.rod.arm_shape import arm_surface, bundle_skins, rest_configuration
-from softreach.support.arguments import checked, each_of, flag, instance, optional
+from softreach.schema import a_configuration
+from softreach.support.arguments import as_flag, as_given, as_instance, as_number
 from softreach.support.arrays import Array, as_stations
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import BODY, bundle_color
@@ -35,15 +35,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from softreach.arm.manipulator import Manipulator
-
 
 _SIDES = 96
 _BULGE = 1.01  # of R2, beyond which a bundle makes the picture wider
 _FADE = 0.62  # how far the colors of the arm at rest go toward white
 
 
-@checked(**DRAWN, arm=MANIPULATOR, configuration=optional(SHAPE), rest=flag)
 def plot_arm(
     arm: Manipulator,
     configuration: xr.Dataset | None = None,
@@ -73,6 +70,8 @@ def plot_arm(
         InvalidInput: Unknown view.
         MissingExtra: matplotlib is not installed.
     """
+    arm, rest = a_manipulator("arm", arm), as_flag("rest", rest)
+    ax, box = panel_arguments(ax, view, box)
     shapes = shapes_of(configuration)
     resting = [rest_configuration(arm)] if rest or not shapes else []
     with figure_style(ax):
@@ -88,6 +87,7 @@ def shapes_of(configuration: xr.Dataset | None) -> list[xr.Dataset]:
     """The single configurations of a dataset that may hold several."""
     if configuration is None:
         return []
+    configuration = a_configuration("configuration", configuration)
     if "sample" not in configuration.dims:
         return [configuration]
     return [configuration.isel(sample=k) for k in range(configuration.sizes["sample"])]
@@ -149,15 +149,6 @@ class DesignPanel(NamedTuple):
     """Which to draw, by index; None for all."""
 
 
-def _panels(name: str, value: object) -> list[DesignPanel]:
-    """One panel or more."""
-    panels = each_of(instance(DesignPanel, "a DesignPanel"))(name, value)
-    if panels:
-        return panels
-    raise InvalidInput(name, "none", "at least one DesignPanel")
-
-
-@checked(panels=_panels, stations_over_length=as_stations, width=optional(WIDTH))
 def plot_designs(
     panels: Sequence[DesignPanel],
     *,
@@ -175,16 +166,23 @@ def plot_designs(
         InvalidInput: A station off an arm, or an unknown view.
         MissingExtra: matplotlib is not installed.
     """
+    if not isinstance(panels, list | tuple):
+        raise InvalidInput("panels", as_given(panels), "a list or tuple")
+    for k, panel in enumerate(panels):
+        as_instance(f"panels[{k}]", panel, DesignPanel, "a DesignPanel")
+    if not panels:
+        raise InvalidInput("panels", "none", "at least one DesignPanel")
+    stations = as_stations("stations_over_length", stations_over_length).tolist()
+    width = 1.5 * len(panels) if width is None else as_number("width", width, WIDTH)
     box = bounding_box(*(arm_points(p.arm, rest_configuration(p.arm)) for p in panels))
     reach = 1.08 * max(
         section_reach(p.arm, s * p.arm.length) / p.arm.length
         for p in panels
-        for s in (*stations_over_length, 0.0)
+        for s in (*stations, 0.0)
     )
-    width = 1.5 * len(panels) if width is None else width
-    rows = 1 + len(stations_over_length)
+    rows = 1 + len(stations)
     with figure_style():
-        heights = [2.6, *[width / len(panels)] * len(stations_over_length)]
+        heights = [2.6, *[width / len(panels)] * len(stations)]
         shape = {"height_ratios": heights, "layout": "constrained", "squeeze": False}
         figure, axes = pyplot().subplots(
             rows, len(panels), figsize=(width, sum(heights) + 0.1), **shape
@@ -194,7 +192,7 @@ def plot_designs(
             drawn, shown = panel.bundles, length * box
             plot_arm(arm, ax=axes[0, k], view=panel.view, bundles=drawn, box=shown)
             axes[0, k].set_title(panel.title)
-            for ax, station in zip(axes[1:, k], stations_over_length, strict=True):
+            for ax, station in zip(axes[1:, k], stations, strict=True):
                 z, half = station * length, reach * length
                 plot_cross_section(arm, z, ax=ax, bundles=drawn, half_width=half, legend=False)
                 ax.set_title(f"Z = {station:.2g} L" if station else "Z = 0")

@@ -8,29 +8,27 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.picture.projection import View, sight_axis
+from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.picture.projection import View, sight_axis, view_angles
 from softreach.picture.zbuffer import ZBuffer
 from softreach.plot.arm import arm_images, arm_points, shapes_of
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.coloring import color_samples, draw_figure_key, draw_key
 from softreach.plot.lengths import LengthUnit, common_unit, in_lengths, unit_of
 from softreach.plot.style import (
-    DRAWN,
     LENGTH,
-    MANIPULATOR,
     PLACE,
-    POINTS,
-    SHAPE,
     SIZE,
     WIDTH,
-    a_view,
     figure_style,
+    panel_arguments,
     pyplot,
     write_note,
 )
 from softreach.rod.arm_shape import rest_configuration
+from softreach.schema import a_cloud
 from softreach.support import parallel
-from softreach.support.arguments import checked, flag, optional
+from softreach.support.arguments import as_flag, as_number
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
@@ -38,8 +36,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from softreach.arm.manipulator import Manipulator
 
 
 _LARGEST = 8.0  # pixels
@@ -50,7 +46,6 @@ Images = tuple[ZBuffer, ZBuffer | None]
 _LEFT, _GAP, _RIGHT, _BOTTOM, _TOP = 0.55, 0.60, 0.12, 0.42, 0.42  # inches
 
 
-@checked(**DRAWN, cloud=POINTS, size=SIZE, key=flag)
 def plot_cloud(
     cloud: xr.Dataset,
     *,
@@ -81,6 +76,9 @@ def plot_cloud(
         InvalidInput: Unknown view, bundle or color, or no finite tip.
         MissingExtra: matplotlib is not installed.
     """
+    cloud, key = a_cloud("cloud", cloud), as_flag("key", key)
+    size = None if size is None else as_number("size", size, SIZE)
+    ax, box = panel_arguments(ax, view, box)
     with figure_style(ax):
         tips = drawn_tips(cloud)
         panel = Panel.opened(tips, unit_of(cloud["tip"]), ax, view, box)
@@ -120,7 +118,6 @@ def point_size(samples: int, box: Array) -> float:
     return 0.45 * float(spacing)
 
 
-@checked(**DRAWN, cloud=POINTS, at=PLACE, thickness=optional(LENGTH), size=SIZE, key=flag)
 def plot_slab(
     cloud: xr.Dataset,
     *,
@@ -156,6 +153,10 @@ def plot_slab(
         InvalidInput: Not a view along an axis, unknown color, or no tip in the slab.
         MissingExtra: matplotlib is not installed.
     """
+    cloud, at, key = a_cloud("cloud", cloud), as_number("at", at, PLACE), as_flag("key", key)
+    thickness = None if thickness is None else as_number("thickness", thickness, LENGTH)
+    size = None if size is None else as_number("size", size, SIZE)
+    ax, box = panel_arguments(ax, view, box)
     tips, unit, axis = drawn_tips(cloud), unit_of(cloud["tip"]), sight_axis(view)
     middle, half = float(unit.of(at)), _half(thickness, tips, unit)
     depth = tips[:, "xyz".index(axis)] - middle
@@ -176,14 +177,6 @@ def plot_slab(
     return panel.ax
 
 
-@checked(
-    cloud=POINTS,
-    arm=optional(MANIPULATOR),
-    configuration=optional(SHAPE),
-    view=a_view,
-    size=SIZE,
-    width=WIDTH,
-)
 def plot_views(
     cloud: xr.Dataset,
     arm: Manipulator | None = None,
@@ -213,11 +206,15 @@ def plot_views(
         InvalidInput: As `plot_cloud`; an arm beside a cloud that does not know L.
         MissingExtra: matplotlib is not installed.
     """
+    cloud, width = a_cloud("cloud", cloud), as_number("width", width, WIDTH)
+    size = None if size is None else as_number("size", size, SIZE)
+    view_angles(view)
     unit, tips = unit_of(cloud["tip"]), drawn_tips(cloud)
-    shown, shapes = [tips], []
+    shown, shapes = [tips], shapes_of(configuration)
     if arm is not None:
+        arm = a_manipulator("arm", arm)
         common_unit([unit, in_lengths(arm.length)])
-        shapes = shapes_of(configuration) or [rest_configuration(arm)]
+        shapes = shapes or [rest_configuration(arm)]
         shown += [arm_points(arm, shape) for shape in shapes]
     box = bounding_box(*shown)
     coloring = color_samples(cloud, color)

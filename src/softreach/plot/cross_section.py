@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.plot.lengths import in_lengths
 from softreach.plot.section_parts import (
     PlacedBundle,
@@ -19,22 +20,20 @@ from softreach.plot.section_parts import (
     tendon_style,
 )
 from softreach.plot.style import (
-    AX,
     LENGTH,
-    MANIPULATOR,
     PLACE,
+    as_axes,
     figure_style,
     small_axes,
     some_bundles,
 )
-from softreach.support.arguments import checked, flag, optional
+from softreach.support.arguments import as_flag, as_number
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-    from softreach.arm.manipulator import Manipulator
     from softreach.arm.material import Material
 
 
@@ -78,7 +77,6 @@ def section_key(arm: Manipulator, placed: Collection[PlacedBundle]) -> SectionKe
     return SectionKey(handles, labels)
 
 
-@checked(arm=MANIPULATOR, z=PLACE, ax=AX, half_width=optional(LENGTH), legend=optional(flag))
 def plot_cross_section(
     arm: Manipulator,
     z: float = 0.0,
@@ -111,6 +109,9 @@ def plot_cross_section(
         InvalidInput: A station off the arm.
         MissingExtra: matplotlib is not installed.
     """
+    arm, z, ax = a_manipulator("arm", arm), as_number("z", z, PLACE), as_axes(ax)
+    half_width = None if half_width is None else as_number("half_width", half_width, LENGTH)
+    legend = needs_section_key(arm) if legend is None else as_flag("legend", legend)
     if not 0 <= z <= arm.length:
         raise InvalidInput("z", z, f"within [0, {arm.length:g}] m")
     unit = in_lengths(arm.length)
@@ -118,7 +119,6 @@ def plot_cross_section(
     placed = placed_bundles(
         arm, z, range(arm.bundles) if bundles is None else some_bundles("bundles", bundles, arm)
     )
-    legend = needs_section_key(arm) if legend is None else legend
     with figure_style(ax):
         key = section_key(arm, placed) if legend else None
         ax = small_axes(_SIZE + (key.width if key else 0.0), _SIZE) if ax is None else ax

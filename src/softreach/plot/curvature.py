@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softreach.plot.lengths import LengthUnit, common_unit, unit_of
-from softreach.plot.style import AX, figure_style, small_axes
-from softreach.support.arguments import checked, dataset, mapping_of, one_of
+from softreach.plot.style import as_axes, figure_style, small_axes
+from softreach.support.arguments import as_dataset, as_mapping, as_one_of
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 
@@ -24,7 +24,6 @@ _SYMBOLS = {"bending": "κ", "torsion": "$u_3$", "extension": "ζ"}
 _BINS = 64
 
 
-@checked(statistics=mapping_of(dataset("bending_count", "Z")), ax=AX)
 def plot_curvature(
     statistics: Mapping[str, xr.Dataset], *, ax: Axes | None = None, quantity: str = "bending"
 ) -> Axes:
@@ -43,9 +42,10 @@ def plot_curvature(
         InvalidInput: Not one or two designs, an unknown quantity, stations at other places along
             the arm, or designs of which only one knows L.
     """
+    statistics, ax = as_mapping("statistics", statistics, _statistics), as_axes(ax)
     if not 1 <= len(statistics) <= 2:
         raise InvalidInput("statistics", f"of {len(statistics)} designs", "of one or two")
-    one_of(_SYMBOLS)("quantity", quantity)
+    as_one_of("quantity", quantity, _SYMBOLS)
     unit = common_unit([unit_of(found) for found in statistics.values()])
     places = _common_places(statistics)
     with figure_style(ax):
@@ -57,6 +57,10 @@ def plot_curvature(
         ax.set_xticks(range(len(places)), [f"{place:.2g}" for place in places])
         ax.legend(loc="upper left")
     return ax
+
+
+def _statistics(name: str, value: object) -> xr.Dataset:
+    return as_dataset(name, value, "bending_count", "Z")
 
 
 def _common_places(statistics: Mapping[str, xr.Dataset]) -> Array:

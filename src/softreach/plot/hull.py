@@ -13,14 +13,23 @@ from softreach.picture.projection import View
 from softreach.picture.shading import draw_mesh
 from softreach.plot.axes import Panel
 from softreach.plot.lengths import in_lengths
-from softreach.plot.style import AX, DRAWN, LENGTH, a_surface, figure_style, small_axes
-from softreach.support.arguments import checked, mapping_of, optional, within
+from softreach.plot.style import (
+    LENGTH,
+    a_surface,
+    as_axes,
+    figure_style,
+    panel_arguments,
+    small_axes,
+)
+from softreach.support.arguments import as_mapping, as_number
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput, Range
 from softreach.support.palette import STEEL
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+_VOLUMES = Range(0.0, unit="m³")
 
 
 def _rgb(name: str, value: object) -> tuple[float, float, float]:
@@ -31,7 +40,6 @@ def _rgb(name: str, value: object) -> tuple[float, float, float]:
     return float(found[0]), float(found[1]), float(found[2])
 
 
-@checked(**DRAWN, hull=a_surface, length=optional(LENGTH), color=_rgb)
 def plot_hull(
     hull: SurfaceMesh,
     *,
@@ -58,6 +66,9 @@ def plot_hull(
         InvalidInput: Unknown view, or no vertices.
         MissingExtra: matplotlib is not installed.
     """
+    hull, color = a_surface("hull", hull), _rgb("color", color)
+    length = None if length is None else as_number("length", length, LENGTH)
+    ax, box = panel_arguments(ax, view, box)
     with figure_style(ax):
         unit = in_lengths(length)
         vertices = unit.of(hull.vertices)
@@ -68,14 +79,6 @@ def plot_hull(
     return panel.ax
 
 
-@checked(
-    curves=mapping_of(as_floats),
-    alphas=as_floats,
-    ax=AX,
-    length=optional(LENGTH),
-    exact=optional(within(Range(0.0, unit="m³"))),
-    convex=optional(within(Range(0.0, unit="m³"))),
-)
 def plot_volume_curve(
     curves: Mapping[str, ArrayLike],
     alphas: ArrayLike,
@@ -102,7 +105,11 @@ def plot_volume_curve(
         InvalidInput: Radii and volumes of different shapes.
         MissingExtra: matplotlib is not installed.
     """
-    radii, unit = np.asarray(alphas, float), in_lengths(length)
+    curves, radii = as_mapping("curves", curves, as_floats), as_floats("alphas", alphas)
+    length = None if length is None else as_number("length", length, LENGTH)
+    exact = None if exact is None else as_number("exact", exact, _VOLUMES)
+    convex = None if convex is None else as_number("convex", convex, _VOLUMES)
+    ax, unit = as_axes(ax), in_lengths(length)
     with figure_style(ax):
         ax = small_axes(3.4, 2.6) if ax is None else ax
         for label, volumes in curves.items():

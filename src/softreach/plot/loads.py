@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.picture.projection import View, is_mirrored, project, view_axes
 from softreach.plot.arm import arm_points, draw_arms, plot_arm, shapes_of
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.lengths import in_lengths
-from softreach.plot.style import DRAWN, MANIPULATOR, SHAPE, figure_style, small_axes
+from softreach.plot.style import figure_style, panel_arguments, small_axes
 from softreach.rod.tip_map import TipStatus
-from softreach.support.arguments import POSITIVE, as_given, checked, flag, optional, within
+from softreach.schema import a_configuration
+from softreach.support.arguments import POSITIVE, as_flag, as_given, as_number
 from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidInput
 
@@ -23,7 +25,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-    from softreach.arm.manipulator import Manipulator
     from softreach.rod.loaded.all_equilibria import AllEquilibria
     from softreach.workspace.payload import LargestPayload, PayloadCurve
 
@@ -41,14 +42,6 @@ _CORNERS = 120
 _COLOR = "tab:orange"
 
 
-def _equilibria(name: str, value: Any) -> Any:
-    """What `softreach.equilibria` returned, whose class need not be loaded."""
-    if type(value).__name__ == "AllEquilibria":
-        return value
-    raise InvalidInput(name, as_given(value), "what `softreach.equilibria` returned")
-
-
-@checked(**DRAWN, equilibria=_equilibria)
 def plot_equilibria(
     equilibria: AllEquilibria,
     *,
@@ -75,6 +68,10 @@ def plot_equilibria(
         InvalidInput: Unknown view.
         MissingExtra: matplotlib is not installed.
     """
+    if type(equilibria).__name__ != "AllEquilibria":  # a class that need not be loaded
+        allowed = "what `softreach.equilibria` returned"
+        raise InvalidInput("equilibria", as_given(equilibria), allowed)
+    ax, box = panel_arguments(ax, view, box)
     arm = equilibria.rod.arm
     shapes = shapes_of(equilibria.configuration(_STATIONS))
     stable = equilibria.status == TipStatus.STABLE
@@ -98,14 +95,6 @@ def plot_equilibria(
     return panel.ax
 
 
-@checked(
-    **DRAWN,
-    arm=MANIPULATOR,
-    configuration=SHAPE,
-    compliance=as_floats,
-    force=optional(within(POSITIVE)),
-    rest=flag,
-)
 def plot_compliance(
     arm: Manipulator,
     configuration: xr.Dataset,
@@ -138,8 +127,11 @@ def plot_compliance(
         InvalidInput: Unknown view, a force that is not positive, or another number of compliances.
         MissingExtra: matplotlib is not installed.
     """
-    shapes = shapes_of(configuration)
-    given = np.asarray(compliance, float)
+    arm, rest = a_manipulator("arm", arm), as_flag("rest", rest)
+    shapes = shapes_of(a_configuration("configuration", configuration))
+    given = as_floats("compliance", compliance)
+    force = None if force is None else as_number("force", force, POSITIVE)
+    ax, box = panel_arguments(ax, view, box)
     matrices = given if given.ndim == 3 else given[None]
     if matrices.shape[1:] != (3, 3):
         raise InvalidInput("compliance.shape", np.shape(compliance), "(3, 3) or (n, 3, 3)")

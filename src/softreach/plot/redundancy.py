@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,25 +22,23 @@ from softreach.plot.coloring import (
 )
 from softreach.plot.lengths import common_unit, unit_of
 from softreach.plot.style import (
-    DRAWN,
     LENGTH,
-    POINTS,
     SIZE,
     WIDTH,
     figure_style,
+    panel_arguments,
     pyplot,
     write_note,
 )
+from softreach.schema import a_cloud
 from softreach.support.arguments import (
     POSITIVE,
-    checked,
-    dataset,
-    flag,
-    mapping_of,
-    name_or_index,
-    optional,
-    whole,
-    within,
+    as_dataset,
+    as_flag,
+    as_integer,
+    as_mapping,
+    as_name_or_index,
+    as_number,
 )
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
@@ -57,16 +56,9 @@ _LABEL = "mean activation distance D̄"
 _SLABS = ("front", "side")
 _MARGINS = {"left": 0.75, "right": 0.1, "bottom": 0.4, "top": 0.55, "gap": 0.12}  # inches
 _COLUMNS = ("cloud", *_SLABS, "distance")
+_a_distance = partial(as_dataset, kind="DataArray")
 
 
-@checked(
-    **DRAWN,
-    cloud=POINTS,
-    distance=dataset(kind="DataArray"),
-    high=optional(within(POSITIVE)),
-    size=SIZE,
-    key=flag,
-)
 def plot_distance(
     cloud: xr.Dataset,
     distance: xr.DataArray,
@@ -99,8 +91,10 @@ def plot_distance(
         InvalidInput: Unknown view, or no finite tip.
         MissingExtra: matplotlib is not installed.
     """
-    values = distance.values
-    high = largest_distance([distance]) if high is None else high
+    cloud, distance = a_cloud("cloud", cloud), _a_distance("distance", distance)
+    high = largest_distance([distance]) if high is None else as_number("high", high, POSITIVE)
+    size, key = None if size is None else as_number("size", size, SIZE), as_flag("key", key)
+    (ax, box), values = panel_arguments(ax, view, box), distance.values
     tips = drawn_tips(cloud)[distance["sample"].values]
     with figure_style(ax):
         panel = Panel.opened(tips, unit_of(cloud["tip"]), ax, view, box)
@@ -115,7 +109,6 @@ def plot_distance(
     return panel.ax
 
 
-@checked(distances=mapping_of(dataset(kind="DataArray")), bins=whole(1, 10_000), width=WIDTH)
 def plot_distance_histograms(
     distances: Mapping[str, xr.DataArray], *, bins: int = 60, width: float = 6.9
 ) -> Figure:
@@ -133,6 +126,8 @@ def plot_distance_histograms(
         InvalidInput: No distances.
         MissingExtra: matplotlib is not installed.
     """
+    distances = as_mapping("distances", distances, _a_distance)
+    bins, width = as_integer("bins", bins, 1, 10_000), as_number("width", width, WIDTH)
     if not distances:
         raise InvalidInput("distances", "none", "at least one")
     with figure_style():
@@ -152,13 +147,6 @@ def largest_distance(distances: Iterable[xr.DataArray]) -> float:
     return max((float(f.max()) for f in finite if len(f)), default=1.0) or 1.0
 
 
-@checked(
-    clouds=mapping_of(POINTS),
-    distances=mapping_of(dataset(kind="DataArray")),
-    bundles=optional(mapping_of(name_or_index)),
-    thickness=optional(LENGTH),
-    width=WIDTH,
-)
 def plot_redundancy(
     clouds: Mapping[str, xr.Dataset],
     distances: Mapping[str, xr.DataArray],
@@ -185,6 +173,11 @@ def plot_redundancy(
             some know L.
         MissingExtra: matplotlib is not installed.
     """
+    clouds = as_mapping("clouds", clouds, a_cloud)
+    distances = as_mapping("distances", distances, _a_distance)
+    bundles = None if bundles is None else as_mapping("bundles", bundles, as_name_or_index)
+    thickness = None if thickness is None else as_number("thickness", thickness, LENGTH)
+    width = as_number("width", width, WIDTH)
     if not clouds or set(clouds) != set(distances):
         raise InvalidInput("distances", sorted(distances), f"of the clouds {sorted(clouds)}")
     common_unit([unit_of(cloud["tip"]) for cloud in clouds.values()])

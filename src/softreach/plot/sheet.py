@@ -20,9 +20,10 @@ from softreach.plot.clouds import drawn_tips, plot_cloud, point_size
 from softreach.plot.coloring import bundle_activations, bundle_names, color_samples, draw_figure_key
 from softreach.plot.lengths import unit_of
 from softreach.plot.metric_map import SheetAxis
-from softreach.plot.style import BOX, DPI, POINTS, WIDTH, a_view, figure_style, pyplot
+from softreach.plot.style import DPI, WIDTH, as_box, figure_style, pyplot
+from softreach.schema import a_cloud
 from softreach.support import parallel
-from softreach.support.arguments import checked, mapping_of
+from softreach.support.arguments import as_mapping, as_number
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import STEEL, activation_colors
@@ -131,7 +132,6 @@ def panel_extent(box: Array, view: View) -> Extent:
     )
 
 
-@checked(clouds=mapping_of(POINTS), view=a_view, box_over_length=BOX, width=WIDTH)
 def plot_opposite_sides(
     clouds: Mapping[str, xr.Dataset],
     *,
@@ -152,12 +152,14 @@ def plot_opposite_sides(
         InvalidInput: No clouds, clouds of different bundles, an unknown view, or no finite tip.
         MissingExtra: matplotlib is not installed.
     """
+    clouds, width = as_mapping("clouds", clouds, a_cloud), as_number("width", width, WIDTH)
+    around = None if box_over_length is None else as_box("box_over_length", box_over_length)
     bundles = {bundle_names(cloud) for cloud in clouds.values()}
     if len(bundles) != 1:
         raise InvalidInput("clouds", f"of bundles {sorted(bundles)}", "one or more of one set")
     azimuth, elevation = view_angles(view)
     sides = ((azimuth, elevation), (azimuth + np.pi, elevation))
-    shown = np.asarray(_around(clouds) if box_over_length is None else box_over_length, float)
+    shown = np.asarray(_around(clouds) if around is None else around, float)
     with figure_style():
         column = width / len(clouds)
         figure = pyplot().figure(figsize=(width, 2 * column + 0.5))

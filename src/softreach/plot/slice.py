@@ -9,8 +9,8 @@ import numpy as np
 
 from softreach.picture.projection import View, is_mirrored, plane_of, sight_axis
 from softreach.plot.lengths import LengthUnit, unit_of
-from softreach.plot.style import AX, PLACE, WIDTH, a_view, figure_style, pyplot, small_axes
-from softreach.support.arguments import checked, dataset, flag
+from softreach.plot.style import PLACE, WIDTH, as_axes, figure_style, pyplot, small_axes
+from softreach.support.arguments import as_dataset, as_flag, as_number
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput
 
@@ -25,7 +25,6 @@ _COLORS = ("white", "#cfe3f2", "#f2a65a", "#c8553d", "#6b2737")
 _LABELS = ("out of reach", "one activation", "two", "three", "four or more")
 
 
-@checked(grid=dataset("x", "y", "z"), ax=AX, view=a_view, at=PLACE, key=flag)
 def plot_slice(
     grid: xr.Dataset,
     *,
@@ -53,6 +52,8 @@ def plot_slice(
         InvalidInput: Not a view along an axis, or a plane that misses the grid.
         MissingExtra: matplotlib is not installed.
     """
+    grid, ax = as_dataset("grid", grid, "x", "y", "z"), as_axes(ax)
+    at, key = as_number("at", at, PLACE), as_flag("key", key)
     axis, unit = sight_axis(view), unit_of(grid)
     layer = _layer(grid, axis, at)
     with figure_style(ax):
@@ -64,7 +65,6 @@ def plot_slice(
     return ax
 
 
-@checked(grid=dataset("x", "y", "z"), at=as_floats, width=WIDTH)
 def plot_slices(
     grid: xr.Dataset, *, at: Sequence[float] = (0.0, 0.0, 0.0), width: float = 9.6
 ) -> Figure:
@@ -79,12 +79,14 @@ def plot_slices(
         InvalidInput: Not a point, or one outside the grid.
         MissingExtra: matplotlib is not installed.
     """
-    if np.shape(at) != (3,):
-        raise InvalidInput("at.shape", np.shape(at), "a point (x, y, z) [m]")
+    grid, width = as_dataset("grid", grid, "x", "y", "z"), as_number("width", width, WIDTH)
+    point = as_floats("at", at)
+    if point.shape != (3,):
+        raise InvalidInput("at.shape", point.shape, "a point (x, y, z) [m]")
     with figure_style():
         size = (width, 0.375 * width)
         figure, axes = pyplot().subplots(1, 3, figsize=size, layout="constrained")
-        for ax, view, place in zip(axes, ("side", "front", "top"), at, strict=True):
+        for ax, view, place in zip(axes, ("side", "front", "top"), point.tolist(), strict=True):
             plot_slice(grid, ax=ax, view=view, at=place)
     return figure
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from os import PathLike
 from pathlib import Path
@@ -13,18 +12,8 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.geometry.surface import SurfaceMesh
-from softreach.picture.projection import view_angles
-from softreach.support.arguments import (
-    POSITIVE,
-    as_given,
-    checked,
-    dataset,
-    flag,
-    instance,
-    optional,
-    path,
-    within,
-)
+from softreach.picture.projection import View, view_angles
+from softreach.support.arguments import POSITIVE, as_flag, as_given, as_path
 from softreach.support.arrays import Array, as_floats, as_indices
 from softreach.support.errors import InvalidInput, MissingExtra, Range
 from softreach.support.files.atomic import writing
@@ -60,14 +49,10 @@ _RC: dict[str, Any] = {
 }
 # text stays text in vector files, so that a journal can set it in its own type
 _SAVING: dict[str, Any] = {"pdf.fonttype": 42, "svg.fonttype": "none"}
-MANIPULATOR = instance(Manipulator, "a Manipulator")
-SHAPE = dataset("position", "directors", "extension", "Z", what="a configuration")
-POINTS = dataset("tip", "activation", what="a cloud")
-LENGTH = within(POSITIVE._replace(unit="m"))
-PLACE = within(Range(unit="m"))
-SIZE = optional(within(Range(0.0, 1e3, "pixels", open_low=True)))
-WIDTH = within(Range(1.0, 100.0, "inches"))
-KEY = {"key": flag}
+LENGTH = POSITIVE._replace(unit="m")
+PLACE = Range(unit="m")
+SIZE = Range(0.0, 1e3, "pixels", open_low=True)
+WIDTH = Range(1.0, 100.0, "inches")
 
 
 def pyplot() -> Any:
@@ -98,14 +83,6 @@ def small_axes(width: float = 3.4, height: float = 2.8) -> Axes:
     return pyplot().subplots(figsize=(width, height), layout="constrained")[1]
 
 
-def _drawn(name: str, value: Any) -> Any:
-    """A figure, or axes in it."""
-    if hasattr(value, "get_figure") and not isinstance(value, type):
-        return value
-    raise InvalidInput(name, as_given(value), "a figure or axes of matplotlib")
-
-
-@checked(figure=_drawn, path=path, overwrite=flag)
 def save_figure(
     figure: Figure | Axes, path: str | PathLike[str], *, overwrite: bool = False
 ) -> None:
@@ -120,6 +97,9 @@ def save_figure(
         InvalidInput: Unknown suffix, or something else is there.
         NotWritten: It cannot be written.
     """
+    if not hasattr(figure, "get_figure") or isinstance(figure, type):
+        raise InvalidInput("figure", as_given(figure), "a figure or axes of matplotlib")
+    path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
     kind, suffix = format_of(path, PICTURES), Path(path).suffix.lower()
     with pyplot().rc_context(_SAVING), writing(path, kind, overwrite=overwrite) as file:
         root = figure.get_figure(root=True)
@@ -133,13 +113,6 @@ def write_note(ax: Axes, text: str, right: float, up: float) -> None:
     place = {"ha": across, "va": along, "transform": ax.transAxes}
     paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
     ax.text(right, up, text, fontsize=7, color="0.25", zorder=5, bbox=paper, **place)
-
-
-def a_view(name: str, value: Any) -> Any:
-    """A view, as `view_angles` knows it."""
-    del name
-    view_angles(value)
-    return value
 
 
 def a_surface(name: str, value: Any) -> SurfaceMesh:
@@ -162,14 +135,15 @@ def _encoding(suffix: str) -> dict[str, Any]:
     return {"pil_kwargs": {"compress_level": 4}} if suffix == ".png" else {}
 
 
-def _axes(name: str, value: Any) -> Any:
-    """Axes of matplotlib, which need not be loaded to know them."""
-    if hasattr(value, "imshow") and hasattr(value, "get_figure") and not isinstance(value, type):
-        return value
-    raise InvalidInput(name, as_given(value), "axes of matplotlib, or None")
+def as_axes(ax: Any) -> Any:
+    """Axes of matplotlib, which need not be loaded to know them, or None."""
+    known = hasattr(ax, "imshow") and hasattr(ax, "get_figure") and not isinstance(ax, type)
+    if ax is None or known:
+        return ax
+    raise InvalidInput("ax", as_given(ax), "axes of matplotlib, or None")
 
 
-def _box(name: str, value: Any) -> Array:
+def as_box(name: str, value: Any) -> Array:
     """A lower and an upper corner, shape (2, 3)."""
     allowed = "a lower and an upper corner, finite numbers of shape (2, 3)"
     corners = as_floats(name, value, allowed)
@@ -179,7 +153,7 @@ def _box(name: str, value: Any) -> Array:
     raise InvalidInput(name, corners.tolist(), allowed)
 
 
-AX: Callable[[str, Any], Any] = optional(_axes)
-BOX = optional(_box)
-DRAWN = {"ax": AX, "view": a_view, "box": BOX}
-"""Arguments of figures of one panel."""
+def panel_arguments(ax: Any, view: View, box: object) -> tuple[Any, Array | None]:
+    """Axes and box of a figure of one panel, each of which may be None; its view is looked at."""
+    view_angles(view)
+    return as_axes(ax), None if box is None else as_box("box", box)

@@ -10,7 +10,7 @@ from softreach.arm.summary import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.rod.free import FreeRod
 from softreach.rod.tip_map import ArmRod, TipMap, check_tol
 from softreach.rod.view import View
-from softreach.support.arguments import as_given, flag
+from softreach.support.arguments import as_flag, as_given
 from softreach.support.errors import InvalidInput
 from softreach.support.errors import warn as issue_warning
 
@@ -34,7 +34,7 @@ def tip_map(arm: Manipulator | TipMap, tol: float = 1e-6, *, warn: bool = True) 
     if not isinstance(arm, Manipulator):
         raise InvalidInput("arm", as_given(arm), "a Manipulator or a TipMap")
     rod = _of_arm(arm, check_tol(tol))
-    if flag("warn", warn) and arm.loads is not None:
+    if as_flag("warn", warn) and arm.loads is not None:
         _warn_of_large_loads(arm)
     return rod
 

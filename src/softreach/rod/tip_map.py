@@ -21,7 +21,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import check_extension
 from softreach.rod.activation_box import ActivationBox
 from softreach.support import parallel
-from softreach.support.arguments import as_number, instance
+from softreach.support.arguments import as_number
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput, Range, counted
 
@@ -321,12 +321,6 @@ def position_slopes(tips: Array, twists: Array, slopes: Array) -> None:
     slopes[:] = v
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         slopes[:, i] += w[:, j] * tips[:, k, None] - w[:, k] * tips[:, j, None]
-
-
-an_arm = instance((Manipulator, TipMap), "a Manipulator or a TipMap")
-"""An argument that is a design, or its tip map."""
-
-a_tip_map = instance(TipMap, "a TipMap")
 
 
 def check_tol(tol: float) -> float:

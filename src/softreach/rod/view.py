@@ -23,16 +23,15 @@ from softreach.rod.tip_map import (
     Strains,
     TipMap,
     TipStatus,
-    a_tip_map,
 )
-from softreach.support.arguments import checked
+from softreach.support.arguments import as_instance
 
 __all__ = ["View", "activation_measures", "free_bundles", "measured_bundles", "stable_tips"]
 
 
-@checked(rod=a_tip_map)
 def free_bundles(rod: TipMap) -> TipMap:
     """The restriction of a tip map to its free bundles; the map itself if all are free."""
+    as_instance("rod", rod, TipMap, "a TipMap")
     if rod.box.dimension == rod.box.bundles:
         return rod
     view = _view(rod)

@@ -11,50 +11,31 @@ Those of arrays are in `softreach.support.arrays`, that of callbacks is `progres
 
 from __future__ import annotations
 
-import functools
-import inspect
 import math
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from numbers import Integral, Real
-from typing import Any, ParamSpec, TypeVar
+from typing import Any
 
 from softreach.support.errors import InvalidInput, Range
 
 __all__ = [
     "POSITIVE",
-    "Converter",
     "as_dataset",
     "as_flag",
     "as_function",
     "as_given",
     "as_instance",
     "as_integer",
+    "as_mapping",
     "as_name_or_index",
     "as_names",
     "as_number",
     "as_one_of",
     "as_path",
     "as_text",
-    "as_whole_number",
-    "checked",
-    "dataset",
-    "each_of",
-    "flag",
-    "function",
-    "instance",
-    "integer",
-    "mapping_of",
-    "name_or_index",
-    "names",
-    "one_of",
-    "optional",
-    "path",
     "plain",
-    "text",
-    "whole",
-    "within",
 ]
 
 POSITIVE = Range(0.0, open_low=True)
@@ -150,6 +131,17 @@ def as_names(name: str, value: object) -> tuple[str, ...]:
     raise InvalidInput(name, as_given(value), "a name, or a list or tuple of names")
 
 
+def as_mapping(name: str, value: object, each: Callable[[str, Any], Any]) -> dict[str, Any]:
+    """A mapping from names as a dictionary of what another converter makes of each value.
+
+    Raises:
+        InvalidInput: Anything else.
+    """
+    if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
+        return {key: each(f"{name}[{key!r}]", one) for key, one in value.items()}
+    raise InvalidInput(name, as_given(value), "a dictionary whose keys are names")
+
+
 def as_name_or_index(name: str, value: object) -> str | int:
     """Text or a whole number; which there are is known elsewhere.
 
@@ -221,97 +213,3 @@ def as_given(value: object) -> object:
     if isinstance(value, str | bytes):
         return repr(value)
     return f"the class {value.__name__}" if isinstance(value, type) else value
-
-
-# Converters as values, for `checked`: it goes with its last use, and these with it.
-
-
-P = ParamSpec("P")
-R = TypeVar("R")
-
-Converter = Callable[[str, Any], Any]
-"""(name, value) -> what the function gets; raises InvalidInput."""
-
-flag, text, path, names, function = as_flag, as_text, as_path, as_names, as_function
-name_or_index, as_whole_number = as_name_or_index, as_integer
-
-
-def checked(**converters: Converter) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Let converters see the arguments of those names before the function does.
-
-    Defaults are not looked at. An argument that the caller forgot stays the `TypeError` of Python.
-    """
-
-    def around(wrapped: Callable[P, R]) -> Callable[P, R]:
-        arguments = tuple(inspect.signature(wrapped).parameters)
-        assert converters.keys() <= set(arguments)
-        in_order = [(name, converters.get(name)) for name in arguments]
-
-        @functools.wraps(wrapped)
-        def wrapper(*args: P.args, **options: P.kwargs) -> R:
-            given = [
-                value if convert is None else convert(name, value)
-                for (name, convert), value in zip(in_order, args, strict=False)
-            ]
-            for name in converters.keys() & options.keys():
-                options[name] = converters[name](name, options[name])
-            return wrapped(*given, *args[len(given) :], **options)  # pyright: ignore[reportCallIssue]
-
-        return wrapper
-
-    return around
-
-
-def optional(convert: Converter) -> Converter:
-    """None as it is, anything else by another converter."""
-    return lambda name, value: None if value is None else convert(name, value)
-
-
-def within(allowed: Range) -> Converter:
-    """A real number in a range, as a float."""
-    return lambda name, value: as_number(name, value, allowed)
-
-
-def integer(low: int, high: float = math.inf) -> Converter:
-    """An integer from `low` to `high`, as an int."""
-    return lambda name, value: as_integer(name, value, low, high)
-
-
-whole = integer
-
-
-def one_of(words: Iterable[str]) -> Converter:
-    """One of some words."""
-    return lambda name, value: as_one_of(name, value, words)
-
-
-def instance(kind: type | tuple[type, ...], what: str) -> Converter:
-    """An object of a class; `what` names it: "a Manipulator"."""
-    return lambda name, value: as_instance(name, value, kind, what)
-
-
-def dataset(*variables: str, kind: str = "Dataset", what: str = "") -> Converter:
-    """An `xarray.Dataset` (or another `kind`) that has some variables."""
-    return lambda name, value: as_dataset(name, value, *variables, kind=kind, what=what)
-
-
-def each_of(convert: Converter) -> Converter:
-    """A sequence whose every member satisfies another converter, as a list."""
-
-    def convert_all(name: str, value: object) -> list[Any]:
-        if isinstance(value, list | tuple):
-            return [convert(f"{name}[{k}]", one) for k, one in enumerate(value)]
-        raise InvalidInput(name, as_given(value), "a list or tuple")
-
-    return convert_all
-
-
-def mapping_of(convert: Converter) -> Converter:
-    """A mapping from names to what satisfies another converter, as a dictionary."""
-
-    def convert_all(name: str, value: object) -> dict[str, Any]:
-        if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
-            return {key: convert(f"{name}[{key!r}]", one) for key, one in value.items()}
-        raise InvalidInput(name, as_given(value), "a dictionary whose keys are names")
-
-    return convert_all

@@ -10,7 +10,7 @@ from dataclasses import replace
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.parameter import OwnParameter, Parameter, parameters
-from softreach.support.arguments import checked, instance, plain, text
+from softreach.support.arguments import as_instance, as_text, plain
 from softreach.support.errors import Fault, InvalidInput, in_short
 
 __all__ = [
@@ -33,7 +33,6 @@ def parameters_by_every_name(arm: Manipulator) -> dict[str, Parameter]:
     }
 
 
-@checked(arm=a_manipulator, name=text)
 def find_parameter(arm: Manipulator, name: str) -> Parameter:
     """The parameter of this name.
 
@@ -45,10 +44,9 @@ def find_parameter(arm: Manipulator, name: str) -> Parameter:
     Raises:
         InvalidInput: The arm has no such parameter.
     """
-    return find_parameters(arm, (name,))[name]
+    return find_parameters(arm, (as_text("name", name),))[name]
 
 
-@checked(arm=a_manipulator, names=instance((Mapping, list, tuple), "names of parameters"))
 def find_parameters(
     arm: Manipulator, names: Mapping[str, object] | tuple[str, ...]
 ) -> dict[str, Parameter]:
@@ -57,6 +55,7 @@ def find_parameters(
     Raises:
         InvalidInput: The arm has no such parameter, or two names are of one.
     """
+    as_instance("names", names, (Mapping, list, tuple), "names of parameters")
     known = parameters(arm)
     listed = {name: name for name in known} | _by_ring_name(arm, known)
     aliases: dict[str, str] = {}
@@ -68,7 +67,6 @@ def find_parameters(
     return {aliases[one]: _renamed(known[one], aliases[one]) for one in known if one in aliases}
 
 
-@checked(arm=a_manipulator, values=instance(Mapping, "a dictionary of parameters"))
 def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
     """The design with these parameters, everything else unchanged.
 
@@ -84,7 +82,8 @@ def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
         InvalidInput: An unknown parameter, or one that is given under two names.
         InvalidDesign: No such arm can exist; the error names every fault.
     """
-    draft = Draft(arm)
+    as_instance("values", values, Mapping, "a dictionary of parameters")
+    draft = Draft(a_manipulator("arm", arm))
     for name, parameter in find_parameters(arm, tuple(values)).items():
         value = plain(values[name])
         if isinstance(value, int | float) and not isinstance(value, bool):

@@ -19,7 +19,7 @@ from softreach.arm.number import Number, fields_of
 from softreach.arm.parameters.draft import Draft, PartKey, Path, part_of, parts
 from softreach.arm.profile import LinearTaper
 from softreach.arm.section import Ring
-from softreach.support.arguments import checked, plain
+from softreach.support.arguments import plain
 from softreach.support.errors import Fault, Range
 
 __all__ = ["OwnParameter", "Parameter", "parameters"]
@@ -173,7 +173,6 @@ class _Revolution(Parameter):
                 draft.wind(self.name, part, math.copysign(value, turn))
 
 
-@checked(arm=a_manipulator)
 def parameters(arm: Manipulator) -> dict[str, Parameter]:
     """Every parameter of an arm by its name.
 
@@ -184,6 +183,7 @@ def parameters(arm: Manipulator) -> dict[str, Parameter]:
     `rings[0].inner_ratio`, `rings[0].material.young_modulus`, `core.density`, and of actuators by
     their name: `left.offset`, `left.helical_angle.values[2]`, `left.lower[1]`.
     """
+    arm = a_manipulator("arm", arm)
     own = [one for key, part in parts(arm).items() for one in _of_part(key, part)]
     every = [*_of_arm(arm, own), *(one for one in own if one.owner)]
     return {one.name: one for one in every}

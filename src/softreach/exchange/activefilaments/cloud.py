@@ -18,8 +18,7 @@ from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.cloud.clouds import design_of
 from softreach.exchange.activefilaments.filament import Filament, filament_of
 from softreach.rod.kinematics import tip_positions
-from softreach.schema import a_cloud
-from softreach.support.arguments import checked, flag, path
+from softreach.support.arguments import as_flag, as_path
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, counted, warn
 from softreach.support.files.atomic import check_place, writing
@@ -38,14 +37,12 @@ _ENDING = "_gamma"
 _NO_NUMBER = re.compile(r"could not convert string (.*) to float64 at row (\d+), column (\d+)")
 
 
-@checked(path=path)
 def gamma_path(path: str | PathLike[str]) -> Path:
     """NAME_gamma.csv beside NAME.csv."""
-    tips = Path(path)
+    tips = Path(as_path("path", path))
     return tips.with_name(f"{tips.stem}{_ENDING}{tips.suffix}")
 
 
-@checked(arm=a_manipulator, path=path)
 def read_cloud(arm: Manipulator, path: str | PathLike[str], *, tol: float = 1e-6) -> xr.Dataset:
     """Read a cloud of ActiveFilaments.jl, and compare its tips with those that softreach computes.
 
@@ -69,6 +66,7 @@ def read_cloud(arm: Manipulator, path: str | PathLike[str], *, tol: float = 1e-6
     Warns:
         SoftreachWarning: Tips differ by more than 1e-5 L, or activations leave the bounds.
     """
+    arm, path = a_manipulator("arm", arm), as_path("path", path)
     filament = filament_of(arm)
     activations = gamma_path(path)
     tip = _table(Path(path), 3, "x, y, z")
@@ -88,7 +86,6 @@ def read_cloud(arm: Manipulator, path: str | PathLike[str], *, tol: float = 1e-6
     return cloud
 
 
-@checked(cloud=a_cloud, path=path, overwrite=flag)
 def write_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write tips to NAME.csv and activations to NAME_gamma.csv, as ActiveFilaments.jl does.
 
@@ -102,6 +99,7 @@ def write_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool
             is there.
         NotWritten: It cannot be written.
     """
+    path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
     filament = filament_of(design_of(schema.check_cloud(cloud)))
     kind = CLOUD_PAIR[".csv"]
     takes = _BYTES * (cloud["tip"].size + cloud["activation"].size)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from os import PathLike, fspath
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from softreach.exchange.activefilaments.filament import (
     arm_of,
     is_from_inside_out,
 )
-from softreach.support.arguments import checked, path
+from softreach.support.arguments import as_path
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.support.files.text import read_text
 
@@ -35,7 +35,6 @@ Pairs = tuple[tuple[float, float], ...]
 """(lower, upper) of each sector of a ring."""
 
 
-@checked(path=path)
 def read_design(path: str | PathLike[str]) -> Manipulator:
     """Read the definition of a filament from Julia source for ActiveFilaments.jl.
 
@@ -53,8 +52,8 @@ def read_design(path: str | PathLike[str]) -> Manipulator:
     """
     from softreach.exchange.activefilaments.julia import Julia
 
-    source = fspath(path)
-    known = Julia(source).read(read_text("definition", path, _LARGEST))
+    source = as_path("path", path)
+    known = Julia(source).read(read_text("definition", source, _LARGEST))
     filament = _filament(_the_filament(source, known), known)
     try:
         return arm_of(filament)

@@ -14,7 +14,7 @@ from softreach.exchange.activefilaments.filament import (
     FilamentRing,
     filament_of,
 )
-from softreach.support.arguments import checked, flag, path
+from softreach.support.arguments import as_flag, as_path
 from softreach.support.files.atomic import writing
 from softreach.support.files.kinds import FileKind, Formats, text_with
 
@@ -33,7 +33,6 @@ FILAMENT_SCRIPT: Formats = {
 """Format of `write_design`."""
 
 
-@checked(arm=a_manipulator, path=path, overwrite=flag)
 def write_design(arm: Manipulator, path: str | PathLike[str], *, overwrite: bool = False) -> None:
     """Write a Julia script that defines the filament of ActiveFilaments.jl with an arm's tips.
 
@@ -47,19 +46,19 @@ def write_design(arm: Manipulator, path: str | PathLike[str], *, overwrite: bool
             a bore, or other actuators than fibers along all of it; or something else is there.
         NotWritten: It cannot be written.
     """
+    path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
     script = design_script(arm)
     with writing(path, FILAMENT_SCRIPT[".jl"], overwrite=overwrite) as file:
         file.write(script.encode())
 
 
-@checked(arm=a_manipulator)
 def design_script(arm: Manipulator) -> str:
     """The text that `write_design` writes.
 
     Raises:
         InvalidInput: As `write_design`.
     """
-    filament = filament_of(arm)
+    filament = filament_of(a_manipulator("arm", arm))
     return "\n".join([_HEAD, *_body(filament)]) + "\n"
 
 
