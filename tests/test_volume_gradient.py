@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
 from softreach.arm import Loads, Manipulator, designs
-from softreach.arm.parameters import changed, find_parameter
+from softreach.arm.parameters import changed, find_parameter, parameters
 from softreach.rod.rods import tip_map
+from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.workspace import VolumeGradient, reachable_set, volume_gradient
 from softreach.workspace.flux import signed_volume
@@ -78,12 +81,68 @@ def test_a_longer_and_thicker_arm_reaches_as_the_cube_of_its_size():
     )
 
 
-def test_the_bounds_of_all_bundles_move_the_sum_of_those_of_each():
-    each = [f"{name}.{side}" for side in ("lower", "upper") for name in ("left", "right")]
-    each += [f"longitudinal.{side}" for side in ("lower", "upper")]
-    found = volume_gradient(NARROW, ("lower", "upper", *each)).volume
-    assert found[0] == pytest.approx(found[[2, 3, 6]].sum(), rel=1e-8)
-    assert found[1] == pytest.approx(found[[4, 5, 7]].sum(), rel=1e-8)
+def uneven(**shared: tuple[float, ...]) -> Manipulator:
+    """The narrow arm with a value of its own for each fiber."""
+    names = [fiber.name for fiber in NARROW.fibers]
+    values = {
+        f"{name}.{field}": value
+        for field, own in shared.items()
+        for name, value in zip(names, own, strict=False)
+    }
+    return changed(NARROW, values)
+
+
+BOUNDED = uneven(lower=(-0.9, -0.8, -0.7), upper=(-0.3, -0.35, -0.2))
+SHARED = {
+    "lower": BOUNDED,
+    "upper": BOUNDED,
+    "extent": uneven(extent=(0.3, 0.5, 0.4)),
+    "revolution": uneven(revolution=(-1.0, 0.5)).with_bounds((-0.7, -0.4)),
+    "poisson_ratio": changed(
+        designs.lce_arm().with_bounds((-2.0, -1.0)),
+        {"core.poisson_ratio": 0.3, "rings[1].material.poisson_ratio": 0.4},
+    ),
+}
+
+
+def parts_of(arm: Manipulator, name: str) -> dict[str, float]:
+    """Single parameters of those that share one, and their values; of revolutions those turned."""
+    known = parameters(arm)
+    return {one: x for one in known if one.endswith(f".{name}") and (x := known[one].value(arm))}
+
+
+def ways(name: str, values: Array) -> Array:
+    """Where the values go when the shared one grows: revolutions grow in their own sense."""
+    return np.sign(values) if name == "revolution" else np.ones(len(values))
+
+
+@cache
+def by_shared(name: str) -> VolumeGradient:
+    """Derivatives by a shared parameter, then by each of those that share it."""
+    return volume_gradient(SHARED[name], (name, *parts_of(SHARED[name], name)))
+
+
+@pytest.mark.parametrize("name", SHARED)
+def test_the_derivative_by_what_parts_share_is_the_sum_of_theirs(name):
+    found, way = by_shared(name), ways(name, np.array([*parts_of(SHARED[name], name).values()]))
+    assert found.route == "flux"
+    assert found.volume[0] == pytest.approx(way @ found.volume[1:], rel=1e-6)
+    off = abs(found.convex_volume[0] - way @ found.convex_volume[1:])
+    assert off < found.convex_volume_error.sum()
+
+
+@pytest.mark.parametrize("name", SHARED)
+def test_it_is_that_of_volumes_of_designs_of_which_all_parts_moved(name):
+    arm, own, h = SHARED[name], parts_of(SHARED[name], name), 1e-3
+    values = np.array([*own.values()])
+
+    def volume(step):
+        moved = changed(arm, dict(zip(own, values + ways(name, values) * step, strict=True)))
+        return rasterized_set(tip_map(moved, 1e-9), 42, None, 3e-3).volume
+
+    at = [volume(k * h) for k in (-2, -1, 1, 2)]
+    expected = (at[0] - 8 * at[1] + 8 * at[2] - at[3]) / (12 * h)
+    assert by_shared(name).volume[0] == pytest.approx(expected, rel=1e-5)
 
 
 def test_the_signed_volume_grows_at_a_bound_by_what_the_face_sweeps():

@@ -169,6 +169,14 @@ def test_what_is_no_file_is_refused_and_never_waited_for(name, tmp_path):
     assert str(path) in str(raised_by(lambda: sr.Manipulator.load(path)))
 
 
+@pytest.mark.parametrize("command", ["design", "volume", "studio"])
+@pytest.mark.parametrize("name", ["arm.toml", "arm", "state.json", "STATE.JSON"])
+def test_a_pipe_in_the_place_of_a_design_or_a_state_is_refused(name, command, tmp_path, capsys):
+    os.mkfifo(path := tmp_path / name)
+    said = refusal_of([command, str(path)], capsys, tmp_path)
+    assert f"{path}: must be a file, not a folder, a pipe or a device" in said
+
+
 @pytest.mark.parametrize("ends", ["\n", "\r\n", "\r"], ids=["Unix", "Windows", "old Mac"])
 @pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"], ids=["", "marked"])
 def test_lines_end_as_any_system_ends_them(ends, mark, tmp_path):

@@ -95,6 +95,8 @@ WRONG = [
     ),
     case(f"studio {TRUNK} --port -1", "port = -1: must be 1 to 65535; leave it out for a free one"),
     case(f"studio {TRUNK} --port 80.5", f"port = 80.5: {WHOLE_NUMBER}"),
+    case(f"studio {TRUNK} --no-open --host=", "host = '': must be an address to listen on"),
+    case(f"studio {TRUNK} --no-open --host=\t", "host = '\\t': must be an address to listen on"),
     # finite numbers
     *(
         case(f"cloud {TRUNK} --tol={value}", f"tol = {value or repr('')}: {FINITE}")

@@ -25,6 +25,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import Material
 from softreach.arm.number import number
 from softreach.arm.parameters import changed, find_parameter, parameters
+from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.shown import written_parameters
 from softreach.arm.profile import PiecewiseTaper
 from softreach.arm.section import Ring, Section
@@ -98,22 +99,55 @@ def test_a_parameter_that_was_changed_has_its_new_value(trunk, name):
 def test_the_values_that_an_arm_has_make_the_same_arm(arm):
     gamma = in_box(arm, 3)
     tips = tip_positions(arm, gamma)
-    # Ω and α say the same, and `revolution` and `extent` would make fibers alike that are not.
-    own = {
-        name: one.value(arm)
-        for name, one in parameters(arm).items()
-        if one.field != "helical_angle" and (one.owner or name not in ("revolution", "extent"))
-    }
+    # Ω and α say the same
+    own = {n: one.value(arm) for n, one in parameters(arm).items() if one.field != "helical_angle"}
     own = {name: value for name, value in own.items() if not math.isnan(value)}
     np.testing.assert_allclose(tip_positions(changed(arm, own), gamma), tips, atol=1e-9)
 
 
-@pytest.mark.parametrize("design", designs.__all__)
-def test_a_named_design_can_be_given_each_value_that_it_has(design):
-    arm = getattr(designs, design)()
+def uneven_arm() -> Manipulator:
+    """An arm whose parts have different values of all that they share."""
+    trunk = designs.minimal_trunk()
+    left, right, longitudinal = trunk.fibers
+    return trunk.replace(
+        actuators=(
+            left.replace(revolution=-1.0, extent=0.3, activation_bounds=(-0.9, -0.3)),
+            right.replace(revolution=0.5, extent=0.4, activation_bounds=(-0.8, -0.35)),
+            longitudinal.replace(bundles=2, activation_bounds=((-0.7, -0.2), (-0.6, -0.1))),
+        )
+    )
+
+
+ARMS = {name: getattr(designs, name) for name in designs.__all__} | {"uneven_arm": uneven_arm}
+
+
+@pytest.mark.parametrize("design", ARMS)
+def test_an_arm_that_is_given_a_value_that_it_has_stays_as_it_is(design):
+    arm = ARMS[design]()
     for name, one in parameters(arm).items():
         if not math.isnan(value := one.value(arm)):
-            assert one.value(changed(arm, {name: value})) == pytest.approx(value, rel=1e-12)
+            assert_alike(changed(arm, {name: value}), arm)
+
+
+UNEVEN = ("revolution", "extent", "lower", "upper", "longitudinal.lower", "longitudinal.upper")
+
+
+@pytest.mark.parametrize("name", UNEVEN)
+def test_what_parts_share_has_no_value_where_they_differ_and_can_be_set(name):
+    arm = uneven_arm()
+    assert math.isnan(value_of(arm, name))
+    value = VALUES.get(name.rpartition(".")[2], 0.3)
+    assert value_of(changed(arm, {name: value}), name) == value
+
+
+@pytest.mark.parametrize("name", UNEVEN)
+def test_a_shift_moves_all_that_share_a_parameter_from_their_own_values(name):
+    arm = uneven_arm()
+    one, draft = find_parameter(arm, name), Draft(arm)
+    one.shift(draft, 0.01)
+    made, moved = draft.made(), np.array(one.values(arm)) + 0.01
+    np.testing.assert_allclose(one.values(made), moved, rtol=1e-12)
+    assert value_of(made, "left.revolution") < 0.0  # it keeps its sense
 
 
 def test_no_values_change_nothing(trunk):

@@ -1,9 +1,10 @@
-"""The rod of SoRoSim's equilibria with strains that are linear in Z on each of its halves.
+"""The steel rod of SoRoSim's equilibria with strains that are linear in Z on each of its halves.
 
-This is how the 500 rows were made, as they tell themselves: beyond the rounding of their wrenches
-and places they differ from the equilibria of the rod by what these strains do. With the moment m(Z)
-that the loads put on the sections of the shape, in its directors, the coefficients solve the
-equations of Galerkin, ∫ φ (u - K⁻¹ m) dZ = 0 for every shape function φ.
+This is how the 500 rows of steel were made, as they tell themselves: beyond the rounding of their
+wrenches and places they differ from the equilibria of the rod by what these strains do. SoRoSim's
+rows of another rod do not (`tests/data/README.md`). With the moment m(Z) that the loads put on the
+sections of the shape, in its directors, the coefficients solve the equations of Galerkin,
+∫ φ (u - K⁻¹ m) dZ = 0 for every shape function φ.
 """
 
 from __future__ import annotations

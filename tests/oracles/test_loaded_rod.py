@@ -100,7 +100,7 @@ def test_the_moment_at_the_base_is_that_of_all_loads():
 
 @pytest.mark.parametrize("number", [0, 5, 24])
 def test_sorosim_has_the_same_equilibria(number):
-    """Its numbers are rounded, and its strains are polynomials: a thousandth of the length."""
+    """Numbers of this file are rounded, its strains are polynomials: a thousandth of L."""
     case = sorosim.cases()[number]
     found = equilibrium(sorosim.steel_rod(), case.loads, sorosim.STATIONS, rtol=1e-9)
     assert np.linalg.norm(found.place - case.place, axis=1).max() < 1e-3 * sorosim.LENGTH

@@ -49,7 +49,7 @@ def of_file(case):
 
 
 def test_all_of_sorosim_s_equilibria_are_those_of_the_branch_and_stable():
-    """As far as rounded wrenches and SoRoSim's strains are right: a thousandth of the length."""
+    """As far as rounded wrenches and the file's strains are right: a thousandth of the length."""
     cases = sorosim.cases()
     found = [solver(case.loads).find(REST) for case in cases]
     assert len(cases) == 500
@@ -99,7 +99,7 @@ def left_over(slopes, apart):
 
 @pytest.mark.parametrize("row", [50, 150, 250, 300, 450])
 def test_what_is_left_of_the_differences_is_the_rounding_of_places(row):
-    """With the wrenches within their rounding, and the strains linear on each half as SoRoSim's."""
+    """With the wrenches within their rounding, and strains linear on each half as in the file."""
     case = sorosim.cases()[row]
     shape = solver(case.loads).shapes(REST, linear_strains.centers(STEEL))
     curvature = shape.moment[0] / [STEEL.bending(0), STEEL.bending(0), STEEL.torsion(0)]

@@ -54,3 +54,8 @@ def test_enough_samples_are_not_called_too_few(tmp_path):
 def test_a_metric_without_a_counterpart_is_told_alone(atlas):
     text = nearest_numbers(atlas, "fold_volume", designs.minimal_trunk())
     assert np.isfinite(float(text.removesuffix(".").rsplit(" ", 1)[1]))
+
+
+def test_the_nearest_design_is_near_to_all_parts(atlas):
+    design = changed(designs.minimal_trunk(), {"left.revolution": -1.0, "right.revolution": 2.4})
+    assert "revolution 114.6 deg" in nearest_numbers(atlas, "volume", design)

@@ -43,6 +43,11 @@ def test_a_taken_port_is_refused_and_not_replaced(server):
         start_server(host="203.0.113.7")
 
 
+def test_every_address_of_the_machine_is_listened_on_only_where_it_is_named():
+    with pytest.raises(InvalidInput, match=r"host = '': must be an address .* 0\.0\.0\.0 is for"):
+        start_server(host="")
+
+
 @pytest.mark.parametrize(
     ("host", "origin", "welcome"),
     [

@@ -7,7 +7,7 @@ from hypothesis import given
 
 from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
-from softreach.arm.parameters import changed, find_parameter
+from softreach.arm.parameters import changed, find_parameter, parameters
 from softreach.studio.shown_parameters import (
     named_parameters,
     part_parameters,
@@ -36,6 +36,33 @@ def test_a_moved_slider_shows_its_own_value_in_the_new_design(design):
         again = next((c for c in slider_parameters(made) if c.name == control.name), None)
         assert again is not None
         assert again.shown == pytest.approx(to, abs=1e-6)
+
+
+@given(arms())
+def test_a_slider_that_is_not_moved_leaves_the_design_as_it_is(arm):
+    for control in slider_parameters(arm):
+        made = changed(arm, {control.name: control.shown * control.scale})
+        for name, one in parameters(arm).items():
+            assert one.values(made) == pytest.approx(
+                one.values(arm), rel=1e-9, abs=1e-9, nan_ok=True
+            ), name
+
+
+def test_what_differs_between_fibers_is_on_sliders_and_in_fields_of_each():
+    fibers = [
+        FiberArchitecture(name=name, revolution=turn, extent=extent)
+        for name, turn, extent in (("a", -0.5, 0.3), ("b", 0.4, 0.2))
+    ]
+    same, differing = arm_of(fibers[0]), arm_of(*fibers)
+    shared = {"revolution", "extent"}
+    assert shared <= {one.name for one in slider_parameters(same)}
+    own = {f"{name}.{field}" for name in "ab" for field in shared}
+    found = {one.name: one.shown * one.scale for one in slider_parameters(differing)}
+    assert own <= found.keys()
+    assert not shared & found.keys()
+    assert found["a.revolution"] == pytest.approx(-0.5)
+    body, *_ = parts(differing).values()
+    assert not shared & {one.name for one in part_parameters(differing, body)}
 
 
 def test_sliders_of_fibers_bear_their_names_whatever_these_are():

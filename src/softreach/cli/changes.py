@@ -189,10 +189,10 @@ def _unchanged(text: str) -> Manipulator:
 
     if text in designs.__all__:
         return getattr(designs, text)()
-    if Path(text).is_file() and not text.endswith(".jl"):
-        return Manipulator.load(text)
-    if text.endswith(".toml"):
-        raise InvalidInput("design", text, "a file that exists")
+    path = Path(text)
+    is_named = path.exists() and not path.is_dir() and path.suffix != ".jl"
+    if is_named or path.suffix == ".toml":
+        return Manipulator.load(text)  # which refuses what is no file, such as a pipe
     hint = f"softreach import {text} {text[:-3]}.toml makes one of a filament"
     allowed = f"a .toml file, or one of {', '.join(designs.__all__)}"
     raise InvalidInput("design", text, allowed, hint if text.endswith(".jl") else "")

@@ -82,7 +82,8 @@ def metrics(*, json: AsJson = False) -> None:
 def parameters(design: Design, /, *, changes: Changes = UNCHANGED, json: AsJson = False) -> None:
     """List every parameter of a design with its value, as --set and --vary name it.
 
-    A dash means that the design gives no single number; it can still be set.
+    A dash means that the design gives no single number, or that parts which share
+    the parameter differ; it can still be set.
 
     Example: softreach list parameters minimal_trunk
     """

@@ -101,10 +101,7 @@ def fixed_places(atlas: xr.Dataset, view: MapView, design: Manipulator) -> dict[
     """Of each parameter that a map does not show, the number of the value nearest to a design's."""
     _, *shown = map_choices(atlas, view)
     others = [str(dim) for dim in atlas["status"].dims if dim not in shown]
-    return {
-        name: int(np.abs(atlas[name].values - find_parameter(design, name).value(design)).argmin())
-        for name in others
-    }
+    return {name: _nearest_place(atlas, name, design) for name in others}
 
 
 def atlas_map(atlas: xr.Dataset, view: MapView, fixed: dict[str, int]) -> AtlasMap:
@@ -235,11 +232,13 @@ def _reason(atlas: xr.Dataset, here: dict[str, int]) -> str:
 
 def _nearest_places(atlas: xr.Dataset, design: Manipulator) -> dict[str, int]:
     """Its place along each parameter."""
-    values = {str(name): atlas[name].values for name in atlas["status"].dims}
-    return {
-        name: int(np.abs(known - find_parameter(design, name).value(design)).argmin())
-        for name, known in values.items()
-    }
+    return {str(name): _nearest_place(atlas, str(name), design) for name in atlas["status"].dims}
+
+
+def _nearest_place(atlas: xr.Dataset, name: str, design: Manipulator) -> int:
+    """Number of the value that is nearest to a design's; to all of them where its parts differ."""
+    values = np.array(find_parameter(design, name).values(design))
+    return int(np.abs(atlas[name].values[:, None] - values).max(axis=1).argmin())
 
 
 def _place(atlas: xr.Dataset, here: dict[str, int]) -> str:

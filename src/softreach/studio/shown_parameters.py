@@ -60,7 +60,11 @@ _OF_PART = {
     "offset": _Slider("offset of {owner} [deg]", 0, 360, 1),
     "distance_ratio": _Slider("distance of {owner} / outer radius", 0, 1, 0.01),
     "radius_ratio": _Slider("radius of {owner} / outer radius", 0.01, 0.5, 0.005),
+    "extent": _Slider("extent of {owner} [deg]", 2, 120, 1),
+    "revolution": _Slider("revolution of {owner} [deg]", -360, 360, 1),
 }
+_ONE_FOR_ALL = ("extent", "revolution", "lower", "upper")
+"""Fields that have a slider of their own only where parts differ."""
 _AROUND_VALUE = ("lower", "upper", "young_modulus")
 """Fields of any magnitude: their sliders end at multiples of what the design has."""
 _MORE = {
@@ -116,8 +120,9 @@ def _is_offered(arm: Manipulator, known: Mapping[str, Parameter], one: Parameter
 
     Only what is helical has a revolution to change; only what is not, its number of bundles.
     """
-    if one.owner and one.field in ("lower", "upper"):
-        return one.field not in known
+    of_all = known.get(one.field) if one.owner and one.field in _ONE_FOR_ALL else None
+    if of_all is not None and not math.isnan(of_all.value(arm)):
+        return False
     if one.field == "revolution":
         return one.value(arm) != 0
     turn = known.get(f"{one.owner}.revolution")
@@ -174,9 +179,16 @@ def parts(arm: Manipulator) -> dict[str, Part]:
 
 @lru_cache(maxsize=16)
 def part_parameters(arm: Manipulator, part: Part) -> tuple[ShownParameter, ...]:
-    """The parameters of a part in the units in which they are typed."""
+    """The parameters of a part in the units in which they are typed.
+
+    Of those of the whole arm, what its parts differ in is typed with each of them.
+    """
     units = {"rad": _DEGREES, "m": ("mm", 1e-3), "Pa": ("kPa", 1e3)}
-    known = [one for one in parameters(arm).values() if one.owner in part.owners]
+    known = [
+        one
+        for one in parameters(arm).values()
+        if one.owner in part.owners and (one.owner or not math.isnan(one.value(arm)))
+    ]
     return tuple(_shown(arm, one, units, one.symbol, f"{one.meaning}: {one.name}") for one in known)
 
 

@@ -24,6 +24,7 @@ from softreach.support.errors import InvalidInput, SoftreachError
 from softreach.support.files.atomic import replacing
 from softreach.support.files.kinds import FileKind, text_with
 from softreach.support.files.stores import kind_of
+from softreach.support.files.text import read_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,13 +52,7 @@ def start_on_state(path: str | PathLike[str], quality: Quality | None = None) ->
         InvalidInput: There is no such file, or it is no state.
         InvalidDesign: A design in it cannot exist.
     """
-    try:
-        if (size := Path(path).stat().st_size) > LARGEST:
-            most = f"at most {LARGEST / 1e6:g} MB"
-            raise InvalidInput("state file", f"{size / 1e6:.3g} MB", most)
-        text = Path(path).read_bytes()
-    except OSError as error:
-        raise InvalidInput("state file", str(path), "a file that can be read", str(error)) from None
+    text = read_text("state file", path, LARGEST)
     return Start(state=StudioState.from_json(text), quality=quality or Quality())
 
 

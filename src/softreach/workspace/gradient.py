@@ -64,6 +64,9 @@ def volume_gradient(
     The convex hull changes with its corners, theory (84). Its volume, as that of the reachable set,
     has kinks where the touched places jump; there the derivative is that of one side.
 
+    By a parameter that several parts share, the derivative is the sum of those by the parts' own:
+    all of them grow by the same amount, revolutions each in its own sense.
+
     Args:
         arm: The design.
         parameters: Names as in atlases: `taper`, `revolution`, `rings[0].inner_ratio`,

@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.parameters import Parameter, changed
+from softreach.arm.parameters import Parameter
+from softreach.arm.parameters.draft import Draft
 from softreach.arm.tables import check_extension
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidDesign, InvalidInput
@@ -48,28 +49,31 @@ class Shifts:
 def shifts_along(arm: Manipulator, parameter: Parameter, reach: int, relative: float) -> Shifts:
     """Neighbors of a design along a parameter: on both sides, or on one at the end of its range.
 
+    Where several parts share the parameter, each moves from its own value by the same amount.
+
     Args:
         arm: The design.
         parameter: What changes.
         reach: Steps to either side; twice as many to one side.
-        relative: Size of a step as a part of the parameter.
+        relative: Size of a step as a part of the parameter, of the smallest where parts differ.
 
     Raises:
         InvalidInput: The parameter counts something, or has no value.
         InvalidDesign: The design has no neighbors on either side.
     """
-    value = parameter.value(arm)
+    values = parameter.values(arm)
     if parameter.whole:
         raise InvalidInput("parameter", parameter.name, "a number that can change continuously")
-    if not np.isfinite(value):
+    if not np.isfinite(values).all():
         allowed = "a parameter that the design gives as one number"
         raise InvalidInput("parameter", parameter.name, allowed)
-    step = relative * (abs(value) or _scale(arm, parameter))
+    sizes = [abs(value) for value in values if value]
+    step = relative * min(sizes, default=_scale(arm, parameter))
     ways = np.arange(-reach, reach + 1), np.arange(2 * reach + 1), -np.arange(2 * reach + 1)
     fault: InvalidDesign | None = None
     for offsets in ways:
         try:
-            arms = tuple(_shifted(arm, parameter, value + step * k) if k else arm for k in offsets)
+            arms = tuple(_shifted(arm, parameter, step * k) if k else arm for k in offsets)
         except InvalidDesign as error:
             fault = fault or error
         else:
@@ -85,8 +89,10 @@ def _scale(arm: Manipulator, parameter: Parameter) -> float:
     return _SCALES.get(parameter.unit, 1.0) * (arm.length if parameter.unit == "m" else 1.0)
 
 
-def _shifted(arm: Manipulator, parameter: Parameter, value: float) -> Manipulator:
-    made = changed(arm, {parameter.name: float(value)})
+def _shifted(arm: Manipulator, parameter: Parameter, amount: float) -> Manipulator:
+    draft = Draft(arm)
+    parameter.shift(draft, float(amount))
+    made = draft.made()
     check_extension(made)
     free, before = (bounds[:, 1] > bounds[:, 0] for bounds in (made.bounds, arm.bounds))
     if not np.array_equal(free, before):

@@ -4,7 +4,8 @@ Each is called by its path. Those of the whole arm have plain names: `taper`, `l
 `revolution`. Those of a part begin with the part: `profile.radii[1]`, `rings[0].inner_ratio`,
 `rings[0].material.young_modulus`, `core.density`, and an actuator's own with its name:
 `left.offset`, `left.helical_angle.values[2]`, `left.lower[1]`. Counting starts at 0; a ring that
-has a name may be called by it: `rings[skin].inner_ratio`.
+has a name may be called by it: `rings[skin].inner_ratio`. What several parts share, such as
+`lower`, has a value where theirs are equal; it can be set in any case, which makes them equal.
 
 Files and the command line write the same names with the unit, which stands before the place in a
 series, and angles in degrees: `taper_deg`, `left.helical_angle.values_deg[2]`.

@@ -24,6 +24,8 @@ from softreach.support.errors import Fault, Range
 
 __all__ = ["OwnParameter", "Parameter", "parameters"]
 
+_NAN = float("nan")
+_ROUNDING = 1e-12  # of an angle that follows from another one
 _SIDES = (("min", "lowest activation"), ("max", "highest activation"))
 
 
@@ -68,17 +70,27 @@ class Parameter(ABC):
         """The name without its owner."""
         return self.name.removeprefix(f"{self.owner}.") if self.owner else self.name
 
-    @abstractmethod
     def value(self, arm: Manipulator) -> float:
-        """Its value on an arm [unit]; where several parts share it, that of the first.
+        """Its value on an arm [unit].
 
-        NaN where the arm does not give it as one number: a modulus that is left out, or an angle
-        that changes along the arm. It can be set all the same.
+        NaN where the arm does not give it as one number: a modulus that is left out, an angle that
+        changes along the arm, or what differs between the parts that share it. It can be set all
+        the same.
         """
+        first, *others = self.values(arm)
+        return first if all(math.isclose(first, one, rel_tol=_ROUNDING) for one in others) else _NAN
+
+    @abstractmethod
+    def values(self, arm: Manipulator) -> tuple[float, ...]:
+        """Its value in each part that shares it [unit]."""
 
     @abstractmethod
     def change(self, draft: Draft, value: float) -> None:
         """Note the change to this value [unit]."""
+
+    def shift(self, draft: Draft, amount: float) -> None:
+        """Note that its value grows by this [unit], in each part from the part's own."""
+        self.change(draft, self.value(draft.arm) + amount)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,19 +99,19 @@ class OwnParameter(Parameter):
 
     path: Path
 
-    def value(self, arm: Manipulator) -> float:
-        """Value in the part of this arm."""
+    def values(self, arm: Manipulator) -> tuple[float, ...]:
+        """Value in the part of this arm; a bound of all its bundles in each."""
         part, (_, field, place) = part_of(arm, self.path.part), self.path
         if field == "activation_bounds":
             side, *bundle = place
-            return float(part.bounds[bundle[0] if bundle else 0, side])
+            return tuple(part.bounds[bundle or slice(None), side].tolist())
         if place:
             *inner, k = place
             series = getattr(part, field)
-            return float(getattr(series, str(inner[0]))[k] if inner else series[k])
+            return (float(getattr(series, str(inner[0]))[k] if inner else series[k]),)
         is_actuator = isinstance(part, Actuator)
         value = part.value_on(field, arm.profile, arm.section) if is_actuator else None
-        return _float(value if is_actuator else getattr(part, field))
+        return (_float(value if is_actuator else getattr(part, field)),)
 
     def change(self, draft: Draft, value: float) -> None:
         """Change it; an element alone must be admitted, as its series names no places."""
@@ -108,6 +120,15 @@ class OwnParameter(Parameter):
             return
         counted = self.whole and float(value).is_integer()
         draft.set(self.name, self.path, int(value) if counted else value)
+
+    def shift(self, draft: Draft, amount: float) -> None:
+        """Shift it; a bound of several bundles in each."""
+        values, path = self.values(draft.arm), self.path
+        if len(values) == 1:
+            super().shift(draft, amount)
+            return
+        for k, value in enumerate(values):
+            draft.set(self.name, path._replace(place=(*path.place, k)), value + amount)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,23 +147,28 @@ class _Shared(Parameter):
 
     parts: tuple[Parameter, ...]
 
-    def value(self, arm: Manipulator) -> float:
-        """That of the first."""
-        return self.parts[0].value(arm)
+    def values(self, arm: Manipulator) -> tuple[float, ...]:
+        """Those of all of them."""
+        return tuple(value for part in self.parts for value in part.values(arm))
 
     def change(self, draft: Draft, value: float) -> None:
         """Change all of them, under the name that they share."""
         for part in self.parts:
             dataclasses.replace(part, name=self.name).change(draft, value)
 
+    def shift(self, draft: Draft, amount: float) -> None:
+        """Shift all of them, under the name that they share."""
+        for part in self.parts:
+            dataclasses.replace(part, name=self.name).shift(draft, amount)
+
 
 @dataclass(frozen=True, kw_only=True)
 class _OuterRadius(Parameter):
     """The radius at the base of a profile given by radii: all of them keep their proportions."""
 
-    def value(self, arm: Manipulator) -> float:
+    def values(self, arm: Manipulator) -> tuple[float, ...]:
         """R2(0) [m]."""
-        return float(arm.profile.radius(0.0))
+        return (float(arm.profile.radius(0.0)),)
 
     def change(self, draft: Draft, value: float) -> None:
         """Change all radii."""
@@ -162,15 +188,21 @@ class _Revolution(Parameter):
     Angles that are given along the arm stay as they are.
     """
 
-    def value(self, arm: Manipulator) -> float:
-        """|Ω| of the first helical fiber or tendon [rad]; 0 without one."""
-        return next((abs(turn) for turn in _revolutions(arm).values() if turn), 0.0)
+    def values(self, arm: Manipulator) -> tuple[float, ...]:
+        """|Ω| of all helical fibers and tendons [rad]; 0 without one."""
+        return tuple(abs(turn) for turn in _revolutions(arm).values() if turn) or (0.0,)
 
     def change(self, draft: Draft, value: float) -> None:
         """Wind fibers and tendons."""
         for part, turn in _revolutions(draft.arm).items():
             if turn:
                 draft.wind(self.name, part, math.copysign(value, turn))
+
+    def shift(self, draft: Draft, amount: float) -> None:
+        """Wind each further, in its own sense."""
+        for part, turn in _revolutions(draft.arm).items():
+            if turn:
+                draft.wind(self.name, part, turn + math.copysign(1.0, turn) * amount)
 
 
 def parameters(arm: Manipulator) -> dict[str, Parameter]:
@@ -280,4 +312,4 @@ def _revolutions(arm: Manipulator) -> dict[PartKey, float]:
 
 def _float(value: Any) -> float:
     """The value, or NaN where it is left out or no number."""
-    return float(value) if isinstance(value, int | float | np.number) else float("nan")
+    return float(value) if isinstance(value, int | float | np.number) else _NAN

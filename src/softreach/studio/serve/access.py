@@ -24,12 +24,15 @@ def is_local(host: str) -> bool:
     return host in _LOCAL or host.startswith("127.")
 
 
-def check_port(port: int) -> None:
-    """Refuse what is no port.
+def check_address(host: str, port: int) -> None:
+    """Refuse what is no host or no port.
 
     Raises:
-        InvalidInput: It is not from 1 to 65535.
+        InvalidInput: No host is named, or the port is not from 1 to 65535 (0 for a free one).
     """
+    if not host.strip():  # systems take it for every address of the machine
+        allowed = f"an address to listen on, such as {LOOPBACK}"
+        raise InvalidInput("host", repr(host), allowed, f"{ANYWHERE[0]} is for every address")
     if not 0 <= port <= _LAST_PORT:
         raise InvalidInput("port", port, f"1 to {_LAST_PORT}", "leave it out for a free one")
 

@@ -12,7 +12,7 @@ from softreach.studio.scene.camera import FOV
 from softreach.studio.serve.access import (
     LOOPBACK,
     answer_headers,
-    check_port,
+    check_address,
     page_address,
     refusal,
 )
@@ -34,8 +34,8 @@ def start_server(host: str = LOOPBACK, port: int | None = None, token: str = "")
         token: What every page has to know; "" for nothing.
 
     Raises:
-        InvalidInput: The port is none or taken, the host is not this machine's, or viser is a
-            version whose requests cannot be checked.
+        InvalidInput: The port is none or taken, the host is none or not this machine's, or viser
+            is a version whose requests cannot be checked.
         MissingExtra: viser is not installed.
     """
     try:
@@ -43,7 +43,7 @@ def start_server(host: str = LOOPBACK, port: int | None = None, token: str = "")
     except ModuleNotFoundError as error:
         raise MissingExtra("viser", "studio") from error
 
-    check_port(port or 0)
+    check_address(host, port or 0)
     _check_free(host, port or 0)
     # viser prints a banner; we print our own line.
     with (
