@@ -26,7 +26,10 @@ class Request:
     targets: Array
     """Where the tip should be [m], shape (t, 3)."""
     residual: float
-    """Largest |tip - target| of a solution [m]."""
+    """|tip - target| at which a search has found its target [m]."""
+    allowance: float
+    """|tip - target| that the error of the tips leaves open [m], `residual` at least: no target so
+    near to a tip of the arm is out of reach."""
     near: Array
     """Activations of the free bundles to stay near to [-], shape (t, dimension)."""
     direction: Array | None = None
