@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.rod.activation_box import ActivationBox
+from softreach.rod.tip_map import TipMap
 from softreach.support.arguments import as_number
 from softreach.support.arrays import Array, Index, as_floats, as_rows, check_finite
 from softreach.support.errors import InvalidInput, Range
@@ -84,6 +85,16 @@ def as_activations(name: str, activations: ArrayLike, box: ActivationBox, count:
 def as_residual(residual_over_length: float) -> float:
     """The largest |tip - target| in L, if that can be asked for."""
     return as_number("residual_over_length", residual_over_length, Range(*_RESIDUALS))
+
+
+def allowance(rod: TipMap, residual: float) -> float:
+    """|tip - target| [m] within which a target is reached: the error of tips, or a wider residual.
+
+    Args:
+        rod: The tip map.
+        residual: To which solutions are searched [m].
+    """
+    return max(residual, rod.tol * rod.length)
 
 
 def positions_in(text: str, source: str) -> list[list[float]]:

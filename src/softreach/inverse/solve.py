@@ -15,6 +15,7 @@ from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.proofs import SLACK, change_bounds, gap_bounds
 from softreach.inverse.request import (
     Request,
+    allowance,
     as_activations,
     as_residual,
     as_targets,
@@ -111,7 +112,7 @@ def solve_inverse(
     request = Request(
         targets=points,
         residual=residual,
-        allowance=max(residual, prepared.whole.tol * prepared.whole.length),
+        allowance=allowance(prepared.whole, residual),
         near=as_activations("near", rest, box, len(points)) / prepared.measures[box.free],
         direction=unit,
         direction_weight=as_number("direction_weight", direction_weight, Range(0.0, 1e6)),
