@@ -154,7 +154,7 @@ def _perhaps_singular(prepared: PreparedMap, request: Request, gap: Array, bound
 
     Those not proved to be out of reach; where nothing is proved, those that are nearly reached.
     """
-    left = (gap > request.residual) & (bound <= request.allowance)
+    left = (gap > request.residual) & (bound == 0.0)
     if prepared.proves:
         return left
     return left & (gap <= _NEARLY * prepared.whole.length)
@@ -205,14 +205,15 @@ def _with_nearest(
 
 
 def _gap_bounds(prepared: PreparedMap, request: Request, gap: Array) -> Array:
-    """Lower bounds of the distance of targets to the reachable set; 0 where nothing is proved."""
+    """Lower bounds of the distance of targets to all tips; 0 where they prove nothing."""
     bounds, out = np.zeros(len(gap)), np.flatnonzero(gap > request.allowance)
     # Where the position yields to a direction, the gap says nothing of what can be reached.
     yielding = request.direction is not None and prepared.dimension <= 3
     if len(out) and not yielding and (prepared.proves or not prepared.dimension):
         asked = request.targets[out], gap[out], request.allowance
         bounds[out] = gap_bounds(prepared.rod, prepared.coarse_cells, *asked)
-    return bounds
+    # Within the error of the tips, what is true of them need not be true of the arm.
+    return np.where(bounds > request.allowance, bounds, 0.0)
 
 
 def _solutions(
@@ -239,8 +240,7 @@ def _solutions(
     # Roots on a bound that miss by what the error of the tips leaves open come last.
     roots = rows(roots, np.lexsort((roots.residual > request.residual, roots.target)))
     statuses = np.full(count, Status.REACHED, np.int8)
-    proved = bounds > request.allowance
-    statuses[missing[~hit]] = np.where(proved[~hit], Status.UNREACHABLE, Status.NOT_FOUND)
+    statuses[missing[~hit]] = np.where(bounds[~hit] > 0.0, Status.UNREACHABLE, Status.NOT_FOUND)
     gamma, gaps, proved_gaps = np.empty((count, rod.box.bundles)), np.empty(count), np.zeros(count)
     reached, first = np.unique(roots.target, return_index=True)
     gamma[reached], gaps[reached] = roots.gamma[first], roots.residual[first]
