@@ -13,7 +13,9 @@
 6. A tetrahedron that folds within itself holds two roots and gave one start: the other root lies
    opposite, along the null direction of the Jacobian (`kernels.folds`), and is searched as well.
 7. Roots between which the tip hardly leaves the target are one.
-8. Targets left without a root are searched by descent, for Newton fails where J is singular.
+8. A root beyond a bound is one on the bound if the tip misses no more there than the error of the
+   map leaves open.
+9. Targets left without a root are searched by descent, for Newton fails where J is singular.
 
 Under loads some activations have no equilibrium, and a tip that is NaN is a failed step. Cells that
 they tear have no image; their other corners begin searches instead (`torn_cells`).
@@ -25,6 +27,7 @@ from functools import partial
 
 import numpy as np
 
+from softreach.inverse.descent import descend
 from softreach.inverse.nearest import local_minima
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
@@ -110,15 +113,17 @@ def _branches_of(prepared: PreparedMap, request: Request, chosen: Index) -> Root
         starts = with_torn_cells(prepared, some, starts)
     roots = _newton(prepared, some, starts)
     # Where the quadratics say that nothing leads there, look once more without believing them.
-    again = starts_from_cells(prepared, some, roots.missing(len(chosen)), with_root=False)
+    missing = roots.missing(len(chosen), some.residual)
+    again = starts_from_cells(prepared, some, missing, with_root=False)
     roots = distinct(prepared, some, roots.joined(_newton(prepared, some, again)))
     roots = _with_partners(prepared, some, roots)
-    roots = roots.joined(_singular_roots(prepared, some, roots.missing(len(chosen))))
+    missing = roots.missing(len(chosen), some.residual)
+    roots = roots.joined(_singular_roots(prepared, some, missing))
     return roots._replace(target=chosen[roots.target])
 
 
 def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
-    """Step 5: damped Newton from every start; the roots that are within the bounds."""
+    """Steps 5 and 8: damped Newton from every start; the roots that are within the bounds."""
     rod, goal = prepared.branch_map, request.targets[starts.target]
     low, high = rod.box.low.copy(), rod.box.high.copy()
     search = _search(goal, _improved(rod, goal, starts))
@@ -132,18 +137,23 @@ def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
             _give_up(search, active)
     converged = np.flatnonzero(search.state == CONVERGED)
     # The trial holds the step that convergence left untaken; it may overstep a bound a little.
-    gamma = rod.box.clip(search.trial[converged])
-    tips, stable = placed(rod, gamma)
-    residual = np.linalg.norm(tips - goal[converged], axis=1)
-    roots = Roots(
-        starts.target[converged],
-        gamma,
+    gamma, slope, goal = (
+        rod.box.clip(search.trial[converged]),
         search.slope[converged],
-        residual,
-        starts.cell[converged],
-        stable,
+        goal[converged],
     )
-    return rows(roots, residual <= request.residual)
+    tips, stable = placed(rod, gamma)
+    residual = np.linalg.norm(tips - goal, axis=1)
+    moved = (gamma != search.trial[converged]).any(axis=1)
+    beside = np.flatnonzero(moved & (residual > request.residual) & (residual <= request.allowance))
+    gamma[beside], _, slope[beside], residual[beside] = descend(
+        rod, goal[beside], gamma[beside], request.residual
+    )
+    stable[beside] = placed(rod, gamma[beside])[1]
+    roots = Roots(starts.target[converged], gamma, slope, residual, starts.cell[converged], stable)
+    found = residual <= request.residual
+    found[beside] = True
+    return rows(roots, found)
 
 
 def _improved(rod: TipMap, goal: Array, starts: Starts) -> Array:
@@ -237,11 +247,8 @@ def distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:
 
 
 def _singular_roots(prepared: PreparedMap, request: Request, chosen: Index) -> Roots:
-    """Step 8: what descent finds for targets where Newton's method found nothing."""
+    """Step 9: what descent finds for targets where Newton's method found nothing."""
     starts = starts_from_cells(prepared, request, chosen)
-    by_position = Request(
-        targets=request.targets[starts.target], residual=request.residual, near=starts.gamma
-    )
-    gamma = local_minima(prepared.rod, by_position, starts.gamma).gamma
+    gamma = local_minima(prepared.rod, request.of(starts.target), starts.gamma).gamma
     roots = roots_at(prepared.rod, request.targets, starts.target, gamma)
     return distinct(prepared, request, rows(roots, roots.residual <= request.residual))

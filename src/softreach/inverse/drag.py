@@ -45,8 +45,7 @@ class Drag:
         self.arm = arm
         self._prepared: PreparedMap = prepared_map(arm)
         self._rod = self._prepared.rod
-        self._residual = _RESIDUAL * self._rod.length
-        self._tracker = Continuation(self._rod, self._residual)
+        self._tracker = Continuation(self._rod, _RESIDUAL * self._rod.length)
         self._side = 0.0
 
     def to(self, activation: tuple[float, ...], target: Array) -> Dragged | None:
@@ -73,13 +72,16 @@ class Drag:
         slope = self._tracker.at(gamma).slope
         starts = self._rod.box.clip(np.array([gamma, *self._beside_fold(gamma, slope)]))
         request = Request(
-            targets=np.tile(target, (len(starts), 1)), residual=self._residual, near=starts
+            targets=np.tile(target, (len(starts), 1)),
+            residual=self._tracker.residual,
+            allowance=self._tracker.allowance,
+            near=starts,
         )
         ends = local_minima(self._rod, request, starts).gamma
         tips, slopes = self._rod.tips_and_slopes(ends)
         gaps = np.linalg.norm(tips - target, axis=1)
         gaps = np.where(np.isfinite(gaps), gaps, np.inf)
-        best = gaps <= gaps.min() + self._residual
+        best = gaps <= gaps.min() + self._tracker.residual
         other_side = [self._side * self._sign(slope) < 0 for slope in slopes]
         away = np.linalg.norm((ends - gamma) / self._rod.box.scales, axis=1)
         return ends[np.lexsort((away, other_side, ~best))[0]]
@@ -107,4 +109,4 @@ class Drag:
         tip = self._tracker.at(gamma).tip
         gap = float(np.linalg.norm(tip - target))
         within = tuple(float(value) for value in activation)
-        return Dragged(within, tip, 0.0 if gap <= self._residual else gap)
+        return Dragged(within, tip, 0.0 if gap <= self._tracker.allowance else gap)

@@ -12,7 +12,7 @@ from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.roots import Roots, placed
 from softreach.rod.tip_map import TipMap
-from softreach.support.arrays import Array, Index, Mask
+from softreach.support.arrays import Array, Index
 
 _SEED = 1
 
@@ -27,7 +27,7 @@ def nearest(prepared: PreparedMap, request: Request, known: Roots | None = None)
     """
     rod, targets = prepared.rod, request.targets
     if not len(targets):
-        return Nearest(request.near, targets, np.empty(0, bool))
+        return Nearest(request.near, targets, np.empty(0))
     target, start = prepared.seeds.starts(prepared.seeds.nearest(targets))
     if known is not None:
         target = np.concatenate([target, known.target])
@@ -35,14 +35,13 @@ def nearest(prepared: PreparedMap, request: Request, known: Roots | None = None)
     minima = local_minima(rod, request.of(target), start)
     order = np.lexsort((minima.value, target))
     best = order[np.searchsorted(target[order], np.arange(len(targets)))]
-    gamma = minima.gamma[best]
-    return Nearest(gamma, placed(rod, gamma)[0], minima.converged[best])
+    return _nearest_at(rod, targets, minima.gamma[best])
 
 
 def nearest_from(rod: TipMap, request: Request, gamma: Array) -> Nearest:
     """The local minimum of distance from one activation for each target."""
     minima = local_minima(rod, replace(request, direction=None), gamma)
-    return Nearest(minima.gamma, placed(rod, minima.gamma)[0], minima.converged)
+    return _nearest_at(rod, request.targets, minima.gamma)
 
 
 def reach(prepared: PreparedMap, request: Request, start: Array) -> Reached:
@@ -95,8 +94,8 @@ class Nearest(NamedTuple):
     """Activations [-], shape (t, m)."""
     tip: Array
     """The points [m], shape (t, 3)."""
-    converged: Mask
-    """Whether the search converged, shape (t,)."""
+    gap: Array
+    """|tip - target| [m], shape (t,)."""
 
 
 class Reached(NamedTuple):
@@ -106,6 +105,11 @@ class Reached(NamedTuple):
     """Activations [-], shape (t, m)."""
     residual: Array
     """|tip - target| [m], shape (t,)."""
+
+
+def _nearest_at(rod: TipMap, targets: Array, gamma: Array) -> Nearest:
+    tip = placed(rod, gamma)[0]
+    return Nearest(gamma, tip, np.linalg.norm(tip - targets, axis=1))
 
 
 class _Effort(NamedTuple):

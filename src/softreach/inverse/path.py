@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.arm.manipulator import Manipulator
-from softreach.inverse.request import as_activations, as_residual, as_targets
+from softreach.inverse.descent import descend
+from softreach.inverse.request import allowance, as_activations, as_residual, as_targets
 from softreach.inverse.roots import placed
 from softreach.inverse.solve import solve_inverse
 from softreach.rod.rods import tip_map
@@ -54,7 +55,9 @@ def track_path(
         path: Tip positions in order [m], shape (k, 3).
         start: Activation to begin with [-], shape (bundles,); it is corrected to the first point.
             By default the best-conditioned of all solutions there.
-        residual_over_length: Largest |tip - point|, in L.
+        residual_over_length: |tip - point| to which activations are corrected, in L. Where the
+            bounds do not let the tip come so near, a point is followed by the nearest tip as far as
+            `tol`: whether the arm reaches it is more than its tips can say.
         tol: Largest error of the tips themselves, in L. A tip map keeps its own.
 
     Returns:
@@ -91,7 +94,7 @@ class PathStatus(IntEnum):
     """Outcome for a point of the path."""
 
     FOLLOWED = 0
-    """The tip is there, on the branch of the start."""
+    """The tip is there, on the branch of the start: `tip_error` says how near."""
     FOLD = 1
     """Beyond a fold: the branch turns back before this point."""
     BOUND = 2
@@ -109,8 +112,9 @@ class Continuation:
     """Following branches of solutions of one tip map, all of whose bundles are free."""
 
     def __init__(self, rod: TipMap, residual: float) -> None:
-        """Set up for tips within `residual` [m] of their points."""
+        """Set up for tips within `residual` [m] of their points, or as near as tips can tell."""
         self.rod, self.box, self.residual = rod, rod.box, residual
+        self.allowance = allowance(rod, residual)
         self._torn = False  # whether the last correction met a place without a stable equilibrium
 
     def at(self, gamma: Array) -> BranchPoint:
@@ -122,7 +126,7 @@ class Continuation:
         """The activation corrected to a first target, if it can be within the bounds."""
         found = self._corrected(gamma, target, self.box.is_free)
         if found is None or (self.box.excess(found.gamma) > _AT_BOUND).any():
-            return None
+            return self._within_bounds(gamma, target[None])
         return self._clipped(found)
 
     def follow(self, point: BranchPoint, begin: Array, end: Array) -> BranchEnd:
@@ -144,6 +148,8 @@ class Continuation:
                 point, done, part = substep.point, 1.0 if last else done + part, 2 * part
                 torn = False
             elif part * substep.shorten < (shortest_torn if torn else shortest):
+                if (beside := self._beside(point, end)) is not None:
+                    return BranchEnd(PathStatus.FOLLOWED, beside, done=1.0)
                 why = PathStatus.UNSTABLE if torn or self._leaps(point) else PathStatus.FOLD
                 return BranchEnd(why, point, done=done, error=part * distance)
             else:
@@ -151,6 +157,12 @@ class Continuation:
         return BranchEnd(PathStatus.FOLLOWED, point, done=1.0)
 
     def _substep(self, point: BranchPoint, target: Array) -> _Substep:
+        """A substep to the target, or as near to it as tips can tell where a bound is met."""
+        substep = self._predicted(point, target)
+        beside = None if substep.end is None else self._beside(point, target)
+        return substep if beside is None else _Substep(point=beside)
+
+    def _predicted(self, point: BranchPoint, target: Array) -> _Substep:
         """Predict and correct; bundles that would leave their bounds are held there."""
         gamma, bundle, upper = point.gamma, -1, False
         moving = self.box.is_free
@@ -178,6 +190,25 @@ class Continuation:
             upper = bool(ahead[bundle] > self.box.high[bundle])
             moving = moving & ~blocked
         return _Substep(end=BranchEnd(PathStatus.BOUND, point, bundle, upper))
+
+    def _beside(self, point: BranchPoint, target: Array) -> BranchPoint | None:
+        """The point of the branch that is at a place as far as tips can tell; None if none is.
+
+        All of the way there has to be as near to the reachable set: half of it is looked at.
+        """
+        found = self._within_bounds(point.gamma, np.array([0.5 * (point.tip + target), target]))
+        if found is None or self._left_branch(point, found.gamma, found):
+            return None
+        far = np.abs(found.gamma - point.gamma) > _LONGEST * self.box.scales
+        return None if far.any() else found
+
+    def _within_bounds(self, gamma: Array, targets: Array) -> BranchPoint | None:
+        """Nearest to the last of some places (k, 3), if all are as near as tips can tell."""
+        start = np.tile(gamma, (len(targets), 1))
+        found = descend(self.rod, targets, start, self.residual)
+        if not (found.residual <= self.allowance).all():
+            return None
+        return BranchPoint(found.gamma[-1], found.tip[-1], found.slope[-1])
 
     def _corrected(self, gamma: Array, target: Array, moving: Mask) -> BranchPoint | None:
         """Newton's method with the least-norm step of the moving bundles; None if it fails."""

@@ -25,7 +25,7 @@ MOST_BUNDLES = 6  # with more, halving cells proves nothing that can be afforded
 _COARSE = 70_000  # cells that all targets share
 _ROUNDING = 1e-12  # of tips, in L
 _BLOCK = 16_384  # cells at once
-_ENOUGH = 0.2  # of the gap of the best place: a bound that large ends the search
+_ENOUGH = 0.2  # of the way from the allowance to the gap: a bound that large ends the search
 _MOST_EXCLUSION_CELLS = 20_000  # examined for one target
 _MOST_OF_THREE = 4_000  # the same with three bundles or fewer, where a proof needs far fewer
 _TARGET_BLOCK = 10  # targets at once
@@ -36,7 +36,9 @@ _MOST_LEAST_CELLS = 100_000  # examined for one target
 _REQUEST_BLOCK = 16  # targets at once
 
 
-def gap_bounds(rod: TipMap, coarse: CoarseCells, targets: Array, gap: Array) -> Array:
+def gap_bounds(
+    rod: TipMap, coarse: CoarseCells, targets: Array, gap: Array, allowance: float
+) -> Array:
     """A lower bound of the distance of each target from everything that the box reaches.
 
     The distance of a target p from the linear image of a cell with center c and half widths h is
@@ -48,6 +50,8 @@ def gap_bounds(rod: TipMap, coarse: CoarseCells, targets: Array, gap: Array) -> 
         coarse: Its cells.
         targets: Shape (t, 3) [m].
         gap: How near to each the best place known is [m], shape (t,).
+        allowance: What a bound has to exceed to prove anything of the arm itself [m]; every gap
+            does.
 
     Returns:
         Bounds [m], shape (t,); 0 where nothing is proved.
@@ -55,9 +59,10 @@ def gap_bounds(rod: TipMap, coarse: CoarseCells, targets: Array, gap: Array) -> 
     if rod.box.dimension == 0:
         return gap.copy()  # one place is reached
     bounds = np.maximum(np.linalg.norm(targets, axis=1) - rod.farthest(), 0.0)
+    enough = allowance + _ENOUGH * (gap - allowance)
 
     def prove(rows: slice) -> None:
-        proved = _exclusion_of_block(rod, coarse, targets[rows], gap[rows])
+        proved = _exclusion_of_block(rod, coarse, targets[rows], enough[rows])
         bounds[rows] = np.maximum(bounds[rows], proved)
 
     parallel.run(partial(prove, rows) for rows in parallel.blocks(len(targets), _TARGET_BLOCK))
@@ -202,15 +207,15 @@ def _halved(rod: TipMap, half: Array, cells: Cells) -> tuple[Array, Cells]:
     return half, Cells(np.repeat(cells.owner, 2), center)
 
 
-def _exclusion_of_block(rod: TipMap, coarse: CoarseCells, targets: Array, gap: Array) -> Array:
+def _exclusion_of_block(rod: TipMap, coarse: CoarseCells, targets: Array, enough: Array) -> Array:
     """Halve the cells of some targets until they are far enough away or too many."""
-    near = [coarse.near(p, _ENOUGH * g) for p, g in zip(targets, gap, strict=True)]
+    near = [coarse.near(*case) for case in zip(targets, enough, strict=True)]
     counts = np.array([len(rows) for rows in near])
     most = _most_cells(rod.box.dimension)
     few = counts <= most
     chosen = np.concatenate([rows[: len(rows) * ok] for rows, ok in zip(near, few, strict=True)])
-    cells = Cells(np.repeat(np.arange(len(gap)), counts * few), coarse.center[chosen])
-    enough = np.where(few, _ENOUGH * gap, 0.0)
+    cells = Cells(np.repeat(np.arange(len(enough)), counts * few), coarse.center[chosen])
+    enough = np.where(few, enough, 0.0)
 
     def bound(part: Cells, at: Linearized) -> Array:
         return _distances(targets[part.owner], at)

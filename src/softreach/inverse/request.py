@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softreach.rod.activation_box import ActivationBox
+from softreach.rod.tip_map import TipMap
 from softreach.support.arguments import as_number
 from softreach.support.arrays import Array, Index, as_floats, as_rows, check_finite
 from softreach.support.errors import InvalidInput, Range
@@ -26,7 +27,10 @@ class Request:
     targets: Array
     """Where the tip should be [m], shape (t, 3)."""
     residual: float
-    """Largest |tip - target| of a solution [m]."""
+    """|tip - target| at which a search has found its target [m]."""
+    allowance: float
+    """|tip - target| that the error of the tips leaves open [m], `residual` at least: no target so
+    near to a tip of the arm is out of reach."""
     near: Array
     """Activations of the free bundles to stay near to [-], shape (t, dimension)."""
     direction: Array | None = None
@@ -81,6 +85,16 @@ def as_activations(name: str, activations: ArrayLike, box: ActivationBox, count:
 def as_residual(residual_over_length: float) -> float:
     """The largest |tip - target| in L, if that can be asked for."""
     return as_number("residual_over_length", residual_over_length, Range(*_RESIDUALS))
+
+
+def allowance(rod: TipMap, residual: float) -> float:
+    """|tip - target| [m] within which a target is reached: the error of tips, or a wider residual.
+
+    Args:
+        rod: The tip map.
+        residual: To which solutions are searched [m].
+    """
+    return max(residual, rod.tol * rod.length)
 
 
 def positions_in(text: str, source: str) -> list[list[float]]:

@@ -52,9 +52,10 @@ class Roots(NamedTuple):
         everything = joined(parts)
         return rows(everything, np.argsort(everything.target, kind="stable"))
 
-    def missing(self, targets: int) -> Index:
-        """Which of so many targets have no stable root."""
-        return np.flatnonzero(np.bincount(self.target[self.stable], minlength=targets) == 0)
+    def missing(self, targets: int, residual: float = np.inf) -> Index:
+        """Which of so many targets have no stable root within a residual [m]."""
+        known = self.target[self.stable & (self.residual <= residual)]
+        return np.flatnonzero(np.bincount(known, minlength=targets) == 0)
 
 
 def no_roots(rod: TipMap) -> Roots:

@@ -25,11 +25,13 @@ class Status(IntEnum):
     """Outcome of the search for a target."""
 
     REACHED = 0
-    """Some activation within the bounds puts the tip there, in a stable equilibrium."""
+    """Some activation within the bounds puts the tip there, in a stable equilibrium, or as near as
+    `tol`, the error of the tips, can tell; its residual says how near."""
     UNREACHABLE = 1
-    """None does, which is proved: `gap_bound` is positive."""
+    """None does, which is proved: no tip is nearer than `gap_bound`, which exceeds `tol` L."""
     NOT_FOUND = 2
-    """The search ended without one, and without a proof that there is none."""
+    """The search ended without one, farther away than `tol` L, and without a proof that there is
+    none."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,7 +57,8 @@ class Solution:
     gap: float
     """|nearest - target| [m]."""
     gap_bound: float
-    """A proved lower bound of the distance to the reachable set [m]; 0 if nothing is proved."""
+    """A proved lower bound of the distance to all tips within the bounds [m], more than their
+    error; 0 if nothing is proved."""
     change_bound: float
     """A proved lower bound of |γ - near| of all activations that reach the target, in their unit,
     or of each over its range where units differ; 0 if nothing is proved, which it is only where
@@ -110,7 +113,7 @@ class Solutions(Sequence[Solution]):
     gaps: Array
     """Shape (t,) [m]."""
     gap_bounds: Array
-    """Proved lower bounds of the distance to the reachable set, shape (t,) [m]."""
+    """Proved lower bounds of the distance to all tips, 0 if nothing is proved, shape (t,) [m]."""
     change_bounds: Array
     """Proved lower bounds of |γ - near| of all activations that reach a target, shape (t,).
 

@@ -15,11 +15,19 @@ from softreach.inverse.prepared import PreparedMap, prepared_map
 from softreach.inverse.proofs import SLACK, change_bounds, gap_bounds
 from softreach.inverse.request import (
     Request,
+    allowance,
     as_activations,
     as_residual,
     as_targets,
 )
-from softreach.inverse.roots import Roots, conditions, nearly_singular_roots, no_roots, roots_at
+from softreach.inverse.roots import (
+    Roots,
+    conditions,
+    nearly_singular_roots,
+    no_roots,
+    placed,
+    roots_at,
+)
 from softreach.inverse.solutions import Solutions, Status
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
@@ -64,7 +72,9 @@ def solve_inverse(
     Args:
         arm: The design, its tip map, or what `prepared_map` made of it.
         targets: Tip positions to reach [m], shape (t, 3).
-        residual_over_length: Largest |tip - target| of a solution, in L.
+        residual_over_length: |tip - target| to which a solution is searched, in L. Where the arm
+            comes no nearer than to within `tol`, its nearest activations are the solutions: whether
+            it reaches such a target is more than its tips can say.
         near: With more than three free bundles: the activation to stay near to [unit of each],
             shape (bundles,) or (t, bundles); by default rest. Where units differ, the change of
             each activation counts in its own range.
@@ -81,7 +91,8 @@ def solve_inverse(
             where it may not succeed; with more nothing is proved.
         seed: Seed of these.
         tol: Largest error of the tips themselves, in L; residuals refer to `tip_positions` with
-            this tolerance. A tip map keeps its own.
+            this tolerance. No target nearer to a tip than that is called out of reach. A tip map
+            keeps its own.
 
     Returns:
         One `Solution` for each target; failures are its status, never an exception.
@@ -97,9 +108,11 @@ def solve_inverse(
     points, box = as_targets("targets", targets), prepared.whole.box
     rest = np.zeros(box.bundles) if near is None else near
     unit = None if direction is None else as_directions("direction", direction, len(points))
+    residual = as_residual(residual_over_length) * prepared.whole.length
     request = Request(
         targets=points,
-        residual=as_residual(residual_over_length) * prepared.whole.length,
+        residual=residual,
+        allowance=allowance(prepared.whole, residual),
         near=as_activations("near", rest, box, len(points)) / prepared.measures[box.free],
         direction=unit,
         direction_weight=as_number("direction_weight", direction_weight, Range(0.0, 1e6)),
@@ -126,36 +139,32 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     missing = roots.missing(count)
     blocks = parallel.blocks(len(missing), _BLOCK) or [slice(0)]
     closest = joined([nearest(prepared, request.of(missing[block])) for block in blocks])
-    solutions = _solutions(prepared, request, roots, missing, closest)
-    left = np.flatnonzero(_perhaps_singular(prepared, solutions))
+    bounds = _gap_bounds(prepared, request.of(missing), closest.gap)
+    left = missing[_perhaps_singular(prepared, request, closest.gap, bounds)]
     if len(left):
         late = distinct(prepared, request, nearly_singular_roots(prepared, request, left))
-        if len(late.target):
-            roots = roots.joined(late)
-            again = roots.missing(count)
-            closest = rows(closest, np.isin(missing, again))
-            bounds = solutions.gap_bounds
-            solutions = _solutions(prepared, request, roots, again, closest, bounds)
+        roots, still = roots.joined(late), np.isin(missing, late.target, invert=True)
+        missing, closest, bounds = missing[still], rows(closest, still), bounds[still]
+    solutions = _solutions(prepared, request, roots, missing, closest, bounds)
     return replace(solutions, unstable=unstable)
 
 
-def _perhaps_singular(prepared: PreparedMap, solutions: Solutions) -> Mask:
+def _perhaps_singular(prepared: PreparedMap, request: Request, gap: Array, bound: Array) -> Mask:
     """Which targets may have roots that only a search of nearly singular ones finds.
 
     Those not proved to be out of reach; where nothing is proved, those that are nearly reached.
     """
-    left = solutions.statuses == Status.NOT_FOUND
+    left = (gap > request.residual) & (bound == 0.0)
     if prepared.proves:
         return left
-    return left & (solutions.gaps <= _NEARLY * prepared.whole.length)
+    return left & (gap <= _NEARLY * prepared.whole.length)
 
 
 def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
     """Nearest points, or compromises between distance and direction."""
     roots = _stable_roots(prepared, request) if prepared.dimension == 3 else None
-    everything = np.arange(len(request.targets))
     closest = nearest(prepared, request, roots)
-    return _solutions(prepared, request, no_roots(prepared.rod), everything, closest)
+    return _with_nearest(prepared, request, no_roots(prepared.rod), closest)
 
 
 def _stable_roots(prepared: PreparedMap, request: Request) -> Roots:
@@ -169,14 +178,14 @@ def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
     roots = roots_at(prepared.rod, request.targets, target, gamma)
     missing = roots.missing(len(request.targets))
     closest = nearest_from(prepared.rod, request.of(missing), best.gamma[missing])
-    solutions = _solutions(prepared, request, roots, missing, closest)
+    solutions = _with_nearest(prepared, request, roots, closest)
     provable = request.prove_least and prepared.proves
     return _with_proofs(prepared, request, solutions) if provable else solutions
 
 
 def _with_proofs(prepared: PreparedMap, request: Request, solutions: Solutions) -> Solutions:
-    """The solutions, with bounds of the change where targets are reached."""
-    reached = np.flatnonzero(solutions.statuses == Status.REACHED)
+    """The solutions, with bounds of the change where targets are reached to the residual."""
+    reached = np.flatnonzero(solutions.gaps <= request.residual)
     first = solutions.activations[solutions.offsets[reached]][:, prepared.whole.box.free]
     asked = request.of(reached)
     change = np.linalg.norm(first - asked.near, axis=1)
@@ -186,13 +195,34 @@ def _with_proofs(prepared: PreparedMap, request: Request, solutions: Solutions) 
     return replace(solutions, change_bounds=bounds, least_proved=proved)
 
 
+def _with_nearest(
+    prepared: PreparedMap, request: Request, roots: Roots, closest: Nearest
+) -> Solutions:
+    """The solutions, from roots and the nearest points to all targets that have none."""
+    missing = roots.missing(len(request.targets))
+    bounds = _gap_bounds(prepared, request.of(missing), closest.gap)
+    return _solutions(prepared, request, roots, missing, closest, bounds)
+
+
+def _gap_bounds(prepared: PreparedMap, request: Request, gap: Array) -> Array:
+    """Lower bounds of the distance of targets to all tips; 0 where they prove nothing."""
+    bounds, out = np.zeros(len(gap)), np.flatnonzero(gap > request.allowance)
+    # Where the position yields to a direction, the gap says nothing of what can be reached.
+    yielding = request.direction is not None and prepared.dimension <= 3
+    if len(out) and not yielding and (prepared.proves or not prepared.dimension):
+        asked = request.targets[out], gap[out], request.allowance
+        bounds[out] = gap_bounds(prepared.rod, prepared.coarse_cells, *asked)
+    # Within the error of the tips, what is true of them need not be true of the arm.
+    return np.where(bounds > request.allowance, bounds, 0.0)
+
+
 def _solutions(
     prepared: PreparedMap,
     request: Request,
     roots: Roots,
     missing: Index,
     closest: Nearest,
-    proved_gaps: Array | None = None,
+    bounds: Array,
 ) -> Solutions:
     """Put together the roots and, for targets without one, the nearest points.
 
@@ -202,32 +232,23 @@ def _solutions(
         roots: The roots found, sorted by target.
         missing: Numbers of the targets without a root.
         closest: The nearest points to these; some may prove to be roots.
-        proved_gaps: Lower bounds of the gaps of all targets, if they are known already.
+        bounds: Lower bounds of the gaps of these.
     """
     rod, count = prepared.rod, len(request.targets)
-    at_closest = roots_at(rod, request.targets, missing, closest.gamma)
-    hit = at_closest.residual <= request.residual
-    roots = roots.joined(rows(at_closest, hit))
+    hit = closest.gap <= request.allowance
+    roots = roots.joined(roots_at(rod, request.targets, missing[hit], closest.gamma[hit]))
+    # Roots on a bound that miss by what the error of the tips leaves open come last.
+    roots = rows(roots, np.lexsort((roots.residual > request.residual, roots.target)))
     statuses = np.full(count, Status.REACHED, np.int8)
-    out, far = missing[~hit], at_closest.residual[~hit]
-    bounds = np.zeros(count)
-    # Where the position yields to a direction, the gap says nothing of what can be reached.
-    yielding = request.direction is not None and prepared.dimension <= 3
-    if proved_gaps is not None:
-        bounds[out] = proved_gaps[out]
-    elif len(out) and not yielding and (prepared.proves or not prepared.dimension):
-        bounds[out] = gap_bounds(rod, prepared.coarse_cells, request.targets[out], far)
-    proved = bounds[out] > request.residual
-    statuses[out] = np.where(proved, Status.UNREACHABLE, Status.NOT_FOUND)
-    gamma, gaps = np.empty((count, rod.box.bundles)), np.empty(count)
+    statuses[missing[~hit]] = np.where(bounds[~hit] > 0.0, Status.UNREACHABLE, Status.NOT_FOUND)
+    gamma, gaps, proved_gaps = np.empty((count, rod.box.bundles)), np.empty(count), np.zeros(count)
     reached, first = np.unique(roots.target, return_index=True)
     gamma[reached], gaps[reached] = roots.gamma[first], roots.residual[first]
     points = request.targets.copy()
-    points[missing], gamma[missing], gaps[missing] = (
-        closest.tip,
-        closest.gamma,
-        at_closest.residual,
-    )
+    off = reached[gaps[reached] > request.residual]
+    points[off] = placed(rod, gamma[off])[0]
+    points[missing], gamma[missing], gaps[missing] = closest.tip, closest.gamma, closest.gap
+    proved_gaps[missing] = bounds
     return Solutions(
         arm=prepared.whole.arm,
         bundles=prepared.whole.box.names,
@@ -241,7 +262,7 @@ def _solutions(
         nearest=points,
         nearest_activations=prepared.whole.box.with_fixed(gamma),
         gaps=gaps,
-        gap_bounds=bounds,
+        gap_bounds=proved_gaps,
         change_bounds=np.zeros(count),
         least_proved=np.zeros(count, bool),
         unstable=np.zeros(count, np.int64),
