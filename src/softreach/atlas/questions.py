@@ -11,7 +11,6 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator
 from softreach.atlas.arguments import a_store, an_atlas, an_interval
 from softreach.atlas.design_task import activations_of
-from softreach.atlas.layout import array_plans
 from softreach.atlas.reading import TOLD, command_of, contents, opened_atlas
 from softreach.atlas.store import (
     DAMAGED,
@@ -36,7 +35,7 @@ from softreach.support.arguments import (
     text,
     whole,
 )
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, warn
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -104,8 +103,18 @@ def verify_atlas(store: StoreLike) -> AtlasStatus:
     Raises:
         InvalidInput: There is no atlas.
         DamagedStore: What all designs share is damaged.
+
+    Warns:
+        SoftreachWarning: An earlier version began it, which did not bind files to their place.
     """
-    return _verified(AtlasStore.open(store, "r"), tips=True)
+    opened = AtlasStore.open(store, "r")
+    if not opened.is_bound:
+        warn(
+            f"{opened.location} was begun by an earlier version of softreach: damage of a file is "
+            "noticed, but not a whole file of another design or atlas in its place; build it again "
+            "in a new folder to have that too"
+        )
+    return _verified(opened, tips=True)
 
 
 @checked(atlas=an_atlas)
@@ -211,7 +220,7 @@ def _is_small(store: AtlasStore) -> bool:
 
 
 def _verified(store: AtlasStore, *, tips: bool) -> AtlasStatus:
-    for plan in array_plans(store.command):
+    for plan in store.plans:
         if plan.name not in PER_DESIGN:
             store.array(plan.name)[...]
     numbers = range(store.command.space.size) if tips else ()
