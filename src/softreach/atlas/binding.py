@@ -43,8 +43,7 @@ def bind(store: AtlasStore, status: NDArray[np.uint8], known: NDArray[np.bool_])
     Returns:
         Number of each design whose status or binding is damaged -> message.
     """
-    ended = np.flatnonzero(status).tolist()
-    if not ended:
+    if not status.any():
         return {}
     with store.watch.noting() as noted:
         bound = np.asarray(store.array(CHECKSUM)[...]).reshape(status.size, len(FILES))
@@ -61,8 +60,13 @@ def bind(store: AtlasStore, status: NDArray[np.uint8], known: NDArray[np.bool_])
 
     store.watch.belongs = belongs
     with store.watch.noting() as noted:
-        for number in ended:
-            chunk = Chunk("status", store.command.space.place(number))
-            if bound[number, 0] != bound_checksum(store.watch, chunk, int(status[number])):
+        ended = np.flatnonzero(status)
+        places = np.argwhere(status.reshape(store.command.space.shape))
+        of_each = zip(
+            places.tolist(), status[ended].tolist(), bound[ended, 0].tolist(), strict=True
+        )
+        for place, value, expected in of_each:
+            chunk = Chunk("status", tuple(place))
+            if expected != bound_checksum(store.watch, chunk, value):
                 store.watch.report(chunk, MISPLACED)
     return {store.number(chunk): line for chunk, line in noted.items()} | damaged
