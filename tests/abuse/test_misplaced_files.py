@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import re
 import warnings
@@ -105,6 +106,21 @@ def test_an_interrupted_copy_over_a_cloud_is_noticed(clouds, tmp_path):
             assert isinstance(raised_by(lambda place=place: sr.open_cloud(place)), DamagedStore)
     whole = sr.open_cloud(written(other, tmp_path / "a.zarr"))
     assert whole.identical(cloud_of(1))
+
+
+@pytest.mark.parametrize("way", ["other arrays", "added arrays"])
+def test_of_several_arrays_of_another_cloud_only_the_first_is_told(clouds, tmp_path, caplog, way):
+    """What a library loses in its threads is not printed when they end."""
+    own, other = clouds["own"], clouds["other"]
+    tips = {name.removeprefix("tip/"): text for name, text in taken("tip")(own, own).items()}
+    files = {
+        "other arrays": taken("tip", "activation", "status")(own, other),
+        "added arrays": {f"my_{k}/{name}": text for k in "abcd" for name, text in tips.items()},
+    }[way]
+    place = written(own | files, tmp_path / "a.zarr")
+    raised_by(lambda: sr.open_cloud(place))
+    gc.collect()
+    assert "never retrieved" not in caplog.text
 
 
 # ---------------------------------------------------------------- atlases

@@ -71,6 +71,7 @@ _TYPES = (
 """Numbers and texts: nothing complex, no dates, no bytes, no objects."""
 _CODECS = ("bytes", "vlen-utf8", "blosc", "zstd", "gzip", "crc32c")
 """Those of the Zarr v3 core; none of them can run code."""
+_FOREIGN = "not listed in the root", "one of those that softreach wrote, or moved away"
 _GROUP = {"zarr_format", "node_type", "attributes", "consolidated_metadata"}
 
 
@@ -151,12 +152,9 @@ def check_arrays(opened: Opened) -> None:
     """Check that the arrays of a store are there, and agree on the sizes of their dimensions.
 
     Raises:
-        DamagedStore: One is missing, or of another size, or has no dimensions.
+        DamagedStore: One is missing or foreign, or of another size, or has no dimensions.
     """
-    arrays: dict[str, Any] = dict(opened.group.arrays())
-    for name in opened.watch.digests:
-        if name not in arrays:
-            opened.watch.report(Chunk(name, None), "missing")
+    arrays = _arrays(opened)
     sizes: dict[str, tuple[int, str]] = {}
     for name, array in arrays.items():
         dims = array.metadata.dimension_names or ()
@@ -167,6 +165,25 @@ def check_arrays(opened: Opened) -> None:
             if known != size:
                 allowed = f"of {known} as {other} is"
                 opened.watch.report(Chunk(name, None), f"of {size} along {dim}", allowed)
+
+
+def _arrays(opened: Opened) -> dict[str, Any]:
+    """The arrays of a store, opened one after the other.
+
+    Of several that Zarr opens at once, it loses all errors but the first, and the traceback of
+    each is printed when the process ends.
+    """
+    watch, arrays = opened.watch, {}
+    if isinstance(watch.location, str) and "://" not in watch.location:
+        documents = Path(watch.location).glob(f"*/{DOCUMENT}")
+        for name in sorted({path.parent.name for path in documents} - watch.digests.keys()):
+            watch.report(Chunk(name, None), *_FOREIGN)
+    for name in watch.digests:
+        try:
+            arrays[name] = opened.group[name]
+        except KeyError:
+            watch.report(Chunk(name, None), "missing")
+    return arrays
 
 
 def kind_of(path: str | os.PathLike[str]) -> Kind:
@@ -274,7 +291,7 @@ class CheckedStore(WrapperStore[Any]):
         if chunk.array:
             document = _parsed(text)
             if chunk.array not in self.watch.digests:
-                raise _Broken("not listed in the root", "one of those that softreach wrote")
+                raise _Broken(*_FOREIGN)
             if _digest(document) != self.watch.digests[chunk.array]:
                 raise _Broken("changed since it was written")
             _check_kind(document)
