@@ -332,7 +332,8 @@ def test_a_cloud_and_an_atlas_are_not_taken_for_each_other(cloud_files, atlas_fi
 
 SHARED = ("taper", "outer_radius", "metric", "axis", "unit_activation", "quantity", "station")
 SHARED += ("quantile",)
-FIRST = {"metrics": "0/0/0", "curvature": "0/0/0/0/0", "tip": "0/0/0/0", "status": "0/0"}
+FIRST = {"metrics": "0/0/0", "curvature": "0/0/0/0/0", "tip": "0/0/0/0", "checksum": "0/0/0"}
+FIRST |= {"status": "0/0"}
 SHARED_FILES = {
     file: ANY_FILE | DELETED
     for name in SHARED
@@ -342,6 +343,7 @@ DESIGN_DOCUMENTS = {f"{name}/zarr.json": ANY_FILE | DELETED for name in (*FIRST,
 DESIGN_CHUNKS = {
     **{f"{name}/c/{place}": ANY_FILE | DELETED for name, place in FIRST.items()},
     "message/c/1/0": ANY_FILE | DELETED,  # of the gap
+    "checksum/c/1/0/0": ANY_FILE | DELETED,
     "status/c/1/0": ANY_FILE | DELETED,
 }
 
@@ -368,7 +370,7 @@ def test_a_damaged_design_is_named(atlas_files, tmp_path, file):
         if not (place / file).exists() and array == "status":
             assert (found.todo, found.damaged) == (1, 0)
         else:
-            number = 2 if file.startswith(("message", "status/c/1")) else 0
+            number = 2 if file.startswith(("message", "checksum/c/1", "status/c/1")) else 0
             assert found.damaged == 1
             assert f"chunk {chunk} of array {array} in {place} = " in found.messages[number]
 

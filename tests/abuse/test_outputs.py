@@ -18,6 +18,7 @@ from softreach.plot import save_figure
 from softreach.support.errors import InvalidInput, NotWritten, SoftreachWarning
 from softreach.support.files.atomic import writing
 from softreach.support.files.kinds import PICTURES
+from softreach.support.files.stores import sealed
 from tests.abuse.refusals import files_in, raised_by, refusal_of
 
 pytest.importorskip("pyarrow")
@@ -237,7 +238,7 @@ UNWRITABLE = [
     case(f"cloud {TRUNK} --out notes.csv", "must be a file name ending in .zarr"),
     case(f"cloud {TRUNK} --out taken/a.zarr", "a part of its path is a file"),
     case(f"cloud {TRUNK} --out atlas.zarr", ELSE),
-    case(f"cloud {TRUNK} --out broken.zarr", ELSE),
+    case(f"cloud {TRUNK} --out broken.zarr", "zarr.json is not as softreach wrote it"),
     case(f"cloud {TRUNK} --out folder.zarr --overwrite", "never replaced"),
     case(f"volume {TRUNK} --out a.txt", SURFACES),
     case(f"volume {TRUNK} --out taken/a.ply", "a part of its path is a file"),
@@ -283,11 +284,11 @@ def crowded(tmp_path, monkeypatch):
         (tmp_path / name / "report.html").write_text("mine")
         (tmp_path / name / "cloud.png").write_text("mine")
     for name, content in {
-        "atlas.zarr": '{"attributes": {"command": "{}"}, "node_type": "group"}',
-        "broken.zarr": '{"attributes": {"sam',
+        "atlas.zarr": sealed(b'{"attributes": {"command": "{}"}, "node_type": "group"}'),
+        "broken.zarr": b'{"attributes": {"sam',
     }.items():
         (tmp_path / name).mkdir()
-        (tmp_path / name / "zarr.json").write_text(content)
+        (tmp_path / name / "zarr.json").write_bytes(content)
     return tmp_path
 
 

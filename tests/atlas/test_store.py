@@ -203,7 +203,7 @@ def test_other_activations_are_noticed_and_written_again(tmp_path):
     store = AtlasStore.begin(tmp_path / "a.zarr", command(small_space(), **SMALL))
     cube = store.cube.copy()
     store.group["unit_activation"][0, 0] = 0.5
-    with pytest.raises(SoftreachError, match=r"unit_activation in .* = with other activations"):
+    with pytest.raises(SoftreachError, match=r"unit_activation in .* = of another store"):
         _ = AtlasStore.open(tmp_path / "a.zarr").cube
     mended = AtlasStore.begin(tmp_path / "a.zarr", command(small_space(), **SMALL))
     assert np.array_equal(mended.cube, cube)

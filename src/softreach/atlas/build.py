@@ -35,7 +35,7 @@ STORED = 6.2
 """Size of a stored tip [bytes]."""
 
 _ON_DISK = 4096  # bytes that the smallest file takes
-_FILES = 4  # of a design without tips: status, message, metrics, curvature
+_FILES = 5  # of a design without tips: status, message, checksum, metrics, curvature
 _HELD = 700  # bytes of memory of a sample and its share of the triangulation
 
 

@@ -13,7 +13,7 @@ from softreach.atlas.command import Command
 from softreach.atlas.metric import Metric
 from softreach.schema import AXES
 
-__all__ = ["CUBE", "MISSING", "RESOLUTION", "SEAL", "Plan", "array_plans"]
+__all__ = ["CHECKSUM", "CUBE", "FILES", "MISSING", "RESOLUTION", "SEAL", "Plan", "array_plans"]
 
 RESOLUTION = 1e-5
 """Step of stored tips over the shortest length: no coordinate is off by more than half of it."""
@@ -23,6 +23,12 @@ SEAL = "metrics"
 
 CUBE = "unit_activation"
 """The array of activations that all designs share."""
+
+FILES = {"status": 0, "message": 0, "curvature": 3, "tip": 2, "metrics": 1}
+"""The arrays of which a design has a chunk -> their dimensions beside those of the designs."""
+
+CHECKSUM = "checksum"
+"""The array that binds these chunks to their design and store."""
 
 MISSING = int(np.iinfo(np.int32).min)
 """Number in place of a tip that is NaN, or not stored."""
@@ -46,7 +52,7 @@ class Plan:
         """Codecs of the Zarr v3 core, which every reader has; a checksum comes last."""
         from zarr.codecs import BloscCodec, Crc32cCodec
 
-        large = self.name in ("tip", CUBE)
+        large = self.name == "tip"  # activations are random bits, and the same bytes anywhere
         blosc = BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle")
         return (blosc, Crc32cCodec()) if large else (Crc32cCodec(),)
 
@@ -67,6 +73,8 @@ def array_plans(command: Command) -> Iterator[Plan]:
         yield from _profiles(command)
     if command.keep_clouds:
         yield _tips(command)
+    attrs = {"long_name": f"checksum, place and store of {', '.join(FILES)}: of each in one"}
+    yield _per_design(command, CHECKSUM, np.uint32, 0, {"file": len(FILES)}, attrs)
     sizes = {"metric": len(command.numbers)}
     yield _per_design(command, SEAL, np.float64, np.nan, sizes, _described(command))
 

@@ -11,7 +11,6 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator
 from softreach.atlas.arguments import a_store, an_atlas, an_interval
 from softreach.atlas.design_task import activations_of
-from softreach.atlas.layout import array_plans
 from softreach.atlas.reading import TOLD, command_of, contents, opened_atlas
 from softreach.atlas.store import (
     DAMAGED,
@@ -27,7 +26,7 @@ from softreach.atlas.store import (
 from softreach.rod.rods import tip_map
 from softreach.schema import cloud_dataset, with_status
 from softreach.support.arguments import as_flag, as_integer, as_mapping, as_number, as_text
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, warn
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -93,8 +92,18 @@ def verify_atlas(store: StoreLike) -> AtlasStatus:
     Raises:
         InvalidInput: There is no atlas.
         DamagedStore: What all designs share is damaged.
+
+    Warns:
+        SoftreachWarning: An earlier version began it, which did not bind files to their place.
     """
-    return _verified(AtlasStore.open(a_store("store", store), "r"), tips=True)
+    opened = AtlasStore.open(a_store("store", store), "r")
+    if not opened.is_bound:
+        warn(
+            f"{opened.location} was begun by an earlier version of softreach: damage of a file is "
+            "noticed, but not a whole file of another design or atlas in its place; build it again "
+            "in a new folder to have that too"
+        )
+    return _verified(opened, tips=True)
 
 
 def atlas_design(atlas: AtlasLike, **at: float) -> Manipulator:
@@ -192,7 +201,7 @@ def _is_small(store: AtlasStore) -> bool:
 
 
 def _verified(store: AtlasStore, *, tips: bool) -> AtlasStatus:
-    for plan in array_plans(store.command):
+    for plan in store.plans:
         if plan.name not in PER_DESIGN:
             store.array(plan.name)[...]
     numbers = range(store.command.space.size) if tips else ()

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.atlas.arguments import a_store, an_atlas
+from softreach.atlas.binding import bind
 from softreach.atlas.command import Command
+from softreach.atlas.layout import CHECKSUM
 from softreach.atlas.metric import Metric, Need
 from softreach.atlas.store import DAMAGED, FAILED, GAP, KNOWN, PER_DESIGN, UNSTABLE, AtlasStore
 from softreach.support.arguments import as_dataset, as_text
@@ -30,7 +32,7 @@ TOLD = (FAILED, GAP, UNSTABLE)
 """The status of designs that have a message."""
 
 _POWERS = {"m": 1, "m2": 2, "m3": 3, "1/m": -1}
-_READ_HERE = ("metrics", "metric", "curvature", "quantity", "status", "message")
+_READ_HERE = ("metrics", "metric", "curvature", "quantity", "status", "message", CHECKSUM)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,6 +74,8 @@ def contents(store: AtlasStore, *, metrics: bool = True, tips_of: Iterable[int] 
     reader = _Reader(store)
     status = reader.read("status").ravel()
     store.watch.required = _required(store, status)
+    if store.is_bound:
+        reader.damaged |= bind(store, status, np.isin(status, KNOWN))
     names = ("metrics", "curvature") if store.command.profiles else ("metrics",)
     tables = {name: reader.table(name, status) for name in names if metrics}
     for index in tips_of if store.command.keep_clouds else ():
@@ -177,13 +181,14 @@ class _Reader:
 def _required(store: AtlasStore, status: NDArray[np.uint8]) -> Callable[[Chunk], bool]:
     """Chunks that must be there, by the status of their designs."""
     known, told = np.isin(status, KNOWN), np.isin(status, TOLD)
+    of_array = {"message": told, CHECKSUM: known | told}
 
     def required(chunk: Chunk) -> bool:
         if chunk.array not in PER_DESIGN:
             return True
         if chunk.array == "status":
             return False
-        return bool((told if chunk.array == "message" else known)[store.number(chunk)])
+        return bool(of_array.get(chunk.array, known)[store.number(chunk)])
 
     return required
 

@@ -2,7 +2,9 @@
 
 No two tasks ever write to the same chunk. Zarr's local store writes every chunk beside its place
 and renames it, so a killed writer leaves chunks whole or absent; a design whose status is missing
-is computed again, whatever else of it exists.
+is computed again, whatever else of it exists. The chunk before the last binds the others to their
+design and to the root, so that one of another design or store is damage too; what all designs share
+is listed in the root.
 
 A store is created in three steps, so that the tasks of a job array may all do it at once and be
 killed anywhere: its root, which holds the command, appears at once and is never written again, so
@@ -24,19 +26,22 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.atlas.binding import bind, binding_of
 from softreach.atlas.command import Command
-from softreach.atlas.layout import CUBE, MISSING, SEAL, Plan, array_plans
+from softreach.atlas.layout import CHECKSUM, CUBE, FILES, MISSING, SEAL, Plan, array_plans
 from softreach.sampling import sample_cube
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.files.damage import Chunk, StoreFailed, Watch, storage_errors, writing
 from softreach.support.files.stores import (
     ARRAYS,
+    CHUNKS,
     REMEDY,
     CheckedStore,
     Opened,
     absolute,
     checked_place,
+    checksums_by_key,
     opened_root,
 )
 
@@ -50,7 +55,7 @@ TODO, DONE, FAILED, GAP, UNSTABLE, DAMAGED = range(6)
 KNOWN = (DONE, UNSTABLE)
 """The status of designs of which metrics are stored."""
 
-PER_DESIGN = ("status", "message", "curvature", "tip", "metrics")
+PER_DESIGN = (*FILES, CHECKSUM)
 """The arrays whose chunks are designs."""
 
 
@@ -124,7 +129,7 @@ class AtlasStore:
             raise InvalidInput("store", location, "an atlas written by build_atlas", hint)
         store = cls(location, Command.from_json(text), opened)
         opened.watch.required = _is_shared
-        for plan in array_plans(store.command):
+        for plan in store.plans:
             store.check(plan.name, plan.shape, plan.dims, plan.dtype)
         return store
 
@@ -143,6 +148,17 @@ class AtlasStore:
     def group(self) -> zarr.Group:
         """The arrays."""
         return self.opened.group
+
+    @property
+    def is_bound(self) -> bool:
+        """Whether chunks are bound to their designs; those of earlier versions are not."""
+        return CHECKSUM in self.watch.digests
+
+    @property
+    def plans(self) -> list[Plan]:
+        """What its arrays must be, the seal last."""
+        plans = array_plans(self.command)
+        return [plan for plan in plans if plan.name != CHECKSUM or self.is_bound]
 
     @property
     def watch(self) -> Watch:
@@ -193,7 +209,10 @@ class AtlasStore:
         array = self.array("status")
         with self.watch.noting() as noted:
             status = np.array(array[...]).ravel()
-        status[[self.number(chunk) for chunk in noted]] = DAMAGED
+        damaged = [self.number(chunk) for chunk in noted]
+        if self.is_bound:
+            damaged += bind(self, status, np.isin(status, KNOWN))
+        status[damaged] = DAMAGED
         return status
 
     def number(self, chunk: Chunk) -> int:
@@ -260,6 +279,8 @@ class AtlasStore:
         """Store how a design ended, and why."""
         place = self.command.space.place(index)
         self.array("message")[place] = np.array(message, dtype=np.dtypes.StringDType())
+        if self.is_bound:
+            self.array(CHECKSUM)[place] = binding_of(self, place, status)
         self.array("status")[place] = status
 
 
@@ -282,26 +303,34 @@ def digest(cube: Array) -> str:
 def _attributes(command: Command) -> dict[str, Any]:
     """Attributes of the root."""
     versions = {name: version(name) for name in ("numpy", "scipy", "zarr", "xarray", "numba")}
+    cube = drawn_cube(command)
     return {
         "title": "reachability cloud atlas",
         "design": command.space.base.to_toml(),
-        "unit_activation_sha256": digest(drawn_cube(command)),
+        "unit_activation_sha256": digest(cube),
         "versions": ", ".join(f"{name} {number}" for name, number in versions.items()),
         "command": command.to_json(),
-        ARRAYS: _digests(command),
+        **_lists(command, cube),
     }
 
 
-def _digests(command: Command) -> dict[str, str]:
-    """Digest of what describes each array, before any of them is written."""
+def _lists(command: Command, cube: Array) -> dict[str, Any]:
+    """Digest of what describes each array, and checksums of what all designs share.
+
+    They are known before any of it is written, as its bytes are the same whoever writes them.
+    """
     import zarr
     from zarr.storage import MemoryStore
 
     watch = Watch(location="memory", remedy="")
     group = zarr.create_group(CheckedStore(MemoryStore(), watch, ""), zarr_format=3)
-    for plan in array_plans(command):
-        _described(group, plan)
-    return watch.digests
+    plans = {plan.name: plan for plan in array_plans(command)}
+    for name, plan in plans.items():
+        array, data = _described(group, plan), cube if name == CUBE else plan.data
+        if data is not None:
+            array[...] = data
+    shared = [name for name in plans if name not in PER_DESIGN]
+    return {ARRAYS: watch.digests, CHUNKS: checksums_by_key(watch, *shared)}
 
 
 def _is_shared(chunk: Chunk) -> bool:
@@ -360,7 +389,7 @@ def _complete(store: AtlasStore) -> None:
     Raises:
         StoreFailed: This machine draws other activations than the one that began the store.
     """
-    *plans, seal = array_plans(store.command)
+    *plans, seal = store.plans
     with store.watch.noting():  # what is damaged counts as missing
         for plan in plans:
             if not _is_stored(store, plan):

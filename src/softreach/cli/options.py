@@ -48,7 +48,7 @@ Durable = Annotated[
 ]
 Overwrite = Annotated[
     bool,
-    Parameter(group=OUTPUT, help="Replace what is in the way, whatever it is."),
+    Parameter(group=OUTPUT, help="Replace any file, or store of softreach, that is in the way."),
 ]
 
 

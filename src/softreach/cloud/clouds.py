@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
@@ -32,6 +31,8 @@ from softreach.support.files.stores import (
     REMEDY,
     check_arrays,
     checked_place,
+    foreign_entry,
+    kind_of,
     list_arrays,
     opened_root,
 )
@@ -118,7 +119,8 @@ def save_cloud(
         cloud: From `compute_cloud`, or a part of its samples.
         path: The folder to write.
         durable: Whether to return only when not even a power cut can lose it, which takes longer.
-        overwrite: Whether it may replace any file and any Zarr store, and not only a cloud.
+        overwrite: Whether it may replace any file and an atlas, and not only a cloud; a folder with
+            anything in it that softreach did not write is never replaced.
 
     Raises:
         InvalidInput: The dataset is no cloud, its design, bundles and length do not agree, or
@@ -210,18 +212,16 @@ def _of_all_bundles(rod: TipMap) -> TipMap:
 
 
 def _is_cloud(path: Path) -> bool:
-    """Whether a folder holds a stored cloud and nothing else."""
+    """Whether the store of softreach at a path is a cloud."""
     try:
-        about = json.loads((path / "zarr.json").read_bytes())["attributes"]
-        names = {entry.name for entry in path.iterdir()} - {"zarr.json"}
-        inside = (entry.name for name in names for entry in (path / name).iterdir())
-        only = set(inside) <= {"zarr.json", "c"}
-        return only and {"tip", "activation"} <= names and {"sampler", "tol"} <= about.keys()
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return kind_of(path) == "cloud"
+    except InvalidInput:
         return False
 
 
-CLOUD_STORE: Formats = {".zarr": FileKind("a stored cloud", _is_cloud)}
+CLOUD_STORE: Formats = {
+    ".zarr": FileKind("a stored cloud", _is_cloud, foreign=foreign_entry),
+}
 """What `save_cloud` writes, and replaces."""
 
 

@@ -109,7 +109,8 @@ def check_place(
         path: The place.
         kind: What will be written: it may replace nothing, an empty file or folder, and its kind.
         takes: What it will take of the disk, if that may be much [bytes].
-        overwrite: Whether it may replace any file, and a Zarr store of any kind.
+        overwrite: Whether it may replace any file, and any store of softreach. A folder with
+            anything else in it is never replaced.
         name: What errors call the path.
 
     Returns:
@@ -303,10 +304,12 @@ def _refusal(
 ) -> tuple[str, str] | tuple[str] | None:
     """Why what is there may not be replaced: what is allowed, and what to do."""
     if stat.S_ISDIR(mode):
-        content = {entry.name for entry in os.scandir(target)}
-        if Path.cwd().is_relative_to(target) or (content and "zarr.json" not in content):
-            return ("a new name; a folder with other things is there, which is never replaced",)
-        free = not content
+        foreign = kind.foreign(target)
+        if foreign or Path.cwd().is_relative_to(target):
+            allowed = "a new name; a folder with other things is there, which is never replaced"
+            hint = f"{foreign} is not as softreach wrote it: move it away, or choose another name"
+            return (allowed, hint) if foreign else (allowed,)
+        free = not any(target.iterdir())
     elif stat.S_ISREG(mode):
         free = target.stat().st_size == 0
     else:

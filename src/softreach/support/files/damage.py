@@ -13,6 +13,7 @@ from softreach.support.files.interruption import as_a_whole
 DOCUMENT = "zarr.json"
 """The file that describes an array, or a store."""
 AS_WRITTEN = "as softreach wrote it"
+MISPLACED = "of another store or place"
 
 
 class StoreFailed(SoftreachError):
@@ -59,6 +60,11 @@ class Chunk(NamedTuple):
             return None
         return cls(array, tuple(map(int, places)))
 
+    @property
+    def key(self) -> str:
+        """The key of a chunk."""
+        return "/".join((self.array, "c", *map(str, self.place or ())))
+
 
 @dataclass(kw_only=True, eq=False)
 class Watch:
@@ -73,6 +79,14 @@ class Watch:
     """Digest of what describes each array, as the root lists it or as it was written."""
     listed: bool = False
     """Whether the digests are those of the root."""
+    root: str = ""
+    """Digest of the root that was read."""
+    listed_checksums: dict[str, int] = field(default_factory=dict)
+    """Checksum of each chunk of what is written only once, by its key."""
+    belongs: Callable[[Chunk, int], bool] = lambda *_: True
+    """Whether a chunk with this checksum is of this store and place, where that is not listed."""
+    written: dict[Chunk, int] = field(default_factory=dict)
+    """Checksums of the chunks that were written."""
     _noted: dict[Chunk, str] | None = field(default=None, init=False)
 
     def report(self, chunk: Chunk, found: str, allowed: str = AS_WRITTEN) -> None:

@@ -19,6 +19,7 @@ __all__ = [
     "Recognizes",
     "beginning_with",
     "check_installed",
+    "first_entry",
     "format_of",
     "text_with",
 ]
@@ -27,6 +28,11 @@ Recognizes = Callable[[Path], bool]
 """Whether what is at a path, which exists, is of some kind."""
 
 _HEAD = 4096  # bytes in which a file says what it is
+
+
+def first_entry(folder: Path) -> str:
+    """The first thing in a folder; empty if there is none."""
+    return min((entry.name for entry in folder.iterdir()), default="")
 
 
 class FileKind(NamedTuple):
@@ -42,6 +48,8 @@ class FileKind(NamedTuple):
     """The extra of softreach that brings these."""
     write: Callable[[Any, BufferedWriter], None] | None = None
     """Writes a content to a file, where several formats take the same content."""
+    foreign: Callable[[Path], str] = first_entry
+    """The first thing in a folder for which it is never replaced; empty if there is none."""
 
 
 Formats = Mapping[str, FileKind]

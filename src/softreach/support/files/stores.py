@@ -2,6 +2,9 @@
 
 Every chunk ends with the checksum of Zarr's crc32c codec. The root lists the digest of what
 describes each array, and ends with its own: any change of any file is noticed when it is read.
+Chunks that are written only once are listed with their checksums, by what describes their array or
+by the root, so that a whole chunk of another store or place is noticed too. Stores of earlier
+versions have no such lists.
 """
 
 from __future__ import annotations
@@ -23,11 +26,13 @@ from softreach.support.files.atomic import sync_file_in
 from softreach.support.files.damage import (
     AS_WRITTEN,
     DOCUMENT,
+    MISPLACED,
     Chunk,
     DamagedStore,
     Watch,
     storage_errors,
 )
+from softreach.support.files.kinds import first_entry
 
 if TYPE_CHECKING:
     import zarr
@@ -40,6 +45,8 @@ Mode = Literal["r", "r+"]
 
 ARRAYS = "arrays"
 """Attribute of the root: digest of what describes each array, by its name."""
+CHUNKS = "chunks"
+"""Attribute of the root or an array: checksum of each chunk that is written once, by its key."""
 DIGEST = "sha256"
 """Attribute of the root: digest of all of it but this attribute."""
 REMEDY = {
@@ -64,6 +71,7 @@ _TYPES = (
 """Numbers and texts: nothing complex, no dates, no bytes, no objects."""
 _CODECS = ("bytes", "vlen-utf8", "blosc", "zstd", "gzip", "crc32c")
 """Those of the Zarr v3 core; none of them can run code."""
+_FOREIGN = "not listed in the root", "one of those that softreach wrote, or moved away"
 _GROUP = {"zarr_format", "node_type", "attributes", "consolidated_metadata"}
 
 
@@ -120,22 +128,33 @@ def checked_place(location: Any, watch: Watch, *, mode: Mode, durable: bool = Fa
 
 
 def list_arrays(place: StorePath, watch: Watch) -> None:
-    """List the digests of the arrays that were written in the root of their store."""
+    """List the chunks that were written with each array, and the arrays in their root."""
     import zarr
 
-    zarr.open_group(place, mode="r+", zarr_format=3).attrs[ARRAYS] = dict(watch.digests)
+    group = zarr.open_group(place, mode="r+", zarr_format=3)
+    for name, array in list(group.arrays()):
+        array.attrs[CHUNKS] = checksums_by_key(watch, name)
+    group.attrs[ARRAYS] = dict(watch.digests)
+
+
+def checksums_by_key(watch: Watch, *arrays: str) -> dict[str, int]:
+    """The checksums of the chunks of arrays that were written."""
+    chunks = sorted(chunk for chunk in watch.written if chunk.array in arrays)
+    return {chunk.key: watch.written[chunk] for chunk in chunks}
+
+
+def bound_checksum(watch: Watch, chunk: Chunk, content: int) -> int:
+    """The checksum of what a chunk holds, of its place and of the root of its store."""
+    return google_crc32c.value(f"{watch.root} {chunk.key} ".encode() + content.to_bytes(4))
 
 
 def check_arrays(opened: Opened) -> None:
     """Check that the arrays of a store are there, and agree on the sizes of their dimensions.
 
     Raises:
-        DamagedStore: One is missing, or of another size, or has no dimensions.
+        DamagedStore: One is missing or foreign, or of another size, or has no dimensions.
     """
-    arrays: dict[str, Any] = dict(opened.group.arrays())
-    for name in opened.watch.digests:
-        if name not in arrays:
-            opened.watch.report(Chunk(name, None), "missing")
+    arrays = _arrays(opened)
     sizes: dict[str, tuple[int, str]] = {}
     for name, array in arrays.items():
         dims = array.metadata.dimension_names or ()
@@ -146,6 +165,25 @@ def check_arrays(opened: Opened) -> None:
             if known != size:
                 allowed = f"of {known} as {other} is"
                 opened.watch.report(Chunk(name, None), f"of {size} along {dim}", allowed)
+
+
+def _arrays(opened: Opened) -> dict[str, Any]:
+    """The arrays of a store, opened one after the other.
+
+    Of several that Zarr opens at once, it loses all errors but the first, and the traceback of
+    each is printed when the process ends.
+    """
+    watch, arrays = opened.watch, {}
+    if isinstance(watch.location, str) and "://" not in watch.location:
+        documents = Path(watch.location).glob(f"*/{DOCUMENT}")
+        for name in sorted({path.parent.name for path in documents} - watch.digests.keys()):
+            watch.report(Chunk(name, None), *_FOREIGN)
+    for name in watch.digests:
+        try:
+            arrays[name] = opened.group[name]
+        except KeyError:
+            watch.report(Chunk(name, None), "missing")
+    return arrays
 
 
 def kind_of(path: str | os.PathLike[str]) -> Kind:
@@ -160,6 +198,26 @@ def kind_of(path: str | os.PathLike[str]) -> Kind:
         reason = f"its {DOCUMENT} is {error.found}" if isinstance(error, _Broken) else str(error)
         raise InvalidInput("store", os.fspath(path), _ALLOWED["cloud"], reason) from None
     return "atlas" if "command" in attributes else "cloud"
+
+
+def foreign_entry(path: Path) -> str:
+    """The first thing in a folder that is none of a store of softreach; empty if there is none."""
+    try:
+        arrays = _unsealed((path / DOCUMENT).read_bytes())["attributes"].get(ARRAYS)
+    except FileNotFoundError:
+        return first_entry(path)
+    except (OSError, _Broken):
+        return DOCUMENT
+    known = {"", *(arrays if isinstance(arrays, dict) else ())}
+    for folder, folders, files in os.walk(path):
+        inside = Path(folder).relative_to(path)
+        for name in sorted([*folders, *files]):
+            key = (inside / name).as_posix()
+            # A folder is one of an array, or holds its chunks.
+            chunk = Chunk.of_key(key if name in files or "/" in key else f"{key}/c")
+            if chunk is None or chunk.array not in known:
+                return key
+    return ""
 
 
 def absolute(location: StoreLike) -> StoreLike:
@@ -228,22 +286,26 @@ class CheckedStore(WrapperStore[Any]):
         return Chunk.of_key(key.removeprefix(self._root)) if key.startswith(self._root) else None
 
     def _document(self, chunk: Chunk, content: Any) -> Buffer:
-        """What describes the store or one of its arrays, without digests."""
+        """What describes the store or one of its arrays, without digests and checksums."""
         text = content.to_bytes()
         if chunk.array:
             document = _parsed(text)
-            if _digest(document) != self.watch.digests.get(chunk.array):
+            if chunk.array not in self.watch.digests:
+                raise _Broken(*_FOREIGN)
+            if _digest(document) != self.watch.digests[chunk.array]:
                 raise _Broken("changed since it was written")
             _check_kind(document)
-            return content
-        document = _unsealed(text)
-        digests = document["attributes"].get(ARRAYS)
-        if isinstance(digests, dict):
-            self.watch.digests, self.watch.listed = digests, True
+        else:
+            document = _unsealed(text)
+            self.watch.root = _digest(document)
+            digests = document["attributes"].get(ARRAYS)
+            if isinstance(digests, dict):
+                self.watch.digests, self.watch.listed = digests, True
+        self.watch.listed_checksums |= document["attributes"].pop(CHUNKS, {})
         return type(content).from_bytes(json.dumps(document).encode())
 
     def _check(self, chunk: Chunk, content: Buffer | None) -> None:
-        """Check the checksum of a chunk."""
+        """Check the checksum of a chunk, and that it is of this store and place."""
         if content is None:
             if self.watch.required(chunk):
                 raise _Broken("missing")
@@ -251,14 +313,20 @@ class CheckedStore(WrapperStore[Any]):
         numbers: Any = content.as_numpy_array()
         if len(numbers) <= _CHECKSUM:
             raise _Broken(f"{len(numbers)} bytes long")
-        checksum = int.from_bytes(numbers[-_CHECKSUM:].tobytes(), "little")
+        checksum = _checksum(content)
         if google_crc32c.value(numbers[:-_CHECKSUM]) != checksum:
             raise _Broken("of a wrong checksum")
+        listed = self.watch.listed_checksums.get(chunk.key, checksum)
+        if listed != checksum or not self.watch.belongs(chunk, checksum):
+            raise _Broken(MISPLACED)
 
     def _written(self, key: str, value: Buffer) -> Buffer:
         """What is written for a value: the root with its digest, all else as it is."""
         chunk = self._chunk(key)
-        if chunk is None or chunk.place is not None:
+        if chunk is None:
+            return value
+        if chunk.place is not None:
+            self.watch.written[chunk] = _checksum(value)
             return value
         if not chunk.array:
             return type(value).from_bytes(sealed(value.to_bytes()))
@@ -303,6 +371,12 @@ def sealed(text: bytes) -> bytes:
     document["attributes"] = attributes
     document["attributes"] = {**attributes, DIGEST: _digest(document)}
     return json.dumps(document, indent=2).encode()
+
+
+def _checksum(content: Buffer) -> int:
+    """The checksum at the end of a chunk."""
+    numbers: Any = content.as_numpy_array()
+    return int.from_bytes(numbers[-_CHECKSUM:].tobytes(), "little")
 
 
 def _unsealed(text: bytes) -> dict[str, Any]:
