@@ -204,7 +204,8 @@ def test_one_number_of_stations_is_too_few():
 
 @pytest.mark.parametrize("draw", ["plot_arm", "plot_views"])
 def test_a_shape_shortened_to_nothing_is_not_drawn(draw):
-    shape = sr.configuration(TRUNK, [-20.0, -20.0, -20.0])
+    shape = sr.configuration(TRUNK, [-1.0, -1.0, -1.0])
+    shape["extension"] -= 1.0
     cloud = sr.compute_cloud(TRUNK, 16)
     calls = {
         "plot_arm": lambda: sr.plot.plot_arm(TRUNK, shape),
