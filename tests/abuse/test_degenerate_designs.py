@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 import softreach as sr
 from softreach.arm.designs import minimal_trunk
+from softreach.cli.app import run
 from softreach.geometry.delaunay import local_dimension
 from tests.abuse.refusals import raised_by, within_memory
 from tests.laws import arm_of
@@ -130,6 +132,17 @@ def test_a_curve_reaches_nothing_of_its_convex_hull():
     tip = sr.compute_cloud(frozen(1, 2), 5_000).tip
     with within_memory():
         assert sr.volume.unreachability(tip) == 1.0
+
+
+@pytest.mark.parametrize("options", [[], ["--json"]], ids=["text", "JSON"])
+def test_a_curve_has_no_critical_radius_and_none_is_printed(options, tmp_path, capsys):
+    frozen(0, 1).save(tmp_path / "arm.toml")
+    asked = ["volume", str(tmp_path / "arm.toml"), "--n", "500", "--alpha", "critical", *options]
+    assert run(asked) == 0
+    printed = capsys.readouterr().out
+    assert "inf" not in printed.lower()
+    if options:
+        assert json.loads(printed)["alpha_L"] is None
 
 
 @pytest.mark.parametrize(

@@ -271,7 +271,7 @@ def test_arithmetic_is_that_of_julia(text, value):
         (PLAIN.replace("L = 1.0", "L = 2.0, L = 3.0"), 1, "L twice: must be given each .* once"),
         (PLAIN.replace("0.1, 0.2", "0.1, R1 = 0.2"), 1, "R1 twice"),
         (PLAIN.replace("0.1, 0.2", "0.3, 0.2"), 1, "R1 = 0.3, R2 = 0.2: must be 0 <= R1 < R2"),
-        (PLAIN.replace("0.1, 0.2", "0.0, 0.0"), 1, "R1 = 0, R2 = 0: must be 0 <= R1 < R2"),
+        (README.replace("L = 1.0", "L = 0.0"), 8, "R1 = 0, R2 = 0: must be 0 <= R1 < R2"),
         (PLAIN.replace("0.1, 0.2", "1e300, 1.0"), 1, "0 <= R1 < R2"),
         (PLAIN.replace("[-1.0]", "[-1.0, 0.0]"), 2, "N = 1"),
         (PLAIN.replace(SECTORS, ""), 1, "ActivationPiecewiseGamma"),
@@ -298,9 +298,6 @@ def test_what_cannot_be_read_is_refused_with_its_line(read, text, line, told):
         ("", "no filament"),
         ("x = 1\n" * 200_000, "at most 0.1 MB"),
         (PLAIN + PLAIN.replace("filament =", "other ="), "lines 1 and 3"),
-        (PLAIN.replace("L = 1.0", "L = 0.0"), "an arm that can exist"),
-        (PLAIN.replace("0.1, 0.2", "0.0, 1e-300"), "an arm that can exist"),
-        (PLAIN.replace("0.1, 0.2", "1e300, 1e305"), "an arm that can exist"),
         (PLAIN.replace("1.0e6, 0.5", "1.0e6, 0.7"), "poisson_ratio"),
     ],
 )
