@@ -135,8 +135,9 @@ def test_a_curve_reaches_nothing_of_its_convex_hull():
 
 
 @pytest.mark.parametrize("options", [[], ["--json"]], ids=["text", "JSON"])
-def test_a_curve_has_no_critical_radius_and_none_is_printed(options, tmp_path, capsys):
-    frozen(0, 1).save(tmp_path / "arm.toml")
+def test_a_straight_line_has_no_critical_radius_and_none_is_printed(options, tmp_path, capsys):
+    straight = TRUNK.replace(actuators=(fiber(revolution=0.0, extent=2 * math.pi),))
+    straight.save(tmp_path / "arm.toml")
     asked = ["volume", str(tmp_path / "arm.toml"), "--n", "500", "--alpha", "critical", *options]
     assert run(asked) == 0
     printed = capsys.readouterr().out
