@@ -45,7 +45,9 @@ def test_an_activation_that_leaves_no_shape_is_refused(tmp_path, capsys):
     out = tmp_path / "arm.glb"
     given = ["export", "three_chamber_arm", str(out), "--activation=-1e9,0,0"]
     assert run(given) == 2
-    assert "activation = -1e9,0,0: must be such that the arm has a shape" in capsys.readouterr().err
+    assert (
+        "activation = -1e+09,0,0: must be such that the arm has a shape" in capsys.readouterr().err
+    )
     assert not out.exists()
 
 

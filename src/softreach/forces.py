@@ -118,7 +118,7 @@ def _starts(
         solutions = solve_inverse(rod, targets, family=family)
         return targets, [one.activations for one in solutions]
     if places is None:
-        gamma = rod.box.check(np.atleast_2d(as_floats("start", start)))
+        gamma = rod.check_activations("start", np.atleast_2d(as_floats("start", start)))
         return rod.tips(gamma), list(gamma[:, None])
     targets = as_targets("places", places)
     gamma = rod.box.with_fixed(as_activations("start", start, rod.box, len(targets)))

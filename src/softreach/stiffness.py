@@ -50,11 +50,12 @@ def tip_compliance(arm: Manipulator | TipMap, activations: ArrayLike, tol: float
         equilibrium.
 
     Raises:
-        InvalidInput: Activations of another shape or not finite, or a tip map of another kind than
-            the arm's own.
+        InvalidInput: Activations of another shape, not finite, or under which there is no arm
+            (ζ <= 0); or a tip map of another kind than the arm's own.
         InvalidDesign: A material has no Young's modulus.
     """
-    return yielding_rod(tip_map(arm, tol)).compliance(activations)
+    rod = yielding_rod(tip_map(arm, tol))
+    return rod.compliance(rod.check_activations("activations", activations))
 
 
 class PrincipalCompliances(NamedTuple):

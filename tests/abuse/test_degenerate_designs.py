@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 import softreach as sr
 from softreach.arm.designs import minimal_trunk
+from softreach.cli.app import run
 from softreach.geometry.delaunay import local_dimension
 from tests.abuse.refusals import raised_by, within_memory
 from tests.laws import arm_of
@@ -132,6 +134,18 @@ def test_a_curve_reaches_nothing_of_its_convex_hull():
         assert sr.volume.unreachability(tip) == 1.0
 
 
+@pytest.mark.parametrize("options", [[], ["--json"]], ids=["text", "JSON"])
+def test_a_straight_line_has_no_critical_radius_and_none_is_printed(options, tmp_path, capsys):
+    straight = TRUNK.replace(actuators=(fiber(revolution=0.0, extent=2 * math.pi),))
+    straight.save(tmp_path / "arm.toml")
+    asked = ["volume", str(tmp_path / "arm.toml"), "--n", "500", "--alpha", "critical", *options]
+    assert run(asked) == 0
+    printed = capsys.readouterr().out
+    assert "inf" not in printed.lower()
+    if options:
+        assert json.loads(printed)["alpha_L"] is None
+
+
 @pytest.mark.parametrize(
     ("arm", "dimension"),
     [(frozen(0, 1), 1.0), (frozen(0), 2.0), (frozen(2), 2.0), (TRUNK, 3.0)],
@@ -204,7 +218,8 @@ def test_one_number_of_stations_is_too_few():
 
 @pytest.mark.parametrize("draw", ["plot_arm", "plot_views"])
 def test_a_shape_shortened_to_nothing_is_not_drawn(draw):
-    shape = sr.configuration(TRUNK, [-20.0, -20.0, -20.0])
+    shape = sr.configuration(TRUNK, [-1.0, -1.0, -1.0])
+    shape["extension"] -= 1.0
     cloud = sr.compute_cloud(TRUNK, 16)
     calls = {
         "plot_arm": lambda: sr.plot.plot_arm(TRUNK, shape),

@@ -51,6 +51,8 @@ NUMBERS = [
     ("extent_deg", "361", "<= 360 deg"),
     ("taper_deg", "90", "< 90 deg"),
     ("taper_deg", "89", "leaves no tip"),
+    ("taper_deg", repr(math.degrees(math.atan(1 / 16))), "leaves no tip"),
+    ("taper_deg", "3.57633437499735", "leaves no tip"),
     ("inner_ratio", "1", "< 1"),
     ("inner_ratio", "-1e-300", ">= 0"),
     ("activation_bounds", "[-inf, 0]", "finite numbers"),
@@ -131,6 +133,34 @@ def test_a_text_that_is_no_design_is_refused_in_a_few_lines(text):
         sr.Manipulator.from_toml(text)
     assert len(str(caught.value)) < 10_000
     assert all(len(line) < 800 for line in str(caught.value).splitlines())
+
+
+THREAD = {
+    "a tendon": """kind = "tendon"
+distance_ratio = {0}
+tension_bounds_n = [0.0, 1e-9]""",
+    "a tendon by its length": """kind = "tendon"
+distance_m = {0}
+tension_bounds_n = [0.0, 1e-9]""",
+    "a chamber": """kind = "chamber"
+distance_ratio = {0}
+radius_ratio = 0.1
+pressure_bounds_pa = [0.0, 1.0]""",
+    "a wide chamber": """kind = "chamber"
+distance_ratio = 0.5
+radius_ratio = {0}
+pressure_bounds_pa = [0.0, 1.0]""",
+}
+
+
+@pytest.mark.parametrize("far", ["1e300", "1.7e308", "1e5"])
+@pytest.mark.parametrize("kind", THREAD)
+def test_what_is_farther_from_the_axis_than_any_disk_is_refused(kind, far):
+    rubber = TRUNK.replace("inner_ratio", 'material = "ecoflex_00_30"\ninner_ratio')
+    text = rubber + f"[[actuators]]\nname = 'far'\n{THREAD[kind].format(far)}\n"
+    told = "far.distance over R2 = .* must be within 1000 times the largest outer radius"
+    assert re.search(told, str(raised_by(lambda: sr.Manipulator.from_toml(text))))
+    assert sr.Manipulator.from_toml(text.replace(far, "0.5")).bundles == 4
 
 
 FILES: dict[str, tuple[bytes, str]] = {

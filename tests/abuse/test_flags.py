@@ -7,6 +7,7 @@ import typing
 
 import pytest
 
+import softreach as sr
 from softreach.cli.app import app
 from softreach.cli.changes import Changes
 from softreach.cli.options import Sampling
@@ -20,6 +21,7 @@ TRUNK = "minimal_trunk"
 POSITION = "three comma-separated numbers x,y,z in m"
 RADIUS = "must be a radius > 0"
 HUGE = "9" * 5_000
+LONG = "n" * 5_000
 
 
 def case(words: str, expected: str, name: str | None = None):
@@ -126,6 +128,29 @@ WRONG = [
     case(f"equilibria {TRUNK} --activation=0,0,0x1", "3 comma-separated numbers"),
     case(f"equilibria {TRUNK} --activation={'0,' * 3000}0", "3 comma-separated", "activations"),
     *(
+        case(f"{words} --activation={given}", "must be such that the arm has a shape, as from -1.6")
+        for words in (f"equilibria {TRUNK}", f"show {TRUNK} -n 10", f"export {TRUNK} a.stl")
+        for given in ("-7,-7,-7", "-100,-100,-100", "9,9,9", "-1e300,0,0", "1e308,1e308,1e308")
+    ),
+    case(f"equilibria {TRUNK} --view diagonal --out a.png", "view = diagonal: must be front, side"),
+    # names of any length
+    *(
+        case(words.format(LONG), "n" * 100 + "...", words)
+        for words in (
+            "{}",
+            "design {}",
+            "design --{}",
+            "list {}",
+            "studio {}",
+            "warmup {}",
+            "volume {}.zarr",
+            f"cloud {TRUNK} --n 10 --out {{}}.zarr",
+            f"show {TRUNK} --color {{}} --n 10",
+            f"design {TRUNK} --set {{}}=1",
+            f"gradient {TRUNK} {{}}",
+        )
+    ),
+    *(
         case(f"volume {TRUNK} --alpha={value}", RADIUS)
         for value in (
             "0",
@@ -229,6 +254,15 @@ def test_a_whole_number_may_be_written_in_every_way_that_rounds_nothing(text, nu
 @pytest.mark.parametrize("text", ["1e-6", ".5", "5.", "-0", "1E3", "+2.5"])
 def test_a_decimal_number_is_what_python_reads(text):
     assert read_number(text) == float(text)
+
+
+def test_names_of_any_length_are_told_in_short(tmp_path, capsys):
+    text = sr.designs.minimal_trunk().to_toml().replace('"left"', f'"{LONG}"')
+    (tmp_path / "arm.toml").write_text(text)
+    for asked in ("equilibria --activation=1,2", "design --set foo=1", "show --color foo --n 10"):
+        command, *options = asked.split()
+        told = refusal_of([command, str(tmp_path / "arm.toml"), *options], capsys, tmp_path)
+        assert "n" * 301 not in told
 
 
 def test_an_atlas_that_the_disk_cannot_hold_is_not_begun(tmp_path, monkeypatch, capsys):

@@ -123,6 +123,29 @@ def test_a_file_of_another_kind_stays_unless_one_says_so(name, things, tmp_path)
     assert (tmp_path / name).is_dir() or b"my notes" not in (tmp_path / name).read_bytes()
 
 
+ALIKE = {
+    "design.toml": b"[robot]\nlength_m = 1.0  # of my own arm\n",
+    "design.jl": b"using ActiveFilaments\nfilament = AFilament(rings)\n# two weeks of my work\n",
+    "cloud.npz": b"PK\x03\x04 the thesis, zipped",
+}
+
+
+@pytest.mark.parametrize("name", ALIKE)
+def test_a_file_that_only_looks_like_an_output_stays(name, things, tmp_path):
+    (tmp_path / name).write_bytes(ALIKE[name])
+    assert "something else is there" in str(
+        raised_by(lambda: WRITERS[name](things, tmp_path / name))
+    )
+    assert files_in(tmp_path) == {name: ALIKE[name]}
+
+
+def test_arrays_of_ones_own_stay(things, tmp_path):
+    np.savez(tmp_path / "cloud.npz", measured=np.arange(3.0), tip=np.zeros(3))
+    before = files_in(tmp_path)
+    assert "something else" in str(raised_by(lambda: _cloud(things, tmp_path / "cloud.npz")))
+    assert files_in(tmp_path) == before
+
+
 @every_writer
 def test_a_folder_with_other_things_is_never_replaced(name, things, tmp_path):
     (tmp_path / name).mkdir()

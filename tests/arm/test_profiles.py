@@ -130,6 +130,8 @@ def test_a_profile_is_a_value(kind):
             "must be two or more numbers that rise from 0",
         ),
         ({"stations_over_length": (0, 0.7, 0.4, 1)}, "rise from 0"),
+        ({"stations_over_length": (0, 5e-324, 1)}, r"rise from 0 .* each by 1e-12 or more"),
+        ({"stations_over_length": (0, 1 - 1.2e-16, 1)}, "each by 1e-12 or more"),
         ({"stations_over_length": (0.1, 1)}, "rise from 0"),
         ({"stations_over_length": (0, 0.9)}, r"to 1 \(tip\)"),
         ({"stations_over_length": (0, math.nan, 1)}, "rise from 0"),

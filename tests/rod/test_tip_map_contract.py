@@ -15,8 +15,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import softreach as sr
 from softreach.arm import Manipulator, designs
 from softreach.arm.loads import Loads
+from softreach.cloud.curvature import stream_statistics
+from softreach.rod import equilibria
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.rods import tip_map
@@ -88,6 +91,45 @@ def test_the_tolerance_is_kept_along_the_arm(make, arm, tol):
     stations = rod.length * np.array([0.0, 0.2, 0.21, 0.5, 0.77, 1.0])
     apart = rod.frames(gamma, stations).position - exact.frames(gamma, stations).position
     assert np.linalg.norm(apart, axis=-1).max() <= tol * rod.length
+
+
+NO_ARM = {
+    "shortened to less than nothing": (-7.0, -7.0, -7.0),
+    "by far": (-100.0, -100.0, -100.0),
+    "coiled beyond what steps follow": (10.0, 10.0, 10.0),
+    "beyond numbers": (1e300, 1e300, 1e300),
+}
+
+
+@pytest.mark.parametrize("gone", NO_ARM.values(), ids=NO_ARM.keys())
+def test_activations_that_leave_no_arm_have_a_status_and_no_shape(make, gone):
+    rod = make(DESIGNS["minimal"], 1e-6)
+    gamma = np.array([[-1.0, 0.0, -0.5], gone, [-2.0, 0.0, 0.1]])
+    tips, status = rod.tips_and_status(gamma)
+    lost = [False, True, False]
+    assert (status == TipStatus.NO_EQUILIBRIUM).tolist() == lost
+    status[:] = -1
+    frames = rod.frames(gamma, [0.5], status)
+    assert (status == TipStatus.NO_EQUILIBRIUM).tolist() == lost
+    strains = rod.strains(gamma, [0.5])
+    for values in (tips, rod.tip_twists(gamma)[1], *frames, *strains):
+        assert np.isnan(values.reshape(3, -1)).all(axis=1).tolist() == lost
+        assert np.isfinite(values).reshape(3, -1).all(axis=1).tolist() == [True, False, True]
+
+
+@pytest.mark.parametrize("gone", NO_ARM.values(), ids=NO_ARM.keys())
+def test_asked_for_one_by_one_they_are_refused_in_one_line(make, gone):
+    rod = make(DESIGNS["minimal"], 1e-6)
+    asked = [
+        lambda: sr.tip_positions(rod, [gone]),
+        lambda: sr.tip_jacobian(rod, [gone]),
+        lambda: sr.configuration(rod, gone),
+        lambda: equilibria(rod, gone),
+        lambda: stream_statistics(rod, [np.array([gone])], [0.5]),
+    ]
+    for ask in asked:
+        with pytest.raises(InvalidInput, match="must be such that the arm has a shape, as from -1"):
+            ask()
 
 
 @of_designs

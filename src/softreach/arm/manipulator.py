@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm import design_file
 from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
-from softreach.arm.actuators.actuator import MOST_BUNDLES, bounds_faults
+from softreach.arm.actuators.actuator import MOST_BUNDLES, bounds_faults, distance_faults
 from softreach.arm.loads import Loads
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper, Profile
@@ -375,7 +375,8 @@ def _fit_faults(arm: Manipulator) -> Iterator[Fault]:
     if arm.loads is not None:
         yield from arm.loads.section_faults(arm.section, arm.length)
     for actuator in arm.actuators:
-        faults = actuator.section_faults(arm.profile, arm.section)
+        parts = arm.profile, arm.section
+        faults = actuator.section_faults(*parts) or distance_faults(actuator, *parts)
         yield from (
             fault
             if fault.path.startswith(("rings", "core"))

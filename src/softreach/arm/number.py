@@ -36,6 +36,9 @@ __all__ = [
 Shape = Literal["single", "along", "triple", "series", "stations"]
 """One number, a function along the arm alone, a vector, several along the arm, or their places."""
 
+_NEAREST = 1e-12
+"""Z/L by which stations differ at least: less is rounding."""
+
 _SUFFIXES = {
     "": "",
     "1": "",
@@ -184,7 +187,10 @@ def series_faults(values: Mapping[str, Any], field: str, per_station: bool = Tru
     """
     stations, along = as_numbers(values["stations_over_length"]), as_numbers(values[field])
     if stations.ndim != 1 or len(stations) < 2 or not _ascends_from_0_to_1(stations):
-        allowed = "must be two or more numbers that rise from 0 (base) to 1 (tip)"
+        allowed = (
+            "must be two or more numbers that rise from 0 (base) to 1 (tip), "
+            f"each by {_NEAREST:g} or more"
+        )
         return [Fault("stations_over_length", values["stations_over_length"], allowed)]
     count = len(stations) if per_station else len(stations) - 1
     if along.shape != (count,) or not np.isfinite(along).all():
@@ -225,4 +231,4 @@ def _is_triple(value: Any) -> bool:
 
 def _ascends_from_0_to_1(stations: np.ndarray[Any, np.dtype[np.float64]]) -> bool:
     ends = stations[0] == 0.0 and stations[-1] == 1.0
-    return bool(ends and np.isfinite(stations).all() and (np.diff(stations) > 0).all())
+    return bool(ends and np.isfinite(stations).all() and (np.diff(stations) >= _NEAREST).all())

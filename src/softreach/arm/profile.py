@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 # Enough for machine precision while a radius changes by less than tenfold between two stations.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 _NEWTON_STEPS = 60
+_SLIMMEST = 1e-12
+"""R2(L) over R2(0), below which the radius of a tip is mostly rounding."""
 
 # Ranges keep fourth powers of radii and cubes of lengths far from where doubles end.
 
@@ -132,10 +134,10 @@ class LinearTaper(Profile):
         if faults := super()._faults():
             return faults
         tip = self.outer_radius - self.length * math.tan(self.taper)
-        if tip > 0:
+        if tip >= _SLIMMEST * self.outer_radius:
             return []
-        limit = math.atan(self.outer_radius / self.length)
-        why = f"leaves no tip (R2(L) = {tip:.4g} m)"
+        limit = math.atan((1.0 - _SLIMMEST) * self.outer_radius / self.length)
+        why = f"leaves no tip (R2(L) = {tip:.4g} m, R2(0) = {self.outer_radius:.4g} m)"
         return [Fault("taper", self.taper, Range(high=limit, unit="rad", open_high=True, why=why))]
 
 

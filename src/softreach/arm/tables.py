@@ -26,6 +26,7 @@ __all__ = [
     "check_extension",
     "compliance",
     "extension_range",
+    "strain_stations",
     "tables",
 ]
 
@@ -106,7 +107,7 @@ def check_extension(arm: Manipulator) -> None:
     if faults := list(_winding_faults(arm)):
         raise InvalidDesign(faults)
     with np.errstate(all="ignore"):
-        table = tables(arm, _stations(arm))
+        table = tables(arm, strain_stations(arm))
     if not (np.isfinite(table.extension).all() and np.isfinite(table.curvature).all()):
         sizes = f"L = {arm.length:.3g} m, R2(0) = {float(arm.profile.radius(0.0)):.3g} m"
         allowed = f"overflows with {sizes}: give all lengths in m, moduli and pressures in Pa"
@@ -130,7 +131,7 @@ def _winding_faults(arm: Manipulator) -> Iterator[Fault]:
 
 def extension_range(arm: Manipulator) -> tuple[float, float]:
     """Smallest and largest ζ anywhere in the activation box and along the arm [-]."""
-    return _extension_range(arm, tables(arm, _stations(arm)))
+    return _extension_range(arm, tables(arm, strain_stations(arm)))
 
 
 def _extension_range(arm: Manipulator, table: Tables) -> tuple[float, float]:
@@ -146,5 +147,6 @@ def both_sides(arm: Manipulator, stations: Array) -> Array:
     return np.union1d(stations, np.append(breaks, np.nextafter(breaks, 0.0)))
 
 
-def _stations(arm: Manipulator) -> Array:
+def strain_stations(arm: Manipulator) -> Array:
+    """Stations Z [m] at which it is seen how far strains go."""
     return both_sides(arm, np.linspace(0.0, arm.length, _STATIONS))

@@ -14,7 +14,7 @@ from cyclopts import App, CycloptsError, Group, Parameter
 
 from softreach.cli.console import HelpConsole, console
 from softreach.cli.signals import INTERRUPTED
-from softreach.support.errors import InvalidInput, NotWritten, SoftreachError
+from softreach.support.errors import InvalidInput, NotWritten, SoftreachError, with_short_words
 
 _MORE = Group("More", sort_key=-1)
 _COMMANDS = (
@@ -122,4 +122,4 @@ def _message(error: Exception) -> str:
         error = error.__cause__
     if isinstance(error, MemoryError):
         return "there is not enough memory for this; ask for fewer samples or less accuracy"
-    return str(error) or type(error).__name__
+    return with_short_words(str(error)) or type(error).__name__

@@ -47,10 +47,13 @@ def equilibria(
 
     Example: softreach equilibria arm.toml --activation -1,0,-0.5 --out all.png
     """
+    from softreach.picture.projection import view_angles
     from softreach.rod import equilibria as all_of
 
     if out is None:
         refuse("left out without a picture: give --out too", view=view)
+    elif view is not None:
+        view_angles(view)  # what is wrong with it is said before anything is computed
     check_picture(out, overwrite)
     arm = design_from(design, changes)
     result = all_of(arm, activation_of(activation, arm))

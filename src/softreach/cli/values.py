@@ -67,7 +67,7 @@ def position_text(point: Iterable[float]) -> str:
 
 def shown(value: Any) -> str:
     """A value in a table; a dash where there is none."""
-    if value is None or (isinstance(value, float) and math.isnan(value)):
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return "-"
     if isinstance(value, float):
         return f"{value:.6g}"

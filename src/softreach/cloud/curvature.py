@@ -140,7 +140,7 @@ def _strains(rod: TipMap, activations: Iterable[Array], z: Array) -> Iterator[St
     """Strains, a few samples at a time."""
     strains = rod.strains_at(z)
     for given in activations:
-        block = rod.box.check(given)
+        block = rod.check_activations("activations", given)
         for rows in parallel.blocks(len(block), max(1, _AT_A_TIME // len(z))):
             found = strains(block[rows])
             yield _in_equilibrium(found) if rod.supports_unstable else found

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+import zipfile
 from collections.abc import Iterator, Sequence
 from io import BufferedWriter
 from itertools import chain, count
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -264,13 +266,24 @@ def _point_mesh(table: CloudTable) -> Any:
     return meshio.Mesh(table.tip, cells, point_data=data)
 
 
+def _is_npz(path: Path) -> bool:
+    """Whether it is an archive with the arrays of a cloud."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return {f"{name}.npy" for name in ("tip", "activation", "bundle")} <= set(
+                archive.namelist()
+            )
+    except zipfile.BadZipFile:
+        return False
+
+
 CLOUD_FILES: Formats = {
     ".ply": format_file("a PLY", beginning_with(b"ply\n", b"ply\r"), _write_ply),
     ".csv": format_file(
         "a cloud's CSV", beginning_with(b'"x","y","z",', b"x,y,z,gamma_"), _write_csv, "pyarrow"
     ),
     ".parquet": format_file("a Parquet", beginning_with(b"PAR1"), _write_parquet, "pyarrow"),
-    ".npz": format_file("an NPZ", beginning_with(b"PK"), _write_npz),
+    ".npz": format_file("a cloud's NPZ", _is_npz, _write_npz),
     ".mat": format_file("a MAT", beginning_with(b"MATLAB "), _write_mat),
     ".vtu": format_file("a VTU", text_with("<VTKFile", "UnstructuredGrid"), _write_vtu, "meshio"),
     ".vtk": format_file("a VTK", beginning_with(b"# vtk DataFile"), _write_vtk, "meshio"),

@@ -13,15 +13,16 @@ from softreach.arm.tables import Tables, tables
 from softreach.kernels.rod import frames, jacobian
 from softreach.kernels.rod import tips as rod
 from softreach.rod.activation_box import ActivationBox
+from softreach.rod.arm_rod import ArmRod
 from softreach.rod.linearization import Linearization
 from softreach.rod.steps import StepRule
 from softreach.rod.tip_map import (
-    ArmRod,
     Frames,
     Status,
     StrainRange,
     Strains,
     TipStatus,
+    drop,
     position_slopes,
 )
 from softreach.support import parallel
@@ -107,7 +108,8 @@ class FreeRod(ArmRod):
         self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
     ) -> Frames:
         """Centerline and directors at ascending stations Z [m]."""
-        gamma, z = self.box.check(activations), self.check_stations(stations)
+        gamma, lost = self.with_arms(self.box.check(activations))
+        z = self.check_stations(stations)
         table, ends = self._station_table(z)
         found = Frames(np.empty((len(gamma), len(z), 3)), np.empty((len(gamma), len(z), 3, 3)))
         parallel.run(
@@ -116,6 +118,7 @@ class FreeRod(ArmRod):
         )
         if status is not None:
             status[:] = TipStatus.STABLE
+        drop(lost, status, *found)
         return found
 
     def strains_at(self, stations: ArrayLike) -> Callable[..., Strains]:
@@ -123,9 +126,12 @@ class FreeRod(ArmRod):
         table = tables(self.arm, self.check_stations(stations, ascending=False))
 
         def strains(activations: ArrayLike, status: Status | None = None) -> Strains:
+            gamma, lost = self.with_arms(self.box.check(activations))
+            found = linear_strains(table, gamma)
             if status is not None:
                 status[:] = TipStatus.STABLE
-            return linear_strains(table, self.box.check(activations))
+            drop(lost, status, *found)
+            return found
 
         return strains
 

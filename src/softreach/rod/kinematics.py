@@ -42,10 +42,12 @@ def tip_positions(arm: Manipulator | TipMap, activations: ArrayLike, tol: float 
         Tips [m], shape (n, 3).
 
     Raises:
-        InvalidInput: Activations of another shape or not finite, or a `tol` out of range.
+        InvalidInput: Activations of another shape, not finite, or such that there is no arm
+            (ζ <= 0) or none that the steps follow; or a `tol` out of range.
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
     """
-    return tip_map(arm, tol).tips(activations)
+    rod = tip_map(arm, tol)
+    return rod.tips(rod.check_activations("activations", activations))
 
 
 def tip_jacobian(arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6) -> Array:
@@ -65,7 +67,8 @@ def tip_jacobian(arm: Manipulator | TipMap, activations: ArrayLike, tol: float =
     Raises:
         InvalidInput: As for `tip_positions`.
     """
-    return tip_map(arm, tol).tip_twists(activations)[1]
+    rod = tip_map(arm, tol)
+    return rod.tip_twists(rod.check_activations("activations", activations))[1]
 
 
 def configuration(
@@ -87,11 +90,12 @@ def configuration(
         `extension` ζ and `radius` R2 [m], over `station` (coordinate Z [m]).
 
     Raises:
-        InvalidInput: Activations or stations of another shape or out of range.
+        InvalidInput: Activations or stations of another shape or out of range, or activations
+            under which there is no arm (ζ <= 0).
     """
     rod = tip_map(arm, tol)
     given = as_floats("activation", activation)
-    gamma = rod.box.check(np.atleast_2d(given))
+    gamma = rod.check_activations("activation", np.atleast_2d(given))
     z = stations_along(rod, stations, _COLUMNS * max(1, len(gamma)))
     status = np.empty(len(gamma), np.int8)
     dataset = shape_dataset(rod, gamma, z, rod.frames(gamma, z, status), rod.strains(gamma, z))

@@ -7,8 +7,9 @@ from functools import lru_cache
 
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.summary import VERIFIED_LOAD_NUMBER, is_overloaded
+from softreach.rod.arm_rod import ArmRod
 from softreach.rod.free import FreeRod
-from softreach.rod.tip_map import ArmRod, TipMap, check_tol
+from softreach.rod.tip_map import TipMap, check_tol
 from softreach.rod.view import View
 from softreach.support.arguments import as_flag, as_given
 from softreach.support.errors import InvalidInput

@@ -19,7 +19,7 @@ from softreach.arm.tables import both_sides, tables
 from softreach.kernels.rod import frames, magnus
 from softreach.kernels.rod import tips as rod
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.tip_map import check_tol
+from softreach.rod.tip_map import MOST_TURN_OF_STEP, check_tol
 from softreach.support import parallel
 from softreach.support.errors import InvalidInput
 
@@ -28,9 +28,8 @@ Differences = Callable[[Array], Array]
 
 _SAFETY = 2.0
 _MOST_STEPS = 4096
-# Rotation of one step [rad] up to which the kernels' series are good to 1e-10 (tips), and to
-# rounding (frames, whose directors must stay orthonormal).
-_TIP_TURN, _FRAME_TURN = 2.0, 1.0
+_FRAME_TURN = 1.0
+"""Rotation of one step [rad] up to which directors stay orthonormal to rounding."""
 _SHAPES = 512  # whole shapes held at once
 # The error of the steps grows with a high power of the bending, so that it is largest where many
 # bundles bend the arm the same way: at few corners of the box, which random samples miss.
@@ -139,7 +138,7 @@ class StepRule:
             InvalidInput: `tol` below 1e-12, or not reached within 4,096 steps.
         """
         check_tol(tol)
-        return self._fewest(tol, self._tip_differences, _TIP_TURN)
+        return self._fewest(tol, self._tip_differences, MOST_TURN_OF_STEP)
 
     def steps_for_shapes(self, tol: float) -> int:
         """As `steps_for`, for the largest error of the centerline anywhere along the arm."""

@@ -8,17 +8,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property, partial
-from threading import RLock
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.manipulator import Manipulator
-from softreach.arm.tables import check_extension
 from softreach.rod.activation_box import ActivationBox
 from softreach.support import parallel
 from softreach.support.arguments import as_number
@@ -31,6 +28,8 @@ Status = NDArray[np.int8]
 BLOCK = 16_384
 """Samples per task: large against a thread's cost, small enough for Ctrl-C to be prompt."""
 _SMALLEST_TOL = 1e-12
+MOST_TURN_OF_STEP = 2.0
+"""Rotation of one step [rad] up to which the series of the kernels of tips are good to 1e-10."""
 
 
 class TipStatus(IntEnum):
@@ -41,14 +40,16 @@ class TipStatus(IntEnum):
     UNSTABLE = 1
     """An unstable equilibrium."""
     NO_EQUILIBRIUM = 2
-    """The branch that starts at the unloaded arm ends before; the tip is NaN."""
+    """The branch that starts at the unloaded arm ends before, or there is no such arm; the tip is
+    NaN."""
 
 
 class TipMap(ABC):
     """The map from the activations of one arm to its tip, to a tolerance; frozen.
 
     All arrays of activations have shape (n, bundles) and are checked; activations outside the
-    bounds are allowed, but `tol` is promised inside them. Results do not depend on threads.
+    bounds are allowed, but `tol` is promised inside them. Where `has_arm` says that there is none,
+    tips are NaN with the status `NO_EQUILIBRIUM`. Results do not depend on threads.
     """
 
     arm: Manipulator
@@ -126,6 +127,54 @@ class TipMap(ABC):
     def prepare(self) -> None:  # noqa: B027
         """Compute what every sample needs, once for all threads."""
 
+    def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
+        """How far activations (n, bundles) go: the smallest ζ along the arm [-], shape (n,).
+
+        And the largest angle by which a step turns the arm [rad], shape (n,).
+        """
+        return np.ones(len(gamma)), np.zeros(len(gamma))
+
+    def has_arm(self, gamma: Array) -> NDArray[np.bool_]:
+        """Whether ζ > 0 and the steps follow the arm at activations (n, bundles), shape (n,).
+
+        Within the bounds they do.
+        """
+        exists = np.ones(len(gamma), bool)
+        outside = np.flatnonzero(((gamma < self.box.low) | (gamma > self.box.high)).any(axis=1))
+        if len(outside):
+            extension, turn = self.extension_and_turn(gamma[outside])
+            exists[outside] = (extension > 0) & (turn <= MOST_TURN_OF_STEP)
+        return exists
+
+    def check_activations(self, name: str, activations: ArrayLike) -> Array:
+        """The activations as an (n, bundles) float array, each of which leaves an arm.
+
+        Raises:
+            InvalidInput: Another shape, values that are not finite, ζ <= 0 somewhere along the arm,
+                or an arm so bent that the steps do not follow it.
+        """
+        gamma = self.box.check(activations)
+        if not len(wrong := np.flatnonzero(~self.has_arm(gamma))):
+            return gamma
+        first = gamma[wrong[:1]]
+        (extension,), (turn,) = self.extension_and_turn(first)
+        why = f"here is ζ = {extension:.4g}, not above 0"
+        if extension > 0:
+            why = f"here the arm turns by {turn:.3g} rad in a step, too far to be followed"
+        lower, upper = map(_listed, (self.box.low, self.box.high))
+        count = f"; so are {len(wrong):,} rows in all" if len(wrong) > 1 else ""
+        allowed = f"such that the arm has a shape, as from {lower} to {upper}"
+        name = name if len(gamma) == 1 else f"{name}[{wrong[0]}]"
+        raise InvalidInput(name, _listed(first[0]), allowed, why + count)
+
+    def with_arms(self, gamma: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Activations with the lower bounds for those that leave no arm, and the rows of these."""
+        lost = np.flatnonzero(~self.has_arm(gamma))
+        if len(lost):
+            gamma = gamma.copy()
+            gamma[lost] = self.box.low
+        return gamma, lost
+
     def farthest(self) -> float:
         """No tip is farther from the base than this [m]; infinite where no bound is known."""
         return np.inf
@@ -185,7 +234,7 @@ class TipMap(ABC):
 
     def _filled(self, activations: ArrayLike, *wanted: str) -> dict[str, Any]:
         """Results of `fill` by name: tips and what else is wanted, on all threads."""
-        gamma = self.box.check(activations)
+        gamma, lost = self.with_arms(self.box.check(activations))
         n, m = gamma.shape
         room = {"tips": np.empty((n, 3))}
         for name in wanted:
@@ -199,6 +248,7 @@ class TipMap(ABC):
             partial(self.fill, gamma[b], **{name: values[b] for name, values in room.items()})
             for b in parallel.blocks(n, size)
         )
+        drop(lost, room.get("status"), *(room[name] for name in room if name != "status"))
         return room
 
     def strains(
@@ -232,45 +282,6 @@ class TipMap(ABC):
         bundles = counted(self.box.bundles, "bundle")
         size = f"L = {self.length:g} m, {bundles}"
         return f"<{type(self).__name__}: {size}, tip error up to {self.tol:g} L>"
-
-
-@dataclass(frozen=True, repr=False)
-class ArmRod(TipMap):
-    """The rod that one arm is, free or loaded, in the activations of all its bundles.
-
-    Raises:
-        InvalidInput: `tol` out of range.
-        InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
-    """
-
-    arm: Manipulator
-    tol: float = 1e-6
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "tol", check_tol(self.tol))
-        check_extension(self.arm)
-
-    @cached_property
-    def box(self) -> ActivationBox:
-        """The activations within bounds."""
-        return ActivationBox.between(self.arm.bounds, self.arm.bundle_names)
-
-    @abstractmethod
-    def _prepare(self) -> None:
-        """Compute what every sample needs."""
-
-    def prepare(self) -> None:
-        """Compute what every sample needs, once for all threads."""
-        known = vars(self)
-        if "_is_prepared" in known:
-            return
-        with known.setdefault("_lock", RLock()):
-            if "_is_prepared" not in known:
-                self._prepare()
-                known["_is_prepared"] = True
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in vars(self).items() if name != "_lock"}
 
 
 class Frames(NamedTuple):
@@ -313,6 +324,19 @@ class TipMotions(NamedTuple):
     """Tangents d3 [-], shape (n, 3)."""
     rotations: Array
     """ω [rad], shape (n, 3, bundles): ∂d3/∂γ = ω × d3."""
+
+
+def drop(lost: NDArray[np.intp], status: Status | None, *values: Array) -> None:
+    """Make rows NaN, with the status `NO_EQUILIBRIUM` where it is asked for."""
+    for some in values:
+        some[lost] = np.nan
+    if status is not None:
+        status[lost] = TipStatus.NO_EQUILIBRIUM
+
+
+def _listed(activation: Array) -> str:
+    """An activation as the command line takes it: "-1,0,-0.5"."""
+    return ",".join(f"{value:g}" for value in activation)
 
 
 def position_slopes(tips: Array, twists: Array, slopes: Array) -> None:

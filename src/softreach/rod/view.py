@@ -181,6 +181,10 @@ class View(TipMap):
             if some is not None:
                 some[lost] = np.nan
 
+    def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
+        """The smallest ζ along the arm [-] and the largest turn of a step [rad] at x."""
+        return self.base.extension_and_turn(self.activations(gamma))
+
     def farthest(self) -> float:
         """No tip is farther from the base than this [m]."""
         return self.base.farthest()

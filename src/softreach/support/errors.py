@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
@@ -25,6 +26,8 @@ _LONGEST = 300
 """Characters of a value that an error shows."""
 
 
+_LONG_WORD = re.compile(rf"(\S{{{_LONGEST}}})\S+")
+
 _MOST = 50
 """Faults of a design that an error lists."""
 
@@ -41,6 +44,11 @@ def in_short(value: object) -> str:
     except Exception:  # a value of a stranger's class, or a number of thousands of digits
         return f"of type {type(value).__name__}"
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+
+
+def with_short_words(text: str) -> str:
+    """Text whose words are of moderate length, such as names that may have thousands of letters."""
+    return _LONG_WORD.sub(r"\1...", text)
 
 
 class SoftreachError(Exception):
@@ -60,7 +68,7 @@ class InvalidInput(SoftreachError, ValueError):
 
     def __init__(self, name: str, value: object, allowed: str, hint: str = "") -> None:
         self.name, self.value, self.allowed = name, value, allowed
-        message = f"{name} = {in_short(value)}: must be {allowed}"
+        message = with_short_words(f"{name} = {in_short(value)}: must be {allowed}")
         super().__init__(f"{message}; {hint}" if hint else message)
 
 
@@ -145,7 +153,7 @@ class InvalidDesign(SoftreachError, ValueError):
 
     def __init__(self, faults: Sequence[Fault], source: str = "") -> None:
         self.faults = tuple(faults)
-        lines = [str(fault) for fault in self.faults[:_MOST]]
+        lines = [with_short_words(str(fault)) for fault in self.faults[:_MOST]]
         if more := len(self.faults) - len(lines):
             lines.append(f"... and {more:,} more")
         if source:
@@ -171,7 +179,7 @@ class NotWritten(SoftreachError, OSError):
 
     def __init__(self, path: str, number: int, reason: str, hint: str = "") -> None:
         super().__init__(number, reason)
-        message = f"{path} cannot be written: {' '.join(reason.split())}"
+        message = f"{in_short(path)} cannot be written: {' '.join(reason.split())}"
         self._message = f"{message}; {hint}" if hint else message
 
     def __str__(self) -> str:

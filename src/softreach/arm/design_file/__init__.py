@@ -1,9 +1,16 @@
 """Designs as TOML files: lengths in meters, angles in degrees, the unit in every key."""
 
 from softreach.arm.design_file.keys import in_file_terms
-from softreach.arm.design_file.read import LONGEST, Parts, document_of, parse, text_of
+from softreach.arm.design_file.read import (
+    LONGEST,
+    Parts,
+    document_of,
+    is_design,
+    parse,
+    text_of,
+)
 from softreach.arm.design_file.write import render
-from softreach.support.files.kinds import FileKind, Formats, text_with
+from softreach.support.files.kinds import FileKind, Formats
 
 __all__ = [
     "DESIGN_FILE",
@@ -16,5 +23,5 @@ __all__ = [
     "text_of",
 ]
 
-DESIGN_FILE: Formats = {".toml": FileKind("a design file", text_with("length_m"))}
+DESIGN_FILE: Formats = {".toml": FileKind("a design file", is_design)}
 """Kind of file that a design is saved as, and replaces."""

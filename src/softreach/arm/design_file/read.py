@@ -27,10 +27,10 @@ from softreach.arm.material import LIBRARY_HINT, Material, material_names, named
 from softreach.arm.number import Number
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.section import Ring, Section, name_faults
-from softreach.support.errors import Fault, InvalidDesign, Range
+from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError
 from softreach.support.files.text import read_text
 
-__all__ = ["LONGEST", "Parts", "document_of", "parse", "text_of"]
+__all__ = ["LONGEST", "Parts", "document_of", "is_design", "parse", "text_of"]
 
 LONGEST = 250_000
 """Bytes, or characters, that a design file may have: thousands of times as many as designs take."""
@@ -63,6 +63,15 @@ def text_of(path: str | PathLike[str]) -> str:
         InvalidInput: No file that can be read, one too large to be a design, or no text in UTF-8.
     """
     return read_text("design", path, LONGEST)
+
+
+def is_design(path: str | PathLike[str]) -> bool:
+    """Whether a file has the tables of a design and no others, whatever is in them."""
+    try:
+        tables = set(document_of(text_of(path), ""))
+    except SoftreachError:
+        return False
+    return {name for name, (_, required) in LAYOUT.items() if required} <= tables <= set(LAYOUT)
 
 
 def document_of(

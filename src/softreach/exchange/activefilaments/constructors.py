@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -61,7 +62,7 @@ class Constructed(SimpleNamespace):
 
 
 def constructed(
-    where: str, name: str, values: Sequence[Any], options: Mapping[str, Any]
+    where: str, name: str, values: Sequence[Any], options: Sequence[tuple[str, Any]]
 ) -> Constructed:
     """Check the arguments of a constructor.
 
@@ -69,16 +70,21 @@ def constructed(
         where: What errors call the place in the file.
         name: Which of `CONSTRUCTORS`.
         values: Positional arguments.
-        options: Named arguments.
+        options: Named arguments with their names.
 
     Raises:
-        InvalidInput: Arguments that are missing, unknown or of another kind.
+        InvalidInput: Arguments that are missing, unknown, given twice or of another kind.
     """
     kinds, defaults, place = CONSTRUCTORS[name], _DEFAULTS.get(name, {}), f"{where}, {name}"
     order = [argument for argument in kinds if argument not in defaults]
     if len(values) > len(order):
         raise _fault(place, f"{len(values)} arguments", f"of {', '.join(order)}")
-    arguments = dict(zip(order, values, strict=False)) | dict(options)
+    given = [*zip(order, values, strict=False), *options]
+    arguments = dict(given)
+    if twice := [
+        argument for argument, count in Counter(key for key, _ in given).items() if count > 1
+    ]:
+        raise _fault(place, f"{twice[0]} twice", "given each argument once")
     if unknown := sorted(set(arguments) - set(kinds)):
         raise _fault(place, unknown[0], f"one of {', '.join(kinds)}")
     if missing := [argument for argument in order if argument not in arguments]:

@@ -116,11 +116,14 @@ def _check_each(of: Constructed, values: Sequence[Any], kind: str) -> None:
 
 
 def _ring(ring: Constructed, sectors: Constructed, bounds: Pairs, length: float) -> FilamentRing:
+    inner, outer = ring.geometry.R1, ring.geometry.R2
+    if not 0 <= inner < outer:
+        raise ring.geometry.fault(f"R1 = {inner:g}, R2 = {outer:g}", "0 <= R1 < R2")
     return FilamentRing(
         young_modulus=ring.mechanics.E,
         poisson_ratio=ring.mechanics.ν,
-        inner_radius=ring.geometry.R1,
-        outer_radius=ring.geometry.R2,
+        inner_radius=inner,
+        outer_radius=outer,
         angle=_angle(ring.architecture, length),
         extent=sectors.σ,
         offset=sectors.θ0,

@@ -131,6 +131,7 @@ def arm_of(filament: Filament) -> Manipulator:
         InvalidDesign: Numbers that no arm can have.
     """
     outer = filament.rings[-1].outer_radius
+    profile = LinearTaper(length=filament.length, outer_radius=outer, taper=filament.taper)
     spans = [(ring.inner_radius / outer, ring.outer_radius / outer) for ring in filament.rings]
     density = _shared_density(filament, spans)
     rings = tuple(
@@ -149,7 +150,6 @@ def arm_of(filament: Filament) -> Manipulator:
         density=density,
     )
     default = min(rings, key=lambda ring: ring.inner_ratio).material
-    profile = LinearTaper(length=filament.length, outer_radius=outer, taper=filament.taper)
     return Manipulator(
         profile=profile,
         section=Section(rings=rings, core=None if core == default else core),

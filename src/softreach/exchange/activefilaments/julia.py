@@ -251,7 +251,7 @@ class _Values(Transformer):
         return _Option(str(name), self.named(name))
 
     def called(self, name: Token, *arguments: Any) -> Any:
-        options = dict(part for part in arguments if isinstance(part, _Option))
+        options = [part for part in arguments if isinstance(part, _Option)]
         values = [part for part in arguments if not isinstance(part, _Option)]
         if name in CONSTRUCTORS:
             return constructed(f"{self._julia.source}, line {name.line}", name, values, options)

@@ -16,19 +16,20 @@ from softreach.exchange.activefilaments.filament import (
 )
 from softreach.support.arguments import as_flag, as_path
 from softreach.support.files.atomic import writing
-from softreach.support.files.kinds import FileKind, Formats, text_with
+from softreach.support.files.kinds import FileKind, Formats, beginning_with
 
 __all__ = ["FILAMENT_SCRIPT", "design_script", "write_design"]
 
-_HEAD = """\
-# The filament of ActiveFilaments.jl with the tips of a design of softreach.
+_TITLE = "# The filament of ActiveFilaments.jl with the tips of a design of softreach."
+_HEAD = f"""\
+{_TITLE}
 # Lengths in m, angles in rad, E in Pa, density in kg/m^3.
 using ActiveFilaments
 """
 
 
 FILAMENT_SCRIPT: Formats = {
-    ".jl": FileKind("a filament's definition", text_with("using ActiveFilaments", "AFilament("))
+    ".jl": FileKind("a filament's definition by softreach", beginning_with(_TITLE.encode()))
 }
 """Format of `write_design`."""
 
@@ -39,7 +40,7 @@ def write_design(arm: Manipulator, path: str | PathLike[str], *, overwrite: bool
     Args:
         arm: The design.
         path: The file; it is replaced only when the new one is complete.
-        overwrite: Whether it may replace any file, and not only a filament's definition.
+        overwrite: Whether it may replace any file, and not only a definition that softreach wrote.
 
     Raises:
         InvalidInput: The arm has what no filament there has: another profile than a linear taper,

@@ -172,8 +172,8 @@ def equilibria(
         tol: Largest tip error, in L.
 
     Raises:
-        InvalidInput: Activations of another shape, or other loads than dead forces along one
-            direction.
+        InvalidInput: Activations of another shape or under which there is no arm (ζ <= 0), or
+            other loads than dead forces along one direction.
 
     Warns:
         SoftreachWarning: Some may be missing, or tips miss `tol`.
@@ -197,7 +197,7 @@ def equilibria(
 def _one(rod: TipMap, activations: ArrayLike) -> Array:
     """Activations (1, bundles)."""
     gamma = as_floats("activations", activations)
-    gamma = rod.box.check(gamma[None] if gamma.ndim == 1 else gamma)
+    gamma = rod.check_activations("activations", gamma[None] if gamma.ndim == 1 else gamma)
     if len(gamma) != 1:
         allowed = f"({rod.box.bundles},) or (1, {rod.box.bundles}): one activation at a time"
         raise InvalidInput("activations.shape", gamma.shape, allowed)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.loads import Loads
 from softreach.arm.tables import tables
 from softreach.kernels.rod.tips import LANES
+from softreach.rod.arm_rod import ArmRod
 from softreach.rod.free import FreeRod, linear_strains
 from softreach.rod.loaded.phase import check_phase
 from softreach.rod.loaded.shapes import Shapes
@@ -29,12 +30,12 @@ from softreach.rod.loaded.tables import ArmBody, Body, LoadTables
 from softreach.rod.steps import pilot_activations
 from softreach.rod.tip_map import (
     BLOCK,
-    ArmRod,
     Frames,
     Status,
     StrainRange,
     Strains,
     TipStatus,
+    drop,
     loads_too_heavy,
     no_equilibrium_message,
     position_slopes,
@@ -128,7 +129,8 @@ class LoadedRod(ArmRod):
         What is to be searched again is gathered from all samples, so that kernels get whole blocks.
         """
         self.prepare()
-        gamma, solver = self.box.check(activations), self.solver
+        gamma, lost = self.with_arms(self.box.check(activations))
+        solver = self.solver
         found = solver.empty(len(gamma))
         blocks = parallel.blocks(len(gamma), _BLOCK)
         parallel.run(partial(solver.direct, gamma[b], found.of(b)) for b in blocks)
@@ -136,6 +138,7 @@ class LoadedRod(ArmRod):
             rows = solver.doubtful(found, rung)
             blocks = parallel.blocks(len(rows), LANES)
             parallel.run(partial(solver.again, gamma, rows[b], rung, found) for b in blocks)
+        drop(lost, found.status, found.tips, found.margin)
         return found
 
     def fill(
@@ -184,9 +187,11 @@ class LoadedRod(ArmRod):
 
     def _shapes(self, gamma: Array, z: Array, status: Status | None) -> Shapes:
         """Shapes at ascending stations; each equilibrium is found once."""
+        gamma, lost = self.with_arms(gamma)
         shapes = self._shape_solver.shapes(gamma, z, status=status)
         if status is not None:
             status[np.isnan(shapes.frames.position[:, 0, 0])] = TipStatus.NO_EQUILIBRIUM
+        drop(lost, status, *shapes.frames, shapes.moment, shapes.force)
         return shapes
 
     def strains_at(self, stations: ArrayLike) -> Callable[..., Strains]:

@@ -1,0 +1,80 @@
+"""What the free rod and the loaded one have in common: one arm, and how far activations bend it."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from threading import RLock
+from typing import Any
+
+import numpy as np
+
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.tables import Tables, check_extension, strain_stations, tables
+from softreach.rod.activation_box import ActivationBox
+from softreach.rod.tip_map import Array, TipMap, check_tol
+from softreach.support import parallel
+
+__all__ = ["ArmRod"]
+
+
+@dataclass(frozen=True, repr=False)
+class ArmRod(TipMap):
+    """The rod that one arm is, free or loaded, in the activations of all its bundles.
+
+    Raises:
+        InvalidInput: `tol` out of range.
+        InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
+    """
+
+    arm: Manipulator
+    tol: float = 1e-6
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tol", check_tol(self.tol))
+        check_extension(self.arm)
+
+    @cached_property
+    def box(self) -> ActivationBox:
+        """The activations within bounds."""
+        return ActivationBox.between(self.arm.bounds, self.arm.bundle_names)
+
+    @cached_property
+    def _strain_table(self) -> Tables:
+        return tables(self.arm, strain_stations(self.arm))
+
+    def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
+        """How far activations (n, bundles) go: the smallest ζ along the arm [-], shape (n,).
+
+        And the largest angle by which a step turns the arm [rad], ζ |u| R2 dS, shape (n,).
+        """
+        table, profile = self._strain_table, self.arm.profile
+        step = profile.radius(table.stations) * (profile.slender_length / self.steps)
+        least, most = np.empty((2, len(gamma)))
+        with np.errstate(all="ignore"):  # what overflows is no arm
+            for block in parallel.blocks(len(gamma), 1024):
+                extension = 1.0 + gamma[block] @ table.extension.T
+                bend = np.linalg.norm(
+                    np.einsum("scb,nb->nsc", table.curvature, gamma[block]), axis=-1
+                )
+                least[block] = extension.min(axis=1)
+                most[block] = (extension * bend * step).max(axis=1)
+        return least, most
+
+    @abstractmethod
+    def _prepare(self) -> None:
+        """Compute what every sample needs."""
+
+    def prepare(self) -> None:
+        """Compute what every sample needs, once for all threads."""
+        known = vars(self)
+        if "_is_prepared" in known:
+            return
+        with known.setdefault("_lock", RLock()):
+            if "_is_prepared" not in known:
+                self._prepare()
+                known["_is_prepared"] = True
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_lock"}
