@@ -28,7 +28,7 @@ from softreach.arm.parameters import changed, find_parameter, parameters
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.shown import written_parameters
 from softreach.arm.profile import PiecewiseTaper
-from softreach.arm.section import Ring, Section
+from softreach.arm.section import Ring, Section, name_faults
 from softreach.rod.kinematics import tip_positions
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.laws import arm_of, arms, in_box
@@ -154,10 +154,10 @@ def test_no_values_change_nothing(trunk):
     assert changed(trunk, {}) is trunk
 
 
-LETTERS = st.characters(exclude_categories=["C", "Z"], exclude_characters=".[]")
+NAMES = st.text(min_size=1, max_size=8).filter(lambda name: not [*name_faults([name], "actuators")])
 
 
-@given(st.lists(st.text(LETTERS, min_size=1, max_size=8), min_size=2, max_size=3, unique=True))
+@given(st.lists(NAMES, min_size=2, max_size=3, unique=True))
 def test_every_actuator_has_parameters_of_its_own_whatever_it_is_called(names):
     fibers = [FiberArchitecture(name=name, revolution=0.5, extent=0.3) for name in names]
     arm = arm_of(*fibers)
