@@ -56,6 +56,22 @@ def test_exact_tips_on_bounds_are_reached_by_maps_of_any_tolerance(bundles, tol)
     check_reached(arm, boundary_tips(arm, 24, tol)[1], tol)
 
 
+@pytest.mark.parametrize("place", ["corners", "edges", "faces"])
+def test_an_activation_on_a_bound_is_found_beside_others_that_lead_to_its_tip(place):
+    arm = designs.minimal_trunk(np.radians(36), np.radians(3))
+    gamma = activations(arm, 200, place)
+    gamma = gamma[np.linalg.cond(tip_map(arm).tips_and_slopes(gamma)[1]) < 1e3]  # not at a fold
+    found = check_reached(arm, tip_positions(arm, gamma, tol=1e-12), TOL)
+    assert (found.counts > 1).any()
+    for solution, wanted in zip(found, gamma, strict=True):
+        apart = np.abs(solution.activations - wanted).max(axis=1)
+        way = wanted + np.linspace(0, 1, 9)[:, None] * (
+            solution.activations[apart.argmin()] - wanted
+        )
+        away = np.linalg.norm(tip_positions(arm, way) - solution.target, axis=1)
+        assert away.max() <= 16 * TOL * arm.length
+
+
 @pytest.mark.parametrize("tol", [1e-4, TOL, 1e-8])
 def test_a_proof_says_more_than_the_error_of_tips(trunk, tol):
     gamma = np.random.default_rng(0).uniform(*trunk.bounds.T, (40, 3))
@@ -107,4 +123,5 @@ def test_a_drag_to_an_exact_tip_on_the_bounds_leaves_no_gap(trunk):
     for gamma in ([low, -0.6, -0.7], [low, low, -0.6], [low, low, low]):
         target = tip_positions(trunk, [gamma], tol=1e-11)[0]
         dragged = Drag(trunk).to(tuple(np.array(gamma) + 0.01), target)
+        assert dragged is not None
         assert dragged.gap == 0.0

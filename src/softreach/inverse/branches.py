@@ -31,7 +31,14 @@ from softreach.inverse.descent import descend
 from softreach.inverse.nearest import local_minima
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
-from softreach.inverse.roots import Roots, no_roots, placed, roots_at, smallest_singular_values
+from softreach.inverse.roots import (
+    Roots,
+    conditions,
+    no_roots,
+    placed,
+    roots_at,
+    smallest_singular_values,
+)
 from softreach.inverse.starts import Starts, spatial_order, starts_from_cells, with_torn_cells
 from softreach.kernels.branches import folds, newton
 from softreach.kernels.branches.newton import CONVERGED, RUNNING, STAGNATED, Search
@@ -137,23 +144,37 @@ def _newton(prepared: PreparedMap, request: Request, starts: Starts) -> Roots:
             _give_up(search, active)
     converged = np.flatnonzero(search.state == CONVERGED)
     # The trial holds the step that convergence left untaken; it may overstep a bound a little.
-    gamma, slope, goal = (
-        rod.box.clip(search.trial[converged]),
-        search.slope[converged],
-        goal[converged],
-    )
+    trial, goal = search.trial[converged], goal[converged]
+    gamma = rod.box.clip(trial)
     tips, stable = placed(rod, gamma)
-    residual = np.linalg.norm(tips - goal, axis=1)
-    moved = (gamma != search.trial[converged]).any(axis=1)
-    beside = np.flatnonzero(moved & (residual > request.residual) & (residual <= request.allowance))
-    gamma[beside], _, slope[beside], residual[beside] = descend(
-        rod, goal[beside], gamma[beside], request.residual
+    roots = Roots(
+        starts.target[converged],
+        gamma,
+        search.slope[converged],
+        np.linalg.norm(tips - goal, axis=1),
+        starts.cell[converged],
+        stable,
     )
-    stable[beside] = placed(rod, gamma[beside])[1]
-    roots = Roots(starts.target[converged], gamma, slope, residual, starts.cell[converged], stable)
-    found = residual <= request.residual
-    found[beside] = True
-    return rows(roots, found)
+    within = roots.residual <= request.residual
+    over = ~within & (gamma != trial).any(axis=1)
+    on_bounds = _moved_to_bounds(rod, request, rows(roots, over), goal[over])
+    return rows(roots, within).joined(on_bounds)
+
+
+def _moved_to_bounds(rod: TipMap, request: Request, roots: Roots, goal: Array) -> Roots:
+    """Step 8: those of roots beyond bounds that miss little enough on the bounds.
+
+    What moves a tip by the allowance moves a root by that over the smallest singular value, and to
+    move it back to the bounds moves the tip by no more than the condition number as much.
+    """
+    near = roots.residual <= request.allowance * conditions(roots.slope)
+    roots, goal = rows(roots, near), goal[near]
+    if not len(goal):
+        return roots
+    gamma, _, slope, residual = descend(rod, goal, roots.gamma, request.residual)
+    stable = placed(rod, gamma)[1]
+    roots = roots._replace(gamma=gamma, slope=slope, residual=residual, stable=stable)
+    return rows(roots, residual <= request.allowance)
 
 
 def _improved(rod: TipMap, goal: Array, starts: Starts) -> Array:

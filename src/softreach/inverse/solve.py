@@ -238,7 +238,8 @@ def _solutions(
     hit = closest.gap <= request.allowance
     roots = roots.joined(roots_at(rod, request.targets, missing[hit], closest.gamma[hit]))
     # Roots on a bound that miss by what the error of the tips leaves open come last.
-    roots = rows(roots, np.lexsort((roots.residual > request.residual, roots.target)))
+    beside = roots.residual > request.residual
+    roots = rows(roots, np.lexsort((beside, roots.target))) if beside.any() else roots
     statuses = np.full(count, Status.REACHED, np.int8)
     statuses[missing[~hit]] = np.where(bounds[~hit] > 0.0, Status.UNREACHABLE, Status.NOT_FOUND)
     gamma, gaps, proved_gaps = np.empty((count, rod.box.bundles)), np.empty(count), np.zeros(count)
