@@ -71,7 +71,6 @@ _TYPES = (
 """Numbers and texts: nothing complex, no dates, no bytes, no objects."""
 _CODECS = ("bytes", "vlen-utf8", "blosc", "zstd", "gzip", "crc32c")
 """Those of the Zarr v3 core; none of them can run code."""
-_FOREIGN = "not listed in the root", "one of those that softreach wrote, or moved away"
 _GROUP = {"zarr_format", "node_type", "attributes", "consolidated_metadata"}
 
 
@@ -168,20 +167,21 @@ def check_arrays(opened: Opened) -> None:
 
 
 def _arrays(opened: Opened) -> dict[str, Any]:
-    """The arrays of a store, opened one after the other.
+    """The arrays of a store; on disk, one looks first at what describes each.
 
-    Of several that Zarr opens at once, it loses all errors but the first, and the traceback of
-    each is printed when the process ends.
+    Zarr opens all at once and loses every error but the first; it would be printed in the end.
     """
-    watch, arrays = opened.watch, {}
+    watch = opened.watch
     if isinstance(watch.location, str) and "://" not in watch.location:
-        documents = Path(watch.location).glob(f"*/{DOCUMENT}")
-        for name in sorted({path.parent.name for path in documents} - watch.digests.keys()):
-            watch.report(Chunk(name, None), *_FOREIGN)
+        for path in sorted(Path(watch.location).glob(f"*/{DOCUMENT}")):
+            chunk = Chunk(path.parent.name, None)
+            try:
+                _described(watch, chunk, path.read_bytes())
+            except _Broken as broken:
+                watch.report(chunk, broken.found, broken.allowed)
+    arrays = dict(opened.group.arrays())
     for name in watch.digests:
-        try:
-            arrays[name] = opened.group[name]
-        except KeyError:
+        if name not in arrays:
             watch.report(Chunk(name, None), "missing")
     return arrays
 
@@ -289,12 +289,7 @@ class CheckedStore(WrapperStore[Any]):
         """What describes the store or one of its arrays, without digests and checksums."""
         text = content.to_bytes()
         if chunk.array:
-            document = _parsed(text)
-            if chunk.array not in self.watch.digests:
-                raise _Broken(*_FOREIGN)
-            if _digest(document) != self.watch.digests[chunk.array]:
-                raise _Broken("changed since it was written")
-            _check_kind(document)
+            document = _described(self.watch, chunk, text)
         else:
             document = _unsealed(text)
             self.watch.root = _digest(document)
@@ -401,6 +396,18 @@ def _parsed(text: bytes) -> dict[str, Any]:
         raise _Broken("empty" if not text else "no JSON document")
     if not isinstance(document.setdefault("attributes", {}), dict):
         raise _Broken("without attributes")
+    return document
+
+
+def _described(watch: Watch, chunk: Chunk, text: bytes) -> dict[str, Any]:
+    """What describes an array, as its store lists it."""
+    document = _parsed(text)
+    if chunk.array not in watch.digests:
+        allowed = "one of those that softreach wrote, or moved away"
+        raise _Broken("not listed in the root", allowed)
+    if _digest(document) != watch.digests[chunk.array]:
+        raise _Broken("changed since it was written")
+    _check_kind(document)
     return document
 
 
