@@ -23,7 +23,7 @@ from softreach import schema
 from softreach.atlas import DamagedStore, atlas_cloud, build_atlas, open_atlas, verify_atlas
 from softreach.cli.app import run
 from softreach.support.errors import SoftreachError, SoftreachWarning
-from softreach.support.files.stores import ARRAYS, DIGEST, sealed
+from softreach.support.files.documents import ARRAYS, DIGEST, sealed
 from tests.abuse.refusals import files_in, raised_by, refusal_of
 from tests.atlas.families import TINY, gapped_space
 

@@ -25,7 +25,7 @@ from softreach.atlas import (
 from softreach.atlas.layout import CHECKSUM
 from softreach.atlas.store import AtlasStore
 from softreach.support.errors import InvalidInput, SoftreachWarning
-from softreach.support.files.stores import ARRAYS, CHUNKS, DIGEST, sealed
+from softreach.support.files.documents import ARRAYS, CHUNKS, DIGEST, sealed
 from tests.abuse.refusals import files_in, raised_by
 from tests.abuse.test_damaged_stores import Files, listed, only_files, written
 from tests.atlas.families import TINY, assert_same

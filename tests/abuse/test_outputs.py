@@ -17,8 +17,8 @@ from softreach.export import export_arm, export_cloud, export_mesh
 from softreach.plot import save_figure
 from softreach.support.errors import InvalidInput, NotWritten, SoftreachWarning
 from softreach.support.files.atomic import writing
+from softreach.support.files.documents import sealed
 from softreach.support.files.kinds import PICTURES
-from softreach.support.files.stores import sealed
 from tests.abuse.refusals import files_in, raised_by, refusal_of
 
 pytest.importorskip("pyarrow")

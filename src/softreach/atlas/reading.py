@@ -19,7 +19,8 @@ from softreach.support.arguments import as_dataset, as_text
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput, counted, warn
 from softreach.support.files.damage import Chunk, storage_errors
-from softreach.support.files.stores import ARRAYS, READING, check_arrays
+from softreach.support.files.documents import ARRAYS
+from softreach.support.files.stores import READING, check_arrays
 
 if TYPE_CHECKING:
     import xarray as xr

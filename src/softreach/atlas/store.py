@@ -33,9 +33,8 @@ from softreach.sampling import sample_cube
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.files.damage import Chunk, StoreFailed, Watch, storage_errors, writing
+from softreach.support.files.documents import ARRAYS, CHUNKS
 from softreach.support.files.stores import (
-    ARRAYS,
-    CHUNKS,
     REMEDY,
     CheckedStore,
     Opened,

@@ -24,9 +24,9 @@ from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.files.atomic import replacing
 from softreach.support.files.damage import Watch, storage_errors
+from softreach.support.files.documents import ARRAYS
 from softreach.support.files.kinds import FileKind, Formats
 from softreach.support.files.stores import (
-    ARRAYS,
     READING,
     REMEDY,
     check_arrays,

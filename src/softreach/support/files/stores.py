@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import asyncio
 import copy
-import hashlib
 import json
 import os
 from collections.abc import Mapping
@@ -24,13 +23,23 @@ from zarr.storage import LocalStore, WrapperStore  # noqa: TID253  (imported whe
 from softreach.support.errors import InvalidInput
 from softreach.support.files.atomic import sync_file_in
 from softreach.support.files.damage import (
-    AS_WRITTEN,
     DOCUMENT,
     MISPLACED,
     Chunk,
     DamagedStore,
     Watch,
     storage_errors,
+)
+from softreach.support.files.documents import (
+    ARRAYS,
+    CHUNKS,
+    Broken,
+    check_kind,
+    described,
+    digest_of,
+    parsed,
+    sealed,
+    unsealed,
 )
 from softreach.support.files.kinds import first_entry
 
@@ -43,12 +52,6 @@ if TYPE_CHECKING:
 Kind = Literal["cloud", "atlas"]
 Mode = Literal["r", "r+"]
 
-ARRAYS = "arrays"
-"""Attribute of the root: digest of what describes each array, by its name."""
-CHUNKS = "chunks"
-"""Attribute of the root or an array: checksum of each chunk that is written once, by its key."""
-DIGEST = "sha256"
-"""Attribute of the root: digest of all of it but this attribute."""
 REMEDY = {
     "cloud": "compute the cloud again, or bring back a copy",
     "atlas": "the command that built the atlas computes again what is damaged",
@@ -64,15 +67,6 @@ READING: Mapping[str, Any] = {
 
 _ALLOWED = {"cloud": "a Zarr store written by softreach", "atlas": "a new folder, or an atlas"}
 _CHECKSUM = 4  # bytes at the end of every chunk, by the crc32c codec
-_TYPES = (
-    *("bool", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64"),
-    *("float32", "float64", "string"),
-)
-"""Numbers and texts: nothing complex, no dates, no bytes, no objects."""
-_CODECS = ("bytes", "vlen-utf8", "blosc", "zstd", "gzip", "crc32c")
-"""Those of the Zarr v3 core; none of them can run code."""
-_FOREIGN = "not listed in the root", "one of those that softreach wrote, or moved away"
-_GROUP = {"zarr_format", "node_type", "attributes", "consolidated_metadata"}
 
 
 class Opened(NamedTuple):
@@ -168,20 +162,21 @@ def check_arrays(opened: Opened) -> None:
 
 
 def _arrays(opened: Opened) -> dict[str, Any]:
-    """The arrays of a store, opened one after the other.
+    """The arrays of a store; on disk, one looks first at what describes each.
 
-    Of several that Zarr opens at once, it loses all errors but the first, and the traceback of
-    each is printed when the process ends.
+    Zarr opens all at once and loses every error but the first; it would be printed in the end.
     """
-    watch, arrays = opened.watch, {}
+    watch = opened.watch
     if isinstance(watch.location, str) and "://" not in watch.location:
-        documents = Path(watch.location).glob(f"*/{DOCUMENT}")
-        for name in sorted({path.parent.name for path in documents} - watch.digests.keys()):
-            watch.report(Chunk(name, None), *_FOREIGN)
+        for path in sorted(Path(watch.location).glob(f"*/{DOCUMENT}")):
+            chunk = Chunk(path.parent.name, None)
+            try:
+                described(watch, chunk, path.read_bytes())
+            except Broken as broken:
+                watch.report(chunk, broken.found, broken.allowed)
+    arrays = dict(opened.group.arrays())
     for name in watch.digests:
-        try:
-            arrays[name] = opened.group[name]
-        except KeyError:
+        if name not in arrays:
             watch.report(Chunk(name, None), "missing")
     return arrays
 
@@ -193,9 +188,9 @@ def kind_of(path: str | os.PathLike[str]) -> Kind:
         InvalidInput: No store of softreach.
     """
     try:
-        attributes = _unsealed((Path(path) / DOCUMENT).read_bytes())["attributes"]
-    except (OSError, _Broken) as error:
-        reason = f"its {DOCUMENT} is {error.found}" if isinstance(error, _Broken) else str(error)
+        attributes = unsealed((Path(path) / DOCUMENT).read_bytes())["attributes"]
+    except (OSError, Broken) as error:
+        reason = f"its {DOCUMENT} is {error.found}" if isinstance(error, Broken) else str(error)
         raise InvalidInput("store", os.fspath(path), _ALLOWED["cloud"], reason) from None
     return "atlas" if "command" in attributes else "cloud"
 
@@ -203,10 +198,10 @@ def kind_of(path: str | os.PathLike[str]) -> Kind:
 def foreign_entry(path: Path) -> str:
     """The first thing in a folder that is none of a store of softreach; empty if there is none."""
     try:
-        arrays = _unsealed((path / DOCUMENT).read_bytes())["attributes"].get(ARRAYS)
+        arrays = unsealed((path / DOCUMENT).read_bytes())["attributes"].get(ARRAYS)
     except FileNotFoundError:
         return first_entry(path)
-    except (OSError, _Broken):
+    except (OSError, Broken):
         return DOCUMENT
     known = {"", *(arrays if isinstance(arrays, dict) else ())}
     for folder, folders, files in os.walk(path):
@@ -267,7 +262,7 @@ class CheckedStore(WrapperStore[Any]):
             if chunk.place is None:
                 return self._document(chunk, content)
             self._check(chunk, content)
-        except _Broken as broken:
+        except Broken as broken:
             self.watch.report(chunk, broken.found, broken.allowed)
             return None
         return content
@@ -289,15 +284,10 @@ class CheckedStore(WrapperStore[Any]):
         """What describes the store or one of its arrays, without digests and checksums."""
         text = content.to_bytes()
         if chunk.array:
-            document = _parsed(text)
-            if chunk.array not in self.watch.digests:
-                raise _Broken(*_FOREIGN)
-            if _digest(document) != self.watch.digests[chunk.array]:
-                raise _Broken("changed since it was written")
-            _check_kind(document)
+            document = described(self.watch, chunk, text)
         else:
-            document = _unsealed(text)
-            self.watch.root = _digest(document)
+            document = unsealed(text)
+            self.watch.root = digest_of(document)
             digests = document["attributes"].get(ARRAYS)
             if isinstance(digests, dict):
                 self.watch.digests, self.watch.listed = digests, True
@@ -308,17 +298,17 @@ class CheckedStore(WrapperStore[Any]):
         """Check the checksum of a chunk, and that it is of this store and place."""
         if content is None:
             if self.watch.required(chunk):
-                raise _Broken("missing")
+                raise Broken("missing")
             return
         numbers: Any = content.as_numpy_array()
         if len(numbers) <= _CHECKSUM:
-            raise _Broken(f"{len(numbers)} bytes long")
+            raise Broken(f"{len(numbers)} bytes long")
         checksum = _checksum(content)
         if google_crc32c.value(numbers[:-_CHECKSUM]) != checksum:
-            raise _Broken("of a wrong checksum")
+            raise Broken("of a wrong checksum")
         listed = self.watch.listed_checksums.get(chunk.key, checksum)
         if listed != checksum or not self.watch.belongs(chunk, checksum):
-            raise _Broken(MISPLACED)
+            raise Broken(MISPLACED)
 
     def _written(self, key: str, value: Buffer) -> Buffer:
         """What is written for a value: the root with its digest, all else as it is."""
@@ -330,8 +320,8 @@ class CheckedStore(WrapperStore[Any]):
             return value
         if not chunk.array:
             return type(value).from_bytes(sealed(value.to_bytes()))
-        _check_kind(document := _parsed(value.to_bytes()))
-        digest = _digest(document)
+        check_kind(document := parsed(value.to_bytes()))
+        digest = digest_of(document)
         if self.watch.listed and self.watch.digests.get(chunk.array) != digest:
             allowed = "as the release of Zarr that began the store describes it"
             raise InvalidInput(f"array {chunk.array}", "described otherwise", allowed)
@@ -356,69 +346,7 @@ def _store(location: Any, mode: Mode) -> Store:
     return LocalStore(location, read_only=mode == "r")
 
 
-class _Broken(Exception):
-    """A file that cannot be trusted, or is none of softreach: what it is, and what it must be."""
-
-    def __init__(self, found: str, allowed: str = AS_WRITTEN) -> None:
-        self.found, self.allowed = found, allowed
-        super().__init__(f"{found}: must be {allowed}")
-
-
-def sealed(text: bytes) -> bytes:
-    """The text of a root with its digest."""
-    document = _parsed(text)
-    attributes = {key: value for key, value in document["attributes"].items() if key != DIGEST}
-    document["attributes"] = attributes
-    document["attributes"] = {**attributes, DIGEST: _digest(document)}
-    return json.dumps(document, indent=2).encode()
-
-
 def _checksum(content: Buffer) -> int:
     """The checksum at the end of a chunk."""
     numbers: Any = content.as_numpy_array()
     return int.from_bytes(numbers[-_CHECKSUM:].tobytes(), "little")
-
-
-def _unsealed(text: bytes) -> dict[str, Any]:
-    """What a root says, without its digest."""
-    document = _parsed(text)
-    digest = document["attributes"].pop(DIGEST, None)
-    if digest is None:
-        allowed = "one that softreach wrote, with checksums (older ones and others have none)"
-        raise _Broken("without a checksum", allowed)
-    if digest != _digest(document):
-        raise _Broken("changed since it was written")
-    _check_kind(document)
-    return document
-
-
-def _parsed(text: bytes) -> dict[str, Any]:
-    try:
-        document = json.loads(text.decode("utf-8"))
-    except (ValueError, RecursionError):
-        document = None
-    if not isinstance(document, dict):
-        raise _Broken("empty" if not text else "no JSON document")
-    if not isinstance(document.setdefault("attributes", {}), dict):
-        raise _Broken("without attributes")
-    return document
-
-
-def _digest(document: dict[str, Any]) -> str:
-    text = json.dumps(document, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _check_kind(document: dict[str, Any]) -> None:
-    """Check that it is a group, or an array of a kind that softreach writes."""
-    if document.get("node_type") != "array":
-        if not _GROUP.issuperset(document):
-            raise _Broken("of neither a group nor an array")
-        return
-    if document.get("data_type") not in _TYPES:
-        shown = json.dumps(document.get("data_type"))
-        raise _Broken(f"of type {shown}", "of numbers or of texts")
-    codecs = [codec.get("name") for codec in document.get("codecs", [])]
-    if not set(codecs) <= set(_CODECS) or codecs[-1:] != ["crc32c"]:
-        allowed = f"some of {', '.join(_CODECS)}, the last of them crc32c"
-        raise _Broken(f"with the codecs {', '.join(map(str, codecs))}", allowed)
