@@ -236,7 +236,7 @@ class TipMap(ABC):
         """Results of `fill` by name: tips and what else is wanted, on all threads."""
         gamma, lost = self.with_arms(self.box.check(activations))
         n, m = gamma.shape
-        room = {"tips": np.empty((n, 3))}
+        room: dict[str, Any] = {"tips": np.empty((n, 3))}
         for name in wanted:
             shape = {"slopes": (n, 3, m), "twists": (n, 6, m), "directions": (n, 3)}.get(name, (n,))
             room[name] = np.empty(shape, np.int8 if name == "status" else float)
