@@ -88,7 +88,7 @@ def test_dask_workers_survive_the_death_of_one(whole, tmp_path):
     body = """
         if __name__ == "__main__":
             from distributed import Client, LocalCluster
-            options = {"dashboard_address": None, "silence_logs": 50}
+            options = {"dashboard_address": ":0", "silence_logs": 50}
             with LocalCluster(2, threads_per_worker=1, **options) as cluster:
                 with Client(cluster) as client:
                     build(sys.argv[1], executor=client)
@@ -123,7 +123,7 @@ def test_workers_may_come_from_a_job_queue(whole, tmp_path, monkeypatch):
             from dask_jobqueue import SLURMCluster
             from distributed import Client
             options = {"log_directory": sys.argv[2], "local_directory": sys.argv[2]}
-            options |= {"scheduler_options": {"dashboard_address": None}, "interface": "lo"}
+            options |= {"scheduler_options": {"dashboard_address": ":0"}, "interface": "lo"}
             queue = SLURMCluster(cores=2, processes=2, memory="4GB", walltime="1:00:00", **options)
             queue.scale(2)
             with queue, Client(queue) as client:

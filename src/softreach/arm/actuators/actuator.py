@@ -245,7 +245,9 @@ def length_or_ratio_faults(values: Mapping[str, Any], field: str) -> list[Fault]
 
 
 def distance_faults(actuator: Actuator, profile: Profile, section: Section) -> list[Fault]:
-    """Faults of bundles so far from the axis that nothing could hold them there."""
+    """Faults of bundles that have a distance from the axis at which nothing could hold them."""
+    if not hasattr(actuator, "distance"):
+        return []
     z = np.array([0.0, *actuator.breakpoints(profile), profile.length])
     radius = profile.radius(z)
     with np.errstate(over="ignore"):
