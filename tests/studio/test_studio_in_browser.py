@@ -264,6 +264,6 @@ def test_a_click_on_the_map_of_an_atlas_loads_the_design(browser, tmp_path):
         tab.click_at(board.place_of(**at))
         tab.wait(lambda: parameter(tab, "taper") == 0.02, "the design is loaded")
         assert tab.session.state.design == changed(trunk, at)
-        assert tab.drawn("/atlas/here")
+        tab.wait(lambda: tab.drawn("/atlas/here"), "it is marked on the map")
         assert not tab.errors
         tab.close()
