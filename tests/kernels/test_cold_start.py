@@ -5,10 +5,8 @@ from __future__ import annotations
 import importlib
 import pkgutil
 import re
-from pathlib import Path
 
-import pytest
-from benchmarks.bench_cold import COMMANDS, ROOT, Cold, measured, recorded
+from benchmarks.bench_cold import COMMANDS, ROOT, measured, recorded
 
 from softreach import kernels
 from softreach.kernels.parts import KernelDispatcher
@@ -64,70 +62,38 @@ FEW = ("--n", "2000")
 WARM_UP = "warmup --loads"
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory) -> Path:
-    return tmp_path_factory.mktemp("cold")
-
-
-@pytest.fixture(scope="module")
-def runs(folder) -> dict[str, Cold]:
+def test_a_first_run_compiles_its_kernels_once_and_nothing_after_a_warm_up(tmp_path):
     """Every command in a process of its own, with one kernel cache that starts empty."""
     few = {name: FEW for name in ("cloud", "volume", "demo")}
-    return {name: measured(name, folder, *few.get(name, ())) for name in COMMANDS}
-
-
-@pytest.fixture(scope="module")
-def warm_up(folder, runs) -> Cold:
-    """What the warm-up does after them."""
-    return recorded(WARM_UP.split(), folder)
-
-
-def test_a_command_uses_its_kernels_and_no_other_each_for_one_set_of_types(runs):
+    runs = {name: measured(name, tmp_path, *few.get(name, ())) for name in COMMANDS}
     used = {
-        name: {kernel: len(types) for kernel, types in run.used.items()}
-        for name, run in runs.items()
+        n: {kernel: len(types) for kernel, types in run.used.items()} for n, run in runs.items()
     }
     assert used == {name: dict.fromkeys(KERNELS[name], 1) for name in COMMANDS}
 
+    for name, run in runs.items():
+        again = {f: times for f, times in run.compiled.items() if times > 1 and not of_numba(f)}
+        assert set(again.values()) <= {2}, name
+        assert again.keys() <= TWICE, name
+        assert sum(t for f, t in run.compiled.items() if of_numba(f)) <= OF_NUMBA, name
 
-def test_no_kernel_is_compiled_by_two_commands(runs, warm_up):
+    warm_up = recorded(WARM_UP.split(), tmp_path)
+    assert _kernels() <= warm_up.used.keys()
     kernels = set().union(*KERNELS.values())
-    every = [*runs.values(), warm_up]
-    compiled = [kernel for run in every for kernel in run.compiled if kernel in kernels]
+    compiled = [f for run in (*runs.values(), warm_up) for f in run.compiled if f in kernels]
     assert sorted(compiled) == sorted(kernels)
 
-
-def test_a_function_is_compiled_for_one_set_of_types_with_few_exceptions(runs):
-    twice = {
-        name: {n: times for n, times in run.compiled.items() if times > 1 and not of_numba(n)}
-        for name, run in runs.items()
-    }
-    assert {times for of_one in twice.values() for times in of_one.values()} == {2}
-    assert set().union(*twice.values()) <= TWICE
-
-
-def test_kernels_ask_numba_for_little_of_its_own(runs):
-    asked = {n: sum(t for f, t in run.compiled.items() if of_numba(f)) for n, run in runs.items()}
-    assert {name: times for name, times in asked.items() if times > OF_NUMBA} == {}
+    others = [line for line in _of_readme() if line not in COMMANDS.values()]
+    afterwards = [recorded(line.split(), tmp_path) for line in others]
+    assert len(runs) + len(afterwards) >= 7
+    assert [run.compiled for run in afterwards if run.compiled] == []
+    for run in (*runs.values(), *afterwards):
+        for kernel, types in run.used.items():
+            assert set(types) <= set(warm_up.used[kernel]), kernel
 
 
 def of_numba(name: str) -> bool:
     return name.startswith("numba.")
-
-
-def test_the_warm_up_compiles_every_kernel(warm_up):
-    assert _kernels() <= warm_up.used.keys()
-
-
-def test_after_the_warm_up_no_command_of_the_readme_compiles_anything(runs, warm_up, folder):
-    """The warm-up uses all that they use, for the same types."""
-    others = [line for line in _of_readme() if line not in COMMANDS.values()]
-    found = [*runs.values(), *(recorded(line.split(), folder) for line in others)]
-    assert len(found) >= 7
-    assert [run.compiled for run in found[len(runs) :] if run.compiled] == []
-    for run in found:
-        for kernel, types in run.used.items():
-            assert set(types) <= set(warm_up.used[kernel]), kernel
 
 
 def _kernels() -> set[str]:

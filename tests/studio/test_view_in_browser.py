@@ -27,9 +27,11 @@ def pixels(tab) -> np.ndarray:
         tab.page.wait_for_timeout(400)
         return imread(io.BytesIO(tab.page.screenshot(clip=canvas)))[..., :3]
 
-    last, image = picture(), picture()
-    while (last != image).any():  # still being drawn
+    image = picture()
+    for _ in range(8):  # until it stands still
         last, image = image, picture()
+        if (last == image).all():
+            break
     return image
 
 
