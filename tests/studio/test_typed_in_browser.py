@@ -19,11 +19,10 @@ def typed(tab, label, text, enter=True):
     tab.settle()
     place = field(tab, label)
     place.scroll_into_view_if_needed()
-    place.click()
-    tab.page.keyboard.press("Control+a")
-    tab.page.keyboard.type(text, delay=15)
+    place.press("Control+a")
+    place.press_sequentially(text, delay=15)
     if enter:
-        tab.page.keyboard.press("Enter")
+        place.press("Enter")
     return place
 
 
