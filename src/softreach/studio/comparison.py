@@ -49,7 +49,7 @@ class Comparison:
     errors: tuple[tuple[Value, ...], ...]
     """The largest errors of the values, where they have one."""
     differ_otherwise: bool
-    """Whether they differ in more than the numbers of the table."""
+    """True if they differ in more than the numbers of the table."""
 
     def difference(self, row: int, column: int) -> Value:
         """From the first design; None where either is not known."""
@@ -191,7 +191,7 @@ def _differing(designs: Sequence[dict[str, ShownParameter]]) -> list[tuple[str, 
 
 
 def _explained(designs: Sequence[Manipulator], names: Sequence[str]) -> bool:
-    """Whether the first design becomes each of the others by these parameters alone."""
+    """True if the first design becomes each of the others by these parameters alone."""
     first = designs[0]
     for other in designs[1:]:
         try:

@@ -1,4 +1,4 @@
-"""What a tab can be saved as: bytes under a name."""
+"""Files that a tab can be saved as: bytes under a name."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def _surface(reach: Reach) -> Surface:
 
 
 def _written(name: str, write: Callable[[Path], object]) -> bytes:
-    """What the library's own writers put into a file of this name."""
+    """Content that the library's own writers put into a file of this name."""
     with tempfile.TemporaryDirectory(prefix="softreach-") as folder:
         path = Path(folder) / name
         write(path)

@@ -72,7 +72,7 @@ def counts_at(reach: Reach, targets: Array, check: StaleCheck = lambda: None) ->
 
 
 def _reached_once(reach: Reach) -> bool:
-    """Whether it is proved that no place is reached by two activations."""
+    """True if it is proved that no place is reached by two activations."""
     return isinstance(reach.exact, ReachableSolid) and reach.exact.route == "flux"
 
 

@@ -316,7 +316,7 @@ class Session:
 
     @property
     def busy(self) -> bool:
-        """Whether any job has something to do."""
+        """True while any job has something to do."""
         return any(worker.busy for worker in self._workers.values())
 
     def cancel(self) -> None:

@@ -116,7 +116,7 @@ def _around(one: Parameter, value: float) -> _Slider:
 
 
 def _is_offered(arm: Manipulator, known: Mapping[str, Parameter], one: Parameter) -> bool:
-    """Whether a parameter changes this arm, and no other slider does the same.
+    """True if a parameter changes this arm, and no other slider does the same.
 
     Only what is helical has a revolution to change; only what is not, its number of bundles.
     """

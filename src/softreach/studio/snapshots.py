@@ -21,7 +21,7 @@ _MOST = 100
 
 
 class Numbers(NamedTuple):
-    """What is known of the reach of a design."""
+    """Known numbers of the reach of a design."""
 
     size: Size
     unreachability: float
@@ -39,7 +39,7 @@ class Snapshot:
     name: str
     state: StudioState
     taken: float
-    """When [s since 1970]: the order of snapshots."""
+    """Time [s since 1970]: the order of snapshots."""
     numbers: Numbers | None = None
     """None while they are not known."""
 
@@ -151,7 +151,7 @@ class Snapshots:
 
 
 class SnapshotStore(Protocol):
-    """Where snapshots stay when the server ends."""
+    """A place where snapshots stay when the server ends."""
 
     def snapshots(self) -> tuple[Snapshot, ...]:
         """Those that it holds, in the order in which they were taken."""

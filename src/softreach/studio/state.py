@@ -161,7 +161,7 @@ class Appearance:
 
     @property
     def surfaces(self) -> bool:
-        """Whether any surface is shown."""
+        """True if any surface is shown."""
         return self.surface or self.alpha_shape
 
     def __post_init__(self) -> None:
@@ -337,7 +337,7 @@ class History:
     kind: str = ""
     """Of the latest change; "" after a step back or forth."""
     at: float = field(default=0.0, compare=False)
-    """When that was [s]."""
+    """Time of that change [s]."""
 
     def after(
         self,

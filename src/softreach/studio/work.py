@@ -48,7 +48,7 @@ class _Turns:
 
     @property
     def taken(self) -> bool:
-        """Whether it is somebody's turn."""
+        """True while it is somebody's turn."""
         return self._lock.locked()
 
     def __enter__(self) -> None:
@@ -86,7 +86,7 @@ class Latest:
 
     @property
     def busy(self) -> bool:
-        """Whether there is something to do."""
+        """True while there is something to do."""
         return self._busy
 
     def submit(self, work: Callable[[StaleCheck], None]) -> None:
@@ -276,7 +276,7 @@ class CompilationWatch(event.Listener):
 
     @property
     def running(self) -> bool:
-        """Whether anything is being compiled."""
+        """True while anything is being compiled."""
         return self._running > 0
 
     def close(self) -> None:

@@ -99,7 +99,7 @@ class DrawSurfaces(Job):
 
 
 def _is_complete(known: Reach | None, state: StudioState) -> bool:
-    """Whether all there is to know was computed, or read from a file."""
+    """True if all there is to know was computed, or read from a file."""
     if known is None or not known.fine or known.arm != state.design:
         return False
     enough = max(known.samples, known.wanted) >= 1 << state.appearance.level
@@ -231,7 +231,7 @@ class FollowCamera(Job):
             session.scene.see_through_arm(self._hides_handle(viewpoint.position))
 
     def _hides_handle(self, camera: Array) -> bool:
-        """Whether the arm is between the camera [L] and the handle on its own tip."""
+        """True if the arm is between the camera [L] and the handle on its own tip."""
         session = self.session
         tip, look = session.tip, session.state.appearance
         shown = look.handle and look.arm

@@ -102,7 +102,7 @@ class TabCamera:
 
     @property
     def is_upright(self) -> bool:
-        """Whether the window is that of a phone."""
+        """True if the window is that of a phone."""
         return self.aspect < _UPRIGHT
 
     @property
@@ -150,7 +150,7 @@ class TabCamera:
         """Step back as the picture gets narrower, and forth again: what was in sight stays so.
 
         Returns:
-            Whether the window is changing, so that one has to look again: a layout passes through
+            True if the window is changing, so that one has to look again: a layout passes through
             widths that are gone before the page has heard of a step. That of a new page, which has
             no panel at first, takes long on a slow machine.
         """
@@ -245,7 +245,7 @@ def in_the_way(points: Array, viewpoint: Viewpoint, cut: str) -> NDArray[np.bool
 
 
 def is_behind(point: Array, camera: Array, centers: Array, radii: Array) -> bool:
-    """Whether a ball stands between the camera and a point [L], other than those that touch it.
+    """True if a ball stands between the camera and a point [L], other than those that touch it.
 
     Args:
         point: Shape (3,).

@@ -20,7 +20,7 @@ _LAST_PORT = 65535
 
 
 def is_local(host: str) -> bool:
-    """Whether only this machine can connect."""
+    """True if only this machine can connect."""
     return host in _LOCAL or host.startswith("127.")
 
 
@@ -86,7 +86,7 @@ def with_token(address: str, token: str) -> str:
 
 
 def is_welcome(path: str, headers: Mapping[str, str], token: str) -> bool:
-    """Whether a request shows the token: in its address, or in the cookie that it got for that.
+    """True if a request shows the token: in its address, or in the cookie that it got for that.
 
     Args:
         path: Of the request, with its query.
@@ -138,7 +138,7 @@ def answer_headers(token: str, path: str, headers: Mapping[str, str]) -> dict[st
 
 
 def same_origin(headers: Mapping[str, str], host: str) -> bool:
-    """Whether a connection comes from our own page, or from no page at all.
+    """True if a connection comes from our own page, or from no page at all.
 
     Browsers let any web page open a socket to this machine; they tell where it came from. On
     loopback the name must be local too, as foreign names can be made to point here.

@@ -109,7 +109,7 @@ class InversePanel:
         """Aim at the point of the cloud under the cursor, if clicks are to do that.
 
         Returns:
-            Whether they are, and there is one.
+            True if they are, and there is one.
         """
         session = self._session
         sample = session.picked_sample(origin, direction) if self._clicks.value else None

@@ -68,7 +68,7 @@ class StatusPanel:
 
 
 def is_behind(session: Session) -> bool:
-    """Whether results of the design in the fields are missing."""
+    """True if results of the design in the fields are missing."""
     reach = session.reach
     return reach is None or reach.arm != session.state.design or not reach.fine
 
