@@ -33,7 +33,7 @@ _GRAVITY = {
 @Parameter(name="*", group=Group("Changes of the design", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class Changes:
-    """What a command changes of the design that it takes."""
+    """Changes that a command makes to the design that it takes."""
 
     revolution_deg: Annotated[
         float | None,

@@ -60,7 +60,7 @@ def out_option(help: str) -> Parameter:
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Sampling:
-    """How a cloud is sampled."""
+    """Options of the sampling of a cloud."""
 
     n: Annotated[
         int | None,
@@ -79,7 +79,7 @@ class Sampling:
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """What `compute_cloud` and `build_atlas` take.
+        """Arguments of `compute_cloud` and `build_atlas`.
 
         Raises:
             InvalidInput: A seed for a sampler without chance.
@@ -100,7 +100,7 @@ def refuse(why: str, **options: object) -> None:
 
 
 def is_stored(source: str) -> bool:
-    """Whether a source is a stored cloud; else it is a design."""
+    """True if a source is a stored cloud; else it is a design."""
     return source.rstrip("/").endswith(".zarr")
 
 

@@ -85,7 +85,7 @@ def _warning(*, with_token: bool) -> str:
 
 
 def _work(start: Start, source: str, *, fresh: bool) -> KeptWork:
-    """What is kept of the work; a state or a cloud that is opened is shown as it is in its file."""
+    """Work that is kept; a state or a cloud that is opened is shown as it is in its file."""
     from softreach.studio.start import work_on
 
     as_it_is = source.lower().endswith(".json") or start.reach is not None
