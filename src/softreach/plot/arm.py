@@ -146,7 +146,7 @@ class DesignPanel(NamedTuple):
     arm: Manipulator
     view: View = "front"
     bundles: Collection[int] | None = None
-    """Which to draw, by index; None for all."""
+    """Bundles to draw, by index; None for all."""
 
 
 def plot_designs(

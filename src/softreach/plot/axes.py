@@ -59,7 +59,7 @@ class Panel:
 
     ax: Axes
     box: Array
-    """What they show: lower and upper corner in the units of the axes, shape (2, 3)."""
+    """Space shown: lower and upper corner in the units of the axes, shape (2, 3)."""
     view: View
     unit: LengthUnit
 

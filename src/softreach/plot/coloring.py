@@ -49,7 +49,7 @@ class BundleKey(NamedTuple):
     symbols: tuple[str, ...]
     """Symbol of the activation of each: γ, τ or P."""
     unstable: bool = False
-    """Whether some samples are marked as unstable equilibria."""
+    """True if some samples are marked as unstable equilibria."""
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -65,11 +65,11 @@ class ScalarKey(NamedTuple):
     low: float
     high: float
     unstable: bool = False
-    """Whether some samples are marked as unstable equilibria."""
+    """True if some samples are marked as unstable equilibria."""
     logarithmic: bool = False
-    """Whether equal ratios, and not equal differences, are equal steps of color."""
+    """True if equal ratios, and not equal differences, are equal steps of color."""
     clipped: bool = False
-    """Whether the ends stand for all values beyond them too."""
+    """True if the ends stand for all values beyond them too."""
 
 
 class Coloring(NamedTuple):
@@ -223,7 +223,7 @@ def _described(color: ArrayLike) -> str:
 
 
 def _spans_decades(values: Array, color: ArrayLike) -> bool:
-    """Whether an array whose ratios count has some that are too large for even steps of color."""
+    """True if an array whose ratios count has some that are too large for even steps of color."""
     if getattr(color, "attrs", {}).get("scale") != "log":
         return False
     known = values[np.isfinite(values)]

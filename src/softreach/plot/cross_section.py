@@ -62,7 +62,7 @@ class SectionKey(NamedTuple):
 
 
 def needs_section_key(arm: Manipulator) -> bool:
-    """Whether colors alone leave open what is what: several materials, or more than fibers."""
+    """True if colors alone leave open what is what: several materials, or more than fibers."""
     shapes = set(arm.outline(0.0).shape)
     plain = shapes == {"sector"} and set(arm.bundle_courses) == {"along"}
     return not plain or len(section_materials(arm.section)) > 1

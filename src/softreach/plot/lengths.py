@@ -24,7 +24,7 @@ class LengthUnit(NamedTuple):
     size: float
     """[m]"""
     relative: bool
-    """Whether it is L, the length of the arm."""
+    """True if it is L, the length of the arm."""
 
     def of(self, meters: ArrayLike) -> Array:
         """Lengths [m] as numbers on an axis."""
