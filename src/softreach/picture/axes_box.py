@@ -22,13 +22,13 @@ class Edge(NamedTuple):
     """The edge that carries the numbers of an axis."""
 
     high: tuple[bool, bool, bool]
-    """Whether it is at the high side, along x, y and z."""
+    """True where it is at the high side, along x, y and z."""
     outward: int
     """The axis along which its ticks lead out of the box."""
 
 
 class Side(NamedTuple):
-    """From where a box is seen, as far as its drawing depends on it."""
+    """Side from which a box is seen, as far as its drawing depends on it."""
 
     visible: tuple[int, int, int]
     """Face across x, y and z that is seen from outside: 1 the high one, -1 the low one."""

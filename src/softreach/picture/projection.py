@@ -87,7 +87,7 @@ def sight_axis(view: View) -> str:
 
 
 def is_mirrored(view: View) -> bool:
-    """Whether a coordinate grows to the left of the paper, as it does from the back."""
+    """True if a coordinate grows to the left of the paper, as it does from the back."""
     return plane_of(view) is not None and bool(view_axes(view)[0].sum() < 0)
 
 

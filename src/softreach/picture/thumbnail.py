@@ -54,7 +54,7 @@ class Skin(NamedTuple):
     """Shape (f, 3)."""
     color: Color = STEEL
     clear: bool = False
-    """Whether the outward sides of all that is not so show through it."""
+    """True if the outward sides of all that is not so show through it."""
 
 
 class Dots(NamedTuple):

@@ -168,7 +168,7 @@ def _fill_spans(triangles: Array, row: Index, columns: int) -> Iterator[tuple[In
 
 
 def _span_ends(triangles: Array, height: Array) -> tuple[Array, Array]:
-    """Where a horizontal line enters and leaves each triangle: column and values."""
+    """Both ends of a horizontal line within each triangle: column and values."""
     start, stop = triangles, np.roll(triangles, -1, axis=1)
     rise = stop[..., 1] - start[..., 1]
     above = height[:, None] - start[..., 1]
