@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def binding_of(store: AtlasStore, place: tuple[int, ...], status: int) -> NDArray[np.uint32]:
-    """What binds the chunks of a design that were written since; 0 for those that were not."""
+    """Checksums that bind the chunks of a design written since; 0 for those that were not."""
 
     def bound(name: str, inner: int) -> int:
         chunk = Chunk(name, (*place, *(0,) * inner))

@@ -62,7 +62,7 @@ class Intermediates(Mapping[Need, Any]):
 
     @cached_property
     def stable(self) -> NDArray[np.bool_]:
-        """Which samples have a stable equilibrium, shape (n,)."""
+        """Mask of the samples that have a stable equilibrium, shape (n,)."""
         return self._samples[1] == TipStatus.STABLE
 
     @cached_property

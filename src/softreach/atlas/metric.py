@@ -59,7 +59,7 @@ class Metric:
     over: tuple[str, ...] = ()
     """Dimensions of the result: () for a number, ("station", "quantile") for a profile."""
     nan_if: str = ""
-    """When NaN is the right answer; empty if never. A design with any other NaN has failed."""
+    """Case where NaN is right; empty if there is none. A design with any other NaN has failed."""
 
     def __post_init__(self) -> None:
         if not as_text("name of the metric", self.name).isidentifier():

@@ -53,9 +53,9 @@ class AtlasStatus:
     """Designs of which a stored chunk is damaged; the command that built them does so again."""
     todo: int
     tips_verified: bool = field(compare=False)
-    """Whether stored tips were read too, or there are none."""
+    """True if stored tips were read too, or there are none."""
     messages: dict[int, str]
-    """Why designs failed, cannot exist, are nowhere stable or are damaged: number -> message."""
+    """Messages of designs that failed, cannot exist, are nowhere stable or damaged, by number."""
 
 
 def atlas_status(atlas: AtlasLike) -> AtlasStatus:

@@ -43,7 +43,7 @@ class Contents:
     status: NDArray[np.uint8]
     """DAMAGED for designs of which a chunk is, shape (designs,)."""
     messages: dict[int, str]
-    """Why designs failed, cannot exist, are nowhere stable or are damaged: number -> message."""
+    """Messages of designs that failed, cannot exist, are nowhere stable or damaged, by number."""
     tables: dict[str, Any]
     """Arrays `metrics` and `curvature`; fill values where they are damaged."""
 

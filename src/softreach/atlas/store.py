@@ -150,12 +150,12 @@ class AtlasStore:
 
     @property
     def is_bound(self) -> bool:
-        """Whether chunks are bound to their designs; those of earlier versions are not."""
+        """True if chunks are bound to their designs; those of earlier versions are not."""
         return CHECKSUM in self.watch.digests
 
     @property
     def plans(self) -> list[Plan]:
-        """What its arrays must be, the seal last."""
+        """Plans of its arrays, the seal last."""
         plans = array_plans(self.command)
         return [plan for plan in plans if plan.name != CHECKSUM or self.is_bound]
 
@@ -166,7 +166,7 @@ class AtlasStore:
 
     @property
     def durable(self) -> bool:
-        """Whether a power cut may lose nothing that was written."""
+        """True if a power cut may lose nothing that was written."""
         return self.opened.durable
 
     def check(self, name: str, shape: tuple[int, ...], dims: tuple[str, ...], dtype: Any) -> None:
@@ -220,12 +220,12 @@ class AtlasStore:
         return int(np.ravel_multi_index((chunk.place or ())[: len(shape)], shape))
 
     def messages(self) -> dict[int, str]:
-        """Why designs failed, cannot exist or are nowhere stable: number -> message."""
+        """Messages of designs that failed, cannot exist or are nowhere stable, by number."""
         told = np.flatnonzero(np.isin(self.status(), (FAILED, GAP, UNSTABLE))).tolist()
         return {index: self.message(index) for index in told}
 
     def message(self, index: int) -> str:
-        """Why a design has no numbers; empty if there is no reason."""
+        """Message of a design that has no numbers; empty if there is no reason."""
         return str(np.asarray(self.array("message")[self.command.space.place(index)]).item())
 
     @cached_property
@@ -378,7 +378,7 @@ def _first_wins(store: Store, location: StoreLike) -> Store:
 
 
 def _is_foreign(name: str) -> bool:
-    """Whether a file is anything but what a killed writer leaves behind."""
+    """True for any file but what a killed writer leaves behind."""
     return not name.endswith(".partial")
 
 
@@ -399,7 +399,7 @@ def _complete(store: AtlasStore) -> None:
 
 
 def _is_stored(store: AtlasStore, plan: Plan) -> bool:
-    """Whether an array is there, with the values that all designs share."""
+    """True if an array is there, with the values that all designs share."""
     if plan.name not in store.group:
         return False
     if plan.name == CUBE:
