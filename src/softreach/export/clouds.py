@@ -267,7 +267,7 @@ def _point_mesh(table: CloudTable) -> Any:
 
 
 def _is_npz(path: Path) -> bool:
-    """Whether it is an archive with the arrays of a cloud."""
+    """True if it is an archive with the arrays of a cloud."""
     try:
         with zipfile.ZipFile(path) as archive:
             return {f"{name}.npy" for name in ("tip", "activation", "bundle")} <= set(
