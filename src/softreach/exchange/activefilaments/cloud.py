@@ -120,7 +120,7 @@ def _write(file: BufferedWriter, values: Array, filament: Filament | None = None
 
 
 def _is_of_pair(path: Path) -> bool:
-    """Whether a file holds numbers alone, and the other file of a cloud is beside it."""
+    """True if a file holds numbers alone, and the other file of a cloud is beside it."""
     tips = path.with_name(f"{path.stem.removesuffix(_ENDING)}{path.suffix}")
     if not (tips.is_file() and gamma_path(tips).is_file()):
         return False

@@ -97,7 +97,7 @@ def constructed(
 
 
 def is_of_kind(value: object, kind: str) -> bool:
-    """Whether a value is a number, a vector, or what a constructor of that name makes."""
+    """True if a value is a number, a vector, or what a constructor of that name makes."""
     if kind == _NUMBER:
         return isinstance(value, float)
     if kind == _NUMBERS:

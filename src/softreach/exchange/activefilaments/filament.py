@@ -47,7 +47,7 @@ class FilamentRing:
     bounds: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
     """(lower, upper) γ of each sector in their scale [-]; one that stays 0 where none is."""
     bundles: tuple[int, ...] = ()
-    """Which bundle of the arm each sector is; none for a ring without fibers."""
+    """Index of the bundle of the arm for each sector; none for a ring without fibers."""
     scale: float = 1.0
     """Their γ over that of the arm [-]."""
     name: str = ""
@@ -188,7 +188,7 @@ def _from_inside_out(rings: list[FilamentRing]) -> tuple[FilamentRing, ...]:
 
 
 def is_from_inside_out(rings: Sequence[FilamentRing]) -> bool:
-    """Whether the first ring is the innermost and the last the outermost, as AFilament takes it."""
+    """True if the first ring is the innermost and the last the outermost, as AFilament takes it."""
     innermost = min(ring.inner_radius for ring in rings)
     outermost = max(ring.outer_radius for ring in rings)
     return rings[0].inner_radius == innermost and rings[-1].outer_radius == outermost

@@ -273,7 +273,7 @@ class _Values(Transformer):
 
 
 def _ends(token: Token, statement: Sequence[Token]) -> bool:
-    """Whether a token outside of brackets ends the statement before it."""
+    """True if a token outside of brackets ends the statement before it."""
     if token.type == "NEWLINE":
         return not (statement and statement[-1] in _CONTINUES)
     return token == ";"
