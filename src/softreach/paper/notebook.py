@@ -37,9 +37,9 @@ class Notebook:
     folder: Path
     part: str
     key: Mapping[str, Any]
-    """What the results depend on; a notebook of another key is stale."""
+    """Everything that the results depend on; a notebook of another key is stale."""
     overwrite: bool = False
-    """Whether files of other kinds may be replaced."""
+    """True if files of other kinds may be replaced."""
     numbers: dict[str, Any] = field(default_factory=dict)
     pictures: list[Picture] = field(default_factory=list)
     seconds: float = 0.0

@@ -28,7 +28,7 @@ REPORT: Formats = {
         "paper",
     )
 }
-"""What is written in the end."""
+"""Files that are written in the end."""
 
 _NARROW = 900  # pixels; two such figures stand side by side
 
