@@ -174,7 +174,7 @@ def tip_map_of(cloud: xr.Dataset) -> TipMap:
 
 
 def sample_bytes(bundles: int) -> int:
-    """What a sample takes: its tip, its activation and its status."""
+    """Memory of a sample [bytes]: its tip, its activation and its status."""
     return 8 * (3 + bundles) + 1
 
 
@@ -212,7 +212,7 @@ def _of_all_bundles(rod: TipMap) -> TipMap:
 
 
 def _is_cloud(path: Path) -> bool:
-    """Whether the store of softreach at a path is a cloud."""
+    """True if the store of softreach at a path is a cloud."""
     try:
         return kind_of(path) == "cloud"
     except InvalidInput:
@@ -222,7 +222,7 @@ def _is_cloud(path: Path) -> bool:
 CLOUD_STORE: Formats = {
     ".zarr": FileKind("a stored cloud", _is_cloud, foreign=foreign_entry),
 }
-"""What `save_cloud` writes, and replaces."""
+"""Files that `save_cloud` writes, and replaces."""
 
 
 def _write(cloud: xr.Dataset, path: Path) -> None:

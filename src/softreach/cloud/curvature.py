@@ -1,4 +1,4 @@
-"""How much an arm bends, twists and stretches over a whole cloud, station by station (section 4).
+"""Bend, twist and stretch of an arm over an entire cloud, station by station (section 4).
 
 The statistics are streamed: blocks of samples fill histograms whose bins span what the activation
 box allows, and no array of all samples by stations ever exists.

@@ -1,4 +1,4 @@
-"""How well the tip can be moved from each sample of a cloud, and how many activations reach it."""
+"""Dexterity of the tip at each sample of a cloud, and the number of activations that reach it."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def dexterity(cloud: xr.Dataset) -> xr.Dataset:
 
 
 def solution_measure(cloud: xr.Dataset, *, cell: float | None = None) -> xr.Dataset:
-    """How many activations reach each place: a number, or the size of the family of solutions.
+    """Number of activations that reach each place, or the size of the family that they form.
 
     For three bundles it is the number of activations that reach a place; with four they form
     curves in the activation box, whose length this is; with five surfaces, whose area; and so on.

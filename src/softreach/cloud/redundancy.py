@@ -1,4 +1,4 @@
-"""How differently an arm must be activated to reach nearly the same place (section 5)."""
+"""Distance between activations that reach nearly the same place (section 5)."""
 
 from __future__ import annotations
 
@@ -271,7 +271,7 @@ def _among(
 
 
 def evaluated_samples(distance: xr.DataArray, cloud: xr.Dataset) -> Index:
-    """Which samples of the cloud were evaluated."""
+    """Indices of the samples of the cloud that were evaluated."""
     n = cloud.sizes["sample"]
     distance = as_dataset("distance", distance, kind="DataArray")
     if distance.dims != ("sample",) or "sample" not in distance.coords:

@@ -1,4 +1,4 @@
-"""How much space a cloud of tips fills, and how much of its hull it cannot reach (section 4)."""
+"""Volume that a cloud of tips fills, and the share of its hull that it cannot reach (section 4)."""
 
 from __future__ import annotations
 
