@@ -88,7 +88,7 @@ class AlphaComplex:
         )
 
     def _joined(self, alpha: float) -> tuple[np.ndarray, int]:
-        """What `kernels.join_regions` needs to join further tetrahedra, and the number of parts."""
+        """Forest for `kernels.join_regions` to add further tetrahedra, and the number of parts."""
         parent = np.full(len(self.radii), -1, np.int32)
         neighbors = self.triangulation.neighbors
         return parent, int(kernels.join_regions(neighbors, self.radii <= alpha, parent))

@@ -65,7 +65,7 @@ class Delaunay:
 
 
 def lies_on_curve(points: Points) -> bool:
-    """Whether neighbors of points are strung along a line, as the tips of one bundle are."""
+    """True if neighbors of points are strung along a line, as the tips of one bundle are."""
     return local_dimension(points) < 1.5
 
 

@@ -56,7 +56,7 @@ class Hull:
         return None if self.volume_corrected is None else self.volume - self.volume_corrected
 
     def _repr_html_(self) -> str:
-        """What `repr` says below a small picture, for notebooks."""
+        """Text of `repr` below a small picture, for notebooks."""
         from softreach.picture import Skin, html_card
 
         return html_card(repr(self), Skin(self.vertices, self.faces))
@@ -93,7 +93,7 @@ class Hull:
 
     @property
     def _bias_text(self) -> str:
-        """What the sampling does to the volume, if asked for."""
+        """Effect of the sampling on the volume, if asked for."""
         if self.volume_corrected is None:
             return ""
         return f" (without sampling bias about {self.volume_corrected:.4g} m³)"

@@ -64,7 +64,7 @@ class CellGrid:
         return [(first + 0.5 + np.arange(n)) * self.edge for first, n in pairs]
 
     def count(self, points: Index | slice = slice(None)) -> Index:
-        """How many of some points, all by default, each cube holds."""
+        """Number of points in each cube, of some of them or, by default, of all."""
         return self._shaped(np.bincount(self.cells[points], minlength=self._size))
 
     def sum(self, values: Array) -> Array:
@@ -83,7 +83,7 @@ class CellGrid:
         return np.divide(total, count, out=mean, where=count > 0)
 
     def _shaped(self, of_cubes: NDArray[Any]) -> NDArray[Any]:
-        """What each cube has, without what is in none."""
+        """Values of the cubes in their shape, without that of the points in none."""
         return of_cubes[: self._size].reshape(self.shape)
 
     @property

@@ -1,4 +1,4 @@
-"""How far apart the values of neighbors are: a mean over a ball around each of many points."""
+"""Distance between the values of neighbors: a mean over a ball around each of many points."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ class _Columns:
         return order, _Sample(keys[order], _taken(points, order), _taken(values.T, order))
 
     def near(self, points: Array, queries: Array) -> Index:
-        """Which points lie in the cubes around those of queries; all others are too far away."""
+        """Points that lie in the cubes around those of queries; all others are too far away."""
         corner, extent = self.low, points.max(axis=0)[self.axes] - self.low
         width = np.maximum(extent / _CUBES, max(self.margin, _SMALLEST))
         shape = tuple((extent / width).astype(np.int64) + 3)

@@ -84,7 +84,7 @@ def quartered(points: Array, triangles: Indices) -> tuple[Array, Indices]:
 
 
 class Roots(NamedTuple):
-    """Where a map takes a value."""
+    """Points that a map takes to a value."""
 
     points: Array
     """Unit vectors, shape (n, 3)."""
@@ -140,7 +140,7 @@ def _candidates(seen: Map, levels: int, caution: float) -> tuple[Array, bool]:
 
 
 def _sags(images: Array, triangles: Index, middles: Index) -> Array:
-    """How far the images of the middles of sides are from the middles of their images."""
+    """Distances from the images of the middles of sides to the middles of their images."""
     corners = images[triangles]
     halfway = 0.5 * (corners + np.roll(corners, -1, axis=1))
     return np.linalg.norm(images[middles] - halfway, axis=2).max(axis=1)
@@ -245,12 +245,12 @@ class Rings(NamedTuple):
 
     @property
     def complete(self) -> bool:
-        """Whether the image of the meridian, which ends opposite, passes the pole that often."""
+        """True if the image of the meridian, which ends opposite, passes the pole that often."""
         return self.pole_sign + 2 * int(self.signs.sum()) == 1
 
 
 def is_axisymmetric(image: Map, axis: Array, tolerance: float) -> bool:
-    """Whether turning about an axis, and mirroring in a plane through it, changes nothing.
+    """True if turning about an axis, and mirroring in a plane through it, changes nothing.
 
     Args:
         image: The map.
