@@ -49,11 +49,11 @@ class ReachableSet(ABC):
     volume: float
     """Volume [m³]; places count once however often they are reached. 0 for all but solids."""
     volume_error: float
-    """How far off `volume` may be, estimated from two resolutions [m³]."""
+    """Error of `volume`, estimated from two resolutions [m³]."""
     convex_volume: float
     """Volume of the convex hull [m³]."""
     convex_volume_error: float
-    """How far off `convex_volume` may be, estimated from two grids [m³]."""
+    """Error of `convex_volume`, estimated from two grids [m³]."""
     lost_share: float
     """Share of the activation box that is left out, by volume [-]: cells of the activation grid
     with a corner that has no stable equilibrium, or with neighbors on different branches. It
@@ -73,7 +73,7 @@ class ReachableSet(ABC):
 
     @property
     def unreachability_error(self) -> float:
-        """How far off `unreachability` may be with both volumes [-]; NaN for 0/0."""
+        """Error of `unreachability` by those of both volumes [-]; NaN for 0/0."""
         if not self.convex_volume > 0:
             return np.nan
         share = self.volume / self.convex_volume
@@ -110,7 +110,7 @@ class ReachableSet(ABC):
         return "\n  ".join([f"{type(self).__name__}: {size}", *details, self._origin()])
 
     def _lost(self) -> dict[str, Number]:
-        """What is left out, for arms of which some activations may not be stable."""
+        """Share left out, for arms of which some activations may not be stable."""
         if not self.tip_map.supports_unstable:
             return {}
         meaning = "share of the activation box left out: no stable equilibrium, or torn"
@@ -118,7 +118,7 @@ class ReachableSet(ABC):
 
     @abstractmethod
     def _lines(self) -> list[str]:
-        """What to print: the size first."""
+        """Lines to print: the size first."""
 
     @abstractmethod
     def _numbers(self) -> dict[str, Number]:
@@ -138,7 +138,7 @@ class ReachableSet(ABC):
         return f"convex hull {quantity(self.convex_volume, 'm³', self.convex_volume_error)}"
 
     def _origin(self) -> str:
-        """How the set was computed."""
+        """A line on how the set was computed."""
         box, rod = self.tip_map.box, self.tip_map
         free = counted(box.dimension, "free bundle")
         power = str(box.dimension).translate(_POWERS) if box.dimension > 1 else ""

@@ -104,12 +104,12 @@ def signed_field(image: Image | ReachedCells) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class ReachedCells:
-    """What `Image` is for three free bundles, for more of them: asked by search."""
+    """Counterpart of `Image` for more than three free bundles: asked by search."""
 
     rod: TipMap
     lattice: Lattice
     reached: Mask
-    """Whether the centers of the cells are reached."""
+    """True for cells whose centers are reached."""
     gamma: Array
     """Activations that reach them, meaningless elsewhere, shape (cells, bundles)."""
     crossings: Crossings
@@ -144,7 +144,7 @@ class ReachedCells:
             out[left] = np.minimum(out[left], found.distance)
 
     def _starts_inside(self, points: Array) -> Iterator[tuple[Mask, Array]]:
-        """Which points have a reached center at a corner of their cube, and where to start."""
+        """Masks of points with a reached center at a corner of their cube, and where to start."""
         at = self.lattice.coordinates(points)
         for corner in (np.rint(at), *(np.floor(at) + corner for corner in _CORNERS)):
             index = corner.astype(np.int64)
@@ -155,7 +155,7 @@ class ReachedCells:
             yield within & self.reached.ravel()[cells], self.gamma[cells]
 
     def boundary_crossings(self, axis: int) -> tuple[tuple[Index, Index, Index], Array]:
-        """Where the boundary cuts the edges between cell centers along an axis.
+        """Places where the boundary cuts the edges between cell centers along an axis.
 
         Returns:
             The centers just before the boundary, as an index of arrays of the lattice's shape, and
@@ -189,7 +189,7 @@ def _axis_distances(image: Image | ReachedCells, axis: int) -> Array:
 
 
 def _level_set(image: Image | ReachedCells, field: Array, level: float) -> Surface:
-    """Where the field, in cells, has a value."""
+    """Surface where the field, in cells, has a value."""
     try:
         from skimage.measure import marching_cubes
     except ImportError as error:

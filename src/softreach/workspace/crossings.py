@@ -1,4 +1,4 @@
-"""Where the boundary cuts the edges between cell centers, by search from both sides."""
+"""Places where the boundary cuts the edges between cell centers, by search from both sides."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def boundary_edges(reached: Mask) -> Edges:
 
 @dataclass
 class Crossings:
-    """How far from the reached center the boundary cuts each edge, enclosed ever closer.
+    """Distances from reached centers at which the boundary cuts the edges, enclosed ever closer.
 
     Places up to `low` are reached, as `gamma` proves at `low`; none was found at `high`, where the
     plane through the nearest tip, `beyond`, says at which place between them the boundary is cut.
@@ -65,7 +65,7 @@ class Crossings:
     beyond: Array
     """Activations whose tips are nearest to `high`, shape (n, bundles)."""
     place: Array
-    """Where the plane through the nearest tip is cut, between `low` and `high`, shape (n,)."""
+    """Place where the plane of the nearest tip cuts the edge, between `low` and `high`, shape (n,)."""
 
     @classmethod
     def of(cls, flood: Flood) -> Crossings:
@@ -126,7 +126,7 @@ class Crossings:
         return reached
 
     def _cut(self, which: Index, tips: Array | None = None) -> None:
-        """Where planes through the tips nearest to `high`, square to the way, cut the edges."""
+        """Cut the edges by the planes through the tips nearest to `high`, square to the way."""
         if tips is None:
             tips = self.rod.tips(self.beyond[which])
         away = (self.points(which, self.high[which]) - tips) / self.lattice.cell

@@ -100,7 +100,7 @@ def _all_stable(rod: TipMap) -> TipMap:
 
 @lru_cache(maxsize=64)
 def _lost(rod: TipMap) -> tuple[int, int]:
-    """How many activations have no stable equilibrium, and of how many tried."""
+    """Number of activations without a stable equilibrium, and of those tried."""
     (cube,) = cube_blocks("sobol", _TRIED, rod.box.bundles, 0, _TRIED)
     corners = rod.box.corners() if rod.box.bundles <= 10 else np.empty((0, rod.box.bundles))
     gamma = np.concatenate([rod.box.from_cube(cube), corners])

@@ -1,4 +1,4 @@
-"""Where the map from activations to tips is torn: cells that have no image of their own.
+"""Tears in the map from activations to tips: cells that have no image of their own.
 
 A loaded arm may lose its stable equilibrium within the activation box, or snap to another branch. A
 cell of the box that holds such a place would be mapped across a gap through which no tip passes.
@@ -56,7 +56,7 @@ def left_out_cells(rod: TipMap, tips: Array, cells: int) -> Mask:
 
 
 def remainder(rod: TipMap, image: Image, stretches: Array, left_out: Mask) -> Remainder:
-    """What cells with a stable corner reach although they are left out, by eight places in each.
+    """Reach of cells with a stable corner that are left out, by eight places in each.
 
     A place counts with the |det J| of the cell's corners, the median of those that are stable, if
     it is stable and its tip lies outside the image. Where stability is lost at a fold, det J grows
@@ -88,7 +88,7 @@ def remainder(rod: TipMap, image: Image, stretches: Array, left_out: Mask) -> Re
 
 
 class Remainder(NamedTuple):
-    """What cells that are left out still reach."""
+    """Remaining reach of cells that are left out."""
 
     volume: float
     """Outside the image [m³], right to a half of itself."""
@@ -146,7 +146,7 @@ def _suspects(apart: Array, axis: int) -> Mask:
 
 
 def _stay_apart(rod: TipMap, edges: Index, axis: int, field: Array) -> Mask:
-    """Whether the tips of edges, given by their first vertex, stay apart as these are halved."""
+    """Mask of edges, given by their first vertex, whose tips stay apart as these are halved."""
     m, cells = edges.shape[1], field.shape[0] - 1
     step = np.eye(m, dtype=int)[axis]
     low, high = edges / cells, (edges + step) / cells

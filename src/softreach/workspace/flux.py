@@ -52,7 +52,7 @@ class Flux(NamedTuple):
     value: float
     """Signed volume [m³]: below zero if the map turns the orientation over."""
     error: float
-    """How far off it may be: half as many nodes or so, and the error of the tips [m³]."""
+    """Estimated error: from half as many nodes or so, and the error of the tips [m³]."""
     faces: FaceNodes
     """Nodes on the faces of the unit cube of the free bundles."""
     area: Array
@@ -97,7 +97,7 @@ class FaceNodes(NamedTuple):
     sense: Array
     """1 on faces at 1, -1 on those at 0: where the cross product of sides points, shape (n,)."""
     axis: Index
-    """Which axis the face is normal to, shape (n,)."""
+    """Axis that the face is normal to, shape (n,)."""
 
     def area_vectors(self, slopes: Array) -> Array:
         """∂r/∂a × ∂r/∂b outwards, times the weights [m²], shape (n, 3).

@@ -106,10 +106,10 @@ def volume_gradient(
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class VolumeGradient:
-    """How volume, convex volume and unreachability change with parameters of a design."""
+    """Derivatives of volume, convex volume and unreachability by parameters of a design."""
 
     solid: ReachableSolid
-    """What the design itself reaches."""
+    """Reachable set of the design itself."""
     parameters: tuple[str, ...]
     """Names of the parameters."""
     units: tuple[str, ...]
@@ -117,15 +117,15 @@ class VolumeGradient:
     volume: Array
     """∂V/∂p [m³ per unit of the parameter], shape (parameter,)."""
     volume_error: Array
-    """How far off they may be."""
+    """Errors of these derivatives."""
     convex_volume: Array
     """Derivatives of the volume of the convex hull [m³ per unit], shape (parameter,)."""
     convex_volume_error: Array
-    """How far off they may be."""
+    """Errors of these derivatives."""
 
     @property
     def route(self) -> str:
-        """What the volume and its derivatives come from, as `ReachableSolid.route`."""
+        """Source of the volume and its derivatives, as `ReachableSolid.route`."""
         return self.solid.route
 
     @property
@@ -136,7 +136,7 @@ class VolumeGradient:
 
     @property
     def unreachability_error(self) -> Array:
-        """How far off they may be."""
+        """Errors of these derivatives."""
         volume, convex = self.solid.volume, self.solid.convex_volume
         return (volume * self.convex_volume_error / convex + self.volume_error) / convex
 
@@ -194,7 +194,7 @@ def _corners(rod: TipMap, cube: Array) -> HullCorners:
 
 
 def _rows_of(some: Array, every: Array) -> Index:
-    """Where in a list of points some of them are; one place for those that come twice."""
+    """Places of some points in a list of all; one place for those that come twice."""
     from scipy.spatial import KDTree  # lazily
 
     return np.asarray(KDTree(every).query(some)[1], np.int64)

@@ -60,11 +60,11 @@ class Spans(NamedTuple):
     """Pieces of lines of sight between crossings, line by line, upwards."""
 
     column: Index
-    """Which line, (i, j) as i · width + j over the two axes that follow, cyclically."""
+    """Index of the line, (i, j) as i · width + j over the two axes that follow, cyclically."""
     start: Array
-    """Where it begins, in cells."""
+    """Beginning of the piece, in cells."""
     length: Array
-    """How long it is, in cells; 0 after the last crossing of a line."""
+    """Length of the piece, in cells; 0 after the last crossing of a line."""
     cover: Index
     """Number of activations that reach it."""
     degree: Index
@@ -85,7 +85,7 @@ class Image:
 
     @cached_property
     def spans(self) -> tuple[Spans, Spans, Spans]:
-        """How it covers the lines through the cell centers along each axis, to rounding."""
+        """Cover of the lines through the cell centers along each axis, to rounding."""
         return self._spans(0), self._spans(1), self._spans(2)
 
     def _spans(self, axis: int) -> Spans:
@@ -138,7 +138,7 @@ class Image:
         return point_cover.bin_triangles(self.vertices, self.triangles, self.unit, shape)
 
     def boundary_crossings(self, axis: int) -> tuple[tuple[Index, Index, Index], Array]:
-        """Where the boundary of the image cuts the edges between cell centers along an axis.
+        """Places where the boundary of the image cuts the edges between cell centers along an axis.
 
         Returns:
             The centers just before the boundary, as an index of arrays of the lattice's shape, and
@@ -177,7 +177,7 @@ class Image:
 
 
 def _starts(*keys: Index) -> Mask:
-    """Where a sorted list of keys changes."""
+    """Mask of the places where a sorted list of keys changes."""
     return np.any([np.diff(key, prepend=-1) != 0 for key in keys], axis=0)
 
 

@@ -1,4 +1,4 @@
-"""Whether three bundles reach each place by one activation alone: a test that is close to a proof.
+"""Injectivity of three bundles, one activation for each place: a test that is close to a proof.
 
 A map of a box is one to one if det J keeps its sign in the box and no two points of the boundary
 meet. Both are bounded on cells, from samples with a margin for what may lie between them.
@@ -35,7 +35,7 @@ _MARGIN = 1.5  # on second differences, for those between the vertices
 
 
 def is_injective(rod: TipMap) -> bool:
-    """Whether the map of a box of three free bundles is found to be one to one.
+    """True if the map of a box of three free bundles is found to be one to one.
 
     False means that it is not or that this is not clear. Arms that may lose their stability are not
     judged: what is stable between samples is not known.
@@ -90,7 +90,7 @@ def solid_by_flux(
 
 
 def faces_meet(rod: TipMap, slopes: Array) -> bool | None:
-    """Whether images of different points of the boundary of the box of three bundles may meet.
+    """True if images of different points of the boundary of the box of three bundles may meet.
 
     Pairs of patches of the six faces are halved until each is settled: by a plane between both
     images, or because a window of the box that holds both patches is mapped one to one.
@@ -145,7 +145,7 @@ class RegularWindows:
         self._offsets = np.concatenate([corners, np.eye(3, dtype=int), -np.eye(3, dtype=int)])
 
     def any_hopeless(self) -> bool:
-        """Whether the map is not known to be one to one even in small windows at the boundary.
+        """True if the map is not known to be one to one even in small windows at the boundary.
 
         Looked at are those where the map is flattest.
         """
@@ -157,7 +157,7 @@ class RegularWindows:
         return not self._are_regular(np.zeros(len(worst), np.int64), worst).all()
 
     def hold(self, low: Array, high: Array) -> tuple[Mask, Mask]:
-        """Whether such windows hold boxes, and whether the smallest that might hold one is none.
+        """Masks of the boxes that such windows hold, and of those whose smallest window is none.
 
         Args:
             low: Lowest corners of the boxes in the unit cube, shape (n, 3).
@@ -246,7 +246,7 @@ def _patches(rod: TipMap, which: Index, side: int) -> _Patches:
 
 
 def _parted(patches: _Patches, a: Index, b: Index, bend: Array) -> Mask:
-    """Whether a plane parts the images of two patches, shape (pairs,).
+    """Mask of the pairs of patches whose images a plane parts, shape (pairs,).
 
     Tried are planes along either of them, and across the line between their centers.
     """
@@ -301,7 +301,7 @@ def _grid_slopes(rod: TipMap, cells: int) -> Array:
 
 
 def _keeps_sign(stretch: Array) -> bool:
-    """Whether det J has no zero within the cells either, shape (n + 1, n + 1, n + 1).
+    """True if det J has no zero within the cells either, shape (n + 1, n + 1, n + 1).
 
     A function differs from its trilinear interpolant by no more than the sum of its second
     differences over 8.

@@ -1,4 +1,4 @@
-"""How much space an image fills, how often, and how sure that is."""
+"""Volume that an image fills, by multiplicity, and its error."""
 
 from __future__ import annotations
 
@@ -221,15 +221,15 @@ class Runs(NamedTuple):
     """Stretches of lines of sight that are reached, line by line, upwards; in cells."""
 
     line: Index
-    """Which line, (i, j) as i · width + j over the other two axes, shape (n,)."""
+    """Index of the line, (i, j) as i · width + j over the other two axes, shape (n,)."""
     first: Index
     """Number of the first center, shape (n,)."""
     last: Index
     """Number of the last center, shape (n,)."""
     start: Array
-    """Where it begins, before its first center, shape (n,)."""
+    """Beginning of the run, before its first center, shape (n,)."""
     end: Array
-    """Where it ends, behind its last center, shape (n,)."""
+    """End of the run, behind its last center, shape (n,)."""
     width: int
     """Number of lines along the last of the other two axes."""
 
@@ -281,7 +281,7 @@ class LineVolume(NamedTuple):
     value: float
     """Volume [m³]."""
     noise: float
-    """How far off it may be for where the lines happen to lie [m³]."""
+    """Error due to where the lines happen to lie [m³]."""
 
 
 def line_volume(crossings: Crossings) -> LineVolume:

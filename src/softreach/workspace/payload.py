@@ -1,4 +1,4 @@
-"""How much of its reachable volume an arm keeps under a payload, and how much it may carry."""
+"""Share of its reachable volume that an arm keeps under a payload, and the payload it can carry."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class LargestPayload(NamedTuple):
     payload: float
     """[kg]"""
     payload_error: float
-    """How far off it may be, by the search and by the errors of the volumes [kg]."""
+    """Error of the payload, by the search and by the errors of the volumes [kg]."""
     share: float
     """Of the volume without payload that is kept [-]."""
 
@@ -103,7 +103,7 @@ class PayloadCurve:
     volumes: Array
     """Of the exact reachable set [m³], shape (n,)."""
     volume_errors: Array
-    """How far off each may be [m³], shape (n,)."""
+    """Error of each volume [m³], shape (n,)."""
     lost_shares: Array
     """Share of the activation box that is left out for want of stability [-], shape (n,)."""
     accuracy: float
@@ -119,7 +119,7 @@ class PayloadCurve:
 
     @property
     def share_errors(self) -> Array:
-        """How far off each share may be; that of the first is 0 [-], shape (n,)."""
+        """Error of each share; that of the first is 0 [-], shape (n,)."""
         first = self.volume_errors[0] * self.shares
         errors = (self.volume_errors + first) / self.volumes[0]
         return np.where(self.payloads > 0, errors, 0.0)

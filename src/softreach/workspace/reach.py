@@ -124,7 +124,7 @@ def rasterized_set(
     accuracy: float,
     progress: Progress = silent,
 ) -> ReachableSolid:
-    """What three free bundles reach by one raster, whether the map is one to one or not.
+    """Reach of three free bundles by one raster, whether the map is one to one or not.
 
     Args:
         rod: The tip map.
@@ -203,12 +203,12 @@ def lattice_for(tips: Array, *, cell: float | None, accuracy: float) -> Lattice:
 
 
 def is_settled(found: ReachableSolid, accuracy: float) -> bool:
-    """Whether a finer grid would hardly change the volume or how much of it is reached twice."""
+    """True if a finer grid would hardly change the volume or how much of it is reached twice."""
     return found.volume_error <= accuracy * found.volume
 
 
 def is_worthwhile(found: ReachableSolid, accuracy: float) -> bool:
-    """Whether grids that memory holds may be fine enough.
+    """True if grids that memory holds may be fine enough.
 
     Where cells are left out the error falls as 1/n, as fast as n grows and no faster.
     """
@@ -267,7 +267,7 @@ def _of_many(
 
 
 def _known(image: T) -> T:
-    """What there is already where it might be made when asked for."""
+    """An image that is there already, where it might be made when asked for."""
     return image
 
 
@@ -282,7 +282,7 @@ class _Grid(NamedTuple):
     """Cells without an image, shape (n, n, n)."""
 
     def image(self, lattice: Lattice, progress: Progress = silent) -> Image:
-        """What the cells cover that are not left out."""
+        """Image of the cells that are not left out."""
         n = len(self.left_out)
         tips, stretches, left_out = self
         return image_of(tips, stretches, (n, n, n), lattice, progress, left_out=left_out)
@@ -299,7 +299,7 @@ class _Grid(NamedTuple):
 
 
 class _Overlaps(NamedTuple):
-    """How often and how three bundles reach places: fields of a `ReachableSolid`."""
+    """Multiplicity and folds of the reach of three bundles: fields of a `ReachableSolid`."""
 
     multiplicity: Mapping[int, float]
     multiplicity_error: float
@@ -334,7 +334,7 @@ def _in_part(rod: TipMap, grid: _Grid, fine: Image, coarse: Image) -> _Measures:
 def _overlaps(
     volume: measure.Estimate, fine: Image, coarse: Image, common: Image | None = None
 ) -> _Overlaps:
-    """What is reached how often; a fold out of place errs by as much here as in the volume."""
+    """Volumes by multiplicity; a fold out of place errs by as much here as in the volume."""
     several, change = measure.multiply_covered(fine, coarse, common)
     return _Overlaps(
         {1: volume.value - sum(several.values()), **several},

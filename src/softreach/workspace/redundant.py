@@ -1,4 +1,4 @@
-"""What four free bundles or more let the tip reach, by search instead of by simplices.
+"""Reach of the tip with four free bundles or more, by search instead of by simplices.
 
 The box of m activations has m! simplices to a cell of its grid, its image has one boundary. So the
 image is found in space: which centers of a lattice are reached, and where the boundary cuts the
@@ -90,7 +90,7 @@ def _lattice(tips: Array, cell: float) -> Lattice:
 
 
 def smallest_memory(rod: TipMap) -> float:
-    """What a search cannot do without [bytes]."""
+    """Memory that a search cannot do without [bytes]."""
     return _fixed(rod) + 2e4 * _per_cell(rod)
 
 
@@ -212,7 +212,7 @@ def _hull(crossings: Crossings, tips: Array) -> Estimate:
 
 
 def _not_among(flood: Flood, tips: Array) -> Mask:
-    """Which tips are not between eight centers that are reached, where no hull has a corner."""
+    """Mask of tips not between eight centers that are reached, where no hull has a corner."""
     cubes = flood.reached
     for axis in range(3):
         rolled = np.moveaxis(cubes, axis, 0)
@@ -224,7 +224,7 @@ def _not_among(flood: Flood, tips: Array) -> Mask:
 
 
 def _convex_volume(points: Array, fewer: Array) -> Estimate:
-    """What hulls of ever more boundary points tend to, as far as two of them tell."""
+    """Limit of the hulls of ever more boundary points, as far as two of them tell."""
     found = np.empty(2)
 
     def measure(place: int, some: Array) -> None:

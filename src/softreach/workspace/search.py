@@ -1,4 +1,4 @@
-"""Which cell centers are within reach, each with an activation that proves it."""
+"""Cell centers within reach, each with an activation that proves it."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Flood:
 
     @property
     def is_bounded(self) -> bool:
-        """Whether all that is reached ends within the lattice."""
+        """True if all that is reached ends within the lattice."""
         inside = self.reached[2:-2, 2:-2, 2:-2]
         return int(np.count_nonzero(inside)) == int(np.count_nonzero(self.gap == 0.0))
 
@@ -148,7 +148,7 @@ def nearest_tips(rod: TipMap, start: Array, targets: Array, enough: float) -> Ne
 
 
 class Nearest(NamedTuple):
-    """Where searches ended: local minima of the distance, one for each target."""
+    """Ends of searches: local minima of the distance, one for each target."""
 
     gamma: Array
     """Activations within the bounds, shape (n, bundles)."""

@@ -83,7 +83,7 @@ def shifts_along(arm: Manipulator, parameter: Parameter, reach: int, relative: f
 
 
 def _scale(arm: Manipulator, parameter: Parameter) -> float:
-    """What a parameter that is 0 is measured by: an offset or a bound of another one."""
+    """Scale of a parameter that is 0: an offset or a bound of another one."""
     if parameter.field.startswith(("lower", "upper")):
         return float(np.ptp(arm.bounds, axis=1).max()) or 1.0
     return _SCALES.get(parameter.unit, 1.0) * (arm.length if parameter.unit == "m" else 1.0)

@@ -43,7 +43,7 @@ _ROUTES = {
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ReachableSolid(ReachableSet):
-    """What three free bundles or more fill.
+    """A solid that three free bundles or more fill.
 
     With exactly three, a place inside is reached by a number of activations, each with an
     orientation: `multiplicity` and `fold_volume` say how much space is reached how. With more,
@@ -63,7 +63,7 @@ class ReachableSolid(ReachableSet):
     """Volume of the places that exactly 1, 2, ... activations reach [m³]; empty for more than three
     free bundles."""
     multiplicity_error: float
-    """How far off the volume reached more than once may be, the same as for the volume itself [m³];
+    """Error of the volume reached more than once, the same as that of the volume itself [m³];
     NaN for more than three free bundles."""
     fold_volume: float
     """Volume of the places reached with both orientations of the map [m³]; they lie behind a fold.
@@ -71,7 +71,7 @@ class ReachableSolid(ReachableSet):
     fold_volume_error: float
     """By how much `fold_volume` changed from half as fine a grid [m³]."""
     route: Route
-    """What the volume comes from. "flux": the map is found to be one to one, and the volume is what
+    """Source of the volume. "flux": the map is found to be one to one, and the volume is what
     flows through the images of the six faces of the activation box. "raster": the image folds or
     overlaps, or this is not clear; it is rasterized, and a signed volume by flux makes it exact
     elsewhere. "search": more than three free bundles."""
@@ -130,9 +130,9 @@ class ReachableSolid(ReachableSet):
         return self._sheets
 
     def contains(self, points: ArrayLike) -> Mask:
-        """Whether points are reachable: whether a mapped simplex of the grid covers them.
+        """Mask of the points that are reachable: a mapped simplex of the grid covers them.
 
-        For more than three free bundles, whether a search within the bounds ends on them, to a
+        For more than three free bundles, a search within the bounds ends on them, to a
         thousandth of a cell.
 
         Args:
@@ -174,7 +174,7 @@ class ReachableSolid(ReachableSet):
         return out
 
     def _repr_html_(self) -> str:
-        """What `repr` says below a small picture, for notebooks."""
+        """Text of `repr` below a small picture, for notebooks."""
         from softreach.picture import Dots, Skin, html_card
 
         try:

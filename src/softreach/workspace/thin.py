@@ -30,7 +30,7 @@ _NODES = 24, 16  # Gauss nodes along each axis, and those that tell the error
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ReachableSurface(ReachableSet):
-    """What two free bundles sweep: a surface, which has an area and no volume."""
+    """A surface that two free bundles sweep, which has an area and no volume."""
 
     dimension: ClassVar[int] = 2
 
@@ -39,7 +39,7 @@ class ReachableSurface(ReachableSet):
     area: float
     """Area [m²]; places count as often as they are reached."""
     area_error: float
-    """How far off `area` may be, estimated from two numbers of Gauss nodes [m²]."""
+    """Error of `area`, estimated from two numbers of Gauss nodes [m²]."""
     convex_volume: float
     convex_volume_error: float
     lost_share: float = 0.0
@@ -81,7 +81,7 @@ class ReachableSurface(ReachableSet):
         return self.mapped_grid.distance(as_points("points", points))
 
     def _repr_html_(self) -> str:
-        """What `repr` says below a small picture, for notebooks."""
+        """Text of `repr` below a small picture, for notebooks."""
         from softreach.picture import Skin, html_card
 
         return html_card(repr(self), Skin(self.mapped_grid.vertices, self.mapped_grid.faces))
@@ -99,7 +99,7 @@ class ReachableSurface(ReachableSet):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ReachableCurve(ReachableSet):
-    """What one free bundle draws: a curve, which has a length and no volume."""
+    """A curve that one free bundle draws, which has a length and no volume."""
 
     dimension: ClassVar[int] = 1
 
@@ -108,7 +108,7 @@ class ReachableCurve(ReachableSet):
     curve_length: float
     """Length [m]; places count as often as they are reached."""
     curve_length_error: float
-    """How far off `curve_length` may be, estimated from two numbers of Gauss nodes [m]."""
+    """Error of `curve_length`, estimated from two numbers of Gauss nodes [m]."""
     convex_volume: float
     convex_volume_error: float
     lost_share: float = 0.0
@@ -116,7 +116,7 @@ class ReachableCurve(ReachableSet):
     """Points along the curve [m], from the lower bound to the upper one, shape (cells + 1, 3); NaN
     where there is no stable equilibrium."""
     left_out: Mask = field(repr=False)
-    """Which pieces between neighboring points are left out, shape (cells,)."""
+    """Mask of the pieces between neighboring points that are left out, shape (cells,)."""
     volume: float = field(init=False, default=0.0)
     volume_error: float = field(init=False, default=0.0)
 
@@ -151,7 +151,7 @@ class ReachableCurve(ReachableSet):
         return Surface(vertices=np.nan_to_num(self.path), faces=faces)
 
     def _repr_html_(self) -> str:
-        """What `repr` says below a small picture, for notebooks."""
+        """Text of `repr` below a small picture, for notebooks."""
         from softreach.picture import Dots, html_card
 
         return html_card(repr(self), Dots(_found(self.path)))
@@ -170,7 +170,7 @@ class ReachableCurve(ReachableSet):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ReachablePoint(ReachableSet):
-    """Where the tip is if no bundle is free."""
+    """Position of the tip if no bundle is free."""
 
     dimension: ClassVar[int] = 0
 
