@@ -166,7 +166,7 @@ def as_instance(name: str, value: Any, kind: type | tuple[type, ...], what: str)
 
 
 def as_function(name: str, value: object) -> Callable[..., Any]:
-    """What can be called.
+    """A function, or anything else that can be called.
 
     Raises:
         InvalidInput: Anything else.

@@ -42,7 +42,7 @@ Index = NDArray[np.int64]
 """Places in other arrays."""
 
 Mask = NDArray[np.bool_]
-"""Which of several things."""
+"""Truth values that mark some of several things."""
 
 Points = NDArray[np.float64]
 """Places [m], shape (n, 3)."""
@@ -238,7 +238,7 @@ def as_faces(name: str, values: object, count: int) -> Faces:
 
 
 def _array(name: str, values: object, allowed: str) -> NDArray[Any]:
-    """What NumPy makes of the values, unless it would lose something on the way."""
+    """The values as NumPy takes them, unless it would lose something on the way."""
     if np.ma.is_masked(values):
         raise InvalidInput(name, "a masked array", allowed, _FILL)
     if found := _no_number(values):
@@ -251,7 +251,7 @@ def _array(name: str, values: object, allowed: str) -> NDArray[Any]:
 
 
 def _no_number(values: object) -> str:
-    """What a nested sequence holds that NumPy would turn into a number, such as True; or nothing.
+    """Kind of value in a nested sequence that NumPy would turn into a number, such as True; or "".
 
     Looks at types alone, row by row: a hundredth of a second for a million numbers.
     """
@@ -279,7 +279,7 @@ def _is_number(value: object) -> bool:
 
 
 def _described(values: object, array: NDArray[Any]) -> str:
-    """What was given, in a few words: an array may be long."""
+    """Words for what was given, in short: an array may be long."""
     if array.ndim == 0:
         return repr(values) if array.dtype.kind in "USO" and _is_text(values) else _kind(values)
     kind = _KINDS.get(array.dtype.kind, str(array.dtype))

@@ -1,4 +1,4 @@
-"""What can go wrong, said so that the reader knows what to do next."""
+"""Errors and warnings, said so that the reader knows what to do next."""
 
 from __future__ import annotations
 
@@ -82,10 +82,10 @@ class Range(NamedTuple):
     open_high: bool = False
     whole: bool = False
     why: str = ""
-    """What lies beyond the limits, if they follow from other values."""
+    """Reason for the limits, if they follow from other values."""
 
     def admits(self, value: object) -> bool:
-        """Whether the value is a finite number (a whole one where asked) in the range."""
+        """True if the value is a finite number (an integer where asked) in the range."""
         if isinstance(value, bool) or not isinstance(value, int if self.whole else int | float):
             return False
         above = value > self.low or (value == self.low and not self.open_low)
@@ -101,7 +101,7 @@ class Range(NamedTuple):
 
     @property
     def text(self) -> str:
-        """What is allowed: "a finite number > 0 and <= 1 m"."""
+        """The range in words: "a finite number > 0 and <= 1 m"."""
         unit = f" {self.unit}" if self.unit else ""
         low = f"{'>' if self.open_low else '>='} {self.low:.6g}" if self.low > -math.inf else ""
         high = f"{'<' if self.open_high else '<='} {self.high:.6g}" if self.high < math.inf else ""
@@ -111,7 +111,7 @@ class Range(NamedTuple):
 
 
 def _is_finite(number: float) -> bool:
-    """Whether it is a finite double; whole numbers of Python may be larger than any."""
+    """True for a finite double; integers of Python may be larger than any."""
     try:
         return math.isfinite(number)
     except OverflowError:
@@ -122,11 +122,11 @@ class Fault(NamedTuple):
     """One thing wrong with a design."""
 
     path: str
-    """Where: ``taper``, or ``fibers[1].extent``."""
+    """Place of the fault: ``taper``, or ``fibers[1].extent``."""
     value: object
-    """What was given; None if nothing was."""
+    """The value that was given; None if there was none."""
     allowed: Range | str
-    """What is allowed, and what to do."""
+    """Values that are allowed, and what to do."""
 
     def __str__(self) -> str:
         if self.value is None:

@@ -1,4 +1,4 @@
-"""Which color a bundle has in every picture and file, and which color its activations mix to."""
+"""Color of a bundle in every picture and file, and the color that its activations mix to."""
 
 from __future__ import annotations
 

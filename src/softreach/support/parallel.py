@@ -109,7 +109,7 @@ class _Unwanted(BaseException):
 
 
 class _Wanted:
-    """Whether somebody still waits for the tasks of a pool."""
+    """Tells tasks of a pool whether somebody still waits for them."""
 
     def __init__(self, outer: _Wanted | None) -> None:
         self.given_up, self._outer = False, outer
@@ -123,7 +123,7 @@ class _Wanted:
 
 
 class _Here(threading.local):
-    """What the task of this thread was started for."""
+    """The pool that the task of this thread belongs to."""
 
     wanted: _Wanted | None = None
 

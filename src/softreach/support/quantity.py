@@ -97,7 +97,7 @@ def numbers_in(text: str, count: int | None = None) -> list[float] | None:
 
 
 def shortened(text: str) -> str:
-    """What was typed, such that it fits into a line and can be printed."""
+    """Typed text, such that it fits into a line and can be printed."""
     plain = "".join(one if one.isprintable() else "?" for one in text)
     return plain if len(plain) <= _SHOWN else f"{plain[: _SHOWN // 2]}...{plain[-_SHOWN // 4 :]}"
 

@@ -103,7 +103,7 @@ def check_place(
     overwrite: bool = False,
     name: str = "path",
 ) -> Path:
-    """Where a file or folder of that kind can be written, by trying it.
+    """Place where a file or folder of that kind can be written, found by trying it.
 
     Args:
         path: The place.
@@ -302,7 +302,7 @@ def _resolved(path: StrPath, name: str) -> Path:
 def _refusal(
     target: Path, mode: int, kind: FileKind, overwrite: bool
 ) -> tuple[str, str] | tuple[str] | None:
-    """Why what is there may not be replaced: what is allowed, and what to do."""
+    """Reason why what is there may not be replaced: what is allowed, and what to do."""
     if stat.S_ISDIR(mode):
         foreign = kind.foreign(target)
         if foreign or Path.cwd().is_relative_to(target):

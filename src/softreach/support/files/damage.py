@@ -68,23 +68,23 @@ class Chunk(NamedTuple):
 
 @dataclass(kw_only=True, eq=False)
 class Watch:
-    """What is asked of the files of a store that are read, and what becomes of damaged ones."""
+    """Checks of the files of a store that are read, and what becomes of damaged ones."""
 
     location: object
     remedy: str
-    """What a person does about damage."""
+    """Advice on what a person does about damage."""
     required: Callable[[Chunk], bool] = lambda _: False
-    """Which chunks must exist; others that are missing hold fill values."""
+    """True for chunks that must exist; others that are missing hold fill values."""
     digests: dict[str, str] = field(default_factory=dict)
     """Digest of what describes each array, as the root lists it or as it was written."""
     listed: bool = False
-    """Whether the digests are those of the root."""
+    """True if the digests are those of the root."""
     root: str = ""
     """Digest of the root that was read."""
     listed_checksums: dict[str, int] = field(default_factory=dict)
     """Checksum of each chunk of what is written only once, by its key."""
     belongs: Callable[[Chunk, int], bool] = lambda *_: True
-    """Whether a chunk with this checksum is of this store and place, where that is not listed."""
+    """True if a chunk with this checksum is of this store and place, where that is not listed."""
     written: dict[Chunk, int] = field(default_factory=dict)
     """Checksums of the chunks that were written."""
     _noted: dict[Chunk, str] | None = field(default=None, init=False)

@@ -1,4 +1,4 @@
-"""What describes a store and its arrays: sealed, listed in the root, and of a kind that is known.
+"""Descriptions of a store and its arrays: sealed, listed in the root, and of a known kind.
 
 The root lists the digest of what describes each array, and ends with its own.
 """
@@ -46,7 +46,7 @@ def sealed(text: bytes) -> bytes:
 
 
 def unsealed(text: bytes) -> dict[str, Any]:
-    """What a root says, without its digest."""
+    """Description in a root, without its digest."""
     document = parsed(text)
     digest = document["attributes"].pop(DIGEST, None)
     if digest is None:
@@ -72,7 +72,7 @@ def parsed(text: bytes) -> dict[str, Any]:
 
 
 def described(watch: Watch, chunk: Chunk, text: bytes) -> dict[str, Any]:
-    """What describes an array, as its store lists it."""
+    """Description of an array, as its store lists it."""
     document = parsed(text)
     if chunk.array not in watch.digests:
         allowed = "one of those that softreach wrote, or moved away"

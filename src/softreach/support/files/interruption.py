@@ -133,7 +133,7 @@ def _silenced() -> int:
 
 
 def _cleared_line(stream: int) -> str:
-    """What removes a progress bar from a terminal and shows its cursor again."""
+    """Codes that remove a progress bar from a terminal and show its cursor again."""
     controlled = os.isatty(stream) and os.environ.get("TERM", "dumb") != "dumb"
     return "\r\x1b[2K\x1b[?25h" if controlled and sys.platform != "win32" else ""
 

@@ -25,7 +25,7 @@ __all__ = [
 ]
 
 Recognizes = Callable[[Path], bool]
-"""Whether what is at a path, which exists, is of some kind."""
+"""True if what is at a path, which exists, is of some kind."""
 
 _HEAD = 4096  # bytes in which a file says what it is
 
@@ -36,14 +36,14 @@ def first_entry(folder: Path) -> str:
 
 
 class FileKind(NamedTuple):
-    """What a writer writes, and therefore may replace."""
+    """A kind of file that a writer writes, and therefore may replace."""
 
     name: str
     """In a sentence: "a PNG picture"."""
     recognizes: Recognizes
-    """Whether what exists at a path is of this kind."""
+    """True if what exists at a path is of this kind."""
     libraries: tuple[str, ...] = ()
-    """What is imported to write it."""
+    """Libraries that are imported to write it."""
     extra: str = ""
     """The extra of softreach that brings these."""
     write: Callable[[Any, BufferedWriter], None] | None = None

@@ -281,7 +281,7 @@ class CheckedStore(WrapperStore[Any]):
         return Chunk.of_key(key.removeprefix(self._root)) if key.startswith(self._root) else None
 
     def _document(self, chunk: Chunk, content: Any) -> Buffer:
-        """What describes the store or one of its arrays, without digests and checksums."""
+        """Description of the store or one of its arrays, without digests and checksums."""
         text = content.to_bytes()
         if chunk.array:
             document = described(self.watch, chunk, text)
@@ -311,7 +311,7 @@ class CheckedStore(WrapperStore[Any]):
             raise Broken(MISPLACED)
 
     def _written(self, key: str, value: Buffer) -> Buffer:
-        """What is written for a value: the root with its digest, all else as it is."""
+        """Bytes that are written for a value: the root with its digest, all else as it is."""
         chunk = self._chunk(key)
         if chunk is None:
             return value
