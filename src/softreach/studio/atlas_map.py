@@ -131,8 +131,8 @@ def _fixed_text(atlas: xr.Dataset, fixed: dict[str, int]) -> list[str]:
 
 
 def _nearest(values: NDArray[np.float64], share: float) -> float:
-    wanted = values[0] + share * (values[-1] - values[0])
-    return float(values[np.abs(values - wanted).argmin()])
+    target = values[0] + share * (values[-1] - values[0])
+    return float(values[np.abs(values - target).argmin()])
 
 
 def _shown(atlas: xr.Dataset, name: str) -> NDArray[np.float64]:
@@ -195,26 +195,26 @@ def nearest_numbers(atlas: xr.Dataset, metric: str, design: Manipulator) -> str:
         metric: Which one.
         design: The present one.
     """
-    here = _nearest_places(atlas, design)
+    places = _nearest_places(atlas, design)
     name = metric.removeprefix("exact_")
     both = {name, f"exact_{name}", "exact_volume"} <= set(atlas.data_vars)
-    where = f"Nearest design of the atlas ({_place(atlas, here)}): "
+    where = f"Nearest design of the atlas ({_place(atlas, places)}): "
     if name not in _PAIRS or not both:
-        return f"{where}{metric.replace('_', ' ')} {_value(atlas, metric, here):.4g}."
+        return f"{where}{metric.replace('_', ' ')} {_value(atlas, metric, places):.4g}."
     symbol, scale, unit = _PAIRS[name]
-    exact, sampled = (scale * _value(atlas, each, here) for each in (f"exact_{name}", name))
+    exact, sampled = (scale * _value(atlas, each, places) for each in (f"exact_{name}", name))
     if not np.isfinite([exact, sampled]).all():
         return f"{where}not computed."
     return (
         f"{where}{symbol} {exact:.4g}{unit} exact, {sampled:.4g}{unit} of the α-shape of "
-        f"{_command(atlas)['n']:,} samples. {_reason(atlas, here)}"
+        f"{_command(atlas)['n']:,} samples. {_reason(atlas, places)}"
     )
 
 
-def _reason(atlas: xr.Dataset, here: dict[str, int]) -> str:
+def _reason(atlas: xr.Dataset, places: dict[str, int]) -> str:
     """Reason why an α-shape is not the exact set."""
     command = _command(atlas)
-    alpha, exact = command["alpha_over_length"], _value(atlas, "exact_volume", here)
+    alpha, exact = command["alpha_over_length"], _value(atlas, "exact_volume", places)
     if alpha == "critical" or not exact > 0:
         return "Samples fill less than the set, a wide α bridges what is hollow."
     spacing = (exact / float(command["n"])) ** (1 / 3)
@@ -241,9 +241,9 @@ def _nearest_place(atlas: xr.Dataset, name: str, design: Manipulator) -> int:
     return int(np.abs(atlas[name].values[:, None] - values).max(axis=1).argmin())
 
 
-def _place(atlas: xr.Dataset, here: dict[str, int]) -> str:
+def _place(atlas: xr.Dataset, places: dict[str, int]) -> str:
     parts = []
-    for name, k in here.items():
+    for name, k in places.items():
         value, unit = float(atlas[name].values[k]), atlas[name].attrs.get("units", "1")
         if unit == "rad":
             value, unit = float(np.degrees(value)), "deg"
@@ -251,8 +251,8 @@ def _place(atlas: xr.Dataset, here: dict[str, int]) -> str:
     return ", ".join(parts)
 
 
-def _value(atlas: xr.Dataset, metric: str, here: dict[str, int]) -> float:
-    return float(over_length(atlas, metric).isel(here))
+def _value(atlas: xr.Dataset, metric: str, places: dict[str, int]) -> float:
+    return float(over_length(atlas, metric).isel(places))
 
 
 def _command(atlas: xr.Dataset) -> dict[str, int | float | str]:
@@ -293,10 +293,10 @@ class MapBoard:
         Raises:
             InvalidInput: There is no such map.
         """
-        wanted = view, fixed_places(self.atlas, view, design)
-        if wanted != self._drawn:
-            self.map = atlas_map(self.atlas, view, wanted[1]) if view.shown else None
-            self._drawn = wanted
+        content = view, fixed_places(self.atlas, view, design)
+        if content != self._drawn:
+            self.map = atlas_map(self.atlas, view, content[1]) if view.shown else None
+            self._drawn = content
             self._scene.remove("/atlas")
             if self.map is not None:
                 self._scene.draw_picture("/atlas/map", self.map.image, _SIZE, _CENTER, _TURN)

@@ -176,7 +176,7 @@ def _shown_parameters(designs: Sequence[Manipulator]) -> tuple[list[_Column], bo
 
 
 def _by_name(shown: Iterable[ShownParameter]) -> dict[str, ShownParameter]:
-    return {one.name: one for one in shown}
+    return {parameter.name: parameter for parameter in shown}
 
 
 def _differing(designs: Sequence[dict[str, ShownParameter]]) -> list[tuple[str, _Column]]:
@@ -209,14 +209,14 @@ def _explained(designs: Sequence[Manipulator], names: Sequence[str]) -> bool:
 def _shape(arm: Manipulator) -> object:
     """Kinds and names of the parts: all that is no number."""
     rings = tuple((ring.name, ring.material) for ring in arm.section.rings)
-    parts = tuple((type(one), one.name) for one in arm.actuators)
+    parts = tuple((type(actuator), actuator.name) for actuator in arm.actuators)
     return type(arm.profile), rings, parts, arm.loads is None
 
 
-def _same(one: Value, other: Value) -> bool:
-    if one is None or other is None:
-        return one is other
-    return abs(one - other) <= _EQUAL * max(abs(one), abs(other))
+def _same(value: Value, other: Value) -> bool:
+    if value is None or other is None:
+        return value is other
+    return abs(value - other) <= _EQUAL * max(abs(value), abs(other))
 
 
 def _finite(value: float) -> Value:

@@ -89,55 +89,60 @@ def slider_parameters(arm: Manipulator) -> tuple[ShownParameter, ...]:
     """
     known = parameters(arm)
     sliders: list[ShownParameter] = []
-    for owner in dict.fromkeys(one.owner for one in known.values()):
+    for owner in dict.fromkeys(parameter.owner for parameter in known.values()):
         for field in dict.fromkeys((*(_OF_PART if owner else _OF_ARM), *_AROUND_VALUE)):
-            one = known.get(f"{owner}.{field}" if owner else field)
-            if one is not None and _is_offered(arm, known, one):
-                slider = _slider(one, one.value(arm))
-                sliders += [_on_slider(arm, one, slider)] if slider else []
+            parameter = known.get(f"{owner}.{field}" if owner else field)
+            if parameter is not None and _is_offered(arm, known, parameter):
+                slider = _slider(parameter, parameter.value(arm))
+                sliders += [_on_slider(arm, parameter, slider)] if slider else []
     return tuple(sliders)
 
 
-def _slider(one: Parameter, value: float) -> _Slider | None:
+def _slider(parameter: Parameter, value: float) -> _Slider | None:
     """Ends and label; None for what the design leaves open, or for a zero of unknown size."""
-    fixed = (_OF_PART if one.owner else _OF_ARM).get(one.field)
-    outside_arm = one.field == "distance_ratio" and value > 1
-    if fixed and one.unit in ("1", "rad", "m") and not outside_arm:
+    fixed = (_OF_PART if parameter.owner else _OF_ARM).get(parameter.field)
+    outside_arm = parameter.field == "distance_ratio" and value > 1
+    if fixed and parameter.unit in ("1", "rad", "m") and not outside_arm:
         return fixed if math.isfinite(value) else None
-    return None if value == 0 or math.isnan(value) else _around(one, value)
+    return None if value == 0 or math.isnan(value) else _around(parameter, value)
 
 
-def _around(one: Parameter, value: float) -> _Slider:
+def _around(parameter: Parameter, value: float) -> _Slider:
     """From zero, or near it where it is not allowed, to twice the value."""
-    owner = f" of {one.owner.removesuffix('.material')}" if one.owner else ""
-    unit, _ = _unit(one, {})
-    ends = (0.01 if one.field == "young_modulus" else 0.0) * value, 2 * value
-    return _Slider(_titled(f"{one.symbol}{owner}", unit), min(ends), max(ends), abs(value) / 100)
+    owner = f" of {parameter.owner.removesuffix('.material')}" if parameter.owner else ""
+    unit, _ = _unit(parameter, {})
+    ends = (0.01 if parameter.field == "young_modulus" else 0.0) * value, 2 * value
+    return _Slider(
+        _titled(f"{parameter.symbol}{owner}", unit), min(ends), max(ends), abs(value) / 100
+    )
 
 
-def _is_offered(arm: Manipulator, known: Mapping[str, Parameter], one: Parameter) -> bool:
+def _is_offered(arm: Manipulator, known: Mapping[str, Parameter], parameter: Parameter) -> bool:
     """True if a parameter changes this arm, and no other slider does the same.
 
     Only what is helical has a revolution to change; only what is not, its number of bundles.
     """
-    of_all = known.get(one.field) if one.owner and one.field in _ONE_FOR_ALL else None
+    of_all = (
+        known.get(parameter.field) if parameter.owner and parameter.field in _ONE_FOR_ALL else None
+    )
     if of_all is not None and not math.isnan(of_all.value(arm)):
         return False
-    if one.field == "revolution":
-        return one.value(arm) != 0
-    turn = known.get(f"{one.owner}.revolution")
-    return one.field != "bundles" or turn is None or turn.value(arm) == 0
+    if parameter.field == "revolution":
+        return parameter.value(arm) != 0
+    turn = known.get(f"{parameter.owner}.revolution")
+    return parameter.field != "bundles" or turn is None or turn.value(arm) == 0
 
 
-def _on_slider(arm: Manipulator, one: Parameter, slider: _Slider) -> ShownParameter:
-    unit, scale = _unit(one, {"rad": _DEGREES, "m": ("L", arm.length)})
-    more = f"; {_MORE[one.field]}" if one.field in _MORE else ""
+def _on_slider(arm: Manipulator, parameter: Parameter, slider: _Slider) -> ShownParameter:
+    unit, scale = _unit(parameter, {"rad": _DEGREES, "m": ("L", arm.length)})
+    more = f"; {_MORE[parameter.field]}" if parameter.field in _MORE else ""
     return ShownParameter(
-        one.name,
-        slider.label.replace("{owner}", one.owner),
-        f"{_titled(one.symbol, unit)}: {one.meaning}{more} (parameter {one.name})",
+        parameter.name,
+        slider.label.replace("{owner}", parameter.owner),
+        f"{_titled(parameter.symbol, unit)}: {parameter.meaning}{more} "
+        f"(parameter {parameter.name})",
         scale,
-        _value(one, arm, scale),
+        _value(parameter, arm, scale),
         slider.low,
         slider.high,
         slider.step,
@@ -170,10 +175,12 @@ def parts(arm: Manipulator) -> dict[str, Part]:
         owners = (f"rings[{k}]", f"rings[{k}].material")
         listed.append(Part(ring_label(arm, k), owners, ring.name, ring=k))
     labels = {part.label for part in listed}
-    for one in arm.actuators:
-        home = one.ring if isinstance(one, SectorActuator) else None
-        label = f"{one.name} (actuator)" if one.name in labels else one.name
-        listed.append(Part(label, (one.name,), one.name, actuator=one.name, home=home))
+    for actuator in arm.actuators:
+        home = actuator.ring if isinstance(actuator, SectorActuator) else None
+        label = f"{actuator.name} (actuator)" if actuator.name in labels else actuator.name
+        listed.append(
+            Part(label, (actuator.name,), actuator.name, actuator=actuator.name, home=home)
+        )
     return {part.label: part for part in listed}
 
 
@@ -185,32 +192,41 @@ def part_parameters(arm: Manipulator, part: Part) -> tuple[ShownParameter, ...]:
     """
     units = {"rad": _DEGREES, "m": ("mm", 1e-3), "Pa": ("kPa", 1e3)}
     known = [
-        one
-        for one in parameters(arm).values()
-        if one.owner in part.owners and (one.owner or not math.isnan(one.value(arm)))
+        parameter
+        for parameter in parameters(arm).values()
+        if parameter.owner in part.owners
+        and (parameter.owner or not math.isnan(parameter.value(arm)))
     ]
-    return tuple(_shown(arm, one, units, one.symbol, f"{one.meaning}: {one.name}") for one in known)
+    return tuple(
+        _shown(arm, parameter, units, parameter.symbol, f"{parameter.meaning}: {parameter.name}")
+        for parameter in known
+    )
 
 
 def named_parameters(arm: Manipulator) -> list[ShownParameter]:
     """All parameters of an arm under their own names, angles in degrees."""
     known = parameters(arm).values()
-    return [_shown(arm, one, {"rad": _DEGREES}, one.name, one.meaning) for one in known]
+    return [
+        _shown(arm, parameter, {"rad": _DEGREES}, parameter.name, parameter.meaning)
+        for parameter in known
+    ]
 
 
 def _shown(
-    arm: Manipulator, one: Parameter, units: Mapping[str, _Unit], name: str, hint: str
+    arm: Manipulator, parameter: Parameter, units: Mapping[str, _Unit], name: str, hint: str
 ) -> ShownParameter:
-    unit, scale = _unit(one, units)
-    return ShownParameter(one.name, _titled(name, unit), hint, scale, _value(one, arm, scale))
+    unit, scale = _unit(parameter, units)
+    return ShownParameter(
+        parameter.name, _titled(name, unit), hint, scale, _value(parameter, arm, scale)
+    )
 
 
-def _unit(one: Parameter, units: Mapping[str, _Unit]) -> _Unit:
-    return units.get(one.unit, ("" if one.unit == "1" else one.unit, 1.0))
+def _unit(parameter: Parameter, units: Mapping[str, _Unit]) -> _Unit:
+    return units.get(parameter.unit, ("" if parameter.unit == "1" else parameter.unit, 1.0))
 
 
-def _value(one: Parameter, arm: Manipulator, scale: float) -> float:
-    return float(f"{one.value(arm) / scale:.12g}")
+def _value(parameter: Parameter, arm: Manipulator, scale: float) -> float:
+    return float(f"{parameter.value(arm) / scale:.12g}")
 
 
 def _titled(name: str, unit: str) -> str:
@@ -224,7 +240,7 @@ def refusal(error: InvalidDesign, shown: Iterable[ShownParameter]) -> str:
         error: What is wrong.
         shown: The parameters that have fields.
     """
-    known = {one.name: one for one in shown}
+    known = {parameter.name: parameter for parameter in shown}
     return "\n".join(_line(fault, known.get(fault.path)) for fault in error.faults)
 
 

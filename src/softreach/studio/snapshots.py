@@ -110,7 +110,7 @@ class Snapshots:
             InvalidInput: The name is taken, or there are too many.
         """
         with self._lock:
-            if any(snapshot.name == one.name for one in self.all):
+            if any(snapshot.name == other.name for other in self.all):
                 raise InvalidInput("snapshot name", snapshot.name, "another, as this one is taken")
             if len(self.all) >= _MOST:
                 raise InvalidInput("snapshots", len(self.all), f"at most {_MOST}", "delete some")
@@ -119,31 +119,31 @@ class Snapshots:
     def measure(self, name: str, numbers: Numbers) -> None:
         """Note the numbers of a snapshot that was taken before they were known."""
         with self._lock:
-            for one in self.all:
-                if one.name == name and one.numbers != numbers:
-                    self._put(replace(one, numbers=numbers))
+            for snapshot in self.all:
+                if snapshot.name == name and snapshot.numbers != numbers:
+                    self._put(replace(snapshot, numbers=numbers))
 
     def remove(self, name: str) -> None:
         """Forget one."""
         with self._lock:
             if self._store is not None:
                 self._store.remove(name)
-            self._become(tuple(one for one in self.all if one.name != name))
+            self._become(tuple(snapshot for snapshot in self.all if snapshot.name != name))
 
     def named(self, name: str) -> Snapshot | None:
         """The snapshot of this name."""
-        return next((one for one in self.all if one.name == name), None)
+        return next((snapshot for snapshot in self.all if snapshot.name == name), None)
 
     def free_name(self) -> str:
         """A name that is not taken."""
-        taken = {one.name for one in self.all}
+        taken = {snapshot.name for snapshot in self.all}
         return next(name for k in range(1, _MOST + 2) if (name := f"design {k}") not in taken)
 
     def _put(self, snapshot: Snapshot) -> None:
         if self._store is not None:
             self._store.put(snapshot)
-        others = [one for one in self.all if one.name != snapshot.name]
-        self._become(tuple(sorted([*others, snapshot], key=lambda one: one.taken)))
+        others = [item for item in self.all if item.name != snapshot.name]
+        self._become(tuple(sorted([*others, snapshot], key=lambda item: item.taken)))
 
     def _become(self, snapshots: tuple[Snapshot, ...]) -> None:
         self.all = snapshots

@@ -138,12 +138,12 @@ class KeptWork:
         known: dict[str, Snapshot] = {}
         for path in sorted(self._folder.glob("snapshot-*.json"))[:_MOST]:
             try:
-                one = Snapshot.from_json(_text(path))
+                snapshot = Snapshot.from_json(_text(path))
             except (SoftreachError, OSError) as error:
                 self._complain(path, error)
             else:
-                known[one.name] = one
-        return tuple(sorted(known.values(), key=lambda one: one.taken))
+                known[snapshot.name] = snapshot
+        return tuple(sorted(known.values(), key=lambda snapshot: snapshot.taken))
 
     def put(self, snapshot: Snapshot) -> None:
         """Keep a snapshot, instead of an older one of its name."""

@@ -298,21 +298,21 @@ def _check_number(name: str, value: object, low: float, high: float) -> None:
 
 def _check_plain(name: str, value: Appearance | MapView) -> None:
     """Texts are texts and switches are switches, in a state that came from elsewhere too."""
-    for one in fields(value):
-        content = getattr(value, one.name)
-        kind = {"bool": bool, "str": str}.get(str(one.type))
+    for attribute in fields(value):
+        content = getattr(value, attribute.name)
+        kind = {"bool": bool, "str": str}.get(str(attribute.type))
         if kind is not None and not isinstance(content, kind):
-            raise InvalidInput(f"{name}.{one.name}", content, f"a {kind.__name__}")
+            raise InvalidInput(f"{name}.{attribute.name}", content, f"a {kind.__name__}")
 
 
 def _within(box: ActivationBox, activation: Sequence[float]) -> tuple[float, ...]:
     """As many activations as there are bundles, each within its bounds."""
-    wanted = np.zeros(box.bundles)
+    values = np.zeros(box.bundles)
     count = min(len(activation), box.bundles)
-    wanted[:count] = np.asarray(activation, float)[:count]
-    if not np.isfinite(wanted).all():
+    values[:count] = np.asarray(activation, float)[:count]
+    if not np.isfinite(values).all():
         raise InvalidInput("activation", tuple(activation), "finite numbers")
-    return tuple(box.clip(wanted).tolist())
+    return tuple(box.clip(values).tolist())
 
 
 # History: states before and states undone, as values, so that going back is exact.

@@ -68,9 +68,9 @@ class SolveInverse(Job):
 
     def _move(self) -> None:
         """Move the arm to the solution nearest to where it is, once after it was ordered."""
-        wanted, self.take_nearest = self.take_nearest, False
+        take_nearest, self.take_nearest = self.take_nearest, False
         answer = self.session.answer
-        if wanted and answer is not None and len(answer):
+        if take_nearest and answer is not None and len(answer):
             change = np.linalg.norm(answer.activations - self.session.state.activation, axis=1)
             best = answer.activations[int(np.argmin(change))]
             self.session.update(
@@ -89,8 +89,8 @@ def _solution(state: StudioState, target: Vector) -> Solution:
 class _Order(NamedTuple):
     """Order of a drag."""
 
-    wanted: NDArray[np.float64]
-    """Place for the tip [L]."""
+    place: NDArray[np.float64]
+    """For the tip [L]."""
     rests: bool
     """True once the drag has ended there."""
 
@@ -122,13 +122,13 @@ class DragTip(Job):
         session, state, order = self.session, self.session.state, self._order
         if order is None:
             return
-        wanted, rests = order
+        place, rests = order
         if rests:
-            wanted = np.round(wanted, _DECIMALS)
-        target = wanted * state.design.length
+            place = np.round(place, _DECIMALS)
+        target = place * state.design.length
         dragged = self._drag_of(state).to(state.activation, target)
         if dragged is not None:
-            session.drag = None if rests else TipDrag(wanted, dragged)
+            session.drag = None if rests else TipDrag(place, dragged)
             rest = vector(target) if rests else None
             session.update(lambda s: _moved(s, state, dragged, rest), goes_on=True)
         if rests:

@@ -146,10 +146,10 @@ class SweepPlot(Plot):
 
     def show(self, result: Sweep) -> str:
         """Draw the volumes that are known so far."""
-        here = result.volume[result.value == result.parameter.shown]
+        volumes = result.volume[result.value == result.parameter.shown]
         if len(result.value) > 1:
             self._chart.show(result.parameter.label, result.value, (_VOLUME,), (result.volume,))
-        parts = [f"here V = {v:.4f} L³ at {result.parameter.shown:g}" for v in here]
+        parts = [f"here V = {v:.4f} L³ at {result.parameter.shown:g}" for v in volumes]
         if result.refused:
             parts.append(f"{result.refused} values make no design or take too long")
         return " · ".join([*parts, *([] if result.complete else ["computing ..."])])

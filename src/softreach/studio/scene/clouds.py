@@ -293,6 +293,6 @@ def _outward(points: Array) -> Array:
     i, j, k = np.rint(places).astype(np.intp).T
     full[i, j, k] = 1.0  # whether a cell has points, not how many: the activations decide that
     slopes = np.gradient(gaussian_filter(full, _BLUR, truncate=2.5))
-    outward = -np.stack([map_coordinates(one, places.T, order=1) for one in slopes], axis=1)
+    outward = -np.stack([map_coordinates(slope, places.T, order=1) for slope in slopes], axis=1)
     length = np.linalg.norm(outward, axis=1, keepdims=True)
     return outward / np.maximum(length, 0.08)

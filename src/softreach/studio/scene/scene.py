@@ -186,9 +186,9 @@ class Scene:
         arm, handles = self._arms.get("/arm", (None, []))
         usual = _opacities(arm, len(handles)) if arm is not None else []
         for handle, opacity in zip(handles, usual, strict=True):
-            wanted = _HIDING if clear else opacity
-            if handle.opacity != wanted:
-                handle.opacity = wanted
+            target = _HIDING if clear else opacity
+            if handle.opacity != target:
+                handle.opacity = target
 
     def draw_ghosts(self, arm: Manipulator, activations: Array) -> None:
         """Many shapes at once, transparent."""
@@ -207,7 +207,7 @@ class Scene:
     def draw_axes(self, reach: Reach, look: Appearance, free: Reach | None = None) -> None:
         """The box with numbers around cloud and arm, and the cloud without loads."""
         clouds = [reach] if free is None or not look.free else [reach, free]
-        around = (cloud_points(one, 14) for one in clouds)
+        around = (cloud_points(source, 14) for source in clouds)
         self.axes.draw(*around, np.array([[0, 0, 0], [0, 0, 1.0]]), shown=look.axes)
 
     def draw_trail(self, tips: Array) -> None:

@@ -51,9 +51,13 @@ def reachable_hosts(host: str) -> list[str]:
         return [host]
     hosts = [_outward()]
     with contextlib.suppress(OSError):
-        hosts += [str(one[4][0]) for one in socket.getaddrinfo(socket.gethostname(), None)]
+        hosts += [str(address[4][0]) for address in socket.getaddrinfo(socket.gethostname(), None)]
     families = (host == "::", False)
-    useful = [one for one in hosts if one and not is_local(one) and (":" in one) in families]
+    useful = [
+        address
+        for address in hosts
+        if address and not is_local(address) and (":" in address) in families
+    ]
     return list(dict.fromkeys(useful))
 
 
@@ -96,7 +100,7 @@ def is_welcome(path: str, headers: Mapping[str, str], token: str) -> bool:
     if not token:
         return True
     shown = [*parse_qs(urlsplit(path).query).get("token", []), *_kept(headers.get("Cookie", ""))]
-    return any(hmac.compare_digest(one.encode(), token.encode()) for one in shown)
+    return any(hmac.compare_digest(candidate.encode(), token.encode()) for candidate in shown)
 
 
 def cookie(path: str, token: str) -> str:

@@ -86,20 +86,24 @@ class DesignPanel:
         self._refused = False
         self._sliders = Fields(self._session, words=self._words)
         with self._folder:
-            self._rows = [(one, self._slider(one)) for one in slider_parameters(arm)]
+            self._rows = [
+                (parameter, self._slider(parameter)) for parameter in slider_parameters(arm)
+            ]
 
-    def _slider(self, one: ShownParameter) -> SliderField:
-        at = Attribute(lambda _: one.shown, lambda state, _: self._changed(state))
-        return self._sliders.slider(one.label, one.limits, one.step, at, one.hint)
+    def _slider(self, parameter: ShownParameter) -> SliderField:
+        at = Attribute(lambda _: parameter.shown, lambda state, _: self._changed(state))
+        return self._sliders.slider(
+            parameter.label, parameter.limits, parameter.step, at, parameter.hint
+        )
 
     def _changed(self, state: StudioState) -> StudioState:
         """The design of all sliders; a slider may show rounded what stays as it is."""
         with self._lock:
             assert self._base is not None
             values = {
-                one.name: field.value * one.scale
-                for one, field in self._rows
-                if field.value != one.shown
+                parameter.name: field.value * parameter.scale
+                for parameter, field in self._rows
+                if field.value != parameter.shown
             }
             self._refused = True
             new = state.replace(design=changed(self._base, values))
@@ -109,7 +113,7 @@ class DesignPanel:
     def _words(self, error: SoftreachError) -> str:
         if not isinstance(error, InvalidDesign):
             return str(error)
-        return refusal(error, [one for one, _ in self._rows])
+        return refusal(error, [parameter for parameter, _ in self._rows])
 
 
 def _reference_text(session: Session) -> tuple[Part, ...]:

@@ -84,7 +84,7 @@ class PartsPanel:
             self._label = next(iter(known))
         part = known[self._label]
         self._design, self._numbers = arm, part_parameters(arm, part)
-        made_for = known, self._label, [one.name for one in self._numbers]
+        made_for = known, self._label, [parameter.name for parameter in self._numbers]
         if made_for == self._made_for:
             self._fields.show(self._session)
             return
@@ -96,8 +96,8 @@ class PartsPanel:
         with self._folder:
             self._widgets = [self._menu(tuple(known))]
             self._add_words(arm, part)
-            for one in self._numbers:
-                self._fields.number(one.label, _typed(part, one), one.hint)
+            for parameter in self._numbers:
+                self._fields.number(parameter.label, _typed(part, parameter), parameter.hint)
             if part.ring is not None or part.actuator:
                 self._button(
                     "Remove", lambda: self._remove(part), "Takes the part out of the design"
@@ -220,16 +220,18 @@ def _of_design(
     )
 
 
-def _typed(part: Part, one: ShownParameter) -> Attribute:
+def _typed(part: Part, parameter: ShownParameter) -> Attribute:
     """A number of a part; 0 where the design leaves it out."""
 
     def read(arm: Manipulator) -> float:
-        shown = {each.name: each.shown for each in part_parameters(arm, part)}[one.name]
+        shown = {each.name: each.shown for each in part_parameters(arm, part)}[parameter.name]
         return 0.0 if math.isnan(shown) else shown
 
     def write(arm: Manipulator, value: float) -> Manipulator:
         """A value that the field only shows rounded is left as it is."""
-        return arm if value == read(arm) else changed(arm, {one.name: value * one.scale})
+        return (
+            arm if value == read(arm) else changed(arm, {parameter.name: value * parameter.scale})
+        )
 
     return _of_design(read, write)
 
