@@ -303,8 +303,8 @@ def _constraint(
     from softreach.arm.parameters.shown import from_written
 
     for sign in ("<=", ">=", "<", ">"):
-        name, found, number = text.partition(sign)
-        if found:
+        name, separator, number = text.partition(sign)
+        if separator:
             break
     values = numbers_in(number, 1)
     if values is None:

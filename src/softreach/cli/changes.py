@@ -139,13 +139,13 @@ class Changes:
         lacking = {fault.path: examples.get(fault.path.rpartition(".")[2]) for fault in faults}
         lacking = {path: example for path, example in lacking.items() if example}
         if lacking:
-            given = {name: str(value) for name, value in self.given.items() if "_deg" not in name}
+            values = {name: str(value) for name, value in self.given.items() if "_deg" not in name}
             options = " ".join(f"--set {path}={example}" for path, example in lacking.items())
             hint = f"give them in the design file, or as {options}"
             if examples["density"] in lacking.values():
                 hint += " (no density is needed with --gravity none)"
             allowed = f"on an arm with {' and '.join(lacking)}"
-            raise InvalidInput(", ".join(given), ", ".join(given.values()), allowed, hint)
+            raise InvalidInput(", ".join(values), ", ".join(values.values()), allowed, hint)
 
     def _loads(self) -> dict[str, object]:
         loads: dict[str, object] = {}
@@ -221,7 +221,9 @@ def _vector(name: str, text: str, unit: str, others: str = "") -> tuple[float, .
     from softreach.support.quantity import read_quantity, unit_names
 
     names = unit_names(unit)
-    written = max((one for one in names if text.rstrip().endswith(one)), key=len, default="")
+    written = max(
+        (suffix for suffix in names if text.rstrip().endswith(suffix)), key=len, default=""
+    )
     parts = text.rstrip().removesuffix(written).split(",")
     try:
         values = tuple(read_quantity(f"{part}{written or names[0]}", unit) for part in parts)

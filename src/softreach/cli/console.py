@@ -73,7 +73,10 @@ class Console:
         if as_json:
             self.json(records)
             return
-        lines = [list(records[0]), *([shown(value) for value in one.values()] for one in records)]
+        lines = [
+            list(records[0]),
+            *([shown(value) for value in record.values()] for record in records),
+        ]
         widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
         for cells in lines:
             padded = (f"{cell:<{width}}" for cell, width in zip(cells, widths, strict=True))
