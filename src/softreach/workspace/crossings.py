@@ -65,7 +65,7 @@ class Crossings:
     beyond: Array
     """Activations whose tips are nearest to `high`, shape (n, bundles)."""
     place: Array
-    """Place where the plane of the nearest tip cuts the edge, between `low` and `high`, shape (n,)."""
+    """Place where the plane of that tip cuts the edge, between `low` and `high`, shape (n,)."""
 
     @classmethod
     def of(cls, flood: Flood) -> Crossings:
