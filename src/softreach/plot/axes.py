@@ -235,10 +235,10 @@ def _framed_axes(box: Array, view: View) -> Axes:
 
 def _check_unit(ax: Axes, unit: LengthUnit) -> None:
     marks = (str(image.get_label()) for image in ax.images)
-    found = {mark.removeprefix(_UNIT_MARK) for mark in marks if mark.startswith(_UNIT_MARK)}
-    if found - {unit.symbol}:
+    symbols = {mark.removeprefix(_UNIT_MARK) for mark in marks if mark.startswith(_UNIT_MARK)}
+    if symbols - {unit.symbol}:
         hint = "give length= or data with attrs['length'] to all that shares axes, or to none"
-        raise InvalidInput("ax", f"counted in {', '.join(found)}", f"in {unit.symbol}", hint)
+        raise InvalidInput("ax", f"counted in {', '.join(symbols)}", f"in {unit.symbol}", hint)
 
 
 def _span(extent: Extent) -> Array:

@@ -157,17 +157,17 @@ def _bundles(arm: Manipulator, placed: Collection[PlacedBundle]) -> Iterator[tup
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    symbols = [one.symbol for one in arm.actuators for _ in range(one.bundles)]
-    for one in placed:
-        if one.shape == "line":
-            handle: Artist = Line2D([], [], **tendon_style(one.color))
+    symbols = [actuator.symbol for actuator in arm.actuators for _ in range(actuator.bundles)]
+    for bundle in placed:
+        if bundle.shape == "line":
+            handle: Artist = Line2D([], [], **tendon_style(bundle.color))
         else:
-            lumen = one.shape == "lumen"
-            handle = Patch(**lumen_style(one.color)) if lumen else Patch(color=one.color)
-        course = "" if one.course == "along" else f", {one.course}"
-        unit = arm.bundle_units[one.index].replace("1", "-")
-        name = arm.bundle_names[one.index]
-        yield handle, f"{name}{course}: {symbols[one.index]} [{unit}]"
+            lumen = bundle.shape == "lumen"
+            handle = Patch(**lumen_style(bundle.color)) if lumen else Patch(color=bundle.color)
+        course = "" if bundle.course == "along" else f", {bundle.course}"
+        unit = arm.bundle_units[bundle.index].replace("1", "-")
+        name = arm.bundle_names[bundle.index]
+        yield handle, f"{name}{course}: {symbols[bundle.index]} [{unit}]"
 
 
 def _material_label(part: str, material: Material) -> str:

@@ -46,13 +46,13 @@ def plot_curvature(
     if not 1 <= len(statistics) <= 2:
         raise InvalidInput("statistics", f"of {len(statistics)} designs", "of one or two")
     as_one_of("quantity", quantity, _SYMBOLS)
-    unit = common_unit([unit_of(found) for found in statistics.values()])
+    unit = common_unit([unit_of(data) for data in statistics.values()])
     places = _common_places(statistics)
     with figure_style(ax):
         ax = small_axes() if ax is None else ax
         sides = (-1, 1) if len(statistics) == 2 else (0,)
-        for (label, found), side, color in zip(statistics.items(), sides, _COLORS, strict=False):
-            _draw(ax, found, quantity, side, color, label)
+        for (label, data), side, color in zip(statistics.items(), sides, _COLORS, strict=False):
+            _draw(ax, data, quantity, side, color, label)
         ax.set(xlabel=unit.label("station Z"), ylabel=_label(quantity, unit))
         ax.set_xticks(range(len(places)), [f"{place:.2g}" for place in places])
         ax.legend(loc="upper left")
@@ -65,7 +65,7 @@ def _statistics(name: str, value: object) -> xr.Dataset:
 
 def _common_places(statistics: Mapping[str, xr.Dataset]) -> Array:
     """The stations on the axis, which all designs share."""
-    places = [unit_of(found).of(found["Z"].values) for found in statistics.values()]
+    places = [unit_of(data).of(data["Z"].values) for data in statistics.values()]
     for other in places[1:]:
         if other.shape != places[0].shape or not np.allclose(other, places[0]):
             raise InvalidInput(
@@ -81,11 +81,11 @@ def _label(quantity: str, unit: LengthUnit) -> str:
     return f"{symbol}L" if unit.relative else f"{symbol} [1/m]"
 
 
-def _draw(ax: Axes, found: xr.Dataset, quantity: str, side: int, color: str, label: str) -> None:
-    scale = 1.0 if quantity == "extension" else unit_of(found).size
-    medians = found[f"{quantity}_quantile"].sel(quantile=0.5).values * scale
+def _draw(ax: Axes, data: xr.Dataset, quantity: str, side: int, color: str, label: str) -> None:
+    scale = 1.0 if quantity == "extension" else unit_of(data).size
+    medians = data[f"{quantity}_quantile"].sel(quantile=0.5).values * scale
     for k in range(len(medians)):
-        edges, density = _coarse(found.isel(station=k), quantity)
+        edges, density = _coarse(data.isel(station=k), quantity)
         reach = 0.46 * density / density.max()
         low, high = (k - reach if side <= 0 else k), (k + reach if side >= 0 else k)
         name = label if k == 0 else None
@@ -95,9 +95,9 @@ def _draw(ax: Axes, found: xr.Dataset, quantity: str, side: int, color: str, lab
     ax.plot(np.arange(len(medians)) + 0.1 * side, medians, ".", color="k", ms=3, zorder=3)
 
 
-def _coarse(found: xr.Dataset, quantity: str) -> tuple[Array, Array]:
+def _coarse(data: xr.Dataset, quantity: str) -> tuple[Array, Array]:
     """Centers of fewer bins, between the smallest and largest value, and counts per width."""
-    count, edges = found[f"{quantity}_count"].values, found[f"{quantity}_edge"].values
+    count, edges = data[f"{quantity}_count"].values, data[f"{quantity}_edge"].values
     used = np.flatnonzero(count)
     first, last = used[0], used[-1] + 1
     ends = np.unique(np.linspace(first, last, _BINS + 1).astype(int))

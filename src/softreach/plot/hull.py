@@ -34,10 +34,10 @@ _VOLUMES = Range(0.0, unit="m³")
 
 def _rgb(name: str, value: object) -> tuple[float, float, float]:
     """Three shares of red, green and blue."""
-    found = as_floats(name, value)
-    if found.shape != (3,) or not ((found >= 0) & (found <= 1)).all():
-        raise InvalidInput(name, found, "three numbers from 0 to 1: red, green, blue")
-    return float(found[0]), float(found[1]), float(found[2])
+    rgb = as_floats(name, value)
+    if rgb.shape != (3,) or not ((rgb >= 0) & (rgb <= 1)).all():
+        raise InvalidInput(name, rgb, "three numbers from 0 to 1: red, green, blue")
+    return float(rgb[0]), float(rgb[1]), float(rgb[2])
 
 
 def plot_hull(

@@ -129,10 +129,10 @@ def plot_compliance(
     """
     arm, rest = a_manipulator("arm", arm), as_flag("rest", rest)
     shapes = shapes_of(a_configuration("configuration", configuration))
-    given = as_floats("compliance", compliance)
+    values = as_floats("compliance", compliance)
     force = None if force is None else as_number("force", force, POSITIVE)
     ax, box = panel_arguments(ax, view, box)
-    matrices = given if given.ndim == 3 else given[None]
+    matrices = values if values.ndim == 3 else values[None]
     if matrices.shape[1:] != (3, 3):
         raise InvalidInput("compliance.shape", np.shape(compliance), "(3, 3) or (n, 3, 3)")
     if len(matrices) != len(shapes):
@@ -175,7 +175,7 @@ def plot_payload_curve(
     Raises:
         MissingExtra: matplotlib is not installed.
     """
-    points = [(0.0, 1.0), *((one.payload, one.share) for one in largest)]
+    points = [(0.0, 1.0), *((point.payload, point.share) for point in largest)]
     points += zip(curve.payloads[1:], curve.shares[1:], strict=True)
     mass, share = zip(*sorted(points), strict=True)
     with figure_style(ax):
@@ -183,10 +183,10 @@ def plot_payload_curve(
         (line,) = ax.plot(mass, share, linewidth=1.2, label=label)
         style = {"fmt": "o", "markersize": 3, "color": line.get_color(), "linewidth": 0.8}
         ax.errorbar(curve.payloads, curve.shares, yerr=curve.share_errors, **style)
-        for one in largest:
-            ax.vlines(one.payload, 0.0, one.share, color="0.3", linewidth=0.8, linestyle=":")
-            ax.hlines(one.share, 0.0, one.payload, color="0.3", linewidth=0.8, linestyle=":")
-            ax.plot(one.payload, one.share, "o", markersize=4, mfc="white", color="0.3")
+        for point in largest:
+            ax.vlines(point.payload, 0.0, point.share, color="0.3", linewidth=0.8, linestyle=":")
+            ax.hlines(point.share, 0.0, point.payload, color="0.3", linewidth=0.8, linestyle=":")
+            ax.plot(point.payload, point.share, "o", markersize=4, mfc="white", color="0.3")
         ax.set(xlabel="payload [kg]", ylabel="share of the volume without payload")
         ax.set(xlim=(0.0, None), ylim=(0.0, None))
         if label is not None:

@@ -126,9 +126,9 @@ def metric_label(metric: xr.DataArray) -> str:
 
 
 def _axis(values: xr.DataArray) -> SheetAxis:
-    given = values.attrs.get("units", "1")
-    unit = _UNITS.get(given, given)
-    shown = np.degrees(values.values) if given == "rad" else values.values
+    si_unit = values.attrs.get("units", "1")
+    unit = _UNITS.get(si_unit, si_unit)
+    shown = np.degrees(values.values) if si_unit == "rad" else values.values
     name = _name(values)
     return SheetAxis(f"{name} ({unit})" if unit else name, tuple(np.round(shown, 9).tolist()))
 

@@ -41,7 +41,9 @@ def draw_layers(ax: Axes, section: Section, outer: float) -> None:
     _draw_voids(ax, section, outer)
     for k, ring in enumerate(section.rings):
         low, high = ring.inner_ratio, ring.outer_ratio
-        over = any(low < one.outer_ratio and one.inner_ratio < high for one in section.rings[:k])
+        over = any(
+            low < other.outer_ratio and other.inner_ratio < high for other in section.rings[:k]
+        )
         if several:
             alpha = 0.5 if over else 1.0
             _draw_material(ax, section, ring.material, outer * low, outer * high, alpha)
@@ -54,15 +56,15 @@ def draw_layers(ax: Axes, section: Section, outer: float) -> None:
 def section_materials(section: Section) -> tuple[tuple[str, Material], ...]:
     """The different materials of a section, rings first, each with the part it is found in."""
     rings = [
-        (one.name or ("ring" if len(section.rings) == 1 else f"ring {k + 1}"), one.material)
-        for k, one in enumerate(section.rings)
+        (ring.name or ("ring" if len(section.rings) == 1 else f"ring {k + 1}"), ring.material)
+        for k, ring in enumerate(section.rings)
     ]
     has_core = section.inner_ratio > section.bore_ratio
-    found: list[tuple[str, Material]] = []
+    materials: list[tuple[str, Material]] = []
     for part, material in [*rings, *([("core", section.core_material)] if has_core else [])]:
-        if not any(material.same_matter(other) for _, other in found):
-            found.append((part, material))
-    return tuple(found)
+        if not any(material.same_matter(other) for _, other in materials):
+            materials.append((part, material))
+    return tuple(materials)
 
 
 def material_style(section: Section, material: Material) -> dict[str, Any]:
@@ -127,21 +129,21 @@ def placed_bundles(arm: Manipulator, z: float, bundles: Collection[int]) -> list
 
 def draw_bundles(ax: Axes, placed: Collection[PlacedBundle], outer: float) -> None:
     """Draw bundles in a section of outer radius `outer`: sectors, then lumens, then tendons."""
-    sectors = [one for one in placed if one.shape == "sector"]
-    for one in sectors:
-        ax.add_patch(_sector(one, outer, color=one.color, linewidth=0))
-    for k, one in enumerate(sectors):
+    sectors = [bundle for bundle in placed if bundle.shape == "sector"]
+    for bundle in sectors:
+        ax.add_patch(_sector(bundle, outer, color=bundle.color, linewidth=0))
+    for k, bundle in enumerate(sectors):
         for above in sectors[k + 1 :]:
-            for part in one.overlaps(above):
+            for part in bundle.overlaps(above):
                 _draw_stripes(ax, part, outer)
-    for one in sectors:
-        _draw_strokes(ax, one, outer)
-    for one in (one for one in placed if one.shape == "lumen"):
-        _draw_lumen(ax, one, outer)
-    lines = [one for one in placed if one.shape == "line"]
+    for bundle in sectors:
+        _draw_strokes(ax, bundle, outer)
+    for bundle in (bundle for bundle in placed if bundle.shape == "lumen"):
+        _draw_lumen(ax, bundle, outer)
+    lines = [bundle for bundle in placed if bundle.shape == "line"]
     _draw_disks(ax, lines, outer)
-    for one in lines:
-        ax.plot(*_middle(one, outer), zorder=3, **tendon_style(one.color))
+    for bundle in lines:
+        ax.plot(*_middle(bundle, outer), zorder=3, **tendon_style(bundle.color))
 
 
 def tendon_style(color: Color) -> dict[str, Any]:
@@ -174,7 +176,7 @@ def _draw_voids(ax: Axes, section: Section, outer: float) -> None:
     reached = section.bore_ratio
     voids = [(0.0, reached)] if reached > 0 else []
     reached = max(reached, section.inner_ratio)
-    for ring in sorted(section.rings, key=lambda one: one.inner_ratio):
+    for ring in sorted(section.rings, key=lambda ring: ring.inner_ratio):
         if ring.inner_ratio > reached:
             voids.append((reached, ring.inner_ratio))
         reached = max(reached, ring.outer_ratio)
@@ -190,12 +192,12 @@ def _annulus(low: float, high: float) -> Patch:
     return Annulus((0, 0), high, high - low) if low > 0 else Circle((0, 0), high)
 
 
-def _sector(one: PlacedBundle, outer: float, **style: Any) -> Wedge:
+def _sector(bundle: PlacedBundle, outer: float, **style: Any) -> Wedge:
     from matplotlib.patches import Wedge
 
-    center, extent = np.degrees(one.center), np.degrees(one.extent)
+    center, extent = np.degrees(bundle.center), np.degrees(bundle.extent)
     ends = center - extent / 2, center + extent / 2
-    radius, width = outer * one.outer_ratio, outer * (one.outer_ratio - one.inner_ratio)
+    radius, width = outer * bundle.outer_ratio, outer * (bundle.outer_ratio - bundle.inner_ratio)
     return Wedge((0, 0), radius, *ends, width=width, **style)
 
 
@@ -207,26 +209,28 @@ def _draw_stripes(ax: Axes, part: PlacedBundle, outer: float) -> None:
     ax.add_patch(stripes)
 
 
-def _draw_strokes(ax: Axes, one: PlacedBundle, outer: float) -> None:
+def _draw_strokes(ax: Axes, bundle: PlacedBundle, outer: float) -> None:
     """Strokes of fibers that do not run along: outwards, or leaning the way they wind."""
     from matplotlib.collections import LineCollection
 
-    lean = {"along": None, "radial": 0.0, "right-handed": _LEAN, "left-handed": -_LEAN}[one.course]
+    lean = {"along": None, "radial": 0.0, "right-handed": _LEAN, "left-handed": -_LEAN}[
+        bundle.course
+    ]
     if lean is None:
         return
-    half = 0.5 * (one.extent - abs(lean))
+    half = 0.5 * (bundle.extent - abs(lean))
     if half <= 0:
-        half, lean = 0.4 * one.extent, np.sign(lean) * min(abs(lean), 0.2 * one.extent)
-    angles = one.center + np.linspace(-half, half, max(3, round(2 * half / _STROKE_ANGLE)))
+        half, lean = 0.4 * bundle.extent, np.sign(lean) * min(abs(lean), 0.2 * bundle.extent)
+    angles = bundle.center + np.linspace(-half, half, max(3, round(2 * half / _STROKE_ANGLE)))
     ends = [
         outer * ratio * np.column_stack([np.cos(at), np.sin(at)])
         for ratio, at in (
-            (one.inner_ratio, angles - lean / 2),
-            (one.outer_ratio, angles + lean / 2),
+            (bundle.inner_ratio, angles - lean / 2),
+            (bundle.outer_ratio, angles + lean / 2),
         )
     ]
     strokes = np.stack(ends, axis=1)
-    ax.add_collection(LineCollection(list(strokes), colors=_contrast(one.color), linewidths=0.7))
+    ax.add_collection(LineCollection(list(strokes), colors=_contrast(bundle.color), linewidths=0.7))
 
 
 def _contrast(color: Color) -> str:
@@ -234,25 +238,27 @@ def _contrast(color: Color) -> str:
     return "white" if np.dot(color, _LIGHTNESS) < 0.55 else "0.3"
 
 
-def _draw_lumen(ax: Axes, one: PlacedBundle, outer: float) -> None:
+def _draw_lumen(ax: Axes, bundle: PlacedBundle, outer: float) -> None:
     from matplotlib.patches import Circle
 
-    radius = 0.5 * outer * (one.outer_ratio - one.inner_ratio)
-    (x,), (y,) = _middle(one, outer)
-    ax.add_patch(Circle((x, y), radius, **lumen_style(one.color)))
+    radius = 0.5 * outer * (bundle.outer_ratio - bundle.inner_ratio)
+    (x,), (y,) = _middle(bundle, outer)
+    ax.add_patch(Circle((x, y), radius, **lumen_style(bundle.color)))
 
 
 def _draw_disks(ax: Axes, lines: Collection[PlacedBundle], outer: float) -> None:
     """A dotted circle for each distance at which tendons run outside of the arm."""
     from matplotlib.patches import Circle
 
-    for ratio in sorted({round(one.outer_ratio, 9) for one in lines if one.outer_ratio > 1}):
+    for ratio in sorted(
+        {round(bundle.outer_ratio, 9) for bundle in lines if bundle.outer_ratio > 1}
+    ):
         circle = Circle((0, 0), outer * ratio, facecolor="none", edgecolor="0.6", linewidth=0.6)
         circle.set_linestyle(":")
         ax.add_patch(circle)
 
 
-def _middle(one: PlacedBundle, outer: float) -> tuple[list[float], list[float]]:
+def _middle(bundle: PlacedBundle, outer: float) -> tuple[list[float], list[float]]:
     """Place of a tendon, or of the center of a lumen."""
-    radius = 0.5 * outer * (one.inner_ratio + one.outer_ratio)
-    return [radius * np.cos(one.center)], [radius * np.sin(one.center)]
+    radius = 0.5 * outer * (bundle.inner_ratio + bundle.outer_ratio)
+    return [radius * np.cos(bundle.center)], [radius * np.sin(bundle.center)]
