@@ -30,7 +30,7 @@ def a_store(name: str, value: object) -> Any:
         return as_path(name, value)
     if any(isinstance(value, kind) for kind in _zarr_stores()):
         return value
-    if isinstance(value, dict) and all(hasattr(one, "to_bytes") for one in value.values()):
+    if isinstance(value, dict) and all(hasattr(content, "to_bytes") for content in value.values()):
         return value  # a store in memory
     raise InvalidInput(name, as_given(value), _PLACE)
 
@@ -69,8 +69,8 @@ def column(name: str, values: ArrayLike) -> tuple[float, ...]:
     floats = as_floats(name, values, "one finite value or more")
     if floats.ndim > 1:
         raise InvalidInput(f"{name}.shape", floats.shape, "of one dimension")
-    given = np.asarray(values)
-    return tuple(np.atleast_1d(given if given.dtype.kind in "iu" else floats).tolist())
+    array = np.asarray(values)
+    return tuple(np.atleast_1d(array if array.dtype.kind in "iu" else floats).tolist())
 
 
 def shard_of(name: str, value: object) -> tuple[int, int]:
@@ -101,5 +101,5 @@ def an_interval(name: str, value: object) -> tuple[float, float]:
 
 
 def _limit(name: str, value: object) -> float:
-    found = plain(value)
-    return found if found in (math.inf, -math.inf) else as_number(name, found)
+    number = plain(value)
+    return number if number in (math.inf, -math.inf) else as_number(name, number)

@@ -163,8 +163,8 @@ def _check_demand(
     local = isinstance(store, str | os.PathLike) and "://" not in str(store)
     if local and not Path(str(store)).exists():
         of_each = STORED * n * keep_clouds + _FILES * _ON_DISK
-        asked = f"{n} samples of {designs} designs"
-        check_disk("n", asked, of_each * designs + 8 * n * space.base.bundles, str(store))
+        amount = f"{n} samples of {designs} designs"
+        check_disk("n", amount, of_each * designs + 8 * n * space.base.bundles, str(store))
 
 
 def _run(

@@ -120,9 +120,9 @@ class Command:
 
     @classmethod
     def _of_values(cls, values: dict[str, Any]) -> Self:
-        if (found := values.get("atlas_version")) != ATLAS_VERSION:
+        if (version := values.get("atlas_version")) != ATLAS_VERSION:
             hint = "build the atlas again in a new folder"
-            raise InvalidInput("version of the atlas", found, str(ATLAS_VERSION), hint)
+            raise InvalidInput("version of the atlas", version, str(ATLAS_VERSION), hint)
         for name, kind in _PLAIN.items():
             if type(values[name]) not in kind:
                 raise InvalidInput(f"{name} of the atlas", repr(values[name]), kind[0].__name__)
@@ -184,19 +184,19 @@ def _flat(command: Command) -> dict[str, Any]:
 
 def _differences(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> Iterator[str]:
     for name in dict.fromkeys([*mine, *theirs]):
-        here, there = mine.get(name), theirs.get(name)
-        if here != there:
-            yield f"{name}: {_shown(there, here)} there, {_shown(here, there)} here"
+        own, other = mine.get(name), theirs.get(name)
+        if own != other:
+            yield f"{name}: {_shown(other, own)} there, {_shown(own, other)} here"
 
 
 def _metric_differences(mine: tuple[Metric, ...], theirs: tuple[Metric, ...]) -> Iterator[str]:
-    here, there = ({m.name: m.to_dict() for m in metrics} for metrics in (mine, theirs))
-    if only := [name for name in there if name not in here]:
+    own, other = ({m.name: m.to_dict() for m in metrics} for metrics in (mine, theirs))
+    if only := [name for name in other if name not in own]:
         yield f"metrics: {', '.join(only)} there and not here"
-    if only := [name for name in here if name not in there]:
+    if only := [name for name in own if name not in other]:
         yield f"metrics: {', '.join(only)} here and not there"
-    for name in here.keys() & there.keys():
-        yield from (f"metric {name}, {line}" for line in _differences(here[name], there[name]))
+    for name in own.keys() & other.keys():
+        yield from (f"metric {name}, {line}" for line in _differences(own[name], other[name]))
 
 
 def _shown(value: Any, other: Any) -> str:

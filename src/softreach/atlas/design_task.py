@@ -100,17 +100,17 @@ def begin_design(store: AtlasStore, metrics: Sequence[Metric], index: int) -> Ca
     """
     try:
         arm = store.command.design(index)
-        found = Intermediates(arm, store.cube, store.command, metrics)
-        if not found.stable.any():  # found now, by all threads
-            return partial(_put_unstable, store, metrics, index, found)
+        intermediates = Intermediates(arm, store.cube, store.command, metrics)
+        if not intermediates.stable.any():  # found now, by all threads
+            return partial(_put_unstable, store, metrics, index, intermediates)
         threaded = [metric for metric in metrics if Need.REACHABLE_SET in metric.needs]
-        values = _values(threaded, found)
-        found.forget(Need.REACHABLE_SET)
+        values = _values(threaded, intermediates)
+        intermediates.forget(Need.REACHABLE_SET)
     except StoreFailed:
         raise
     except Exception as error:
         return partial(_fail, store, index, error)
-    return partial(_finish, store, metrics, index, found, values)
+    return partial(_finish, store, metrics, index, intermediates, values)
 
 
 class Remote:
@@ -194,12 +194,12 @@ def _finish(
     store: AtlasStore,
     metrics: Sequence[Metric],
     index: int,
-    found: Intermediates,
+    intermediates: Intermediates,
     values: Values,
 ) -> Outcome:
     try:
         rest = [metric for metric in metrics if metric.name not in values]
-        result = Result(values | _values(rest, found), _kept_tips(store, found))
+        result = Result(values | _values(rest, intermediates), _kept_tips(store, intermediates))
     except Exception as error:
         return _fail(store, index, error)
     store.write(index, result)
@@ -207,27 +207,27 @@ def _finish(
 
 
 def _put_unstable(
-    store: AtlasStore, metrics: Sequence[Metric], index: int, found: Intermediates
+    store: AtlasStore, metrics: Sequence[Metric], index: int, intermediates: Intermediates
 ) -> Outcome:
     """Store a design of which no sample is stable: it has no other metric than that."""
-    sizes = found.command.profile_sizes
+    sizes = intermediates.command.profile_sizes
     values = {
         metric.name: np.full([sizes[dim] for dim in metric.over], np.nan) for metric in metrics
     }
     known = [metric for metric in metrics if metric.needs == (Need.LOST_SHARE,)]
-    values |= {metric.name: metric.value(found, sizes) for metric in known}
-    result = Result(values, _kept_tips(store, found))
-    store.write(index, result, UNSTABLE, no_equilibrium_message(len(found.stable)))
+    values |= {metric.name: metric.value(intermediates, sizes) for metric in known}
+    result = Result(values, _kept_tips(store, intermediates))
+    store.write(index, result, UNSTABLE, no_equilibrium_message(len(intermediates.stable)))
     return index, ""
 
 
-def _values(metrics: Sequence[Metric], found: Intermediates) -> Values:
-    sizes = found.command.profile_sizes
-    return {metric.name: metric.value(found, sizes) for metric in metrics}
+def _values(metrics: Sequence[Metric], intermediates: Intermediates) -> Values:
+    sizes = intermediates.command.profile_sizes
+    return {metric.name: metric.value(intermediates, sizes) for metric in metrics}
 
 
-def _kept_tips(store: AtlasStore, found: Intermediates) -> Array | None:
-    return found.tips if store.command.keep_clouds else None
+def _kept_tips(store: AtlasStore, intermediates: Intermediates) -> Array | None:
+    return intermediates.tips if store.command.keep_clouds else None
 
 
 def _fail(store: AtlasStore, index: int, error: Exception) -> Outcome:

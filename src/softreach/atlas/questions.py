@@ -205,8 +205,8 @@ def _verified(store: AtlasStore, *, tips: bool) -> AtlasStatus:
         if plan.name not in PER_DESIGN:
             store.array(plan.name)[...]
     numbers = range(store.command.space.size) if tips else ()
-    found = contents(store, tips_of=numbers)
-    return _counted(found.status, found.messages, tips)
+    content = contents(store, tips_of=numbers)
+    return _counted(content.status, content.messages, tips)
 
 
 def _counted(status: np.ndarray, messages: dict[int, str], tips_verified: bool) -> AtlasStatus:

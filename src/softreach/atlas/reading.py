@@ -198,28 +198,28 @@ def _opened(store: StoreLike, *, metrics: bool) -> xr.Dataset:
     import xarray as xr
 
     held = AtlasStore.open(store, "r")
-    found = contents(held, metrics=metrics)
-    if found.damage:
+    content = contents(held, metrics=metrics)
+    if content.damage:
         then = "left out; the command that built the atlas computes again what is damaged"
-        warn(f"{found.damage} ({then})")
+        warn(f"{content.damage} ({then})")
     with storage_errors(f"{held.location} cannot be read"):
         check_arrays(held.opened)
         raw = xr.open_zarr(held.opened.place, drop_variables=_READ_HERE, **READING)
         coordinates = _coordinates(held, raw)
     raw.attrs.pop(ARRAYS)
-    variables = _variables(held, found) | (_metrics(held.command, found) if metrics else {})
+    variables = _variables(held, content) | (_metrics(held.command, content) if metrics else {})
     opened = raw.assign(variables).assign_coords(coordinates)
     opened.encoding["source"] = str(held.location)
     return opened
 
 
-def _variables(store: AtlasStore, found: Contents) -> dict[str, Any]:
+def _variables(store: AtlasStore, content: Contents) -> dict[str, Any]:
     """Status and message of every design."""
     space = store.command.space
     texts = np.full(space.size, "", dtype=np.dtypes.StringDType())
-    for index, message in found.messages.items():
+    for index, message in content.messages.items():
         texts[index] = message
-    values = {"status": found.status, "message": texts}
+    values = {"status": content.status, "message": texts}
     return {
         name: (space.dims, column.reshape(space.shape), store.array(name).attrs.asdict())
         for name, column in values.items()
@@ -229,15 +229,15 @@ def _variables(store: AtlasStore, found: Contents) -> dict[str, Any]:
 def _metrics(command: Command, contents: Contents) -> dict[str, Any]:
     dims, table = command.space.dims, contents.tables["metrics"]
     done = np.isin(contents.status, KNOWN).reshape(command.space.shape)
-    found = {
+    variables = {
         metric.name: (dims, np.where(done, table[..., k], np.nan), _attributes(command, metric))
         for k, metric in enumerate(command.numbers)
     }
     for k, metric in enumerate(command.profiles):
         profiles = contents.tables["curvature"][..., k, :, :]
         values = np.where(done[..., None, None], profiles, np.nan)
-        found[metric.name] = (*dims, *metric.over), values, _attributes(command, metric)
-    return found
+        variables[metric.name] = (*dims, *metric.over), values, _attributes(command, metric)
+    return variables
 
 
 def _attributes(command: Command, metric: Metric) -> dict[str, Any]:
@@ -254,9 +254,9 @@ def _coordinates(store: AtlasStore, raw: xr.Dataset) -> dict[str, Any]:
         if not np.array_equal(raw[name].values, values):
             store.watch.report(Chunk(name, None), "with other values", "those of the command")
     numbers = np.arange(space.size, dtype=np.uint32).reshape(space.shape)
-    found: dict[str, Any] = {
+    coordinates: dict[str, Any] = {
         "length": ((), space.base.length, {"units": "m"}),
         **{name: raw[name] for name in space.names},
         "number": (space.dims, numbers, {"long_name": "number of the design"}),
     }
-    return found
+    return coordinates

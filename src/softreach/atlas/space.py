@@ -135,7 +135,7 @@ class DesignSpace:
 
     def units(self) -> dict[str, str]:
         """Unit of each parameter."""
-        return {name: one.unit for name, one in self.varied().items()}
+        return {name: parameter.unit for name, parameter in self.varied().items()}
 
     def varied(self) -> dict[str, Parameter]:
         """Varied parameters, by name."""
@@ -223,21 +223,21 @@ class _Survey(NamedTuple):
 
 def _surveyed(space: DesignSpace, progress: Progress) -> _Survey:
     gaps: dict[int, str] = {}
-    found: set[tuple[int, float]] = set()
+    sizes: set[tuple[int, float]] = set()
     for index in range(space.size):
         try:
             arm = space.design(index)
         except InvalidDesign as error:
             gaps[index] = "; ".join(str(error).splitlines())
         else:
-            found.add((arm.bundles, arm.length))
+            sizes.add((arm.bundles, arm.length))
         progress(1)
-    bundles, lengths = zip(*found, strict=True) if found else ((0,), (math.nan,))
+    bundles, lengths = zip(*sizes, strict=True) if sizes else ((0,), (math.nan,))
     return _Survey(gaps, _Extent(max(bundles), min(lengths), max(lengths)))
 
 
 def _plain(values: Mapping[str, ArrayLike]) -> tuple[tuple[str, tuple[float, ...]], ...]:
-    return tuple((name, column(name, given)) for name, given in values.items())
+    return tuple((name, column(name, entries)) for name, entries in values.items())
 
 
 def _ends(name: str, ends: ArrayLike) -> np.ndarray:
@@ -251,7 +251,7 @@ def _ends(name: str, ends: ArrayLike) -> np.ndarray:
 
 def _faults(space: DesignSpace) -> Iterator[InvalidInput]:
     if not space.parameters:
-        known = (name for name, one in parameters(space.base).items() if not one.owner)
+        known = (name for name, parameter in parameters(space.base).items() if not parameter.owner)
         allowed = f"at least one of {', '.join(known)}, or of a part, such as left.offset"
         yield InvalidInput("parameters", "none", allowed)
     find_parameters(space.base, space.names)

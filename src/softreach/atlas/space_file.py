@@ -50,11 +50,11 @@ def parse_space(text: str, design_from: Callable[[str], Manipulator]) -> DesignS
     """
     document = _document(text)
     base = design_from(str(document.get("design", "minimal_trunk")))
-    given = document.get("parameters", {})
-    if not isinstance(given, dict):
-        raise InvalidInput("parameters", given, "a table of parameters and their values")
+    table = document.get("parameters", {})
+    if not isinstance(table, dict):
+        raise InvalidInput("parameters", table, "a table of parameters and their values")
     values: dict[str, list[float]] = {}
-    for key, value in _flat(given):
+    for key, value in _flat(table):
         name, numbers = parse_parameter(base, key, value)
         if name in values:
             raise InvalidInput(key, value, "given once")
@@ -80,8 +80,8 @@ def parse_parameter(base: Manipulator, key: str, value: Any) -> tuple[str, list[
     known = written_parameters(base)
     if key not in known:
         raise unknown_parameter(key, known)
-    numbers, one = _numbers(key, value), known[key]
-    return one.name, [from_written(x, one.unit) for x in numbers]
+    numbers, parameter = _numbers(key, value), known[key]
+    return parameter.name, [from_written(x, parameter.unit) for x in numbers]
 
 
 def _document(text: str) -> dict[str, Any]:

@@ -176,10 +176,10 @@ class AtlasStore:
             DamagedStore: It is not.
         """
         array = self.array(name)
-        found = array.shape, array.metadata.dimension_names, _kind(array.dtype)
-        wanted = shape, dims, _kind(dtype)
-        if found != wanted:
-            shown, allowed = (f"of shape {s} over {d} of {k}" for s, d, k in (found, wanted))
+        actual = array.shape, array.metadata.dimension_names, _kind(array.dtype)
+        expected = shape, dims, _kind(dtype)
+        if actual != expected:
+            shown, allowed = (f"of shape {s} over {d} of {k}" for s, d, k in (actual, expected))
             self.watch.report(Chunk(name, None), shown, allowed)
 
     def array(self, name: str) -> Any:
