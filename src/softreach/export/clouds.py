@@ -85,8 +85,8 @@ def cloud_table(cloud: xr.Dataset) -> CloudTable:
     """
     missing = {"tip", "activation"} - set(map(str, cloud.data_vars))
     if missing:
-        found = ", ".join(map(str, cloud.data_vars)) or "nothing"
-        raise InvalidInput("cloud", found, "a dataset with tip and activation")
+        names = ", ".join(map(str, cloud.data_vars)) or "nothing"
+        raise InvalidInput("cloud", names, "a dataset with tip and activation")
     tip, activation = cloud["tip"], cloud["activation"]
     return CloudTable(
         tip.transpose("sample", "axis").values.astype(float, copy=False),
