@@ -166,8 +166,8 @@ def _table(path: Path, columns: int, meaning: str) -> Array:
     except (ValueError, OverflowError, MemoryError) as error:
         raise InvalidInput(name, _reason(error), "rows of comma-separated numbers") from None
     if table.shape[1] != columns:
-        found = counted(table.shape[1], "column")
-        raise InvalidInput(name, found, f"{columns}: {meaning}")
+        size = counted(table.shape[1], "column")
+        raise InvalidInput(name, size, f"{columns}: {meaning}")
     if not (good := np.isfinite(table).all(axis=1)).all():
         row = int(np.argmin(good)) + 1
         raise InvalidInput(f"{name}, row {row}", table[row - 1].tolist(), "finite numbers")
@@ -189,7 +189,7 @@ def _reason(error: Exception) -> str:
     if isinstance(error, UnicodeDecodeError):
         return "no text"
     text = str(error).partition(";")[0] or type(error).__name__
-    if found := _NO_NUMBER.search(text):
-        text = f"{found[1]} in row {int(found[2]) + 1}, column {found[3]}"
-    shown = "".join(one if one.isprintable() else "?" for one in text)
+    if match := _NO_NUMBER.search(text):
+        text = f"{match[1]} in row {int(match[2]) + 1}, column {match[3]}"
+    shown = "".join(character if character.isprintable() else "?" for character in text)
     return shown if len(shown) < 120 else f"{shown[:60]} ... {shown[-40:]}"

@@ -79,10 +79,10 @@ def constructed(
     order = [argument for argument in kinds if argument not in defaults]
     if len(values) > len(order):
         raise _fault(place, f"{len(values)} arguments", f"of {', '.join(order)}")
-    given = [*zip(order, values, strict=False), *options]
-    arguments = dict(given)
+    pairs = [*zip(order, values, strict=False), *options]
+    arguments = dict(pairs)
     if twice := [
-        argument for argument, count in Counter(key for key, _ in given).items() if count > 1
+        argument for argument, count in Counter(key for key, _ in pairs).items() if count > 1
     ]:
         raise _fault(place, f"{twice[0]} twice", "given each argument once")
     if unknown := sorted(set(arguments) - set(kinds)):

@@ -136,13 +136,13 @@ def arm_of(filament: Filament) -> Manipulator:
     density = _shared_density(filament, spans)
     rings = tuple(
         Ring(
-            inner_ratio=inner,
-            outer_ratio=whole,
+            inner_ratio=low,
+            outer_ratio=high,
             material=Material(
-                young_modulus=one.young_modulus, poisson_ratio=one.poisson_ratio, density=density
+                young_modulus=ring.young_modulus, poisson_ratio=ring.poisson_ratio, density=density
             ),
         )
-        for one, (inner, whole) in zip(filament.rings, spans, strict=True)
+        for ring, (low, high) in zip(filament.rings, spans, strict=True)
     )
     core = Material(
         young_modulus=filament.core_modulus,
@@ -179,9 +179,9 @@ def _shared_density(filament: Filament, spans: list[tuple[float, float]]) -> flo
 
 def _from_inside_out(rings: list[FilamentRing]) -> tuple[FilamentRing, ...]:
     """As they are, if the first is innermost and the last outermost; else sorted to be so."""
-    for found in rings, sorted(rings, key=lambda ring: (ring.outer_radius, ring.inner_radius)):
-        if is_from_inside_out(found):
-            return tuple(found)
+    for order in rings, sorted(rings, key=lambda ring: (ring.outer_radius, ring.inner_radius)):
+        if is_from_inside_out(order):
+            return tuple(order)
     spans = [(ring.inner_radius, ring.outer_radius) for ring in rings]
     allowed = "in ActiveFilaments.jl such that the innermost one is not the outermost of several"
     raise InvalidInput("radii of the rings", spans, allowed)
