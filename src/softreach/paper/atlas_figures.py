@@ -106,8 +106,8 @@ def _corners(atlas: xr.Dataset) -> dict[str, xr.Dataset]:
     across, up = sheet_axes(ends)
     cloud_at = _clouds(ends)
     places = [(column, row) for column in range(2) for row in range(2)]
-    found = ((f"{_at(across, j)}, {_at(up, i)}", cloud_at(j, i)) for j, i in places)
-    return {title: cloud for title, cloud in found if cloud is not None}
+    pairs = ((f"{_at(across, j)}, {_at(up, i)}", cloud_at(j, i)) for j, i in places)
+    return {title: cloud for title, cloud in pairs if cloud is not None}
 
 
 def _at(axis: SheetAxis, k: int) -> str:
@@ -128,9 +128,9 @@ def _curvature(atlas: xr.Dataset) -> Any:
     ends = _thinned(atlas, 2)
     across, up = sheet_axes(ends)
     clouds = {f"{_at(up, k)}": _clouds(ends)(len(across.values) - 1, k) for k in range(2)}
-    found = {label: cloud for label, cloud in clouds.items() if cloud is not None}
-    if not found:
+    panels = {label: cloud for label, cloud in clouds.items() if cloud is not None}
+    if not panels:
         return None
-    ax = plot_curvature({label: curvature_statistics(cloud) for label, cloud in found.items()})
+    ax = plot_curvature({label: curvature_statistics(cloud) for label, cloud in panels.items()})
     ax.set_title(_at(across, -1), fontsize=9)
     return ax

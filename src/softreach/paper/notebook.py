@@ -68,15 +68,15 @@ class Notebook:
     @classmethod
     def opened(cls, folder: Path, part: str, key: Mapping[str, Any]) -> Self | None:
         """The finished notebook of a part, or None if there is none of that key."""
-        found = cls(folder, part, key)
+        book = cls(folder, part, key)
         try:
-            stored = json.loads(found._file.read_text(encoding="utf-8"))
+            stored = json.loads(book._file.read_text(encoding="utf-8"))
             same = stored["key"] == json.loads(json.dumps(dict(key)))
-            found.pictures = [Picture(**picture) for picture in stored["pictures"]]
-            found.numbers, found.seconds = stored["numbers"], stored["seconds"]
+            book.pictures = [Picture(**picture) for picture in stored["pictures"]]
+            book.numbers, book.seconds = stored["numbers"], stored["seconds"]
         except (OSError, ValueError, KeyError, TypeError):
             return None
-        return found if same and all(found.png(p).is_file() for p in found.pictures) else None
+        return book if same and all(book.png(p).is_file() for p in book.pictures) else None
 
     def png(self, picture: Picture) -> Path:
         """The file of a picture."""

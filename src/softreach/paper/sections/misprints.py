@@ -104,10 +104,10 @@ def _rotation(arm: Manipulator, taper: float, angle: float) -> dict[str, float]:
     slope = np.tan(angle) * np.hypot(1, np.tan(taper))
     integral = quad(lambda s: slope / float(rod.radius(s)), 0, z)[0]
     almost = printed.rotation(radius, 1e-5, angle, z)
-    found = printed.rotation(radius, taper, angle, z)
+    rotation = printed.rotation(radius, taper, angle, z)
     limit = np.tan(angle) * z / radius
     return {
-        "rotation": float(abs(found / integral - 1)),
+        "rotation": float(abs(rotation / integral - 1)),
         "rotation_limit": float(abs(almost / limit - 1)),
     }
 
@@ -132,7 +132,7 @@ def _errors(ratio: float, taper: float, angle: float) -> tuple[float, ...]:
         (printed.delta3(ratio, taper, angle), 6 * exact.torsion),
         (printed.delta3(ratio, taper, angle, corrected=True), 6 * exact.torsion),
     )
-    return tuple(float(abs(found / true - 1)) for found, true in pairs)
+    return tuple(float(abs(value / true - 1)) for value, true in pairs)
 
 
 def _refusal() -> str:

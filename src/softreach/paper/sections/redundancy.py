@@ -83,31 +83,31 @@ def uneven(n: Numbers) -> Finding:
 
 def front(n: Numbers) -> Finding:
     """Density and D̄ in front and behind."""
-    found = n["redundant"]
+    data = n["redundant"]
     words = (
-        f"{found['density_front']:.3g} points/m³ in front against {found['density_behind']:.3g} "
-        f"behind; median D̄ {found['distance_front']:.2f} against {found['distance_behind']:.2f}"
+        f"{data['density_front']:.3g} points/m³ in front against {data['density_behind']:.3g} "
+        f"behind; median D̄ {data['distance_front']:.2f} against {data['distance_behind']:.2f}"
     )
-    dense = found["density_front"] > found["density_behind"]
-    return judged(words, dense and found["distance_front"] > found["distance_behind"])
+    dense = data["density_front"] > data["density_behind"]
+    return judged(words, dense and data["distance_front"] > data["distance_behind"])
 
 
 def small(n: Numbers) -> Finding:
     """D̄ of three fibers."""
-    found = n["minimal"]
-    words = f"median {found['median']:.3f}, 95 % below {found['quantiles']['0.95']:.3f}"
-    return judged(words, found["quantiles"]["0.95"] < 0.5)
+    data = n["minimal"]
+    words = f"median {data['median']:.3f}, 95 % below {data['quantiles']['0.95']:.3f}"
+    return judged(words, data["quantiles"]["0.95"] < 0.5)
 
 
 def large(n: Numbers) -> Finding:
     """D̄ of four."""
-    found = n["redundant"]
+    data = n["redundant"]
     words = (
-        f"median {found['median']:.3f}, 95 % below {found['quantiles']['0.95']:.3f}; above "
-        f"{found['threshold']:g} in {found['redundant_volume']:.0%} of the volume, against "
+        f"median {data['median']:.3f}, 95 % below {data['quantiles']['0.95']:.3f}; above "
+        f"{data['threshold']:g} in {data['redundant_volume']:.0%} of the volume, against "
         f"{n['minimal']['redundant_volume']:.0%}"
     )
-    return judged(words, found["quantiles"]["0.95"] > 0.5 > n["minimal"]["quantiles"]["0.95"])
+    return judged(words, data["quantiles"]["0.95"] > 0.5 > n["minimal"]["quantiles"]["0.95"])
 
 
 def _cloud(name: str, arm: Manipulator, settings: Settings, notes: Notebook) -> xr.Dataset:

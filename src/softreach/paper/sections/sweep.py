@@ -60,8 +60,8 @@ class Shape(NamedTuple):
 def shapes(revolutions: Array, tapers: Array, accuracy: float) -> dict[str, list[list[float]]]:
     """The shapes of exact reachable sets over (revolution, taper) [rad], by name."""
     accuracy = max(accuracy, _ACCURACY)
-    found = np.array([[_shape(o, p, accuracy) for p in tapers] for o in revolutions])
-    return {name: found[..., k].tolist() for k, name in enumerate(Shape._fields)}
+    values = np.array([[_shape(o, p, accuracy) for p in tapers] for o in revolutions])
+    return {name: values[..., k].tolist() for k, name in enumerate(Shape._fields)}
 
 
 def swept_atlas(folder: Path) -> xr.Dataset:

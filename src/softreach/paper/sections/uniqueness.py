@@ -40,7 +40,7 @@ def uniqueness(settings: Settings, folder: Path, notes: Notebook) -> None:
     turn, taper = float(worst["revolution"]), float(worst["taper"])
     arm = minimal_trunk(turn, taper)
     paper, clearest = (
-        reachable_set(one, accuracy=settings.accuracy) for one in (minimal_trunk(), arm)
+        reachable_set(trunk, accuracy=settings.accuracy) for trunk in (minimal_trunk(), arm)
     )
     assert isinstance(paper, ReachableSolid)
     assert isinstance(clearest, ReachableSolid)
@@ -88,8 +88,8 @@ def _clearest_pair(reached: ReachableSolid) -> Pair:
     every = max(1, len(places) // _TARGETS)
     axes = [grid[axis].values for axis in "xyz"]
     tips = np.stack([axes[k][places[::every, k]] for k in range(3)], axis=1)
-    found = [s for s in solve_inverse(reached.arm, tips) if len(s) > 1]
-    best = max(found, key=lambda s: _apart(s.activations), default=None)
+    solutions = [s for s in solve_inverse(reached.arm, tips) if len(s) > 1]
+    best = max(solutions, key=lambda s: _apart(s.activations), default=None)
     return (
         Pair(np.zeros(3), np.empty((0, 3))) if best is None else Pair(best.target, best.activations)
     )
@@ -103,10 +103,12 @@ def _apart(activations: Array) -> float:
 def _fewer_fibers() -> dict[str, float]:
     """Area of what two fibers reach and length of what one does, for L = 1 m."""
     arm = minimal_trunk()
-    two, one = (reachable_set(arm.replace(actuators=arm.actuators[:count])) for count in (2, 1))
-    assert isinstance(two, ReachableSurface)
-    assert isinstance(one, ReachableCurve)
-    return {"area": two.area, "curve": one.curve_length}
+    surface, curve = (
+        reachable_set(arm.replace(actuators=arm.actuators[:count])) for count in (2, 1)
+    )
+    assert isinstance(surface, ReachableSurface)
+    assert isinstance(curve, ReachableCurve)
+    return {"area": surface.area, "curve": curve.curve_length}
 
 
 def _draw(atlas: xr.Dataset, arm: Manipulator, pair: Pair, notes: Notebook) -> None:
