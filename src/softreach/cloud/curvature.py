@@ -110,8 +110,8 @@ def stream_statistics(
     shares = as_shares("quantiles", quantiles)
     blocks = _blocks("activations", activations)
     rod = stable_tips(tip_map(arm))
-    asked = distal_stations(rod) if stations is None else stations
-    z = rod.check_stations(np.atleast_1d(as_floats("stations", asked)), ascending=False)
+    places = distal_stations(rod) if stations is None else stations
+    z = rod.check_stations(np.atleast_1d(as_floats("stations", places)), ascending=False)
     ranges = rod.strain_range(z)._asdict()
     tallies = {name: _Tally.between(ranges[name], bins) for name in QUANTITIES}
     for strains in _strains(rod, blocks, z):
@@ -139,11 +139,11 @@ def _blocks(name: str, value: Any) -> Iterable[Array]:
 def _strains(rod: TipMap, activations: Iterable[Array], z: Array) -> Iterator[Strains]:
     """Strains, a few samples at a time."""
     strains = rod.strains_at(z)
-    for given in activations:
-        block = rod.check_activations("activations", given)
+    for activation in activations:
+        block = rod.check_activations("activations", activation)
         for rows in parallel.blocks(len(block), max(1, _AT_A_TIME // len(z))):
-            found = strains(block[rows])
-            yield _in_equilibrium(found) if rod.supports_unstable else found
+            values = strains(block[rows])
+            yield _in_equilibrium(values) if rod.supports_unstable else values
 
 
 def _in_equilibrium(strains: Strains) -> Strains:

@@ -264,9 +264,9 @@ def _among(
 ) -> tuple[Array, Index]:
     """D̄ and K of some samples among the stable ones; NaN and 0 of those that are not."""
     mean, others = np.full(len(sample), np.nan), np.zeros(len(sample), np.intp)
-    asked, number = stable[sample], np.cumsum(stable) - 1
-    found = mean_value_distance(tip[stable], activation[stable], radius, number[sample[asked]])
-    mean[asked], others[asked] = found
+    mask, number = stable[sample], np.cumsum(stable) - 1
+    measures = mean_value_distance(tip[stable], activation[stable], radius, number[sample[mask]])
+    mean[mask], others[mask] = measures
     return mean, others
 
 

@@ -204,13 +204,13 @@ def _alpha_complex(positions: np.ndarray, method: Method) -> AlphaComplex:
 
 def _alpha_complexes(clouds: list[np.ndarray], method: Method) -> list[AlphaComplex]:
     """Triangulate and measure several clouds, each on a thread of its own."""
-    found: dict[int, AlphaComplex] = {}
+    complexes: dict[int, AlphaComplex] = {}
 
     def build(number: int) -> None:
-        found[number] = _alpha_complex(clouds[number], method)
+        complexes[number] = _alpha_complex(clouds[number], method)
 
     parallel.run(partial(build, number) for number in range(len(clouds)))
-    return [found[number] for number in range(len(clouds))]
+    return [complexes[number] for number in range(len(clouds))]
 
 
 def _quarter(positions: np.ndarray) -> np.ndarray:
