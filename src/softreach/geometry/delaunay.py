@@ -128,10 +128,10 @@ def _by_qhull(points: Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return *_nothing(), duplicate_of
     inner = points[distinct] - points[distinct].mean(axis=0)
     try:
-        found = Qhull(inner, qhull_options="Qbb Qc Qz Q12")
+        triangulation = Qhull(inner, qhull_options="Qbb Qc Qz Q12")
     except QhullError:  # flat
         return *_nothing(), duplicate_of
-    cells, neighbors = _positively_oriented(inner, found.simplices, found.neighbors)
+    cells, neighbors = _positively_oriented(inner, triangulation.simplices, triangulation.neighbors)
     return distinct.astype(np.int32)[cells], neighbors, duplicate_of
 
 

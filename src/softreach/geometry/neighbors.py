@@ -127,15 +127,15 @@ class _Columns:
         corner, extent = self.low, points.max(axis=0)[self.axes] - self.low
         width = np.maximum(extent / _CUBES, max(self.margin, _SMALLEST))
         shape = tuple((extent / width).astype(np.int64) + 3)
-        wanted = np.zeros(shape, bool)
+        mask = np.zeros(shape, bool)
         x, y, z = ((queries[:, self.axes] - corner) / width + 1.0).astype(np.int64).T
         for i, j, k in np.ndindex(3, 3, 3):
-            wanted[x + i - 1, y + j - 1, z + k - 1] = True
+            mask[x + i - 1, y + j - 1, z + k - 1] = True
         cubes = np.zeros(len(points), np.int64)
-        for axis, size, low, one in zip(self.axes, shape, corner, width, strict=True):
+        for axis, size, low, edge in zip(self.axes, shape, corner, width, strict=True):
             cubes *= size
-            cubes += ((points[:, axis] - low) / one + 1.0).astype(np.int64)
-        return np.flatnonzero(wanted.ravel()[cubes])
+            cubes += ((points[:, axis] - low) / edge + 1.0).astype(np.int64)
+        return np.flatnonzero(mask.ravel()[cubes])
 
     def windows(self, keys: Index, along: Array) -> Index:
         """First and last key of what each query can reach in its own column, shape (2, q)."""
@@ -195,6 +195,6 @@ def _finite_values(values: object, n: int) -> Array:
         raise InvalidInput("values", f"array of shape {array.shape}", f"of shape ({n}, m)")
     wrong = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if len(wrong):
-        found = f"{len(wrong)} rows with NaN or infinity, the first at index {wrong[0]}"
-        raise InvalidInput("values", found, "finite")
+        fault = f"{len(wrong)} rows with NaN or infinity, the first at index {wrong[0]}"
+        raise InvalidInput("values", fault, "finite")
     return array

@@ -144,13 +144,13 @@ def _pieces(faces: NDArray[np.integer], above: Mask) -> NDArray[np.integer]:
 def _chained(pieces: NDArray[np.integer], count: int) -> list[list[int]]:
     """Curves through places that pieces connect; open ones first, from an end to the other."""
     touching: list[list[int]] = [[] for _ in range(count)]
-    for number, (one, other) in enumerate(pieces.tolist()):
-        touching[one].append(number)
-        touching[other].append(number)
+    for number, (start, end) in enumerate(pieces.tolist()):
+        touching[start].append(number)
+        touching[end].append(number)
     used = np.zeros(len(pieces), bool)
     order = sorted(range(count), key=lambda place: len(touching[place]) % 2 == 0)
-    found = (_walk(place, pieces, touching, used) for place in order)
-    return [curve for curve in found if len(curve) > 1]
+    curves = (_walk(place, pieces, touching, used) for place in order)
+    return [curve for curve in curves if len(curve) > 1]
 
 
 def _walk(
@@ -163,7 +163,7 @@ def _walk(
     curve = [place]
     while (ahead := next((k for k in touching[place] if not used[k]), None)) is not None:
         used[ahead] = True
-        one, other = pieces[ahead].tolist()
-        place = other if one == place else one
+        start, end = pieces[ahead].tolist()
+        place = end if start == place else start
         curve.append(place)
     return curve
