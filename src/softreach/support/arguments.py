@@ -53,9 +53,9 @@ def as_number(name: str, value: object, allowed: Range = Range()) -> float:  # n
     Raises:
         InvalidInput: Anything else.
     """
-    found = plain(value)
-    if isinstance(found, Real) and not isinstance(found, bool) and allowed.admits(found):
-        return float(found)
+    number = plain(value)
+    if isinstance(number, Real) and not isinstance(number, bool) and allowed.admits(number):
+        return float(number)
     raise InvalidInput(name, as_given(value), allowed.text)
 
 
@@ -65,9 +65,9 @@ def as_integer(name: str, value: object, low: int = 0, high: float = math.inf) -
     Raises:
         InvalidInput: Anything else, 2.0 too.
     """
-    found = plain(value)
-    if isinstance(found, Integral) and not isinstance(found, bool) and low <= int(found) <= high:
-        return int(found)
+    number = plain(value)
+    if isinstance(number, Integral) and not isinstance(number, bool) and low <= int(number) <= high:
+        return int(number)
     limits = f"{low:,} or more" if high == math.inf else f"from {low:,} to {high:,}"
     raise InvalidInput(name, as_given(value), f"a whole number, {limits}")
 
@@ -78,9 +78,9 @@ def as_flag(name: str, value: object) -> bool:
     Raises:
         InvalidInput: Anything else, even if Python takes it for true.
     """
-    found = plain(value)
-    if isinstance(found, bool):
-        return found
+    flag = plain(value)
+    if isinstance(flag, bool):
+        return flag
     raise InvalidInput(name, as_given(value), "True or False")
 
 
@@ -101,9 +101,9 @@ def as_path(name: str, value: object) -> str:
     Raises:
         InvalidInput: Neither text nor a path, or one that no file can have.
     """
-    found = os.fspath(value) if isinstance(value, os.PathLike) else value
-    if isinstance(found, str) and found and "\0" not in found:
-        return found
+    path = os.fspath(value) if isinstance(value, os.PathLike) else value
+    if isinstance(path, str) and path and "\0" not in path:
+        return path
     raise InvalidInput(name, as_given(value), "a path: text that is not empty, or a pathlib.Path")
 
 
@@ -126,7 +126,7 @@ def as_names(name: str, value: object) -> tuple[str, ...]:
     """
     if isinstance(value, str):
         return (value,)
-    if isinstance(value, list | tuple | Mapping) and all(isinstance(one, str) for one in value):
+    if isinstance(value, list | tuple | Mapping) and all(isinstance(item, str) for item in value):
         return tuple(value)
     raise InvalidInput(name, as_given(value), "a name, or a list or tuple of names")
 
@@ -138,7 +138,7 @@ def as_mapping(name: str, value: object, each: Callable[[str, Any], Any]) -> dic
         InvalidInput: Anything else.
     """
     if isinstance(value, Mapping) and all(isinstance(key, str) for key in value):
-        return {key: each(f"{name}[{key!r}]", one) for key, one in value.items()}
+        return {key: each(f"{name}[{key!r}]", item) for key, item in value.items()}
     raise InvalidInput(name, as_given(value), "a dictionary whose keys are names")
 
 
@@ -148,9 +148,9 @@ def as_name_or_index(name: str, value: object) -> str | int:
     Raises:
         InvalidInput: Anything else.
     """
-    found = plain(value)
-    if isinstance(found, str | int) and not isinstance(found, bool):
-        return found
+    key = plain(value)
+    if isinstance(key, str | int) and not isinstance(key, bool):
+        return key
     raise InvalidInput(name, as_given(value), "a name or an index")
 
 

@@ -143,9 +143,9 @@ def check_finite(name: str, values: Array) -> Array:
     if values.ndim < 2:
         raise InvalidInput(name, values, "finite numbers")
     wrong = np.flatnonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1))
-    found = f"{values[wrong[0]]}"
+    text = f"{values[wrong[0]]}"
     hint = f"so are {len(wrong):,} rows in all" if len(wrong) > 1 else ""
-    raise InvalidInput(f"{name}[{wrong[0]}]", found, "finite numbers", hint)
+    raise InvalidInput(f"{name}[{wrong[0]}]", text, "finite numbers", hint)
 
 
 def as_stations(name: str, values: object) -> Array:
@@ -215,8 +215,8 @@ def as_indices(name: str, values: object, count: int, what: str) -> Index:
     if array.ndim != 1 or (array.size and array.dtype.kind not in "iu"):
         raise InvalidInput(name, _described(values, array), allowed)
     if array.size and not (array.min() >= 0 and array.max() < count):
-        found = f"indices from {array.min():,} to {array.max():,}"
-        raise InvalidInput(name, found, allowed)
+        span = f"indices from {array.min():,} to {array.max():,}"
+        raise InvalidInput(name, span, allowed)
     return array.astype(np.intp)
 
 
@@ -241,13 +241,13 @@ def _array(name: str, values: object, allowed: str) -> NDArray[Any]:
     """The values as NumPy takes them, unless it would lose something on the way."""
     if np.ma.is_masked(values):
         raise InvalidInput(name, "a masked array", allowed, _FILL)
-    if found := _no_number(values):
-        raise InvalidInput(name, found, allowed)
+    if fault := _no_number(values):
+        raise InvalidInput(name, fault, allowed)
     try:
         return np.asarray(values)
     except (TypeError, ValueError, OverflowError):  # ragged rows; objects that are no arrays
-        found = "rows of different lengths" if isinstance(values, list | tuple) else _kind(values)
-        raise InvalidInput(name, found, allowed) from None
+        fault = "rows of different lengths" if isinstance(values, list | tuple) else _kind(values)
+        raise InvalidInput(name, fault, allowed) from None
 
 
 def _no_number(values: object) -> str:
@@ -268,7 +268,7 @@ def _no_number(values: object) -> str:
     ):
         return "masked entries"
     if any(issubclass(kind, list | tuple) for kind in nested):
-        return next((found for row in values if (found := _no_number(row))), "")
+        return next((fault for row in values if (fault := _no_number(row))), "")
     return ""
 
 

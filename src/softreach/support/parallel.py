@@ -25,9 +25,9 @@ _here = threading.local()
 
 def thread_count() -> int:
     """Number of threads used: ``SOFTREACH_NUM_THREADS``, or the cores this process may use."""
-    asked = os.environ.get("SOFTREACH_NUM_THREADS", "")
-    if asked.isdigit() and int(asked) > 0:
-        return int(asked)
+    setting = os.environ.get("SOFTREACH_NUM_THREADS", "")
+    if setting.isdigit() and int(setting) > 0:
+        return int(setting)
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -78,10 +78,10 @@ def read_whole_number(text: str) -> int:
         ValueError: Anything else, also what is written with a point, or has more than 30 digits.
     """
     plain = text.strip().replace("_", "") if _GROUPED.fullmatch(text.strip()) else text
-    found = _NUMBER.fullmatch(plain)
-    if found is None or found[2] or len(plain) > _LONGEST:
+    match = _NUMBER.fullmatch(plain)
+    if match is None or match[2] or len(plain) > _LONGEST:
         raise ValueError(text)
-    number = Decimal(found[1])
+    number = Decimal(match[1])
     if number.adjusted() > _LARGEST or number != number.to_integral_value():
         raise ValueError(text)
     return int(number)
@@ -98,7 +98,7 @@ def numbers_in(text: str, count: int | None = None) -> list[float] | None:
 
 def shortened(text: str) -> str:
     """Typed text, such that it fits into a line and can be printed."""
-    plain = "".join(one if one.isprintable() else "?" for one in text)
+    plain = "".join(character if character.isprintable() else "?" for character in text)
     return plain if len(plain) <= _SHOWN else f"{plain[: _SHOWN // 2]}...{plain[-_SHOWN // 4 :]}"
 
 
@@ -119,15 +119,15 @@ def read_quantity(text: str, unit: str) -> float:
     Raises:
         ValueError: No finite number, or another unit.
     """
-    found = _NUMBER.fullmatch(text)
-    if found is None or found[2] not in (unit_names(unit) or ("",)):
+    match = _NUMBER.fullmatch(text)
+    if match is None or match[2] not in (unit_names(unit) or ("",)):
         raise ValueError(text)
-    number, given = found.groups()
+    number, symbol = match.groups()
     value = float(number)
-    if given in _ANGLES:
-        value = value if given == "rad" else math.radians(value)
+    if symbol in _ANGLES:
+        value = value if symbol == "rad" else math.radians(value)
     elif abs(value) < math.inf:  # decimals, so that 200 g are 0.2 kg to the last bit
-        value = float(Decimal(number) * Decimal(_UNITS.get(unit, {}).get(given, "1")))
+        value = float(Decimal(number) * Decimal(_UNITS.get(unit, {}).get(symbol, "1")))
     if not math.isfinite(value):
         raise ValueError(text)
     return value

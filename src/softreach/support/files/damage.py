@@ -52,11 +52,11 @@ class Chunk(NamedTuple):
         """The file with this key, from the root of the store on; None for any other."""
         if key == DOCUMENT or key.endswith(f"/{DOCUMENT}"):
             return cls(key.removesuffix(DOCUMENT).rstrip("/"), None)
-        array, found, numbers = key.rpartition("/c/")
+        array, separator, numbers = key.rpartition("/c/")
         if key.endswith("/c"):  # the only chunk of a number
-            array, found, numbers = key[:-2], "/c", ""
+            array, separator, numbers = key[:-2], "/c", ""
         places = numbers.split("/") if numbers else []
-        if not found or not all(text.isascii() and text.isdigit() for text in places):
+        if not separator or not all(text.isascii() and text.isdigit() for text in places):
             return None
         return cls(array, tuple(map(int, places)))
 

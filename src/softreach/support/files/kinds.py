@@ -97,11 +97,11 @@ def beginning_with(*heads: bytes) -> Recognizes:
 
 def text_with(*parts: str) -> Recognizes:
     """Recognize text that has all of these parts near its beginning."""
-    wanted = [part.encode() for part in parts]
+    marks = [part.encode() for part in parts]
 
     def recognizes(path: Path) -> bool:
         head = _head(path)
-        return b"\0" not in head and all(part in head for part in wanted)
+        return b"\0" not in head and all(part in head for part in marks)
 
     return recognizes
 

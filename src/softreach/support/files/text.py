@@ -39,11 +39,11 @@ def read_text(name: str, path: str | os.PathLike[str], most: int) -> str:
 def _bytes_of(name: str, path: str | os.PathLike[str], most: int) -> bytes:
     shown = os.fspath(path)
     try:
-        found = os.stat(path)
-        if not stat.S_ISREG(found.st_mode):
+        status = os.stat(path)
+        if not stat.S_ISREG(status.st_mode):
             raise InvalidInput(name, shown, "a file, not a folder, a pipe or a device")
-        if found.st_size > most:
-            raise _too_large(name, shown, found.st_size, most)
+        if status.st_size > most:
+            raise _too_large(name, shown, status.st_size, most)
         with Path(path).open("rb") as stream:
             content = stream.read(most + 1)
     except FileNotFoundError:
@@ -56,8 +56,8 @@ def _bytes_of(name: str, path: str | os.PathLike[str], most: int) -> bytes:
 
 
 def _too_large(name: str, shown: str, size: int, most: int) -> InvalidInput:
-    found = f"{shown}, of {size / MEGABYTE:,.3g} MB"
-    return InvalidInput(name, found, f"at most {most / MEGABYTE:,.3g} MB large")
+    file = f"{shown}, of {size / MEGABYTE:,.3g} MB"
+    return InvalidInput(name, file, f"at most {most / MEGABYTE:,.3g} MB large")
 
 
 def _no_text(name: str, path: str | os.PathLike[str], why: str) -> InvalidInput:
