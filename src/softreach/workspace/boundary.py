@@ -140,8 +140,8 @@ class ReachedCells:
         starts = [self.crossings.beyond[near[:, k]] for k in range(_STARTS)]
         for known, start in [*self._starts_inside(points), *((None, start) for start in starts)]:
             left = np.flatnonzero((out > enough) & (True if known is None else known))
-            found = nearest_tips(self.rod, start[left], points[left], enough)
-            out[left] = np.minimum(out[left], found.distance)
+            nearest = nearest_tips(self.rod, start[left], points[left], enough)
+            out[left] = np.minimum(out[left], nearest.distance)
 
     def _starts_inside(self, points: Array) -> Iterator[tuple[Mask, Array]]:
         """Masks of points with a reached center at a corner of their cube, and where to start."""

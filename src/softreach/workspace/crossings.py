@@ -37,12 +37,12 @@ def boundary_edges(reached: Mask) -> Edges:
     for axis in range(3):
         before, after = np.moveaxis(reached, axis, 0)[:-1], np.moveaxis(reached, axis, 0)[1:]
         cells = np.moveaxis(flat, axis, 0)
-        for sense, here, cell in (
+        for sense, mask, cell in (
             (1, before & ~after, cells[:-1]),
             (-1, after & ~before, cells[1:]),
         ):
-            found = cell[here]
-            parts.append((found, np.full(len(found), axis), np.full(len(found), sense)))
+            places = cell[mask]
+            parts.append((places, np.full(len(places), axis), np.full(len(places), sense)))
     return Edges(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
@@ -73,7 +73,7 @@ class Crossings:
         edges = boundary_edges(flood.reached)
         n = len(edges.cell)
         outside = edges.cell + edges.sense * flood.steps[edges.axis]
-        found = cls(
+        crossings = cls(
             rod=flood.rod,
             lattice=flood.lattice,
             edges=edges,
@@ -83,9 +83,9 @@ class Crossings:
             beyond=flood.gamma[outside],
             place=np.zeros(n),
         )
-        found._cut(np.arange(n))
-        found.enclose(np.arange(n))
-        return found
+        crossings._cut(np.arange(n))
+        crossings.enclose(np.arange(n))
+        return crossings
 
     def points(self, which: Index, t: Array) -> Array:
         """Places on edges, t cells from the reached center [m], shape (n, 3)."""
@@ -117,12 +117,12 @@ class Crossings:
     def _try(self, which: Index, t: Array, start: Array) -> Mask:
         """Search for places on edges; whether they are reached."""
         cell = self.lattice.cell
-        found = nearest_tips(self.rod, start, self.points(which, t), ENOUGH * cell)
-        reached = found.distance <= ENOUGH * cell
+        nearest = nearest_tips(self.rod, start, self.points(which, t), ENOUGH * cell)
+        reached = nearest.distance <= ENOUGH * cell
         yes, no = which[reached], which[~reached]
-        self.low[yes], self.gamma[yes] = t[reached], found.gamma[reached]
-        self.high[no], self.beyond[no] = t[~reached], found.gamma[~reached]
-        self._cut(no, found.tips[~reached])
+        self.low[yes], self.gamma[yes] = t[reached], nearest.gamma[reached]
+        self.high[no], self.beyond[no] = t[~reached], nearest.gamma[~reached]
+        self._cut(no, nearest.tips[~reached])
         return reached
 
     def _cut(self, which: Index, tips: Array | None = None) -> None:
@@ -142,12 +142,12 @@ class Crossings:
         before = self.place[which].copy()
         target = np.minimum(before + by, 1.0)
         cell = self.lattice.cell
-        found = nearest_tips(self.rod, start, self.points(which, target), ENOUGH * cell)
-        reached = found.distance <= ENOUGH * cell
+        nearest = nearest_tips(self.rod, start, self.points(which, target), ENOUGH * cell)
+        reached = nearest.distance <= ENOUGH * cell
         yes = which[reached]
-        self.low[yes], self.gamma[yes] = target[reached], found.gamma[reached]
+        self.low[yes], self.gamma[yes] = target[reached], nearest.gamma[reached]
         self.high[yes] = np.maximum(self.high[yes], 1.0)
-        self.beyond[yes] = found.gamma[reached]
+        self.beyond[yes] = nearest.gamma[reached]
         self.place[yes] = 0.5 * (self.low[yes] + 1.0)
         self.enclose(yes)
         return self.place[which] - before

@@ -91,10 +91,10 @@ def _all_stable(rod: TipMap) -> TipMap:
     if rod.supports_unstable:
         lost, tried = _lost(rod)
         if lost:
-            found = f"{lost} of {tried} activations tried have no stable equilibrium"
+            fault = f"{lost} of {tried} activations tried have no stable equilibrium"
             allowed = "such that every activation has one"
             hint = "lighten the load or narrow the bounds; a cloud says which samples have one"
-            raise InvalidInput("loads", found, allowed, hint)
+            raise InvalidInput("loads", fault, allowed, hint)
     return rod
 
 

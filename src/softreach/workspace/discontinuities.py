@@ -141,8 +141,8 @@ def _suspects(apart: Array, axis: int) -> Mask:
     none = np.full((1, *rows.shape[1:]), np.nan)
     neighbor = np.fmin(np.concatenate([none, rows[:-1]]), np.concatenate([rows[1:], none]))
     with np.errstate(invalid="ignore"):
-        found = np.isfinite(rows) & ~(rows <= _SUSPECT * neighbor)
-    return np.moveaxis(found, 0, axis)
+        suspects = np.isfinite(rows) & ~(rows <= _SUSPECT * neighbor)
+    return np.moveaxis(suspects, 0, axis)
 
 
 def _stay_apart(rod: TipMap, edges: Index, axis: int, field: Array) -> Mask:

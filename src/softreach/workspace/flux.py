@@ -37,13 +37,13 @@ def signed_volume(rod: TipMap, nodes: int | None = None) -> Flux:
     """
     rod = refined(rod, flux_tol(rod) if nodes is None else _ROUGH_TOL)
     counts = _NODES if nodes is None else (2 * nodes // 3, nodes)
-    found, change = _flux(rod, counts[0]), np.inf
+    flux, change = _flux(rod, counts[0]), np.inf
     for count in counts[1:]:
-        rough, found = found, _flux(rod, count)
-        change = abs(found.value - rough.value)
-        if nodes is None and not change > found.error:  # NaN too
+        rough, flux = flux, _flux(rod, count)
+        change = abs(flux.value - rough.value)
+        if nodes is None and not change > flux.error:  # NaN too
             break
-    return found._replace(error=change + found.error)
+    return flux._replace(error=change + flux.error)
 
 
 class Flux(NamedTuple):
@@ -81,10 +81,10 @@ def face_image(rod: TipMap, cells: int = _CELLS) -> Surface | None:
     tips = stable_tips(rod).tips(rod.box.from_free_cube(cube))
     if not np.isfinite(tips).all():
         return None
-    found = Surface(vertices=tips, faces=_face_triangles(cube, cells))
-    if found.volume < 0:  # the map turns the box over
-        found = Surface(vertices=tips, faces=found.faces[:, ::-1].copy())
-    return found
+    surface = Surface(vertices=tips, faces=_face_triangles(cube, cells))
+    if surface.volume < 0:  # the map turns the box over
+        surface = Surface(vertices=tips, faces=surface.faces[:, ::-1].copy())
+    return surface
 
 
 class FaceNodes(NamedTuple):

@@ -204,9 +204,9 @@ def _solid(arm: Manipulator, accuracy: float) -> ReachableSolid:
     free = tip_map(arm).box.dimension
     if free != 3:
         raise InvalidInput("arm", f"{free} free bundles", "three of them")
-    found = reachable_set(arm, accuracy=accuracy)
-    assert isinstance(found, ReachableSolid)
-    return found
+    solid = reachable_set(arm, accuracy=accuracy)
+    assert isinstance(solid, ReachableSolid)
+    return solid
 
 
 class _Base:
@@ -282,10 +282,10 @@ def _limit(of_grids: Mapping[int, Estimate]) -> Estimate:
     cells = np.array(list(of_grids), float)
     values = np.array([each.value for each in of_grids.values()])
     rule = np.stack([np.ones_like(cells), cells**-2.0], axis=1)
-    found = np.linalg.lstsq(rule, values, rcond=None)[0]
-    off = float(np.abs(rule @ found - values).max())
+    coefficients = np.linalg.lstsq(rule, values, rcond=None)[0]
+    off = float(np.abs(rule @ coefficients - values).max())
     smooth = max(each.error for each in of_grids.values())
-    limit = float(found[0])
+    limit = float(coefficients[0])
     return Estimate(limit, smooth + 2.0 * off + 2.0 * abs(limit - values[-1]))
 
 

@@ -62,16 +62,16 @@ def grid_stretches(rod: TipMap, tips: Array, cells: int, left_out: Mask) -> Arra
     Returns:
         Shape ((cells + 1)³,); 0 where there is no stable equilibrium.
     """
-    found = stretches(tips, np.array([cells] * 3))
-    found *= cells**3 / (8.0 * rod.box.volume)
+    determinants = stretches(tips, np.array([cells] * 3))
+    determinants *= cells**3 / (8.0 * rod.box.volume)
     unsure = corners_of(left_out).ravel()
-    largest = _largest(rod, np.abs(found[~unsure]))
-    small = np.flatnonzero(unsure | (np.abs(found) <= _DIFFERENCES / cells**2 * largest))
+    largest = _largest(rod, np.abs(determinants[~unsure]))
+    small = np.flatnonzero(unsure | (np.abs(determinants) <= _DIFFERENCES / cells**2 * largest))
     small = small[np.isfinite(tips[small, 0])]
     places = np.stack(np.unravel_index(small, (cells + 1,) * 3), axis=1) / cells
-    found[small] = _stretch(rod, rod.box.from_free_cube(places))
-    found[~np.isfinite(found)] = 0.0
-    return found
+    determinants[small] = _stretch(rod, rod.box.from_free_cube(places))
+    determinants[~np.isfinite(determinants)] = 0.0
+    return determinants
 
 
 def _largest(rod: TipMap, stretch: Array) -> float:

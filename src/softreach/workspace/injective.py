@@ -172,14 +172,14 @@ class RegularWindows:
         size = np.searchsorted(self._sizes, reach - 1e-9)
         held = size < len(self._sizes)
         vertex = (center[:, 0] * (n + 1) + center[:, 1]) * (n + 1) + center[:, 2]
-        found = np.zeros(len(low), bool)
-        found[held] = self._are_regular(size[held], vertex[held])
-        return found, held & ~found & (size == 0)
+        regular = np.zeros(len(low), bool)
+        regular[held] = self._are_regular(size[held], vertex[held])
+        return regular, held & ~regular & (size == 0)
 
     def _are_regular(self, size: Index, vertex: Index) -> Mask:
-        asked = np.zeros(self._known.shape, bool)
-        asked[size, vertex] = True
-        number, at = np.nonzero(asked & (self._known == _UNKNOWN))
+        queries = np.zeros(self._known.shape, bool)
+        queries[size, vertex] = True
+        number, at = np.nonzero(queries & (self._known == _UNKNOWN))
         self._known[number, at] = np.where(self._judge(self._sizes[number], at), _YES, _NO)
         return self._known[size, vertex] == _YES
 
@@ -230,8 +230,8 @@ def _each_once(first: Index, second: Index, size: int) -> tuple[Index, Index, In
 def _largest_bend(slopes: Array) -> Array:
     """The largest |∂²r/∂xj∂xk| on the grid [m], shape (3, 3)."""
     n = len(slopes) - 1
-    found = [np.linalg.norm(np.diff(slopes, axis=k), axis=-2).max(axis=(0, 1, 2)) for k in range(3)]
-    return _FACE_MARGIN * n * np.array(found)
+    bends = [np.linalg.norm(np.diff(slopes, axis=k), axis=-2).max(axis=(0, 1, 2)) for k in range(3)]
+    return _FACE_MARGIN * n * np.array(bends)
 
 
 def _patches(rod: TipMap, which: Index, side: int) -> _Patches:
@@ -254,17 +254,17 @@ def _parted(patches: _Patches, a: Index, b: Index, bend: Array) -> Mask:
     rest = 0.5 * np.einsum("ij,jk,ik->i", patches.half, bend, patches.half)
     radius = np.linalg.norm(sides, axis=1).sum(axis=1) + rest
     between = patches.tips[b] - patches.tips[a]
-    found = np.linalg.norm(between, axis=1) > radius[a] + radius[b]
+    mask = np.linalg.norm(between, axis=1) > radius[a] + radius[b]
     normal = _normals(patches)
     # Along its own plane a patch reaches no farther than by its bend.
     for direction, tilted in ((between, (a, b)), (normal[a], (b,)), (normal[b], (a,))):
-        left = np.flatnonzero(~found)
+        left = np.flatnonzero(~mask)
         unit = direction[left] / np.linalg.norm(direction[left], axis=1).clip(1e-300)[:, None]
         reach = rest[a[left]] + rest[b[left]]
         for each in tilted:
             reach += np.abs(unit[:, None, :] @ sides[each[left]]).sum(axis=(1, 2))
-        found[left] = np.abs((unit * between[left]).sum(axis=1)) > reach
-    return found
+        mask[left] = np.abs((unit * between[left]).sum(axis=1)) > reach
+    return mask
 
 
 def _normals(patches: _Patches) -> Array:

@@ -97,12 +97,12 @@ def multiply_covered(
     error = float(abs(same.sum() - rough.sum()))
     sure = np.maximum(np.abs(same - rough), error) < volumes
     sure[0] = True
-    found, unsure = {}, 0.0
+    measures, unsure = {}, 0.0
     for number in range(size - 1, 1, -1):
         unsure += float(volumes[number - 2])
         if sure[number - 2] and unsure > 0.0:
-            found[number], unsure = unsure, 0.0
-    return dict(sorted(found.items())), error
+            measures[number], unsure = unsure, 0.0
+    return dict(sorted(measures.items())), error
 
 
 def _by_cover(image: Image) -> Array:
@@ -310,10 +310,10 @@ def line_volume(crossings: Crossings) -> LineVolume:
 def _sparse(runs: Runs) -> list[float]:
     """Sums of lengths from every other line along both directions and every other center."""
     i, j = np.divmod(runs.line, runs.width)
-    found = []
+    volumes = []
     for parity in range(2):
         lengths = length_sum(runs, 2, parity)
         for a in range(2):
             for b in range(2):
-                found.append(4.0 * float(lengths[(i % 2 == a) & (j % 2 == b)].sum()))
-    return found
+                volumes.append(4.0 * float(lengths[(i % 2 == a) & (j % 2 == b)].sum()))
+    return volumes

@@ -183,8 +183,8 @@ class PayloadCurve:
     def _at(self, mass: float) -> _Volume:
         """The volume under a payload, known or computed now."""
         rows = zip(self.payloads, self.volumes, self.volume_errors, self.lost_shares, strict=True)
-        for one, *volume in rows:
-            if one == mass:
+        for payload, *volume in rows:
+            if payload == mass:
                 return _Volume(*volume)
         if mass not in self._known:
             self._known[mass] = _volume(self.arm, mass, self.accuracy, self.tol)
@@ -242,8 +242,8 @@ def _narrowed(
 def _volume(arm: Manipulator, mass: float, accuracy: float, tol: float) -> _Volume:
     assert arm.loads is not None
     carrying = arm.replace(loads=arm.loads.replace(payload=mass))
-    found = reachable_set(carrying, accuracy=accuracy, tol=tol)
-    return _Volume(found.volume, found.volume_error, float(getattr(found, "lost_share", 0.0)))
+    reached = reachable_set(carrying, accuracy=accuracy, tol=tol)
+    return _Volume(reached.volume, reached.volume_error, float(getattr(reached, "lost_share", 0.0)))
 
 
 def _check(arm: Manipulator) -> None:

@@ -107,14 +107,14 @@ def reachable_set(
     if m < 3:
         return thin_set(rod)
     if m == 3:
-        found = _of_three(rod, accuracy, cell, grid, progress)
-        finer = f"a grid above {found.cells} and a smaller cell"
+        result = _of_three(rod, accuracy, cell, grid, progress)
+        finer = f"a grid above {result.cells} and a smaller cell"
     else:
-        found = _of_many(rod, accuracy, cell, grid, memory, progress)
+        result = _of_many(rod, accuracy, cell, grid, memory, progress)
         finer = "a smaller cell" if cell is not None else "more memory"
-    if found.volume_error > accuracy * found.volume:
-        warn(_inaccurate(found, accuracy, finer))
-    return found
+    if result.volume_error > accuracy * result.volume:
+        warn(_inaccurate(result, accuracy, finer))
+    return result
 
 
 def rasterized_set(
@@ -197,9 +197,9 @@ def lattice_for(tips: Array, *, cell: float | None, accuracy: float) -> Lattice:
                 "cell", cell, f"at least {smallest:.3g} m for {_MOST_CELLS:.0g} cells"
             )
         return Lattice.around(tips, float(cell))
-    wanted = np.sqrt(accuracy / 30.0) * np.cbrt(np.prod(sides))
+    edge = np.sqrt(accuracy / 30.0) * np.cbrt(np.prod(sides))
     # An image that is almost flat would need countless cells along it.
-    return Lattice.around(tips, float(max(wanted, sides.max() / 1024.0)))
+    return Lattice.around(tips, float(max(edge, sides.max() / 1024.0)))
 
 
 def is_settled(found: ReachableSolid, accuracy: float) -> bool:
@@ -232,10 +232,10 @@ def _of_three(
         return solid_by_flux(
             rod, cells, partial(lattice_for, cell=cell, accuracy=accuracy), progress
         )
-    found = rasterized_set(rod, cells, cell, accuracy, progress)
-    while grid is None and not is_settled(found, accuracy) and is_worthwhile(found, accuracy):
-        found = rasterized_set(rod, 2 * found.cells, cell, accuracy, progress)
-    return found
+    solid = rasterized_set(rod, cells, cell, accuracy, progress)
+    while grid is None and not is_settled(solid, accuracy) and is_worthwhile(solid, accuracy):
+        solid = rasterized_set(rod, 2 * solid.cells, cell, accuracy, progress)
+    return solid
 
 
 def _of_many(
@@ -251,17 +251,17 @@ def _of_many(
     memory = max(free_memory() / 4.0, smallest_memory(rod)) if memory is None else memory
     if not smallest_memory(rod) <= memory < np.inf:
         raise InvalidInput("memory", memory, f"at least {smallest_memory(rod):.3g} bytes")
-    found = searched_set(rod, accuracy, cell, memory, progress)
+    search = searched_set(rod, accuracy, cell, memory, progress)
     return ReachableSolid(
         tip_map=rod,
         cells=0,
-        volume=found.volume.value,
-        volume_error=found.volume.error,
-        convex_volume=found.convex_volume.value,
-        convex_volume_error=found.convex_volume.error,
+        volume=search.volume.value,
+        volume_error=search.volume.error,
+        convex_volume=search.convex_volume.value,
+        convex_volume_error=search.convex_volume.error,
         lost_share=lost_share(rod),
         route="search",
-        rasterize=partial(_known, found.cells),
+        rasterize=partial(_known, search.cells),
         **_NO_OVERLAPS._asdict(),
     )
 
@@ -351,13 +351,13 @@ def _reached(tips: Array, left_out: Mask) -> Array:
     """
     used = corners_of(~left_out).ravel()
     if not used.any():
-        found = f"no cell of an activation grid of {len(left_out)}³ has a stable, untorn image"
-        raise loads_too_heavy(found)
+        fault = f"no cell of an activation grid of {len(left_out)}³ has a stable, untorn image"
+        raise loads_too_heavy(fault)
     return tips[used]
 
 
-def _inaccurate(found: ReachableSolid, accuracy: float, finer: str) -> str:
+def _inaccurate(solid: ReachableSolid, accuracy: float, finer: str) -> str:
     return (
-        f"volume {found.volume:.5g} m³ may be off by {found.volume_error:.2g} m³, more than "
+        f"volume {solid.volume:.5g} m³ may be off by {solid.volume_error:.2g} m³, more than "
         f"{accuracy:g} of it; pass {finer}"
     )

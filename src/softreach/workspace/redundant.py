@@ -74,13 +74,13 @@ def searched_set(
         if not smallest <= cell < np.inf:  # NaN too
             raise InvalidInput("cell", cell, f"at least {smallest:.3g} m for {memory:.2g} bytes")
         return _search(rod, _lattice(tips, cell), gamma, tips, progress)
-    wanted = min(np.sqrt(accuracy) / _RULE, 1.0 / _FEWEST) * np.cbrt(np.prod(sides))
-    edge = float(max(wanted, smallest, sides.max() / 1024.0))
-    found = _search(rod, _lattice(tips, edge), gamma, tips, progress)
-    while found.volume.error > accuracy * found.volume.value and edge / _FINER >= smallest:
+    target = min(np.sqrt(accuracy) / _RULE, 1.0 / _FEWEST) * np.cbrt(np.prod(sides))
+    edge = float(max(target, smallest, sides.max() / 1024.0))
+    result = _search(rod, _lattice(tips, edge), gamma, tips, progress)
+    while result.volume.error > accuracy * result.volume.value and edge / _FINER >= smallest:
         edge /= _FINER
-        found = _search(rod, _lattice(tips, edge), gamma, tips, progress)
-    return found
+        result = _search(rod, _lattice(tips, edge), gamma, tips, progress)
+    return result
 
 
 def _lattice(tips: Array, cell: float) -> Lattice:
@@ -225,13 +225,13 @@ def _not_among(flood: Flood, tips: Array) -> Mask:
 
 def _convex_volume(points: Array, fewer: Array) -> Estimate:
     """Limit of the hulls of ever more boundary points, as far as two of them tell."""
-    found = np.empty(2)
+    volumes = np.empty(2)
 
     def measure(place: int, some: Array) -> None:
-        found[place] = convex_hull(some).volume
+        volumes[place] = convex_hull(some).volume
 
     parallel.run([partial(measure, 0, points), partial(measure, 1, fewer)])
-    value, rough = found.tolist()
+    value, rough = volumes.tolist()
     rest = max(value - rough, 0.0) / 3.0
     return Estimate(value + 0.5 * rest, rest)
 

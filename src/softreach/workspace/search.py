@@ -111,14 +111,14 @@ class Flood:
         cell = self.lattice.cell
         for first in range(0, len(cells), _CHUNK):
             some = cells[first : first + _CHUNK]
-            found = nearest_tips(
+            nearest = nearest_tips(
                 self.rod, starts[first : first + _CHUNK], self.centers(some), ENOUGH * cell
             )
-            gap = found.distance / cell
+            gap = nearest.distance / cell
             gap[gap <= ENOUGH] = 0.0
             closer = gap < self.gap[some]
             self.gap[some[closer]] = gap[closer]
-            self.gamma[some[closer]] = found.gamma[closer]
+            self.gamma[some[closer]] = nearest.gamma[closer]
             self.progress(len(some))
 
 
@@ -134,17 +134,17 @@ def nearest_tips(rod: TipMap, start: Array, targets: Array, enough: float) -> Ne
         enough: Distance at which a target counts as reached [m].
     """
     rod, gamma = stable_tips(rod), np.ascontiguousarray(start)
-    found = Nearest(gamma.copy(), np.empty_like(targets), np.empty(len(targets)))
+    nearest = Nearest(gamma.copy(), np.empty_like(targets), np.empty(len(targets)))
 
     def task(block: slice) -> None:
-        parts = (found.gamma[block], found.tips[block], found.distance[block])
+        parts = (nearest.gamma[block], nearest.tips[block], nearest.distance[block])
         _descend(rod, targets[block], enough, Nearest(*parts))
 
     # Searches that end make room for others; only the last of a task run by a few.
     share = max(_TOGETHER, -(-len(targets) // parallel.thread_count()))
     rod.prepare()
     parallel.run(partial(task, block) for block in parallel.blocks(len(targets), share))
-    return found
+    return nearest
 
 
 class Nearest(NamedTuple):
@@ -159,7 +159,7 @@ class Nearest(NamedTuple):
     equilibrium."""
 
 
-def _descend(rod: TipMap, targets: Array, enough: float, found: Nearest) -> None:
+def _descend(rod: TipMap, targets: Array, enough: float, nearest: Nearest) -> None:
     """Damped Gauss and Newton steps that stay within the bounds; on the calling thread."""
     total, box = len(targets), rod.box
     bounds = box.low, box.high, box.scales
@@ -171,18 +171,18 @@ def _descend(rod: TipMap, targets: Array, enough: float, found: Nearest) -> None
         more = min(total - begun, len(tips) - n)
         new, rows = slice(n, n + more), slice(begun, begun + more)
         running.row[new], running.steps[new] = np.arange(begun, begun + more), 0
-        running.trial[new], running.damping[new] = found.gamma[rows], FIRST_DAMPING
+        running.trial[new], running.damping[new] = nearest.gamma[rows], FIRST_DAMPING
         n, begun = n + more, begun + more
         rod.fill(running.trial[:n], tips[:n], ahead[:n])
         if torn:
             tips[np.isnan(tips[:n, 0]).nonzero()[0]] = NOWHERE
-        n = judge(running, n, tips, ahead, targets, found, enough, *bounds)
+        n = judge(running, n, tips, ahead, targets, nearest, enough, *bounds)
         slope, wanted, softness = running.slope[:n], running.wanted[:n], running.softness[:n]
         low, high = running.low[:n], running.high[:n]
         project(center[:n], slope, wanted, softness, low, high, step[:n], multiplier[:n])
-        next_trials(running, n, step, multiplier, found.gamma, *bounds)
-    nowhere = found.distance >= NOWHERE
-    found.distance[nowhere], found.tips[nowhere] = np.inf, np.nan
+        next_trials(running, n, step, multiplier, nearest.gamma, *bounds)
+    nowhere = nearest.distance >= NOWHERE
+    nearest.distance[nowhere], nearest.tips[nowhere] = np.inf, np.nan
 
 
 def _room(count: int, m: int) -> tuple[Running, Array]:

@@ -41,9 +41,9 @@ class Shifts:
     def rough_weights(self) -> Array:
         """The same without the two offsets that are farthest, two orders lower."""
         kept = np.sort(np.argsort(np.abs(self.offsets), kind="stable")[:-2])
-        found = np.zeros(len(self.offsets))
-        found[kept] = _weights(self.offsets[kept]) / self.step
-        return found
+        weights = np.zeros(len(self.offsets))
+        weights[kept] = _weights(self.offsets[kept]) / self.step
+        return weights
 
 
 def shifts_along(arm: Manipulator, parameter: Parameter, reach: int, relative: float) -> Shifts:

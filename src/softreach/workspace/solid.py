@@ -114,8 +114,8 @@ class ReachableSolid(ReachableSet):
         Raises:
             MissingExtra: scikit-image is not installed.
         """
-        found = self._face_image if self.route == "flux" and not self.lost_share else None
-        return self._boundary if found is None else found
+        image = self._face_image if self.route == "flux" and not self.lost_share else None
+        return self._boundary if image is None else image
 
     def sheets(self) -> Surface:
         """The boundary as the sheets it consists of: images of faces of the box, and folds.
@@ -147,9 +147,9 @@ class ReachableSolid(ReachableSet):
         # A cell's diagonal inside nothing is to be decided; one cell where each place is a search.
         margin = np.sqrt(3.0) if isinstance(self.image, Image) else 1.0
         at = self.image.lattice.coordinates(positions)
-        found = map_coordinates(self._field, at.T, order=1, cval=np.inf) < -margin
-        found[~found] = self.image.counts_at(positions[~found]) > 0
-        return found
+        inside = map_coordinates(self._field, at.T, order=1, cval=np.inf) < -margin
+        inside[~inside] = self.image.counts_at(positions[~inside]) > 0
+        return inside
 
     def distance(self, points: ArrayLike) -> Array:
         """Distance to the boundary [m], negative inside.
@@ -187,14 +187,16 @@ class ReachableSolid(ReachableSet):
         """All numbers with their errors and units; `multiplicity` over `activations`."""
         import xarray as xr
 
-        found = super().to_dataset().assign_attrs(route=self.route)
+        dataset = super().to_dataset().assign_attrs(route=self.route)
         if self.route != "flux":  # else there may be no raster yet
-            found = found.assign_attrs(cell=self.image.lattice.cell)
+            dataset = dataset.assign_attrs(cell=self.image.lattice.cell)
         if not self.multiplicity:
-            return found
+            return dataset
         name = {"units": "m3", "long_name": "volume that so many activations reach"}
         volumes = xr.Variable("activations", list(self.multiplicity.values()), name)
-        return found.assign_coords(activations=list(self.multiplicity)).assign(multiplicity=volumes)
+        return dataset.assign_coords(activations=list(self.multiplicity)).assign(
+            multiplicity=volumes
+        )
 
     @cached_property
     def _field(self) -> Array:
