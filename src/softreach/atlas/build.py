@@ -36,7 +36,7 @@ STORED = 6.2
 
 _ON_DISK = 4096  # bytes that the smallest file takes
 _FILES = 5  # of a design without tips: status, message, checksum, metrics, curvature
-_HELD = 700  # bytes of memory of a sample and its share of the triangulation
+_SAMPLE_MEMORY = 700  # bytes of memory of a sample and its share of the triangulation
 
 
 def build_atlas(
@@ -135,10 +135,10 @@ def build_atlas(
     indices = np.array(numbers)
     _warn_of_gaps(space)
     atlas = AtlasStore.begin(store, command, durable=durable)
-    held = contents(atlas, tips_of=indices.tolist())
-    if held.damage:
-        warn(f"{held.damage}; what is damaged is computed again")
-    ended = np.isin(held.status[indices], (DONE, GAP, UNSTABLE))
+    content = contents(atlas, tips_of=indices.tolist())
+    if content.damage:
+        warn(f"{content.damage}; what is damaged is computed again")
+    ended = np.isin(content.status[indices], (DONE, GAP, UNSTABLE))
     _run(atlas, indices[~ended], executor, progress)
     built = open_atlas(store)
     _warn_of_unstable(built)
@@ -159,7 +159,7 @@ def _check_demand(
     Warns:
         SoftreachWarning: It takes more than half of what is free.
     """
-    check_memory("n", n, _HELD * n)
+    check_memory("n", n, _SAMPLE_MEMORY * n)
     local = isinstance(store, str | os.PathLike) and "://" not in str(store)
     if local and not Path(str(store)).exists():
         of_each = STORED * n * keep_clouds + _FILES * _ON_DISK

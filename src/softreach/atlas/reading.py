@@ -197,19 +197,19 @@ def _required(store: AtlasStore, status: NDArray[np.uint8]) -> Callable[[Chunk],
 def _opened(store: StoreLike, *, metrics: bool) -> xr.Dataset:
     import xarray as xr
 
-    held = AtlasStore.open(store, "r")
-    content = contents(held, metrics=metrics)
+    atlas = AtlasStore.open(store, "r")
+    content = contents(atlas, metrics=metrics)
     if content.damage:
         then = "left out; the command that built the atlas computes again what is damaged"
         warn(f"{content.damage} ({then})")
-    with storage_errors(f"{held.location} cannot be read"):
-        check_arrays(held.opened)
-        raw = xr.open_zarr(held.opened.place, drop_variables=_READ_HERE, **READING)
-        coordinates = _coordinates(held, raw)
+    with storage_errors(f"{atlas.location} cannot be read"):
+        check_arrays(atlas.opened)
+        raw = xr.open_zarr(atlas.opened.place, drop_variables=_READ_HERE, **READING)
+        coordinates = _coordinates(atlas, raw)
     raw.attrs.pop(ARRAYS)
-    variables = _variables(held, content) | (_metrics(held.command, content) if metrics else {})
+    variables = _variables(atlas, content) | (_metrics(atlas.command, content) if metrics else {})
     opened = raw.assign(variables).assign_coords(coordinates)
-    opened.encoding["source"] = str(held.location)
+    opened.encoding["source"] = str(atlas.location)
     return opened
 
 

@@ -20,7 +20,7 @@ from softreach.support.quantity import read_number, read_whole_number
 __all__ = ["parse_parameter", "parse_space"]
 
 _KEYS = ("design", "layout", "designs", "seed", "parameters")
-_WHOLE = re.compile(r"[+-]?\d+", re.ASCII)
+_INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
 _MOST = 100_000  # values of one parameter
 _LAYOUTS = ("grid", "list", "sobol", "latin")
 
@@ -123,7 +123,7 @@ def _numbers(key: str, value: Any) -> list[float]:
 
 def _number(text: str) -> float:
     number = read_number(text)
-    return read_whole_number(text) if _WHOLE.fullmatch(text.strip()) else number
+    return read_whole_number(text) if _INTEGER.fullmatch(text.strip()) else number
 
 
 def _range(text: str) -> list[float]:

@@ -151,11 +151,11 @@ class HelpConsole:
 def _rich_console() -> RichConsole:
     from rich.console import Console as RichConsole
 
-    class Whole(RichConsole):
+    class StrictConsole(RichConsole):
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError
 
-    return Whole(width=max(_NARROWEST, shutil.get_terminal_size().columns))
+    return StrictConsole(width=max(_NARROWEST, shutil.get_terminal_size().columns))
 
 
 class _Compilations(logging.Handler):

@@ -52,8 +52,8 @@ def delta3(ratio: float, taper: float, helical_angle: float, *, corrected: bool 
 
     arctangents = (t(-ratio) + t(ratio) - t(-1) - t(1)) * p**2
     roots = 6 * a * (s(1) - s(ratio))
-    whole = 3 * arctangents + roots if corrected else 3 * (arctangents + roots)
-    return float((whole / (p**2 * a**2 * root)).real)
+    total = 3 * arctangents + roots if corrected else 3 * (arctangents + roots)
+    return float((total / (p**2 * a**2 * root)).real)
 
 
 def rotation(radius: float, taper: float, helical_angle: float, z: float) -> float:

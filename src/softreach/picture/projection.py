@@ -29,7 +29,7 @@ VIEWS: dict[str, tuple[float, float]] = {
     "back": (np.pi / 2, 0.0),
     "left": (np.pi, 0.0),
 }
-"""Azimuth and elevation of the eye [rad].
+"""Azimuth and elevation of the camera [rad].
 
 The front is at -y, where the longitudinal fiber lies; "side" is seen from the right, +x, and "left"
 from -x. "oblique" is from the front, a little from the right and above.
@@ -46,10 +46,10 @@ _PLANES = {
 
 
 def view_axes(view: View) -> Array:
-    """Unit vectors to the right of the paper, up it, and out of it to the eye, shape (3, 3).
+    """Unit vectors to the right of the paper, up it, and out of it to the camera, shape (3, 3).
 
     Args:
-        view: One of `VIEWS`, or azimuth (from x, about z) and elevation of the eye [rad].
+        view: One of `VIEWS`, or azimuth (from x, about z) and elevation of the camera [rad].
 
     Raises:
         InvalidInput: Neither a known name nor two finite angles.
@@ -62,7 +62,7 @@ def view_axes(view: View) -> Array:
 
 
 def project(points: ArrayLike, view: View) -> Array:
-    """Right, up and toward the eye, in the units of the points, shape (n, 3).
+    """Right, up and toward the camera, in the units of the points, shape (n, 3).
 
     Raises:
         InvalidInput: An unknown view.
@@ -92,7 +92,7 @@ def is_mirrored(view: View) -> bool:
 
 
 def view_angles(view: View) -> tuple[float, float]:
-    """Azimuth and elevation of the eye [rad].
+    """Azimuth and elevation of the camera [rad].
 
     Raises:
         InvalidInput: Neither a known name nor two finite angles.

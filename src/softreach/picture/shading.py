@@ -9,7 +9,7 @@ from softreach.picture.projection import View, project
 from softreach.picture.zbuffer import ZBuffer
 from softreach.support.arrays import Array, Index
 
-_LAMP = np.array([-0.45, 0.60, 0.66])  # over the left shoulder: right, up, toward the eye
+_LAMP = np.array([-0.45, 0.60, 0.66])  # over the left shoulder: right, up, toward the camera
 _AMBIENT, _DIFFUSE, _GLOSS = 0.40, 0.62, 0.08
 _SHARE = 0.55  # of what is inside, in the color of a pixel
 
@@ -29,7 +29,7 @@ def draw_mesh(
         vertices: In the units of the buffer, shape (v, 3).
         faces: Shape (f, 3).
         color: RGB from 0 to 1.
-        view: The direction of the eye.
+        view: The direction of the camera.
         fade: How far the lit colors go toward white.
     """
     points, faces = project(vertices, view), np.asarray(faces)
@@ -42,7 +42,7 @@ def shade(normals: Array, color: ArrayLike) -> Array:
     """RGB from 0 to 255 of surface elements, lit alike from both sides, shape (n, 3).
 
     Args:
-        normals: Unit normals: right, up, toward the eye; shape (n, 3).
+        normals: Unit normals: right, up, toward the camera; shape (n, 3).
         color: RGB from 0 to 1.
     """
     facing = np.where(normals[:, 2:] < 0, -normals, normals)
@@ -84,7 +84,7 @@ def faces_to_eye(vertices: ArrayLike, faces: ArrayLike, view: View) -> Index:
     Args:
         vertices: Shape (v, 3).
         faces: Turning outwards, shape (f, 3).
-        view: The direction of the eye.
+        view: The direction of the camera.
     """
     points, faces = project(vertices, view)[:, :2], np.asarray(faces)
     a, b, c = (points[faces[:, k]] for k in range(3))

@@ -54,7 +54,7 @@ class Extent(NamedTuple):
 
 
 class ZBuffer:
-    """An image under construction: (right, up, toward the eye) coordinates in, RGBA out.
+    """An image under construction: (right, up, toward the camera) coordinates in, RGBA out.
 
     Args:
         extent: What the image covers, in the units of the coordinates.
@@ -84,13 +84,13 @@ class ZBuffer:
         *,
         view: View | None = None,
     ) -> None:
-        """Draw discs that face the eye; points that are not finite or outside are left out.
+        """Draw discs that face the camera; points that are not finite or outside are left out.
 
         Args:
             points: Shape (n, 3).
             colors: RGB from 0 to 255, shape (n, 3) or (3,).
             size: Diameter in pixels of the image.
-            view: The direction of the eye, for points in space; None for points that are already
+            view: The direction of the camera, for points in space; None for points that are already
                 seen from it.
         """
         points = np.asarray(points, float)

@@ -36,15 +36,15 @@ def draw_box(ax: Axes, box: Array, view: View, unit: LengthUnit) -> None:
     Args:
         ax: Axes with an orthographic image of the inside; their own frame is hidden.
         box: Lower and upper corner, shape (2, 3).
-        view: The direction of the eye.
+        view: The direction of the camera.
         unit: What coordinates are counted in.
     """
     from matplotlib.collections import LineCollection
 
     edges = [_outer_edge(box, view, axis) for axis in range(3)]
     ticks = _ticks(box, [project(edge, view)[:, :2] for edge in edges])
-    eye = view_axes(view)[2]
-    far = np.where(eye > 0, box[0], box[1])
+    camera = view_axes(view)[2]
+    far = np.where(camera > 0, box[0], box[1])
     lines = [project(line, view)[:, :2] for line in _wall_lines(box, ticks, far)]
     walls = LineCollection(lines, colors="0.85", linewidths=0.5, zorder=1, clip_on=False)
     ax.add_collection(walls)
@@ -201,7 +201,7 @@ def _outward(ends: Array, center: Array) -> Array:
     along = ends[1] - ends[0]
     normal = np.array([-along[1], along[0]])
     size = np.linalg.norm(normal)
-    if size == 0:  # the edge points at the eye
+    if size == 0:  # the edge points at the camera
         return np.array([0.0, -1.0])
     return normal / size * np.sign((ends.mean(axis=0) - center) @ normal or 1.0)
 

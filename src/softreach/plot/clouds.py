@@ -62,8 +62,8 @@ def plot_cloud(
         cloud: tip(sample, axis) [m], with the attribute `length` [m] if known, and
             activation(sample, bundle), each in its unit.
         ax: Axes to draw in; None for a new figure.
-        view: "front", "side", "top", "oblique", "back", "left", or azimuth and elevation of the eye
-            [rad].
+        view: "front", "side", "top", "oblique", "back", "left", or azimuth and elevation of the
+            camera [rad].
         color: "rgb", the name or index of a bundle, or an array; see `color_samples`.
         size: Diameter of a point [pixels at 250 per inch]; None chooses by their number.
         key: Whether to explain the colors.

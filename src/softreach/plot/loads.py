@@ -34,7 +34,7 @@ _PALE = 0.7  # how far the colors of other stable arms go toward white
 _FOLLOWED, _STABLE, _UNSTABLE = "0.05", "#1f4e9e", "0.55"
 _BASE = 1.7  # radius of the disk that the arm stands on, in R2(0)
 _ARROW = 26  # length of the arrow of gravity [points]
-_ALONG_SIGHT = 0.1  # part of a direction in the paper, below which an arrow says nothing
+_SHORTEST_ARROW = 0.1  # part of a direction in the paper, below which an arrow says nothing
 _LEAST_WIDTH, _ENTRY = 2.6, 0.18  # of figures, and the height of an entry of the legend [inch]
 _ABOVE = 4  # the order of lines over images
 _LARGEST = 0.2  # L, the longest half axis if the force is not given
@@ -236,7 +236,7 @@ def _gravity_arrow(panel: Panel, equilibria: AllEquilibria) -> None:
         return
     tables = equilibria.solver.tables
     right, up, _ = view_axes(panel.view) @ tables.axes[0]
-    if np.hypot(right, up) < _ALONG_SIGHT:
+    if np.hypot(right, up) < _SHORTEST_ARROW:
         return
     mirror = -1 if is_mirrored(panel.view) else 1
     panel.ax.annotate(

@@ -170,11 +170,11 @@ class RegularWindows:
         center = np.rint(0.5 * n * (low + high)).astype(np.int64)
         reach = np.maximum(n * high - center, center - n * low).max(axis=1)
         size = np.searchsorted(self._sizes, reach - 1e-9)
-        held = size < len(self._sizes)
+        fits = size < len(self._sizes)
         vertex = (center[:, 0] * (n + 1) + center[:, 1]) * (n + 1) + center[:, 2]
         regular = np.zeros(len(low), bool)
-        regular[held] = self._are_regular(size[held], vertex[held])
-        return regular, held & ~regular & (size == 0)
+        regular[fits] = self._are_regular(size[fits], vertex[fits])
+        return regular, fits & ~regular & (size == 0)
 
     def _are_regular(self, size: Index, vertex: Index) -> Mask:
         queries = np.zeros(self._known.shape, bool)

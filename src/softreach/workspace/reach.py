@@ -139,7 +139,7 @@ def rasterized_set(
     stretches = grid_stretches(rod, tips, cells, left_out)
     grid = _Grid(tips, stretches, left_out)
     fine, coarse = grid.image(lattice, progress), grid.every_second().image(lattice)
-    measures = None if left_out.any() else _whole(rod, fine, coarse)
+    measures = None if left_out.any() else _entire(rod, fine, coarse)
     volume, convex, overlaps = measures or _in_part(rod, grid, fine, coarse)
     return ReachableSolid(
         tip_map=rod,
@@ -314,7 +314,7 @@ _Measures = tuple[measure.Estimate, measure.Estimate, _Overlaps]
 """Volume, volume of the convex hull, overlaps."""
 
 
-def _whole(rod: TipMap, fine: Image, coarse: Image) -> _Measures | None:
+def _entire(rod: TipMap, fine: Image, coarse: Image) -> _Measures | None:
     """Measures of the image of all of the box; None if not all of it is stable after all."""
     volume = measure.solid_volume(rod, fine, coarse)
     if np.isnan(volume.value):

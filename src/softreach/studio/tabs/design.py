@@ -74,7 +74,7 @@ class DesignPanel:
         self._session.update(lambda s: s.replace(reference=None, side_by_side=False))
 
     def _step(self, back: bool) -> None:
-        """Move the eye so that two clouds side by side fit; or to where it was."""
+        """Move the camera so that two clouds side by side fit; or to where it was."""
         session = self._session
         if session.reach is not None:
             shift = beside(session.reach)
