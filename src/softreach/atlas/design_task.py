@@ -47,8 +47,8 @@ class Intermediates(Mapping[Need, Any]):
         self, arm: Manipulator, cube: Array, command: Command, metrics: Sequence[Metric]
     ) -> None:
         self.arm, self.cube, self.command = arm, cube, command
-        self.wanted = frozenset(need for metric in metrics for need in metric.needs)
-        self._found: dict[Need, Any] = {}
+        self.needs = frozenset(need for metric in metrics for need in metric.needs)
+        self._cache: dict[Need, Any] = {}
 
     @cached_property
     def rod(self) -> TipMap:
@@ -70,9 +70,9 @@ class Intermediates(Mapping[Need, Any]):
         return self.rod.tips_and_status(activations_of(self.rod, self.cube))
 
     def __getitem__(self, need: Need) -> Any:
-        if need not in self._found:
-            self._found[need] = _COMPUTE[need](self)
-        return self._found[need]
+        if need not in self._cache:
+            self._cache[need] = _COMPUTE[need](self)
+        return self._cache[need]
 
     def __iter__(self) -> Iterator[Need]:
         return iter(_COMPUTE)
@@ -83,7 +83,7 @@ class Intermediates(Mapping[Need, Any]):
     def forget(self, *needs: Need) -> None:
         """Free the memory of results that are no longer needed."""
         for need in needs:
-            self._found.pop(need, None)
+            self._cache.pop(need, None)
 
 
 def activations_of(rod: TipMap, cube: Array) -> Array:
@@ -169,7 +169,7 @@ def _alpha_complex(of: Intermediates) -> AlphaComplex:
 
 def _convex_volume(of: Intermediates) -> float:
     """From the triangulation, if one is needed anyway."""
-    if Need.ALPHA_COMPLEX in of.wanted:
+    if Need.ALPHA_COMPLEX in of.needs:
         return float(of[Need.ALPHA_COMPLEX].volumes.sum())
     return convex_hull(of[Need.TIPS]).volume
 

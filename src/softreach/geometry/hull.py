@@ -52,7 +52,7 @@ class Hull:
 
     @property
     def bias(self) -> float | None:
-        """By how much the volume is estimated to be off [m³], below zero if it is too small."""
+        """Estimated error of the volume [m³], below zero if it is too small."""
         return None if self.volume_corrected is None else self.volume - self.volume_corrected
 
     def _repr_html_(self) -> str:

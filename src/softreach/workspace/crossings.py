@@ -28,7 +28,7 @@ class Edges(NamedTuple):
     axis: Index
     """Along which axis the other lies, shape (n,)."""
     sense: Index
-    """On which side, 1 or -1, shape (n,)."""
+    """Side, 1 or -1, shape (n,)."""
 
 
 def boundary_edges(reached: Mask) -> Edges:

@@ -69,7 +69,7 @@ class ReachableSolid(ReachableSet):
     """Volume of the places reached with both orientations of the map [m³]; they lie behind a fold.
     NaN for more than three free bundles."""
     fold_volume_error: float
-    """By how much `fold_volume` changed from half as fine a grid [m³]."""
+    """Change of `fold_volume` from half as fine a grid [m³]."""
     route: Route
     """Source of the volume. "flux": the map is found to be one to one, and the volume is what
     flows through the images of the six faces of the activation box. "raster": the image folds or

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 ASIDE = 0.3
-"""From where on a place lies far from the plane of symmetry [L]."""
+"""Distance at which a place begins to lie far from the plane of symmetry [L]."""
 
 _ACCURACY = 2e-2  # finer is not needed for what is shown
 _STORE = "atlas.zarr"

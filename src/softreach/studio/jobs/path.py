@@ -61,7 +61,7 @@ class PlayPath(AskedJob):
     """Moves the arm along the path."""
 
     def do(self, check: StaleCheck) -> None:
-        """From where the arm is, or from the first point, to the last that is followed."""
+        """Move from where the arm is, or from the first point, to the last that is followed."""
         track, path = self.session.figures.track, self.session.state.path
         if track is None or path is None:
             return
