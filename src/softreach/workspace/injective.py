@@ -157,7 +157,7 @@ class RegularWindows:
         return not self._are_regular(np.zeros(len(worst), np.int64), worst).all()
 
     def hold(self, low: Array, high: Array) -> tuple[Mask, Mask]:
-        """Masks of the boxes that such windows hold, and of those whose smallest window is none.
+        """Masks of the boxes that such windows hold, and of those whose smallest is irregular.
 
         Args:
             low: Lowest corners of the boxes in the unit cube, shape (n, 3).
