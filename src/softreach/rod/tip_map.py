@@ -33,7 +33,7 @@ MOST_TURN_OF_STEP = 2.0
 
 
 class TipStatus(IntEnum):
-    """Status of a tip: a stable equilibrium, an unstable one, or none."""
+    """Status of a tip: a stable equilibrium, an unstable one, none, or unknown."""
 
     STABLE = 0
     """A stable equilibrium."""
@@ -42,6 +42,14 @@ class TipStatus(IntEnum):
     NO_EQUILIBRIUM = 2
     """The branch that starts at the unloaded arm ends before, or there is no such arm; the tip is
     NaN."""
+    UNDECIDED = 3
+    """The branch was not followed to its end: nobody knows whether it has an equilibrium; the tip
+    is NaN."""
+
+
+def has_tip(status: Status) -> NDArray[np.bool_]:
+    """Whether each `TipStatus` is that of an equilibrium, stable or not."""
+    return status <= TipStatus.UNSTABLE
 
 
 class TipMap(ABC):

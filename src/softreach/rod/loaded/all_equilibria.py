@@ -33,7 +33,7 @@ from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import LoadTables
 from softreach.rod.rods import tip_map
-from softreach.rod.tip_map import TipMap, TipStatus
+from softreach.rod.tip_map import TipMap, TipStatus, has_tip
 from softreach.rod.view import View
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput, warn
@@ -189,7 +189,7 @@ def equilibria(
     _check_loads(rod.tables)
     solver = _resolving(Solver(rod.tables, FreeRod(rod.arm, rod.tol).steps, rod.tol), gamma)
     branch = solver.find(gamma)
-    known = branch.frame[branch.status != TipStatus.NO_EQUILIBRIUM]
+    known = branch.frame[has_tip(branch.status)]
     solver, found = _accurate(solver, gamma, _search(solver, gamma, known))
     return _judged(rod, solver, gamma, found, known)
 

@@ -36,6 +36,7 @@ from softreach.rod.tip_map import (
     Strains,
     TipStatus,
     drop,
+    has_tip,
     loads_too_heavy,
     no_equilibrium_message,
     position_slopes,
@@ -190,7 +191,8 @@ class LoadedRod(ArmRod):
         gamma, lost = self.with_arms(gamma)
         shapes = self._shape_solver.shapes(gamma, z, status=status)
         if status is not None:
-            status[np.isnan(shapes.frames.position[:, 0, 0])] = TipStatus.NO_EQUILIBRIUM
+            gone = np.isnan(shapes.frames.position[:, 0, 0])
+            status[gone & has_tip(status)] = TipStatus.UNDECIDED
         drop(lost, status, *shapes.frames, shapes.moment, shapes.force)
         return shapes
 

@@ -31,7 +31,7 @@ from softreach.rod.loaded.shooting import (
     with_across,
 )
 from softreach.rod.loaded.tables import LoadTables, OneDirection, StepTables
-from softreach.rod.tip_map import TipStatus
+from softreach.rod.tip_map import TipStatus, has_tip
 from softreach.support import parallel
 
 Array = NDArray[np.float64]
@@ -41,7 +41,7 @@ _CAREFUL_STEP = 1e-3  # the same of a continuation, on fine steps
 _NEAR_STEP = 1e-7  # Newton step that may be taken linearly
 _DOUBTFUL = 0.02  # margin below which the tangents of coarse steps decide nothing
 _OF_TOL = 1e-2  # what the search may use up of the tolerance
-_FOUND = 1.0
+_FOUND, _ENDED = 1.0, 2.0  # states of searches
 LATER_RUNGS = {Rung.CONTINUATION: CONTINUATION, Rung.PATIENT: PATIENT}
 """Searches of what the first rung leaves in doubt, in this order."""
 _TRACED = 1 << 20  # numbers kept of the sections of all arms in one task, 8 MB
@@ -120,7 +120,7 @@ class Solver:
 
     def doubtful(self, found: Equilibria, rung: Rung) -> NDArray[np.intp]:
         """Rows that a later rung is to search again."""
-        lost = found.status == TipStatus.NO_EQUILIBRIUM
+        lost = ~has_tip(found.status)
         least = 0.0 if rung == Rung.PATIENT else _DOUBTFUL
         return np.flatnonzero(lost | (found.margin < least))
 
@@ -181,7 +181,8 @@ class Solver:
         stable = np.where(margin > 0, TipStatus.STABLE, TipStatus.UNSTABLE)
         found.tips[rows] = np.where(good[:, None], tips, np.nan)
         found.frame[rows], found.margin[rows] = frame, margin
-        found.status[rows] = np.where(good, stable, TipStatus.NO_EQUILIBRIUM)
+        none = np.where(state == _ENDED, TipStatus.NO_EQUILIBRIUM, TipStatus.UNDECIDED)
+        found.status[rows] = np.where(good, stable, none)
         found.rung[rows] = np.where(good, rung, Rung.NONE)
 
     def _shoot(self, gamma: Array, search: Search, guesses: Array | None) -> Shots:
@@ -235,7 +236,7 @@ class Solver:
         """The last walk again, from known equilibria, with whatever more is asked for."""
         frames = with_across(known.frame) if self.tables.one_direction else known.frame
         walked = self._walk(gamma, frames, table, NEAR, **asked)
-        lost = (known.status == TipStatus.NO_EQUILIBRIUM) | (walked.shots.state != _FOUND)
+        lost = ~has_tip(known.status) | (walked.shots.state != _FOUND)
         for values in (walked.shots.tips, walked.slopes, walked.compliance):
             if len(values):
                 values[lost] = np.nan
@@ -256,9 +257,10 @@ class Solver:
         )
         tips, twists = walked.shots.tips.copy(), walked.slopes
         lost = np.isnan(tips[:, 0])
-        status = np.where(lost, TipStatus.NO_EQUILIBRIUM, known.status).astype(np.int8)
+        # An equilibrium that was found and not found again is in doubt, not gone.
+        status = np.where(lost & has_tip(known.status), TipStatus.UNDECIDED, known.status)
         d3 = self._tip_directions(tips, walked.trace, fine) if directions else np.empty((0, 3))
-        return Response(tips, twists, walked.compliance, d3, status)
+        return Response(tips, twists, walked.compliance, d3, status.astype(np.int8))
 
     def _tip_directions(self, tips: Array, trace: Array, table: StepTables) -> Array:
         """d3 of tips whose sections were kept, (n, 3)."""
