@@ -41,22 +41,24 @@ TURNS = 6 * LANES  # Newton steps at this load
 DONE = 7 * LANES  # 0 at work, 1 found, 2 the branch has ended, 3 given up
 MARGIN = 8 * LANES  # smallest sign of no conjugate point so far
 HALVED = 9 * LANES  # whether the increment was halved since the last equilibrium
-DETERMINANT = 10 * LANES  # of the tangents at the base: on trial, held and past
-HELD_DETERMINANT = 11 * LANES
-PAST_DETERMINANT = 12 * LANES
-STEP = 13 * LANES  # of the unknown
-TRIAL = 16 * LANES  # what the tip sees: one direction, or two
-HELD = 22 * LANES
-PAST = 28 * LANES
-OLD = 34 * LANES
-INVERSE = 40 * LANES  # change at the tip per change at the base, 3 x 3
-BEFORE = 49 * LANES  # what was missing at the walk before
-HEAD = 52 * LANES
+TRIED = 10 * LANES  # turn of the tip that was too much, at twice the increment
+DETERMINANT = 11 * LANES  # of the tangents at the base: on trial, held and past
+HELD_DETERMINANT = 12 * LANES
+PAST_DETERMINANT = 13 * LANES
+STEP = 14 * LANES  # of the unknown
+TRIAL = 17 * LANES  # what the tip sees: one direction, or two
+HELD = 23 * LANES
+PAST = 29 * LANES
+OLD = 35 * LANES
+INVERSE = 41 * LANES  # change at the tip per change at the base, 3 x 3
+BEFORE = 50 * LANES  # what was missing at the walk before
+HEAD = 53 * LANES
 
 FOUND, FOLD, UNSURE = 1, 2, 3
 _CONTRACTION = 0.6
 _MOST_TURNS = 8
 _SMALLEST_INCREMENT = 2.0**-20
+_NEAR_FOLD = 2.0**-12  # the longest last increment by which a fold is told
 _COARSE_INCREMENT = 1 / 64  # below it Newton steps must end as much smaller
 _FASTER, _CALM = 3.0, 1.0  # growth of the tip's turn per load in a step, and how much is none [rad]
 _AS_FAST, _AS_CALM = 1.5, 0.5  # the same where an increment cannot be halved any more
@@ -147,7 +149,7 @@ def _whereabouts(w, i):
         if share < 2.0 * _SMALLEST_INCREMENT:
             faster, calm = _AS_FAST, _AS_CALM
         rate = _apart(w, HELD, PAST, i) / (held - past)
-        if _apart(w, TRIAL, HELD, i) > (faster * rate + calm) * share:
+        if _is_too_far(w, i, (faster * rate + calm) * share):
             return _AWAY
         expected += (before - w[PAST_DETERMINANT + i]) * share / (held - past)
     half = 0.5 * before
@@ -155,6 +157,19 @@ def _whereabouts(w, i):
     if now * before <= 0.0 or (falling and abs(now - expected) > abs(half)):
         return _CROSSED
     return _ON_BRANCH
+
+
+@inline
+def _is_too_far(w, i, allowed):
+    """Whether the tip turned by more than allowed, and not by half as much for half the load.
+
+    So it does where a branch turns ever faster; the way to another branch stays as long as it is.
+    """
+    turn, tried = _apart(w, TRIAL, HELD, i), w[TRIED + i]
+    if turn <= allowed or 0.4 * tried <= turn <= 0.6 * tried:
+        return False
+    w[TRIED + i] = turn
+    return True
 
 
 def _predict_with(extrapolate):
@@ -198,7 +213,7 @@ def _is_fold(w, i):
     """
     held, past = w[HELD_LOAD + i], w[PAST_LOAD + i]
     square, before = w[HELD_DETERMINANT + i] ** 2, w[PAST_DETERMINANT + i] ** 2
-    if held == past or square >= before:
+    if held == past or square >= before or held - past > _NEAR_FOLD:
         return False
     ahead = (held - past) * square / (before - square)
     return ahead <= 4.0 * _SMALLEST_INCREMENT + 0.25 * (held - past)
@@ -219,6 +234,7 @@ def _go_on_with(predict):
         if w[TURNS + i] <= 2.0 and w[HALVED + i] == 0.0:
             w[INCREMENT + i] *= 2.0
         w[HALVED + i] = 0.0
+        w[TRIED + i] = 0.0
         predict(w, i, widest)
 
     return go_on
@@ -238,6 +254,7 @@ def start(w, increment, widest):
         w[PAST_DETERMINANT + i] = 1.0
         w[INCREMENT + i] = increment
         w[HALVED + i] = 0.0
+        w[TRIED + i] = 0.0
         w[LOAD + i] = min(1.0, increment)
         w[LEFT + i] = widest
         w[TURNS + i] = 0.0
