@@ -29,7 +29,7 @@ class Rest:
     sag_over_length: float
     """The same over the length of the arm [-]."""
     status: TipStatus
-    """Whether the equilibrium is stable."""
+    """Whether the equilibrium is stable, and whether one was found."""
 
 
 def rest(arm: Manipulator, *, tol: float = 1e-6) -> Rest:

@@ -74,7 +74,7 @@ def cloud_dataset(
     return cloud
 
 
-_STATUS = "0=stable 1=unstable 2=no_equilibrium"
+_STATUS = "0=stable 1=unstable 2=no_equilibrium 3=undecided"
 
 
 def with_status(cloud: xr.Dataset, status: NDArray[np.int8]) -> xr.Dataset:
@@ -212,7 +212,7 @@ def _disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[InvalidInput
     if not isinstance(length, int | float) or not math.isclose(length, arm.length):
         allowed = f"{arm.length} m, as its design says"
         yield InvalidInput("cloud.tip.attrs['length']", repr(length), allowed)
-    if "status" in cloud.coords and not np.isin(cloud["status"].values, (0, 1, 2)).all():
+    if "status" in cloud.coords and not np.isin(cloud["status"].values, (0, 1, 2, 3)).all():
         yield InvalidInput("cloud.status", "another number", f"one of {_STATUS}")
 
 

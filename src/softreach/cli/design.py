@@ -202,6 +202,7 @@ _STABILITY = {
     "STABLE": "stable",
     "UNSTABLE": "not stable",
     "NO_EQUILIBRIUM": "no equilibrium follows from the unloaded arm",
+    "UNDECIDED": "undecided: the search for an equilibrium gave up",
 }
 
 

@@ -40,7 +40,7 @@ LEFT = 5 * LANES  # size of the last step, or of what is missing still
 TURNS = 6 * LANES  # Newton steps at this load
 DONE = 7 * LANES  # 0 at work, 1 found, 2 the branch has ended, 3 given up
 MARGIN = 8 * LANES  # smallest sign of no conjugate point so far
-HALVED = 9 * LANES  # whether the increment was halved since the last equilibrium
+HALVED = 9 * LANES  # whether it was halved since the last equilibrium, and at last enlarged (2)
 TRIED = 10 * LANES  # turn of the tip that was too much, at twice the increment
 DETERMINANT = 11 * LANES  # of the tangents at the base: on trial, held and past
 HELD_DETERMINANT = 12 * LANES
@@ -58,6 +58,9 @@ FOUND, FOLD, UNSURE = 1, 2, 3
 _CONTRACTION = 0.6
 _MOST_TURNS = 8
 _SMALLEST_INCREMENT = 2.0**-20
+_SMALL = 4.0  # up to so many of these it cannot be halved any more
+_LEAPT = 2.0
+_DIVERGING = 1.1  # growth of the tip's turn per load, from step to step, before a fold
 _NEAR_FOLD = 2.0**-12  # the longest last increment by which a fold is told
 _COARSE_INCREMENT = 1 / 64  # below it Newton steps must end as much smaller
 _FASTER, _CALM = 3.0, 1.0  # growth of the tip's turn per load in a step, and how much is none [rad]
@@ -110,7 +113,7 @@ def _advance_with(newton, move, go_back, go_on):
                 w[LEFT + i] = _CONTRACTION * size
                 w[TURNS + i] += 1.0
             return
-        where, least = _whereabouts(w, i), share < 2.0 * _SMALLEST_INCREMENT
+        where, least = _whereabouts(w, i), share < _SMALL * _SMALLEST_INCREMENT
         if where == _AWAY or (where == _CROSSED and not least):
             go_back(w, i, widest)
         elif w[LOAD + i] >= 1.0:
@@ -146,7 +149,7 @@ def _whereabouts(w, i):
     expected = before
     if held > past:
         faster, calm = _FASTER, _CALM
-        if share < 2.0 * _SMALLEST_INCREMENT:
+        if share < _SMALL * _SMALLEST_INCREMENT:
             faster, calm = _AS_FAST, _AS_CALM
         rate = _apart(w, HELD, PAST, i) / (held - past)
         if _is_too_far(w, i, (faster * rate + calm) * share):
@@ -195,12 +198,16 @@ def _predict_with(extrapolate):
 def _go_back_with(predict):
     @inline
     def go_back(w, i, widest):
+        if w[HALVED + i] == _LEAPT:
+            w[DONE + i] = FOLD if _is_fold(w, i) else UNSURE
+            return
         w[INCREMENT + i] = 0.5 * (w[LOAD + i] - w[HELD_LOAD + i])
         w[HALVED + i] = 1.0
         if w[INCREMENT + i] < _SMALLEST_INCREMENT:
-            w[DONE + i] = FOLD if _is_fold(w, i) else UNSURE
-        else:
-            predict(w, i, widest)
+            # Where D is singular no step is found, but one over that place is.
+            w[INCREMENT + i] = 3.3 * _SMALLEST_INCREMENT
+            w[HALVED + i] = _LEAPT
+        predict(w, i, widest)
 
     return go_back
 
@@ -209,11 +216,15 @@ def _go_back_with(predict):
 def _is_fold(w, i):
     """Whether det D goes to zero as at a fold, like the root of the load that is left to it.
 
-    Its square is then linear in the load, and its zero no farther than what could not be done.
+    Its square is then linear in the load, its zero no farther than what could not be done, and the
+    tip turns ever faster. Where branches cross, it does not.
     """
-    held, past = w[HELD_LOAD + i], w[PAST_LOAD + i]
+    held, past, old = w[HELD_LOAD + i], w[PAST_LOAD + i], w[OLD_LOAD + i]
     square, before = w[HELD_DETERMINANT + i] ** 2, w[PAST_DETERMINANT + i] ** 2
-    if held == past or square >= before or held - past > _NEAR_FOLD:
+    if past == old or square >= before or held - past > _NEAR_FOLD:
+        return False
+    rate, slower = _apart(w, HELD, PAST, i) / (held - past), _apart(w, PAST, OLD, i) / (past - old)
+    if rate < _DIVERGING * slower:
         return False
     ahead = (held - past) * square / (before - square)
     return ahead <= 4.0 * _SMALLEST_INCREMENT + 0.25 * (held - past)

@@ -7,7 +7,7 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.rod.tip_map import TipStatus
+from softreach.rod.tip_map import TipStatus, has_tip
 from softreach.studio.jobs.plots import plots_from
 from softreach.studio.multiplicity import count_activations, uncounted
 from softreach.studio.reach import Reach, shown_rows, stages
@@ -193,9 +193,9 @@ class DrawArm(Job):
         if session.tip is not None:
             session.trail = [*session.trail[-_LONGEST_TRAIL:], session.tip]
         if rod.supports_unstable:
-            lost = session.tip is None
-            status = TipStatus.NO_EQUILIBRIUM if lost else rod.status([state.activation])[0]
-            session.posture = TipStatus(status)
+            status = TipStatus(rod.status([state.activation])[0])
+            lost = session.tip is None and has_tip(status)  # its shape was not found again
+            session.posture = TipStatus.UNDECIDED if lost else status
 
     def _draw_trail(self) -> None:
         session, state = self.session, self.session.state
