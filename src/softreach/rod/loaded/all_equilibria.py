@@ -141,6 +141,7 @@ class AllEquilibria:
 
 _SEARCHES = ((4, 1.0), (5, 3.0), (6, 10.0))
 """Levels of the first mesh, and caution: the later ones where the degree is not 1."""
+_MOST_WALKED = 20_000_000  # steps of one search, which take about a second
 _MOST_STEPS = 512
 _ROUGHLY = 0.01  # [rad]
 _SYMMETRIC = 1e-6  # [rad], of the directions that the base would have to see
@@ -254,19 +255,23 @@ def _search(solver: Solver, gamma: Array, known: Array) -> _Found:
         directions = np.concatenate([axis[None], rings.points])
         is_ring = np.arange(len(directions)) > 0
         return _Found(directions, np.append(1, rings.signs), is_ring, rings.complete)
-    return _isolated(image, axis, known)
+    return _isolated(image, axis, known, _MOST_WALKED // solver.steps)
 
 
 def _isolated(
-    image: Map, axis: Array, known: Array, searches: Sequence[tuple[int, float]] = _SEARCHES
+    image: Map,
+    axis: Array,
+    known: Array,
+    most: int,
+    searches: Sequence[tuple[int, float]] = _SEARCHES,
 ) -> _Found:
     """Those of an arm that is not axisymmetric, searched more finely if the degree is not 1."""
     (levels, caution), *finer = searches
-    roots, cut = sphere_roots(image, axis, levels=levels, caution=caution, starts=known)
+    roots, cut = sphere_roots(image, axis, levels=levels, caution=caution, starts=known, most=most)
     complete = cut and int(np.sign(roots.determinants).sum()) == 1
     if complete or not finer:
         return _of_roots(roots, complete=complete)
-    return _isolated(image, axis, known, finer)
+    return _isolated(image, axis, known, most, finer)
 
 
 def _of_roots(roots: Roots, *, complete: bool) -> _Found:
