@@ -114,7 +114,7 @@ class _Walk:
         return seen[:, 0], slopes, np.array([first, second])
 
     def corrected(self, g, share, ahead, stride):
-        """The point of the branch in the plane across it, a stride ahead; None if it is not near."""
+        """The point in the plane across the branch, a stride ahead; None if it is not near."""
         at, load = g + stride * ahead[:3], share + stride * ahead[3]
         at /= np.linalg.norm(at)
         begin, before = at, load

@@ -72,7 +72,7 @@ def cloud(
 
 
 def _status_rows(cloud: xr.Dataset) -> Rows:
-    """Numbers of samples of a loaded arm that are stable, unstable, without equilibrium, and undecided."""
+    """Numbers of samples of a loaded arm with each status."""
     if "status" not in cloud:
         return {}
     from softreach.rod.tip_map import TipStatus
