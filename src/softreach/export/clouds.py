@@ -119,8 +119,8 @@ def export_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: boo
     Tables have the columns x, y, z [m] and one activation per bundle, such as ``gamma_left``;
     NPZ and MAT hold the arrays tip, activation and bundle. Clouds of arms under loads have the
     column or array status too: 0 stable, 1 unstable; 2 no equilibrium and 3 undecided, whose tips
-    are NaN. Design, seed, tolerance, version and units go along, except in CSV, VTU and VTK, which have no place for
-    them. PLY carries the picture's colors too.
+    are NaN. Design, seed, tolerance, version and units go along, except in CSV, VTU and VTK, which
+    have no place for them. PLY carries the picture's colors too.
 
     Args:
         cloud: tip(sample, axis) [m] and activation(sample, bundle), each in its unit.

@@ -7,7 +7,7 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from softreach.rod.tip_map import TipStatus, has_tip
+from softreach.rod.tip_map import TipStatus
 from softreach.studio.jobs.plots import plots_from
 from softreach.studio.multiplicity import count_activations, uncounted
 from softreach.studio.reach import Reach, shown_rows, stages
@@ -194,7 +194,9 @@ class DrawArm(Job):
             session.trail = [*session.trail[-_LONGEST_TRAIL:], session.tip]
         if rod.supports_unstable:
             status = TipStatus(rod.status([state.activation])[0])
-            lost = session.tip is None and has_tip(status)  # its shape was not found again
+            lost = (
+                session.tip is None and status <= TipStatus.UNSTABLE
+            )  # its shape was not found again
             session.posture = TipStatus.UNDECIDED if lost else status
 
     def _draw_trail(self) -> None:
