@@ -1,6 +1,7 @@
 """From a design to the two tables that everything downstream sees: ζ = 1 + z·γ and u = Uγ.
 
-The map is linear in the activations, theory (7). All physics lives in this room: a new actuator,
+The map is linear in the activations, theory (7). Curvature u is per length of η = 1 + Σ zγ over
+fibers and muscles alone: these change the length of matter at rest, which forces leave as it is. All physics lives in this room: a new actuator,
 profile or material changes these tables, and nothing that reads them.
 """
 
@@ -44,7 +45,10 @@ class Tables:
     extension: Array
     """z = dζ/dγ [-], shape (station, bundle)."""
     curvature: Array
-    """U = du/dγ [1/m], per activated arclength, in the directors, shape (station, 3, bundle)."""
+    """U = du/dγ [1/m], per length of η, in the directors, shape (station, 3, bundle)."""
+    growth: Array
+    """dη/dγ [-]: z of bundles that change the length of matter at rest, 0 of those that are forces;
+    shape (station, bundle). Of fibers and muscles alone it is `extension` itself."""
 
 
 def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
@@ -59,11 +63,11 @@ def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
     loads += [_resultants(actuator, arm, z) for actuator in arm.actuators]
     stiffness = arm.section.stiffness(arm.profile.radius(z))
     resistance = np.stack([stiffness.bending, stiffness.bending, stiffness.torsion], axis=1)
-    return Tables(
-        z,
-        np.concatenate([load.force for load in loads], axis=1) / stiffness.axial[:, None],
-        np.concatenate([load.moment for load in loads], axis=2) / resistance[..., None],
-    )
+    extension = np.concatenate([load.force for load in loads], axis=1) / stiffness.axial[:, None]
+    curvature = np.concatenate([load.moment for load in loads], axis=2) / resistance[..., None]
+    is_force = [one.is_force for one in arm.actuators for _ in range(one.bundles)]
+    growth = np.where(is_force, 0.0, extension) if any(is_force) else extension
+    return Tables(z, extension, curvature, growth)
 
 
 def _resultants(actuator: Actuator, arm: Manipulator, z: Array) -> Resultants:

@@ -40,6 +40,7 @@ class Chamber(PolarActuator):
     unit: ClassVar[str] = "Pa"
     symbol: ClassVar[str] = "P"
     activation: ClassVar[str] = "pressure"
+    is_force: ClassVar[bool] = True
     default_name: ClassVar[str] = "chamber"
     validity: ClassVar[str] = (
         "Exact for thin-walled channels that do not widen; else calibrate `area_factor`. Curvature "

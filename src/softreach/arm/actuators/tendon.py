@@ -54,6 +54,7 @@ class Tendon(PolarActuator):
     unit: ClassVar[str] = "N"
     symbol: ClassVar[str] = "τ"
     activation: ClassVar[str] = "tension"
+    is_force: ClassVar[bool] = True
     default_name: ClassVar[str] = "tendon"
     validity: ClassVar[str] = (
         "Exact for tendons parallel to the axis; others pull along their direction before "
