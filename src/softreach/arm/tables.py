@@ -1,8 +1,9 @@
 """From a design to the two tables that everything downstream sees: ζ = 1 + z·γ and u = Uγ.
 
 The map is linear in the activations, theory (7). Curvature u is per length of η = 1 + Σ zγ over
-fibers and muscles alone: these change the length of matter at rest, which forces leave as it is. All physics lives in this room: a new actuator,
-profile or material changes these tables, and nothing that reads them.
+fibers and muscles alone: these change the length of matter at rest, which forces leave as it is.
+All physics lives in this room: a new actuator, profile or material changes these tables, and
+nothing that reads them.
 """
 
 from __future__ import annotations
@@ -116,7 +117,9 @@ def check_extension(arm: Manipulator) -> None:
         sizes = f"L = {arm.length:.3g} m, R2(0) = {float(arm.profile.radius(0.0)):.3g} m"
         allowed = f"overflows with {sizes}: give all lengths in m, moduli and pressures in Pa"
         raise InvalidDesign([Fault("design", None, allowed)])
-    smallest, _ = _extension_range(arm, table)
+    smallest, _ = _extension_range(arm, table.extension)
+    if smallest > 0:  # of matter itself, which forces may lengthen again
+        smallest, _ = _extension_range(arm, table.growth)
     if smallest <= 0:
         allowed = f"reaches extension ζ = {smallest:.4g}; must keep ζ > 0: narrow the bounds"
         raise InvalidDesign([Fault("activation_bounds", arm.bounds.tolist(), allowed)])
@@ -135,11 +138,11 @@ def _winding_faults(arm: Manipulator) -> Iterator[Fault]:
 
 def extension_range(arm: Manipulator) -> tuple[float, float]:
     """Smallest and largest ζ anywhere in the activation box and along the arm [-]."""
-    return _extension_range(arm, tables(arm, strain_stations(arm)))
+    return _extension_range(arm, tables(arm, strain_stations(arm)).extension)
 
 
-def _extension_range(arm: Manipulator, table: Tables) -> tuple[float, float]:
-    ends = table.extension[..., None] * arm.bounds
+def _extension_range(arm: Manipulator, extension: Array) -> tuple[float, float]:
+    ends = extension[..., None] * arm.bounds
     return 1.0 + float(ends.min(-1).sum(-1).min()), 1.0 + float(ends.max(-1).sum(-1).max())
 
 

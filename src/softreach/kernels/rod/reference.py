@@ -23,9 +23,7 @@ def hat(omega: Array, v: Array) -> Array:
     return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
-def twists(
-    measure: Array, stretch: Array, growth: Array, curvature: Array, gamma: Array
-) -> Array:
+def twists(measure: Array, stretch: Array, growth: Array, curvature: Array, gamma: Array) -> Array:
     """A = (ηu, ζe3) dZ at every node of every step, shape (step, node, 4, 4).
 
     Args:
@@ -55,9 +53,7 @@ def magnus6(a1: Array, a2: Array, a3: Array) -> Array:
     return b1 + b3 / 12 + bracket(-20 * b1 - b3 + c1, b2 + c2) / 240
 
 
-def frames(
-    measure: Array, stretch: Array, growth: Array, curvature: Array, gamma: Array
-) -> Array:
+def frames(measure: Array, stretch: Array, growth: Array, curvature: Array, gamma: Array) -> Array:
     """Homogeneous frames (d1 d2 d3 r) at the base and after every step, (step + 1, 4, 4)."""
     from scipy.linalg import expm
 
@@ -67,8 +63,6 @@ def frames(
     return np.array(frame)
 
 
-def tip(
-    measure: Array, stretch: Array, growth: Array, curvature: Array, gamma: Array
-) -> Array:
+def tip(measure: Array, stretch: Array, growth: Array, curvature: Array, gamma: Array) -> Array:
     """Tip position r(L) [m], shape (3,)."""
     return frames(measure, stretch, growth, curvature, gamma)[-1, :3, 3]
