@@ -263,6 +263,7 @@ def test_the_walk_is_that_of_the_reference():
         force = float(weight(z) - weight(TRUNK.length)) + 0.3 * 9.81
         return loaded_reference.Section(
             1.0 + float(at.extension[0] @ gamma[0]),
+            1.0 + float(at.growth[0] @ gamma[0]),
             at.curvature[0] @ gamma[0],
             np.array([bending, bending, torsion]),
             axial,
