@@ -63,9 +63,9 @@ def test_a_chamber_pushes_as_the_quadrature_of_its_pressure_says(body, share):
 def test_a_chamber_lengthens_the_arm_and_bends_it_away_to_an_arc(pressure, offset):
     area = math.pi * 0.004**2
     zeta, curvature = 1 + pressure * area / K0, pressure * area * 0.008 / K1
-    angle = zeta * curvature * LENGTH
-    side = (1 - math.cos(angle)) / curvature
-    expected = [-side * math.cos(offset), -side * math.sin(offset), math.sin(angle) / curvature]
+    angle, bent = curvature * LENGTH, zeta / curvature
+    side = bent * (1 - math.cos(angle))
+    expected = [-side * math.cos(offset), -side * math.sin(offset), bent * math.sin(angle)]
     tip = sr.tip_positions(arm(chamber(offset=offset)), [[pressure]], tol=1e-11)[0]
     np.testing.assert_allclose(tip, expected, atol=1e-11)
 
