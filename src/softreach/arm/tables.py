@@ -117,12 +117,13 @@ def check_extension(arm: Manipulator) -> None:
         sizes = f"L = {arm.length:.3g} m, R2(0) = {float(arm.profile.radius(0.0)):.3g} m"
         allowed = f"overflows with {sizes}: give all lengths in m, moduli and pressures in Pa"
         raise InvalidDesign([Fault("design", None, allowed)])
-    smallest, _ = _extension_range(arm, table.extension)
-    if smallest > 0:  # of matter itself, which forces may lengthen again
-        smallest, _ = _extension_range(arm, table.growth)
-    if smallest <= 0:
-        allowed = f"reaches extension ζ = {smallest:.4g}; must keep ζ > 0: narrow the bounds"
-        raise InvalidDesign([Fault("activation_bounds", arm.bounds.tolist(), allowed)])
+    for rates, of in ((table.extension, ""), (table.growth, " of matter itself, without forces")):
+        smallest, _ = _extension_range(arm, rates)
+        if smallest <= 0:
+            allowed = (
+                f"reaches extension ζ = {smallest:.4g}{of}; must keep ζ > 0: narrow the bounds"
+            )
+            raise InvalidDesign([Fault("activation_bounds", arm.bounds.tolist(), allowed)])
 
 
 def _winding_faults(arm: Manipulator) -> Iterator[Fault]:
