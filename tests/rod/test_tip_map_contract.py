@@ -26,6 +26,7 @@ from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.bodies import rubber
+from tests.kinds import fibers_and_a_tendon
 from tests.laws import arms, in_box, integrated_tip
 
 Make = Callable[[Manipulator, float], TipMap]
@@ -46,6 +47,7 @@ DESIGNS = {
     "one bundle": designs.minimal_trunk().replace(actuators=designs.minimal_trunk().actuators[:1]),
     "one held": designs.minimal_trunk().with_bounds(((-1, 0), (-0.5, -0.5), (-1, 0.3))),
     "wide": designs.minimal_trunk(taper=-0.05),
+    "fibers and a tendon": fibers_and_a_tendon(),
 }
 of_designs = pytest.mark.parametrize("arm", DESIGNS.values(), ids=DESIGNS.keys())
 

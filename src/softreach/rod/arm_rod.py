@@ -45,21 +45,23 @@ class ArmRod(TipMap):
         return tables(self.arm, strain_stations(self.arm))
 
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
-        """How far activations (n, bundles) go: the smallest ζ along the arm [-], shape (n,).
+        """How far activations (n, bundles) go: the smallest ζ, or η, along the arm, shape (n,).
 
-        And the largest angle by which a step turns the arm [rad], ζ |u| R2 dS, shape (n,).
+        And the largest angle by which a step turns the arm [rad], η |Uγ| R2 dS, shape (n,).
         """
         table, profile = self._strain_table, self.arm.profile
         step = profile.radius(table.stations) * (profile.slender_length / self.steps)
         least, most = np.empty((2, len(gamma)))
         with np.errstate(all="ignore"):  # what overflows is no arm
             for block in parallel.blocks(len(gamma), 1024):
-                extension = 1.0 + gamma[block] @ table.extension.T
+                extension = growth = 1.0 + gamma[block] @ table.extension.T
+                if table.growth is not table.extension:
+                    growth = 1.0 + gamma[block] @ table.growth.T
                 bend = np.linalg.norm(
                     np.einsum("scb,nb->nsc", table.curvature, gamma[block]), axis=-1
                 )
-                least[block] = extension.min(axis=1)
-                most[block] = (extension * bend * step).max(axis=1)
+                least[block] = np.minimum(extension, growth).min(axis=1)
+                most[block] = (growth * bend * step).max(axis=1)
         return least, most
 
     @abstractmethod

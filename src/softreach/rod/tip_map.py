@@ -128,7 +128,7 @@ class TipMap(ABC):
         """Compute what every sample needs, once for all threads."""
 
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
-        """How far activations (n, bundles) go: the smallest ζ along the arm [-], shape (n,).
+        """How far activations (n, bundles) go: the smallest ζ, or η, along the arm, shape (n,).
 
         And the largest angle by which a step turns the arm [rad], shape (n,).
         """
@@ -306,7 +306,8 @@ class StrainRange(NamedTuple):
     """Ranges of the strains within the activation box, shape (station, 2) each."""
 
     bending: Array
-    """√(u1² + u2²) [1/m], from 0 to an upper bound at most 1e-5 too large."""
+    """√(u1² + u2²) [1/m], from 0 to an upper bound: at most 1e-5 too large for fibers and muscles,
+    with tendons and chambers by as much as their ζ differs."""
     torsion: Array
     """u3 [1/m]."""
     extension: Array
