@@ -22,6 +22,7 @@ from softreach.arm.design_file.keys import (
     own_kinds,
 )
 from softreach.arm.design_file.tables import WRONG, TableReader, is_doubtful, unknown_key
+from softreach.arm.base import Base
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.material import LIBRARY_HINT, Material, material_names, named_material
 from softreach.arm.number import Number
@@ -43,6 +44,7 @@ LAYOUT: Mapping[str, tuple[type, bool]] = {
     "rings": (list, True),
     "actuators": (list, True),
     "loads": (dict, False),
+    "base": (dict, False),
 }
 """Keys at the top of a file, their types, and whether they are required."""
 
@@ -54,6 +56,7 @@ class Parts(NamedTuple):
     section: Section
     actuators: tuple[Actuator, ...]
     loads: Loads | None
+    base: Base
 
 
 def text_of(path: str | PathLike[str]) -> str:
@@ -143,6 +146,8 @@ class _DesignReader(TableReader):
         actuators = [(k, self._actuator(k, raw)) for k, raw in self._tables("actuators")]
         raw = self._table("loads")
         loads = None if raw is None else self.part(Loads, raw, "loads")
+        raw = self._table("base")
+        base = Base() if raw is None else self.part(Base, raw, "base")
         names = [one.get("name") if isinstance(one, dict) else None for one in tables or ()]
         self.faults += name_faults(names, "actuators")
         if profile is None or section is None:
@@ -151,7 +156,7 @@ class _DesignReader(TableReader):
         self._check_fit(profile, section, sound)
         if loads is not None:
             self.faults += self._of_section(loads.section_faults(section, profile.length))
-        return Parts(profile, section, tuple(one for _, one in sound), loads)
+        return Parts(profile, section, tuple(one for _, one in sound), loads, base)
 
     def _check_layout(self) -> None:
         """Top of the file: keys that are unknown or missing, and values of another type."""
