@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ __all__ = [
     "check_stored_cloud",
     "cloud_dataset",
     "configuration_dataset",
+    "frame_of",
     "is_stable",
     "provenance",
     "storable",
@@ -62,12 +63,19 @@ _CONFIGURATION = {
 
 
 def cloud_dataset(
-    arm: Manipulator, activation: Array, tip: Array, *, seed: int, sampler: str, tol: float
+    arm: Manipulator,
+    activation: Array,
+    tip: Array,
+    *,
+    seed: int,
+    sampler: str,
+    tol: float,
+    frame: str = "world",
 ) -> xr.Dataset:
     """A reachability cloud: tips and activations with everything needed to make them again."""
     import xarray as xr
 
-    attrs = {**provenance(arm), "seed": seed, "sampler": sampler, "tol": tol}
+    attrs = {**provenance(arm, frame), "seed": seed, "sampler": sampler, "tol": tol}
     variables = _variables(_CLOUD, arm, {"tip": tip, "activation": activation})
     cloud = xr.Dataset(variables, {"axis": list(AXES), **bundle_coordinates(arm)}, attrs)
     cloud.tip.attrs["length"] = arm.length
@@ -96,11 +104,13 @@ def configuration_dataset(
     z: Array,
     *,
     names: Sequence[str] | None = None,
+    frame: str = "world",
     **arrays: Array,
 ) -> xr.Dataset:
     """Shapes of an arm at stations Z, one for each row of `activation`.
 
-    `names` are those of the bundles with a column there; by default all.
+    `names` are those of the bundles with a column there; by default all. `frame` is that of the
+    arrays.
     """
     import xarray as xr
 
@@ -112,7 +122,7 @@ def configuration_dataset(
         "component": ["u1", "u2", "u3"],
         **bundle_coordinates(arm, names),
     }
-    return xr.Dataset(variables, coordinates, provenance(arm))
+    return xr.Dataset(variables, coordinates, provenance(arm, frame))
 
 
 def a_cloud(name: str, value: object) -> xr.Dataset:
@@ -163,6 +173,7 @@ def check_stored_cloud(cloud: xr.Dataset) -> xr.Dataset:
             raise InvalidInput(f"cloud.attrs['{name}']", repr(value), allowed)
     if not 0 < cloud.attrs["tol"] < np.inf:
         raise InvalidInput("cloud.attrs['tol']", cloud.attrs["tol"], "a finite number > 0")
+    frame_of(cloud)
     arm = Manipulator.from_toml(cloud.attrs["design"], source="the cloud's design")
     for fault in _disagreements(cloud, arm):
         raise fault
@@ -269,9 +280,29 @@ def _variables(
     }
 
 
-def provenance(arm: Manipulator) -> dict[str, object]:
-    """Attributes that say which design and version a dataset was computed from."""
-    return {"design": arm.to_toml(), **versions()}
+def provenance(arm: Manipulator, frame: str = "world") -> dict[str, object]:
+    """Attributes that say which design and version a dataset was computed from, and its frame.
+
+    What is at p in the frame of the base is at `base_position` + `base_rotation` p in the world;
+    the rotation is there row by row.
+    """
+    pose = {
+        "base_position": list(arm.base.position),
+        "base_rotation": arm.base.rotation.ravel().tolist(),
+    }
+    return {"design": arm.to_toml(), **versions(), "frame": frame, **pose}
+
+
+def frame_of(data: xr.Dataset) -> Literal["world", "base"]:
+    """The frame in which a dataset tells places; the world's, of one made before there were two.
+
+    Raises:
+        InvalidInput: There is no such frame.
+    """
+    frame = data.attrs.get("frame", "world")
+    if frame not in ("world", "base"):
+        raise InvalidInput("attrs['frame']", as_given(frame), "world or base")
+    return frame
 
 
 def storable(dataset: xr.Dataset) -> xr.Dataset:

@@ -38,6 +38,8 @@ _ALLOWED = (
     f"must be one of {', '.join(POINTS)}, or a rotation: a 3x3 matrix, a quaternion (w, x, y, z) of "
     "length 1, or a rotation vector (three numbers [rad])"
 )
+_FARTHEST = 1e6
+"""Farthest from the origin [m]: beyond, rounding of places in the world is too coarse."""
 _NEAR = 1e-6
 """How far the numbers of a rotation may be off: what is typed with seven digits."""
 
@@ -71,7 +73,11 @@ class Base(Part):
 
     def _faults(self) -> list[Fault]:
         wrong = _as_rotation(self.points).wrong
-        return super()._faults() + ([Fault("points", self.points, wrong)] if wrong else [])
+        faults = [Fault("points", self.points, wrong)] if wrong else []
+        if (np.abs(as_numbers(self.position)) > _FARTHEST).any():
+            allowed = f"must be within {_FARTHEST:g} m of the origin"
+            faults.append(Fault("position", self.position, allowed))
+        return super()._faults() + faults
 
     @cached_property
     def rotation(self) -> Array:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
+from softreach.rod.tip_map import Frame
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import counted
@@ -90,6 +91,8 @@ class Solutions(Sequence[Solution]):
 
     arm: Manipulator
     """The design."""
+    frame: Frame
+    """The frame in which places are told."""
     bundles: tuple[str, ...]
     """Names of the bundles that were solved for."""
     targets: Array
@@ -243,7 +246,7 @@ class Solutions(Sequence[Solution]):
                 "margin": ("solution", self.margins, {"units": "1"}),
             },
             {"axis": list(AXES), **bundle_coordinates(self.arm, self.bundles)},
-            provenance(self.arm),
+            provenance(self.arm, self.frame),
         )
 
 
