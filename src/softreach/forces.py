@@ -145,9 +145,7 @@ def _rows(best: list[_Best | None]) -> Iterator[tuple[int, _Best]]:
     return ((k, one) for k, one in enumerate(best) if one is not None)
 
 
-def _dataset(
-    rod: TipMap, places: Array, directions: Array, best: list[_Best | None]
-) -> xr.Dataset:
+def _dataset(rod: TipMap, places: Array, directions: Array, best: list[_Best | None]) -> xr.Dataset:
     import xarray as xr
 
     n, bundles = len(places), rod.box.bundles

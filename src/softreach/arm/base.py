@@ -15,7 +15,7 @@ from softreach.arm.number import as_numbers, number
 from softreach.arm.part import Part
 from softreach.support.errors import Fault
 
-__all__ = ["POINTS", "Base"]
+__all__ = ["POINTS", "UPRIGHT", "Base"]
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -31,12 +31,12 @@ POINTS: Mapping[str, Matrix] = MappingProxyType(
         "-y": ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)),
     }
 )
-"""Rotations by the directions in the world in which the straight arm then points: about x, but about
-y where it points along x. All numbers are exact."""
+"""Rotations by the way in the world in which the straight arm then points: about x, but about y
+where it points along x. All numbers are exact."""
 
 _ALLOWED = (
-    f"must be one of {', '.join(POINTS)}, or a rotation: a 3x3 matrix, a quaternion (w, x, y, z) of "
-    "length 1, or a rotation vector (three numbers [rad])"
+    f"must be one of {', '.join(POINTS)}, or a rotation: a 3x3 matrix, a quaternion (w, x, y, z), "
+    "or a rotation vector (three numbers [rad])"
 )
 _FARTHEST = 1e6
 """Farthest from the origin [m]: beyond, rounding of places in the world is too coarse."""
@@ -182,3 +182,7 @@ def _turned(rotation: Array, vectors: Array) -> Array:
     """Each vector turned alone, so that others beside it do not change its last bits."""
     x, y, z = np.moveaxis(vectors, -1, 0)
     return np.stack([a * x + b * y + c * z for a, b, c in rotation.tolist()], axis=-1)
+
+
+UPRIGHT = Base()
+"""At the origin of the world, where the frame of the base is that of the world."""

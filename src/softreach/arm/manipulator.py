@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm import design_file
 from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
 from softreach.arm.actuators.actuator import MOST_BUNDLES, bounds_faults, distance_faults
-from softreach.arm.base import Base
+from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.loads import Loads
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper, Profile
@@ -59,7 +59,7 @@ class Manipulator:
     """In the order of the activations, bundle by bundle; empty for a passive rod."""
     loads: Loads | None = None
     """Loads beside them; None for nothing, not even its weight."""
-    base: Base = Base()
+    base: Base = UPRIGHT
     """Where in the world it is clamped, and which way it points; upright at the origin."""
 
     def __post_init__(self) -> None:
@@ -197,9 +197,7 @@ class Manipulator:
 
     @cached_property
     def _toml(self) -> str:
-        return design_file.render(
-            self.profile, self.section, self.actuators, self.loads, self.base
-        )
+        return design_file.render(self.profile, self.section, self.actuators, self.loads, self.base)
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Self:

@@ -104,9 +104,7 @@ def compute_cloud(
     with bar("computing tips", n) if show_bar else nullcontext(report) as shown:
         _fill(rod, activation, tip, status, cube_blocks(sampler, n, bundles, seed, BLOCK), shown)
     drawn = {"seed": seed, "sampler": sampler}
-    cloud = schema.cloud_dataset(
-        rod.arm, activation, tip, **drawn, tol=rod.tol, frame=rod.frame
-    )
+    cloud = schema.cloud_dataset(rod.arm, activation, tip, **drawn, tol=rod.tol, frame=rod.frame)
     return schema.with_status(cloud, status) if rod.supports_unstable else cloud
 
 

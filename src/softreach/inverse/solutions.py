@@ -135,6 +135,7 @@ class Solutions(Sequence[Solution]):
         counts = np.concatenate([part.counts for part in parts])
         return cls(
             arm=parts[0].arm,
+            frame=parts[0].frame,
             bundles=parts[0].bundles,
             offsets=np.concatenate([[0], np.cumsum(counts)]),
             **{

@@ -1,6 +1,7 @@
 """Forward kinematics: where the tip is, how it moves, what shape the arm takes.
 
-Clamped at Z = 0 by its base, whose z is the tangent d3 there; told in the world unless asked otherwise.
+Clamped at Z = 0 by its base, whose z is the tangent d3 there; told in the world unless asked
+otherwise.
 """
 
 from __future__ import annotations

@@ -72,9 +72,7 @@ class PlacedRod(TipMap):
         directions: Array | None = None,
     ) -> None:
         """Put tips, and what else is asked for, into place; they are turned and moved there."""
-        self.rod.fill(
-            gamma, tips, slopes, twists=twists, status=status, directions=directions
-        )
+        self.rod.fill(gamma, tips, slopes, twists=twists, status=status, directions=directions)
         rotation, position = self._pose
         move(tips, rotation, position)
         if slopes is not None:

@@ -15,7 +15,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.base import Base
+from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.activation_box import ActivationBox
 from softreach.support import parallel
@@ -115,7 +115,7 @@ class TipMap(ABC):
     @property
     def pose(self) -> Base:
         """Pose of the clamped end in the frame in which the map tells places."""
-        return Base()
+        return UPRIGHT
 
     @property
     def frame(self) -> Frame:

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from softreach.arm.actuators import Actuator
 from softreach.arm.actuators.actuator import MOST_BUNDLES
 from softreach.arm.along import AlongArm
+from softreach.arm.base import Base
 from softreach.arm.design_file.keys import (
     ACTUATORS,
     PROFILES,
@@ -22,7 +23,6 @@ from softreach.arm.design_file.keys import (
     own_kinds,
 )
 from softreach.arm.design_file.tables import WRONG, TableReader, is_doubtful, unknown_key
-from softreach.arm.base import Base
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.material import LIBRARY_HINT, Material, material_names, named_material
 from softreach.arm.number import Number

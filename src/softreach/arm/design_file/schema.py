@@ -8,8 +8,8 @@ from typing import Any
 
 from softreach.arm.actuators import Actuator
 from softreach.arm.along import Samples
-from softreach.arm.design_file.keys import ACTUATORS, PROFILES, Key, in_file_units, keys_of
 from softreach.arm.base import POINTS, Base
+from softreach.arm.design_file.keys import ACTUATORS, PROFILES, Key, in_file_units, keys_of
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.material import Material
 from softreach.arm.number import Number

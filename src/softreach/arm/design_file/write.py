@@ -8,6 +8,7 @@ from typing import Any
 
 from softreach.arm.actuators import Actuator
 from softreach.arm.along import AlongArm, Samples
+from softreach.arm.base import Base
 from softreach.arm.design_file.keys import (
     ACTUATORS,
     PROFILES,
@@ -17,7 +18,6 @@ from softreach.arm.design_file.keys import (
     keys_of,
     value_text,
 )
-from softreach.arm.base import Base
 from softreach.arm.loads import Loads
 from softreach.arm.material import Material
 from softreach.arm.profile import Profile

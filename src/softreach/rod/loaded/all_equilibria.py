@@ -115,7 +115,9 @@ class AllEquilibria:
         }
         names = {"axis": list(schema.AXES), **schema.bundle_coordinates(self.rod.arm)}
         whole = {"degree": self.degree, "complete": int(self.complete)}
-        return xr.Dataset(values, names, {**schema.provenance(self.rod.arm, self.rod.frame), **whole})
+        return xr.Dataset(
+            values, names, {**schema.provenance(self.rod.arm, self.rod.frame), **whole}
+        )
 
     def __len__(self) -> int:
         return len(self.tips)
