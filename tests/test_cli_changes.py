@@ -165,7 +165,7 @@ class TestRestInTheSummary:
         (["--payload", "inf kg"], "payload = inf kg"),
         (["--payload", "2lb"], "payload = 2lb"),
         (["--payload", "2g,3g"], "payload = 2g,3g"),
-        (["--gravity", "Down"], "gravity = Down: must be down, upright, up, hanging, sideways"),
+        (["--gravity", "Down"], "gravity = Down: must be down, up, sideways, none, or"),
         (["--gravity", "9.81"], "gravity = 9.81"),
         (["--gravity", "0,0,nan"], "gravity = 0,0,nan"),
         (["--gravity", "0,0,-9.81N"], "three finite numbers x,y,z in m/s²"),

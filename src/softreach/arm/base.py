@@ -74,7 +74,8 @@ class Base(Part):
     def _faults(self) -> list[Fault]:
         wrong = _as_rotation(self.points).wrong
         faults = [Fault("points", self.points, wrong)] if wrong else []
-        if (np.abs(as_numbers(self.position)) > _FARTHEST).any():
+        place = np.abs(as_numbers(self.position)).ravel()
+        if _FARTHEST < place.max(initial=0.0) < np.inf:
             allowed = f"must be within {_FARTHEST:g} m of the origin"
             faults.append(Fault("position", self.position, allowed))
         return super()._faults() + faults

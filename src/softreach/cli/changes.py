@@ -102,7 +102,8 @@ class Changes:
         pairs = dict(self._pairs())
         of_loads = {name: text for name, text in pairs.items() if name.startswith("loads.")}
         others = {name: text for name, text in pairs.items() if name not in of_loads}
-        arm = changed(self._posed(arm), _values(arm, others, self._angles()))
+        arm = self._posed(arm)
+        arm = changed(arm, _values(arm, others, self._angles()))
         if of_loads or {"payload", "gravity", "tip_force"} & self.given.keys():
             arm = self._loaded(arm, bool(of_loads))
             arm = changed(arm, _values(arm, of_loads))
@@ -146,7 +147,7 @@ class Changes:
         """The arm with the loads it has and those given; none where all are zero and stay so."""
         from softreach.arm.loads import Loads
 
-        loads = (arm.loads or Loads()).replace(**self._loads())
+        loads = (arm.loads or Loads()).replace(**self._loads(arm))
         if not others and loads == Loads(gravity=_GRAVITY["none"]):
             return arm.replace(loads=None)
         self._check_matter(loads, arm)
@@ -168,21 +169,30 @@ class Changes:
             allowed = f"on an arm with {' and '.join(lacking)}"
             raise InvalidInput(", ".join(given), ", ".join(given.values()), allowed, hint)
 
-    def _loads(self) -> dict[str, object]:
+    def _loads(self, arm: Manipulator) -> dict[str, object]:
         loads: dict[str, object] = {}
         if self.payload is not None:
             loads["payload"] = read_mass("payload", self.payload)
-        if self.gravity in _POSTURES:
-            allowed = f"{', '.join(_GRAVITY)}, or three finite numbers x,y,z in m/s²"
-            hint = f"say how the arm stands with --base {self.gravity}"
-            raise InvalidInput("gravity", self.gravity, allowed, hint)
         if self.gravity is not None:
-            loads["gravity"] = _GRAVITY.get(self.gravity) or _vector(
-                "gravity", self.gravity, "m/s²", f"{', '.join(_GRAVITY)}, or "
-            )
+            loads["gravity"] = _gravity(self.gravity, arm)
         if self.tip_force is not None:
             loads["tip_force"] = _vector("tip_force", self.tip_force, "N")
         return loads
+
+
+def _gravity(text: str, arm: Manipulator) -> tuple[float, ...]:
+    """Gravity in the world [m/s²] from a word or numbers.
+
+    Words for how the arm stands are for one whose frame is the world's: it hangs where things fall
+    up there.
+    """
+    if text in _POSTURES:
+        if not arm.base.is_identity:
+            allowed = f"{', '.join(_GRAVITY)}, or three finite numbers x,y,z in m/s², in the world"
+            hint = f"how the arm stands is said by its base, which {arm.base}"
+            raise InvalidInput("gravity", text, allowed, hint)
+        text = {"upright": "down", "hanging": "up"}[text]
+    return _GRAVITY.get(text) or _vector("gravity", text, "m/s²", f"{', '.join(_GRAVITY)}, or ")
 
 
 UNCHANGED = Changes()
