@@ -27,6 +27,7 @@ __all__ = [
     "activation_attributes",
     "activation_symbols",
     "activation_units",
+    "base_of",
     "bundle_coordinates",
     "cell_dataset",
     "check_cloud",
@@ -303,6 +304,12 @@ def frame_of(data: xr.Dataset) -> Literal["world", "base"]:
     if frame not in ("world", "base"):
         raise InvalidInput("attrs['frame']", as_given(frame), "world or base")
     return frame
+
+
+def base_of(data: xr.Dataset) -> Array:
+    """Where the arm of a dataset is clamped, in the frame of its places [m], shape (3,)."""
+    place = data.attrs.get("base_position", (0.0, 0.0, 0.0))
+    return np.array(place if frame_of(data) == "world" else (0.0, 0.0, 0.0), float)
 
 
 def storable(dataset: xr.Dataset) -> xr.Dataset:
