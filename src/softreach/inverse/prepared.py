@@ -16,8 +16,9 @@ from softreach.kernels.image.activation_mesh import ActivationMesh
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import Frame, TipMap
 from softreach.rod.view import free_bundles, measured_bundles, stable_tips
-from softreach.support.arguments import as_integer
+from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import Array
+from softreach.support.errors import InvalidInput
 
 __all__ = ["PreparedMap", "prepared_map"]
 
@@ -127,6 +128,9 @@ def prepared_map(
     """
     cells, depth = as_integer("cells", cells, 2, 256), as_integer("depth", depth, 0, 20)
     if isinstance(arm, PreparedMap):
+        if as_one_of("frame", frame, ("world", "base")) == "base" != arm.whole.frame:
+            hint = "prepare the arm with this frame"
+            raise InvalidInput("frame", frame, f"{arm.whole.frame}, that of what is prepared", hint)
         return arm
     rod = measured_bundles(tip_map(arm, tol, frame=frame))
     # Loads make the map steep before an equilibrium is lost.
