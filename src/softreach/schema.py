@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.number import as_numbers
 from softreach.support.arguments import POSITIVE, as_dataset, as_given, as_number
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput
@@ -176,7 +177,7 @@ def check_stored_cloud(cloud: xr.Dataset) -> xr.Dataset:
         raise InvalidInput("cloud.attrs['tol']", cloud.attrs["tol"], "a finite number > 0")
     frame_of(cloud)
     arm = Manipulator.from_toml(cloud.attrs["design"], source="the cloud's design")
-    for fault in _disagreements(cloud, arm):
+    for fault in (*_disagreements(cloud, arm), *_pose_disagreements(cloud, arm)):
         raise fault
     return cloud
 
@@ -226,6 +227,15 @@ def _disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[InvalidInput
         yield InvalidInput("cloud.tip.attrs['length']", repr(length), allowed)
     if "status" in cloud.coords and not np.isin(cloud["status"].values, (0, 1, 2)).all():
         yield InvalidInput("cloud.status", "another number", f"one of {_STATUS}")
+
+
+def _pose_disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[InvalidInput]:
+    """A pose of the base that is not that of the design; clouds made before poses have none."""
+    for name, wanted in _pose(arm).items():
+        found = as_numbers(cloud.attrs.get(name, wanted))
+        if found.shape != (len(wanted),) or not np.allclose(found, wanted):
+            shown = as_given(cloud.attrs[name])
+            yield InvalidInput(f"cloud.attrs['{name}']", shown, f"{wanted}, as its design says")
 
 
 def bundle_coordinates(arm: Manipulator, names: Sequence[str] | None = None) -> dict[str, Any]:
@@ -287,11 +297,12 @@ def provenance(arm: Manipulator, frame: str = "world") -> dict[str, object]:
     What is at p in the frame of the base is at `base_position` + `base_rotation` p in the world;
     the rotation is there row by row.
     """
-    pose = {
-        "base_position": list(arm.base.position),
-        "base_rotation": arm.base.rotation.ravel().tolist(),
-    }
-    return {"design": arm.to_toml(), **versions(), "frame": frame, **pose}
+    return {"design": arm.to_toml(), **versions(), "frame": frame, **_pose(arm)}
+
+
+def _pose(arm: Manipulator) -> dict[str, list[float]]:
+    rotation = arm.base.rotation.ravel().tolist()
+    return {"base_position": list(arm.base.position), "base_rotation": rotation}
 
 
 def frame_of(data: xr.Dataset) -> Literal["world", "base"]:

@@ -292,7 +292,12 @@ class TestFrames:
         old = sr.open_cloud(tmp_path / "old.zarr")
         np.testing.assert_array_equal(tip_map_of(old).tips(old.activation.values), old.tip)
 
-    def test_a_frame_that_is_none_is_refused(self, trunk, tmp_path):
-        cloud = sr.compute_cloud(trunk, 10).assign_attrs(frame="tip")
-        with pytest.raises(InvalidInput, match="attrs"):
+    @pytest.mark.parametrize(
+        "attrs",
+        [{"frame": "tip"}, {"base_position": [1, 0, 0]}, {"base_rotation": "up"}],
+        ids=["frame", "position", "rotation"],
+    )
+    def test_a_frame_that_is_none_or_another_pose_is_refused(self, trunk, tmp_path, attrs):
+        cloud = sr.compute_cloud(trunk, 10).assign_attrs(attrs)
+        with pytest.raises(InvalidInput, match=f"attrs.*{next(iter(attrs))}"):
             sr.save_cloud(cloud, tmp_path / "cloud.zarr")
