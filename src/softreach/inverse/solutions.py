@@ -216,6 +216,7 @@ class Solutions(Sequence[Solution]):
         rows = np.repeat(self.offsets[chosen], counts) + inside
         return Solutions(
             arm=self.arm,
+            frame=self.frame,
             bundles=self.bundles,
             offsets=offsets,
             **{name: getattr(self, name)[chosen] for name in _PER_TARGET},
