@@ -13,7 +13,7 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import Tables, check_extension, strain_stations, tables
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.tip_map import Array, TipMap, check_tol
+from softreach.rod.tip_map import Array, Frame, TipMap, check_tol
 from softreach.support import parallel
 
 __all__ = ["ArmRod"]
@@ -22,6 +22,8 @@ __all__ = ["ArmRod"]
 @dataclass(frozen=True, repr=False)
 class ArmRod(TipMap):
     """The rod that one arm is, free or loaded, in the activations of all its bundles.
+
+    It is that of the frame of the base, wherever this is in the world.
 
     Raises:
         InvalidInput: `tol` out of range.
@@ -34,6 +36,11 @@ class ArmRod(TipMap):
     def __post_init__(self) -> None:
         object.__setattr__(self, "tol", check_tol(self.tol))
         check_extension(self.arm)
+
+    @property
+    def frame(self) -> Frame:
+        """That of the base, which is the world's where the arm stands upright at its origin."""
+        return "world" if self.arm.base.is_identity else "base"
 
     @cached_property
     def box(self) -> ActivationBox:

@@ -10,11 +10,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from enum import IntEnum
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.activation_box import ActivationBox
 from softreach.support import parallel
@@ -24,6 +25,8 @@ from softreach.support.errors import InvalidInput, Range, counted
 
 Array = NDArray[np.float64]
 Status = NDArray[np.int8]
+Frame = Literal["world", "base"]
+"""Where places are told: in the world, or from the base, whose z is along the straight arm."""
 
 BLOCK = 16_384
 """Samples per task: large against a thread's cost, small enough for Ctrl-C to be prompt."""
@@ -108,6 +111,16 @@ class TipMap(ABC):
     def length(self) -> float:
         """L [m], the scale of everything in space."""
         return self.arm.length
+
+    @property
+    def pose(self) -> Base:
+        """Pose of the clamped end in the frame in which the map tells places."""
+        return UPRIGHT
+
+    @property
+    def frame(self) -> Frame:
+        """The frame in which the map tells places and takes directions."""
+        return "world"
 
     @property
     def supports_unstable(self) -> bool:

@@ -62,10 +62,11 @@ class LoadedRod(ArmRod):
         """Whether a tip can have another status than stable."""
         return True
 
-    @property
+    @cached_property
     def loads(self) -> Loads:
-        """Loads on the arm beside its actuators."""
-        return self.arm.loads or Loads(gravity=(0.0, 0.0, 0.0))
+        """Loads on the arm beside its actuators, in the frame of the base."""
+        loads = self.arm.loads or Loads(gravity=(0.0, 0.0, 0.0))
+        return loads.seen_from(self.arm.base)
 
     @property
     def body(self) -> Body:
