@@ -25,6 +25,7 @@ FLAGS = [
     "--metrics-recording-only",
     "--no-first-run",
     "--no-pings",
+    "--disable-gpu-compositing",
 ]
 
 

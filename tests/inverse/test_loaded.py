@@ -16,8 +16,8 @@ from softreach.support.errors import InvalidInput
 from tests.bodies import oracle_rod
 from tests.oracles import loaded_rod
 
-TARGETS = 150
-FEW = 3
+TARGETS = 60
+FEW = 2
 
 
 def loaded(arm: Manipulator) -> LoadedRod:

@@ -24,7 +24,7 @@ from softreach.studio.work import affordable_level
 from softreach.support.errors import InvalidDesign, InvalidInput
 
 SMALL = Quality(coarse_level=10, fine_level=12, coarse_accuracy=0.1, fine_accuracy=0.05)
-HANGING = GRAVITIES["hanging"]
+HANGING = GRAVITIES["up"]
 
 
 @pytest.fixture(scope="module")

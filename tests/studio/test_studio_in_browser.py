@@ -19,7 +19,7 @@ from softreach.studio.start import start_on_store
 from softreach.studio.state import Slice
 from softreach.studio.tabs.inverse import InversePanel
 from tests.studio.conftest import SMALL
-from tests.studio.tab import PATIENCE, Tab
+from tests.studio.tab import PATIENCE, Tab, unit
 
 
 def test_the_page_opens_with_the_volume_of_the_design_and_a_slider_changes_it(tab):
@@ -224,10 +224,17 @@ def test_a_state_is_saved_loaded_and_linked_and_tabs_stay_apart(own_tab, tmp_pat
     tab.wait(lambda: other.state == kept, "the state is there")
     assert other.settle(PATIENCE)
     assert other.reach.arm == kept.design
-    tab.wait(
-        lambda: np.allclose(other.camera.usual().position, kept.camera.position, atol=1e-6),
-        "the page looks from where the first one did",
-    )
+    toward = unit(np.subtract(kept.camera.position, kept.camera.look_at))
+
+    def looks_alike() -> bool:
+        """From the same side at the same place; how near, the width of the page says."""
+        seen = other.camera.usual()
+        turned = unit(np.subtract(seen.position, seen.look_at)) - toward
+        return np.allclose(
+            np.append(turned, np.subtract(seen.look_at, kept.camera.look_at)), 0, atol=1e-6
+        )
+
+    tab.wait(looks_alike, "the page looks from where the first one did")
     page.close()
     tab.wait(lambda: set(studio.sessions) <= known, "the session of the closed tab ends")
 

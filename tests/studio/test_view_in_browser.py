@@ -189,10 +189,10 @@ def test_the_window_is_called_softreach(tab):
 def test_numbers_are_dark_on_light_and_light_on_dark(tab):
     show(tab, cloud=False, arm=False, handle=False)
     name = next(one for k in range(60) if (one := tab.drawn(f"/axes/label {k}")).text == "x / L")
-    right, down = tab.projected(name.position)
 
     def around() -> np.ndarray:
         image = pixels(tab)
+        right, down = tab.projected(name.position)
         row, column = round(down * len(image)), round(right * image.shape[1])
         return image[row - 6 : row + 6, column - 10 : column + 10].mean(axis=-1)
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import threading
+from collections.abc import Iterable
 
 from softreach.support.files.interruption import end_process, stop_here
 
@@ -33,6 +35,13 @@ def end_on_signals() -> None:
     signal.set_wakeup_fd(wakeup, warn_on_full_buffer=False)
     for number in heeded:
         signal.signal(number, stop_here)
+    atexit.register(_ignore, heeded)  # the first registered is the last called
+
+
+def _ignore(numbers: Iterable[int]) -> None:
+    """A command that is done has the exit code of its work, also if a signal comes this late."""
+    for number in numbers:
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _wait(arrivals: int, heeded: dict[int, str]) -> None:

@@ -32,6 +32,7 @@ from softreach.rod.kinematics import configuration, shape_dataset, stations_alon
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import LoadTables
+from softreach.rod.placed import PlacedRod
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap, TipStatus, has_tip
 from softreach.rod.view import View
@@ -63,8 +64,8 @@ class AllEquilibria:
     margin: Array
     """Margin of stability, from 1 to below 0 [-], shape (n,); 0 of stable rings."""
     directions: Array
-    """Direction of gravity as the tip sees it, in the base frame of the unloaded arm, shape (n, 3);
-    NaN without loads."""
+    """Direction of gravity as the tip sees it, in the frame of the base of the unloaded arm, shape
+    (n, 3); NaN without loads."""
     signs: NDArray[np.int8]
     """Sense of rotation of the map of directions there: kept (1), or turned over (-1) where the
     ways to fall are odd in number; 0 of rings; shape (n,)."""
@@ -88,12 +89,14 @@ class AllEquilibria:
             stations: Number of stations, evenly spaced from base to tip, or their Z [m], ascending.
         """
         gamma, rod = np.repeat(self.activation[None], len(self), axis=0), self.rod
-        if self.solver is None or not isinstance(rod, LoadedRod):
+        loaded = _in_base(rod)
+        if self.solver is None or not isinstance(loaded, LoadedRod):
             return configuration(rod, gamma, stations)
         z = stations_along(rod, stations)
         shapes = self.solver.shapes_facing(gamma, self.directions, z)[0]
-        strains = rod.strains_of_shapes(z)(gamma, shapes.moment, shapes.force)
-        return shape_dataset(rod, gamma, z, shapes.frames, strains)
+        frames = rod.placed(shapes.frames) if isinstance(rod, PlacedRod) else shapes.frames
+        strains = loaded.strains_of_shapes(z)(gamma, shapes.moment, shapes.force)
+        return shape_dataset(rod, gamma, z, frames, strains)
 
     def to_dataset(self) -> xr.Dataset:
         """All numbers over `equilibrium` and `axis`."""
@@ -112,7 +115,9 @@ class AllEquilibria:
         }
         names = {"axis": list(schema.AXES), **schema.bundle_coordinates(self.rod.arm)}
         whole = {"degree": self.degree, "complete": int(self.complete)}
-        return xr.Dataset(values, names, {**schema.provenance(self.rod.arm), **whole})
+        return xr.Dataset(
+            values, names, {**schema.provenance(self.rod.arm, self.rod.frame), **whole}
+        )
 
     def __len__(self) -> int:
         return len(self.tips)
@@ -185,14 +190,20 @@ def equilibria(
         rod, gamma = rod.base, rod.activations(gamma)
     if not rod.supports_unstable:
         return _without_loads(rod, gamma)
-    if not isinstance(rod, LoadedRod):
+    loaded = _in_base(rod)
+    if not isinstance(loaded, LoadedRod):
         raise InvalidInput("arm", repr(rod), "a Manipulator, or a tip map of one")
-    _check_loads(rod.tables)
-    solver = _resolving(Solver(rod.tables, FreeRod(rod.arm, rod.tol).steps, rod.tol), gamma)
+    _check_loads(loaded.tables)
+    solver = _resolving(Solver(loaded.tables, FreeRod(rod.arm, rod.tol).steps, rod.tol), gamma)
     branch = solver.find(gamma)
     known = branch.frame[has_tip(branch.status)]
     solver, found = _accurate(solver, gamma, _search(solver, gamma, known))
     return _judged(rod, solver, gamma, found, known)
+
+
+def _in_base(rod: TipMap) -> TipMap:
+    """The rod in the frame of the base, where all directions of the search are."""
+    return rod.rod if isinstance(rod, PlacedRod) else rod
 
 
 def _one(rod: TipMap, activations: ArrayLike) -> Array:
@@ -337,7 +348,7 @@ def _tips(solver: Solver, gamma: Array, found: _Found) -> Array:
 
 
 def _judged(
-    rod: LoadedRod, solver: Solver, gamma: Array, found: _Found, known: Array
+    rod: TipMap, solver: Solver, gamma: Array, found: _Found, known: Array
 ) -> AllEquilibria:
     """In order, with tips and status."""
     axis, many = solver.tables.axes[0], np.repeat(gamma, len(found.directions), axis=0)
@@ -355,7 +366,7 @@ def _judged(
         rod=rod,
         solver=solver,
         activation=gamma[0],
-        tips=shapes.frames.position[order, 0],
+        tips=rod.pose.to_world(shapes.frames.position[order, 0]),
         status=np.where(stable, TipStatus.STABLE, TipStatus.UNSTABLE).astype(np.int8)[order],
         margin=margin[order],
         directions=found.directions[order],

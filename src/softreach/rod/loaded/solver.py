@@ -9,9 +9,11 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.tables import tables
 from softreach.kernels.loaded.any_loads import TRACE
 from softreach.kernels.loaded.grid_values import interpolate
 from softreach.rod.activation_box import ActivationBox
+from softreach.rod.free import linear_strains
 from softreach.rod.loaded.shapes import Shapes, shapes_of
 from softreach.rod.loaded.shooting import (
     CONTINUATION,
@@ -157,13 +159,14 @@ class Solver:
     def _give_up_squeezed(
         self, gamma: Array, rows: slice | NDArray[np.intp], found: Equilibria
     ) -> None:
-        """No arm is where ζ = ζ̂ (1 + n3/K0) is not positive: it would be turned inside out."""
+        """No arm is where ζ = ζ̂ + η n3/K0 is not positive: it would be turned inside out."""
         squeezed = np.arange(len(gamma))[rows]
         edges = self.tables.edges(np.array([]), self.steps)[::-1]
         z = self.tables.arm.profile.station(edges)
         force = self.shapes(gamma[squeezed], z, found.of(squeezed)).force[..., 2]
-        stretch = 1.0 + force * self.tables.body.compliance(z)[0]
-        squeezed = squeezed[(stretch <= 0.0).any(axis=1)]
+        _, extension, growth = linear_strains(tables(self.tables.arm, z), gamma[squeezed])
+        extension = extension + growth * force * self.tables.body.compliance(z)[0]
+        squeezed = squeezed[(extension <= 0.0).any(axis=1)]
         found.tips[squeezed] = np.nan
         found.status[squeezed] = TipStatus.NO_EQUILIBRIUM
         found.rung[squeezed] = Rung.NONE

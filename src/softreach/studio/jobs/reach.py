@@ -249,6 +249,7 @@ class FollowCamera(Job):
         return Viewpoint(
             position=np.asarray(camera.position),
             look_at=np.asarray(camera.look_at),
+            base=np.array(state.design.base.position) / state.design.length,
             centers=centers,
             radii=radii,
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -31,6 +32,7 @@ _AWAY = 40.0  # times the distance from which parallels stay parallel, to 1 %
 _PATIENCE = 30.0  # [s] for a picture
 _UPRIGHT = 0.6  # aspect below which a window is that of a phone
 _NARROWEST = 0.3  # aspect below which a page is only being laid out
+_LAID_OUT = 1.0  # [s] after which the width of a new page counts as its own
 _ROOM = 1.12  # times what would just fill the picture
 
 
@@ -92,6 +94,7 @@ class TabCamera:
         self._orthographic = False
         self._aspect: float | None = None
         self._latest: float | None = None
+        self._since = 0.0
 
     def on_move(self, moved: Callable[[], None]) -> None:
         """Call this whenever the camera has moved."""
@@ -148,13 +151,16 @@ class TabCamera:
 
         Returns:
             Whether the window is changing, so that one has to look again: a layout passes through
-            widths that are gone before the page has heard of a step.
+            widths that are gone before the page has heard of a step. That of a new page, which has
+            no panel at first, takes long on a slow machine.
         """
         now = self.aspect
         if now < _NARROWEST:
             return False
-        rests, self._latest = now == self._latest, now
-        if not rests:
+        if now != self._latest:
+            self._latest, self._since = now, time.monotonic()
+            return True
+        if self._aspect is None and time.monotonic() - self._since < _LAID_OUT:
             return True
         before, self._aspect = self._aspect or now, now
         if (ratio := _half_sine(before) / _half_sine(now)) != 1.0:
@@ -207,6 +213,8 @@ class Viewpoint:
 
     position: Array
     look_at: Array
+    base: Array
+    """Where the arm is clamped, shape (3,)."""
     centers: Array
     """Shape (n, 3)."""
     radii: Array
@@ -234,7 +242,7 @@ def in_the_way(points: Array, viewpoint: Viewpoint, cut: str) -> NDArray[np.bool
     hides = _hides(seen, viewpoint) if len(viewpoint.centers) else np.zeros(len(points), bool)
     if cut == "half":
         ahead = (viewpoint.look_at - viewpoint.position) * (1.0, 1.0, 0.0)
-        hides |= points @ ahead < 0.0
+        hides |= (points - viewpoint.base) @ ahead < 0.0
     return hides
 
 
