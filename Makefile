@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: help setup demo test test-all browser quick fast record check lint types format bench atlas paper docs lock clean
+.PHONY: help setup demo test test-all kernels browser quick fast record check lint types format bench atlas paper docs lock clean
 
 help:
 	@echo "make demo    set up, then compute the paper's design into out/"
@@ -35,11 +35,17 @@ demo: setup
 # Tests side by side, up to four on as many cores.
 TESTS := $(BIN)/python -m pytest -q --numprocesses auto --maxprocesses 4 --dist worksteal --max-worker-restart 0
 
-test: check browser
+test: setup
+	$(MAKE) --no-print-directory -j3 --output-sync=target check kernels browser
 	$(TESTS)
 
-test-all: check browser
+test-all: setup
+	$(MAKE) --no-print-directory -j3 --output-sync=target check kernels browser
 	$(TESTS) -m "large or not large"
+
+# Compiled once here, and not by every process of the tests.
+kernels: setup
+	$(BIN)/softreach warmup --loads
 
 # The studio is tested in a real browser. Only root installs one; whoever has none is told at the end
 # of the tests what to type.

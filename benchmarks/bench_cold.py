@@ -54,10 +54,17 @@ def measured(name: str, folder: Path, *options: str) -> Cold:
     return recorded([*COMMANDS[name].split(), *options], folder)
 
 
-def recorded(arguments: list[str], folder: Path) -> Cold:
-    """Run the command line in a new process, in a folder that also has the kernel cache."""
-    found = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(folder / "cache"), "PYTHONPATH": found}
+def recorded(arguments: list[str], folder: Path, *, own_cache: bool = True) -> Cold:
+    """Run the command line in a new process.
+
+    Args:
+        arguments: Of the command line.
+        folder: Place for the results.
+        own_cache: Keep kernels in that folder too, and not where they always are.
+    """
+    path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+    cache = {"NUMBA_CACHE_DIR": str(folder / "cache")} if own_cache else {}
+    environment = os.environ | cache | {"PYTHONPATH": path}
     record = folder / "cold.json"
     run = [sys.executable, "-m", "benchmarks.bench_cold", str(record), *arguments]
     done = subprocess.run(run, env=environment, cwd=folder, capture_output=True, text=True)

@@ -56,7 +56,8 @@ def oracle_rod(arm: Manipulator, body: Body, gamma, loads: Loads) -> tuple[rod.R
         torsion=lambda z: at(z)[2],
         mass=lambda z: at(z)[3],
         stretch=lambda z: at(z)[4],
-        curvature=lambda z: at(z)[5:],
+        growth=lambda z: at(z)[5],
+        curvature=lambda z: at(z)[6:],
         breaks=breaks,
     ), rod.Loads(
         gravity=loads.gravity,
@@ -75,11 +76,12 @@ def oracle_rod(arm: Manipulator, body: Body, gamma, loads: Loads) -> tuple[rod.R
 
 
 def _sections(arm: Manipulator, body: Body, gamma, z):
-    """K0, K1, K3, mass per length, ζ̂ and û at stations, shape (station, 8)."""
+    """K0, K1, K3, mass per length, ζ̂, η and û at stations, shape (station, 9)."""
     table, yields = tables(arm, z), body.compliance(z)
     stiff = [1.0 / np.maximum(one, 1e-300) for one in yields]
-    stretch, bend = 1.0 + table.extension @ gamma, table.curvature @ gamma
-    return np.column_stack([*stiff, body.mass_per_length(z), stretch, bend])
+    stretch, growth = 1.0 + table.extension @ gamma, 1.0 + table.growth @ gamma
+    bend = table.curvature @ gamma
+    return np.column_stack([*stiff, body.mass_per_length(z), stretch, growth, bend])
 
 
 def _polynomials(values: Callable, ends: list[float]) -> Callable:

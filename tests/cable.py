@@ -23,6 +23,7 @@ class Cable(Actuator):
     """
 
     unit: ClassVar[str] = "N"
+    is_force: ClassVar[bool] = True
     default_name: ClassVar[str] = "cable"
 
     place: tuple[float, float]

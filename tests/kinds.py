@@ -25,6 +25,7 @@ from softreach.arm import (
     Samples,
     Section,
     Tendon,
+    designs,
 )
 from softreach.arm.tables import tables
 from tests.oracles.sections import Layer
@@ -164,6 +165,14 @@ def _tendons(draw: st.DrawFn, common: dict) -> Tendon:
     return Tendon(
         distance_ratio=draw(number(0.1, 1.0)), activation_bounds=(0.0, 1.0), **turn, **common
     )
+
+
+def fibers_and_a_tendon() -> Manipulator:
+    """Two helical fibers, by whose length curvature counts, and a tendon that leaves it alone."""
+    soft = Material(young_modulus=1e6, poisson_ratio=0.5, density=1000.0)
+    trunk = designs.minimal_trunk(material=soft)
+    tendon = Tendon(distance_ratio=0.8, revolution=1.0, offset=2.0, activation_bounds=(0, 60))
+    return trunk.replace(actuators=(*trunk.actuators[:2], tendon))
 
 
 def driven(arm: Manipulator, sharpness: float = 3.0) -> Manipulator:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from softreach.arm.actuators import FiberArchitecture
+from softreach.arm.base import POINTS, Base
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import tables
 
@@ -70,9 +71,9 @@ def integrated_tip(arm: Manipulator, gamma: Array) -> Array:
     def rhs(z: float, state: Array) -> Array:
         table = tables(arm, [z])
         directors = state[3:].reshape(3, 3)  # rows d1, d2, d3
-        zeta = 1.0 + table.extension[0] @ gamma
+        zeta, eta = 1.0 + table.extension[0] @ gamma, 1.0 + table.growth[0] @ gamma
         u = (table.curvature[0] @ gamma) @ directors
-        return np.concatenate([zeta * directors[2], (zeta * np.cross(u, directors)).ravel()])
+        return np.concatenate([zeta * directors[2], (eta * np.cross(u, directors)).ravel()])
 
     start = np.concatenate([np.zeros(3), np.eye(3).ravel()])
     span = (0.0, arm.length)
@@ -83,3 +84,20 @@ def in_box(arm: Manipulator, n: int, seed: int = 1) -> Array:
     """Random activations within the bounds."""
     cube = np.random.default_rng(seed).random((n, arm.bundles))
     return arm.bounds[:, 0] + cube * np.diff(arm.bounds, axis=1)[:, 0]
+
+
+def rotvec(angles):
+    """SciPy's rotation by a rotation vector [rad]."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_rotvec(angles)
+
+
+@st.composite
+def bases(draw: st.DrawFn) -> Base:
+    """Poses within meters, pointing anywhere."""
+    number = st.floats(-3, 3)
+    words, angles = st.sampled_from([*POINTS]), st.tuples(number, number, number)
+    turned = angles.map(lambda w: rotvec(w).as_matrix())
+    position = draw(st.tuples(number, number, number))
+    return Base(position=position, points=draw(words | turned), turn=draw(number))

@@ -14,7 +14,15 @@ from softreach.cli.changes import Changes
 
 pytestmark = pytest.mark.filterwarnings("always::softreach.support.errors.SoftreachWarning")
 
-OPTIONS = ("--payload", "--gravity", "--tip-force", "--set", "--taper-deg", "--revolution-deg")
+OPTIONS = (
+    "--base",
+    "--payload",
+    "--gravity",
+    "--tip-force",
+    "--set",
+    "--taper-deg",
+    "--revolution-deg",
+)
 TAKE_ONE_DESIGN = ("design", "cloud", "volume", "reach", "solve", "track", "show", "export")
 HEAVY = ("rings[0].material.young_modulus=1MPa", "rings[0].material.density=1000kg/m3")
 
@@ -37,7 +45,7 @@ def test_every_command_that_takes_a_design_offers_to_change_it(command, capsys):
     assert run([command, "--help"]) == 0
     text = capsys.readouterr().out
     assert all(f"{option} " in text for option in OPTIONS)
-    assert "+z points along the" in " ".join(text.replace("│", "").split())
+    assert "in the world, whose +z points up" in " ".join(text.replace("│", "").split())
 
 
 @pytest.mark.parametrize(
@@ -107,6 +115,52 @@ def test_moduli_and_densities_may_come_with_the_loads_that_need_them(folder):
     assert made.loads == sr.Loads(payload=0.2)
 
 
+@pytest.mark.parametrize(
+    ("word", "points"),
+    [("hanging", "down"), ("upright", "up"), ("down", "down"), ("x", "x"), ("-y", "-y")],
+)
+def test_the_base_points_the_way_that_is_said(folder, word, points):
+    assert saved(folder, "minimal_trunk", "--base", word).base == sr.Base(points=points)
+
+
+def test_the_place_and_the_turn_of_a_file_stay(folder):
+    base = sr.Base(position=(0, 0, 2), points="x", turn=0.3)
+    sr.designs.minimal_trunk().replace(base=base).save("posed.toml")
+    made = saved(folder, "posed.toml", "--base", "hanging", "--set", "base.turn=0.4rad")
+    assert made.base == base.replace(points="down", turn=0.4)
+
+
+def test_gravity_down_beside_a_hanging_base_pulls_along_the_arm(folder, capsys):
+    made = saved(folder, "lce_arm", "--base", "hanging", "--gravity", "down")
+    assert (made.base.points, made.loads) == ("down", sr.Loads())
+    assert run(["design", "lce_arm", "--base", "hanging", "--gravity", "down", "--json"]) == 0
+    *_, last = capsys.readouterr().out.splitlines()
+    assert json.loads(last)["base"] == "hanging: points down"
+
+
+def test_words_for_how_an_arm_stands_are_refused_beside_another_base(capsys):
+    assert run(["design", "lce_arm", "--base", "hanging", "--gravity", "hanging"]) == 2
+    said = capsys.readouterr().err
+    assert "gravity = hanging: must be down, up" in said
+    assert "its base, which points down" in said
+
+
+@pytest.mark.parametrize("word", ["left", "", "z", "Down", "0,0,-1"])
+def test_other_ways_are_refused(word, capsys):
+    assert run(["design", "lce_arm", f"--base={word}"]) == 2
+    assert "must be one of upright, hanging, up, down, x, -x, y, -y" in capsys.readouterr().err
+
+
+def test_a_place_below_a_hanging_arm_is_reached_and_hinted_at(capsys):
+    place = ["minimal_trunk", "--target", "0.2,0.1,-0.6"]
+    assert run(["solve", *place, "--base", "hanging"]) == 0
+    assert "reached" in capsys.readouterr().out.splitlines()[0]
+    assert run(["solve", *place]) == 0
+    assert "--base hanging" in capsys.readouterr().out.splitlines()[-1]
+    assert run(["solve", *place, "--json"]) == 0
+    assert "--base hanging" in json.loads(capsys.readouterr().out)[0]["hint"]
+
+
 def test_a_loaded_cloud_counts_its_stable_samples(folder, capsys):
     options = ["--n", "64", "--payload", "2g", "--gravity", "hanging", "--json"]
     assert run(["cloud", "lce_arm", *options]) == 0
@@ -165,7 +219,7 @@ class TestRestInTheSummary:
         (["--payload", "inf kg"], "payload = inf kg"),
         (["--payload", "2lb"], "payload = 2lb"),
         (["--payload", "2g,3g"], "payload = 2g,3g"),
-        (["--gravity", "Down"], "gravity = Down: must be down, upright, up, hanging, sideways"),
+        (["--gravity", "Down"], "gravity = Down: must be down, up, sideways, none, or"),
         (["--gravity", "9.81"], "gravity = 9.81"),
         (["--gravity", "0,0,nan"], "gravity = 0,0,nan"),
         (["--gravity", "0,0,-9.81N"], "three finite numbers x,y,z in m/s²"),
@@ -236,6 +290,7 @@ def test_a_filament_of_julia_is_pointed_to_the_import(capsys):
 def test_every_change_has_an_option(capsys):
     """No field of the changes is forgotten in what a stored cloud refuses."""
     every = Changes(
+        base="up",
         revolution_deg=1.0,
         taper_deg=1.0,
         payload="1g",

@@ -44,7 +44,7 @@ def solid(surface):
 
 
 def resting(arm, stations=11):
-    line = Centerline.unactivated(np.linspace(0, arm.length, stations))
+    line = Centerline.unactivated(np.linspace(0, arm.length, stations), arm.base)
     return line.with_stations(arm.breakpoints)
 
 

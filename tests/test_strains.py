@@ -8,6 +8,7 @@ from hypothesis import given
 
 from softreach.arm.tables import tables
 from softreach.rod.rods import refined, tip_map
+from tests.kinds import any_arms, fibers_and_a_tendon
 from tests.laws import arms, in_box
 
 
@@ -20,9 +21,21 @@ def test_strains_are_the_tables_times_the_activations(arm):
     z, gamma = stations(arm), in_box(arm, 20)
     table, (curvature, extension) = tables(arm, z), tip_map(arm).strains(gamma, z)
     scale = np.abs(table.curvature).max()
+    assert table.growth is table.extension
     u = np.einsum("scb,nb->nsc", table.curvature, gamma)
     np.testing.assert_allclose(curvature, u, rtol=1e-12, atol=1e-13 * scale)
     np.testing.assert_allclose(extension, 1 + gamma @ table.extension.T, rtol=1e-12)
+
+
+def test_a_force_leaves_curvature_per_length_at_rest_and_fibers_take_it_along():
+    """dᵢ' = η Uγ × dᵢ = ζ u × dᵢ with η of the fibers alone."""
+    arm = fibers_and_a_tendon()
+    z, gamma = stations(arm), in_box(arm, 20)
+    table, (curvature, extension) = tables(arm, z), tip_map(arm).strains(gamma, z)
+    np.testing.assert_allclose(extension, 1 + gamma @ table.extension.T, rtol=1e-12)
+    eta = 1 + gamma[:, :2] @ table.extension[:, :2].T
+    rate = eta[..., None] * np.einsum("scb,nb->nsc", table.curvature, gamma)
+    np.testing.assert_allclose(curvature * extension[..., None], rate, rtol=1e-12, atol=1e-12)
 
 
 def test_a_sample_has_the_same_strains_to_the_last_bit_whatever_is_beside_it(trunk):
@@ -46,6 +59,19 @@ def test_the_range_of_the_box_holds_all_strains_and_its_corners_reach_it(arm):
         np.testing.assert_allclose(extremes.max(axis=0), ends[:, 1], rtol=2e-5, atol=slack)
         if name != "bending":  # which is convex: its smallest value lies inside the box
             np.testing.assert_allclose(extremes.min(axis=0), ends[:, 0], rtol=1e-9, atol=slack)
+
+
+@given(arm=any_arms())
+def test_the_range_of_the_box_holds_all_strains_of_fibers_and_forces(arm):
+    z, rod = stations(arm), tip_map(arm, 1e-4)
+    gamma = np.concatenate([in_box(arm, 50), rod.box.corners()])
+    for name, ends in rod.strain_range(z)._asdict().items():
+        slack, values = (
+            1e-12 * max(1.0, np.abs(ends).max()),
+            quantities(rod.strains(gamma, z))[name],
+        )
+        assert (values >= ends[:, 0] - slack).all()
+        assert (values <= ends[:, 1] + slack).all()
 
 
 def quantities(strains):

@@ -10,6 +10,7 @@ from . import rest as rest
 from . import rod as rod
 from . import stiffness as stiffness
 from . import workspace as workspace
+from .arm import Base as Base
 from .arm import Chamber as Chamber
 from .arm import FiberArchitecture as FiberArchitecture
 from .arm import LinearTaper as LinearTaper

@@ -88,10 +88,11 @@ def blocked_force(
     directions = as_directions("direction", direction, len(targets))
     best = []
     for target, along, choice in zip(targets, directions, starts, strict=True):
-        found = [_grown(yielding, along, target, gamma) for gamma in choice]
+        push, place = rod.pose.directions_to_base(along), rod.pose.to_base(target)
+        found = [_grown(yielding, push, place, gamma) for gamma in choice]
         best.append(max((one for one in found if one), key=_force, default=None))
         progress(1)
-    return _dataset(yielding, targets, directions, best)
+    return _dataset(rod, targets, directions, best)
 
 
 class _Best(NamedTuple):
@@ -144,9 +145,7 @@ def _rows(best: list[_Best | None]) -> Iterator[tuple[int, _Best]]:
     return ((k, one) for k, one in enumerate(best) if one is not None)
 
 
-def _dataset(
-    rod: LoadedRod, places: Array, directions: Array, best: list[_Best | None]
-) -> xr.Dataset:
+def _dataset(rod: TipMap, places: Array, directions: Array, best: list[_Best | None]) -> xr.Dataset:
     import xarray as xr
 
     n, bundles = len(places), rod.box.bundles
@@ -159,7 +158,8 @@ def _dataset(
         error[k] = one.end.slope * one.tip_error
         activation[k], begun[k], settles[k] = one.end.fixed.gamma, one.start, one.settles
     units = activation_attributes(rod.arm)
-    acting = np.array(rod.loads.tip_force) - force[:, None] * directions
+    dead = np.array(yielding_rod(rod).loads.tip_force)
+    acting = rod.pose.directions_to_world(dead) - force[:, None] * directions
     return xr.Dataset(
         {
             "position": (("place", "axis"), places, {"units": "m"}),
@@ -186,5 +186,5 @@ def _dataset(
             ),
         },
         {"axis": list(AXES), **bundle_coordinates(rod.arm)},
-        {**provenance(rod.arm), "tol": rod.tol},
+        {**provenance(rod.arm, rod.frame), "tol": rod.tol},
     )

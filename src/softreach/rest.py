@@ -23,13 +23,13 @@ class Rest:
     activation: NDArray[np.float64]
     """The activation of least size within the bounds, zero where these hold it [unit]."""
     tip: NDArray[np.float64]
-    """Of the loaded arm [m]; NaN without equilibrium."""
+    """Of the loaded arm in the world [m]; NaN without equilibrium."""
     sag: float
     """How far the loads move the tip [m]; NaN without equilibrium."""
     sag_over_length: float
     """The same over the length of the arm [-]."""
     status: TipStatus
-    """Whether the equilibrium is stable."""
+    """Whether the equilibrium is stable, and whether one was found."""
 
 
 def rest(arm: Manipulator, *, tol: float = 1e-6) -> Rest:
@@ -55,7 +55,7 @@ def rest(arm: Manipulator, *, tol: float = 1e-6) -> Rest:
     sag = float(np.linalg.norm(found.tips[0] - free))
     return Rest(
         activation=activation,
-        tip=found.tips[0],
+        tip=arm.base.to_world(found.tips[0]),
         sag=sag,
         sag_over_length=sag / arm.length,
         status=TipStatus(int(found.status[0])),

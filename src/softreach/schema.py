@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.number import as_numbers
 from softreach.support.arguments import POSITIVE, as_dataset, as_given, as_number
 from softreach.support.arrays import Array, Mask
 from softreach.support.errors import InvalidInput
@@ -27,12 +28,14 @@ __all__ = [
     "activation_attributes",
     "activation_symbols",
     "activation_units",
+    "base_of",
     "bundle_coordinates",
     "cell_dataset",
     "check_cloud",
     "check_stored_cloud",
     "cloud_dataset",
     "configuration_dataset",
+    "frame_of",
     "is_stable",
     "provenance",
     "storable",
@@ -62,19 +65,26 @@ _CONFIGURATION = {
 
 
 def cloud_dataset(
-    arm: Manipulator, activation: Array, tip: Array, *, seed: int, sampler: str, tol: float
+    arm: Manipulator,
+    activation: Array,
+    tip: Array,
+    *,
+    seed: int,
+    sampler: str,
+    tol: float,
+    frame: str = "world",
 ) -> xr.Dataset:
     """A reachability cloud: tips and activations with everything needed to make them again."""
     import xarray as xr
 
-    attrs = {**provenance(arm), "seed": seed, "sampler": sampler, "tol": tol}
+    attrs = {**provenance(arm, frame), "seed": seed, "sampler": sampler, "tol": tol}
     variables = _variables(_CLOUD, arm, {"tip": tip, "activation": activation})
     cloud = xr.Dataset(variables, {"axis": list(AXES), **bundle_coordinates(arm)}, attrs)
     cloud.tip.attrs["length"] = arm.length
     return cloud
 
 
-_STATUS = "0=stable 1=unstable 2=no_equilibrium"
+_STATUS = "0=stable 1=unstable 2=no_equilibrium 3=undecided"
 
 
 def with_status(cloud: xr.Dataset, status: NDArray[np.int8]) -> xr.Dataset:
@@ -96,11 +106,13 @@ def configuration_dataset(
     z: Array,
     *,
     names: Sequence[str] | None = None,
+    frame: str = "world",
     **arrays: Array,
 ) -> xr.Dataset:
     """Shapes of an arm at stations Z, one for each row of `activation`.
 
-    `names` are those of the bundles with a column there; by default all.
+    `names` are those of the bundles with a column there; by default all. `frame` is that of the
+    arrays.
     """
     import xarray as xr
 
@@ -112,7 +124,7 @@ def configuration_dataset(
         "component": ["u1", "u2", "u3"],
         **bundle_coordinates(arm, names),
     }
-    return xr.Dataset(variables, coordinates, provenance(arm))
+    return xr.Dataset(variables, coordinates, provenance(arm, frame))
 
 
 def a_cloud(name: str, value: object) -> xr.Dataset:
@@ -163,8 +175,9 @@ def check_stored_cloud(cloud: xr.Dataset) -> xr.Dataset:
             raise InvalidInput(f"cloud.attrs['{name}']", repr(value), allowed)
     if not 0 < cloud.attrs["tol"] < np.inf:
         raise InvalidInput("cloud.attrs['tol']", cloud.attrs["tol"], "a finite number > 0")
+    frame_of(cloud)
     arm = Manipulator.from_toml(cloud.attrs["design"], source="the cloud's design")
-    for fault in _disagreements(cloud, arm):
+    for fault in (*_disagreements(cloud, arm), *_pose_disagreements(cloud, arm)):
         raise fault
     return cloud
 
@@ -212,8 +225,17 @@ def _disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[InvalidInput
     if not isinstance(length, int | float) or not math.isclose(length, arm.length):
         allowed = f"{arm.length} m, as its design says"
         yield InvalidInput("cloud.tip.attrs['length']", repr(length), allowed)
-    if "status" in cloud.coords and not np.isin(cloud["status"].values, (0, 1, 2)).all():
+    if "status" in cloud.coords and not np.isin(cloud["status"].values, (0, 1, 2, 3)).all():
         yield InvalidInput("cloud.status", "another number", f"one of {_STATUS}")
+
+
+def _pose_disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[InvalidInput]:
+    """A pose of the base that is not that of the design; clouds made before poses have none."""
+    for name, wanted in _pose(arm).items():
+        found = as_numbers(cloud.attrs.get(name, wanted))
+        if found.shape != (len(wanted),) or not np.allclose(found, wanted):
+            shown = as_given(cloud.attrs[name])
+            yield InvalidInput(f"cloud.attrs['{name}']", shown, f"{wanted}, as its design says")
 
 
 def bundle_coordinates(arm: Manipulator, names: Sequence[str] | None = None) -> dict[str, Any]:
@@ -269,9 +291,36 @@ def _variables(
     }
 
 
-def provenance(arm: Manipulator) -> dict[str, object]:
-    """Attributes that say which design and version a dataset was computed from."""
-    return {"design": arm.to_toml(), **versions()}
+def provenance(arm: Manipulator, frame: str = "world") -> dict[str, object]:
+    """Attributes that say which design and version a dataset was computed from, and its frame.
+
+    What is at p in the frame of the base is at `base_position` + `base_rotation` p in the world;
+    the rotation is there row by row.
+    """
+    return {"design": arm.to_toml(), **versions(), "frame": frame, **_pose(arm)}
+
+
+def _pose(arm: Manipulator) -> dict[str, list[float]]:
+    rotation = arm.base.rotation.ravel().tolist()
+    return {"base_position": list(arm.base.position), "base_rotation": rotation}
+
+
+def frame_of(data: xr.Dataset) -> Literal["world", "base"]:
+    """The frame in which a dataset tells places; the world's, of one made before there were two.
+
+    Raises:
+        InvalidInput: There is no such frame.
+    """
+    frame = data.attrs.get("frame", "world")
+    if frame not in ("world", "base"):
+        raise InvalidInput("attrs['frame']", as_given(frame), "world or base")
+    return frame
+
+
+def base_of(data: xr.Dataset) -> Array:
+    """Where the arm of a dataset is clamped, in the frame of its places [m], shape (3,)."""
+    place = data.attrs.get("base_position", (0.0, 0.0, 0.0))
+    return np.array(place if frame_of(data) == "world" else (0.0, 0.0, 0.0), float)
 
 
 def storable(dataset: xr.Dataset) -> xr.Dataset:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import tip_map_of
 from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.placed import PlacedRod
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import BLOCK, TipMap
 from softreach.schema import AXES, check_cloud
@@ -54,8 +55,8 @@ def tip_compliance(arm: Manipulator | TipMap, activations: ArrayLike, tol: float
             (ζ <= 0); or a tip map of another kind than the arm's own.
         InvalidDesign: A material has no Young's modulus.
     """
-    rod = yielding_rod(tip_map(arm, tol))
-    return rod.compliance(rod.check_activations("activations", activations))
+    rod = tip_map(arm, tol)
+    return _compliance(rod, rod.check_activations("activations", activations))
 
 
 class PrincipalCompliances(NamedTuple):
@@ -137,12 +138,12 @@ def cloud_compliance(cloud: xr.Dataset) -> xr.Dataset:
     """
     import xarray as xr
 
-    rod = yielding_rod(tip_map_of(check_cloud(cloud)))
+    rod = tip_map_of(check_cloud(cloud))
     n = cloud.sizes["sample"]
     matrices, soft = np.empty((n, 3, 3)), np.empty((n, 3))
     largest, smallest = np.empty((2, n))
     for rows in parallel.blocks(n, 8 * BLOCK):
-        matrices[rows] = rod.compliance(cloud.activation[rows].values)
+        matrices[rows] = _compliance(rod, cloud.activation[rows].values)
         axes = principal_compliances(matrices[rows])
         largest[rows], smallest[rows] = axes.largest, axes.smallest
         soft[rows] = axes.displacements[:, 0]
@@ -179,12 +180,22 @@ def _checked_compliance(compliance: ArrayLike) -> Array:
 
 
 def yielding_rod(rod: TipMap) -> LoadedRod:
-    """The rod of a tip map that also knows how it yields; without loads nothing weighs on it."""
-    if isinstance(rod, LoadedRod):
-        return rod
-    if rod != tip_map(rod.arm, rod.tol):
+    """The rod of a tip map that also knows how it yields, in the frame of the base.
+
+    Without loads nothing weighs on it.
+    """
+    of_base = rod.rod if isinstance(rod, PlacedRod) else rod
+    if isinstance(of_base, LoadedRod):
+        return of_base
+    if of_base != tip_map(rod.arm, rod.tol, frame="base"):
         raise InvalidInput("arm", repr(rod), "a Manipulator, or the tip map that it has")
-    return _without_loads(rod)
+    return _without_loads(of_base)
+
+
+def _compliance(rod: TipMap, activations: ArrayLike) -> Array:
+    """∂r/∂F [m/N] in the frame of a tip map, shape (n, 3, 3)."""
+    matrices, turn = yielding_rod(rod).compliance(activations), rod.pose.rotation
+    return matrices if rod.pose.is_identity else turn @ matrices @ turn.T
 
 
 @lru_cache(maxsize=16)

@@ -117,7 +117,7 @@ NAMES = {
         half_width high length memory radius radius_ratio residual_over_length revolution size
         taper thickness threshold tol width""",
     "whole number": "bins cells count depth family n seed segments sides",
-    "word": "color fiber method metric name quantity sampler view",
+    "word": "color fiber frame method metric name quantity sampler view",
     "words": "metrics names panels parameters",
     "flag": """bias durable keep_clouds keep_extent key legend overwrite prove_least rest smallest
         warn""",
@@ -230,6 +230,7 @@ CALLS: dict[str, Call] = {
     "forces.blocked_force": Call(lambda: dict(arm=HEAVY, places=TIP, direction=(1.0, 0.0, 0.0))),
     "inverse.prepared_map": Call(lambda: dict(arm=ARM)),
     "inverse.solve_inverse": Call(lambda: dict(arm=ARM, targets=TIP)),
+    "inverse.twin_hints": Call(lambda: dict(arm=ARM, targets=TIP)),
     "inverse.path.track_path": Call(lambda: dict(arm=ARM, path=TIP), kinds=dict(path="array")),
     "workspace.payload.payload_curve": Call(
         lambda: dict(arm=HEAVY, payloads=[0.1]), fine={"payloads": MANY}

@@ -123,6 +123,11 @@ TEXTS = {
     "the profile twice": TRUNK + "\n[profile]\n",
     "nulls": "length_m = null",
     "loads that never end": TRUNK + "[loads]\ntip_force_n = [1e300, 0, 0]\n",
+    "a base at the end of the world": TRUNK + "[base]\nposition_m = [1e300, 0, 0]\n",
+    "a base of a matrix of text": TRUNK + '[base]\npoints = [["1", 0, 0]]\n',
+    "a base of a thousand numbers": TRUNK + f"[base]\npoints = {[0.5] * 1000}\n",
+    "a base that is no table": TRUNK + 'base = "down"\n',
+    "a left-handed base": TRUNK + "[base]\npoints = [[1, 0, 0], [0, 1, 0], [0, 0, -1]]\n",
     "loads of text": TRUNK + '[loads]\ntip_force_n = ["1", 0, 0]\n',
 }
 

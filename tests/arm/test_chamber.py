@@ -10,9 +10,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import softreach as sr
-from softreach.arm import Chamber, LinearTaper, Manipulator, Material, Ring, Section, Tendon
+from softreach.arm import (
+    Chamber,
+    FiberArchitecture,
+    LinearTaper,
+    Manipulator,
+    Material,
+    Ring,
+    Section,
+    Tendon,
+)
 from softreach.arm.summary import design_warnings
-from softreach.arm.tables import tables
+from softreach.arm.tables import check_extension, tables
 from softreach.support.errors import InvalidDesign
 from tests.kinds import any_arms, layers_at
 from tests.oracles.sections import disc, pressure_load, stiffness
@@ -63,9 +72,9 @@ def test_a_chamber_pushes_as_the_quadrature_of_its_pressure_says(body, share):
 def test_a_chamber_lengthens_the_arm_and_bends_it_away_to_an_arc(pressure, offset):
     area = math.pi * 0.004**2
     zeta, curvature = 1 + pressure * area / K0, pressure * area * 0.008 / K1
-    angle = zeta * curvature * LENGTH
-    side = (1 - math.cos(angle)) / curvature
-    expected = [-side * math.cos(offset), -side * math.sin(offset), math.sin(angle) / curvature]
+    angle, bent = curvature * LENGTH, zeta / curvature
+    side = bent * (1 - math.cos(angle))
+    expected = [-side * math.cos(offset), -side * math.sin(offset), bent * math.sin(angle)]
     tip = sr.tip_positions(arm(chamber(offset=offset)), [[pressure]], tol=1e-11)[0]
     np.testing.assert_allclose(tip, expected, atol=1e-11)
 
@@ -103,6 +112,17 @@ def test_the_area_factor_scales_what_a_pressure_does():
     one, twice = (tables(arm(chamber(area_factor=f)), [0.0]) for f in (1.0, 2.0))
     np.testing.assert_allclose(twice.extension, 2 * one.extension, rtol=1e-15)
     np.testing.assert_allclose(twice.curvature, 2 * one.curvature, rtol=1e-15)
+
+
+def test_fibers_that_leave_no_length_of_matter_are_refused_also_where_pressure_lengthens_the_arm():
+    fiber = FiberArchitecture(extent=6.0, helical_angle=0.0, activation_bounds=(-5.0, 0.0))
+    alone = arm(fiber)
+    shortest = 1.0 - 5.0 * float(tables(alone, [0.0]).extension[0, 0])
+    assert shortest < 0
+    area = math.pi * 0.004**2
+    pressure = (1.0 - shortest) * K0 / area  # ζ = 1 and more
+    with pytest.raises(InvalidDesign, match="of matter itself, without forces; must keep ζ > 0"):
+        check_extension(arm(fiber, chamber(activation_bounds=(pressure, pressure))))
 
 
 def test_three_even_chambers_of_one_pressure_only_lengthen():

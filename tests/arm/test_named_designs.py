@@ -126,13 +126,14 @@ def test_the_muscles_of_the_trunk_do_what_elephants_do_with_them():
 
 
 def test_a_tendon_bends_the_robot_to_a_circle():
-    """κ = τ ρt/EI, a quarter turn over 0.2 m at 8 N, and the wire is shortened by τ/EA."""
+    """κ = τ ρt/EI per length at rest, a quarter turn over 0.2 m at 8 N, shortened by τ/EA."""
     arm = designs.three_tendon_robot()
     stiffness = 54e9 * math.pi / 4 * 0.0007**4
     curvature = 8 * 0.01 / stiffness
-    angle = curvature * 0.2 * (1 - 8 / (54e9 * math.pi * 0.0007**2))
+    radius = (1 - 8 / (54e9 * math.pi * 0.0007**2)) / curvature
+    angle = curvature * 0.2
     assert angle == pytest.approx(math.pi / 2, rel=1e-3)
-    circle = [0, (1 - math.cos(angle)) / curvature, math.sin(angle) / curvature]
+    circle = [0, radius * (1 - math.cos(angle)), radius * math.sin(angle)]
     np.testing.assert_allclose(tip(arm, 8, 0, 0), circle, rtol=0, atol=1e-12)
 
 
@@ -159,13 +160,14 @@ def test_the_next_helical_tendon_does_the_same_a_quarter_turn_on():
 
 
 def test_a_helical_tendon_bends_by_the_offset_and_the_slope_of_its_route():
-    """κ = τ ρt t3/EI with the slope ρt Ω/L = 0.1893 that the numbers of the source give."""
+    """κ ζ = τ ρt t3/EI with the slope ρt Ω/L = 0.1893 that the numbers of the source give."""
     arm = designs.helical_tendon_robot()
     slope = 0.01506 * 2 * math.pi / 0.5
     assert slope == pytest.approx(0.1893, abs=1e-4)
     expected = 15 * 0.01506 / math.hypot(1, slope) / (200e9 * math.pi / 4 * 0.001**4)
-    curvature = sr.configuration(arm, [15, 0, 0, 0]).curvature.values
-    np.testing.assert_allclose(np.linalg.norm(curvature[:, :2], axis=1), expected, rtol=1e-12)
+    shape = sr.configuration(arm, [15, 0, 0, 0])
+    bending = np.linalg.norm(shape.curvature.values[:, :2], axis=1) * shape.extension.values
+    np.testing.assert_allclose(bending, expected, rtol=1e-12)
 
 
 def test_a_chamber_bends_the_pneumatic_arm_to_a_circle_away_from_it():
@@ -173,8 +175,9 @@ def test_a_chamber_bends_the_pneumatic_arm_to_a_circle_away_from_it():
     area, modulus = math.pi * 0.004**2, 82.7e3
     pressure = 50e3
     curvature = pressure * area * 0.0075 / (modulus * math.pi / 4 * 0.0125**4)
-    angle = curvature * 0.15 * (1 + pressure * area / (modulus * math.pi * 0.0125**2))
-    circle = [0, -(1 - math.cos(angle)) / curvature, math.sin(angle) / curvature]
+    radius = (1 + pressure * area / (modulus * math.pi * 0.0125**2)) / curvature
+    angle = curvature * 0.15
+    circle = [0, -radius * (1 - math.cos(angle)), radius * math.sin(angle)]
     np.testing.assert_allclose(tip(arm, pressure, 0, 0), circle, rtol=0, atol=1e-12)
 
 

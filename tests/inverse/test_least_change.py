@@ -13,6 +13,7 @@ from softreach.inverse import Status, solve_inverse
 from softreach.rod import TipMap, tip_map, tip_positions
 from softreach.support.errors import InvalidInput
 from tests.inverse.test_many_bundles import changes, six_bundles
+from tests.kinds import fibers_and_a_tendon
 
 OVERLOOKED = np.array([-0.6582, -0.8974, -1.036, -1.4149])
 LOCAL_MINIMA = [  # edges whose tips were solved with a larger activation: bundles, design, row
@@ -143,7 +144,16 @@ def test_the_least_compromise_with_a_direction_is_not_proved():
         )
 
 
-@pytest.mark.parametrize("design", [designs.minimal_trunk, designs.redundant_trunk, six_bundles])
+@pytest.mark.parametrize(
+    "design",
+    [
+        designs.minimal_trunk,
+        designs.redundant_trunk,
+        six_bundles,
+        fibers_and_a_tendon,
+        designs.three_chamber_arm,
+    ],
+)
 def test_the_remainder_of_the_linearization_is_within_the_bound_of_its_cell(design):
     arm = design()
     rod, rng = tip_map(arm), np.random.default_rng(0)

@@ -16,8 +16,8 @@ from softreach.support.errors import InvalidInput
 from tests.bodies import oracle_rod
 from tests.oracles import loaded_rod
 
-TARGETS = 150
-FEW = 3
+TARGETS = 60
+FEW = 2
 
 
 def loaded(arm: Manipulator) -> LoadedRod:
@@ -35,8 +35,8 @@ def hanging(payload: float, **loads) -> Manipulator:
 
 @pytest.fixture(scope="module")
 def heavy() -> Manipulator:
-    """An arm that is torn: a quarter of a percent of its activations are unstable, some have no
-    equilibrium."""
+    """An arm that is torn: some of its activations have no equilibrium, and where it is its own
+    mirror image some are unstable."""
     return hanging(0.020)
 
 
@@ -112,8 +112,10 @@ def test_a_shooting_from_the_base_puts_the_tip_of_a_root_at_its_target(heavy, st
         assert np.linalg.norm(tip - targets[several]) <= 1e-6 * heavy.length
 
 
-def test_unstable_activations_are_no_answers(heavy, samples):
-    gamma, found = samples
+def test_unstable_activations_are_no_answers(heavy):
+    gamma = np.random.default_rng(0).uniform(*heavy.bounds.T, (1000, 3))
+    gamma[:, 1] = gamma[:, 0]  # one that leans a little would fall to that side
+    found = loaded(heavy).equilibria(gamma)
     unstable = found.status == TipStatus.UNSTABLE
     assert unstable.sum() >= FEW
     solutions = solve_inverse(heavy, found.tips[unstable][:FEW])

@@ -2,9 +2,9 @@
 
 Links of equal length carry the frames; springs between them bend and twist, each link stretches.
 The clamp and the tip have half a spring each. With the rotation of a spring as its Cayley vector
-w, u = w/(ζ̂ ℓ) over the length ℓ that the spring stands for, the energy is
+w, u = w/(η ℓ) over the length ℓ that the spring stands for, the energy is
 
-    Σ ½ ℓ ζ̂ (u - û)·K(u - û) + Σ ½ h ζ̂ K0 (ζ/ζ̂ - 1)² - work of the dead forces
+    Σ ½ ℓ η (u - û)·K(u - û) + Σ ½ h K0 (ζ - ζ̂)²/η - work of the dead forces
 
 and tends to that of the rod with the square of the links' length h. Moments and following forces
 have no potential and are refused. Second derivatives are imaginary parts of the first.
@@ -65,10 +65,10 @@ class Chain:
 
     @cached_property
     def span(self) -> Array:
-        """Stretched length ζ̂ ℓ that each spring stands for, shape (links + 1,)."""
+        """Length η ℓ that each spring stands for, shape (links + 1,)."""
         rest = np.full(self.links + 1, self.h)
         rest[[0, -1]] = self.h / 2
-        return rest * [self.rod.stretch(z) for z in self.joints]
+        return rest * [self.rod.grown(z) for z in self.joints]
 
     @cached_property
     def stiffness(self) -> Array:
@@ -88,8 +88,8 @@ class Chain:
 
     @cached_property
     def axial(self) -> Array:
-        """K0 of each link, shape (links,)."""
-        return np.array([self.rod.axial(z) for z in self.centers])
+        """K0/η of each link, shape (links,)."""
+        return np.array([self.rod.axial(z) / self.rod.grown(z) for z in self.centers])
 
     @cached_property
     def weight(self) -> Array:
@@ -141,7 +141,7 @@ class Chain:
         frames = self._frames(w[None])[0]
         bent = w / self.span[:, None] - self.curvature
         elastic = 0.5 * np.sum(self.span[:, None] * self.stiffness * bent**2)
-        stretched = self.axial * self.stretch * (zeta / self.stretch - 1) ** 2
+        stretched = self.axial * (zeta - self.stretch) ** 2
         work = np.sum(self.h * zeta[:, None] * frames[1:-1, :, 2] * self.pull)
         work += frames[-1] @ np.array(self.loads.lever) @ self.weight
         return float(elastic + 0.5 * self.h * stretched.sum() - work)
@@ -152,7 +152,7 @@ class Chain:
         w, zeta = self._parts(batch)
         frames = self._frames(w)
         axes = frames[:, 1:-1, :, 2]
-        along = self.axial * (zeta / self.stretch - 1) - np.sum(axes * self.pull, axis=-1)
+        along = self.axial * (zeta - self.stretch) - np.sum(axes * self.pull, axis=-1)
         torque = np.cross(self.h * zeta[..., None] * axes, self.pull)
         lever = frames[:, -1] @ np.array(self.loads.lever)
         torque = np.concatenate([torque, np.cross(lever, self.weight)[:, None]], axis=1)

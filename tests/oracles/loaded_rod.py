@@ -1,11 +1,11 @@
 """Equilibria of a loaded rod by shooting from its base, in the fixed frame.
 
-An extensible rod that bends and twists but does not shear, about the shape with the stretch ζ̂(Z)
-and the curvature û(Z) per length of it that it has without loads:
+An extensible rod that bends and twists but does not shear, about the shape that it has without
+loads: with the stretch ζ̂(Z) and the curvature û(Z) per length of η(Z), which is ζ̂ but for forces:
 
-    r' = ζ d3,    dᵢ' = ζ̂ u × dᵢ,    n' = -f,    m' = -r' × n
+    r' = ζ d3,    dᵢ' = η u × dᵢ,    n' = -f,    m' = -r' × n
 
-    u = û + K⁻¹ m,    ζ = ζ̂ (1 + n·d3/K0)
+    u = û + K⁻¹ m,    ζ = ζ̂ + η n·d3/K0
 
 with m, n, r and the directors in the fixed frame. At the base the pose and all dead forces are
 known; unknown is m(0), and with a force that follows the tip also that force. SciPy's DOP853
@@ -217,13 +217,13 @@ class _Shooting:
     def _rates(self, z: float, flat: Complex, load: Complex) -> Complex:
         y, rod = flat.reshape(18, -1), self.rod
         frame, moment, force = y[3:12].reshape(3, 3, -1), y[12:15], y[15:]
-        k1, k3, stretch = rod.bending(z), rod.torsion(z), rod.stretch(z)
+        k1, k3, growth = rod.bending(z), rod.torsion(z), rod.grown(z)
         in_directors = (frame * moment[:, None]).sum(axis=0)
         u = np.asarray(rod.curvature(z))[:, None] + in_directors / np.array([[k1], [k1], [k3]])
-        turn = _turned(frame, stretch * u)
+        turn = _turned(frame, growth * u)
         thrust = (frame[:, 2] * force).sum(axis=0)
         rates = np.empty_like(y)
-        rates[:3] = stretch * (1 + thrust / rod.axial(z)) * frame[:, 2]
+        rates[:3] = (rod.stretch(z) + growth * thrust / rod.axial(z)) * frame[:, 2]
         rates[3:12] = _cross(turn[:, None], frame).reshape(9, -1)
         rates[12:15] = -_cross(rates[:3], force)
         rates[15:] = -self._per_length(z)[:, None] * load

@@ -30,12 +30,18 @@ class Rod:
     """Mass per length Z [kg/m]."""
     stretch: Number = lambda z: 1.0
     """ζ̂(Z) [-]."""
+    growth: Number | None = None
+    """η(Z) [-], what of ζ̂ changes the length of matter at rest; all of it if None."""
     curvature: Vector = lambda z: ZERO
-    """û(Z) per stretched length, in the directors [1/m]."""
+    """û(Z) per length of η, in the directors [1/m]."""
     breaks: tuple[float, ...] = ()
     """Where these are not smooth [m]."""
     base: tuple[Triple, Triple, Triple] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     """d1, d2, d3 at the base, in the fixed frame."""
+
+    def grown(self, z: float) -> float:
+        """η(Z) [-]."""
+        return (self.growth or self.stretch)(z)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,6 +1,6 @@
 """The linear law of tendons, and how far it is from the follower load.
 
-N = -τ t3 and M = -p × τ t with the tangent t of the rod at rest, ζ = 1 + N/K0, u = K⁻¹ M. The
+N = -τ t3 and M = -p × τ t with the tangent t of the rod at rest, ζ = 1 + N/K0, ω = K⁻¹ M. The
 tendon of the bent rod has b = p' + ω × p + ζ e3 instead of p' + e3: the bend, of the curvature κ,
 shortens it by κρt, the thrust by 1 - ζ, the twist turns it by ω3 ρt. For the slope β = atan(ρt θ')
 of the tendon they together turn its tangent by
@@ -9,11 +9,7 @@ of the tendon they together turn its tangent by
 
 the last for a solid rod of the radius R, to first order. The linear law is wrong by the part
 δβ tan β of bending and extension and by δβ / tan β of twist, thus of order κρt, second order in the
-tension. A parallel tendon does not turn: the linear law is exact for it with the law "activated".
-
-With the law "reference", curvature per length at rest, the linear law bends less by the factor
-ζ = 1 - τ/K0, which for a solid rod is 1 - κρt (R/2ρt)²: of order κρt too, also where β = 0, and
-as a rule the larger part.
+tension. A parallel tendon does not turn: for it the linear law is that of the follower load.
 """
 
 from __future__ import annotations
@@ -26,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
-from tests.oracles.tendon_rod import Law, Rod, Shape, Tendon, follower_shape
+from tests.oracles.tendon_rod import Rod, Shape, Tendon, follower_shape
 
 Array = NDArray[np.float64]
 
@@ -45,7 +41,7 @@ class Deviation(NamedTuple):
 
 
 def linear_strains(rod: Rod, tendons: Sequence[Tendon], z: float) -> Array:
-    """(ω, ζ) by the linear law, ω = ζ K⁻¹ M per length at rest."""
+    """(ω, ζ) by the linear law."""
     *bending, axial = (k(z) for k in rod.stiffness)
     force, moment = 0.0, np.zeros(3)
     for tendon in tendons:
@@ -55,8 +51,7 @@ def linear_strains(rod: Rod, tendons: Sequence[Tendon], z: float) -> Array:
             t /= np.linalg.norm(t)
             force -= tendon.tension * t[2]
             moment -= np.cross(p, tendon.tension * t)
-    zeta = 1 + force / axial
-    return np.append(zeta * moment / bending, zeta)
+    return np.append(moment / bending, 1 + force / axial)
 
 
 def linear_shape(rod: Rod, tendons: Sequence[Tendon], stations: ArrayLike) -> Shape:
@@ -96,12 +91,10 @@ def shape_of(
     return Shape(states[:3].T, states[3:].T.reshape(-1, 3, 3), along[:, 3], along[:, :3])
 
 
-def linear_law_deviation(
-    rod: Rod, tendons: Sequence[Tendon], *, law: Law = "reference", stations: int = 33
-) -> Deviation:
+def linear_law_deviation(rod: Rod, tendons: Sequence[Tendon], *, stations: int = 33) -> Deviation:
     """How far the linear law is from the follower load for tendons on a rod."""
     z = np.linspace(0.0, rod.length, stations)
-    exact = follower_shape(rod, tendons, z, law=law)
+    exact = follower_shape(rod, tendons, z)
     linear = linear_shape(rod, tendons, z)
     kappa = np.linalg.norm(exact.curvature[:, :2], axis=1) / exact.extension
     radius = np.max([np.broadcast_to(tendon.radius(z), z.shape) for tendon in tendons], axis=0)

@@ -12,10 +12,7 @@ the couple p × f, and at its anchor with the force -τ t and the couple -p × �
 The solution starts at the tip, where nothing is left to bear, and walks to the base as an initial
 value problem: f contains ω' and ζ', for which the balances are solved at each point.
 
-`law` says what ω has to do with m. "reference": m = K ω, an elastic rod whose energy is per length
-at rest, as in Rucker and Webster. "activated": m = K ω/ζ, curvature per length of the stretched
-rod, as in the linear law of the library, which takes t at rest. Bent by parallel tendons the two
-differ by the factor ζ.
+With m = K ω and n3 = K0 (ζ - 1): an elastic rod whose energy is per length at rest.
 """
 
 from __future__ import annotations
@@ -24,7 +21,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import Chebyshev
@@ -34,7 +31,6 @@ from scipy.optimize import root
 
 Array = NDArray[np.float64]
 Function = Callable[[Array], ArrayLike]
-Law = Literal["reference", "activated"]
 
 _E3 = np.array([0.0, 0.0, 1.0])
 _DEGREE = 40
@@ -106,9 +102,7 @@ class Shape(NamedTuple):
     """ω per length at rest, in the directors [1/m], shape (station, 3)."""
 
 
-def follower_shape(
-    rod: Rod, tendons: Sequence[Tendon], stations: ArrayLike, *, law: Law = "reference"
-) -> Shape:
+def follower_shape(rod: Rod, tendons: Sequence[Tendon], stations: ArrayLike) -> Shape:
     """The rod pulled by the tendons, from the balances of force and moment."""
     z = np.asarray(stations, float)
     ends = _breaks(rod, tendons)[::-1]
@@ -116,9 +110,9 @@ def follower_shape(
     pose, above, parts = np.concatenate([np.zeros(3), np.eye(3).ravel()]), (), []
     for top, bottom in pairwise(ends):
         pulled = [tendon for tendon in tendons if tendon.anchor >= top]
-        strains, n = _across(rod, above, pulled, top, slack, law)
+        strains, n = _across(rod, above, pulled, top, slack)
         walk = solve_ivp(
-            _Walk(rod, pulled, law),
+            _Walk(rod, pulled),
             (top, bottom),
             np.concatenate([pose, n[:2], strains]),
             method="DOP853",
@@ -134,9 +128,7 @@ def follower_shape(
     return _from_base(_sampled(parts, z), pose)
 
 
-def balanced_strains(
-    rod: Rod, tendons: Sequence[Tendon], z: float, *, law: Law = "reference"
-) -> Array:
+def balanced_strains(rod: Rod, tendons: Sequence[Tendon], z: float) -> Array:
     """(ω, ζ) where the section at Z bears what the tendons that cross it pull.
 
     Cut at Z, the part beyond is held by n + Σ τ t = 0 and m + Σ p × τ t = 0. The same follows from
@@ -145,7 +137,7 @@ def balanced_strains(
     pulled = [tendon for tendon in tendons if tendon.anchor >= z]
 
     def unbalanced(strains: Array) -> Array:
-        return _resultants(rod, z, strains, law) + _pull(pulled, z, strains)[[3, 4, 5, 2]]
+        return _resultants(rod, z, strains) + _pull(pulled, z, strains)[[3, 4, 5, 2]]
 
     return _solved(unbalanced, np.array([0.0, 0.0, 0.0, 1.0]))
 
@@ -153,8 +145,8 @@ def balanced_strains(
 class _Walk:
     """d/dZ of (r, d1, d2, d3, n1, n2, ω, ζ)."""
 
-    def __init__(self, rod: Rod, tendons: Sequence[Tendon], law: Law) -> None:
-        self.rod, self.tendons, self.power = rod, tendons, int(law == "activated")
+    def __init__(self, rod: Rod, tendons: Sequence[Tendon]) -> None:
+        self.rod, self.tendons = rod, tendons
         self.slopes = [k.deriv() for k in rod.stiffness]
 
     def __call__(self, z: float, y: Array) -> Array:
@@ -163,10 +155,9 @@ class _Walk:
         n = np.array([y[12], y[13], stiff[3] * (zeta - 1)])
         pull, pull_rate = self._tendons(z, omega, zeta)
         # (m, n3)' = own_rate (ω', ζ') + own, and the tendons add pull_rate (ω', ζ') + pull
-        m = stiff[:3] * omega / zeta**self.power
-        own = np.append(slope[:3] * omega / zeta**self.power, slope[3] * (zeta - 1))
-        own_rate = np.diag(stiff / np.array([*[zeta**self.power] * 3, 1.0]))
-        own_rate[:3, 3] = -self.power * m / zeta
+        m = stiff[:3] * omega
+        own = np.append(slope[:3] * omega, slope[3] * (zeta - 1))
+        own_rate = np.diag(stiff)
         turning = np.append(np.cross(omega, m) + zeta * np.cross(_E3, n), np.cross(omega, n)[2])
         order = [3, 4, 5, 2]
         strain_rate = np.linalg.solve(own_rate + pull_rate[order], -(own + turning + pull[order]))
@@ -196,7 +187,6 @@ def _across(
     below: Sequence[Tendon],
     z: float,
     known: Sequence[Array],
-    law: Law,
 ) -> tuple[Array, Array]:
     """Strains and n just below an anchor, where those just above are known.
 
@@ -204,23 +194,21 @@ def _across(
     n + Σ τ t and m + Σ p × τ t do not jump.
     """
     strains, n = known
-    m = _resultants(rod, z, strains, law)[:3]
+    m = _resultants(rod, z, strains)[:3]
     whole = np.concatenate([n, m]) + _pull(above, z, strains)
 
     def jump(below_strains: Array) -> Array:
-        held = _resultants(rod, z, below_strains, law)
+        held = _resultants(rod, z, below_strains)
         return held + _pull(below, z, below_strains)[[3, 4, 5, 2]] - whole[[3, 4, 5, 2]]
 
     found = _solved(jump, strains)
     return found, (whole - _pull(below, z, found))[:3]
 
 
-def _resultants(rod: Rod, z: float, strains: Array, law: Law) -> Array:
+def _resultants(rod: Rod, z: float, strains: Array) -> Array:
     """(m, n3) of the strains (ω, ζ)."""
     *bending, axial = (k(z) for k in rod.stiffness)
-    omega, zeta = strains[:3], strains[3]
-    u = omega / zeta if law == "activated" else omega
-    return np.append(np.array(bending) * u, axial * (zeta - 1))
+    return np.append(np.array(bending) * strains[:3], axial * (strains[3] - 1))
 
 
 def _pull(tendons: Sequence[Tendon], z: float, strains: Array) -> Array:

@@ -28,7 +28,6 @@ STRAIGHT = Tendon(
     radius=lambda z: 0.015 + 0 * z, angle=lambda z: 0.6 + 0 * z, tension=8.0, anchor=LENGTH
 )
 HELIX = replace(STRAIGHT, angle=lambda z: 0.6 + 7.0 * z)
-LAWS = ["reference", "activated"]
 
 
 def arc(extension, angle, length, heading):
@@ -43,19 +42,17 @@ def arc(extension, angle, length, heading):
 
 
 def test_a_parallel_tendon_bends_to_an_arc_and_shortens_by_its_tension_over_k0():
-    """Total angle τ ρt L/K1 in the elastic rod; 1 - τ/K0 times this with curvature per stretch."""
-    zeta, turn = 1 - 8.0 / 900.0, 8.0 * 0.015 * LENGTH / 0.09
-    for law, angle in (("reference", turn), ("activated", zeta * turn)):
-        shape = follower_shape(ROD, [STRAIGHT], [0.0, LENGTH], law=law)
-        np.testing.assert_allclose(shape.extension, zeta, rtol=1e-12)
-        np.testing.assert_allclose(shape.place[-1], arc(zeta, angle, LENGTH, 0.6), atol=1e-11)
-        np.testing.assert_allclose(np.arccos(shape.frame[-1, 2, 2]), angle, rtol=1e-10)
+    """Total angle τ ρt L/K1."""
+    zeta, angle = 1 - 8.0 / 900.0, 8.0 * 0.015 * LENGTH / 0.09
+    shape = follower_shape(ROD, [STRAIGHT], [0.0, LENGTH])
+    np.testing.assert_allclose(shape.extension, zeta, rtol=1e-12)
+    np.testing.assert_allclose(shape.place[-1], arc(zeta, angle, LENGTH, 0.6), atol=1e-11)
+    np.testing.assert_allclose(np.arccos(shape.frame[-1, 2, 2]), angle, rtol=1e-10)
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_opposite_tendons_of_the_same_tension_only_shorten(law):
+def test_opposite_tendons_of_the_same_tension_only_shorten():
     other = replace(STRAIGHT, angle=lambda z: 0.6 + math.pi + 0 * z)
-    shape = follower_shape(ROD, [STRAIGHT, other], [LENGTH], law=law)
+    shape = follower_shape(ROD, [STRAIGHT, other], [LENGTH])
     np.testing.assert_allclose(shape.place[0], [0, 0, LENGTH * (1 - 16 / 900)], atol=1e-13)
 
 
@@ -69,13 +66,12 @@ def test_beyond_its_anchor_the_rod_is_straight():
     np.testing.assert_allclose(shape.extension[1:], 1.0, rtol=1e-12)
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_distributed_tendon_loads_balance_as_the_cut_part_does(law):
+def test_distributed_tendon_loads_balance_as_the_cut_part_does():
     """Two tendons, one of them anchored midway, so that the other has a kink."""
     tendons = [HELIX, replace(STRAIGHT, anchor=0.3, tension=5.0, angle=lambda z: 2.0 - 3 * z)]
     z = np.linspace(0, LENGTH, 9)
-    walked = follower_shape(TAPERED, tendons, z, law=law)
-    direct = np.array([balanced_strains(TAPERED, tendons, s, law=law) for s in z])
+    walked = follower_shape(TAPERED, tendons, z)
+    direct = np.array([balanced_strains(TAPERED, tendons, s) for s in z])
     np.testing.assert_allclose(walked.extension, direct[:, 3], atol=1e-10)
     np.testing.assert_allclose(walked.curvature, direct[:, :3], atol=1e-8)
 
@@ -95,18 +91,17 @@ def test_turning_the_tendons_turns_the_shape():
     np.testing.assert_allclose(after, [[c, -s, 0], [s, c, 0], [0, 0, 1]] @ before, atol=1e-10)
 
 
-def test_the_linear_law_is_exact_for_parallel_tendons_with_curvature_per_stretched_length():
-    exact = follower_shape(TAPERED, [STRAIGHT], [0.2, LENGTH], law="activated")
+def test_the_linear_law_is_that_of_the_follower_load_for_parallel_tendons():
+    exact = follower_shape(TAPERED, [STRAIGHT], [0.2, LENGTH])
     linear = linear_shape(TAPERED, [STRAIGHT], [0.2, LENGTH])
     np.testing.assert_allclose(linear.place, exact.place, atol=1e-11)
     np.testing.assert_allclose(linear.extension, exact.extension, rtol=1e-12)
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_the_linear_law_misses_a_helical_tendon_at_second_order_in_the_tension(law):
+def test_the_linear_law_misses_a_helical_tendon_at_second_order_in_the_tension():
     tensions = np.array([0.01, 0.02, 0.04])
     found = [
-        linear_law_deviation(ROD, [replace(HELIX, tension=tension)], law=law, stations=3)
+        linear_law_deviation(ROD, [replace(HELIX, tension=tension)], stations=3)
         for tension in tensions
     ]
     for field, order in (("bend", 1.0), ("tip", 2.0), ("relative", 1.0)):
@@ -126,9 +121,8 @@ def test_bending_turns_a_tendon_on_a_solid_rod_by_the_radius_and_poisson_s_ratio
         torsion=lambda z: area * outer**2 / 4 / (1 + nu) + 0 * z,
     )
     tendon = replace(HELIX, tension=1e-3)
-    exact = balanced_strains(rod, [tendon], 0.1, law="activated")
+    exact = balanced_strains(rod, [tendon], 0.1)
     linear = linear_strains(rod, [tendon], 0.1)
     bend = radius * np.hypot(*linear[:2])
     turn = bend * slope / (1 + slope**2) * ((outer / (2 * radius)) ** 2 - nu)
-    u, u_linear = exact[2] / exact[3], linear[2] / linear[3]
-    assert u / u_linear - 1 == pytest.approx(turn / slope, rel=1e-3)
+    assert exact[2] / linear[2] - 1 == pytest.approx(turn / slope, rel=1e-3)

@@ -13,7 +13,7 @@ from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.shooting import Rung
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import LoadTables
-from softreach.rod.tip_map import TipStatus
+from softreach.rod.tip_map import TipStatus, has_tip
 from softreach.support.errors import InvalidInput
 from tests.bodies import Uniform, rubber, uniform
 from tests.oracles import elastica
@@ -141,7 +141,7 @@ def test_an_arm_squeezed_to_nothing_has_no_equilibrium():
 def test_steps_of_an_arm_that_never_rests_are_no_fewer_than_those_of_the_free_one():
     arm = stubby(1.5).arm
     rod = LoadedRod(arm.with_bounds(np.full((3, 2), [-1e-3, 0.0])), 1e-6)
-    assert (rod.status(rod.box.corners()) == TipStatus.NO_EQUILIBRIUM).all()
+    assert not has_tip(rod.status(rod.box.corners())).any()
     assert rod.steps >= FreeRod(rod.arm, 1e-6).steps
     with pytest.raises(InvalidInput, match="has an equilibrium"):
         rod.strain_range([0.1])

@@ -16,6 +16,7 @@ from softreach.kernels.rod import reference
 from softreach.rod.free import FreeRod
 from softreach.rod.rods import tip_map
 from softreach.support.errors import InvalidInput
+from tests.kinds import fibers_and_a_tendon
 from tests.laws import arm_of, arms, in_box, integrated_tip, single
 
 
@@ -131,7 +132,7 @@ def test_tips_equal_an_independent_integrator(arm):
     np.testing.assert_allclose(tips, expected, atol=1e-9 * arm.length)
 
 
-@given(arm=arms())
+@given(arm=arms() | st.just(fibers_and_a_tendon()))
 def test_kernels_equal_the_reference(arm):
     gamma = in_box(arm, 5)
     nodes = nodes_of(arm, 1e-9)
@@ -140,7 +141,7 @@ def test_kernels_equal_the_reference(arm):
     np.testing.assert_allclose(tips, expected, atol=1e-12 * arm.length)
 
 
-@given(arm=arms())
+@given(arm=arms() | st.just(fibers_and_a_tendon()))
 def test_the_jacobian_is_the_complex_step_derivative_of_the_reference(arm):
     gamma = in_box(arm, 2)
     nodes = nodes_of(arm, 1e-6)

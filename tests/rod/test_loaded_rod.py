@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from softreach.arm import designs
+from softreach.arm import Chamber, Tendon, designs
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.tables import tables
 from softreach.cloud.curvature import stream_statistics
@@ -88,6 +88,67 @@ def test_a_shooting_from_the_base_finds_the_same_rod(loads):
         np.testing.assert_allclose(shapes.frames.position[k], expected.place, atol=2e-9)
         np.testing.assert_allclose(shapes.frames.directors[k], expected.frame, atol=1e-8)
         np.testing.assert_allclose(moment, expected.moment, atol=5e-8)
+
+
+@of_kinds
+def test_a_shooting_from_the_base_finds_an_arm_of_fibers_and_forces(loads):
+    """Curvature counts by the length that the fiber gives; tendon and chamber leave that."""
+    actuators = (
+        TRUNK.actuators[0],
+        Tendon(distance_ratio=0.8, revolution=1.0, offset=2.0, activation_bounds=(0, 60)),
+        Chamber(distance_ratio=0.4, radius_ratio=0.3, offset=4.0, activation_bounds=(0, 1e5)),
+    )
+    trunk = TRUNK.replace(actuators=())
+    rod = loaded(loads, arm=rubber(trunk, loads).replace(actuators=actuators))
+    gamma = np.array([[-0.8, 60.0, 5e4]])
+    expected = loaded_rod.equilibrium(
+        *oracle_rod(rod.arm, rod.body, gamma[0], loads), [0.0, 1.0], rtol=1e-10
+    )
+    np.testing.assert_allclose(rod.tips(gamma)[0], expected.tip, atol=1e-9)
+
+
+PULLS = {
+    "tendon": (0.04, Tendon(distance=0.008, offset=0.4, activation_bounds=(0, 8)), 6.0, 1.0),
+    "chamber": (
+        0.15,
+        Chamber(distance=0.008, radius=0.004, offset=0.4, activation_bounds=(0, 2e5)),
+        1e5,
+        -math.pi * 0.004**2,
+    ),
+}
+
+
+@pytest.mark.parametrize(("length", "actuator", "activation", "pull"), PULLS.values(), ids=PULLS)
+def test_a_parallel_tendon_or_chamber_is_the_forces_that_it_puts_on_a_passive_arm(
+    length, actuator, activation, pull
+):
+    """It pulls along d3 at the tip, with a moment, and where the arm bends toward its center.
+
+    Forces on `points` sections stand for those along the arm, which is wrong at second order.
+    """
+    profile = TRUNK.profile.replace(length=length, outer_radius=0.012, taper=0.0)
+    passive = rubber(TRUNK.replace(actuators=(), profile=profile), Loads(gravity=(0, 0, 0)))
+    driven = FreeRod(passive.replace(actuators=(actuator,), loads=None), 1e-11)
+    place = 0.008 * np.array([math.cos(0.4), math.sin(0.4), 0.0])
+    apart = []
+    for points in (100, 200):
+        z = np.linspace(0.0, length, points + 1)
+        stations = np.append(0.5 * (z[1:] + z[:-1]), length)
+        directors = driven.frames([[activation]], stations).directors[0]
+        force = -pull * activation * directors[:-1, 2]
+        loads = Loads(
+            gravity=(0, 0, 0),
+            tip_force=tuple(force[-1]),
+            tip_moment=tuple(np.cross(place, [0, 0, -pull * activation]) @ directors[-1]),
+            point_loads=tuple(
+                PointLoad(station=float(at), force=tuple(one))
+                for at, one in zip(z[1:-1], force[:-1] - force[1:], strict=True)
+            ),
+        )
+        tip = LoadedRod(passive.replace(loads=loads), 1e-9).tips(np.zeros((1, 0)))
+        apart.append(np.linalg.norm(tip - driven.tips([[activation]])) / length)
+    assert apart[1] < 1e-6
+    assert apart[0] / apart[1] == pytest.approx(4.0, rel=0.02)
 
 
 @pytest.mark.parametrize("load", [1.0, 10.0])
@@ -263,6 +324,7 @@ def test_the_walk_is_that_of_the_reference():
         force = float(weight(z) - weight(TRUNK.length)) + 0.3 * 9.81
         return loaded_reference.Section(
             1.0 + float(at.extension[0] @ gamma[0]),
+            1.0 + float(at.growth[0] @ gamma[0]),
             at.curvature[0] @ gamma[0],
             np.array([bending, bending, torsion]),
             axial,

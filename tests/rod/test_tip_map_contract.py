@@ -16,16 +16,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import softreach as sr
-from softreach.arm import Manipulator, designs
+from softreach.arm import Base, Manipulator, designs
 from softreach.arm.loads import Loads
 from softreach.cloud.curvature import stream_statistics
 from softreach.rod import equilibria
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.rod import LoadedRod
+from softreach.rod.placed import PlacedRod
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.bodies import rubber
+from tests.kinds import fibers_and_a_tendon
 from tests.laws import arms, in_box, integrated_tip
 
 Make = Callable[[Manipulator, float], TipMap]
@@ -36,7 +38,26 @@ def sideways(arm: Manipulator, tol: float) -> LoadedRod:
     return LoadedRod(rubber(arm, Loads(gravity=(9.81, 0.0, 0.0), payload=0.1)), tol)
 
 
-MAKERS: dict[str, Make] = {"free": FreeRod, "loaded": sideways}
+POSE = Base(position=(0.3, -0.2, 1.5), points="-x", turn=0.7)
+
+
+def placed(arm: Manipulator, tol: float) -> PlacedRod:
+    """An arm whose base is anywhere in the world."""
+    return PlacedRod(FreeRod(arm.replace(base=POSE), tol))
+
+
+def placed_and_loaded(arm: Manipulator, tol: float) -> PlacedRod:
+    """The same with its weight and 100 g, which fall in the world."""
+    heavy = rubber(arm, Loads(payload=0.1)).replace(base=POSE)
+    return PlacedRod(LoadedRod(heavy, tol))
+
+
+MAKERS: dict[str, Make] = {
+    "free": FreeRod,
+    "loaded": sideways,
+    "placed": placed,
+    "placed and loaded": placed_and_loaded,
+}
 
 pytestmark = pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS.keys())
 
@@ -46,6 +67,7 @@ DESIGNS = {
     "one bundle": designs.minimal_trunk().replace(actuators=designs.minimal_trunk().actuators[:1]),
     "one held": designs.minimal_trunk().with_bounds(((-1, 0), (-0.5, -0.5), (-1, 0.3))),
     "wide": designs.minimal_trunk(taper=-0.05),
+    "fibers and a tendon": fibers_and_a_tendon(),
 }
 of_designs = pytest.mark.parametrize("arm", DESIGNS.values(), ids=DESIGNS.keys())
 
@@ -163,15 +185,17 @@ def test_twists_move_the_tip_as_slopes_do_and_turn_its_frame(make, arm):
 
 
 @of_designs
-def test_frames_start_upright_end_at_the_tips_and_are_orthonormal(make, arm):
+def test_frames_start_at_the_base_end_at_the_tips_and_are_orthonormal(make, arm):
     rod = make(arm, 1e-9)
     gamma = activations(rod, 20)
     stations = rod.length * np.array([0.0, 0.3, 0.3, 0.8, 1.0])
     frames = rod.frames(gamma, stations)
     assert frames.position.shape == (len(gamma), 5, 3)
     assert frames.directors.shape == (len(gamma), 5, 3, 3)
-    np.testing.assert_array_equal(frames.position[:, 0], 0.0)
-    np.testing.assert_array_equal(frames.directors[:, 0], np.tile(np.eye(3), (len(gamma), 1, 1)))
+    clamped = np.broadcast_to(rod.pose.position, (len(gamma), 3))
+    np.testing.assert_array_equal(frames.position[:, 0], clamped)
+    axes = np.broadcast_to(rod.pose.rotation.T, (len(gamma), 3, 3))
+    np.testing.assert_array_equal(frames.directors[:, 0], axes)
     np.testing.assert_array_equal(frames.position[:, 1], frames.position[:, 2])
     gram = frames.directors @ np.swapaxes(frames.directors, -1, -2)
     np.testing.assert_allclose(gram, np.broadcast_to(np.eye(3), gram.shape), atol=1e-12)
@@ -190,7 +214,7 @@ def test_a_frame_does_not_depend_on_the_other_stations(make, arm):
     alone = rod.frames(gamma, [0.5 * rod.length])
     np.testing.assert_allclose(alone.position[:, 0], many.position[:, 4], atol=2e-9 * rod.length)
     base = rod.frames(gamma, [0.0])
-    np.testing.assert_array_equal(base.position, 0.0)
+    np.testing.assert_array_equal(base.position[:, 0] - rod.pose.position, 0.0)
 
 
 @of_designs

@@ -11,7 +11,7 @@ import numpy as np
 from softreach.studio import Start, Studio
 from softreach.studio.session import Session
 
-PATIENCE = 40.0  # [s] a loaded machine compiles shaders slowly
+PATIENCE = 300.0  # [s] a loaded machine compiles shaders slowly
 SIZE = 900, 560
 HARMLESS = (
     "Tried to update non-existent component",  # it was removed before the page heard of it

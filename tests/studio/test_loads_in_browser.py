@@ -45,7 +45,7 @@ def become(tab, condition, what):
 
 def test_loads_are_put_on_shown_refused_saved_and_taken_off(loads_tab, tmp_path):
     tab, free = loads_tab, loads_tab.session.reach
-    tab.choose("gravity", "hanging")
+    tab.choose("gravity", "up")
     become(tab, lambda one: one.gravity == (0.0, 0.0, 9.81), "gravity acts")
     loaded = tab.session.reach
     assert loaded.arm == tab.session.state.design
@@ -142,3 +142,16 @@ def test_loads_are_put_on_shown_refused_saved_and_taken_off(loads_tab, tmp_path)
     tab.choose("gravity", "sideways")
     tab.page.get_by_role("alert").filter(has_text="on the tab Parts").wait_for()
     assert loads(tab) is None
+
+
+def test_an_arm_is_hung_from_its_base_and_its_weight_pulls_it_down(loads_tab):
+    tab = loads_tab
+    tab.choose("base", "down (hanging)")
+    tab.wait(lambda: tab.session.state.design.base == sr.Base(points="down"), "it hangs")
+    tab.settle()
+    assert tab.session.tip[2] == pytest.approx(-1.0)
+    tab.choose("gravity", "down")
+    become(tab, lambda one: one.gravity == (0.0, 0.0, -9.81), "gravity acts")
+    assert tab.session.tip[2] < -1.0
+    assert tab.session.reach.cloud.tip.values[:, 2].mean() < 0
+    assert tab.session.scene.spine[0][-1, 2] < -0.99

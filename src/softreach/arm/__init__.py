@@ -14,6 +14,7 @@ from softreach.arm.actuators import (
 )
 from softreach.arm.actuators.ring_integrals import RingIntegrals
 from softreach.arm.along import AlongArm, Pieces, Samples
+from softreach.arm.base import Base
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import Material, material_names, named_material
@@ -24,6 +25,7 @@ from softreach.arm.summary import DesignSummary, describe
 __all__ = [
     "Actuator",
     "AlongArm",
+    "Base",
     "Chamber",
     "DesignSummary",
     "FiberArchitecture",

@@ -38,7 +38,7 @@ class Extreme(NamedTuple):
 
 
 def bending_at(arm: Manipulator, stations: ArrayLike) -> tuple[Array, Array]:
-    """Least and largest bending √(u1² + u2²), theory (45), of the activation box.
+    """Least and largest bending √(u1² + u2²), theory (45) with u of (7), of the activation box.
 
     Args:
         arm: The design.

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from softreach.arm.number import number
 from softreach.arm.part import Part
 from softreach.support.errors import Fault
 
 if TYPE_CHECKING:
+    from softreach.arm.base import Base
     from softreach.arm.section import Section
 
 __all__ = ["GRAVITY", "Loads", "PointLoad"]
@@ -24,7 +25,7 @@ _ZERO: Triple = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, kw_only=True)
 class PointLoad(Part):
-    """A force and a moment on one section, in the base frame whatever the arm does.
+    """A force and a moment on one section, in the world whatever the arm does.
 
     Raises:
         InvalidDesign: A field is not what it must be.
@@ -40,7 +41,10 @@ class PointLoad(Part):
 
 @dataclass(frozen=True, kw_only=True)
 class Loads(Part):
-    """Gravity, a payload, forces and moments; in the base frame unless they follow the tip.
+    """Gravity, a payload, forces and moments; in the world unless they follow the tip.
+
+    The base of an arm decides how they act on it: one that points up has gravity against the
+    straight arm, one that points down along it.
 
     Raises:
         InvalidDesign: A field is not what it must be.
@@ -49,8 +53,7 @@ class Loads(Part):
     gravity: Triple = number(
         "g", "m/s²", "acceleration of what falls", default=(0.0, 0.0, -GRAVITY), shape="triple"
     )
-    """Acceleration of what falls [m/s²]; the base tangent is +z, so that an arm whose base points
-    up has -z here."""
+    """Acceleration of what falls in the world, whose z points up [m/s²]."""
     payload: float = number("mp", "kg", "mass at the tip", low=0.0, default=0.0)
     """Mass at the tip [kg]."""
     payload_arm: Triple = number(
@@ -97,6 +100,21 @@ class Loads(Part):
             for k, one in enumerate(self.point_loads)
             if one.station > length
         ]
+
+    def seen_from(self, base: Base) -> Self:
+        """The same in the frame of a base: everything that does not follow the tip is turned."""
+        if base.is_identity:
+            return self
+        points = tuple(
+            one.replace(
+                force=base.directions_to_base(one.force),
+                moment=base.directions_to_base(one.moment),
+            )
+            for one in self.point_loads
+        )
+        dead = ("gravity", "tip_force", "tip_moment", "force_per_length")
+        turned = {name: base.directions_to_base(getattr(self, name)) for name in dead}
+        return self.replace(point_loads=points, **turned)
 
     @property
     def conservative(self) -> bool:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm import design_file
 from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
 from softreach.arm.actuators.actuator import MOST_BUNDLES, bounds_faults, distance_faults
+from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.loads import Loads
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper, Profile
@@ -41,7 +42,7 @@ _NAMES = 6  # of bundles that `repr` lists
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Manipulator:
-    """A slender arm with actuators, clamped at Z = 0 where its tangent is +z (section 2).
+    """A slender arm with actuators, clamped at Z = 0 where its tangent is the base's z (section 2).
 
     Values are frozen; `replace` makes a changed copy, which is checked again. What a design does is
     computed elsewhere: by `arm.tables` and everything after it.
@@ -58,6 +59,8 @@ class Manipulator:
     """In the order of the activations, bundle by bundle; empty for a passive rod."""
     loads: Loads | None = None
     """Loads beside them; None for nothing, not even its weight."""
+    base: Base = UPRIGHT
+    """Where in the world it is clamped, and which way it points; upright at the origin."""
 
     def __post_init__(self) -> None:
         if faults := list(_part_faults(self)):
@@ -194,7 +197,7 @@ class Manipulator:
 
     @cached_property
     def _toml(self) -> str:
-        return design_file.render(self.profile, self.section, self.actuators, self.loads)
+        return design_file.render(self.profile, self.section, self.actuators, self.loads, self.base)
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Self:
@@ -290,9 +293,10 @@ class Manipulator:
         base, tip = self.profile.radius([0.0, self.length])
         names = ", ".join(self.bundle_names[:_NAMES]) or "none, a passive rod"
         more = f", ... ({self.bundles} in all)" if self.bundles > _NAMES else ""
+        pose = "" if self.base.is_identity else f"\n  base: {self.base}"
         return (
             f"{type(self).__name__}: L = {self.length:g} m, R2 = {base:.4g} to {tip:.4g} m\n"
-            f"  bundles: {names}{more}"
+            f"  bundles: {names}{more}{pose}"
         )
 
     def _repr_html_(self) -> str:
@@ -354,6 +358,8 @@ def _part_faults(arm: Manipulator) -> Iterator[Fault]:
         yield Fault("section", arm.section, "must be a Section")
     if not isinstance(arm.loads, Loads | None):
         yield Fault("loads", arm.loads, "must be Loads or None")
+    if not isinstance(arm.base, Base):
+        yield Fault("base", arm.base, 'must be a Base, such as Base(points="down")')
     yield from _kind_faults(arm.actuators)
 
 

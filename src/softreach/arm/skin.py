@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.actuators import Outline
+from softreach.arm.base import Base
 from softreach.arm.profile import Profile
 from softreach.geometry.surface import Surface
 from softreach.geometry.tube import grid_faces, joined, ribbon_surface, tube_surface
@@ -44,6 +45,11 @@ class Body(Protocol):
     @property
     def profile(self) -> Profile:
         """Outer radius along the arm."""
+        ...
+
+    @property
+    def base(self) -> Base:
+        """Pose in the world."""
         ...
 
     @property
@@ -78,10 +84,11 @@ class Centerline:
     """d1, d2, d3 of each, shape (station, 3, 3)."""
 
     @classmethod
-    def unactivated(cls, z: Array) -> Self:
-        """Straight along z, directors along x, y, z."""
-        directors = np.tile(np.eye(3), (len(z), 1, 1))
-        return cls(z=z, position=np.column_stack([0 * z, 0 * z, z]), directors=directors)
+    def unactivated(cls, z: Array, base: Base) -> Self:
+        """Straight from a base, directors along the axes of that."""
+        position = base.to_world(np.column_stack([0 * z, 0 * z, z]))
+        directors = base.directions_to_world(np.tile(np.eye(3), (len(z), 1, 1)))
+        return cls(z=z, position=position, directors=directors)
 
     def with_stations(self, more: ArrayLike) -> Self:
         """The same line with more stations; those that it has, or that lie beyond it, are left."""
@@ -232,7 +239,7 @@ def inside(arm: Body) -> tuple[bool, ...]:
 
 def arm_card(arm: Body) -> str:
     """HTML with a small picture of the unactivated arm above its numbers, for notebooks."""
-    line = Centerline.unactivated(np.linspace(0.0, arm.length, _CARD_STATIONS))
+    line = Centerline.unactivated(np.linspace(0.0, arm.length, _CARD_STATIONS), arm.base)
     line = line.with_stations(arm.breakpoints)
     body = body_skin(arm, line)
     bundles = bundle_skins(arm, line, lift=0.01, step=_CARD_STEP)

@@ -1,7 +1,9 @@
 """From a design to the two tables that everything downstream sees: ζ = 1 + z·γ and u = Uγ.
 
-The map is linear in the activations, theory (7). All physics lives in this room: a new actuator,
-profile or material changes these tables, and nothing that reads them.
+The map is linear in the activations, theory (7). Curvature u is per length of η = 1 + Σ zγ over
+fibers and muscles alone: these change the length of matter at rest, which forces leave as it is.
+All physics lives in this room: a new actuator, profile or material changes these tables, and
+nothing that reads them.
 """
 
 from __future__ import annotations
@@ -44,7 +46,10 @@ class Tables:
     extension: Array
     """z = dζ/dγ [-], shape (station, bundle)."""
     curvature: Array
-    """U = du/dγ [1/m], per activated arclength, in the directors, shape (station, 3, bundle)."""
+    """U = du/dγ [1/m], per length of η, in the directors, shape (station, 3, bundle)."""
+    growth: Array
+    """dη/dγ [-]: z of bundles that change the length of matter at rest, 0 of those that are forces;
+    shape (station, bundle). Of fibers and muscles alone it is `extension` itself."""
 
 
 def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
@@ -59,11 +64,11 @@ def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
     loads += [_resultants(actuator, arm, z) for actuator in arm.actuators]
     stiffness = arm.section.stiffness(arm.profile.radius(z))
     resistance = np.stack([stiffness.bending, stiffness.bending, stiffness.torsion], axis=1)
-    return Tables(
-        z,
-        np.concatenate([load.force for load in loads], axis=1) / stiffness.axial[:, None],
-        np.concatenate([load.moment for load in loads], axis=2) / resistance[..., None],
-    )
+    extension = np.concatenate([load.force for load in loads], axis=1) / stiffness.axial[:, None]
+    curvature = np.concatenate([load.moment for load in loads], axis=2) / resistance[..., None]
+    is_force = [one.is_force for one in arm.actuators for _ in range(one.bundles)]
+    growth = np.where(is_force, 0.0, extension) if any(is_force) else extension
+    return Tables(z, extension, curvature, growth)
 
 
 def _resultants(actuator: Actuator, arm: Manipulator, z: Array) -> Resultants:
@@ -112,10 +117,13 @@ def check_extension(arm: Manipulator) -> None:
         sizes = f"L = {arm.length:.3g} m, R2(0) = {float(arm.profile.radius(0.0)):.3g} m"
         allowed = f"overflows with {sizes}: give all lengths in m, moduli and pressures in Pa"
         raise InvalidDesign([Fault("design", None, allowed)])
-    smallest, _ = _extension_range(arm, table)
-    if smallest <= 0:
-        allowed = f"reaches extension ζ = {smallest:.4g}; must keep ζ > 0: narrow the bounds"
-        raise InvalidDesign([Fault("activation_bounds", arm.bounds.tolist(), allowed)])
+    for rates, of in ((table.extension, ""), (table.growth, " of matter itself, without forces")):
+        smallest, _ = _extension_range(arm, rates)
+        if smallest <= 0:
+            allowed = (
+                f"reaches extension ζ = {smallest:.4g}{of}; must keep ζ > 0: narrow the bounds"
+            )
+            raise InvalidDesign([Fault("activation_bounds", arm.bounds.tolist(), allowed)])
 
 
 def _winding_faults(arm: Manipulator) -> Iterator[Fault]:
@@ -131,11 +139,11 @@ def _winding_faults(arm: Manipulator) -> Iterator[Fault]:
 
 def extension_range(arm: Manipulator) -> tuple[float, float]:
     """Smallest and largest ζ anywhere in the activation box and along the arm [-]."""
-    return _extension_range(arm, tables(arm, strain_stations(arm)))
+    return _extension_range(arm, tables(arm, strain_stations(arm)).extension)
 
 
-def _extension_range(arm: Manipulator, table: Tables) -> tuple[float, float]:
-    ends = table.extension[..., None] * arm.bounds
+def _extension_range(arm: Manipulator, extension: Array) -> tuple[float, float]:
+    ends = extension[..., None] * arm.bounds
     return 1.0 + float(ends.min(-1).sum(-1).min()), 1.0 + float(ends.max(-1).sum(-1).max())
 
 

@@ -241,6 +241,7 @@ _COMPUTE: dict[Need, Callable[[Intermediates], Any]] = {
     Need.LENGTH: lambda of: of.arm.length,
     Need.ACTIVATIONS: lambda of: _stable(of, activations_of(of.rod, of.cube)),
     Need.TIPS: lambda of: _stable(of, of.tips),
+    Need.BASE_TIPS: lambda of: of.arm.base.to_base(of[Need.TIPS]),
     Need.LOST_SHARE: lambda of: float((~of.stable).mean()),
     Need.ALPHA: lambda of: of.command.alpha_over_length * of.arm.length,
     Need.ALPHA_COMPLEX: _alpha_complex,

@@ -131,7 +131,8 @@ def _quantiles(name: str, statistics: xr.Dataset) -> Array:
     return statistics[name].values
 
 
-_TIPS, _SET, _ALPHA = (Need.TIPS,), (Need.REACHABLE_SET,), (Need.ALPHA_COMPLEX, Need.ALPHA)
+_TIPS, _BASE_TIPS = (Need.TIPS,), (Need.BASE_TIPS,)
+_SET, _ALPHA = (Need.REACHABLE_SET,), (Need.ALPHA_COMPLEX, Need.ALPHA)
 _FINITE = "the design has other than three bundles"
 _ENDS = (("min", "lower", _lowest), ("max", "upper", _highest))
 
@@ -142,9 +143,9 @@ _ROWS: dict[str, list[tuple[Any, ...]]] = {
            partial(compute, k), _TIPS)
           for k, axis in enumerate("xyz") for end, word, compute in _ENDS),
         ("reach_height", "m", "largest height of a tip above the base plane",
-         partial(_highest, 2), _TIPS),
+         partial(_highest, 2), _BASE_TIPS),
         ("reach_radius", "m", "largest distance of a tip from the base axis",
-         _reach_radius, _TIPS),
+         _reach_radius, _BASE_TIPS),
     ],
     "convex": [
         ("convex_volume", "m3", "volume of the cloud's convex hull",

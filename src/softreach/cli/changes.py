@@ -21,13 +21,14 @@ if TYPE_CHECKING:
 
 _GRAVITY = {
     "down": (0.0, 0.0, -9.81),
-    "upright": (0.0, 0.0, -9.81),
     "up": (0.0, 0.0, 9.81),
-    "hanging": (0.0, 0.0, 9.81),
     "sideways": (9.81, 0.0, 0.0),
     "none": (0.0, 0.0, 0.0),
 }
-"""In the base frame, where a straight arm points along +z."""
+"""In the world, whose z points up."""
+
+_POSTURES = {"upright": "up", "hanging": "down"}
+"""Words for the way that a base points."""
 
 
 @Parameter(name="*", group=Group("Changes of the design", sort_key=2))
@@ -35,6 +36,14 @@ _GRAVITY = {
 class Changes:
     """Changes that a command makes to the design that it takes."""
 
+    base: Annotated[
+        str | None,
+        Parameter(
+            help="The way the arm points from its base in the world: up (upright), down (hanging), "
+            "x, -x, y or -y.",
+            allow_leading_hyphen=True,
+        ),
+    ] = None
     revolution_deg: Annotated[
         float | None,
         NUMBER,
@@ -48,15 +57,15 @@ class Changes:
     gravity: Annotated[
         str | None,
         Parameter(
-            help="down (with loads, if left out), up, sideways, none, or x,y,z [m/s²] in the base "
-            "frame, whose +z points along the straight arm: with up it hangs from its base.",
+            help="down (with loads, if left out), up, sideways (along +x), none, or x,y,z [m/s²] "
+            "in the world, whose +z points up.",
             allow_leading_hyphen=True,
         ),
     ] = None
     tip_force: Annotated[
         str | None,
         Parameter(
-            help="Force on the tip in the base frame, x,y,z [N]: 0,0,-0.5 or 0,0,-500mN.",
+            help="Force on the tip in the world, x,y,z [N]: 0,0,-0.5 or 0,0,-500mN.",
             allow_leading_hyphen=True,
         ),
     ] = None
@@ -93,11 +102,23 @@ class Changes:
         pairs = dict(self._pairs())
         of_loads = {name: text for name, text in pairs.items() if name.startswith("loads.")}
         others = {name: text for name, text in pairs.items() if name not in of_loads}
+        arm = self._posed(arm)
         arm = changed(arm, _values(arm, others, self._angles()))
         if of_loads or {"payload", "gravity", "tip_force"} & self.given.keys():
             arm = self._loaded(arm, bool(of_loads))
             arm = changed(arm, _values(arm, of_loads))
         return arm
+
+    def _posed(self, arm: Manipulator) -> Manipulator:
+        """The arm with its base as asked; its place and its turn stay."""
+        from softreach.arm.base import POINTS
+
+        if self.base is None:
+            return arm
+        points = _POSTURES.get(self.base, self.base)
+        if points not in POINTS:
+            raise InvalidInput("base", self.base, f"one of {', '.join([*_POSTURES, *POINTS])}")
+        return arm.replace(base=arm.base.replace(points=points))
 
     def refuse(self, why: str) -> None:
         """Refuse whatever was given, where there is no design to change."""
@@ -126,7 +147,7 @@ class Changes:
         """The arm with the loads it has and those given; none where all are zero and stay so."""
         from softreach.arm.loads import Loads
 
-        loads = (arm.loads or Loads()).replace(**self._loads())
+        loads = (arm.loads or Loads()).replace(**self._loads(arm))
         if not others and loads == Loads(gravity=_GRAVITY["none"]):
             return arm.replace(loads=None)
         self._check_matter(loads, arm)
@@ -139,7 +160,8 @@ class Changes:
         lacking = {fault.path: examples.get(fault.path.rpartition(".")[2]) for fault in faults}
         lacking = {path: example for path, example in lacking.items() if example}
         if lacking:
-            values = {name: str(value) for name, value in self.given.items() if "_deg" not in name}
+            idle = ("base", "revolution_deg", "taper_deg")  # which ask for no matter
+            values = {name: str(value) for name, value in self.given.items() if name not in idle}
             options = " ".join(f"--set {path}={example}" for path, example in lacking.items())
             hint = f"give them in the design file, or as {options}"
             if examples["density"] in lacking.values():
@@ -147,17 +169,30 @@ class Changes:
             allowed = f"on an arm with {' and '.join(lacking)}"
             raise InvalidInput(", ".join(values), ", ".join(values.values()), allowed, hint)
 
-    def _loads(self) -> dict[str, object]:
+    def _loads(self, arm: Manipulator) -> dict[str, object]:
         loads: dict[str, object] = {}
         if self.payload is not None:
             loads["payload"] = read_mass("payload", self.payload)
         if self.gravity is not None:
-            loads["gravity"] = _GRAVITY.get(self.gravity) or _vector(
-                "gravity", self.gravity, "m/s²", f"{', '.join(_GRAVITY)}, or "
-            )
+            loads["gravity"] = _gravity(self.gravity, arm)
         if self.tip_force is not None:
             loads["tip_force"] = _vector("tip_force", self.tip_force, "N")
         return loads
+
+
+def _gravity(text: str, arm: Manipulator) -> tuple[float, ...]:
+    """Gravity in the world [m/s²] from a word or numbers.
+
+    Words for how the arm stands are for one whose frame is the world's: it hangs where things fall
+    up there.
+    """
+    if text in _POSTURES:
+        if not arm.base.is_identity:
+            allowed = f"{', '.join(_GRAVITY)}, or three finite numbers x,y,z in m/s², in the world"
+            hint = f"how the arm stands is said by its base, which {arm.base}"
+            raise InvalidInput("gravity", text, allowed, hint)
+        text = {"upright": "down", "hanging": "up"}[text]
+    return _GRAVITY.get(text) or _vector("gravity", text, "m/s²", f"{', '.join(_GRAVITY)}, or ")
 
 
 UNCHANGED = Changes()

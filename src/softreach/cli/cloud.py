@@ -62,7 +62,7 @@ def cloud(
         "seed": (arguments["seed"], ""),
         "steps per arm": (tip_map(arm, tol).steps, ""),
         "time to compute": (round(seconds, 3), "s"),
-        **load_rows(arm.loads),
+        **load_rows(arm),
         **_status_rows(dataset),
         "highest tip": (float(dataset.tip[:, 2].max()) / arm.length, "L"),
         "lowest tip": (float(dataset.tip[:, 2].min()) / arm.length, "L"),
@@ -72,7 +72,7 @@ def cloud(
 
 
 def _status_rows(cloud: xr.Dataset) -> Rows:
-    """Numbers of samples of a loaded arm that are stable, unstable, and without equilibrium."""
+    """Numbers of samples of a loaded arm with each status."""
     if "status" not in cloud:
         return {}
     from softreach.rod.tip_map import TipStatus

@@ -15,7 +15,6 @@ from softreach.cli.values import to_degrees
 from softreach.support.errors import InvalidInput
 
 if TYPE_CHECKING:
-    from softreach.arm.loads import Loads
     from softreach.arm.manipulator import Manipulator
     from softreach.arm.summary import DesignSummary
     from softreach.rest import Rest
@@ -85,7 +84,7 @@ def _rows(arm: Manipulator, facts: DesignSummary) -> Rows:
         rows["breakpoints"] = (list(facts.breakpoints), "m")
     rows["extension"] = (list(facts.extension), "")
     rows["curvature times L"] = (list(facts.curvature), "")
-    return rows | _rows_of_matter(facts) | load_rows(arm.loads) | _rest_rows(arm)
+    return rows | _rows_of_matter(facts) | load_rows(arm) | _rest_rows(arm)
 
 
 def _rows_of_matter(facts: DesignSummary) -> Rows:
@@ -139,16 +138,20 @@ def _rows_for_machines(arm: Manipulator, facts: DesignSummary) -> Rows:
     }
 
 
-def load_rows(loads: Loads | None) -> Rows:
-    """Gravity with the direction that the base then has, and all other loads that are not 0."""
+def load_rows(arm: Manipulator) -> Rows:
+    """How the base stands, gravity, and all other loads that are not 0; all of it in the world."""
     from softreach.arm.number import fields_of
 
+    loads, posed = arm.loads, not arm.base.is_identity
+    rows: Rows = {"base": (str(arm.base), "")} if posed else {}
     if loads is None:
-        return {}
-    rows: Rows = {}
+        return rows
     if any(loads.gravity):
-        rows["gravity"] = (list(loads.gravity), "m/s²")
-        rows["base"] = (_base(loads.gravity), "")
+        posture = _posture(loads.seen_from(arm.base).gravity)
+        rows = {
+            "gravity": (list(loads.gravity), "m/s²"),
+            "base": (f"{posture}: {arm.base}" if posed else posture, ""),
+        }
     for field, number in fields_of(type(loads)).items():
         value = getattr(loads, field)
         if field != "gravity" and (any(value) if isinstance(value, tuple) else value):
@@ -158,8 +161,8 @@ def load_rows(loads: Loads | None) -> Rows:
     return rows
 
 
-def _base(gravity: tuple[float, float, float]) -> str:
-    """The way the base stands: a straight arm points along +z, gravity pulls downward."""
+def _posture(gravity: tuple[float, float, float]) -> str:
+    """The way the base stands by gravity in its own frame: a straight arm points along +z there."""
     angle = to_degrees(math.acos(-gravity[2] / math.hypot(*gravity)))
     names = {0: "upright", 90: "sideways", 180: "hanging"}
     return names.get(round(angle, 6), f"tilted from upright by {angle:.4g}°")
@@ -171,6 +174,7 @@ def _rest_rows(arm: Manipulator) -> Rows:
     Without loads: the sag under its own weight of an arm held sideways, and whether it would stand
     upright; nothing where moduli or densities are not known.
     """
+    from softreach.arm.base import Base
     from softreach.arm.loads import GRAVITY, Loads
     from softreach.arm.summary import load_number_faults
 
@@ -180,7 +184,7 @@ def _rest_rows(arm: Manipulator) -> Rows:
         rest = _rest(arm)
         return _sag("", rest) | {"at rest": (_stability(rest), "")}
     sideways, upright = (
-        _rest(arm.replace(loads=Loads(gravity=gravity)))
+        _rest(arm.replace(loads=Loads(gravity=gravity), base=Base()))
         for gravity in ((GRAVITY, 0.0, 0.0), (0.0, 0.0, -GRAVITY))
     )
     return _sag(" sideways", sideways) | {"at rest upright": (_stability(upright), "")}
@@ -202,6 +206,7 @@ _STABILITY = {
     "STABLE": "stable",
     "UNSTABLE": "not stable",
     "NO_EQUILIBRIUM": "no equilibrium follows from the unloaded arm",
+    "UNDECIDED": "undecided: the search for an equilibrium gave up",
 }
 
 

@@ -52,7 +52,7 @@ def reach(
     _check_outputs(arm, outs, overwrite)
     with progress.bar("mapping the activation box", None) as step:
         reached = reachable_set(arm, accuracy=accuracy, progress=step)
-    rows = load_rows(arm.loads) | _rows(reached)
+    rows = load_rows(arm) | _rows(reached)
     if reached.lost_share > 0.0:  # not stable, or torn
         rows["activation box left out"] = (100.0 * reached.lost_share, "%")
     for path in outs:

@@ -15,7 +15,9 @@ from softreach.support.errors import InvalidInput, counted
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
-    from softreach.inverse import Solution
+    from softreach.inverse import Solution, Solutions
+
+_HINTS = 100  # targets out of reach that get one
 
 
 def solve(
@@ -41,7 +43,7 @@ def solve(
     """Find every activation that puts the tip at a target.
 
     Where none does, the nearest point that can be reached and a bound on its
-    distance.
+    distance. Places are in the world: --base hanging turns the arm in it.
 
     Example: softreach solve minimal_trunk --target 0.2,0.1,0.6
     """
@@ -60,11 +62,28 @@ def solve(
         points = points_in("targets", targets)
     count = 1 if family is None else family
     solutions = solve_inverse(arm, points, family=count, prove_least=prove_least)
+    hints = _hints(arm, solutions)
     if json:
-        console.json([_record(solution) for solution in solutions])
+        records = zip(solutions, hints, strict=True)
+        console.json([{**_record(one), "hint": hint or None} for one, hint in records])
         return
-    for solution in solutions:
+    for solution, hint in zip(solutions, hints, strict=True):
         _print(solution, arm)
+        if hint:
+            console.line(f"  {hint}")
+
+
+def _hints(arm: Manipulator, solutions: Solutions) -> list[str]:
+    """What may be meant by targets out of reach; of the first of many."""
+    from softreach.inverse import twin_hints
+
+    hints = [""] * len(solutions)
+    missed = [k for k, one in enumerate(solutions) if not len(one)][:_HINTS]
+    if missed:
+        found = twin_hints(arm, solutions.targets[missed])
+        for k, hint in zip(missed, found, strict=True):
+            hints[k] = hint
+    return hints
 
 
 def _record(solution: Solution) -> dict[str, object]:

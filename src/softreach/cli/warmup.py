@@ -38,16 +38,19 @@ def _free() -> list[Callable[[], object]]:
     """Small jobs that together call every kernel but those of loads."""
     from softreach import workspace
     from softreach.arm import designs
+    from softreach.arm.base import Base
     from softreach.inverse import solve_inverse
     from softreach.inverse.path import track_path
     from softreach.rod.kinematics import configuration, tip_jacobian
 
     arm, redundant = designs.minimal_trunk(), designs.redundant_trunk()
+    hanging = arm.replace(base=Base(points="down"))
     target, beyond = (0.2, 0.1, 0.6), (2.0, 0.0, 0.0)
     path = (target, (0.2, 0.1, 0.61))
     return [
         _hulls,
         partial(tip_jacobian, arm, [[-1.0, 0.0, -0.4]]),
+        partial(tip_jacobian, hanging, [[-1.0, 0.0, -0.4]]),
         partial(configuration, arm, [-1.0, 0.0, -0.4]),
         partial(workspace.reachable_set, arm, accuracy=0.1),
         partial(solve_inverse, arm, [target, beyond]),

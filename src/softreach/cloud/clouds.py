@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from softreach import schema
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.rods import tip_map
-from softreach.rod.tip_map import BLOCK, TipMap
+from softreach.rod.tip_map import BLOCK, Frame, TipMap
 from softreach.rod.view import View
 from softreach.sampling import check_sampler, cube_blocks
 from softreach.support import parallel
@@ -61,6 +61,7 @@ def compute_cloud(
     seed: int = 0,
     sampler: str = "uniform",
     tol: float = 1e-6,
+    frame: Frame = "world",
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Sample the activation box and compute the tip of each sample (section 3).
@@ -75,6 +76,8 @@ def compute_cloud(
         seed: Seed of the sampler.
         sampler: `uniform` (the paper's), `boundary`, `sobol` or `grid`; see `sampling.sample_cube`.
         tol: Largest tip error, in L.
+        frame: In which tips are told: that of the "world", or of the "base", whose z is along the
+            straight arm. The attributes hold it, and the pose of the base.
         progress: Called with the number of samples done since its last call; by default a bar is
             shown on a terminal when the cloud is large.
 
@@ -91,7 +94,7 @@ def compute_cloud(
         SoftreachWarning: The samples take more than half of the free memory.
     """
     report = None if progress is None else as_function("progress", progress)
-    rod = _of_all_bundles(tip_map(arm, tol))
+    rod = _of_all_bundles(tip_map(arm, tol, frame=frame))
     bundles = rod.box.bundles
     n, seed = check_sampler(sampler, n, bundles, seed)
     check_room("n", n, bundles + 3)
@@ -100,7 +103,8 @@ def compute_cloud(
     show_bar = report is None and n > _LONG
     with bar("computing tips", n) if show_bar else nullcontext(report) as shown:
         _fill(rod, activation, tip, status, cube_blocks(sampler, n, bundles, seed, BLOCK), shown)
-    cloud = schema.cloud_dataset(rod.arm, activation, tip, seed=seed, sampler=sampler, tol=rod.tol)
+    drawn = {"seed": seed, "sampler": sampler}
+    cloud = schema.cloud_dataset(rod.arm, activation, tip, **drawn, tol=rod.tol, frame=rod.frame)
     return schema.with_status(cloud, status) if rod.supports_unstable else cloud
 
 
@@ -170,7 +174,7 @@ def design_of(cloud: xr.Dataset) -> Manipulator:
 def tip_map_of(cloud: xr.Dataset) -> TipMap:
     """The tip map that a cloud was computed with."""
     arm = design_of(cloud)
-    return tip_map(arm, float(cloud.attrs["tol"]))
+    return tip_map(arm, float(cloud.attrs["tol"]), frame=schema.frame_of(cloud))
 
 
 def sample_bytes(bundles: int) -> int:

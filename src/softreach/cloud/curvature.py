@@ -237,5 +237,5 @@ def _dataset(rod: TipMap, z: Array, tallies: dict[str, _Tally], quantiles: Array
         "quantile": quantiles,
     }
     samples = int(tallies["bending"].count[0].sum())
-    attrs = {**provenance(rod.arm), "length": rod.length, "samples": samples}
+    attrs = {**provenance(rod.arm, rod.frame), "length": rod.length, "samples": samples}
     return xr.Dataset(variables, coordinates, attrs)

@@ -50,7 +50,7 @@ class CloudTable(NamedTuple):
     units: tuple[str, ...]
     """Unit of the activation of each bundle."""
     status: NDArray[np.uint8] | None
-    """0 stable, 1 unstable, 2 no equilibrium, of an arm under loads, shape (sample,)."""
+    """`TipStatus` of an arm under loads, shape (sample,)."""
     metadata: dict[str, str | int | float]
     """Design (TOML), seed, tolerance, versions and units."""
 
@@ -118,9 +118,9 @@ def export_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: boo
 
     Tables have the columns x, y, z [m] and one activation per bundle, such as ``gamma_left``;
     NPZ and MAT hold the arrays tip, activation and bundle. Clouds of arms under loads have the
-    column or array status too: 0 stable, 1 unstable, 2 no equilibrium, whose tip is NaN. Design,
-    seed, tolerance, version and units go along, except in CSV, VTU and VTK, which have no place for
-    them. PLY carries the picture's colors too.
+    column or array status too: 0 stable, 1 unstable; 2 no equilibrium and 3 undecided, whose tips
+    are NaN. Design, seed, tolerance, version and units go along, except in CSV, VTU and VTK, which
+    have no place for them. PLY carries the picture's colors too.
 
     Args:
         cloud: tip(sample, axis) [m] and activation(sample, bundle), each in its unit.

@@ -22,6 +22,7 @@ Map = Callable[[Array], Array]
 _MOST_LEVELS = 16
 _MOST_TRIANGLES = 200_000
 _MOST_STARTS = 1000  # of triangles that are not flat
+_IMAGES_OF_ROOT = 60  # that Newton's method asks for, of most starts
 
 _FLAT = 2.5
 """Least altitude of a flat image, in sags of the one that it was cut from, of which it has 1/4."""
@@ -93,7 +94,7 @@ class Roots(NamedTuple):
 
 
 def sphere_roots(
-    image: Map, value: Array, *, levels: int, caution: float, starts: Array
+    image: Map, value: Array, *, levels: int, caution: float, starts: Array, most: int = 10_000_000
 ) -> tuple[Roots, bool]:
     """All places where a smooth map takes a value.
 
@@ -103,6 +104,7 @@ def sphere_roots(
         levels: How often the triangles of the first mesh are quartered.
         caution: How near an image must come to the value to be cut further, in its sags.
         starts: Where to look too, shape (n, 3).
+        most: About so many images may be asked for.
 
     Returns:
         The places, and whether the triangles were few enough to be cut until they were flat, or
@@ -113,14 +115,16 @@ def sphere_roots(
     def seen(points: Array) -> Array:
         return image(points) @ frame.T
 
-    centers, settled = _candidates(seen, levels, caution)
+    centers, settled = _candidates(seen, levels, caution, most // 2)
+    every = 1 + len(centers) * _IMAGES_OF_ROOT * 2 // most
+    centers, settled = centers[::every], settled and every == 1
     return polished_roots(image, value, np.concatenate([starts, centers])), settled
 
 
-def _candidates(seen: Map, levels: int, caution: float) -> tuple[Array, bool]:
+def _candidates(seen: Map, levels: int, caution: float, most: int) -> tuple[Array, bool]:
     """Centers of the triangles that may hold a root, and whether they were not too many."""
     points, triangles = icosphere(levels)
-    images, centers = seen(points), [np.empty((0, 3))]
+    images, centers, few_enough = seen(points), [np.empty((0, 3))], False
     for _ in range(_MOST_LEVELS):
         before, parents = len(points), triangles
         points, triangles = quartered(points, triangles)
@@ -132,11 +136,12 @@ def _candidates(seen: Map, levels: int, caution: float) -> tuple[Array, bool]:
         flat = _altitudes(corners[..., :2]) >= _FLAT * sag
         centers.append(points[triangles[near & flat]].mean(axis=1))
         triangles = triangles[near & ~flat]
-        if not 0 < len(triangles) < _MOST_TRIANGLES:
+        few_enough = len(triangles) < _MOST_TRIANGLES and len(points) + 3 * len(triangles) < most
+        if not few_enough or not len(triangles):
             break
     few = triangles[:: 1 + len(triangles) // _MOST_STARTS]
     starts = _unit(np.concatenate([*centers, points[few].mean(axis=1)]))
-    return starts, len(triangles) < _MOST_TRIANGLES
+    return starts, few_enough
 
 
 def _sags(images: Array, triangles: Index, middles: Index) -> Array:

@@ -364,7 +364,7 @@ def _dataset(
         },
         {"axis": list(AXES), **bundle_coordinates(rod.arm, rod.box.names)},
         {
-            **provenance(rod.arm),
+            **provenance(rod.arm, rod.frame),
             "end": "" if outcome == PathStatus.FOLLOWED else outcome.name.lower(),
             "end_bundle": bundle,
             "end_bound": bound,

@@ -14,10 +14,11 @@ from softreach.inverse.seeds import Seeds, face_seeds, seeds
 from softreach.kernels.branches.space_tree import SpaceTree
 from softreach.kernels.image.activation_mesh import ActivationMesh
 from softreach.rod.rods import tip_map
-from softreach.rod.tip_map import TipMap
+from softreach.rod.tip_map import Frame, TipMap
 from softreach.rod.view import free_bundles, measured_bundles, stable_tips
-from softreach.support.arguments import as_integer
+from softreach.support.arguments import as_integer, as_one_of
 from softreach.support.arrays import Array
+from softreach.support.errors import InvalidInput
 
 __all__ = ["PreparedMap", "prepared_map"]
 
@@ -113,6 +114,7 @@ def prepared_map(
     *,
     cells: int = _CELLS,
     depth: int = 0,
+    frame: Frame = "world",
 ) -> PreparedMap:
     """Prepare an arm for `solve_inverse`; the last four are remembered.
 
@@ -122,11 +124,15 @@ def prepared_map(
         cells: With three free bundles: cells along each axis of the activation box.
         depth: How often a cell is halved where det ∂r/∂γ changes sign or is uneven; once at least
             for an arm under loads.
+        frame: In which targets are told: that of the "world" or of the "base".
     """
     cells, depth = as_integer("cells", cells, 2, 256), as_integer("depth", depth, 0, 20)
     if isinstance(arm, PreparedMap):
+        if as_one_of("frame", frame, ("world", "base")) == "base" != arm.whole.frame:
+            hint = "prepare the arm with this frame"
+            raise InvalidInput("frame", frame, f"{arm.whole.frame}, that of what is prepared", hint)
         return arm
-    rod = measured_bundles(tip_map(arm, tol))
+    rod = measured_bundles(tip_map(arm, tol, frame=frame))
     # Loads make the map steep before an equilibrium is lost.
     return _of_map(rod, cells, max(depth, 1) if rod.supports_unstable else depth)
 

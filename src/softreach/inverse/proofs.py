@@ -58,7 +58,8 @@ def gap_bounds(
     """
     if rod.box.dimension == 0:
         return gap.copy()  # one place is reached
-    bounds = np.maximum(np.linalg.norm(targets, axis=1) - rod.farthest(), 0.0)
+    from_base = np.linalg.norm(targets - np.array(rod.pose.position), axis=1)
+    bounds = np.maximum(from_base - rod.farthest(), 0.0)
     enough = allowance + _ENOUGH * (gap - allowance)
 
     def prove(rows: slice) -> None:

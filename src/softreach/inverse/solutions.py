@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softreach.arm.manipulator import Manipulator
+from softreach.rod.tip_map import Frame
 from softreach.schema import AXES, activation_attributes, bundle_coordinates, provenance
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import counted
@@ -90,6 +91,8 @@ class Solutions(Sequence[Solution]):
 
     arm: Manipulator
     """The design."""
+    frame: Frame
+    """The frame in which places are told."""
     bundles: tuple[str, ...]
     """Names of the bundles that were solved for."""
     targets: Array
@@ -132,6 +135,7 @@ class Solutions(Sequence[Solution]):
         counts = np.concatenate([part.counts for part in parts])
         return cls(
             arm=parts[0].arm,
+            frame=parts[0].frame,
             bundles=parts[0].bundles,
             offsets=np.concatenate([[0], np.cumsum(counts)]),
             **{
@@ -212,6 +216,7 @@ class Solutions(Sequence[Solution]):
         rows = np.repeat(self.offsets[chosen], counts) + inside
         return Solutions(
             arm=self.arm,
+            frame=self.frame,
             bundles=self.bundles,
             offsets=offsets,
             **{name: getattr(self, name)[chosen] for name in _PER_TARGET},
@@ -243,7 +248,7 @@ class Solutions(Sequence[Solution]):
                 "margin": ("solution", self.margins, {"units": "1"}),
             },
             {"axis": list(AXES), **bundle_coordinates(self.arm, self.bundles)},
-            provenance(self.arm),
+            provenance(self.arm, self.frame),
         )
 
 

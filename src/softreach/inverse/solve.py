@@ -29,7 +29,7 @@ from softreach.inverse.roots import (
     roots_at,
 )
 from softreach.inverse.solutions import Solutions, Status
-from softreach.rod.tip_map import TipMap
+from softreach.rod.tip_map import Frame, TipMap
 from softreach.support import parallel
 from softreach.support.arguments import as_flag, as_integer, as_number
 from softreach.support.arrays import Array, Index, Mask, as_directions, joined, rows
@@ -55,6 +55,7 @@ def solve_inverse(
     prove_least: bool = False,
     seed: int = 0,
     tol: float = 1e-6,
+    frame: Frame = "world",
 ) -> Solutions:
     """The activations that put the tip at each target, or as near to it as the arm can reach.
 
@@ -93,6 +94,8 @@ def solve_inverse(
         tol: Largest error of the tips themselves, in L; residuals refer to `tip_positions` with
             this tolerance. No target nearer to a tip than that is called out of reach. A tip map
             keeps its own.
+        frame: In which targets and directions are told: that of the "world", or of the "base",
+            whose z is along the straight arm.
 
     Returns:
         One `Solution` for each target; failures are its status, never an exception.
@@ -104,7 +107,7 @@ def solve_inverse(
     prove_least = as_flag("prove_least", prove_least)
     if prove_least and direction is not None:
         raise InvalidInput("prove_least", prove_least, "False where a direction is wanted")
-    prepared = prepared_map(arm, tol)
+    prepared = prepared_map(arm, tol, frame=frame)
     points, box = as_targets("targets", targets), prepared.whole.box
     rest = np.zeros(box.bundles) if near is None else near
     unit = None if direction is None else as_directions("direction", direction, len(points))
@@ -252,6 +255,7 @@ def _solutions(
     proved_gaps[missing] = bounds
     return Solutions(
         arm=prepared.whole.arm,
+        frame=prepared.whole.frame,
         bundles=prepared.whole.box.names,
         targets=request.targets,
         offsets=np.searchsorted(roots.target, np.arange(count + 1)),

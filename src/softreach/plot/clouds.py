@@ -26,7 +26,7 @@ from softreach.plot.style import (
     write_note,
 )
 from softreach.rod.arm_shape import rest_configuration
-from softreach.schema import a_cloud
+from softreach.schema import a_cloud, base_of
 from softreach.support import parallel
 from softreach.support.arguments import as_flag, as_number
 from softreach.support.arrays import Array
@@ -123,7 +123,7 @@ def plot_slab(
     *,
     ax: Axes | None = None,
     view: View = "front",
-    at: float = 0.0,
+    at: float | None = None,
     thickness: float | None = None,
     color: str | int | ArrayLike = "rgb",
     size: float | None = None,
@@ -138,7 +138,7 @@ def plot_slab(
         cloud: As in `plot_cloud`.
         ax: As in `plot_cloud`.
         view: A view along an axis: "front" for a slab in y, "side" in x, "top" in z.
-        at: Where the middle of the slab is on that axis [m].
+        at: Where the middle of the slab is on that axis [m]; None for the base of the arm.
         thickness: Of the whole slab [m]; None for a fiftieth of L, or where the cloud does not know
             L, of its largest extent.
         color: As in `plot_cloud`, for all samples of the cloud.
@@ -153,11 +153,13 @@ def plot_slab(
         InvalidInput: Not a view along an axis, unknown color, or no tip in the slab.
         MissingExtra: matplotlib is not installed.
     """
-    cloud, at, key = a_cloud("cloud", cloud), as_number("at", at, PLACE), as_flag("key", key)
+    cloud, key = a_cloud("cloud", cloud), as_flag("key", key)
+    at = None if at is None else as_number("at", at, PLACE)
     thickness = None if thickness is None else as_number("thickness", thickness, LENGTH)
     size = None if size is None else as_number("size", size, SIZE)
     ax, box = panel_arguments(ax, view, box)
     tips, unit, axis = drawn_tips(cloud), unit_of(cloud["tip"]), sight_axis(view)
+    at = float(base_of(cloud)["xyz".index(axis)]) if at is None else at
     middle, half = float(unit.of(at)), _half(thickness, tips, unit)
     depth = tips[:, "xyz".index(axis)] - middle
     inside = np.abs(depth) <= half

@@ -79,7 +79,8 @@ def plot_equilibria(
     followed = [] if equilibria.followed is None else [shapes[equilibria.followed]]
     circles = {k: _circle(equilibria, k) for k, ring in enumerate(equilibria.is_ring) if ring}
     with figure_style(ax):
-        rim = _rim(float(arm.profile.radius(0.0)) / arm.length)
+        rim = _rim(float(arm.profile.radius(0.0)))
+        rim = equilibria.rod.pose.to_world(rim) / arm.length
         points = [rim, *(arm_points(arm, shape) for shape in shapes), *circles.values()]
         panel = Panel.opened(np.concatenate(points), in_lengths(arm.length), ax, view, box)
         draw_arms(panel, arm, pale, range(arm.bundles), _PALE)
@@ -217,11 +218,12 @@ def _line(panel: Panel, points: Array, **style: Any) -> None:
 def _circle(equilibria: AllEquilibria, k: int) -> Array:
     """Circle of tips of a ring of equilibria [L]."""
     assert equilibria.solver is not None
-    axis, tip = equilibria.solver.tables.axes[0], equilibria.tips[k]
+    pose = equilibria.rod.pose
+    axis, tip = equilibria.solver.tables.axes[0], pose.to_base(equilibria.tips[k])
     angle = np.linspace(0.0, 2.0 * np.pi, 97)[:, None]
     along, across = (tip @ axis) * axis, np.cross(axis, tip)
     turned = along + np.cos(angle) * (tip - along) + np.sin(angle) * across
-    return turned / equilibria.rod.length
+    return pose.to_world(turned) / equilibria.rod.length
 
 
 def _rim(radius: float) -> Array:
@@ -235,7 +237,7 @@ def _gravity_arrow(panel: Panel, equilibria: AllEquilibria) -> None:
     if equilibria.solver is None:
         return
     tables = equilibria.solver.tables
-    right, up, _ = view_axes(panel.view) @ tables.axes[0]
+    right, up, _ = view_axes(panel.view) @ equilibria.rod.pose.directions_to_world(tables.axes[0])
     if np.hypot(right, up) < _SHORTEST_ARROW:
         return
     mirror = -1 if is_mirrored(panel.view) else 1

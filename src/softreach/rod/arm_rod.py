@@ -13,7 +13,7 @@ import numpy as np
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.tables import Tables, check_extension, strain_stations, tables
 from softreach.rod.activation_box import ActivationBox
-from softreach.rod.tip_map import Array, TipMap, check_tol
+from softreach.rod.tip_map import Array, Frame, TipMap, check_tol
 from softreach.support import parallel
 
 __all__ = ["ArmRod"]
@@ -22,6 +22,8 @@ __all__ = ["ArmRod"]
 @dataclass(frozen=True, repr=False)
 class ArmRod(TipMap):
     """The rod that one arm is, free or loaded, in the activations of all its bundles.
+
+    It is that of the frame of the base, wherever this is in the world.
 
     Raises:
         InvalidInput: `tol` out of range.
@@ -35,6 +37,11 @@ class ArmRod(TipMap):
         object.__setattr__(self, "tol", check_tol(self.tol))
         check_extension(self.arm)
 
+    @property
+    def frame(self) -> Frame:
+        """That of the base, which is the world's where the arm stands upright at its origin."""
+        return "world" if self.arm.base.is_identity else "base"
+
     @cached_property
     def box(self) -> ActivationBox:
         """The activations within bounds."""
@@ -45,21 +52,23 @@ class ArmRod(TipMap):
         return tables(self.arm, strain_stations(self.arm))
 
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
-        """How far activations (n, bundles) go: the smallest ζ along the arm [-], shape (n,).
+        """How far activations (n, bundles) go: the smallest ζ, or η, along the arm, shape (n,).
 
-        And the largest angle by which a step turns the arm [rad], ζ |u| R2 dS, shape (n,).
+        And the largest angle by which a step turns the arm [rad], η |Uγ| R2 dS, shape (n,).
         """
         table, profile = self._strain_table, self.arm.profile
         step = profile.radius(table.stations) * (profile.slender_length / self.steps)
         least, most = np.empty((2, len(gamma)))
         with np.errstate(all="ignore"):  # what overflows is no arm
             for block in parallel.blocks(len(gamma), 1024):
-                extension = 1.0 + gamma[block] @ table.extension.T
+                extension = growth = 1.0 + gamma[block] @ table.extension.T
+                if table.growth is not table.extension:
+                    growth = 1.0 + gamma[block] @ table.growth.T
                 bend = np.linalg.norm(
                     np.einsum("scb,nb->nsc", table.curvature, gamma[block]), axis=-1
                 )
-                least[block] = extension.min(axis=1)
-                most[block] = (extension * bend * step).max(axis=1)
+                least[block] = np.minimum(extension, growth).min(axis=1)
+                most[block] = (growth * bend * step).max(axis=1)
         return least, most
 
     @abstractmethod

@@ -30,21 +30,22 @@ Array = NDArray[np.float64]
 
 
 def rest_configuration(arm: Manipulator, stations: int = 101) -> xr.Dataset:
-    """The arm before activation: straight along z, directors along x, y, z.
+    """The arm before activation: straight from its base, directors along the axes of that.
 
     Args:
         arm: The design.
         stations: Number of stations, evenly spaced in Z.
     """
     z = np.linspace(0.0, arm.length, stations)
-    position = np.zeros((1, stations, 3))
-    position[..., 2] = z
+    straight = np.zeros((1, stations, 3))
+    straight[..., 2] = z
+    directors = np.tile(np.eye(3), (1, stations, 1, 1))
     shape = configuration_dataset(
         arm,
         np.zeros((1, arm.bundles)),
         z,
-        position=position,
-        directors=np.tile(np.eye(3), (1, stations, 1, 1)),
+        position=arm.base.to_world(straight),
+        directors=arm.base.directions_to_world(directors),
         curvature=np.zeros((1, stations, 3)),
         extension=np.ones((1, stations)),
         radius=arm.profile.radius(z),

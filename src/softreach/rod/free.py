@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,7 +35,7 @@ _HEADINGS = 720
 
 @dataclass(frozen=True, repr=False)
 class FreeRod(ArmRod):
-    """r' = ζ d3, dᵢ' = ζ u × dᵢ with ζ = 1 + z·γ, u = Uγ, in Magnus steps of order 6: (18)."""
+    """r' = ζ d3, dᵢ' = η Uγ × dᵢ with ζ = 1 + z·γ, in Magnus steps of order 6: (18)."""
 
     @cached_property
     def rule(self) -> StepRule:
@@ -122,12 +123,12 @@ class FreeRod(ArmRod):
         return found
 
     def strains_at(self, stations: ArrayLike) -> Callable[..., Strains]:
-        """u = Uγ and ζ = 1 + z·γ at stations Z [m] as a function of activations: theory (7)."""
+        """u = Uγ η/ζ and ζ = 1 + z·γ at stations Z [m] as a function of activations: theory (7)."""
         table = tables(self.arm, self.check_stations(stations, ascending=False))
 
         def strains(activations: ArrayLike, status: Status | None = None) -> Strains:
             gamma, lost = self.with_arms(self.box.check(activations))
-            found = linear_strains(table, gamma)
+            found = per_length(*linear_strains(table, gamma))
             if status is not None:
                 status[:] = TipStatus.STABLE
             drop(lost, status, *found)
@@ -152,19 +153,32 @@ class FreeRod(ArmRod):
         return self.rule.packed_stations(np.array([self.length]), steps)
 
 
-def linear_strains(table: Tables, gamma: Array) -> Strains:
-    """u = Uγ and ζ = 1 + z·γ at the stations of a table.
+class LinearStrains(NamedTuple):
+    """What is linear in the activations, (n, station) of each."""
+
+    curvature: Array
+    """Uγ [1/m] in the directors, per length of η."""
+    extension: Array
+    """ζ = 1 + z·γ [-]."""
+    growth: Array
+    """η [-], what fibers and muscles make of the length of matter at rest: theory (7)."""
+
+
+def linear_strains(table: Tables, gamma: Array) -> LinearStrains:
+    """Uγ, ζ and η at the stations of a table.
 
     Samples vary fastest in memory, so that all values at one station lie side by side. The sum runs
     over the bundles in their order, whatever BLAS and its threads would do.
 
     Args:
-        table: z and U.
+        table: z and U, and the part of z in η.
         gamma: Activations, shape (n, bundles).
     """
-    rows = np.concatenate([table.curvature, table.extension[:, None]], axis=1)
-    bundles = np.ascontiguousarray(gamma.T)
-    total, term = np.empty((len(rows), 4, len(gamma))), np.empty((4, len(gamma)))
+    parts = [table.curvature, table.extension[:, None]]
+    parts += [] if table.growth is table.extension else [table.growth[:, None]]
+    rows, bundles = np.concatenate(parts, axis=1), np.ascontiguousarray(gamma.T)
+    columns = rows.shape[1]
+    total, term = np.empty((len(rows), columns, len(gamma))), np.empty((columns, len(gamma)))
     if not len(bundles):
         total[:] = 0.0
     for row, out in zip(
@@ -173,19 +187,36 @@ def linear_strains(table: Tables, gamma: Array) -> Strains:
         np.multiply(row[:, :1], bundles[0], out=out)
         for j in range(1, len(bundles)):
             out += np.multiply(row[:, j : j + 1], bundles[j], out=term)
-    total[:, 3] += 1.0
-    return Strains(np.moveaxis(total[:, :3], 2, 0), total[:, 3].T)
+    total[:, 3:] += 1.0
+    extension = total[:, 3].T
+    growth = extension if table.growth is table.extension else total[:, 4].T
+    return LinearStrains(np.moveaxis(total[:, :3], 2, 0), extension, growth)
+
+
+def per_length(curvature: Array, extension: Array, growth: Array) -> Strains:
+    """Strains with curvature per length as it is, from curvature per length of η."""
+    if growth is not extension:
+        curvature = curvature * (growth / extension)[..., None]
+    return Strains(curvature, extension)
 
 
 def strain_range(table: Tables, box: ActivationBox) -> StrainRange:
-    """Ranges of the strains of all activations in a box."""
+    """Ranges of the strains of all activations in a box; where η is not ζ, bounds of them."""
     bounds = np.stack([box.low, box.high], axis=1)
-    most = _most_bending(table.curvature[:, :2], bounds)
-    return StrainRange(
-        bending=np.stack([np.zeros_like(most), most], axis=1),
-        torsion=_ends(table.curvature[:, 2], bounds),
-        extension=1.0 + _ends(table.extension, bounds),
-    )
+    most, torsion = _most_bending(table.curvature[:, :2], bounds), table.curvature[:, 2]
+    bending, torsion = np.stack([np.zeros_like(most), most], axis=1), _ends(torsion, bounds)
+    extension = 1.0 + _ends(table.extension, bounds)
+    if table.growth is not table.extension:  # η/ζ = 1 - (ζ - η)/ζ
+        forces = _ends(table.extension - table.growth, bounds)
+        ratio = 1.0 - _products(forces, 1.0 / extension)
+        bending, torsion = bending * ratio[:, :1], _products(torsion, ratio)
+    return StrainRange(bending, torsion, extension)
+
+
+def _products(first: Array, second: Array) -> Array:
+    """Least and largest products of numbers from two ranges, shape (station, 2)."""
+    all_ends = (first[:, :, None] * second[:, None]).reshape(len(first), 4)
+    return np.stack([all_ends.min(axis=1), all_ends.max(axis=1)], axis=1)
 
 
 def _ends(rows: Array, bounds: Array) -> Array:

@@ -1,6 +1,7 @@
 """Forward kinematics: where the tip is, how it moves, what shape the arm takes.
 
-Clamped at Z = 0, tangent d3 = +z there.
+Clamped at Z = 0 by its base, whose z is the tangent d3 there; told in the world unless asked
+otherwise.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach import schema
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.rods import tip_map
-from softreach.rod.tip_map import Frames, Strains, TipMap
+from softreach.rod.tip_map import Frame, Frames, Strains, TipMap
 from softreach.support.arguments import as_given, plain
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput
@@ -29,7 +30,13 @@ Array = NDArray[np.float64]
 _COLUMNS = 64  # numbers at a station of one sample, those that come and go included
 
 
-def tip_positions(arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6) -> Array:
+def tip_positions(
+    arm: Manipulator | TipMap,
+    activations: ArrayLike,
+    tol: float = 1e-6,
+    *,
+    frame: Frame = "world",
+) -> Array:
     """Tip positions of many activations: theory (25), by sixth-order Magnus integration.
 
     Args:
@@ -37,6 +44,8 @@ def tip_positions(arm: Manipulator | TipMap, activations: ArrayLike, tol: float 
         activations: γ [-], shape (n, bundles); values outside the bounds are allowed, but `tol` is
             promised inside them.
         tol: Largest tip error, in L; it decides the number of steps.
+        frame: In which tips are told: that of the "world", or of the "base", whose z is along the
+            straight arm.
 
     Returns:
         Tips [m], shape (n, 3).
@@ -46,11 +55,17 @@ def tip_positions(arm: Manipulator | TipMap, activations: ArrayLike, tol: float 
             (ζ <= 0) or none that the steps follow; or a `tol` out of range.
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
     """
-    rod = tip_map(arm, tol)
+    rod = tip_map(arm, tol, frame=frame)
     return rod.tips(rod.check_activations("activations", activations))
 
 
-def tip_jacobian(arm: Manipulator | TipMap, activations: ArrayLike, tol: float = 1e-6) -> Array:
+def tip_jacobian(
+    arm: Manipulator | TipMap,
+    activations: ArrayLike,
+    tol: float = 1e-6,
+    *,
+    frame: Frame = "world",
+) -> Array:
     """Spatial twist of the tip per unit of each activation: the exact derivative of the tip.
 
     Column j is (v, ω): ω [rad] turns the tip frame, and the tip at p moves by v + ω × p [m],
@@ -60,6 +75,7 @@ def tip_jacobian(arm: Manipulator | TipMap, activations: ArrayLike, tol: float =
         arm: The design, or its tip map.
         activations: γ [-], shape (n, bundles).
         tol: As for `tip_positions`, whose derivative this is to rounding.
+        frame: As for `tip_positions`; v is the velocity of what passes its origin.
 
     Returns:
         Jacobians, shape (n, 6, bundles), linear rows first.
@@ -67,7 +83,7 @@ def tip_jacobian(arm: Manipulator | TipMap, activations: ArrayLike, tol: float =
     Raises:
         InvalidInput: As for `tip_positions`.
     """
-    rod = tip_map(arm, tol)
+    rod = tip_map(arm, tol, frame=frame)
     return rod.tip_twists(rod.check_activations("activations", activations))[1]
 
 
@@ -76,6 +92,8 @@ def configuration(
     activation: ArrayLike,
     stations: int | ArrayLike = 101,
     tol: float = 1e-6,
+    *,
+    frame: Frame = "world",
 ) -> xr.Dataset:
     """The whole shape of the arm: centerline, directors, curvature and extension along Z.
 
@@ -84,6 +102,7 @@ def configuration(
         activation: γ [-], shape (bundles,), or (n, bundles) for a leading `sample` dimension.
         stations: Number of stations, evenly spaced from base to tip, or their Z [m], ascending.
         tol: Largest error of the tip, in L.
+        frame: As for `tip_positions`.
 
     Returns:
         Dataset with `position` [m], `directors` (d1, d2, d3), `curvature` u [1/m] in the directors,
@@ -93,7 +112,7 @@ def configuration(
         InvalidInput: Activations or stations of another shape or out of range, or activations
             under which there is no arm (ζ <= 0).
     """
-    rod = tip_map(arm, tol)
+    rod = tip_map(arm, tol, frame=frame)
     given = as_floats("activation", activation)
     gamma = rod.check_activations("activation", np.atleast_2d(given))
     z = stations_along(rod, stations, _COLUMNS * max(1, len(gamma)))
@@ -113,6 +132,7 @@ def shape_dataset(
         gamma * rod.measures,
         z,
         names=rod.box.names,
+        frame=rod.frame,
         **frames._asdict(),
         **strains._asdict(),
         radius=rod.radius(z),

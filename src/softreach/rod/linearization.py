@@ -1,17 +1,18 @@
 """Bound of the distance of the tip map of a free rod from its linearization.
 
-A change d of activation changes the twist by κ = ∂(ζu)/∂γ d = ζ U d + (z·d) u, and turns a section
-by at most a = ∫ |κ|. From r = ∫ ζ d3 the second derivative along d is
+A change d of activation changes the twist by κ = ∂(ηu)/∂γ d = η U d + (y·d) u with u = Uγ and
+η = 1 + y·γ, in which y is z of fibers and muscles and 0 of forces, and turns a section by at most
+a = ∫ |κ|. From r = ∫ ζ d3 the second derivative along d is
 
-r''[d, d] = ∫ 2 (z·d) ω × d3 + ζ ω' × d3 + ζ ω × (ω × d3),   |ω'| <= ½ a² + ∫ 2 |z·d| |U d|,
+r''[d, d] = ∫ 2 (z·d) ω × d3 + ζ ω' × d3 + ζ ω × (ω × d3),   |ω'| <= ½ a² + ∫ 2 |y·d| |U d|,
 
-so that |r''[d, d]| <= ∫ 2 |z·d| a + ζ (3/2 a² + ∫ 2 |z·d| |U d|) with ζ and u at their largest in
-the activation box, or in the cell of it where γ + d lies. Here ω' is the change of ω = ∫ R κ, whose
-part ∫ ω × ω' is at most ½ a². The remainder of the linearization is at most half of that.
+so that |r''[d, d]| <= ∫ 2 |z·d| a + ζ (3/2 a² + ∫ 2 |y·d| |U d|) with ζ, η and u at their largest
+in the activation box, or in the cell of it where γ + d lies. Here ω' is the change of ω = ∫ R κ,
+whose part ∫ ω × ω' is at most ½ a². The remainder of the linearization is at most half of that.
 
 In a cell ζ and |u| are parts of what they are at most in the box, at every station no more than the
-largest part anywhere along the arm. All integrals are then those of the box times powers of the two
-largest parts, and are computed once.
+largest part anywhere along the arm; so is η where it is ζ, and else it stays at its largest. All
+integrals are then those of the box times powers of the largest parts, and are computed once.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class _Terms(NamedTuple):
     """Terms of the bound where extension and bending are largest: degree two in d."""
 
     turned_twice: float
-    """∫ 3/2 ζ a² by the first part of κ = ζ U d + (z·d) u."""
+    """∫ 3/2 ζ a² by the first part of κ = η U d + (y·d) u."""
     turned_and_stretched: float
     """The same by one of each."""
     stretched_twice: float
@@ -51,13 +52,15 @@ class _Terms(NamedTuple):
     stretched: float
     """∫ 2 |z·d| a by the second part."""
     mixed: float
-    """∫ ζ ∫ 2 |z·d| |U d|."""
+    """∫ ζ ∫ 2 |y·d| |U d|."""
 
-    def sum(self, longest: Array | float, bending: Array | float) -> Array | float:
-        """The bound where extension and bending are these parts of their largest values."""
-        square = self.turned_twice * longest**2 + self.stretched_twice * bending**2
-        square += self.turned_and_stretched * longest * bending
-        linear = self.turned * longest + self.stretched * bending + self.mixed * longest
+    def sum(
+        self, longest: Array | float, grown: Array | float, bending: Array | float
+    ) -> Array | float:
+        """The bound where ζ, η and bending are these parts of their largest values."""
+        square = self.turned_twice * grown**2 + self.stretched_twice * bending**2
+        square += self.turned_and_stretched * grown * bending
+        linear = self.turned * grown + self.stretched * bending + self.mixed * longest
         return 0.5 * _SAFETY * (longest * square + linear)
 
 
@@ -72,6 +75,11 @@ class Linearization:
         self.extension, self.stretch = table.extension, np.abs(table.extension)
         middle, half = 0.5 * (box.low + box.high), 0.5 * box.widths
         self.longest = 1.0 + table.extension @ middle + self.stretch @ half
+        self.has_forces = table.growth is not table.extension
+        self.growth, self.most_grown = self.stretch, self.longest
+        if self.has_forces:
+            self.growth = np.abs(table.growth)
+            self.most_grown = 1.0 + table.growth @ middle + self.growth @ half
         self.size = np.linalg.norm(self.curvature, axis=1)
         self.bending = np.linalg.norm(self.curvature @ middle, axis=1) + self.size @ half
         self._known: dict[bytes, _Terms] = {}
@@ -84,7 +92,7 @@ class Linearization:
     def error(self, half_widths: Array) -> float:
         """The largest |r(γ + d) - r(γ) - r'(γ) d| [m] for |dj| <= half_widths[j] in the box."""
         square, terms = self._terms(half_widths)
-        return square * float(terms.sum(1.0, 1.0))
+        return square * float(terms.sum(1.0, 1.0, 1.0))
 
     def errors(self, centers: Array, half_widths: Array) -> Array:
         """The same for |dj| <= half_widths[j] around each center only, shape (n,)."""
@@ -94,7 +102,9 @@ class Linearization:
         relative_strains(np.ascontiguousarray(centers), offset, *self._relative, longest, bending)
         bending = np.sqrt(bending) + (self.size @ half_widths * self._bending_inverse).max()
         square, terms = self._terms(half_widths)
-        return square * np.asarray(terms.sum(np.minimum(longest, 1.0), np.minimum(bending, 1.0)))
+        longest = np.minimum(longest, 1.0)
+        grown = 1.0 if self.has_forces else longest
+        return square * np.asarray(terms.sum(longest, grown, np.minimum(bending, 1.0)))
 
     @cached_property
     def _bending_inverse(self) -> Array:
@@ -124,10 +134,11 @@ class Linearization:
         if not len(free):
             return _Terms(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         stretch, turned = self.stretch @ half_widths, self._turns(half_widths, free)
-        first = _integrals(self.longest * turned, z)
-        second = _integrals(stretch * self.bending, z)
+        growth = self.growth @ half_widths
+        first = _integrals(self.most_grown * turned, z)
+        second = _integrals(growth * self.bending, z)
         weight, most = 1.5 * self.longest, turned.max(axis=0)
-        inner = self.longest * _integrals(2.0 * stretch * most, z)
+        inner = self.longest * _integrals(2.0 * growth * most, z)
         # The square of a is convex in d, so that it is largest where all |dj| are.
         return _Terms(
             turned_twice=float(_integrals(weight * first**2, z)[:, -1].max()),

@@ -9,35 +9,48 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.summary import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.rod.arm_rod import ArmRod
 from softreach.rod.free import FreeRod
-from softreach.rod.tip_map import TipMap, check_tol
+from softreach.rod.placed import PlacedRod
+from softreach.rod.tip_map import Frame, TipMap, check_tol
 from softreach.rod.view import View
-from softreach.support.arguments import as_flag, as_given
+from softreach.support.arguments import as_flag, as_given, as_one_of
 from softreach.support.errors import InvalidInput
 from softreach.support.errors import warn as issue_warning
 
 __all__ = ["refined", "tip_map"]
 
 
-def tip_map(arm: Manipulator | TipMap, tol: float = 1e-6, *, warn: bool = True) -> TipMap:
+def tip_map(
+    arm: Manipulator | TipMap, tol: float = 1e-6, *, frame: Frame = "world", warn: bool = True
+) -> TipMap:
     """The tip map of an arm, kept for the next call; a tip map is returned as it is.
 
     Args:
         arm: The design, or a tip map, whose own tolerance then counts.
         tol: Largest tip error, in L.
+        frame: Where places are told: in the "world", or in the frame of the "base", whose z is
+            along the straight arm. That of a tip map, if it is not of the world, counts.
         warn: Whether to warn of loads beyond what was verified.
 
     Raises:
-        InvalidInput: No arm, or `tol` out of range.
+        InvalidInput: No arm, no such frame, or `tol` out of range.
         InvalidDesign: Some activation within the bounds would shorten the arm to nothing.
     """
+    as_one_of("frame", frame, ("world", "base"))
     if isinstance(arm, TipMap):
-        return arm
+        return arm if frame == "world" else _from_base(arm)
     if not isinstance(arm, Manipulator):
         raise InvalidInput("arm", as_given(arm), "a Manipulator or a TipMap")
-    rod = _of_arm(arm, check_tol(tol))
+    rod = _of_arm(arm, check_tol(tol), frame)
     if as_flag("warn", warn) and arm.loads is not None:
         _warn_of_large_loads(arm)
     return rod
+
+
+def _from_base(rod: TipMap) -> TipMap:
+    """The same map in the frame of the base."""
+    if isinstance(rod, View):
+        return replace(rod, base=_from_base(rod.base))
+    return rod.rod if isinstance(rod, PlacedRod) else rod
 
 
 def refined(rod: TipMap, tol: float) -> TipMap:
@@ -51,11 +64,16 @@ def refined(rod: TipMap, tol: float) -> TipMap:
         return rod
     if isinstance(rod, View):
         return replace(rod, base=refined(rod.base, tol))
-    return _of_arm(rod.arm, tol) if isinstance(rod, ArmRod) else rod
+    frame: Frame = "base" if isinstance(rod, ArmRod) else "world"
+    return _of_arm(rod.arm, tol, frame) if isinstance(rod, ArmRod | PlacedRod) else rod
 
 
 @lru_cache(maxsize=64)
-def _of_arm(arm: Manipulator, tol: float) -> TipMap:
+def _of_arm(arm: Manipulator, tol: float, frame: Frame) -> TipMap:
+    if frame == "world" and not arm.base.is_identity:
+        rod = _of_arm(arm, tol, "base")
+        assert isinstance(rod, ArmRod)
+        return PlacedRod(rod)
     if arm.loads is None:
         return FreeRod(arm, tol)
     from softreach.rod.loaded.rod import LoadedRod

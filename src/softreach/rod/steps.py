@@ -48,6 +48,8 @@ class Nodes(NamedTuple):
     """Length of the step as each node sees it [m], shape (step, node)."""
     stretch: Array
     """z [-], shape (step, node, bundle)."""
+    growth: Array
+    """Its part in η [-], shape (step, node, bundle)."""
     curvature: Array
     """U [1/m], shape (step, node, 3, bundle)."""
 
@@ -88,6 +90,7 @@ class StepRule:
         return Nodes(
             width * self.arm.profile.radius(z),  # dZ = R2 dS
             table.extension.reshape(*s.shape, self.arm.bundles),
+            table.growth.reshape(*s.shape, self.arm.bundles),
             table.curvature.reshape(*s.shape, 3, self.arm.bundles),
         )
 
@@ -163,7 +166,7 @@ class StepRule:
         raise InvalidInput("tol", tol, f"reachable within {_MOST_STEPS} steps", "use a larger one")
 
     def _fewest_steps(self, turn: float) -> int:
-        """Steps of which none turns by more than `turn`: |ω| = ζ |u| R2 dS at the pilot samples."""
+        """Steps of which none turns by more than `turn`: |ω| = η |u| R2 dS at the pilot samples."""
         steps = min(self._largest_turn / turn, 2.0 * _MOST_STEPS)  # infinite ones overflow
         return max(2, int(np.ceil(steps)))
 
@@ -174,12 +177,12 @@ class StepRule:
 
     @cached_property
     def _largest_turn(self) -> float:
-        """Largest ζ |u| R2 over the pilot samples and the arm, times S(L) [rad]."""
+        """Largest η |u| R2 over the pilot samples and the arm, times S(L) [rad]."""
         profile, gamma = self.arm.profile, self.pilot
         z = both_sides(self.arm, profile.station(np.linspace(0.0, profile.slender_length, 65)))
         table = tables(self.arm, z)
         bend = np.linalg.norm(np.einsum("scb,nb->nsc", table.curvature, gamma), axis=-1)
-        rate = (1.0 + gamma @ table.extension.T) * bend * profile.radius(z)
+        rate = (1.0 + gamma @ table.growth.T) * bend * profile.radius(z)
         return float(rate.max() * profile.slender_length)
 
     @cached_property

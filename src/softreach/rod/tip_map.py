@@ -10,11 +10,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from enum import IntEnum
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.activation_box import ActivationBox
 from softreach.support import parallel
@@ -24,6 +25,8 @@ from softreach.support.errors import InvalidInput, Range, counted
 
 Array = NDArray[np.float64]
 Status = NDArray[np.int8]
+Frame = Literal["world", "base"]
+"""Where places are told: in the world, or from the base, whose z is along the straight arm."""
 
 BLOCK = 16_384
 """Samples per task: large against a thread's cost, small enough for Ctrl-C to be prompt."""
@@ -33,7 +36,7 @@ MOST_TURN_OF_STEP = 2.0
 
 
 class TipStatus(IntEnum):
-    """Status of a tip: a stable equilibrium, an unstable one, or none."""
+    """Status of a tip: a stable equilibrium, an unstable one, none, or unknown."""
 
     STABLE = 0
     """A stable equilibrium."""
@@ -42,6 +45,14 @@ class TipStatus(IntEnum):
     NO_EQUILIBRIUM = 2
     """The branch that starts at the unloaded arm ends before, or there is no such arm; the tip is
     NaN."""
+    UNDECIDED = 3
+    """The branch was not followed to its end: nobody knows whether it has an equilibrium; the tip
+    is NaN."""
+
+
+def has_tip(status: Status) -> NDArray[np.bool_]:
+    """Whether each `TipStatus` is that of an equilibrium, stable or not."""
+    return status <= TipStatus.UNSTABLE
 
 
 class TipMap(ABC):
@@ -110,6 +121,16 @@ class TipMap(ABC):
         return self.arm.length
 
     @property
+    def pose(self) -> Base:
+        """Pose of the clamped end in the frame in which the map tells places."""
+        return UPRIGHT
+
+    @property
+    def frame(self) -> Frame:
+        """The frame in which the map tells places and takes directions."""
+        return "world"
+
+    @property
     def supports_unstable(self) -> bool:
         """Whether a tip can have another status than stable."""
         return False
@@ -128,7 +149,7 @@ class TipMap(ABC):
         """Compute what every sample needs, once for all threads."""
 
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
-        """How far activations (n, bundles) go: the smallest ζ along the arm [-], shape (n,).
+        """How far activations (n, bundles) go: the smallest ζ, or η, along the arm, shape (n,).
 
         And the largest angle by which a step turns the arm [rad], shape (n,).
         """
@@ -306,7 +327,8 @@ class StrainRange(NamedTuple):
     """Ranges of the strains within the activation box, shape (station, 2) each."""
 
     bending: Array
-    """√(u1² + u2²) [1/m], from 0 to an upper bound at most 1e-5 too large."""
+    """√(u1² + u2²) [1/m], from 0 to an upper bound: at most 1e-5 too large for fibers and muscles,
+    with tendons and chambers by as much as their ζ differs."""
     torsion: Array
     """u3 [1/m]."""
     extension: Array

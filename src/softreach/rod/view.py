@@ -13,10 +13,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softreach.arm.base import Base
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.tip_map import (
     Array,
+    Frame,
     Frames,
     Status,
     StrainRange,
@@ -97,6 +99,16 @@ class View(TipMap):
     def __post_init__(self) -> None:
         object.__setattr__(self, "arm", self.base.arm)
         object.__setattr__(self, "tol", self.base.tol)
+
+    @property
+    def pose(self) -> Base:
+        """Pose of the clamped end in the frame in which the map tells places."""
+        return self.base.pose
+
+    @property
+    def frame(self) -> Frame:
+        """The frame in which the map tells places."""
+        return self.base.frame
 
     @property
     def supports_unstable(self) -> bool:

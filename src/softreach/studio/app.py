@@ -30,11 +30,13 @@ from softreach.studio.serve.viser_fixes import close_sockets, request_path
 from softreach.studio.session import Job, Session
 from softreach.studio.snapshots import Snapshots
 from softreach.studio.start import KeptWork, Start, state_in_request
-from softreach.studio.state import Camera, History, StudioState
+from softreach.studio.state import Camera, History, StudioState, vector
 from softreach.studio.work import CompilationWatch, Latest
 
 if TYPE_CHECKING:
     from viser import ClientHandle
+
+    from softreach.arm.manipulator import Manipulator
 
 __all__ = ["JOBS", "Studio"]
 
@@ -91,7 +93,9 @@ class Studio:
         self._notice = Latest(_ignored)
         self._compilation = CompilationWatch(self._compiling)
         self.server = start_server(host, port, token)
-        camera = start.state.camera or (_CAMERA if start.atlas is None else _CAMERA_ON_MAP)
+        camera = start.state.camera or (
+            _camera_beside(start.state.design) if start.atlas is None else _CAMERA_ON_MAP
+        )
         self.server.initial_camera.position = camera.position
         self.server.initial_camera.look_at = camera.look_at
         self.server.on_client_connect(self._connected)
@@ -201,6 +205,13 @@ class Studio:
 def _ignored(error: Exception) -> None:
     """A tab that is told may be gone."""
     del error
+
+
+def _camera_beside(arm: Manipulator) -> Camera:
+    """Camera that sees an arm wherever it is clamped and points."""
+    look_at = arm.base.to_world(arm.length * np.array(_CAMERA.look_at)) / arm.length
+    position = look_at + np.subtract(_CAMERA.position, _CAMERA.look_at)
+    return Camera(position=vector(position), look_at=vector(look_at))
 
 
 def _look_at_all(session: Session) -> None:

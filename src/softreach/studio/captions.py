@@ -29,6 +29,7 @@ _POSTURES = {
     TipStatus.STABLE: "a stable equilibrium",
     TipStatus.UNSTABLE: "an unstable equilibrium: a real arm leaves it",
     TipStatus.NO_EQUILIBRIUM: "no equilibrium: the arm is not drawn",
+    TipStatus.UNDECIDED: "the search for an equilibrium gave up: the arm is not drawn",
 }
 
 
@@ -63,7 +64,9 @@ def legend_text(reach: Reach, *, free: bool) -> list[Part]:
         parts += [Swatch(UNSTABLE), f" unstable: {_percent(unstable)} of the samples {_GAP}"]
     if lost := reach.share(TipStatus.NO_EQUILIBRIUM):
         parts.append(f"no equilibrium, not shown: {_percent(lost)} {_GAP}")
-    if not unstable and not lost:
+    if undecided := reach.share(TipStatus.UNDECIDED):
+        parts.append(f"undecided, not shown: {_percent(undecided)} {_GAP}")
+    if not (unstable or lost or undecided):
         parts.append(f"every sample rests in a stable equilibrium {_GAP}")
     return [*parts, Swatch(FAINT), " without loads"] if free else parts
 

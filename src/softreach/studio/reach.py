@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import compute_cloud, design_of
 from softreach.cloud.volume import concave_hull
-from softreach.rod.tip_map import TipMap, TipStatus
+from softreach.rod.tip_map import TipMap, TipStatus, has_tip
 from softreach.studio.state import TOL, solvable_rod
 from softreach.studio.work import (
     Budget,
@@ -130,8 +130,9 @@ class Reach:
         """`TipStatus` of every sample."""
         if "status" not in self.cloud:
             return np.full(self.samples, TipStatus.STABLE, np.int8)
-        lost = np.isnan(self.cloud.tip.values).any(axis=1)
-        return np.where(lost, TipStatus.NO_EQUILIBRIUM, self.cloud.status.values).astype(np.int8)
+        status = self.cloud.status.values
+        lost = has_tip(status) & np.isnan(self.cloud.tip.values).any(axis=1)
+        return np.where(lost, TipStatus.NO_EQUILIBRIUM, status).astype(np.int8)
 
     @cached_property
     def counts(self) -> NDArray[np.float64]:
@@ -168,7 +169,7 @@ def shown_samples(reach: Reach, level: int) -> Rows:
     """Samples that a picture of 2^level points shows: those that have a tip."""
     first = slice(0, min(1 << level, reach.samples))
     rows = first if reach.order is None else reach.order[first]
-    settled = reach.status[rows] != TipStatus.NO_EQUILIBRIUM
+    settled = has_tip(reach.status[rows])
     return rows if settled.all() else np.arange(reach.samples)[rows][settled]
 
 

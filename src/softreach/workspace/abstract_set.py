@@ -98,7 +98,7 @@ class ReachableSet(ABC):
             name: ((), number.value, {"units": number.units, "long_name": number.long_name})
             for name, number in {**self._numbers(), **self._lost()}.items()
         }
-        attrs = {**provenance(self.arm), "tol": self.tip_map.tol}
+        attrs = {**provenance(self.arm, self.tip_map.frame), "tol": self.tip_map.tol}
         attrs |= {"activation_grid": self.cells} if self.cells else {}
         return xr.Dataset(variables, attrs=attrs | {"dimension": self.dimension})
 

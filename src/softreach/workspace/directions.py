@@ -79,7 +79,9 @@ def direction_spread(
     angle.flat[cells] = _cones(directions[order], starts)
     samples.flat[cells] = np.diff(starts, append=n)
     drawn = {"n": n, "sampler": "sobol", "seed": seed, "tol": rod.tol}
-    return _dataset(lattice, angle, samples).assign_attrs({**provenance(rod.arm), **drawn})
+    return _dataset(lattice, angle, samples).assign_attrs(
+        {**provenance(rod.arm, rod.frame), **drawn}
+    )
 
 
 def _all_stable(rod: TipMap) -> TipMap:

@@ -149,7 +149,7 @@ class VolumeGradient:
             for name, (unit, meaning) in _MEANINGS.items()
         }
         coordinates = {"parameter": list(self.parameters), "unit": ("parameter", list(self.units))}
-        attrs = {**provenance(self.solid.arm), "route": self.route}
+        attrs = {**provenance(self.solid.arm, self.solid.tip_map.frame), "route": self.route}
         return xr.Dataset(numbers, coordinates, attrs)
 
     def __repr__(self) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.rod.rods import tip_map
-from softreach.rod.tip_map import TipMap, loads_too_heavy
+from softreach.rod.tip_map import Frame, TipMap, loads_too_heavy
 from softreach.support.arguments import (
     POSITIVE,
     as_given,
@@ -49,6 +49,7 @@ def reachable_set(
     cell: float | None = None,
     grid: int | None = None,
     tol: float = 1e-6,
+    frame: Frame = "world",
     memory: float | None = None,
     progress: Progress | None = None,
 ) -> ReachableSet:
@@ -84,6 +85,8 @@ def reachable_set(
         grid: Cells n along each axis of the activation box, even, instead of the rule's; for three
             free bundles.
         tol: Largest tip error, in L.
+        frame: In which places are told: that of the "world", or of the "base", whose z is along the
+            straight arm.
         memory: What more than three free bundles may use [bytes]; by default a quarter of what is
             free. Cells do not become smaller than it allows.
         progress: Called with the number of grid vertices or cells done since its last call.
@@ -102,7 +105,7 @@ def reachable_set(
     cell = None if cell is None else as_number("cell", cell, _LENGTHS)
     grid = None if grid is None else as_even_cells("grid", grid)
     memory = None if memory is None else as_number("memory", memory, _SIZES)
-    rod = tip_map(arm, tol)
+    rod = tip_map(arm, tol, frame=frame)
     m = rod.box.dimension
     if m < 3:
         return thin_set(rod)

@@ -101,7 +101,11 @@ class ReachableSolid(ReachableSet):
             fields |= {"count": counts.clip(0), "degree": degrees}
         variables = {name: (tuple("xyz"), values) for name, values in fields.items()}
         lattice = self.image.lattice
-        attrs = {**provenance(self.arm), "cell": lattice.cell, "length": self.tip_map.length}
+        attrs = {
+            **provenance(self.arm, self.tip_map.frame),
+            "cell": lattice.cell,
+            "length": self.tip_map.length,
+        }
         return xr.Dataset(variables, lattice.centers(), attrs)
 
     def surface(self) -> Surface:

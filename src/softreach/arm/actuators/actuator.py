@@ -106,6 +106,11 @@ class Actuator(Part, ABC):
     """Symbol of an activation in formulas."""
     activation: ClassVar[str] = "activation"
     """Quantity that an activation is."""
+    is_force: ClassVar[bool] = False
+    """Whether it loads matter and leaves its length at rest, per which curvature then counts.
+
+    Tendons and chambers do; fibers and muscles change that length, and curvature with it: (7).
+    """
     default_name: ClassVar[str] = "actuator"
     """Name that an arm gives to unnamed ones, followed by a number."""
     validity: ClassVar[str] = ""

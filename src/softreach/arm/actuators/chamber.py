@@ -40,11 +40,10 @@ class Chamber(PolarActuator):
     unit: ClassVar[str] = "Pa"
     symbol: ClassVar[str] = "P"
     activation: ClassVar[str] = "pressure"
+    is_force: ClassVar[bool] = True
     default_name: ClassVar[str] = "chamber"
     validity: ClassVar[str] = (
-        "Exact for thin-walled channels that do not widen; else calibrate `area_factor`. Curvature "
-        "is per length after activation: an elastic rod whose stiffness is per length before it "
-        "bends less by 1/ζ where pressure lengthens it to ζ."
+        "Linear material, and thin-walled channels that do not widen; else calibrate `area_factor`."
     )
 
     distance: float | None = number(

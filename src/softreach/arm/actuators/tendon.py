@@ -54,12 +54,12 @@ class Tendon(PolarActuator):
     unit: ClassVar[str] = "N"
     symbol: ClassVar[str] = "τ"
     activation: ClassVar[str] = "tension"
+    is_force: ClassVar[bool] = True
     default_name: ClassVar[str] = "tendon"
     validity: ClassVar[str] = (
-        "Exact for tendons parallel to the axis; others pull along their direction before "
-        "activation, with a relative error of the order of curvature times distance from the axis. "
-        "Curvature is per length after activation: an elastic rod whose stiffness is per length "
-        "before it bends more by 1/ζ, ζ = 1 - τ/K0."
+        "Linear material: real silicone (neo-Hookean) bends less than this, by about 2.3 τ/K0. "
+        "Tendons that are not parallel to the axis pull along their direction before activation, "
+        "with a relative error of the order of curvature times distance from the axis."
     )
 
     revolution: float = number(

@@ -25,6 +25,7 @@ from softreach.arm.actuators import (
     Tendon,
 )
 from softreach.arm.actuators.actuator import actuator_kinds
+from softreach.arm.base import Base
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.material import Material
 from softreach.arm.number import Number, fields_of, unit_suffix
@@ -65,7 +66,7 @@ ACTUATORS: Mapping[str, type[Actuator]] = MappingProxyType(
 )
 """Actuators by the kind that files know them by."""
 
-_BODY = (Material, Ring, Section, Loads, PointLoad)
+_BODY = (Material, Ring, Section, Loads, PointLoad, Base)
 _PI = Decimal("3.14159265358979323846264338327950288420")
 _LONG = 17  # digits from which a number of degrees is read exactly
 

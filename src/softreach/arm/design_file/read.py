@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from softreach.arm.actuators import Actuator
 from softreach.arm.actuators.actuator import MOST_BUNDLES
 from softreach.arm.along import AlongArm
+from softreach.arm.base import Base
 from softreach.arm.design_file.keys import (
     ACTUATORS,
     PROFILES,
@@ -43,6 +44,7 @@ LAYOUT: Mapping[str, tuple[type, bool]] = {
     "rings": (list, True),
     "actuators": (list, True),
     "loads": (dict, False),
+    "base": (dict, False),
 }
 """Keys at the top of a file, their types, and whether they are required."""
 
@@ -54,6 +56,7 @@ class Parts(NamedTuple):
     section: Section
     actuators: tuple[Actuator, ...]
     loads: Loads | None
+    base: Base
 
 
 def text_of(path: str | PathLike[str]) -> str:
@@ -143,6 +146,8 @@ class _DesignReader(TableReader):
         actuators = [(k, self._actuator(k, raw)) for k, raw in self._tables("actuators")]
         raw = self._table("loads")
         loads = None if raw is None else self.part(Loads, raw, "loads")
+        raw = self._table("base")
+        base = Base() if raw is None else self.part(Base, raw, "base")
         names = [one.get("name") if isinstance(one, dict) else None for one in tables or ()]
         self.faults += name_faults(names, "actuators")
         if profile is None or section is None:
@@ -151,7 +156,7 @@ class _DesignReader(TableReader):
         self._check_fit(profile, section, sound)
         if loads is not None:
             self.faults += self._of_section(loads.section_faults(section, profile.length))
-        return Parts(profile, section, tuple(one for _, one in sound), loads)
+        return Parts(profile, section, tuple(one for _, one in sound), loads, base)
 
     def _check_layout(self) -> None:
         """Top of the file: keys that are unknown or missing, and values of another type."""

@@ -8,6 +8,7 @@ from typing import Any
 
 from softreach.arm.actuators import Actuator
 from softreach.arm.along import Samples
+from softreach.arm.base import POINTS, Base
 from softreach.arm.design_file.keys import ACTUATORS, PROFILES, Key, in_file_units, keys_of
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.material import Material
@@ -22,6 +23,8 @@ _Schema = dict[str, Any]
 _NUMBERS: _Schema = {"type": "array", "items": {"type": "number"}}
 _PAIR: _Schema = {**_NUMBERS, "minItems": 2, "maxItems": 2}
 _PAIRS: _Schema = {"type": "array", "items": _PAIR, "minItems": 1}
+_TRIPLE: _Schema = {**_NUMBERS, "minItems": 3, "maxItems": 3}
+_ROTATION: _Schema = {"type": "array", "items": _TRIPLE, "minItems": 3, "maxItems": 3}
 _TEXT: _Schema = {"type": "string"}
 
 
@@ -33,6 +36,7 @@ def json_schema() -> dict[str, Any]:
         "ring": _table(Ring, "Layer between two radii"),
         "section": _table(Section, "Inside of the arm"),
         "loads": _table(Loads, "Gravity, payload, forces and moments"),
+        "base": _table(Base, "Where in the world the arm is clamped, and which way it points"),
         "point_load": _table(PointLoad, "Force and moment on one section"),
         "own_actuator": {
             "description": "Actuator of a class of one's own: its fields, in SI units",
@@ -67,6 +71,7 @@ def json_schema() -> dict[str, Any]:
             "items": _one_of({**ACTUATORS, "own_actuator": None}, "What drives the arm"),
         },
         "loads": _of("loads"),
+        "base": _of("base"),
     }
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",
@@ -125,6 +130,10 @@ def _value(part: type, key: Key) -> _Schema:
         "ring": {"type": ["integer", "string"], "description": "Index or name of its ring"},
         "material": {"anyOf": [_TEXT, _of("inline_material")]},
         "core": {"anyOf": [_TEXT, _of("inline_material")]},
+        "points": {
+            "description": "The way the straight arm points, or a rotation",
+            "anyOf": [{"enum": [*POINTS]}, _ROTATION, {**_NUMBERS, "minItems": 3, "maxItems": 4}],
+        },
         "point_loads": {"type": "array", "items": _of("point_load")},
     }
     return others.get(key.field, _TEXT)
@@ -137,7 +146,7 @@ def _number(number: Number) -> _Schema:
     about = {"description": f"{number.symbol}: {number.meaning} [{allowed.unit or '-'}]"}
     single = {"type": "integer" if allowed.whole else "number", **_limits(allowed)}
     if number.shape == "triple":
-        return {**about, **_NUMBERS, "minItems": 3, "maxItems": 3}
+        return {**about, **_TRIPLE}
     if number.shape == "stations":
         return {**about, **_NUMBERS}
     if number.shape == "series":

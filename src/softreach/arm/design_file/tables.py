@@ -102,6 +102,8 @@ class TableReader:
             return self._judged(raw, path, ring_name_faults(raw))
         if key.field in ("material", "core"):
             return self.material(raw, path)
+        if key.field == "points":  # words or a rotation, which the base judges
+            return raw
         if key.field == "point_loads":
             return self._point_loads(raw, path)
         return raw if isinstance(raw, str) else self.refused(path, raw, "must be text")

@@ -8,6 +8,7 @@ from typing import Any
 
 from softreach.arm.actuators import Actuator
 from softreach.arm.along import AlongArm, Samples
+from softreach.arm.base import Base
 from softreach.arm.design_file.keys import (
     ACTUATORS,
     PROFILES,
@@ -42,7 +43,11 @@ _LAST = (
 
 
 def render(
-    profile: Profile, section: Section, actuators: Sequence[Actuator], loads: Loads | None = None
+    profile: Profile,
+    section: Section,
+    actuators: Sequence[Actuator],
+    loads: Loads | None,
+    base: Base,
 ) -> str:
     """TOML text of a design, of version 2.
 
@@ -62,6 +67,8 @@ def render(
     if loads is not None:
         blocks.append(["[loads]", *_lines(loads)])
         blocks += [["[[loads.point_loads]]", *_lines(one)] for one in loads.point_loads]
+    if not base.is_identity:
+        blocks.append(["[base]", *_lines(base)])
     return "\n\n".join("\n".join(block) for block in blocks) + "\n"
 
 

@@ -107,6 +107,8 @@ def unknown_parameter(name: str, known: Mapping[str, Parameter]) -> InvalidInput
     hint = f'did you mean "{close[0]}"?' if close else ""
     if name.startswith("loads.") and not any(key.startswith("loads.") for key in known):
         hint = "the arm has no loads: give it some first"
+    if name.startswith("base.") and not any(key.startswith("base.") for key in known):
+        hint = "the arm stands upright at the origin: give it another base first"
     owners = list(dict.fromkeys(one.owner for one in known.values() if one.owner))
     meant = max((own for own in owners if name.startswith(f"{own}.")), key=len, default="")
     own = [key for key, one in known.items() if one.owner == meant]

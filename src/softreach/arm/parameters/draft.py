@@ -70,6 +70,8 @@ def parts(arm: Manipulator) -> dict[PartKey, Any]:
     keyed: dict[PartKey, Any] = {("profile",): arm.profile, ("section",): arm.section}
     if arm.loads is not None:
         keyed["loads",] = arm.loads
+    if not arm.base.is_identity:
+        keyed["base",] = arm.base
     for k, ring in enumerate(arm.section.rings):
         keyed |= {("rings", k): ring, ("rings", k, "material"): ring.material}
     if arm.section.core is not None:
@@ -202,6 +204,8 @@ class Draft:
         changes: dict[str, Any] = {"profile": self._made(("profile",)), "section": self._section()}
         if self.arm.loads is not None:
             changes["loads"] = self._made(("loads",))
+        if ("base",) in self._parts:
+            changes["base"] = self._made(("base",))
         keys = [("actuators", one.name) for one in self.arm.actuators]
         changes["actuators"] = tuple(self._made(key) for key in keys)
         if not self._faults:

@@ -258,8 +258,17 @@ def _density(arm: Manipulator) -> float | None:
     return float(arm.section.mass_per_length(1.0)) / math.pi
 
 
+def _check_upright(arm: Manipulator) -> None:
+    """Refuse a base that stands anywhere but upright at the origin."""
+    if not arm.base.is_identity:
+        allowed = "upright at the origin in ActiveFilaments.jl"
+        hint = "give arm.replace(base=Base()), whose places are those in the frame of the base"
+        raise InvalidInput("base", str(arm.base), allowed, hint)
+
+
 def _check_expressible(arm: Manipulator) -> None:
     """Refuse what no filament there has, one reason at a time."""
+    _check_upright(arm)
     there = "in ActiveFilaments.jl"
     if not isinstance(arm.profile, LinearTaper):
         raise InvalidInput("profile", type(arm.profile).__name__, f"a LinearTaper {there}")

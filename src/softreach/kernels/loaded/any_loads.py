@@ -19,11 +19,13 @@ from softreach.kernels.loaded.frame_step import COLUMN_ROWS, PLANE, SIZE, STATE,
 from softreach.kernels.loaded.frame_walk import TRACE, adjugate_rows, walk
 from softreach.kernels.loaded.load_continuation import (
     BEFORE,
+    DETERMINANT,
     DONE,
     FOUND,
     HELD,
     LEFT,
     MARGIN,
+    OLD,
     PAST,
     STEP,
     TRIAL,
@@ -68,6 +70,7 @@ def _newton(w, i):
     a, b, c = get(w, PLANE, i), get(w, PLANE + 3 * LANES, i), get(w, PLANE + 6 * LANES, i)
     p1, p2, p3 = adjugate_rows(a, b, c)
     determinant = dot(p1, a)
+    w[DETERMINANT + i] = determinant
     scale = 1.0 / math.copysign(max(abs(determinant), 1e-12), determinant)
     keep_inverse(w, i, (times(scale, p1), times(scale, p2), times(scale, p3)))
     missing = _missing(w, i)
@@ -104,11 +107,15 @@ def _move(w, i):
 
 
 @inline
-def _extrapolate(w, i, ratio):
-    """The secant of theory (71)."""
-    g, p = get(w, HELD, i), get(w, PAST, i)
-    h, q = get(w, HELD + 3 * LANES, i), get(w, PAST + 3 * LANES, i)
-    _put_frame(w, i, plus(g, times(ratio, minus(g, p))), plus(h, times(ratio, minus(h, q))))
+def _extrapolate(w, i, last, first):
+    """The parabola of theory (71)."""
+    _put_frame(w, i, _ahead(w, i, 0, last, first), _ahead(w, i, 3 * LANES, last, first))
+
+
+@inline
+def _ahead(w, i, at, last, first):
+    g, p, o = get(w, HELD + at, i), get(w, PAST + at, i), get(w, OLD + at, i)
+    return plus(g, plus(times(last, minus(g, p)), times(first, minus(p, o))))
 
 
 _advance_all = advance_with(_newton, _move, _extrapolate)
@@ -167,7 +174,7 @@ def solve(gamma, axes, guesses, coarse, fine, limits, most, found, slopes, compl
         most: Walks (coarse, fine) allowed; with none on fine tables, the last Newton step is taken
             linearly.
         found: Filled with the tip, G, H as in `guesses`, the margin of stability, and the state (0
-            not found, 1 found, 2 given up), (n, 11).
+            not found, 1 found, 2 the branch has ended, 3 given up), (n, 11).
         slopes: Filled with (v, ω) of the tip per activation, (n, 6, bundle); or (0, 6, bundle).
         compliance: Zeros, to which the change of the tip per force there is added, (n, 3, 3); or
             (0, 3, 3).

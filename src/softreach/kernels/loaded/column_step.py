@@ -14,7 +14,8 @@ A tangent turns the whole frame of a section by θ, so that δG = θ × G. It is
     dθ = ω × θ + δω,  δn = θ × n + u1 G + u2 H + u3 K,
 
 driven by its values at the tip, by a change of force u, or by a change of activation: that changes
-ℓ by δℓ, and turns the unloaded arm by `turn` over the step as the frames of the walk see it.
+λ by δλ and ℓ by δℓ, and turns the unloaded arm by `turn` over the step as the frames of the walk
+see it.
 """
 
 from __future__ import annotations
@@ -33,37 +34,38 @@ def _mix(a, x, b, y):
 
 @inline
 def _internal(node, s):
-    """Force, twist and stretch of a section, and how the step turns the frame."""
-    length, d, bending, twisting, axial, load = node
+    """Force, twist and stretch by loads of a section, and how the step turns the frame."""
+    growth, _, d, bending, twisting, axial, load = node
     g, h, m, _ = s
     n = combination(load, (g, h, cross(g, h)))
-    twist, stretch = twisting * dot(d, m), 1.0 + axial * dot(d, n)
-    return n, twist, stretch, _mix(length * bending, m, length * twist, d)
+    twist, stretch = twisting * dot(d, m), axial * dot(d, n)
+    return n, twist, stretch, _mix(growth * bending, m, growth * twist, d)
 
 
 @inline
 def _rates(node, s):
-    """Changes over the step; node = (ℓ, d, 1/K1, 1/K3 - 1/K1, 1/K0, (n1, n2, n3))."""
-    length, d = node[0], node[1]
+    """Changes over the step; node = (λ, ℓ, d, 1/K1, 1/K3 - 1/K1, 1/K0, (n1, n2, n3))."""
+    growth, d = node[0], node[2]
     g, h, m, y = s
     n, twist, stretch, turn = _internal(node, s)
-    push = _mix(length * twist, m, length * stretch, n)
-    along = times(length * stretch, d)
-    return cross(turn, g), cross(turn, h), cross(d, push), plus(cross(turn, y), along)
+    length = node[1] + growth * stretch
+    push = _mix(growth * twist, m, length, n)
+    return cross(turn, g), cross(turn, h), cross(d, push), plus(cross(turn, y), times(length, d))
 
 
 @inline
 def _tangent_rates(place, t):
-    """Product rule on `_rates`, theory (73); place = (node, state, (δℓ, turn, u))."""
-    node, s, (d_length, d_turn, unit) = place
-    length, d, bending, twisting, axial, _ = node
+    """Product rule on `_rates`, theory (73); place = (node, state, (δλ, δℓ, turn, u))."""
+    node, s, (d_growth, d_length, d_turn, unit) = place
+    growth, length, d, bending, twisting, axial, _ = node
     (g, h, m, y), (theta, dm, dy) = s, t
     n, twist, stretch, turn = _internal(node, s)
     dn = plus(cross(theta, n), combination(unit, (g, h, cross(g, h))))
-    d_beta = length * twisting * dot(d, dm) + d_length * twist
-    d_zeta = length * axial * dot(d, dn) + d_length * stretch
-    turned = plus(_mix(length * bending, dm, d_beta, d), _mix(d_length * bending, m, 1.0, d_turn))
-    pushed = plus(_mix(d_beta, m, length * twist, dm), _mix(d_zeta, n, length * stretch, dn))
+    d_beta = growth * twisting * dot(d, dm) + d_growth * twist
+    d_zeta = growth * axial * dot(d, dn) + d_growth * stretch + d_length
+    zeta = length + growth * stretch
+    turned = plus(_mix(growth * bending, dm, d_beta, d), _mix(d_growth * bending, m, 1.0, d_turn))
+    pushed = plus(_mix(d_beta, m, growth * twist, dm), _mix(d_zeta, n, zeta, dn))
     return (
         plus(cross(turn, theta), turned),
         plus(cross(d, pushed), cross(d_turn, m)),

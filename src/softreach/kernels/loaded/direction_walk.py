@@ -9,6 +9,7 @@ from softreach.kernels.lanes import get, put
 from softreach.kernels.loaded.explicit_rk8 import at_stages
 from softreach.kernels.loaded.load_continuation import HEAD, LOAD, MARGIN, TRIAL
 from softreach.kernels.loaded.step import tangent_step, tip_step
+from softreach.kernels.loaded.unloaded_frames import NODE_ROWS
 from softreach.kernels.rod.tips import LANES
 from softreach.kernels.vector import cross, dot, minus, times
 
@@ -37,9 +38,9 @@ def _put_six(w, at, i, v):
 
 @inline
 def _node(rest, scalars, n, i, share):
-    at = 4 * n * LANES + i
+    at, weight = NODE_ROWS * n * LANES + i, scalars[n, 3] * share
     d = (rest[at + LANES], rest[at + 2 * LANES], rest[at + 3 * LANES])
-    return rest[at], d, scalars[n, 0], scalars[n, 1], scalars[n, 2], scalars[n, 3] * share
+    return rest[at], rest[at + 4 * LANES], d, scalars[n, 0], scalars[n, 1], scalars[n, 2], weight
 
 
 @inline

@@ -10,7 +10,7 @@ from softreach.kernels.lanes import copy, get, get_four, put, put_four, turn_at
 from softreach.kernels.loaded.column_step import column_step, state_step
 from softreach.kernels.loaded.explicit_rk8 import at_stages
 from softreach.kernels.loaded.load_continuation import HEAD, LOAD
-from softreach.kernels.loaded.unloaded_frames import STEP_ROWS
+from softreach.kernels.loaded.unloaded_frames import NODE_ROWS, STEP_ROWS
 from softreach.kernels.quaternion import turned
 from softreach.kernels.rod.tips import LANES
 from softreach.kernels.vector import plus, times
@@ -61,10 +61,11 @@ def _all_constants(scalars):
 
 @inline
 def _node(w, c, n, i):
-    at, share = REST + 4 * n * LANES, w[LOAD + i]
+    at, share = REST + NODE_ROWS * n * LANES, w[LOAD + i]
     bending, twisting, axial, force = c[n]
     load = plus(times(share, force), get(w, FOLLOWING, i))
-    return w[at + i], get(w, at + LANES, i), bending, twisting, axial, load
+    d = get(w, at + LANES, i)
+    return w[at + i], w[at + 4 * LANES + i], d, bending, twisting, axial, load
 
 
 @inline
@@ -82,15 +83,15 @@ def _nodes(w, c, i):
 
 @inline
 def _drives(w, change, i):
-    a, b, c, d, e = change
+    (a, b, c, d, e), (p, q, r, s, t) = change
     unit = get(w, COLUMN + 9 * LANES, i)
     return at_stages(
         (
-            (a, get(w, DRIVE, i), unit),
-            (b, get(w, DRIVE + 3 * LANES, i), unit),
-            (c, get(w, DRIVE + 6 * LANES, i), unit),
-            (d, get(w, DRIVE + 9 * LANES, i), unit),
-            (e, get(w, DRIVE + 12 * LANES, i), unit),
+            (a, p, get(w, DRIVE, i), unit),
+            (b, q, get(w, DRIVE + 3 * LANES, i), unit),
+            (c, r, get(w, DRIVE + 6 * LANES, i), unit),
+            (d, s, get(w, DRIVE + 9 * LANES, i), unit),
+            (e, t, get(w, DRIVE + 12 * LANES, i), unit),
         )
     )
 
@@ -148,7 +149,7 @@ def _drive(w, lanes, rest, bends, change, j):
         lanes: Activations.
         rest: Unloaded arm at the nodes.
         bends: U at the nodes (node, 3, bundle).
-        change: dζ̂ dZ at the nodes (node,).
+        change: dη dZ at the nodes (node,).
         j: Bundle.
     """
     for n in range(5):
@@ -158,7 +159,7 @@ def _drive(w, lanes, rest, bends, change, j):
                 x += bends[n, 0, b] * lanes[b, i]
                 y += bends[n, 1, b] * lanes[b, i]
                 z += bends[n, 2, b] * lanes[b, i]
-            length, c = rest[4 * n * LANES + i], change[n]
+            length, c = rest[NODE_ROWS * n * LANES + i], change[n]
             bend = (
                 c * x + length * bends[n, 0, j],
                 c * y + length * bends[n, 1, j],
@@ -173,9 +174,13 @@ def step_columns(w, columns, count, lanes, rest, scalars, lengths, bends, bundle
     """Step the first `count` tangents: three of rotations, `bundles` of activations, the others."""
     c = _all_constants(scalars)
     for n in range(count):
-        j, change = n - 3, (0.0, 0.0, 0.0, 0.0, 0.0)
+        j, none = n - 3, (0.0, 0.0, 0.0, 0.0, 0.0)
+        change = (none, none)
         if 0 <= j < bundles:
-            change = (lengths[0, j], lengths[1, j], lengths[2, j], lengths[3, j], lengths[4, j])
+            change = (
+                (lengths[0, j], lengths[1, j], lengths[2, j], lengths[3, j], lengths[4, j]),
+                (lengths[5, j], lengths[6, j], lengths[7, j], lengths[8, j], lengths[9, j]),
+            )
             _drive(w, lanes, rest, bends, lengths[:, j], j)
         elif n == 0 or j == bundles:
             w[DRIVE : DRIVE + 15 * LANES] = 0.0

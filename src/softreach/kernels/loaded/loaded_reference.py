@@ -22,6 +22,8 @@ class Section(NamedTuple):
 
     stretch: float
     """ζ̂ [-]."""
+    growth: float
+    """η [-], per length of which curvature is."""
     curvature: Array
     """û [1/m], shape (3,)."""
     compliance: Array
@@ -35,11 +37,11 @@ class Section(NamedTuple):
 def rates(at: Section, g: Array, m: Array, y: Array) -> tuple[Array, Array, Array]:
     """dG/dZ, dm/dZ and dy/dZ, with n = w G.
 
-    G' = -ω × G, m' = -ω × m - ζ e3 × n, y' = -ω × y - ζ e3, where ω = ζ̂ (û + K⁻¹m) and
-    ζ = ζ̂ (1 + n3/K0).
+    G' = -ω × G, m' = -ω × m - ζ e3 × n, y' = -ω × y - ζ e3, where ω = η (û + K⁻¹m) and
+    ζ = ζ̂ + η n3/K0.
     """
-    omega = at.stretch * (at.curvature + at.compliance * m)
-    along = np.array([0.0, 0.0, at.stretch * (1.0 + at.force * g[2] * at.axial)])
+    omega = at.growth * (at.curvature + at.compliance * m)
+    along = np.array([0.0, 0.0, at.stretch + at.growth * at.force * g[2] * at.axial])
     push = np.cross(along, at.force * g)
     return -np.cross(omega, g), -np.cross(omega, m) - push, -np.cross(omega, y) - along
 

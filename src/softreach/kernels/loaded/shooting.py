@@ -26,12 +26,14 @@ from softreach.kernels.loaded.direction_walk import (
 )
 from softreach.kernels.loaded.load_continuation import (
     BEFORE,
+    DETERMINANT,
     DONE,
     FOUND,
     HELD,
     LEFT,
     LOAD,
     MARGIN,
+    OLD,
     PAST,
     STEP,
     TRIAL,
@@ -69,6 +71,7 @@ def _newton(w, i):
     t1, t2 = tangents(get(w, TRIAL, i))
     c1, c2 = cross(b, g), cross(g, a)
     determinant = dot(a, c1)
+    w[DETERMINANT + i] = determinant
     determinant = math.copysign(max(abs(determinant), 1e-12), determinant)
     c = times(1.0 / determinant, c1), times(1.0 / determinant, c2), (0.0, 0.0, 0.0)
     rows = (
@@ -94,10 +97,11 @@ def _move_all(w):
 
 
 @inline
-def _extrapolate(w, i, ratio):
-    """The secant of theory (71)."""
-    g, p = get(w, HELD, i), get(w, PAST, i)
-    put(w, TRIAL, i, _unit(plus(g, times(ratio, minus(g, p)))))
+def _extrapolate(w, i, last, first):
+    """The parabola of theory (71)."""
+    g, p, o = get(w, HELD, i), get(w, PAST, i), get(w, OLD, i)
+    ahead = plus(times(last, minus(g, p)), times(first, minus(p, o)))
+    put(w, TRIAL, i, _unit(plus(g, ahead)))
 
 
 _advance_all = advance_with(_newton, _move, _extrapolate)
@@ -139,8 +143,8 @@ def solve(gamma, gravity, tip, guesses, coarse, fine, limits, most, out):
         limits: First share of the load to try; longest first Newton step [rad] that is trusted;
             step at which the coarse tables have done their work; what the fine ones may leave.
         most: Walks (coarse, fine) allowed.
-        out: Filled with the tip, G(L), the margin, and the state (0 not found, 1 found, 2 given
-            up), (n, 8).
+        out: Filled with the tip, G(L), the margin, and the state (0 not found, 1 found, 2 the
+            branch has ended, 3 given up), (n, 8).
     """
     increment, widest, small, tiny = limits
     lanes = np.zeros((coarse[0].shape[2] - 1, LANES))

@@ -1,10 +1,10 @@
 """One step of the loaded rod, from its tip end to its base end, in the frames of the unloaded arm.
 
 There gravity G and the moment M turn with the load alone, theory (64). With d the tangent of the
-unloaded arm, ℓ = ζ̂ dZ and n = w G,
+unloaded arm, λ = η dZ, ℓ = ζ̂ dZ and n = w G,
 
     dG = ω × G,  dM = d × (β M + ζ w G),  dy = ω × y + ζ d,
-    ω = ℓ M/K1 + β d,  β = ℓ (1/K3 - 1/K1) (d·M),  ζ = ℓ (1 + w (d·G)/K0),
+    ω = λ M/K1 + β d,  β = λ (1/K3 - 1/K1) (d·M),  ζ = ℓ + λ w (d·G)/K0,
 
 y the tip seen from the section. A state (G, M) is a tuple of six, and so
 is each of its tangents.
@@ -21,12 +21,12 @@ __all__ = ["tangent_step", "tip_step"]
 
 @inline
 def _rate(node, x):
-    """Change of (G, M) over the step at one node; node = (ℓ, d, 1/K1, 1/K3 - 1/K1, 1/K0, w)."""
-    length, d, bending, twisting, axial, w = node
+    """Change of (G, M) over the step at one node; node = (λ, ℓ, d, 1/K1, 1/K3 - 1/K1, 1/K0, w)."""
+    growth, length, d, bending, twisting, axial, w = node
     g, m = x[:3], x[3:]
-    beta = length * twisting * dot(d, m)
-    zeta = length * w * (1.0 + axial * w * dot(d, g))
-    a = length * bending
+    beta = growth * twisting * dot(d, m)
+    zeta = w * (length + growth * axial * w * dot(d, g))
+    a = growth * bending
     turn = cross((a * m[0] + beta * d[0], a * m[1] + beta * d[1], a * m[2] + beta * d[2]), g)
     push = (beta * m[0] + zeta * g[0], beta * m[1] + zeta * g[1], beta * m[2] + zeta * g[2])
     return turn + cross(d, push)
@@ -35,10 +35,10 @@ def _rate(node, x):
 @inline
 def _tip_rate(node, x, y):
     """Change of the tip y as the section sees it."""
-    length, d, bending, twisting, axial, w = node
+    growth, length, d, bending, twisting, axial, w = node
     g, m = x[:3], x[3:]
-    a, beta = length * bending, length * twisting * dot(d, m)
-    zeta = length * (1.0 + axial * w * dot(d, g))
+    a, beta = growth * bending, growth * twisting * dot(d, m)
+    zeta = length + growth * axial * w * dot(d, g)
     turn = cross((a * m[0] + beta * d[0], a * m[1] + beta * d[1], a * m[2] + beta * d[2]), y)
     return turn[0] + zeta * d[0], turn[1] + zeta * d[1], turn[2] + zeta * d[2]
 
@@ -46,11 +46,11 @@ def _tip_rate(node, x, y):
 @inline
 def _tangent_rate(node, x, t):
     """Product rule on `_rate`, for the tangents of theory (68)."""
-    length, d, bending, twisting, axial, w = node
+    growth, length, d, bending, twisting, axial, w = node
     g, m, dg, dm = x[:3], x[3:], t[:3], t[3:]
-    a, beta = length * bending, length * twisting * dot(d, m)
-    zeta = length * w * (1.0 + axial * w * dot(d, g))
-    d_beta, d_zeta = length * twisting * dot(d, dm), length * axial * w * w * dot(d, dg)
+    a, beta = growth * bending, growth * twisting * dot(d, m)
+    zeta = w * (length + growth * axial * w * dot(d, g))
+    d_beta, d_zeta = growth * twisting * dot(d, dm), growth * axial * w * w * dot(d, dg)
     turn = cross((a * m[0] + beta * d[0], a * m[1] + beta * d[1], a * m[2] + beta * d[2]), dg)
     more = cross(
         (a * dm[0] + d_beta * d[0], a * dm[1] + d_beta * d[1], a * dm[2] + d_beta * d[2]), g

@@ -3,7 +3,7 @@
 They are d and P of theory (63). A load turns an arm by less than its activations bend it, so that
 an integrator of the load alone, in the frames of the unloaded arm, needs a fifth of the steps
 (`design/loaded_rod.md`). What it needs of those frames is d3 at the five Lobatto nodes of a step
-and the activated length.
+and the activated lengths.
 """
 
 from __future__ import annotations
@@ -14,32 +14,38 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, pasted
 from softreach.kernels.loaded.explicit_rk8 import NODES
-from softreach.kernels.rod.tips import LANES, node_values, nodes_at
+from softreach.kernels.rod.tips import LANES, TIP, node_values, nodes_at
 from softreach.kernels.vector import cross
 
-__all__ = ["STEP_ROWS", "TURN", "TURN_ROWS", "WORK", "pack_lengths", "rest_frames"]
+__all__ = ["NODE_ROWS", "STEP_ROWS", "TURN", "TURN_ROWS", "WORK", "pack_lengths", "rest_frames"]
 
 _FIRST, _SECOND = math.sqrt(15) / 3, 10 / 3
 
-# A step is a row of a table: ζ̂ dZ, d1, d2, d3 of each of its nodes, tip first, LANES numbers each.
-STEP_ROWS = 4 * len(NODES)
+# A step is a row of a table: η dZ, d1, d2, d3, ζ̂ dZ of each of its nodes, tip first, LANES numbers
+# each.
+NODE_ROWS = 5
+STEP_ROWS = NODE_ROWS * len(NODES)
 # Where asked for, the turn so far at each node follows, as quaternions.
 TURN_ROWS = 4 * len(NODES)
-# The workspace: 12 node values of a piece between nodes, then the turn so far as a quaternion.
-TURN = 12 * LANES
+# The workspace: node values of a piece between nodes, then the turn so far as a quaternion.
+TURN = TIP
 WORK = TURN + 4 * LANES
 
 
-def pack_lengths(measure, stretch):
-    """Tables (step, node, bundle + 1) of ζ̂ dZ at the nodes of steps; the last column is at rest.
+def pack_lengths(measure, stretch, growth):
+    """Tables (step, 2 node, bundle + 1) of η dZ, then ζ̂ dZ, at the nodes of steps.
+
+    The last column is at rest.
 
     Args:
         measure: Length of the step as each node sees it [m], shape (step, node).
         stretch: z [-], shape (step, node, bundle).
+        growth: Its part in η [-], shape (step, node, bundle).
     """
-    bundles = stretch.shape[2]
+    measure, both = np.tile(measure, 2), np.concatenate([growth, stretch], axis=1)
+    bundles = both.shape[2]
     table = np.zeros((*measure.shape, -(-max(bundles, 1) // 4) * 4 + 1))
-    table[..., :bundles] = measure[..., None] * stretch
+    table[..., :bundles] = measure[..., None] * both
     table[..., -1] = measure
     return table
 
@@ -54,14 +60,16 @@ def rest_frames(work, lanes, pieces, lengths, steps):
         work[TURN + 3 * LANES + i] = 0.0
     for k in range(steps.shape[0]):
         for node in range(5):
-            _fill_lengths(steps[k, 4 * node * LANES :], lanes, lengths[k, node])
+            at = NODE_ROWS * node * LANES
+            _fill_lengths(steps[k, at:], lanes, lengths[k, node])
+            _fill_lengths(steps[k, at + 4 * LANES :], lanes, lengths[k, 5 + node])
         _fill_tangents(steps[k], work)
         if steps.shape[1] > STEP_ROWS * LANES:
             _keep_turn(steps[k, STEP_ROWS * LANES :], work)
         for piece in range(4):
             node_values(work, lanes, pieces, 4 * k + piece)
             _turn(work)
-            _fill_tangents(steps[k, 4 * (piece + 1) * LANES :], work)
+            _fill_tangents(steps[k, NODE_ROWS * (piece + 1) * LANES :], work)
             if steps.shape[1] > STEP_ROWS * LANES:
                 _keep_turn(steps[k, (STEP_ROWS + 4 * (piece + 1)) * LANES :], work)
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.rod.magnus import exponent
+from softreach.kernels.rod.tips import BEND_ROWS
 from softreach.kernels.rod.twist import act, exp_coefficients
 from softreach.kernels.vector import combination, cross
 
@@ -18,15 +19,16 @@ _BASE, _MIDDLE, _TIP = np.intp(0), np.intp(1), np.intp(2)
 
 @inline
 def _node(table, k, node, gamma):
-    """A = (ζu, e3 ζ) dZ at one node of step k."""
-    row = 4 * node
-    length, x, y, z = table[k, row, -1], 0.0, 0.0, 0.0
+    """A = (ηu, ζ e3) dZ at one node of step k."""
+    row, last = 4 * node, BEND_ROWS + node if table.shape[1] > BEND_ROWS else 4 * node
+    growth, length, x, y, z = table[k, row, -1], table[k, last, -1], 0.0, 0.0, 0.0
     for j in range(gamma.shape[0]):
-        length += table[k, row, j] * gamma[j]
+        growth += table[k, row, j] * gamma[j]
         x += table[k, row + 1, j] * gamma[j]
         y += table[k, row + 2, j] * gamma[j]
         z += table[k, row + 3, j] * gamma[j]
-    return length * x, length * y, length * z, 0.0, 0.0, length
+        length += table[k, last, j] * gamma[j]
+    return growth * x, growth * y, growth * z, 0.0, 0.0, length
 
 
 @inline
@@ -46,7 +48,7 @@ def frames(table, ends, gamma, position, directors):
     """Centerline and directors of n rods at stations.
 
     Args:
-        table: Packed node tables, (step, 12, bundle + 1).
+        table: Packed node tables, (step, row, bundle + 1).
         ends: Number of steps from the base to each station, ascending, (station,).
         gamma: Activations, (n, bundle).
         position: Filled with r, (n, station, 3).

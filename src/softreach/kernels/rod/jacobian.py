@@ -11,6 +11,7 @@ import numpy as np
 from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.rod.magnus import exponent, exponent_derivative
 from softreach.kernels.rod.tips import (
+    BEND_ROWS,
     LANES,
     TIP,
     clear_tips,
@@ -28,19 +29,19 @@ _TOGETHER = 16  # lanes: the last searches of many ask for a few rods at a time
 
 
 @inline
-def _change(length, weights, a):
-    """Change of A = (ζu, e3 ζ) dZ per unit of one activation, from its column of the table.
+def _change(growth, weights, a):
+    """Change of A = (ηu, ζ e3) dZ per unit of one activation, from its column of the table.
 
-    Product rule on ω = ℓu, with u = ω/ℓ, theory (28).
+    Product rule on ω = ηu, with u = ω/η, theory (28).
     """
-    d_length, ratio = weights[0], weights[0] / length
+    ratio = weights[0] / growth
     return (
-        ratio * a[0] + length * weights[1],
-        ratio * a[1] + length * weights[2],
-        ratio * a[2] + length * weights[3],
+        ratio * a[0] + growth * weights[1],
+        ratio * a[1] + growth * weights[2],
+        ratio * a[2] + growth * weights[3],
         0.0,
         0.0,
-        d_length,
+        weights[4],
     )
 
 
@@ -48,10 +49,11 @@ def _change(length, weights, a):
 def _walk_column(work, column, table, k, j, groups):
     """Carry one column of the Jacobian across step k, in groups of lanes of which one is in use."""
     t = table[k, :, j]
+    lengths = (t[12], t[13], t[14]) if len(t) > BEND_ROWS else (t[0], t[4], t[8])
     at_base, at_middle, at_tip = (
-        (t[0], t[1], t[2], t[3]),
-        (t[4], t[5], t[6], t[7]),
-        (t[8], t[9], t[10], t[11]),
+        (t[0], t[1], t[2], t[3], lengths[0]),
+        (t[4], t[5], t[6], t[7], lengths[1]),
+        (t[8], t[9], t[10], t[11], lengths[2]),
     )
     for group in range(groups):
         for lane in range(_TOGETHER):
@@ -62,9 +64,9 @@ def _walk_column(work, column, table, k, j, groups):
                 base,
                 middle,
                 tip,
-                _change(base[5], at_base, base),
-                _change(middle[5], at_middle, middle),
-                _change(tip[5], at_tip, tip),
+                _change(work[i], at_base, base),
+                _change(work[4 * LANES + i], at_middle, middle),
+                _change(work[8 * LANES + i], at_tip, tip),
             )
             xi = (
                 column[i],

@@ -29,31 +29,36 @@ __all__ = [
 LANES = 128
 """Samples side by side: whole blocks only, so a sample's result never depends on its neighbors."""
 
-# A workspace is a flat array of rows of LANES numbers: 12 node values, then 3 coordinates of the
-# point. Rows at constant distances in one array are what the compiler can prove disjoint.
-NODE_ROWS = 12
+# A workspace is a flat array of rows of LANES numbers: η dZ, u1, u2, u3 of three nodes, their ζ dZ,
+# then 3 coordinates of the point. Rows at constant distances in one array are what the compiler can
+# prove disjoint.
+BEND_ROWS = 12
+NODE_ROWS = BEND_ROWS + 3
 TIP = NODE_ROWS * LANES
 WORK = TIP + 3 * LANES
 _GROUP = 4  # bundles added at once
 
 
-def pack(measure, stretch, curvature):
-    """Node tables as one array (step, 12, bundle + 1): rows ℓ, u1, u2, u3 of each node.
+def pack(measure, stretch, growth, curvature):
+    """Node tables as one array (step, row, bundle + 1): rows η dZ, u1, u2, u3 of each node.
 
-    The last column is the value at rest; bundles are padded with zeros to a multiple
-    of four, and at least four.
+    Three rows ζ dZ follow where ζ is not η. The last column is the value at rest; bundles are
+    padded with zeros to a multiple of four, and at least four.
 
     Args:
         measure: Length of the step as each node sees it [m], shape (step, 3).
         stretch: z [-], shape (step, 3, bundle).
+        growth: Its part in η [-], shape (step, 3, bundle).
         curvature: U [1/m], shape (step, 3, 3, bundle).
     """
     steps, _, bundles = stretch.shape
-    table = np.zeros((steps, 3, 4, -(-max(bundles, 1) // _GROUP) * _GROUP + 1))
-    table[:, :, 0, :bundles] = measure[..., None] * stretch
-    table[:, :, 0, -1] = measure
-    table[:, :, 1:, :bundles] = curvature
-    return table.reshape(steps, NODE_ROWS, table.shape[-1])
+    table = np.zeros((steps, NODE_ROWS, -(-max(bundles, 1) // _GROUP) * _GROUP + 1))
+    bends = table[:, :BEND_ROWS].reshape(steps, 3, 4, table.shape[-1])
+    for rows, values in ((bends[:, :, 0], growth), (table[:, BEND_ROWS:], stretch)):
+        rows[..., :bundles] = measure[..., None] * values
+        rows[..., -1] = measure
+    bends[:, :, 1:, :bundles] = curvature
+    return table if (growth != stretch).any() else table[:, :BEND_ROWS].copy()
 
 
 @inline
@@ -66,13 +71,17 @@ def load(lanes, gamma, first, count):
 
 @inline
 def node_values(work, lanes, table, k):
-    """ℓ = dZ (1 + z·γ) and u = Uγ at the nodes of step k, for every lane."""
-    for row in range(NODE_ROWS):
+    """η dZ, u = Uγ and ζ dZ at the nodes of step k, for every lane."""
+    for row in range(table.shape[1]):
         values = work[row * LANES : (row + 1) * LANES]
         _first_group(values, lanes[0], lanes[1], lanes[2], lanes[3], table[k, row])
         for j in range(_GROUP, lanes.shape[0], _GROUP):
             weights = table[k, row, j:]
             _next_group(values, lanes[j], lanes[j + 1], lanes[j + 2], lanes[j + 3], weights)
+    if table.shape[1] == BEND_ROWS:
+        for node in range(3):
+            for i in range(LANES):
+                work[(BEND_ROWS + node) * LANES + i] = work[4 * node * LANES + i]
 
 
 @inline
@@ -91,18 +100,23 @@ def _next_group(values, g0, g1, g2, g3, weights):
 
 @inline
 def nodes_at(work, i):
-    """A = (ζu, e3 ζ) dZ of lane i at the three nodes, base first."""
+    """A = (ηu, ζ e3) dZ of lane i at the three nodes, base first."""
     base, middle, tip = work[i], work[4 * LANES + i], work[8 * LANES + i]
+    at_base, at_middle, at_tip = (
+        work[12 * LANES + i],
+        work[13 * LANES + i],
+        work[14 * LANES + i],
+    )
     return (
-        _twist(base, work[LANES + i], work[2 * LANES + i], work[3 * LANES + i]),
-        _twist(middle, work[5 * LANES + i], work[6 * LANES + i], work[7 * LANES + i]),
-        _twist(tip, work[9 * LANES + i], work[10 * LANES + i], work[11 * LANES + i]),
+        _twist(base, work[LANES + i], work[2 * LANES + i], work[3 * LANES + i], at_base),
+        _twist(middle, work[5 * LANES + i], work[6 * LANES + i], work[7 * LANES + i], at_middle),
+        _twist(tip, work[9 * LANES + i], work[10 * LANES + i], work[11 * LANES + i], at_tip),
     )
 
 
 @inline
-def _twist(length, u1, u2, u3):
-    return length * u1, length * u2, length * u3, 0.0, 0.0, length
+def _twist(growth, u1, u2, u3, length):
+    return growth * u1, growth * u2, growth * u3, 0.0, 0.0, length
 
 
 @inline

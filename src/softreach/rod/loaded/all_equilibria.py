@@ -32,8 +32,9 @@ from softreach.rod.kinematics import configuration, shape_dataset, stations_alon
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import LoadTables
+from softreach.rod.placed import PlacedRod
 from softreach.rod.rods import tip_map
-from softreach.rod.tip_map import TipMap, TipStatus
+from softreach.rod.tip_map import TipMap, TipStatus, has_tip
 from softreach.rod.view import View
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput, warn
@@ -63,8 +64,8 @@ class AllEquilibria:
     margin: Array
     """Margin of stability, from 1 to below 0 [-], shape (n,); 0 of stable rings."""
     directions: Array
-    """Direction of gravity as the tip sees it, in the base frame of the unloaded arm, shape (n, 3);
-    NaN without loads."""
+    """Direction of gravity as the tip sees it, in the frame of the base of the unloaded arm, shape
+    (n, 3); NaN without loads."""
     signs: NDArray[np.int8]
     """Sense of rotation of the map of directions there: kept (1), or turned over (-1) where the
     ways to fall are odd in number; 0 of rings; shape (n,)."""
@@ -88,12 +89,14 @@ class AllEquilibria:
             stations: Number of stations, evenly spaced from base to tip, or their Z [m], ascending.
         """
         gamma, rod = np.repeat(self.activation[None], len(self), axis=0), self.rod
-        if self.solver is None or not isinstance(rod, LoadedRod):
+        loaded = _in_base(rod)
+        if self.solver is None or not isinstance(loaded, LoadedRod):
             return configuration(rod, gamma, stations)
         z = stations_along(rod, stations)
         shapes = self.solver.shapes_facing(gamma, self.directions, z)[0]
-        strains = rod.strains_of_shapes(z)(gamma, shapes.moment, shapes.force)
-        return shape_dataset(rod, gamma, z, shapes.frames, strains)
+        frames = rod.placed(shapes.frames) if isinstance(rod, PlacedRod) else shapes.frames
+        strains = loaded.strains_of_shapes(z)(gamma, shapes.moment, shapes.force)
+        return shape_dataset(rod, gamma, z, frames, strains)
 
     def to_dataset(self) -> xr.Dataset:
         """All numbers over `equilibrium` and `axis`."""
@@ -112,7 +115,9 @@ class AllEquilibria:
         }
         names = {"axis": list(schema.AXES), **schema.bundle_coordinates(self.rod.arm)}
         whole = {"degree": self.degree, "complete": int(self.complete)}
-        return xr.Dataset(values, names, {**schema.provenance(self.rod.arm), **whole})
+        return xr.Dataset(
+            values, names, {**schema.provenance(self.rod.arm, self.rod.frame), **whole}
+        )
 
     def __len__(self) -> int:
         return len(self.tips)
@@ -141,6 +146,7 @@ class AllEquilibria:
 
 _SEARCHES = ((4, 1.0), (5, 3.0), (6, 10.0))
 """Levels of the first mesh, and caution: the later ones where the degree is not 1."""
+_MOST_WALKED = 20_000_000  # steps of one search, which take about a second
 _MOST_STEPS = 512
 _ROUGHLY = 0.01  # [rad]
 _SYMMETRIC = 1e-6  # [rad], of the directions that the base would have to see
@@ -184,14 +190,20 @@ def equilibria(
         rod, gamma = rod.base, rod.activations(gamma)
     if not rod.supports_unstable:
         return _without_loads(rod, gamma)
-    if not isinstance(rod, LoadedRod):
+    loaded = _in_base(rod)
+    if not isinstance(loaded, LoadedRod):
         raise InvalidInput("arm", repr(rod), "a Manipulator, or a tip map of one")
-    _check_loads(rod.tables)
-    solver = _resolving(Solver(rod.tables, FreeRod(rod.arm, rod.tol).steps, rod.tol), gamma)
+    _check_loads(loaded.tables)
+    solver = _resolving(Solver(loaded.tables, FreeRod(rod.arm, rod.tol).steps, rod.tol), gamma)
     branch = solver.find(gamma)
-    known = branch.frame[branch.status != TipStatus.NO_EQUILIBRIUM]
+    known = branch.frame[has_tip(branch.status)]
     solver, found = _accurate(solver, gamma, _search(solver, gamma, known))
     return _judged(rod, solver, gamma, found, known)
+
+
+def _in_base(rod: TipMap) -> TipMap:
+    """The rod in the frame of the base, where all directions of the search are."""
+    return rod.rod if isinstance(rod, PlacedRod) else rod
 
 
 def _one(rod: TipMap, activations: ArrayLike) -> Array:
@@ -254,19 +266,23 @@ def _search(solver: Solver, gamma: Array, known: Array) -> _Found:
         directions = np.concatenate([axis[None], rings.points])
         is_ring = np.arange(len(directions)) > 0
         return _Found(directions, np.append(1, rings.signs), is_ring, rings.complete)
-    return _isolated(image, axis, known)
+    return _isolated(image, axis, known, _MOST_WALKED // solver.steps)
 
 
 def _isolated(
-    image: Map, axis: Array, known: Array, searches: Sequence[tuple[int, float]] = _SEARCHES
+    image: Map,
+    axis: Array,
+    known: Array,
+    most: int,
+    searches: Sequence[tuple[int, float]] = _SEARCHES,
 ) -> _Found:
     """Those of an arm that is not axisymmetric, searched more finely if the degree is not 1."""
     (levels, caution), *finer = searches
-    roots, cut = sphere_roots(image, axis, levels=levels, caution=caution, starts=known)
+    roots, cut = sphere_roots(image, axis, levels=levels, caution=caution, starts=known, most=most)
     complete = cut and int(np.sign(roots.determinants).sum()) == 1
     if complete or not finer:
         return _of_roots(roots, complete=complete)
-    return _isolated(image, axis, known, finer)
+    return _isolated(image, axis, known, most, finer)
 
 
 def _of_roots(roots: Roots, *, complete: bool) -> _Found:
@@ -332,7 +348,7 @@ def _tips(solver: Solver, gamma: Array, found: _Found) -> Array:
 
 
 def _judged(
-    rod: LoadedRod, solver: Solver, gamma: Array, found: _Found, known: Array
+    rod: TipMap, solver: Solver, gamma: Array, found: _Found, known: Array
 ) -> AllEquilibria:
     """In order, with tips and status."""
     axis, many = solver.tables.axes[0], np.repeat(gamma, len(found.directions), axis=0)
@@ -350,7 +366,7 @@ def _judged(
         rod=rod,
         solver=solver,
         activation=gamma[0],
-        tips=shapes.frames.position[order, 0],
+        tips=rod.pose.to_world(shapes.frames.position[order, 0]),
         status=np.where(stable, TipStatus.STABLE, TipStatus.UNSTABLE).astype(np.int8)[order],
         margin=margin[order],
         directions=found.directions[order],

@@ -37,7 +37,8 @@ class LoadPhase(NamedTuple):
     steepest: float
     """Over the entire arm, were it everywhere as steep in S as where it is steepest [rad]."""
     squeeze: float
-    """The largest force over K0 [-]: from 1 on it could squeeze the arm to nothing."""
+    """The largest force over K0, times the largest η/ζ̂ [-]: from 1 on it could squeeze the arm to
+    nothing."""
 
     @property
     def fewest_steps(self) -> int:
@@ -55,7 +56,8 @@ def load_phase(
     """The phase that loads give the tangents at most.
 
     Its rate is √(w (1 + w/K0)/K + (M/2K)²) ζ̂, with K the smaller of K1 and K3, w and M the sizes of
-    all forces and moments beyond, added whatever their directions, and ζ̂ the largest within bounds.
+    all forces and moments beyond, added whatever their directions, and ζ̂ the largest within bounds,
+    or η where that is larger.
 
     Args:
         arm: The design.
@@ -68,8 +70,11 @@ def load_phase(
     with np.errstate(over="ignore"):
         force, softest = _force(loads, z, mass), np.maximum(bending, torsion)
         swing = force * (1.0 + force * axial) * softest + (0.5 * _moment(loads) * softest) ** 2
-        squeeze = float((force * axial).max())
-        rate = _longest(arm, z) * np.sqrt(swing)
+        table = tables(arm, z)
+        longest, grown = (1.0 + _ends(arm, part) for part in (table.extension, table.growth))
+        relative = grown[1] / longest[0] if table.growth is not table.extension else 1.0
+        squeeze = float((force * axial * relative).max())
+        rate = np.maximum(longest[1], grown[1]) * np.sqrt(swing)
     steepest = rate * arm.profile.radius(z) * arm.profile.slender_length  # dZ = R2 dS
     return LoadPhase(float(np.trapezoid(rate, z)), float(steepest.max()), squeeze)
 
@@ -97,9 +102,10 @@ def phase_stations(arm: Manipulator) -> Array:
     return both_sides(arm, profile.station(np.linspace(0.0, profile.slender_length, _STATIONS)))
 
 
-def _longest(arm: Manipulator, z: Array) -> Array:
-    """The largest ζ̂ within the bounds."""
-    return 1.0 + (tables(arm, z).extension[:, None] * arm.bounds.T).max(axis=1).sum(axis=-1)
+def _ends(arm: Manipulator, rates: Array) -> Array:
+    """Least and largest Σ rates γ within the bounds at each station, shape (2, station)."""
+    ends = rates[:, None] * arm.bounds.T
+    return np.stack([ends.min(axis=1).sum(axis=-1), ends.max(axis=1).sum(axis=-1)])
 
 
 def _force(loads: Loads, z: Array, mass: Array) -> Array:

@@ -13,7 +13,7 @@ from softreach.arm.loads import Loads
 from softreach.arm.tables import tables
 from softreach.kernels.rod.tips import LANES
 from softreach.rod.arm_rod import ArmRod
-from softreach.rod.free import FreeRod, linear_strains
+from softreach.rod.free import FreeRod, linear_strains, per_length
 from softreach.rod.loaded.phase import check_phase
 from softreach.rod.loaded.shapes import Shapes
 from softreach.rod.loaded.shooting import Equilibria
@@ -36,6 +36,7 @@ from softreach.rod.tip_map import (
     Strains,
     TipStatus,
     drop,
+    has_tip,
     loads_too_heavy,
     no_equilibrium_message,
     position_slopes,
@@ -51,7 +52,7 @@ _BLOCK = BLOCK // 8  # samples per task
 
 @dataclass(frozen=True, repr=False)
 class LoadedRod(ArmRod):
-    """r' = ζ d3, dᵢ' = ζ̂ u × dᵢ with u = û + K⁻¹m, ζ = ζ̂ (1 + n3/K0), theory (57), (58).
+    """r' = ζ d3, dᵢ' = η u × dᵢ with u = û + K⁻¹m, ζ = ζ̂ + η n3/K0, theory (57), (58).
 
     It is shot from the tip.
     The equilibrium is the one that an arm comes to which is activated first and loaded slowly then.
@@ -62,10 +63,11 @@ class LoadedRod(ArmRod):
         """Whether a tip can have another status than stable."""
         return True
 
-    @property
+    @cached_property
     def loads(self) -> Loads:
-        """Loads on the arm beside its actuators."""
-        return self.arm.loads or Loads(gravity=(0.0, 0.0, 0.0))
+        """Loads on the arm beside its actuators, in the frame of the base."""
+        loads = self.arm.loads or Loads(gravity=(0.0, 0.0, 0.0))
+        return loads.seen_from(self.arm.base)
 
     @property
     def body(self) -> Body:
@@ -190,12 +192,13 @@ class LoadedRod(ArmRod):
         gamma, lost = self.with_arms(gamma)
         shapes = self._shape_solver.shapes(gamma, z, status=status)
         if status is not None:
-            status[np.isnan(shapes.frames.position[:, 0, 0])] = TipStatus.NO_EQUILIBRIUM
+            gone = np.isnan(shapes.frames.position[:, 0, 0])
+            status[gone & has_tip(status)] = TipStatus.UNDECIDED
         drop(lost, status, *shapes.frames, shapes.moment, shapes.force)
         return shapes
 
     def strains_at(self, stations: ArrayLike) -> Callable[..., Strains]:
-        """(û + K⁻¹m) ζ̂/ζ and ζ = ζ̂ (1 + n3/K0) at stations Z [m] as a function of activations.
+        """(û + K⁻¹m) η/ζ and ζ = ζ̂ + η n3/K0 at stations Z [m] as a function of activations.
 
         Curvature is per length as it is, stretched by loads too, so that dᵢ' = ζ u × dᵢ.
         """
@@ -216,9 +219,9 @@ class LoadedRod(ArmRod):
         yielded = np.stack([bending, bending, torsion], axis=1)
 
         def strains(gamma: Array, moment: Array, force: Array) -> Strains:
-            unloaded, stretch = linear_strains(table, gamma), 1.0 + force[..., 2] * axial
-            u = unloaded.curvature + moment * yielded
-            return Strains(u / stretch[..., None], unloaded.extension * stretch)
+            u, extension, growth = linear_strains(table, gamma)
+            extension = extension + growth * force[..., 2] * axial
+            return per_length(u + moment * yielded, extension, growth)
 
         return strains
 

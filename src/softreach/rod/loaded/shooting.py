@@ -26,7 +26,7 @@ class Shots(NamedTuple):
     margin: Array
     """Of stability [-], shape (n,)."""
     state: Array
-    """0 not found, 1 found, 2 given up; shape (n,)."""
+    """0 not found, 1 found, 2 the branch has ended, 3 given up; shape (n,)."""
 
 
 class Walked(NamedTuple):
@@ -126,7 +126,7 @@ class Rung(IntEnum):
     PATIENT = 2
     """The same in steps an order smaller."""
     NONE = 3
-    """Not found: the branch ends before all of the load is on."""
+    """Not found: the branch ends before all of the load is on, or was not followed so far."""
 
 
 class Search(NamedTuple):

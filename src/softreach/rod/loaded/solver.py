@@ -9,9 +9,11 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.tables import tables
 from softreach.kernels.loaded.any_loads import TRACE
 from softreach.kernels.loaded.grid_values import interpolate
 from softreach.rod.activation_box import ActivationBox
+from softreach.rod.free import linear_strains
 from softreach.rod.loaded.shapes import Shapes, shapes_of
 from softreach.rod.loaded.shooting import (
     CONTINUATION,
@@ -31,7 +33,7 @@ from softreach.rod.loaded.shooting import (
     with_across,
 )
 from softreach.rod.loaded.tables import LoadTables, OneDirection, StepTables
-from softreach.rod.tip_map import TipStatus
+from softreach.rod.tip_map import TipStatus, has_tip
 from softreach.support import parallel
 
 Array = NDArray[np.float64]
@@ -41,7 +43,7 @@ _CAREFUL_STEP = 1e-3  # the same of a continuation, on fine steps
 _NEAR_STEP = 1e-7  # Newton step that may be taken linearly
 _DOUBTFUL = 0.02  # margin below which the tangents of coarse steps decide nothing
 _OF_TOL = 1e-2  # what the search may use up of the tolerance
-_FOUND = 1.0
+_FOUND, _ENDED = 1.0, 2.0  # states of searches
 LATER_RUNGS = {Rung.CONTINUATION: CONTINUATION, Rung.PATIENT: PATIENT}
 """Searches of what the first rung leaves in doubt, in this order."""
 _TRACED = 1 << 20  # numbers kept of the sections of all arms in one task, 8 MB
@@ -120,7 +122,7 @@ class Solver:
 
     def doubtful(self, found: Equilibria, rung: Rung) -> NDArray[np.intp]:
         """Rows that a later rung is to search again."""
-        lost = found.status == TipStatus.NO_EQUILIBRIUM
+        lost = ~has_tip(found.status)
         least = 0.0 if rung == Rung.PATIENT else _DOUBTFUL
         return np.flatnonzero(lost | (found.margin < least))
 
@@ -157,13 +159,14 @@ class Solver:
     def _give_up_squeezed(
         self, gamma: Array, rows: slice | NDArray[np.intp], found: Equilibria
     ) -> None:
-        """No arm is where ζ = ζ̂ (1 + n3/K0) is not positive: it would be turned inside out."""
+        """No arm is where ζ = ζ̂ + η n3/K0 is not positive: it would be turned inside out."""
         squeezed = np.arange(len(gamma))[rows]
         edges = self.tables.edges(np.array([]), self.steps)[::-1]
         z = self.tables.arm.profile.station(edges)
         force = self.shapes(gamma[squeezed], z, found.of(squeezed)).force[..., 2]
-        stretch = 1.0 + force * self.tables.body.compliance(z)[0]
-        squeezed = squeezed[(stretch <= 0.0).any(axis=1)]
+        _, extension, growth = linear_strains(tables(self.tables.arm, z), gamma[squeezed])
+        extension = extension + growth * force * self.tables.body.compliance(z)[0]
+        squeezed = squeezed[(extension <= 0.0).any(axis=1)]
         found.tips[squeezed] = np.nan
         found.status[squeezed] = TipStatus.NO_EQUILIBRIUM
         found.rung[squeezed] = Rung.NONE
@@ -181,7 +184,8 @@ class Solver:
         stable = np.where(margin > 0, TipStatus.STABLE, TipStatus.UNSTABLE)
         found.tips[rows] = np.where(good[:, None], tips, np.nan)
         found.frame[rows], found.margin[rows] = frame, margin
-        found.status[rows] = np.where(good, stable, TipStatus.NO_EQUILIBRIUM)
+        none = np.where(state == _ENDED, TipStatus.NO_EQUILIBRIUM, TipStatus.UNDECIDED)
+        found.status[rows] = np.where(good, stable, none)
         found.rung[rows] = np.where(good, rung, Rung.NONE)
 
     def _shoot(self, gamma: Array, search: Search, guesses: Array | None) -> Shots:
@@ -235,7 +239,7 @@ class Solver:
         """The last walk again, from known equilibria, with whatever more is asked for."""
         frames = with_across(known.frame) if self.tables.one_direction else known.frame
         walked = self._walk(gamma, frames, table, NEAR, **asked)
-        lost = (known.status == TipStatus.NO_EQUILIBRIUM) | (walked.shots.state != _FOUND)
+        lost = ~has_tip(known.status) | (walked.shots.state != _FOUND)
         for values in (walked.shots.tips, walked.slopes, walked.compliance):
             if len(values):
                 values[lost] = np.nan
@@ -256,9 +260,10 @@ class Solver:
         )
         tips, twists = walked.shots.tips.copy(), walked.slopes
         lost = np.isnan(tips[:, 0])
-        status = np.where(lost, TipStatus.NO_EQUILIBRIUM, known.status).astype(np.int8)
+        # An equilibrium that was found and not found again is in doubt, not gone.
+        status = np.where(lost & has_tip(known.status), TipStatus.UNDECIDED, known.status)
         d3 = self._tip_directions(tips, walked.trace, fine) if directions else np.empty((0, 3))
-        return Response(tips, twists, walked.compliance, d3, status)
+        return Response(tips, twists, walked.compliance, d3, status.astype(np.int8))
 
     def _tip_directions(self, tips: Array, trace: Array, table: StepTables) -> Array:
         """d3 of tips whose sections were kept, (n, 3)."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from softreach.rod.loaded.shooting import Equilibria
 from softreach.rod.loaded.solver import Solver
-from softreach.rod.tip_map import TipStatus
+from softreach.rod.tip_map import has_tip
 from softreach.support.errors import InvalidInput
 
 __all__ = [
@@ -91,7 +91,7 @@ def _enough(
 def _settled(solver: Solver, gamma: Array) -> tuple[Array, Equilibria]:
     """The activations that judge the steps, and their equilibria."""
     found = solver.find(gamma, patient=False)
-    settled = (found.status != TipStatus.NO_EQUILIBRIUM) & (np.abs(found.margin) > _CRITICAL)
+    settled = has_tip(found.status) & (np.abs(found.margin) > _CRITICAL)
     return gamma[settled], found.of(settled)
 
 

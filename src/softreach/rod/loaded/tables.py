@@ -63,7 +63,7 @@ class StepTables(NamedTuple):
     pieces: Array
     """Packed Magnus nodes of the pieces between the nodes of steps, (4 step, 12, bundle + 1)."""
     lengths: Array
-    """ζ̂ dZ at the nodes, (step, 5, bundle + 1)."""
+    """η dZ, then ζ̂ dZ, at the nodes, (step, 10, bundle + 1)."""
     scalars: Array
     """1/K1, 1/K3 - 1/K1, 1/K0 and the dead force along the world's axes, (step, 5, 6)."""
     bends: Array
@@ -171,7 +171,11 @@ class LoadTables:
         )
         return StepTables(
             self._pieces(s, width),
-            rest_frames.pack_lengths(measure, at.extension.reshape(*z.shape, bundles)),
+            rest_frames.pack_lengths(
+                measure,
+                at.extension.reshape(*z.shape, bundles),
+                at.growth.reshape(*z.shape, bundles),
+            ),
             np.ascontiguousarray(scalars),
             np.ascontiguousarray(at.curvature.reshape(*z.shape, 3, bundles)),
             self._jumps(profile.station(edges[:-1])),
@@ -184,9 +188,11 @@ class LoadTables:
         gauss = s[:, 1:].ravel()[:, None] + wide[:, None] * np.array(magnus.NODES)
         z = profile.station(gauss)
         at = tables(self.arm, z.ravel())
+        growth = at.growth.reshape(*z.shape, bundles)  # whose rotations alone are asked for
         return rod.pack(
             wide[:, None] * profile.radius(z),
-            at.extension.reshape(*z.shape, bundles),
+            growth,
+            growth,
             at.curvature.reshape(*z.shape, 3, bundles),
         )
 

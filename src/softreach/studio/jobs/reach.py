@@ -193,9 +193,11 @@ class DrawArm(Job):
         if session.tip is not None:
             session.trail = [*session.trail[-_LONGEST_TRAIL:], session.tip]
         if rod.supports_unstable:
-            lost = session.tip is None
-            status = TipStatus.NO_EQUILIBRIUM if lost else rod.status([state.activation])[0]
-            session.posture = TipStatus(status)
+            status = TipStatus(rod.status([state.activation])[0])
+            lost = (
+                session.tip is None and status <= TipStatus.UNSTABLE
+            )  # its shape was not found again
+            session.posture = TipStatus.UNDECIDED if lost else status
 
     def _draw_trail(self) -> None:
         session, state = self.session, self.session.state
@@ -247,6 +249,7 @@ class FollowCamera(Job):
         return Viewpoint(
             position=np.asarray(camera.position),
             look_at=np.asarray(camera.look_at),
+            base=np.array(state.design.base.position) / state.design.length,
             centers=centers,
             radii=radii,
         )

@@ -95,14 +95,15 @@ def section_curves(reach: Reach, cut: Slice) -> list[Array]:
     if not isinstance(reach.exact, ReachableSolid | ReachableSurface):
         raise InvalidInput("section", reach.refusal or "no volume", "a set with a surface to cut")
     surface, length = reach.exact.surface(), reach.arm.length
-    curves = plane_cut(surface, "xyz".index(_plane(cut).axis), _plane(cut).center * length)
+    plane = _plane(cut, reach)
+    curves = plane_cut(surface, "xyz".index(plane.axis), plane.center * length)
     return [curve / length for curve in curves]
 
 
 def section_picture(
     reach: Reach, cut: Slice, check: StaleCheck = lambda: None, *, dark: bool = False
 ) -> Picture:
-    """Draw the section, in L; without a slice that of the plane y = 0.
+    """Draw the section, in L; without a slice that across y through the base.
 
     Args:
         reach: Of the design.
@@ -113,7 +114,7 @@ def section_picture(
     Raises:
         InvalidInput: As `section_curves`.
     """
-    plane = _plane(cut)
+    plane = _plane(cut, reach)
     axis = "xyz".index(plane.axis)
     with all_cores:
         curves = section_curves(reach, cut)
@@ -152,8 +153,10 @@ def _shoelace(curve: Array) -> float:
     return float(x[:-1] @ y[1:] - x[1:] @ y[:-1]) / 2
 
 
-def _plane(cut: Slice) -> Slice:
-    return Slice(axis="y", center=0.0) if cut.axis == "none" else cut
+def _plane(cut: Slice, reach: Reach) -> Slice:
+    """The plane of a slice; without one that across y through the base."""
+    base = reach.arm.base.position[1] / reach.arm.length
+    return Slice(axis="y", center=base) if cut.axis == "none" else cut
 
 
 def _draw_boundary(ax: Axes, curves: list[Array], view: View) -> None:

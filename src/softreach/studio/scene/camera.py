@@ -213,6 +213,8 @@ class Viewpoint:
 
     position: Array
     look_at: Array
+    base: Array
+    """Where the arm is clamped, shape (3,)."""
     centers: Array
     """Shape (n, 3)."""
     radii: Array
@@ -240,7 +242,7 @@ def in_the_way(points: Array, viewpoint: Viewpoint, cut: str) -> NDArray[np.bool
     hides = _hides(seen, viewpoint) if len(viewpoint.centers) else np.zeros(len(points), bool)
     if cut == "half":
         ahead = (viewpoint.look_at - viewpoint.position) * (1.0, 1.0, 0.0)
-        hides |= points @ ahead < 0.0
+        hides |= (points - viewpoint.base) @ ahead < 0.0
     return hides
 
 

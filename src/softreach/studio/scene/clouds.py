@@ -13,7 +13,7 @@ from softreach.arm.manipulator import Manipulator
 from softreach.cloud.dexterity import dexterity
 from softreach.cloud.redundancy import activation_distance
 from softreach.plot.coloring import BundleKey, Coloring, ScalarKey, color_samples
-from softreach.rod.tip_map import TipStatus
+from softreach.rod.tip_map import has_tip
 from softreach.schema import activation_symbols
 from softreach.studio import markup
 from softreach.studio.multiplicity import count_activations
@@ -220,7 +220,7 @@ def _manipulability(reach: Reach, rows: NDArray[np.int64]) -> Array:
 
 def _activation_distance(reach: Reach, rows: NDArray[np.int64]) -> Array:
     """D̄ of the samples that are shown, among all that have a tip; NaN where isolated."""
-    settled = np.flatnonzero(reach.status != TipStatus.NO_EQUILIBRIUM)
+    settled = np.flatnonzero(has_tip(reach.status))
     cloud = reach.cloud if len(settled) == reach.samples else reach.cloud.isel(sample=settled)
     shown = np.searchsorted(settled, rows)
     distance = activation_distance(cloud, _RADIUS * reach.arm.length, queries=np.sort(shown))

@@ -208,7 +208,8 @@ class Scene:
         """The box with numbers around cloud and arm, and the cloud without loads."""
         clouds = [reach] if free is None or not look.free else [reach, free]
         around = (cloud_points(source, 14) for source in clouds)
-        self.axes.draw(*around, np.array([[0, 0, 0], [0, 0, 1.0]]), shown=look.axes)
+        straight = reach.arm.base.to_world(np.array([[0, 0, 0], [0, 0, reach.arm.length]]))
+        self.axes.draw(*around, straight / reach.arm.length, shown=look.axes)
 
     def draw_trail(self, tips: Array) -> None:
         """A line through the places where the tip has been [L], shape (n, 3)."""

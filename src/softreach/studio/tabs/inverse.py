@@ -66,7 +66,7 @@ class InversePanel:
         with tab:
             self._text = Line(gui, _HINT)
             self._target = TypedField(
-                gui, "target / L", (0.0, 0.0, 1.0), "Where the tip should go [L]", VECTOR
+                gui, "target / L", _straight_tip(session), "Where the tip should go [L]", VECTOR
             )
             self._clicks = gui.add_checkbox("clicks set the target", False, hint=_ABOUT_CLICKS)
             solve = gui.add_button("Solve", hint="Finds every activation that reaches the target")
@@ -132,6 +132,12 @@ class InversePanel:
         take = lambda: self._session.update(lambda s: s.replace(activation=target))  # noqa: E731
         bind_button(button, self._session, take)
         return button
+
+
+def _straight_tip(session: Session) -> tuple[float, ...]:
+    """Where the tip of the straight arm is [L]."""
+    arm = session.state.design
+    return tuple((arm.base.to_world([0.0, 0.0, arm.length]) / arm.length).tolist())
 
 
 def _is_near(activation: Any, state: StudioState) -> bool:

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from softreach.arm.base import POINTS
 from softreach.arm.design_file import in_file_terms
 from softreach.arm.loads import GRAVITY, Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.studio.captions import tip_text
 from softreach.studio.fields import Attribute, Fields, attribute
-from softreach.studio.state import Vector, vector
+from softreach.studio.state import StudioState, Vector, vector
 from softreach.studio.widgets import Line
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput
 
@@ -23,11 +24,17 @@ if TYPE_CHECKING:
 
 GRAVITIES: Mapping[str, Vector] = {
     "none": (0.0, 0.0, 0.0),
-    "base upright": (0.0, 0.0, -GRAVITY),
-    "hanging": (0.0, 0.0, GRAVITY),
+    "down": (0.0, 0.0, -GRAVITY),
+    "up": (0.0, 0.0, GRAVITY),
     "sideways": (GRAVITY, 0.0, 0.0),
 }
-"""Gravity [m/s²] as the base sees it, whose tangent is +z."""
+"""Gravity in the world, whose z points up [m/s²]."""
+
+_WAYS: Mapping[str, str] = {name: name for name in POINTS} | {
+    "up": "up (upright)",
+    "down": "down (hanging)",
+    "": "as the file says",
+}
 
 _NONE = Loads(gravity=GRAVITIES["none"])
 _MOST = 1e6  # of any unit that is typed: far above what an arm bears, far below an overflow
@@ -62,7 +69,7 @@ _QUANTITIES = {
         "g",
         "m/s²",
         1.0,
-        "g: acceleration of gravity as x, y, z in the frame of the base, whose tangent is z",
+        "g: acceleration of gravity as x, y, z in the world, whose z points up",
     ),
     "payload": _Quantity(
         "payload",
@@ -83,7 +90,7 @@ _QUANTITIES = {
         "tip force",
         "N",
         1.0,
-        "F: force on the tip as x, y, z in the frame of the base",
+        "F: force on the tip as x, y, z in the world",
     ),
 }
 
@@ -97,13 +104,19 @@ class LoadsPanel:
         gravity = _typed("gravity")
         with tab:
             fields.dropdown(
+                "base",
+                _WAYS,
+                Attribute(lambda state: base_name(state.design), _based),
+                "Which way the straight arm points from its base, in the world",
+            )
+            fields.dropdown(
                 "gravity",
                 {name: name for name in GRAVITIES} | {"": "as typed"},
                 Attribute(
                     lambda state: gravity_name(gravity.read(state)),
                     lambda state, name: gravity.write(state, GRAVITIES[name]) if name else state,
                 ),
-                "Which way the base of the arm points",
+                "Which way things fall in the world; the base says how the arm stands in it",
             )
             for name, kind in _QUANTITIES.items():
                 add = fields.number if name == "payload" else fields.vector
@@ -170,6 +183,18 @@ def with_loads(arm: Manipulator, typed: TypedLoads) -> Manipulator:
 def gravity_name(gravity: Vector) -> str:
     """Name of a gravity in the list of directions; "" for any other."""
     return next((name for name, known in GRAVITIES.items() if known == gravity), "")
+
+
+def base_name(arm: Manipulator) -> str:
+    """Word for the way that an arm points; "" for a rotation."""
+    return arm.base.points if isinstance(arm.base.points, str) else ""
+
+
+def _based(state: StudioState, name: str) -> StudioState:
+    if not name:
+        return state
+    design = state.design
+    return state.replace(design=design.replace(base=design.base.replace(points=name)))
 
 
 def other_loads(arm: Manipulator) -> list[str]:

@@ -24,7 +24,7 @@ _TOGGLES = {
         "α-shape (0.05 L)",
         "The surface of a cloud by balls of radius α = 0.05 L, to compare with",
     ),
-    "axes": ("axes", "x, y and z [L] from the base"),
+    "axes": ("axes", "x, y and z in the world [L]"),
     "lit": ("lit points", "Points are shaded as spheres in a light"),
     "dark": ("dark page", "Light on dark"),
 }
@@ -66,7 +66,7 @@ class ViewPanel:
                     fields.checkbox(label, attribute(f"appearance.{name}"), hint)
             with gui.add_folder("camera"):
                 views = gui.add_button_group(
-                    "look from", tuple(VIEWS), hint="Along an axis of the base, or between them"
+                    "look from", tuple(VIEWS), hint="Along an axis of the world, or between them"
                 )
                 fields.checkbox(
                     "orthographic",

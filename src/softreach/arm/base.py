@@ -1,0 +1,189 @@
+"""The pose of an arm: where in the world its base is clamped, and which way it points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.arm.number import as_numbers, number
+from softreach.arm.part import Part
+from softreach.support.errors import Fault
+
+__all__ = ["POINTS", "UPRIGHT", "Base"]
+
+Array = NDArray[np.float64]
+Triple = tuple[float, float, float]
+Matrix = tuple[Triple, Triple, Triple]
+
+POINTS: Mapping[str, Matrix] = MappingProxyType(
+    {
+        "up": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+        "down": ((1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)),
+        "x": ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0)),
+        "-x": ((0.0, 0.0, -1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)),
+        "y": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)),
+        "-y": ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)),
+    }
+)
+"""Rotations by the way in the world in which the straight arm then points: about x, but about y
+where it points along x. All numbers are exact."""
+
+_ALLOWED = (
+    f"must be one of {', '.join(POINTS)}, or a rotation: a 3x3 matrix, a quaternion (w, x, y, z), "
+    "or a rotation vector (three numbers [rad])"
+)
+_FARTHEST = 1e6
+"""Farthest from the origin [m]: beyond, rounding of places in the world is too coarse."""
+_NEAR = 1e-6
+"""How far the numbers of a rotation may be off: what is typed with seven digits."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Base(Part):
+    """The pose of the clamped end in the world, whose z points up.
+
+    A point at p in the frame of the base, where the arm begins at 0 along +z, is at
+    `position` + `rotation` p in the world.
+
+    Raises:
+        InvalidDesign: A field is not what it must be, such as a rotation that is none.
+    """
+
+    position: Triple = number(
+        "r(0)", "m", "where the arm is clamped in the world", default=(0.0,) * 3, shape="triple"
+    )
+    """[m]."""
+    points: str | Matrix = "up"
+    """The way the straight arm points: "up", "down" (it hangs; turned about x), "x", "-x" (turned
+    about y), "y", "-y" (about x); or a rotation, kept as the rows of its matrix."""
+    turn: float = number("ψ", "rad", "turn about the way the arm points", default=0.0)
+    """By the right hand [rad], before the arm is made to point."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.points, str):
+            rows = tuple(map(tuple, _as_rotation(self.points).matrix.tolist()))
+            object.__setattr__(self, "points", rows)
+
+    def _faults(self) -> list[Fault]:
+        wrong = _as_rotation(self.points).wrong
+        faults = [Fault("points", self.points, wrong)] if wrong else []
+        place = np.abs(as_numbers(self.position)).ravel()
+        if _FARTHEST < place.max(initial=0.0) < np.inf:
+            allowed = f"must be within {_FARTHEST:g} m of the origin"
+            faults.append(Fault("position", self.position, allowed))
+        return super()._faults() + faults
+
+    @cached_property
+    def rotation(self) -> Array:
+        """The axes of the base in the world as columns, shape (3, 3), read-only."""
+        turned = np.array(_as_rotation(self.points).matrix)
+        if np.abs(turned @ turned.T - np.eye(3)).max() > 1e-15:  # typed with fewer digits
+            left, _, right = np.linalg.svd(turned)
+            turned = left @ right
+        if self.turn:
+            c, s = np.cos(self.turn), np.sin(self.turn)
+            turned = turned @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        turned.setflags(write=False)
+        return turned
+
+    @cached_property
+    def is_identity(self) -> bool:
+        """Whether the frame of the base is that of the world."""
+        return not any(self.position) and bool((self.rotation == np.eye(3)).all())
+
+    def to_world(self, points: ArrayLike) -> Array:
+        """Places in the world [m] of points in the frame of the base, shape (..., 3)."""
+        return self.directions_to_world(points) + np.array(self.position)
+
+    def to_base(self, points: ArrayLike) -> Array:
+        """Places in the frame of the base [m] of points in the world, shape (..., 3)."""
+        return self.directions_to_base(np.asarray(points, float) - np.array(self.position))
+
+    def directions_to_world(self, vectors: ArrayLike) -> Array:
+        """Forces and directions in the world of those in the frame of the base, shape (..., 3)."""
+        return _turned(self.rotation, np.asarray(vectors, float))
+
+    def directions_to_base(self, vectors: ArrayLike) -> Array:
+        """Forces and directions in the frame of the base of those in the world, shape (..., 3)."""
+        return _turned(self.rotation.T, np.asarray(vectors, float))
+
+    def __str__(self) -> str:
+        x, y, z = self.position
+        place = f", at ({x:g}, {y:g}, {z:g}) m" if any(self.position) else ""
+        turn = f", turned by {np.degrees(self.turn):.6g}°" if self.turn else ""
+        way = self.points
+        if not isinstance(way, str):
+            way = "along ({:.4g}, {:.4g}, {:.4g})".format(*self.rotation[:, 2] + 0.0)
+        return f"points {way}{turn}{place}"
+
+
+class _Reading(NamedTuple):
+    """What `points` means."""
+
+    matrix: Array
+    wrong: str = ""
+    """What is wrong with it, if anything."""
+
+
+def _as_rotation(points: Any) -> _Reading:
+    """The rotation that words or numbers mean."""
+    if isinstance(points, str):
+        rows = POINTS.get(points)
+        return _Reading(np.array(rows or POINTS["up"]), "" if rows else _ALLOWED)
+    given = as_numbers(points.as_matrix() if hasattr(points, "as_matrix") else points)
+    if not np.isfinite(given).all():
+        return _Reading(np.eye(3), _ALLOWED)
+    if given.shape == (3,):
+        return _of_vector(given)
+    if given.shape == (4,):
+        return _of_quaternion(given)
+    return _of_matrix(given) if given.shape == (3, 3) else _Reading(np.eye(3), _ALLOWED)
+
+
+def _of_matrix(given: Array) -> _Reading:
+    off = float(np.abs(given.T @ given - np.eye(3)).max())
+    if off > _NEAR:
+        columns = f"its columns are not of length 1 and at right angles, by {off:.2g}"
+        return _Reading(np.eye(3), f"must be a rotation; {columns}")
+    if np.linalg.det(given) < 0:
+        return _Reading(np.eye(3), "must be a rotation; these axes are left-handed")
+    return _Reading(given)
+
+
+def _of_quaternion(given: Array) -> _Reading:
+    size = float(np.linalg.norm(given))
+    if abs(size - 1.0) > _NEAR:
+        return _Reading(np.eye(3), f"must be a quaternion (w, x, y, z) of length 1, not {size:.4g}")
+    w, x, y, z = (given / size).tolist()
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return _Reading(np.array(rows))
+
+
+def _of_vector(given: Array) -> _Reading:
+    angle = float(np.linalg.norm(given))
+    if abs(angle - 1.0) < _NEAR:  # (0, 0, -1) is meant to be down, and would be up, turned by 1 rad
+        why = "three numbers are a rotation vector [rad], and these look like a direction"
+        return _Reading(np.eye(3), f"must be a word or a rotation; {why}: say it by a matrix")
+    x, y, z = (np.sinc(0.5 * angle / np.pi) * 0.5 * given).tolist()
+    return _of_quaternion(np.array([np.cos(0.5 * angle), x, y, z]))
+
+
+def _turned(rotation: Array, vectors: Array) -> Array:
+    """Each vector turned alone, so that others beside it do not change its last bits."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    return np.stack([a * x + b * y + c * z for a, b, c in rotation.tolist()], axis=-1)
+
+
+UPRIGHT = Base()
+"""At the origin of the world, where the frame of the base is that of the world."""
