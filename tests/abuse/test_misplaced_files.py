@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import json
+import os
 import re
 import warnings
 from collections.abc import Callable
@@ -93,6 +94,15 @@ def test_a_file_of_another_cloud_or_place_is_noticed(clouds, tmp_path, change, o
     assert isinstance(error, DamagedStore)
     assert f" in {place} = " in str(error)
     assert "must be as softreach wrote it; compute the cloud again" in str(error)
+
+
+@pytest.mark.parametrize("name", ["zarr.json", "tip/zarr.json", "tip/c/0/0"])
+def test_a_pipe_in_the_place_of_a_file_of_a_cloud_is_refused_at_once(clouds, tmp_path, name):
+    place = written(clouds["own"], tmp_path / "a.zarr")
+    (place / name).unlink()
+    os.mkfifo(place / name)
+    error = raised_by(lambda: sr.open_cloud(place))
+    assert " = no file: must be as softreach wrote it; compute the cloud again" in str(error)
 
 
 def test_an_interrupted_copy_over_a_cloud_is_noticed(clouds, tmp_path):

@@ -171,7 +171,7 @@ def _arrays(opened: Opened) -> dict[str, Any]:
         for path in sorted(Path(watch.location).glob(f"*/{DOCUMENT}")):
             chunk = Chunk(path.parent.name, None)
             try:
-                described(watch, chunk, path.read_bytes())
+                described(watch, chunk, _bytes_of(path))
             except Broken as broken:
                 watch.report(chunk, broken.found, broken.allowed)
     arrays = dict(opened.group.arrays())
@@ -181,6 +181,17 @@ def _arrays(opened: Opened) -> dict[str, Any]:
     return arrays
 
 
+def _bytes_of(path: Path) -> bytes:
+    """Content of a file that describes a store or an array.
+
+    Raises:
+        Broken: It is no file: reading a pipe or a device would never end.
+    """
+    if path.exists() and not path.is_file():
+        raise Broken("no file")
+    return path.read_bytes()
+
+
 def kind_of(path: str | os.PathLike[str]) -> Kind:
     """The kind of a store on disk.
 
@@ -188,7 +199,7 @@ def kind_of(path: str | os.PathLike[str]) -> Kind:
         InvalidInput: No store of softreach.
     """
     try:
-        attributes = unsealed((Path(path) / DOCUMENT).read_bytes())["attributes"]
+        attributes = unsealed(_bytes_of(Path(path) / DOCUMENT))["attributes"]
     except (OSError, Broken) as error:
         reason = f"its {DOCUMENT} is {error.found}" if isinstance(error, Broken) else str(error)
         raise InvalidInput("store", os.fspath(path), _ALLOWED["cloud"], reason) from None
@@ -254,8 +265,12 @@ class CheckedStore(WrapperStore[Any]):
         Raises:
             DamagedStore: It is not what was written, or it is missing.
         """
-        content = await super().get(key, prototype, byte_range)
         chunk = self._chunk(key)
+        if self._is_endless(key):
+            if chunk is not None:
+                self.watch.report(chunk, "no file")
+            return None
+        content = await super().get(key, prototype, byte_range)
         if chunk is None or (chunk.place is None and content is None):
             return content
         try:
@@ -276,6 +291,13 @@ class CheckedStore(WrapperStore[Any]):
         """Write a file unless it exists."""
         await super().set_if_not_exists(key, self._written(key, value))
         await self._sync(key)
+
+    def _is_endless(self, key: str) -> bool:
+        """True if a pipe or a device is in the place of a file: reading it would never end."""
+        if not isinstance(self._store, LocalStore):
+            return False
+        path = self._store.root / key
+        return path.exists() and not (path.is_file() or path.is_dir())
 
     def _chunk(self, key: str) -> Chunk | None:
         return Chunk.of_key(key.removeprefix(self._root)) if key.startswith(self._root) else None
