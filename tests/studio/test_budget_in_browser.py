@@ -107,12 +107,12 @@ def test_a_hundred_bundles_show_a_cloud_and_say_what_is_left_out(tab):
     tab.settle()
 
 
-def test_an_upload_of_50_mb_is_refused_in_one_line(tab, tmp_path):
+def test_an_upload_of_5_mb_is_refused_in_one_line(tab, tmp_path):
     path = tmp_path / "state.json"
-    path.write_bytes(b" " * 50_000_000)
+    path.write_bytes(b" " * 5_000_000)
     tab.open("Export")
     tab.load(path)
-    tab.page.get_by_text("state.json = 50 MB: must be at most 2 MB").wait_for()
+    tab.page.get_by_text("state.json = 5 MB: must be at most 2 MB").wait_for()
 
 
 def test_an_export_says_that_it_works_and_what_it_wrote(tab, tmp_path):

@@ -150,11 +150,11 @@ def test_a_handle_behind_the_arm_is_seen_through_it_and_can_be_grabbed(inverse_t
 def test_the_handle_is_dark_on_a_light_page_and_light_on_a_dark_one(inverse_tab):
     tab = inverse_tab
     begin = pose(tab, START)
-    tab.wait(lambda: around(tab, begin).max() < 0.4, "it is dark")
+    tab.wait(lambda: np.median(around(tab, begin)) < 0.3, "it is dark")
     tab.session.update(lambda s: s.showing(dark=True))
-    tab.wait(lambda: around(tab, begin)[..., 0].min() > 0.4, "it is light")
+    tab.wait(lambda: np.median(around(tab, begin)) > 0.5, "it is light")
     tab.session.update(lambda s: s.showing(dark=False))
-    tab.wait(lambda: around(tab, begin).max() < 0.4, "it is dark again")
+    tab.wait(lambda: np.median(around(tab, begin)) < 0.3, "it is dark again")
 
 
 def test_the_cloud_is_whole_again_after_a_drag_that_ends_outside_of_the_window(inverse_tab):

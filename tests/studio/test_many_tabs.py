@@ -41,13 +41,13 @@ def shake(session: Session, times: int, pause: float = 0.0) -> None:
         time.sleep(pause)
 
 
-def test_of_ten_tabs_that_were_closed_nothing_stays(studio):
+def test_of_tabs_that_were_closed_nothing_stays(studio):
     with page(studio):
         pass  # what is made once
     until(lambda: not studio.sessions)
     before = own_threads()
     gone = []
-    for _ in range(10):
+    for _ in range(4):
         with page(studio) as session:
             gone.append(weakref.ref(session.reach.cloud))
             del session
