@@ -47,7 +47,9 @@ def test_where_the_flux_holds_it_is_exact_to_a_millionth(narrow, name):
     assert narrow.volume[row] == pytest.approx(expected, rel=1e-6)
 
 
-@pytest.mark.parametrize("name", ["taper", "lower", "left.offset"])
+@pytest.mark.parametrize(
+    "name", ["taper", "lower", pytest.param("left.offset", marks=pytest.mark.large)]
+)
 def test_the_convex_volume_s_derivative_is_within_its_error(narrow, name):
     def convex(arm):
         return reachable_set(arm, accuracy=5e-4).convex_volume
@@ -95,7 +97,6 @@ def uneven(**shared: tuple[float, ...]) -> Manipulator:
 BOUNDED = uneven(lower=(-0.9, -0.8, -0.7), upper=(-0.3, -0.35, -0.2))
 SHARED = {
     "lower": BOUNDED,
-    "upper": BOUNDED,
     "extent": uneven(extent=(0.3, 0.5, 0.4)),
     "revolution": uneven(revolution=(-1.0, 0.5)).with_bounds((-0.7, -0.4)),
     "poisson_ratio": changed(
@@ -119,7 +120,8 @@ def ways(name: str, values: Array) -> Array:
 @cache
 def by_shared(name: str) -> VolumeGradient:
     """Derivatives by a shared parameter, then by each of those that share it."""
-    return volume_gradient(SHARED[name], (name, *parts_of(SHARED[name], name)))
+    names = (name, *parts_of(SHARED[name], name))
+    return volume_gradient(SHARED[name], names, accuracy=1e-2)
 
 
 @pytest.mark.parametrize("name", SHARED)
@@ -166,7 +168,7 @@ def test_where_the_image_folds_finer_rasters_agree_within_the_error(name):
     assert found.route == "raster"
 
     def raster(arm):
-        return rasterized_set(tip_map(arm), 84, 0.008, 1e-3).volume
+        return rasterized_set(tip_map(arm), 60, 0.01, 1e-2).volume
 
     expected = difference(arm, name, 2e-2, raster)
     assert abs(found.volume[0] - expected) < 2.0 * found.volume_error[0]
