@@ -97,6 +97,7 @@ def uneven(**shared: tuple[float, ...]) -> Manipulator:
 BOUNDED = uneven(lower=(-0.9, -0.8, -0.7), upper=(-0.3, -0.35, -0.2))
 SHARED = {
     "lower": BOUNDED,
+    "upper": BOUNDED,
     "extent": uneven(extent=(0.3, 0.5, 0.4)),
     "revolution": uneven(revolution=(-1.0, 0.5)).with_bounds((-0.7, -0.4)),
     "poisson_ratio": changed(
@@ -104,6 +105,10 @@ SHARED = {
         {"core.poisson_ratio": 0.3, "rings[1].material.poisson_ratio": 0.4},
     ),
 }
+of_shared = pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.large] if name == "upper" else []) for name in SHARED],
+)
 
 
 def parts_of(arm: Manipulator, name: str) -> dict[str, float]:
@@ -124,7 +129,7 @@ def by_shared(name: str) -> VolumeGradient:
     return volume_gradient(SHARED[name], names, accuracy=1e-2)
 
 
-@pytest.mark.parametrize("name", SHARED)
+@of_shared
 def test_the_derivative_by_what_parts_share_is_the_sum_of_theirs(name):
     found, way = by_shared(name), ways(name, np.array([*parts_of(SHARED[name], name).values()]))
     assert found.route == "flux"
@@ -133,7 +138,7 @@ def test_the_derivative_by_what_parts_share_is_the_sum_of_theirs(name):
     assert off < found.convex_volume_error.sum()
 
 
-@pytest.mark.parametrize("name", SHARED)
+@of_shared
 def test_it_is_that_of_volumes_of_designs_of_which_all_parts_moved(name):
     arm, own, h = SHARED[name], parts_of(SHARED[name], name), 1e-3
     values = np.array([*own.values()])
