@@ -99,7 +99,7 @@ def test_volume_is_the_integral_of_det_j_minus_what_is_covered_again(folded):
 
 def test_a_cloud_lies_inside_to_one_cell(best, folded):
     for found in (best, folded):
-        tips = compute_cloud(found.arm, n=400_000).tip.values
+        tips = compute_cloud(found.arm, n=100_000).tip.values
         outside = tips[~found.contains(tips)]
         assert len(outside) < 0.05 * len(tips)
         assert found.distance(outside).max() < found.grid.attrs["cell"]
@@ -115,7 +115,15 @@ def test_the_grid_and_single_points_agree(folded):
     assert (folded.contains(centers[some]) == (counted > 0)).all()
 
 
-@pytest.mark.parametrize(("revolution_deg", "taper_deg"), [(108, 2), (75, 3), (36, 3), (0, 0)])
+@pytest.mark.parametrize(
+    ("revolution_deg", "taper_deg"),
+    [
+        (75, 3),
+        (0, 0),
+        pytest.param(108, 2, marks=pytest.mark.large),
+        pytest.param(36, 3, marks=pytest.mark.large),
+    ],
+)
 def test_away_from_folds_and_faces_the_count_is_that_of_the_inverse(revolution_deg, taper_deg):
     arm = trunk_at(revolution_deg, taper_deg)
     found = solid(arm)
@@ -153,9 +161,8 @@ def test_the_image_of_a_part_of_the_box_lies_within(best, trunk):
 def test_the_surface_is_closed_outward_and_holds_the_volume(best, folded):
     for found in (best, folded):
         surface = found.surface()
-        edges = Counter(
-            (int(a), int(b)) for f in surface.faces for a, b in zip(f, np.roll(f, -1), strict=True)
-        )
+        begins, ends = surface.faces.ravel(), np.roll(surface.faces, -1, axis=1).ravel()
+        edges = Counter(zip(begins.tolist(), ends.tolist(), strict=True))
         assert all(edges[b, a] == 1 == n for (a, b), n in edges.items())
         assert surface.volume == pytest.approx(found.volume, rel=5e-4)
 
@@ -240,7 +247,7 @@ def test_four_bundles_agree_with_smaller_cells_within_the_error(redundant):
 
 
 def test_a_cloud_of_four_bundles_lies_inside_to_one_cell(redundant):
-    tips = compute_cloud(redundant.arm, n=400_000).tip.values
+    tips = compute_cloud(redundant.arm, n=100_000).tip.values
     outside = tips[~redundant.contains(tips)]
     assert redundant.distance(outside).max() < redundant.grid.attrs["cell"]
 
@@ -251,7 +258,7 @@ def test_two_free_bundles_sweep_an_area(trunk):
     assert isinstance(sheet, ReachableSurface)
     assert (sheet.dimension, sheet.volume, sheet.unreachability) == (2, 0.0, 1.0)
     assert sheet.surface().area == pytest.approx(sheet.area, rel=1e-3)
-    finer = convex_hull(tip_positions(arm, fine_grid(arm, 400)))
+    finer = convex_hull(tip_positions(arm, fine_grid(arm, 200)))
     assert 0 < finer.volume - sheet.convex_volume < sheet.convex_volume_error < 1e-3
     assert "<img" in sheet._repr_html_()
     assert repr(sheet).startswith(f"ReachableSurface: area {sheet.area:.3f}"[:-1])
@@ -385,10 +392,10 @@ def counted(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
 
 def test_the_cone_of_three_bundles_closes_with_the_cell_and_that_of_four_stays(trunk):
     def shrinks(arm: Manipulator) -> float:
-        """Median cone in cells of 0.1 m over that in cells of 0.05 m."""
+        """Median cone in cells of 125 mm over that in cells half as wide."""
         wide, narrow = (
             float(spread["solid_angle"].where(spread["samples"] > 30).median())
-            for spread in (direction_spread(arm, n=1 << 18, cell=cell) for cell in (0.1, 0.05))
+            for spread in (direction_spread(arm, n=1 << 17, cell=cell) for cell in (0.125, 0.0625))
         )
         return wide / narrow
 

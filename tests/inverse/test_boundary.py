@@ -42,15 +42,21 @@ def test_tips_of_a_hanging_arm_on_its_bounds_are_solved_back(hanging, place):
         assert np.abs(solution.activations - wanted).max(axis=1).min() < 1e-4
 
 
-@pytest.mark.parametrize("bundles", [3, 4, 5])
+@pytest.mark.parametrize("bundles", [3, 5, pytest.param(4, marks=pytest.mark.large)])
 def test_tips_of_arms_under_payload_on_their_bounds_are_reached(bundles):
     arm = bounded_design(bundles, bundles, loaded=True)
     targets = tip_positions(arm, activations(arm, 12, "faces"))
     check_reached(arm, targets[np.isfinite(targets[:, 0])], TOL)
 
 
-@pytest.mark.parametrize("tol", [1e-3, 1e-6, 1e-9])
-@pytest.mark.parametrize("bundles", [3, 4, 5, 6, 7, 8])
+@pytest.mark.parametrize(
+    ("bundles", "tol"),
+    [
+        pytest.param(bundles, tol, marks=[] if (bundles + k) % 3 == 1 else [pytest.mark.large])
+        for bundles in range(3, 9)
+        for k, tol in enumerate([1e-3, 1e-6, 1e-9])
+    ],
+)
 def test_exact_tips_on_bounds_are_reached_by_maps_of_any_tolerance(bundles, tol):
     arm = bounded_design(bundles, bundles, loaded=False)
     check_reached(arm, boundary_tips(arm, 24, tol)[1], tol)
@@ -72,9 +78,9 @@ def test_an_activation_on_a_bound_is_found_beside_others_that_lead_to_its_tip(pl
         assert away.max() <= 16 * TOL * arm.length
 
 
-@pytest.mark.parametrize("tol", [1e-4, TOL, 1e-8])
+@pytest.mark.parametrize("tol", [1e-4, 1e-8, pytest.param(TOL, marks=pytest.mark.large)])
 def test_a_proof_says_more_than_the_error_of_tips(trunk, tol):
-    gamma = np.random.default_rng(0).uniform(*trunk.bounds.T, (40, 3))
+    gamma = np.random.default_rng(0).uniform(*trunk.bounds.T, (20, 3))
     gamma[:, 0] = 0.0
     tips, slopes = tip_map(trunk, tol).tips_and_slopes(gamma)
     normal = np.cross(slopes[:, :, 1], slopes[:, :, 2])
@@ -96,7 +102,7 @@ def test_a_proof_says_more_than_the_error_of_tips(trunk, tol):
 def test_a_path_that_leaves_the_set_by_less_than_the_error_of_tips_is_followed(
     trunk, bundle, given
 ):
-    line = np.tile([-0.4, -0.9, -0.6], (12, 1)) + np.linspace(0.0, 0.01, 12)[:, None]
+    line = np.tile([-0.4, -0.9, -0.6], (6, 1)) + np.linspace(0.0, 0.01, 6)[:, None]
     for bound in trunk.bounds[bundle]:
         line[:, bundle] = bound
         path = tip_positions(trunk, line, tol=1e-9)

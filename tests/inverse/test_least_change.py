@@ -52,14 +52,14 @@ def least_from_many_starts(
 def test_no_search_from_many_starts_finds_less(design, place):
     arm = design()
     rod, rng = tip_map(arm), np.random.default_rng(0)
-    gamma = activations(arm, 3, place, seed=5)
+    gamma = activations(arm, 2, place, seed=5)
     if design is designs.redundant_trunk and place == "interior":
         gamma[0] = OVERLOOKED
     targets = rod.tips(gamma)
     for near in (np.zeros(arm.bundles), rng.uniform(*arm.bounds.T)):
         found = changes(solve_inverse(arm, targets, near=near), near)
         for target, least, known in zip(targets, found, gamma, strict=True):
-            starts = np.concatenate([known[None], rng.uniform(*arm.bounds.T, (10, arm.bundles))])
+            starts = np.concatenate([known[None], rng.uniform(*arm.bounds.T, (6, arm.bundles))])
             assert least <= least_from_many_starts(rod, target, near, starts) + 1e-6
 
 
@@ -74,7 +74,7 @@ def test_a_local_minimum_larger_than_the_activation_drawn_is_left(bundles, seed,
 @pytest.mark.parametrize("place", ["interior", "faces", "edges", "corners"])
 def test_four_bundles_are_proved_to_change_least(place):
     arm = designs.redundant_trunk()
-    targets = tip_positions(arm, activations(arm, 25, place, seed=2))
+    targets = tip_positions(arm, activations(arm, 12, place, seed=2))
     found = solve_inverse(arm, targets, prove_least=True)
     assert found.least_proved.mean() > 0.9
     assert (found.change_bounds <= changes(found)).all()
@@ -154,7 +154,7 @@ def test_the_least_compromise_with_a_direction_is_not_proved():
         designs.three_chamber_arm,
     ],
 )
-def test_the_remainder_of_the_linearization_is_within_the_bound_of_its_cell(design):
+def test_the_remainder_of_the_linearization_is_within_the_bounds_of_its_cell_and_of_all(design):
     arm = design()
     rod, rng = tip_map(arm), np.random.default_rng(0)
     for cells in (1.5, 4, 30):
@@ -164,5 +164,7 @@ def test_the_remainder_of_the_linearization_is_within_the_bound_of_its_cell(desi
         tips, slopes = rod.tips_and_slopes(center)
         rest = rod.tips(center + change) - tips - np.einsum("nij,nj->ni", slopes, change)
         errors = rod.linearization_errors(center, half)
-        assert (np.linalg.norm(rest, axis=1) <= errors).all()
+        missed = np.linalg.norm(rest, axis=1)
+        assert (missed <= errors).all()
+        assert missed.max() <= rod.linearization_error(half)
         assert errors.max() <= rod.linearization_error(half) * (1 + 1e-12)
