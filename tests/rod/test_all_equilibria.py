@@ -51,8 +51,8 @@ def test_no_random_start_of_a_chain_of_links_comes_to_another(load):
     arm = trunk(load)
     every = sr.equilibria(arm, BENT)
     chain = Chain(*oracle_rod(arm, every.rod.body, BENT, arm.loads), 20)
-    tips = [tip for seed in range(60) if (tip := come_to_rest(chain, seed)) is not None]
-    assert len(tips) > 20
+    tips = [tip for seed in range(30) if (tip := come_to_rest(chain, seed)) is not None]
+    assert len(tips) > 10
     apart = np.linalg.norm(np.array(tips)[:, None] - every.tips, axis=2)
     assert apart.min(axis=1).max() < 0.03
     assert len(set(apart.argmin(axis=1))) > 1
