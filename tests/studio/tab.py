@@ -88,15 +88,23 @@ class Tab:
         )
 
     def drag(self, label: str, pixels: int) -> None:
-        """Grab the thumb of a slider and pull it along."""
+        """Grab the thumb of a slider and pull it along, again if the page moved it meanwhile."""
         thumb = self.slider(label)
-        thumb.scroll_into_view_if_needed()
-        box = thumb.bounding_box()
-        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-        self.page.mouse.move(x, y)
-        self.page.mouse.down()
-        self.page.mouse.move(x + pixels, y, steps=4)
-        self.page.mouse.up()
+        before = thumb.get_attribute("aria-valuenow")
+
+        def dragged() -> bool:
+            thumb.evaluate("thumb => thumb.scrollIntoView({block: 'center'})")
+            self.page.wait_for_timeout(50)
+            box = thumb.bounding_box()
+            x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+            self.page.mouse.move(x, y)
+            self.page.mouse.down()
+            self.page.mouse.move(x + pixels, y, steps=4)
+            self.page.mouse.up()
+            self.page.wait_for_timeout(100)
+            return thumb.get_attribute("aria-valuenow") != before
+
+        self.wait(dragged, f"{label} moves")
 
     def press(self, button: str) -> None:
         self.page.get_by_role("button", name=button, exact=True).click()
