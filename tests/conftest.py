@@ -38,6 +38,17 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(7)
 
 
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests in the browser, which are long and wait much, begin the shares of two workers."""
+    long = [item for item in items if "browser" in getattr(item, "fixturenames", ())]
+    others = set(items).difference(long)
+    short = [item for item in items if item in others]
+    half = len(long) // 2
+    first = max(0, len(items) // 2 - half)
+    items[:] = [*long[:half], *short[:first], *long[half:], *short[first:]]
+
+
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> Iterator[None]:
     """Say in the end how many tests had no browser, and what to type."""
