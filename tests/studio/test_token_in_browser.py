@@ -10,7 +10,7 @@ from tests.studio.conftest import SMALL
 from tests.studio.tab import Tab
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def guarded():
     state = StudioState(design=designs.minimal_trunk()).showing(level=14)
     with Studio(Start(state=state, quality=SMALL), token="secret") as running:
