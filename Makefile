@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: help setup demo test test-all kernels browser quick fast record check lint types format bench atlas paper docs lock clean
+.PHONY: help setup demo test test-all ready kernels browser quick fast record check lint types format bench atlas paper docs lock clean
 
 help:
 	@echo "make demo    set up, then compute the paper's design into out/"
@@ -35,13 +35,15 @@ demo: setup
 # Tests side by side, up to four on as many cores.
 TESTS := $(BIN)/python -m pytest -q --numprocesses auto --maxprocesses 4 --dist worksteal --max-worker-restart 0
 
-test: setup
-	$(MAKE) --no-print-directory -j3 --output-sync=target check kernels browser
+test: ready
 	$(TESTS)
 
-test-all: setup
-	$(MAKE) --no-print-directory -j3 --output-sync=target check kernels browser
+test-all: ready
 	$(TESTS) -m "large or not large"
+
+# All that comes before the tests, side by side.
+ready: setup
+	$(MAKE) --no-print-directory -j3 --output-sync=target check kernels browser
 
 # Compiled once here, and not by every process of the tests.
 kernels: setup

@@ -42,8 +42,7 @@ def rng() -> np.random.Generator:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Tests in the browser, which are long and wait much, begin the shares of two workers."""
     long = [item for item in items if "browser" in getattr(item, "fixturenames", ())]
-    others = set(items).difference(long)
-    short = [item for item in items if item in others]
+    short = [item for item in items if "browser" not in getattr(item, "fixturenames", ())]
     half = len(long) // 2
     first = max(0, len(items) // 2 - half)
     items[:] = [*long[:half], *short[:first], *long[half:], *short[first:]]

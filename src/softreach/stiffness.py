@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.manipulator import Manipulator
 from softreach.cloud.clouds import tip_map_of
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.placed import PlacedRod
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import BLOCK, TipMap
 from softreach.schema import AXES, check_cloud
@@ -184,7 +183,7 @@ def yielding_rod(rod: TipMap) -> LoadedRod:
 
     Without loads nothing weighs on it.
     """
-    of_base = rod.rod if isinstance(rod, PlacedRod) else rod
+    of_base = tip_map(rod, frame="base")
     if isinstance(of_base, LoadedRod):
         return of_base
     if of_base != tip_map(rod.arm, rod.tol, frame="base"):

@@ -11,7 +11,6 @@ from softreach.studio import Quality, Start, Studio, StudioState
 from tests.studio.tab import Tab
 
 SMALL = Quality(coarse_level=11, fine_level=12, coarse_accuracy=0.05, fine_accuracy=0.02)
-"""Few points: without a graphics card a browser draws 16,000 in a tenth of a second."""
 
 
 @pytest.fixture(scope="session")

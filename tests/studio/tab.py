@@ -87,13 +87,17 @@ class Tab:
             f"xpath=//label[normalize-space()='{label}']/following::*[@role='slider'][1]"
         )
 
+    def center(self, place) -> None:
+        """Scroll to a place of the panel, where its head does not cover it."""
+        place.evaluate("place => place.scrollIntoView({block: 'center'})")
+
     def drag(self, label: str, pixels: int) -> None:
         """Grab the thumb of a slider and pull it along, again if the page moved it meanwhile."""
         thumb = self.slider(label)
         before = thumb.get_attribute("aria-valuenow")
 
         def dragged() -> bool:
-            thumb.evaluate("thumb => thumb.scrollIntoView({block: 'center'})")
+            self.center(thumb)
             self.page.wait_for_timeout(50)
             box = thumb.bounding_box()
             x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -33,13 +32,6 @@ def pose(tab, activation):
     tab.wait(lambda: np.allclose(tab.drawn("/grip").position, tip, atol=1e-4), "the ball is there")
     tab.page.wait_for_timeout(200)  # until the page has drawn it
     return tip
-
-
-def show_many_points(tab):
-    """More than are drawn while the tip is dragged."""
-    tab.session.quality = replace(tab.session.quality, coarse_level=14, fine_level=14)
-    tab.session.update(lambda s: s.replace(design=sr.designs.minimal_trunk(taper=0.03)))
-    tab.settle()
 
 
 def drag_tip(tab, begin, end, steps=12):
@@ -73,7 +65,6 @@ START = (-0.7, -0.4, -0.9)
 
 def test_the_arm_follows_a_drag_of_its_tip_on_its_branch_and_the_others_are_ghosts(inverse_tab):
     tab = inverse_tab
-    show_many_points(tab)
     begin = pose(tab, START)
     end = sr.tip_positions(tab.session.state.design, [(-0.6, -0.55, -0.8)])[0]
     drag_tip(tab, begin, end)
@@ -168,7 +159,6 @@ def test_the_handle_is_dark_on_a_light_page_and_light_on_a_dark_one(inverse_tab)
 
 def test_the_cloud_is_whole_again_after_a_drag_that_ends_outside_of_the_window(inverse_tab):
     tab = inverse_tab
-    show_many_points(tab)
     begin = pose(tab, START)
     drag_tip(tab, begin, begin + [0.0, 0.0, 0.1])
     tab.wait(lambda: len(tab.drawn("/cloud").points) <= 1 << 13, "the cloud is thin")

@@ -38,21 +38,25 @@ def loads(tab):
     return tab.session.state.design.loads
 
 
-def become(tab, condition, what):
-    tab.wait(lambda: loads(tab) is not None and condition(loads(tab)), what)
+def become(tab, condition, what, before=lambda: None):
+    """Wait until the loads are as they should be, after doing something each time."""
+
+    def done():
+        before()
+        return loads(tab) is not None and condition(loads(tab))
+
+    tab.wait(done, what)
     tab.settle()
 
 
 def enter(tab, label, text, condition, what):
     """Type a load, and again where the page put back the one before meanwhile."""
 
-    def taken():
+    def type_it():
         typed(tab, label, text)
         tab.page.wait_for_timeout(500)
-        return loads(tab) is not None and condition(loads(tab))
 
-    tab.wait(taken, what)
-    tab.settle()
+    become(tab, condition, what, before=type_it)
 
 
 def mirrored_unstable(arm):

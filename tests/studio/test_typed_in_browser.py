@@ -95,7 +95,7 @@ def test_every_control_has_a_tooltip_with_its_meaning(tab):
     assert not lacking
     tab.open("Design")
     thumb = tab.slider("extent σ [deg]")
-    thumb.evaluate("thumb => thumb.scrollIntoView({block: 'center'})")  # else the head may cover it
+    tab.center(thumb)
     thumb.hover()
     tab.page.get_by_text("the angle of the cross-section").wait_for()
     assert "hull" in tab.page.get_by_text("UNR").first.get_attribute("title")

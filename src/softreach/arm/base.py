@@ -15,7 +15,7 @@ from softreach.arm.number import as_numbers, number
 from softreach.arm.part import Part
 from softreach.support.errors import Fault
 
-__all__ = ["POINTS", "UPRIGHT", "Base"]
+__all__ = ["POINTS", "UPRIGHT", "Base", "rotation_matrices"]
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -161,13 +161,7 @@ def _of_quaternion(given: Array) -> _Reading:
     size = float(np.linalg.norm(given))
     if abs(size - 1.0) > _NEAR:
         return _Reading(np.eye(3), f"must be a quaternion (w, x, y, z) of length 1, not {size:.4g}")
-    w, x, y, z = (given / size).tolist()
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return _Reading(np.array(rows))
+    return _Reading(rotation_matrices(given / size))
 
 
 def _of_vector(given: Array) -> _Reading:
@@ -177,6 +171,17 @@ def _of_vector(given: Array) -> _Reading:
         return _Reading(np.eye(3), f"must be a word or a rotation; {why}: say it by a matrix")
     x, y, z = (np.sinc(0.5 * angle / np.pi) * 0.5 * given).tolist()
     return _of_quaternion(np.array([np.cos(0.5 * angle), x, y, z]))
+
+
+def rotation_matrices(quaternions: Array) -> Array:
+    """Rotation matrices of unit quaternions (w, x, y, z), shape (..., 3, 3)."""
+    w, x, y, z = np.moveaxis(quaternions, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def _turned(rotation: Array, vectors: Array) -> Array:

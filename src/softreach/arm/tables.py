@@ -27,6 +27,7 @@ __all__ = [
     "both_sides",
     "check_extension",
     "compliance",
+    "ends_over",
     "extension_range",
     "strain_stations",
     "tables",
@@ -143,8 +144,19 @@ def extension_range(arm: Manipulator) -> tuple[float, float]:
 
 
 def _extension_range(arm: Manipulator, extension: Array) -> tuple[float, float]:
-    ends = extension[..., None] * arm.bounds
-    return 1.0 + float(ends.min(-1).sum(-1).min()), 1.0 + float(ends.max(-1).sum(-1).max())
+    least, most = ends_over(extension, arm.bounds).T
+    return 1.0 + float(least.min()), 1.0 + float(most.max())
+
+
+def ends_over(rates: Array, bounds: Array) -> Array:
+    """Least and largest of Σ rates γ over a box of activations, shape (station, 2).
+
+    Args:
+        rates: Per unit of each activation, shape (station, bundle).
+        bounds: Of the box, shape (bundle, 2).
+    """
+    ends = rates[..., None] * bounds
+    return np.stack([ends.min(-1).sum(-1), ends.max(-1).sum(-1)], axis=1)
 
 
 def both_sides(arm: Manipulator, stations: Array) -> Array:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.tables import Tables, tables
+from softreach.arm.tables import Tables, ends_over, tables
 from softreach.kernels.rod import frames, jacobian
 from softreach.kernels.rod import tips as rod
 from softreach.rod.activation_box import ActivationBox
@@ -204,10 +204,10 @@ def strain_range(table: Tables, box: ActivationBox) -> StrainRange:
     """Ranges of the strains of all activations in a box; where η is not ζ, bounds of them."""
     bounds = np.stack([box.low, box.high], axis=1)
     most, torsion = _most_bending(table.curvature[:, :2], bounds), table.curvature[:, 2]
-    bending, torsion = np.stack([np.zeros_like(most), most], axis=1), _ends(torsion, bounds)
-    extension = 1.0 + _ends(table.extension, bounds)
+    bending, torsion = np.stack([np.zeros_like(most), most], axis=1), ends_over(torsion, bounds)
+    extension = 1.0 + ends_over(table.extension, bounds)
     if table.growth is not table.extension:  # η/ζ = 1 - (ζ - η)/ζ
-        forces = _ends(table.extension - table.growth, bounds)
+        forces = ends_over(table.extension - table.growth, bounds)
         ratio = 1.0 - _products(forces, 1.0 / extension)
         bending, torsion = bending * ratio[:, :1], _products(torsion, ratio)
     return StrainRange(bending, torsion, extension)
@@ -217,12 +217,6 @@ def _products(first: Array, second: Array) -> Array:
     """Least and largest products of numbers from two ranges, shape (station, 2)."""
     all_ends = (first[:, :, None] * second[:, None]).reshape(len(first), 4)
     return np.stack([all_ends.min(axis=1), all_ends.max(axis=1)], axis=1)
-
-
-def _ends(rows: Array, bounds: Array) -> Array:
-    """Least and largest of linear functions over a box, shape (station, 2)."""
-    ends = rows[..., None] * bounds
-    return np.stack([ends.min(-1).sum(-1), ends.max(-1).sum(-1)], axis=1)
 
 
 def _most_bending(plane: Array, bounds: Array) -> Array:

@@ -89,7 +89,7 @@ class AllEquilibria:
             stations: Number of stations, evenly spaced from base to tip, or their Z [m], ascending.
         """
         gamma, rod = np.repeat(self.activation[None], len(self), axis=0), self.rod
-        loaded = _in_base(rod)
+        loaded = tip_map(rod, frame="base")
         if self.solver is None or not isinstance(loaded, LoadedRod):
             return configuration(rod, gamma, stations)
         z = stations_along(rod, stations)
@@ -190,7 +190,7 @@ def equilibria(
         rod, gamma = rod.base, rod.activations(gamma)
     if not rod.supports_unstable:
         return _without_loads(rod, gamma)
-    loaded = _in_base(rod)
+    loaded = tip_map(rod, frame="base")  # where all directions of the search are
     if not isinstance(loaded, LoadedRod):
         raise InvalidInput("arm", repr(rod), "a Manipulator, or a tip map of one")
     _check_loads(loaded.tables)
@@ -199,11 +199,6 @@ def equilibria(
     known = branch.frame[has_tip(branch.status)]
     solver, found = _accurate(solver, gamma, _search(solver, gamma, known))
     return _judged(rod, solver, gamma, found, known)
-
-
-def _in_base(rod: TipMap) -> TipMap:
-    """The rod in the frame of the base, where all directions of the search are."""
-    return rod.rod if isinstance(rod, PlacedRod) else rod
 
 
 def _one(rod: TipMap, activations: ArrayLike) -> Array:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from softreach.arm.loads import Loads
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.summary import load_number
-from softreach.arm.tables import both_sides, tables
+from softreach.arm.tables import both_sides, ends_over, tables
 from softreach.support.errors import InvalidInput
 
 __all__ = ["LoadPhase", "check_phase", "load_phase", "phase_stations"]
@@ -71,7 +71,9 @@ def load_phase(
         force, softest = _force(loads, z, mass), np.maximum(bending, torsion)
         swing = force * (1.0 + force * axial) * softest + (0.5 * _moment(loads) * softest) ** 2
         table = tables(arm, z)
-        longest, grown = (1.0 + _ends(arm, part) for part in (table.extension, table.growth))
+        longest, grown = (
+            1.0 + ends_over(part, arm.bounds).T for part in (table.extension, table.growth)
+        )
         relative = grown[1] / longest[0] if table.growth is not table.extension else 1.0
         squeeze = float((force * axial * relative).max())
         rate = np.maximum(longest[1], grown[1]) * np.sqrt(swing)
@@ -100,12 +102,6 @@ def phase_stations(arm: Manipulator) -> Array:
     """Z [m], even in S, and both sides of every breakpoint."""
     profile = arm.profile
     return both_sides(arm, profile.station(np.linspace(0.0, profile.slender_length, _STATIONS)))
-
-
-def _ends(arm: Manipulator, rates: Array) -> Array:
-    """Least and largest Σ rates γ within the bounds at each station, shape (2, station)."""
-    ends = rates[:, None] * arm.bounds.T
-    return np.stack([ends.min(axis=1).sum(axis=-1), ends.max(axis=1).sum(axis=-1)])
 
 
 def _force(loads: Loads, z: Array, mass: Array) -> Array:

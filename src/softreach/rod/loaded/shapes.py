@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.base import rotation_matrices
 from softreach.rod.tip_map import Frames
 
 __all__ = ["Shapes", "shapes_of"]
@@ -57,7 +58,7 @@ def shapes_of(
     """
     axes = _world(trace[:, -1])[:, None]
     trace = trace[:, rows]
-    world, turn = _world(trace), _matrix(trace[..., 12:16])
+    world, turn = _world(trace), rotation_matrices(trace[..., 12:16])
     directors = np.swapaxes(world, -1, -2) @ axes
     back = _rows(trace[..., 9:12], turn) @ np.swapaxes(world, -1, -2) @ axes
     position = tips[:, None] - back[..., 0, :]
@@ -77,7 +78,7 @@ def _rows(vectors: Array, matrices: Array) -> Array:
 
 def _world(trace: Array) -> Array:
     """Axes of the world in the directors of sections, as rows, shape (..., 3, 3)."""
-    return _orthonormal(trace[..., 0:3], trace[..., 3:6]) @ _matrix(trace[..., 12:16])
+    return _orthonormal(trace[..., 0:3], trace[..., 3:6]) @ rotation_matrices(trace[..., 12:16])
 
 
 def _orthonormal(g: Array, h: Array) -> Array:
@@ -86,14 +87,3 @@ def _orthonormal(g: Array, h: Array) -> Array:
     h = h - (g * h).sum(axis=-1, keepdims=True) * g
     h /= np.linalg.norm(h, axis=-1, keepdims=True)
     return np.stack([g, h, np.cross(g, h)], axis=-2)
-
-
-def _matrix(q: Array) -> Array:
-    """Rotation matrices of unit quaternions, shape (..., 3, 3)."""
-    w, x, y, z = np.moveaxis(q, -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

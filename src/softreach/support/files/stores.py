@@ -185,11 +185,16 @@ def _bytes_of(path: Path) -> bytes:
     """Content of a file that describes a store or an array.
 
     Raises:
-        Broken: It is no file: reading a pipe or a device would never end.
+        Broken: It is no file.
     """
-    if path.exists() and not path.is_file():
+    if path.is_dir() or _is_endless(path):
         raise Broken("no file")
     return path.read_bytes()
+
+
+def _is_endless(path: Path) -> bool:
+    """True if a pipe or a device is in the place of a file: reading it would never end."""
+    return path.exists() and not (path.is_file() or path.is_dir())
 
 
 def kind_of(path: str | os.PathLike[str]) -> Kind:
@@ -266,7 +271,7 @@ class CheckedStore(WrapperStore[Any]):
             DamagedStore: It is not what was written, or it is missing.
         """
         chunk = self._chunk(key)
-        if self._is_endless(key):
+        if isinstance(self._store, LocalStore) and _is_endless(self._store.root / key):
             if chunk is not None:
                 self.watch.report(chunk, "no file")
             return None
@@ -291,13 +296,6 @@ class CheckedStore(WrapperStore[Any]):
         """Write a file unless it exists."""
         await super().set_if_not_exists(key, self._written(key, value))
         await self._sync(key)
-
-    def _is_endless(self, key: str) -> bool:
-        """True if a pipe or a device is in the place of a file: reading it would never end."""
-        if not isinstance(self._store, LocalStore):
-            return False
-        path = self._store.root / key
-        return path.exists() and not (path.is_file() or path.is_dir())
 
     def _chunk(self, key: str) -> Chunk | None:
         return Chunk.of_key(key.removeprefix(self._root)) if key.startswith(self._root) else None
