@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator
 
 os.environ.setdefault("MPLBACKEND", "agg")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the workers of the tests keep all cores busy
 
 import numpy as np
 import pytest
@@ -41,8 +42,8 @@ def rng() -> np.random.Generator:
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Tests in the browser, which are long and wait much, begin the shares of two workers."""
-    long = [item for item in items if "browser" in getattr(item, "fixturenames", ())]
-    short = [item for item in items if "browser" not in getattr(item, "fixturenames", ())]
+    long = [item for item in items if item.path.stem.endswith("in_browser")]
+    short = [item for item in items if not item.path.stem.endswith("in_browser")]
     half = len(long) // 2
     first = max(0, len(items) // 2 - half)
     items[:] = [*long[:half], *short[:first], *long[half:], *short[first:]]

@@ -135,6 +135,12 @@ class TestFigures:
             assert panels[0].get_xlabel().endswith("/ L")
 
     @pytest.mark.usefixtures("coarse")
+    def test_views_of_a_thin_arm_fit_a_page(self, trunk):
+        thin = trunk.with_bounds([(0, 0)] * 3)
+        width, height = plot_views(sr.compute_cloud(thin, 10), thin).get_size_inches()
+        assert height < 1.5 * width
+
+    @pytest.mark.usefixtures("coarse")
     def test_orthogonal_views_share_one_scale(self, trunk, cloud, bent):
         front, side, top, _ = plot_views(cloud, trunk, bent).axes
         scales = []

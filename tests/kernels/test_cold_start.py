@@ -6,6 +6,7 @@ import importlib
 import pkgutil
 import re
 
+import pytest
 from benchmarks.bench_cold import COMMANDS, ROOT, measured, recorded
 
 from softreach import kernels
@@ -62,8 +63,21 @@ FEW = ("--n", "2000")
 WARM_UP = "warmup --loads"
 
 
-def test_a_first_run_compiles_its_kernels_once_and_nothing_after_a_warm_up(tmp_path):
-    """Every command in a process of its own, at first with one kernel cache that starts empty."""
+def test_nothing_is_compiled_after_a_warm_up(tmp_path):
+    """Kernels of all tests from here on: most have been compiled already."""
+    warm_up = recorded(WARM_UP.split(), tmp_path, own_cache=False)
+    assert _kernels() <= warm_up.used.keys()
+    runs = [recorded(line.split(), tmp_path, own_cache=False) for line in _of_readme()]
+    assert len(runs) >= 6
+    assert [run.compiled for run in runs if run.compiled] == []
+    for run in runs:
+        for kernel, types in run.used.items():
+            assert set(types) <= set(warm_up.used[kernel]), kernel
+
+
+@pytest.mark.large
+def test_a_first_run_compiles_its_kernels_once(tmp_path):
+    """Every command in a process of its own, with one kernel cache that starts empty."""
     few = {name: FEW for name in ("cloud", "volume", "demo")}
     runs = {name: measured(name, tmp_path, *few.get(name, ())) for name in COMMANDS}
     used = {
@@ -80,18 +94,6 @@ def test_a_first_run_compiles_its_kernels_once_and_nothing_after_a_warm_up(tmp_p
     kernels = set().union(*KERNELS.values())
     compiled = [f for run in runs.values() for f in run.compiled if f in kernels]
     assert sorted(compiled) == sorted(kernels)
-
-    # Kernels of all tests from here on: most have been compiled already.
-    warm_up = recorded(WARM_UP.split(), tmp_path, own_cache=False)
-    assert _kernels() <= warm_up.used.keys()
-
-    others = [line for line in _of_readme() if line not in COMMANDS.values()]
-    afterwards = [recorded(line.split(), tmp_path, own_cache=False) for line in others]
-    assert len(runs) + len(afterwards) >= 7
-    assert [run.compiled for run in afterwards if run.compiled] == []
-    for run in (*runs.values(), *afterwards):
-        for kernel, types in run.used.items():
-            assert set(types) <= set(warm_up.used[kernel]), kernel
 
 
 def of_numba(name: str) -> bool:

@@ -19,6 +19,12 @@ HARMLESS = (
 )
 """Errors of viser's in the console."""
 
+TEN_A_SECOND = """
+    window.requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), 100);
+    window.cancelAnimationFrame = clearTimeout;
+"""
+"""So many pictures are enough: without a graphics card each takes a core as long as it is drawn."""
+
 
 class Tab:
     """One page and its session."""
@@ -29,6 +35,7 @@ class Tab:
         )
         self.requests: list[str] = []
         self.errors: list[str] = []
+        self.context.add_init_script(TEN_A_SECOND)
         self.context.on("request", lambda request: self.requests.append(request.url))
         self.page = self.context.new_page()
         self.page.set_default_timeout(1000 * PATIENCE)

@@ -16,7 +16,7 @@ TRUNK = designs.minimal_trunk()
 
 
 def start():
-    return Start(state=StudioState(design=TRUNK).showing(level=14), quality=SMALL)
+    return Start(state=StudioState(design=TRUNK).showing(level=12), quality=SMALL)
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from softreach.studio import StudioState
 @pytest.fixture
 def loads_tab(tab):
     """An arm of a known stiffness."""
-    state = StudioState(design=designs.lce_arm()).showing(level=14, cut="none")
+    state = StudioState(design=designs.lce_arm()).showing(level=12, cut="none")
     tab.session.update(lambda _: state)
     tab.settle()
     tab.open("Loads")

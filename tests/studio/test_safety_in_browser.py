@@ -18,7 +18,7 @@ QUOTED = STRIKE.replace('"', '\\"')
 
 def state_with(**changes) -> str:
     """A state as text, of which some fields are not what the studio saved."""
-    values = json.loads(StudioState(design=designs.minimal_trunk()).showing(level=14).to_json())
+    values = json.loads(StudioState(design=designs.minimal_trunk()).showing(level=12).to_json())
     look = values["appearance"]
     for path, value in changes.items():
         place, _, name = path.rpartition("__")

@@ -28,7 +28,7 @@ def opened(browser, tmp_path_factory):
         def opened(kind: str) -> Tab:
             if kind not in tabs:
                 tabs[kind] = Tab(browser, studio, SIZES[kind])
-                tabs[kind].session.update(lambda s: s.showing(level=14))
+                tabs[kind].session.update(lambda s: s.showing(level=12))
             return tabs[kind]
 
         yield opened

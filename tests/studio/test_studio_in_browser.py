@@ -201,7 +201,7 @@ def test_a_state_is_saved_loaded_and_linked_and_tabs_stay_apart(own_tab, tmp_pat
     design = tab.save("Save design (TOML)", tmp_path)
     assert tomllib.loads(design.read_text())["profile"]["length_m"] == 1.0
     tab.session.update(
-        lambda s: StudioState(design=sr.designs.minimal_trunk(1.0)).showing(level=14)
+        lambda s: StudioState(design=sr.designs.minimal_trunk(1.0)).showing(level=12)
     )
     tab.settle()
     tab.load(file)

@@ -12,7 +12,7 @@ from tests.studio.tab import Tab
 
 @pytest.fixture
 def guarded():
-    state = StudioState(design=designs.minimal_trunk()).showing(level=14)
+    state = StudioState(design=designs.minimal_trunk()).showing(level=12)
     with Studio(Start(state=state, quality=SMALL), token="secret") as running:
         yield running
 

@@ -218,7 +218,7 @@ def plot_views(
         common_unit([unit, in_lengths(arm.length)])
         shapes = shapes or [rest_configuration(arm)]
         shown += [arm_points(arm, shape) for shape in shapes]
-    box = bounding_box(*shown)
+    box = _not_too_slim(bounding_box(*shown))
     coloring = color_samples(cloud, color)
     with figure_style():
         figure, axes, top = _layout(np.ptp(box, axis=0), width, view)
@@ -236,6 +236,13 @@ def plot_views(
                 panel.show(image, within)
         draw_figure_key(figure, coloring.key, top)
     return figure
+
+
+def _not_too_slim(box: Array) -> Array:
+    """The box with sides of half the longest one at least, so that a thin arm fits a page."""
+    span = np.ptp(box, axis=0)
+    margin = np.maximum(0.5 * span.max() - span, 0.0) / 2
+    return box + np.array([-margin, margin])
 
 
 def _half(thickness: float | None, tips: Array, unit: LengthUnit) -> float:

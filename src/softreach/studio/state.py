@@ -76,7 +76,7 @@ def _is_solvable(arm: Manipulator) -> bool:
 
 
 VERSION = 1
-LEVELS = range(14, 22)
+LEVELS = range(12, 22)
 """The cloud has 2^level points: in a Sobol sequence every such prefix is an even subsample."""
 
 CUTS = {
