@@ -1,4 +1,4 @@
-"""How a force grows while the tip stays where it is: linear programs, each corrected by Newton.
+"""Growth of a force while the tip stays where it is: linear programs, each corrected by Newton.
 
 The bundles move so that the force with which the tip pushes grows most: a linear program in the
 change of activations, of which none may be large, and of the force, under ∂r/∂γ δγ + ∂r/∂F δF = 0
@@ -38,7 +38,7 @@ _MULTIPLIER = 1e-4  # of the largest one, below which a bound does not count
 
 
 class Stop(IntEnum):
-    """Why a force grows no further."""
+    """Reason why a force grows no further."""
 
     BOUND = 0
     """Bundles are at their bounds."""
@@ -68,7 +68,7 @@ class Grown(NamedTuple):
     fixed: FixedTip
     stop: Stop
     limits: Mask
-    """Which bundles are at a bound that keeps the force from growing, shape (bundles,)."""
+    """Mask of the bundles at a bound that keeps the force from growing, shape (bundles,)."""
     slope: float
     """By how much the force would change if the place moved [N/m]."""
 
@@ -83,7 +83,7 @@ class _Program(NamedTuple):
     rate: float
     """The same in units of force per range of activation."""
     multipliers: Array
-    """What each bundle's bounds cost, shape (bundles,)."""
+    """Lagrange multiplier of each bundle's bounds, shape (bundles,)."""
     slope: float
     """By how much the force would change if the place moved [N/m]; NaN if it was not solved."""
 
@@ -211,13 +211,13 @@ class Growth:
         )
 
     def _columns(self, response: TipResponse, unit: float) -> Array:
-        """How the tip moves [L] with each activation over its range and with the unit of force."""
+        """Motion of the tip [L] by each activation over its range and by the unit of force."""
         moves = response.slope * np.where(self.box.is_free, self.box.scales, 0.0)
         columns = np.column_stack([moves, -unit * response.retreat])
         return columns / self.pushing.rod.length
 
     def _at_bound(self, gamma: Array) -> Mask:
-        """Which free bundles are at a bound."""
+        """Mask of the free bundles that are at a bound."""
         box = self.box
         room = np.minimum(gamma - box.low, box.high - gamma) / box.scales
         return box.is_free & (room <= _AT_BOUND)

@@ -18,18 +18,18 @@ __all__ = ["Rest", "rest"]
 
 @dataclass(frozen=True)
 class Rest:
-    """Where an arm rests that nothing drives."""
+    """Equilibrium of an arm that nothing drives."""
 
     activation: NDArray[np.float64]
     """The activation of least size within the bounds, zero where these hold it [unit]."""
     tip: NDArray[np.float64]
     """Of the loaded arm in the world [m]; NaN without equilibrium."""
     sag: float
-    """How far the loads move the tip [m]; NaN without equilibrium."""
+    """Distance by which the loads move the tip [m]; NaN without equilibrium."""
     sag_over_length: float
     """The same over the length of the arm [-]."""
     status: TipStatus
-    """Whether the equilibrium is stable, and whether one was found."""
+    """Status of the equilibrium: stable or not, or none found."""
 
 
 def rest(arm: Manipulator, *, tol: float = 1e-6) -> Rest:

@@ -1,4 +1,4 @@
-"""What is stored and passed on: names, dimensions, units and version of every dataset."""
+"""Schema of every dataset that is stored or passed on: names, dimensions, units and version."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def with_status(cloud: xr.Dataset, status: NDArray[np.int8]) -> xr.Dataset:
 
 
 def is_stable(data: xr.Dataset | xr.DataArray) -> Mask:
-    """Which samples hold the arm in a stable equilibrium; all, of an arm without loads."""
+    """Mask of the samples at a stable equilibrium; all, of an arm without loads."""
     if "status" not in data.coords:
         return np.ones(data.sizes["sample"], bool)
     return np.asarray(data.coords["status"].values == 0)
@@ -203,7 +203,7 @@ _ATTRIBUTES = {
 
 
 def _disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[InvalidInput]:
-    """What of a cloud is not as its design says."""
+    """Disagreements of a cloud with its design."""
     seed = cloud.attrs.get("seed", 0)  # a cloud of another program has none
     if not isinstance(seed, int) or isinstance(seed, bool):
         yield InvalidInput("cloud.attrs['seed']", repr(seed), "a whole number")
@@ -256,7 +256,7 @@ _SYMBOLS = {"1": "γ", "N": "τ", "Pa": "P"}
 
 
 def activation_symbols(units: Iterable[str]) -> tuple[str, ...]:
-    """What formulas call activations of these units: γ, the tension τ, the pressure P."""
+    """Symbols of activations of these units: γ, the tension τ, the pressure P."""
     return tuple(_SYMBOLS.get(unit, "a") for unit in units)
 
 
@@ -318,7 +318,7 @@ def frame_of(data: xr.Dataset) -> Literal["world", "base"]:
 
 
 def base_of(data: xr.Dataset) -> Array:
-    """Where the arm of a dataset is clamped, in the frame of its places [m], shape (3,)."""
+    """Position of the clamped end of the arm, in the frame of the dataset [m], shape (3,)."""
     place = data.attrs.get("base_position", (0.0, 0.0, 0.0))
     return np.array(place if frame_of(data) == "world" else (0.0, 0.0, 0.0), float)
 

@@ -41,7 +41,7 @@ _ALLOWED = (
 _FARTHEST = 1e6
 """Farthest from the origin [m]: beyond, rounding of places in the world is too coarse."""
 _NEAR = 1e-6
-"""How far the numbers of a rotation may be off: what is typed with seven digits."""
+"""Largest error of the numbers of a rotation: what is typed with seven digits."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +95,7 @@ class Base(Part):
 
     @cached_property
     def is_identity(self) -> bool:
-        """Whether the frame of the base is that of the world."""
+        """True if the frame of the base is that of the world."""
         return not any(self.position) and bool((self.rotation == np.eye(3)).all())
 
     def to_world(self, points: ArrayLike) -> Array:
@@ -125,11 +125,11 @@ class Base(Part):
 
 
 class _Reading(NamedTuple):
-    """What `points` means."""
+    """Rotation that `points` means."""
 
     matrix: Array
     wrong: str = ""
-    """What is wrong with it, if anything."""
+    """Fault of `points`; empty if there is none."""
 
 
 def _as_rotation(points: Any) -> _Reading:

@@ -60,7 +60,7 @@ class Manipulator:
     loads: Loads | None = None
     """Loads beside them; None for nothing, not even its weight."""
     base: Base = UPRIGHT
-    """Where in the world it is clamped, and which way it points; upright at the origin."""
+    """Pose of its clamped end in the world; upright at the origin."""
 
     def __post_init__(self) -> None:
         if faults := list(_part_faults(self)):

@@ -1,4 +1,4 @@
-"""How every activation that puts the tip at a target is found, with three free bundles.
+"""All activations that put the tip at a target, with three free bundles.
 
 1. The activation box is cut into cells of six tetrahedra each; tips and Jacobians are computed at
    their corners, once for an arm (`cells`).
@@ -97,7 +97,7 @@ def _sets(order: Index, size: int) -> list[Index]:
 
 
 def _set_size(prepared: PreparedMap, count: int) -> int:
-    """How many targets to solve together: enough of them for kernels, enough sets for threads.
+    """Number of targets to solve together: enough of them for kernels, enough sets for threads.
 
     Rods under loads are work enough to be shared out among threads by themselves.
     """

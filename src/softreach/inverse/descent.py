@@ -174,7 +174,7 @@ def linearized(rod: TipMap, gamma: Array) -> tuple[Array, Array]:
 
 
 class Descent(NamedTuple):
-    """Where searches ended."""
+    """Ends of searches."""
 
     gamma: Array
     """Activations [-], shape (n, m)."""
@@ -190,11 +190,11 @@ class Minima(NamedTuple):
     """Local minima."""
 
     gamma: Array
-    """Where [-], shape (n, m)."""
+    """Activations [-], shape (n, m)."""
     value: Array
     """The functions there, shape (n,)."""
     converged: Mask
-    """Whether the last step was negligible, shape (n,)."""
+    """Mask of the searches whose last step was negligible, shape (n,)."""
 
 
 def _trials(rod: TipMap, at: Descent, targets: Array, damping: Array) -> Array:

@@ -160,7 +160,7 @@ def _starts(prepared: PreparedMap, request: Request) -> tuple[Index, Array]:
 def _promising(
     prepared: PreparedMap, request: Request, owner: Index, start: Array
 ) -> tuple[Index, Array]:
-    """Where the best searches of each target are after a few steps, those that are apart."""
+    """Activations of the best searches of each target after a few steps, those that are apart."""
     gamma, merit = survey(prepared.rod, request.of(owner), start, _SURVEY)
     order = np.lexsort((merit, owner))
     counts = np.bincount(owner, minlength=len(request.targets))

@@ -113,7 +113,7 @@ def _nearest_at(rod: TipMap, targets: Array, gamma: Array) -> Nearest:
 
 
 class _Effort(NamedTuple):
-    """How many searches a target that is still left is worth."""
+    """Searches spent on a target that is still left."""
 
     neighbors: int
     """Seeds looked at."""

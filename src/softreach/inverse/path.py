@@ -231,7 +231,7 @@ class Continuation:
         return None
 
     def _left_branch(self, point: BranchPoint, ahead: Array, found: BranchPoint) -> bool:
-        """Whether the correction was large, or passed a fold."""
+        """True if the correction was large, or passed a fold."""
         predicted = np.linalg.norm((ahead - point.gamma) / self.box.scales)
         correction = np.linalg.norm((found.gamma - ahead) / self.box.scales)
         if correction > _CORRECTION * predicted + 1e-9:
@@ -241,7 +241,7 @@ class Continuation:
         return bool(np.linalg.det(point.slope) * np.linalg.det(found.slope) <= 0)
 
     def _leaps(self, point: BranchPoint) -> bool:
-        """Whether a branch ends here though no fold is near: an arm under loads leaps."""
+        """True if a branch ends here though no fold is near: an arm under loads leaps."""
         if not self.rod.supports_unstable:
             return False
         sizes = np.linalg.svd(point.slope * self.box.scales, compute_uv=False)
@@ -275,7 +275,7 @@ class BranchPoint(NamedTuple):
 
 
 class BranchEnd(NamedTuple):
-    """How far a branch was followed."""
+    """End of a branch as far as it was followed."""
 
     status: PathStatus
     point: BranchPoint
@@ -283,11 +283,11 @@ class BranchEnd(NamedTuple):
     bundle: int = -1
     """The bundle at its bound."""
     upper: bool = False
-    """Which bound that is."""
+    """True for its upper bound."""
     done: float = 0.0
     """The part of the way to the next point that was followed [-]."""
     error: float = 0.0
-    """How much farther the branch may go [m]."""
+    """Largest distance that the branch may go farther [m]."""
 
 
 class _Substep(NamedTuple):
@@ -297,7 +297,7 @@ class _Substep(NamedTuple):
     shorten: float = 1.0
     end: BranchEnd | None = None
     torn: bool = False
-    """Whether it met a place without a stable equilibrium."""
+    """True if it met a place without a stable equilibrium."""
 
 
 def _least_norm(slope: Array, moving: Mask) -> Array:

@@ -122,7 +122,7 @@ class Linearized(NamedTuple):
     slopes: Array
     """∂r/∂γ there [m], shape (n, 3, m)."""
     errors: Array
-    """How far a tip may lie from its linearization [m], shape (n,)."""
+    """Bounds of the distance from tips to their linearization [m], shape (n,)."""
 
 
 Bound = Callable[[Cells, Linearized], Array]
@@ -225,14 +225,14 @@ def _exclusion_of_block(rod: TipMap, coarse: CoarseCells, targets: Array, enough
 
 
 def _most_cells(bundles: int) -> int:
-    """How many cells may be examined for one target."""
+    """Most cells that are examined for one target."""
     if bundles <= 3:
         return _MOST_OF_THREE
     return _MOST_EXCLUSION_CELLS if bundles <= MOST_BUNDLES else 0
 
 
 def _distances(targets: Array, at: Linearized) -> Array:
-    """How far each target is at least from the image of its cell, negative if it may be in it."""
+    """Least distance of each target from the image of its cell, negative if it may be in it."""
     n, _, m = at.slopes.shape
     away, slopes = targets - at.tips, at.slopes * at.half
     softness = _SOFTNESS * (slopes**2).sum(axis=(1, 2)) + 1e-30

@@ -40,7 +40,7 @@ class Roots(NamedTuple):
     cell: Index
     """Cell of the mesh where the search began; -1 if in none, shape (n,)."""
     stable: Mask
-    """Whether the arm can be there, shape (n,)."""
+    """Mask of the roots at stable equilibria, shape (n,)."""
 
     def joined(self, other: Roots) -> Roots:
         """Both, sorted by target as each of them is."""
@@ -53,7 +53,7 @@ class Roots(NamedTuple):
         return rows(everything, np.argsort(everything.target, kind="stable"))
 
     def missing(self, targets: int, residual: float = np.inf) -> Index:
-        """Which of so many targets have no stable root within a residual [m]."""
+        """Numbers of the targets, of so many, that have no stable root within a residual [m]."""
         known = self.target[self.stable & (self.residual <= residual)]
         return np.flatnonzero(np.bincount(known, minlength=targets) == 0)
 
@@ -189,7 +189,7 @@ def _from_starts(rod: TipMap, request: Request, owner: Index, start: Array) -> R
 
 
 class _Valley(NamedTuple):
-    """Where the tip has the right place along the direction in which it moves most."""
+    """Activations whose tips are right along the direction in which the tip moves most."""
 
     rod: TipMap
     low: Array

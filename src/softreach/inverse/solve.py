@@ -153,7 +153,7 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
 
 
 def _perhaps_singular(prepared: PreparedMap, request: Request, gap: Array, bound: Array) -> Mask:
-    """Which targets may have roots that only a search of nearly singular ones finds.
+    """Mask of the targets that may have roots that only a search of nearly singular ones finds.
 
     Those not proved to be out of reach; where nothing is proved, those that are nearly reached.
     """

@@ -54,7 +54,7 @@ def sqp(
 
 
 def survey(rod: TipMap, request: Request, start: Array, most: int) -> tuple[Array, Array]:
-    """Where searches as those of `sqp` are after a few steps, and what they promise.
+    """Activations of searches as those of `sqp` after a few steps, and what they promise.
 
     Returns:
         Activations [-], shape (n, m), and what each search minimizes, ½|γ - near|² and the penalty
@@ -112,7 +112,7 @@ class _State(NamedTuple):
     slope: Array
     """(∂r/∂γ)/L, shape (n, 3, m)."""
     penalty: Array
-    """What a miss of L costs, beside ½|γ - near|², shape (n,)."""
+    """Penalty of a miss of L, beside ½|γ - near|², shape (n,)."""
     proximity: Array
     """σ: ½σ|step|² is added to what a step minimizes, shape (n,)."""
 

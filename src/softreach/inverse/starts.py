@@ -1,4 +1,4 @@
-"""Where searches for the activations with a given tip begin, with three free bundles."""
+"""Starts of searches for the activations with a given tip, with three free bundles."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _PLACES = 32  # along each axis, when targets are put in order
 
 
 class Starts(NamedTuple):
-    """Where searches begin."""
+    """Activations at which searches begin."""
 
     target: Index
     """Number of the target, shape (n,)."""

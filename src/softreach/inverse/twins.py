@@ -20,7 +20,7 @@ __all__ = ["twin_hints"]
 def twin_hints(
     arm: Manipulator | TipMap, targets: ArrayLike, *, tol: float = 1e-6
 ) -> tuple[str, ...]:
-    """What may be meant by targets out of reach: another base, or a z axis that points down.
+    """Hints at what targets out of reach may mean: another base, or a z axis that points down.
 
     A hint for the place that the arm would reach if its base pointed another way; its loads turn
     with it here, so that a loaded arm may reach it not quite.

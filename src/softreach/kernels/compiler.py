@@ -1,4 +1,4 @@
-"""How every kernel is compiled: without the interpreter lock, with loops cached on disk.
+"""Compiler of every kernel: without the interpreter lock, with loops cached on disk.
 
 A `kernel` calls nothing but what is inlined, so that all of its arithmetic is fused and rounded in
 one place. What is `strict` rounds as written in every process and may call its like; it calls

@@ -104,7 +104,7 @@ class ActivationBox:
 
     @cached_property
     def _overshoots(self) -> bool:
-        """Whether rounding carries some low + width past its bound, where 1 would then lie."""
+        """True if rounding carries some low + width past its bound, where 1 would then lie."""
         return bool((self.low + self.widths > self.high).any())
 
     def from_free_cube(self, cube: Array) -> Array:

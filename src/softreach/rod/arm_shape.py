@@ -87,7 +87,7 @@ def bundle_curves(arm: Manipulator, configuration: xr.Dataset) -> Array:
 def bundle_skins(
     arm: Manipulator, configuration: xr.Dataset, *, lift: float = 0.0, step: float = np.pi / 32
 ) -> list[Surface]:
-    """What shows every bundle, where it acts: a band, a thin tube for a line, a tube for a lumen.
+    """Surfaces of all bundles where they act: bands, thin tubes for lines, tubes for lumens.
 
     Args:
         arm: The design; band j covers a_j - σ_j/2 to a_j + σ_j/2 on the outside of its ring.

@@ -154,7 +154,7 @@ class FreeRod(ArmRod):
 
 
 class LinearStrains(NamedTuple):
-    """What is linear in the activations, (n, station) of each."""
+    """Strains that are linear in the activations, (n, station) of each."""
 
     curvature: Array
     """Uγ [1/m] in the directors, per length of η."""

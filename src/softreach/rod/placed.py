@@ -49,7 +49,7 @@ class PlacedRod(TipMap):
 
     @property
     def supports_unstable(self) -> bool:
-        """Whether a tip can have another status than stable."""
+        """True if a tip can have another status than stable."""
         return self.rod.supports_unstable
 
     @property

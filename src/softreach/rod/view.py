@@ -92,7 +92,7 @@ class View(TipMap):
     free: tuple[int, ...]
     """The bundles of the base that x has; the others are fixed at their lower bounds."""
     only_stable: bool = False
-    """Whether unstable equilibria count as none."""
+    """True if unstable equilibria count as none."""
     arm: Manipulator = field(init=False, compare=False)
     tol: float = field(init=False, compare=False)
 
@@ -112,7 +112,7 @@ class View(TipMap):
 
     @property
     def supports_unstable(self) -> bool:
-        """Whether a tip can have another status than stable."""
+        """True if a tip can have another status than stable."""
         return self.base.supports_unstable
 
     @cached_property
@@ -135,7 +135,7 @@ class View(TipMap):
 
     @cached_property
     def _is_plain(self) -> bool:
-        """Whether x are the activations of the base."""
+        """True if x are the activations of the base."""
         return len(self.free) == len(self.scale) and all(one == 1.0 for one in self.scale)
 
     def activations(self, x: Array) -> Array:

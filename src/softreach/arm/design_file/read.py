@@ -69,7 +69,7 @@ def text_of(path: str | PathLike[str]) -> str:
 
 
 def is_design(path: str | PathLike[str]) -> bool:
-    """Whether a file has the tables of a design and no others, whatever is in them."""
+    """True if a file has the tables of a design and no others, whatever is in them."""
     try:
         tables = set(document_of(text_of(path), ""))
     except SoftreachError:

@@ -28,7 +28,7 @@ class Running(NamedTuple):
     """Searches side by side, and the step each takes next."""
 
     row: np.ndarray
-    """Which search it is, shape (n,), int64."""
+    """Number of the search, shape (n,), int64."""
     steps: np.ndarray
     """Steps it has taken, shape (n,), int64."""
     damping: np.ndarray
@@ -42,9 +42,9 @@ class Running(NamedTuple):
     softness: np.ndarray
     """Damping times that mean square [m²], shape (n,)."""
     low: np.ndarray
-    """How far the lower bounds are, in ranges, shape (n, m)."""
+    """Signed distances to the lower bounds, in ranges, shape (n, m)."""
     high: np.ndarray
-    """How far the upper bounds are, shape (n, m)."""
+    """Distances to the upper bounds, in ranges, shape (n, m)."""
     trial: np.ndarray
     """Activations to evaluate next [-], shape (n, m)."""
 
@@ -120,7 +120,7 @@ def judge(running, n, tips, ahead, targets, found, enough, low, high, scales):  
 
 @kernel
 def next_trials(running, n, step, multiplier, gamma, low, high, scales):
-    """Where the steps of the first n lead, and what the linear map leaves there.
+    """Ends of the steps of the first n, and what the linear map leaves there.
 
     Args:
         running: The searches.

@@ -1,4 +1,4 @@
-"""Which cells of the activation box may come near a target."""
+"""Cells of the activation box that may come near a target."""
 
 from __future__ import annotations
 

@@ -99,7 +99,7 @@ def _find_starts(
 
 @inline
 def _attempts(even, found):
-    """How many searches to begin in a tetrahedron: one, or also on either side of a fold."""
+    """Number of searches to begin in a tetrahedron: one, or also on either side of a fold."""
     if found >= MOST_STARTS:
         return 0
     return 1 if even or found >= _MANY else 3
@@ -107,7 +107,7 @@ def _attempts(even, found):
 
 @inline
 def _search(q, weights, even, remainder):
-    """Whether a search reaches the target, where it ends, and the determinant there."""
+    """Outcome of a search: true if it reaches the target, its end, and the determinant there."""
     reached, weights, det = refine(q, weights, remainder)
     if reached and even:
         reached = is_inside(q, weights, det, _MARGIN * remainder)
@@ -182,7 +182,7 @@ def _linear_weights(tip, v, p):
 
 @inline
 def _is_new(mesh, c, guess, det, start, side, begin, end):
-    """Whether no start of the target is so near, on one side of a fold, that both lead to one."""
+    """True if no start of the target is so near, on one side of a fold, that both lead to one."""
     gamma, first, last = mesh.gamma, mesh.corner[c, 0], mesh.corner[c, 7]
     for i in range(begin, end):
         apart = 0.0

@@ -23,16 +23,16 @@ class SpaceTree(NamedTuple):
     child: np.ndarray
     """First child of each node, 0 for a leaf."""
     first: np.ndarray
-    """Where a leaf's tetrahedra begin in `item`."""
+    """Beginning of a leaf's tetrahedra in `item`."""
     length: np.ndarray
-    """How many there are."""
+    """Number of its tetrahedra."""
     item: np.ndarray
     """Tetrahedra, leaf after leaf."""
 
 
 @inline
 def may_meet(planes, k, p, half):
-    """Whether a box round p, of half-sizes, meets tetrahedron k as far as its face planes tell."""
+    """True if a box round p, of half-sizes, meets tetrahedron k as far as its face planes tell."""
     for i in range(4):
         a, b, c = planes[k, i, 0], planes[k, i, 1], planes[k, i, 2]
         reach = abs(a) * half[0] + abs(b) * half[1] + abs(c) * half[2]
@@ -77,7 +77,7 @@ def listed(tree, p, begin, end, held):
 
 @inline
 def _is_beyond(planes, k, i, p):
-    """Whether p lies on the inner side of face i of tetrahedron k."""
+    """True if p lies on the inner side of face i of tetrahedron k."""
     inward = planes[k, i, 0] * p[0] + planes[k, i, 1] * p[1] + planes[k, i, 2] * p[2]
     return inward >= planes[k, i, 3]
 
@@ -113,7 +113,7 @@ def sort_into_children(planes, boxes, centers, half, first, count, item, counts,
 
 @inline
 def _boxes_meet(boxes, k, p, half):
-    """Whether the box of tetrahedron k meets the cube round p."""
+    """True if the box of tetrahedron k meets the cube round p."""
     for axis in range(3):
         if p[axis] + half < boxes[k, 0, axis] or p[axis] - half > boxes[k, 1, axis]:
             return False

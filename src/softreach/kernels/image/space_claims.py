@@ -1,4 +1,4 @@
-"""Which of many points is nearest to each center of a lattice, among those in the cubes around."""
+"""Nearest of many points to each center of a lattice, among those in the cubes around."""
 
 from __future__ import annotations
 

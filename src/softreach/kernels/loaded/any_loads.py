@@ -124,7 +124,7 @@ _chord_all = chord_with(_missing, _move)
 
 @inline
 def _aim(w, work, axes):
-    """What the base must see, in the frame of the walk, theory (65)."""
+    """Directions that the base must see, in the frame of the walk, theory (65)."""
     for i in range(LANES):
         q = turn_at(work, TURN, i)
         put(w, TARGET, i, turned(q, (axes[0, 0], axes[0, 1], axes[0, 2])))

@@ -142,7 +142,7 @@ def _step_column(w, c, change):
 
 @inline
 def _drive(w, lanes, rest, bends, change, j):
-    """How an activation turns the unloaded arm over a step: δω̂ of theory (73) at its five nodes.
+    """Turn of the unloaded arm over a step by an activation: δω̂ of theory (73) at its five nodes.
 
     Args:
         w: Workspace.

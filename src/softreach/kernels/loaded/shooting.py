@@ -59,7 +59,7 @@ def _unit(v):
 
 @inline
 def _missing(w, i):
-    """What is missing at the base, in the plane normal to G(0), which steps do not keep at 1."""
+    """Residual at the base, in the plane normal to G(0), whose size steps do not keep at 1."""
     g, t = get(w, X, i), get(w, TARGET, i)
     return minus(t, times(dot(g, t) / dot(g, g), g))
 
@@ -110,7 +110,7 @@ _chord_all = chord_with(_missing, _move)
 
 @inline
 def _aim(w, work, gravity):
-    """What the base must see, in the frame of the walk, theory (65)."""
+    """Directions that the base must see, in the frame of the walk, theory (65)."""
     for i in range(LANES):
         q = turn_at(work, TURN, i)
         put(w, TARGET, i, turned(q, (gravity[0], gravity[1], gravity[2])))

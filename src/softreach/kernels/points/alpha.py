@@ -117,7 +117,7 @@ def boundary_faces(cells, neighbors, kept, faces):
 
 @strict
 def is_boundary(neighbors, kept, t, i):
-    """Whether cell t is kept and its neighbor i is not."""
+    """True if cell t is kept and its neighbor i is not."""
     return kept[t] and (neighbors[t, i] < 0 or not kept[neighbors[t, i]])
 
 

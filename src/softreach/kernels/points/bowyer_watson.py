@@ -150,7 +150,7 @@ def first_cell(points, mesh, start, w):
 
 @strict
 def equal(points, a, b):
-    """Whether two points are the same."""
+    """True if two points are the same."""
     return (
         points[a, 0] == points[b, 0]
         and points[a, 1] == points[b, 1]

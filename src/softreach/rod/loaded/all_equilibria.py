@@ -75,7 +75,7 @@ class AllEquilibria:
     """The one that follows continuously from the unloaded arm, which is that of the tip map; None
     where that branch has ended."""
     complete: bool
-    """Whether the degree is 1, and the branch is among them: nothing says that one is missing."""
+    """True if the degree is 1, and the branch is among them: nothing says that one is missing."""
 
     @property
     def degree(self) -> int:

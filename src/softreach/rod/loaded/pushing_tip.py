@@ -87,7 +87,7 @@ class PushingTip:
         return TipResponse(found.tips[0], slopes[0], retreat, known)
 
     def is_stable(self, gamma: Array, force: float, response: TipResponse) -> bool:
-        """Whether this equilibrium is stable; in doubt steps half as long decide."""
+        """True if this equilibrium is stable; in doubt steps half as long decide."""
         if abs(response.margin) > _DOUBTFUL:
             return response.margin > 0
         fine = self._solver(force, 2 * self.steps).near(gamma[None], response.equilibrium)
@@ -99,7 +99,7 @@ class PushingTip:
         return float(np.linalg.norm(fine.tips[0] - response.tip))
 
     def settles(self, gamma: Array, force: float, response: TipResponse) -> bool:
-        """Whether the arm that is activated first and loaded slowly then ends there."""
+        """True if the arm that is activated first and loaded slowly then ends there."""
         branch = self._solver(force, self.steps).find(gamma[None])
         apart = float(np.linalg.norm(branch.tips[0] - response.tip))
         return apart <= self.rod.tol * self.rod.length

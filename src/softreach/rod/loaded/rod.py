@@ -60,7 +60,7 @@ class LoadedRod(ArmRod):
 
     @property
     def supports_unstable(self) -> bool:
-        """Whether a tip can have another status than stable."""
+        """True if a tip can have another status than stable."""
         return True
 
     @cached_property

@@ -103,7 +103,7 @@ class LoadTables:
 
     @cached_property
     def one_direction(self) -> bool:
-        """Whether all forces are dead and along the first axis, so that two unknowns are enough."""
+        """True if all forces are dead and along the first axis, so that two unknowns are enough."""
         loads = self.loads
         dead = [self._at_tip, loads.gravity, loads.force_per_length]
         dead += [one.force for one in loads.point_loads]
@@ -279,7 +279,7 @@ class TipForceTables(LoadTables):
 
     @cached_property
     def one_direction(self) -> bool:
-        """Whether all forces, this one included, are dead and along the first axis."""
+        """True if all forces, this one included, are dead and along the first axis."""
         if self.origin is not None:
             return self.origin.one_direction
         along = np.abs(self.axes[1:] @ self.direction).max() <= 1e-14
