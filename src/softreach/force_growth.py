@@ -195,19 +195,21 @@ class Growth:
         ends = [*zip(np.minimum(lowest, 0.0), np.maximum(highest, 0.0), strict=True), (0.0, most)]
         goal = np.zeros(box.bundles + 1)
         goal[-1] = -1.0
-        found = linprog(goal, A_eq=columns, b_eq=np.zeros(3), bounds=ends, method="highs-ds")
-        if found.x is None:
-            found = linprog(goal, A_eq=columns, b_eq=np.zeros(3), bounds=ends, method="highs-ipm")
-        if found.x is None:
+        solution = linprog(goal, A_eq=columns, b_eq=np.zeros(3), bounds=ends, method="highs-ds")
+        if solution.x is None:
+            solution = linprog(
+                goal, A_eq=columns, b_eq=np.zeros(3), bounds=ends, method="highs-ipm"
+            )
+        if solution.x is None:
             return _Program(np.zeros(box.bundles), 0.0, 0.0, np.zeros(box.bundles), np.nan)
-        change = reach * found.x
-        price = found.lower.marginals + found.upper.marginals
+        change = reach * solution.x
+        price = solution.lower.marginals + solution.upper.marginals
         return _Program(
             change[:-1] * box.scales,
             float(change[-1]) * self.unit,
-            float(found.x[-1]),
+            float(solution.x[-1]),
             price[:-1],
-            float(np.linalg.norm(found.eqlin.marginals)) * self.unit / length,
+            float(np.linalg.norm(solution.eqlin.marginals)) * self.unit / length,
         )
 
     def _columns(self, response: TipResponse, unit: float) -> Array:
@@ -259,8 +261,8 @@ class Growth:
         high = np.append((box.high - gamma) / box.scales, np.inf)
         step, open_ = np.zeros(len(low)), np.append(moves, True)
         for _ in range(len(low)):
-            rest = missing - columns[:, ~open_] @ step[~open_]
-            step[open_] = np.linalg.lstsq(columns[:, open_], rest, rcond=1e-12)[0]
+            left = missing - columns[:, ~open_] @ step[~open_]
+            step[open_] = np.linalg.lstsq(columns[:, open_], left, rcond=1e-12)[0]
             over = open_ & ((step < low) | (step > high))
             if not over.any():
                 break
@@ -280,7 +282,7 @@ class Growth:
             )
         )
         gradient = np.append(np.zeros(box.bundles), -1.0)
-        found: Any = minimize(
+        solution: Any = minimize(
             lambda x: -x[-1],
             x,
             jac=lambda x: gradient,
@@ -293,8 +295,10 @@ class Growth:
             },
             options={"ftol": 1e-10, "maxiter": 25},
         )
-        gamma = box.clip(box.low + found.x[:-1] * box.scales)
-        better = self._corrected(gamma, float(found.x[-1]) * self.unit, self.unit, fixed.response)
+        gamma = box.clip(box.low + solution.x[:-1] * box.scales)
+        better = self._corrected(
+            gamma, float(solution.x[-1]) * self.unit, self.unit, fixed.response
+        )
         if better is None or better.force < fixed.force:
             return fixed
         return better if self._is_stable(better) else fixed

@@ -50,13 +50,13 @@ def rest(arm: Manipulator, *, tol: float = 1e-6) -> Rest:
     # Nothing but rest is asked for, and the steps need suit no other activation.
     held = arm.with_bounds(np.stack([activation, activation], axis=1)) if arm.bundles else arm
     rod = LoadedRod(held, tol)
-    found = rod.equilibria(activation[None])
+    equilibria = rod.equilibria(activation[None])
     free = FreeRod(held.replace(loads=None), tol).tips(activation[None])[0]
-    sag = float(np.linalg.norm(found.tips[0] - free))
+    sag = float(np.linalg.norm(equilibria.tips[0] - free))
     return Rest(
         activation=activation,
-        tip=arm.base.to_world(found.tips[0]),
+        tip=arm.base.to_world(equilibria.tips[0]),
         sag=sag,
         sag_over_length=sag / arm.length,
-        status=TipStatus(int(found.status[0])),
+        status=TipStatus(int(equilibria.status[0])),
     )

@@ -150,11 +150,11 @@ def check_cloud(cloud: xr.Dataset) -> xr.Dataset:
         raise InvalidInput("cloud", as_given(cloud), "a cloud: a dataset from compute_cloud")
     for name, (dims, _, _) in _CLOUD.items():
         if name not in cloud or cloud[name].dims != dims:
-            found = cloud[name].dims if name in cloud else "missing"
-            raise InvalidInput(f"cloud.{name}", found, f"a variable over {dims}")
-    found = cloud.attrs.get("schema_version")
-    if found != SCHEMA_VERSION:
-        raise InvalidInput("cloud.attrs['schema_version']", found, str(SCHEMA_VERSION))
+            actual = cloud[name].dims if name in cloud else "missing"
+            raise InvalidInput(f"cloud.{name}", actual, f"a variable over {dims}")
+    version = cloud.attrs.get("schema_version")
+    if version != SCHEMA_VERSION:
+        raise InvalidInput("cloud.attrs['schema_version']", version, str(SCHEMA_VERSION))
     return cloud
 
 
@@ -207,12 +207,12 @@ def _disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[InvalidInput
     seed = cloud.attrs.get("seed", 0)  # a cloud of another program has none
     if not isinstance(seed, int) or isinstance(seed, bool):
         yield InvalidInput("cloud.attrs['seed']", repr(seed), "a whole number")
-    found = {
+    pairs = {
         "axis": (cloud.get("axis"), AXES),
         "bundle": (cloud.get("bundle"), arm.bundle_names),
         "unit": (cloud.get("unit"), arm.bundle_units),
     }
-    for name, (labels, wanted) in found.items():
+    for name, (labels, wanted) in pairs.items():
         if labels is not None and tuple(map(str, labels.values)) != tuple(wanted):
             shown = ", ".join(map(str, labels.values))
             yield InvalidInput(f"cloud.{name}", shown, f"{', '.join(wanted)}, as its design says")
@@ -232,8 +232,8 @@ def _disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[InvalidInput
 def _pose_disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[InvalidInput]:
     """A pose of the base that is not that of the design; clouds made before poses have none."""
     for name, wanted in _pose(arm).items():
-        found = as_numbers(cloud.attrs.get(name, wanted))
-        if found.shape != (len(wanted),) or not np.allclose(found, wanted):
+        values = as_numbers(cloud.attrs.get(name, wanted))
+        if values.shape != (len(wanted),) or not np.allclose(values, wanted):
             shown = as_given(cloud.attrs[name])
             yield InvalidInput(f"cloud.attrs['{name}']", shown, f"{wanted}, as its design says")
 

@@ -68,11 +68,11 @@ def reach(prepared: PreparedMap, request: Request, start: Array) -> Reached:
         if not len(left):
             break
         for rows in np.array_split(left, 1 + len(left) * effort.neighbors // 100_000):
-            owner, found = _searched(prepared, request.of(rows), effort, anywhere)
-            best = first_of_each(owner, found.residual, len(rows))
-            better = found.residual[best] < residual[rows]
-            gamma[rows[better]] = found.gamma[best[better]]
-            residual[rows[better]] = found.residual[best[better]]
+            owner, ends = _searched(prepared, request.of(rows), effort, anywhere)
+            best = first_of_each(owner, ends.residual, len(rows))
+            better = ends.residual[best] < residual[rows]
+            gamma[rows[better]] = ends.gamma[best[better]]
+            residual[rows[better]] = ends.residual[best[better]]
     return Reached(gamma, residual)
 
 

@@ -170,7 +170,7 @@ def least_of_cells(
     spent = np.zeros(count, np.int64)
     while len(cells.owner):
         owner = cells.owner
-        found = np.concatenate(
+        bounds = np.concatenate(
             [
                 bound(part, linearized(rod, half, part.center))
                 for first in range(0, len(owner), _BLOCK)
@@ -178,10 +178,10 @@ def least_of_cells(
             ]
         )
         spent += np.bincount(owner, minlength=count)
-        open_cells = found < enough[owner]
+        open_cells = bounds < enough[owner]
         left = np.bincount(owner[open_cells], minlength=count)
         hopeless = open_cells & (spent + 2 * left > most)[owner]
-        np.minimum.at(least, owner[hopeless], found[hopeless])
+        np.minimum.at(least, owner[hopeless], bounds[hopeless])
         half, cells = _halved(rod, half, rows(cells, open_cells & ~hopeless))
     return least
 
@@ -255,8 +255,8 @@ def _least_of_block(
     cells = Cells(owner, coarse.center[np.concatenate(rows)])
 
     def bound(part: Cells, at: Linearized) -> Array:
-        one = part.owner
-        return _of_cells(targets[one], near[one], enough[one], part.center, at)
+        owner = part.owner
+        return _of_cells(targets[owner], near[owner], enough[owner], part.center, at)
 
     return least_of_cells(rod, coarse.half, cells, enough, bound, _MOST_LEAST_CELLS)
 
@@ -271,6 +271,6 @@ def _within(coarse: CoarseCells, target: Array, near: Array, change: float) -> I
 def _of_cells(targets: Array, near: Array, enough: Array, center: Array, at: Linearized) -> Array:
     """The bound for each cell, `enough` at most, shape (n,)."""
     wanted = targets - at.tips + np.einsum("nij,nj->ni", at.slopes, center)
-    low, high, found = center - at.half, center + at.half, np.empty(len(center))
-    dual.change_bounds(near, at.slopes, wanted, at.errors, low, high, enough, found)
-    return found
+    low, high, bounds = center - at.half, center + at.half, np.empty(len(center))
+    dual.change_bounds(near, at.slopes, wanted, at.errors, low, high, enough, bounds)
+    return bounds

@@ -184,8 +184,8 @@ def _closed_form(slope: Array) -> tuple[Array, Array]:
 def _from_starts(rod: TipMap, request: Request, owner: Index, start: Array) -> Roots:
     """Roots from starts."""
     gamma = affine_invariant_newton(rod, request.targets[owner], start, request.residual)
-    found = roots_at(rod, request.targets, owner, gamma)
-    return rows(found, found.residual <= request.residual)
+    roots = roots_at(rod, request.targets, owner, gamma)
+    return rows(roots, roots.residual <= request.residual)
 
 
 class _Valley(NamedTuple):

@@ -72,10 +72,10 @@ def seeds(rod: TipMap) -> Seeds:
         gamma = box.from_cube(np.array(sample_cube("grid", int(_MOST ** (1 / m)) ** m, m)))
     else:
         gamma = box.from_cube(np.array(sample_cube("sobol", _SOBOL, m)))
-    found = _with_tips(rod, gamma)
-    if not len(found.gamma):
+    samples = _with_tips(rod, gamma)
+    if not len(samples.gamma):
         raise no_stable_equilibrium(len(gamma))
-    return found
+    return samples
 
 
 def face_seeds(rod: TipMap) -> Seeds:

@@ -81,8 +81,8 @@ class Solution:
             near = f"nearest point {self.gap:.3g} m away"
             return f"<Solution for ({place}) m: {outcome}, {near}{unstable}>"
         count, worst = counted(len(self), "activation"), self.residuals.max()
-        found = f"{count}, largest residual {worst:.1e} m"
-        return f"<Solution for ({place}) m: {outcome}, {found}{unstable}>"
+        summary = f"{count}, largest residual {worst:.1e} m"
+        return f"<Solution for ({place}) m: {outcome}, {summary}{unstable}>"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -49,8 +49,8 @@ def sqp(
         Activations [-], shape (n, m), and their |tip - target| [m], shape (n,).
     """
     state = _searched(rod, request, start, penalty, settled, most)
-    found = descend(rod, request.targets, state.gamma, request.residual, most=20)
-    return found.gamma, found.residual
+    ends = descend(rod, request.targets, state.gamma, request.residual, most=20)
+    return ends.gamma, ends.residual
 
 
 def survey(rod: TipMap, request: Request, start: Array, most: int) -> tuple[Array, Array]:
@@ -98,8 +98,8 @@ def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Arr
         error = (linearized(rod, gamma[rows])[0] - part.targets) / rod.length
         multiplier[rows] += penalty * error  # theory (40)
         residual[rows] = np.linalg.norm(error, axis=1) * rod.length
-    found = descend(rod, request.targets, gamma, request.residual)
-    return found.gamma, found.residual
+    ends = descend(rod, request.targets, gamma, request.residual)
+    return ends.gamma, ends.residual
 
 
 class _State(NamedTuple):

@@ -61,10 +61,10 @@ def starts_from_cells(
     low, high, out = box.low.copy(), box.high.copy(), Starts.empty(_ROOM)
     first = 0
     while first < len(chosen):
-        done, found = candidates.find_starts(
+        done, count = candidates.find_starts(
             prepared.mesh, prepared.tree, targets[first:], low, high, with_root, *out
         )
-        part = rows(out, np.arange(found))
+        part = rows(out, np.arange(count))
         parts.append(part._replace(target=chosen[part.target + first]))
         first += done
     return joined(parts)

@@ -38,8 +38,8 @@ def twin_hints(
     """
     rod, places = tip_map(arm, tol), as_targets("targets", targets)
     twins = _twins(rod, places)
-    found = solve_inverse(rod, np.concatenate(list(twins.values())))
-    reached = (found.statuses == Status.REACHED).reshape(len(twins), len(places))
+    solutions = solve_inverse(rod, np.concatenate(list(twins.values())))
+    reached = (solutions.statuses == Status.REACHED).reshape(len(twins), len(places))
     words = list(twins)
     return tuple(words[int(each.argmax())] if each.any() else "" for each in reached.T)
 

@@ -115,10 +115,10 @@ class _Cache(FunctionCache):
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled code, or None if there is none that can be read."""
         try:
-            found = super().load_overload(sig, target_context)
-            if found is not None and found.signature.args != getattr(sig, "args", sig):
-                raise TypeError(f"compiled for {found.signature.args}")
-            return found
+            overload = super().load_overload(sig, target_context)
+            if overload is not None and overload.signature.args != getattr(sig, "args", sig):
+                raise TypeError(f"compiled for {overload.signature.args}")
+            return overload
         except Exception as error:  # unpickling raises whatever it likes
             _LOG.info("cache of %r discarded: %s: %s", self, type(error).__name__, error)
             self._attempt(self.flush)

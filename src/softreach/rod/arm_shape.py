@@ -128,8 +128,8 @@ def _drawn_line(arm: Manipulator, configuration: xr.Dataset) -> Centerline:
 def _line(configuration: xr.Dataset) -> Centerline:
     if not (least := float(configuration["extension"].min())) > 0.0:
         hint = "ask for the configuration of activations within the bounds of the design"
-        found = f"with extension ζ = {least:.4g}"
-        raise InvalidInput("configuration", found, "of an arm that has a length, ζ > 0", hint)
+        extension = f"with extension ζ = {least:.4g}"
+        raise InvalidInput("configuration", extension, "of an arm that has a length, ζ > 0", hint)
     if "sample" in configuration.dims:
         count = configuration.sizes["sample"]
         hint = "choose one with configuration.isel(sample=0)"

@@ -153,11 +153,11 @@ class StepRule:
         steps, pilot = self._fewest_steps(turn), self.pilot
         while steps <= _MOST_STEPS:
             difference = halving(steps)
-            found = difference(pilot)
-            error = float(found.max())
+            errors = difference(pilot)
+            error = float(errors.max())
             if error <= allowed:
-                worse, found = worsened(difference, pilot, found, self.box)
-                error = float(found.max())
+                worse, errors = worsened(difference, pilot, errors, self.box)
+                error = float(errors.max())
                 if error <= allowed:
                     return steps
                 pilot = np.concatenate([pilot, worse])
@@ -298,21 +298,21 @@ def _stations(arm: Manipulator) -> Array:
 
 
 def worsened(
-    error: Callable[[Array], Array], pilot: Array, found: Array, box: ActivationBox
+    error: Callable[[Array], Array], pilot: Array, known: Array, box: ActivationBox
 ) -> tuple[Array, Array]:
     """Activations of larger error, by moving one bundle to a bound at a time, from the worst.
 
     Args:
         error: Errors of activations (n, bundles), shape (n,).
         pilot: Where to begin, shape (n, bundles).
-        found: Their errors, shape (n,).
+        known: Their errors, shape (n,).
         box: The bounds.
 
     Returns:
         Where the searches ended, shape (at most 8, bundles), and the errors there.
     """
-    chosen = np.argsort(-found, kind="stable")[:_SEARCHED]
-    gamma, worst = pilot[chosen].copy(), found[chosen].copy()
+    chosen = np.argsort(-known, kind="stable")[:_SEARCHED]
+    gamma, worst = pilot[chosen].copy(), known[chosen].copy()
     free, rows = box.free, np.arange(len(chosen))
     for _ in range(_ROUNDS if len(free) else 0):
         moved = np.repeat(gamma[:, None], 2 * len(free), axis=1)

@@ -136,7 +136,7 @@ class View(TipMap):
     @cached_property
     def _is_plain(self) -> bool:
         """True if x are the activations of the base."""
-        return len(self.free) == len(self.scale) and all(one == 1.0 for one in self.scale)
+        return len(self.free) == len(self.scale) and all(factor == 1.0 for factor in self.scale)
 
     def activations(self, x: Array) -> Array:
         """Activations of the base, (n, its bundles), at checked x (n, bundles)."""
@@ -234,9 +234,9 @@ class View(TipMap):
             gamma = self.activations(self.box.check(activations))
             if self.only_stable and status is None:
                 status = np.empty(len(gamma), np.int8)
-            found = of_base(gamma, status)
-            self._drop(status, *found)
-            return found
+            strain = of_base(gamma, status)
+            self._drop(status, *strain)
+            return strain
 
         return strains
 

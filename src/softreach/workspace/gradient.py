@@ -227,8 +227,8 @@ class _Base:
         volume = _swept(self._flux, shifts, rods)
         convex = _limit({n: _dragged(each, shifts, rods) for n, each in self._corners.items()})
         if self._solid.route == "raster":
-            rest, _ = self._by_raster(parameter)
-            volume = Estimate(volume.value + rest.value, volume.error + rest.error)
+            beyond, _ = self._by_raster(parameter)
+            volume = Estimate(volume.value + beyond.value, volume.error + beyond.error)
         return volume, convex
 
     def _by_raster(self, parameter: Parameter) -> tuple[Estimate, Estimate]:

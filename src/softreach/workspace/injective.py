@@ -251,8 +251,8 @@ def _parted(patches: _Patches, a: Index, b: Index, bend: Array) -> Mask:
     Tried are planes along either of them, and across the line between their centers.
     """
     sides = patches.slopes * patches.half[:, None, :]  # of parallelograms, halved
-    rest = 0.5 * np.einsum("ij,jk,ik->i", patches.half, bend, patches.half)
-    radius = np.linalg.norm(sides, axis=1).sum(axis=1) + rest
+    bulge = 0.5 * np.einsum("ij,jk,ik->i", patches.half, bend, patches.half)
+    radius = np.linalg.norm(sides, axis=1).sum(axis=1) + bulge
     between = patches.tips[b] - patches.tips[a]
     mask = np.linalg.norm(between, axis=1) > radius[a] + radius[b]
     normal = _normals(patches)
@@ -260,7 +260,7 @@ def _parted(patches: _Patches, a: Index, b: Index, bend: Array) -> Mask:
     for direction, tilted in ((between, (a, b)), (normal[a], (b,)), (normal[b], (a,))):
         left = np.flatnonzero(~mask)
         unit = direction[left] / np.linalg.norm(direction[left], axis=1).clip(1e-300)[:, None]
-        reach = rest[a[left]] + rest[b[left]]
+        reach = bulge[a[left]] + bulge[b[left]]
         for each in tilted:
             reach += np.abs(unit[:, None, :] @ sides[each[left]]).sum(axis=(1, 2))
         mask[left] = np.abs((unit * between[left]).sum(axis=1)) > reach

@@ -42,9 +42,9 @@ def solid_volume(rod: TipMap, fine: Image, coarse: Image) -> Estimate:
     signed = signed_volume(rod, _NODES)
     sense = 1 if signed.value >= 0 else -1
     at_fine, at_coarse = _correction(fine, sense), _correction(coarse, sense)
-    rest = extrapolated(at_fine, at_coarse)
-    removed = abs(rest.value - at_fine.value)
-    return Estimate(abs(signed.value) + rest.value, signed.error + removed + at_fine.error)
+    beyond = extrapolated(at_fine, at_coarse)
+    removed = abs(beyond.value - at_fine.value)
+    return Estimate(abs(signed.value) + beyond.value, signed.error + removed + at_fine.error)
 
 
 def partial_volume(fine: Image, common: Image, coarse: Image, remainder: float) -> Estimate:

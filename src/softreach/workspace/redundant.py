@@ -232,8 +232,8 @@ def _convex_volume(points: Array, fewer: Array) -> Estimate:
 
     parallel.run([partial(measure, 0, points), partial(measure, 1, fewer)])
     value, rough = volumes.tolist()
-    rest = max(value - rough, 0.0) / 3.0
-    return Estimate(value + 0.5 * rest, rest)
+    missing = max(value - rough, 0.0) / 3.0
+    return Estimate(value + 0.5 * missing, missing)
 
 
 def _cloud(rod: TipMap, seed: int) -> tuple[Array, Array]:

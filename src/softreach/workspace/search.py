@@ -189,5 +189,5 @@ def _room(count: int, m: int) -> tuple[Running, Array]:
     """Place for as many searches side by side, and where their steps are centered."""
     integers = np.zeros(count, np.int64), np.zeros(count, np.int64)
     numbers = [np.zeros(shape) for shape in ((count,), (count,), (count, 3, m), (count, 3))]
-    rest = [np.zeros(shape) for shape in ((count,), (count, m), (count, m), (count, m))]
-    return Running(*integers, *numbers, *rest), np.zeros((count, m))
+    others = [np.zeros(shape) for shape in ((count,), (count, m), (count, m), (count, m))]
+    return Running(*integers, *numbers, *others), np.zeros((count, m))

@@ -108,8 +108,10 @@ class Tendon(PolarActuator):
 
     def breakpoints(self, profile: Profile) -> tuple[float, ...]:
         """Stations where it begins, ends, or its route is not smooth [m]."""
-        bent = [one for one in (self.distance, self.routing) if isinstance(one, AlongArm)]
-        breaks = [profile.length * x for one in bent for x in one.breaks]
+        bent = [
+            function for function in (self.distance, self.routing) if isinstance(function, AlongArm)
+        ]
+        breaks = [profile.length * x for function in bent for x in function.breaks]
         return (*super().breakpoints(profile), *breaks)
 
     def section_faults(self, profile: Profile, section: Section) -> list[Fault]:

@@ -50,7 +50,7 @@ class Running(NamedTuple):
 
 
 @kernel
-def judge(running, n, tips, ahead, targets, found, enough, low, high, scales):  # noqa: C901
+def judge(running, n, tips, ahead, targets, ends, enough, low, high, scales):  # noqa: C901
     """Take in the trials of the first n, and set up the next steps of those that go on.
 
     Args:
@@ -59,7 +59,7 @@ def judge(running, n, tips, ahead, targets, found, enough, low, high, scales):  
         tips: Of their trials [m], `NOWHERE` if they do not count, shape (n, 3).
         ahead: ∂r/∂γ of their trials [m], shape (n, 3, m).
         targets: Of all searches [m], shape (all, 3).
-        found: Best activations, their tips and distances of all searches.
+        ends: Best activations, their tips and distances of all searches.
         enough: Distance at which a search ends [m].
         low: Lower bounds, shape (m,).
         high: Upper bounds, shape (m,).
@@ -68,7 +68,7 @@ def judge(running, n, tips, ahead, targets, found, enough, low, high, scales):  
     Returns:
         How many go on.
     """
-    gamma, best, distance = found
+    gamma, best, distance = ends
     kept = 0
     for i in range(n):
         row, damping = running.row[i], running.damping[i]

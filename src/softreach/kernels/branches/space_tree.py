@@ -101,14 +101,14 @@ def sort_into_children(planes, boxes, centers, half, first, count, item, counts,
     for n in range(centers.shape[0]):
         for o in range(8):
             p = (centers[n, o, 0], centers[n, o, 1], centers[n, o, 2])
-            found = 0
+            size = 0
             for entry in range(first[n], first[n] + count[n]):
                 k = item[entry]
                 if _boxes_meet(boxes, k, p, half) and may_meet(planes, k, p, (half, half, half)):
                     if out.shape[0]:
-                        out[starts[n, o] + found] = k
-                    found += 1
-            counts[n, o] = found
+                        out[starts[n, o] + size] = k
+                    size += 1
+            counts[n, o] = size
 
 
 @inline

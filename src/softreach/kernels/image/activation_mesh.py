@@ -75,15 +75,15 @@ def interpolation_errors(gamma, tip, slope, corner, error, remainder):
     |f'''[e, e, e]|/12.
     """
     for c in range(corner.shape[0]):
-        worst, rest = 0.0, 0.0
+        worst, cubic = 0.0, 0.0
         for a, b in _EDGES:
             i, j = corner[c, a], corner[c, b]
             bend = _second_difference(gamma, slope, i, j)
             worst = max(worst, dot(bend, bend))
             twist = _cubic_difference(gamma, tip, slope, i, j)
-            rest = max(rest, dot(twist, twist))
+            cubic = max(cubic, dot(twist, twist))
         error[c] = _SHARE * math.sqrt(worst)
-        remainder[c] = _CUBIC_SHARE * math.sqrt(rest) + _QUARTIC_SHARE * error[c]
+        remainder[c] = _CUBIC_SHARE * math.sqrt(cubic) + _QUARTIC_SHARE * error[c]
 
 
 @kernel

@@ -149,17 +149,17 @@ def solve(gamma, gravity, tip, guesses, coarse, fine, limits, most, out):
     increment, widest, small, tiny = limits
     lanes = np.zeros((coarse[0].shape[2] - 1, LANES))
     work, w = np.zeros(REST_WORK), np.zeros(WHOLE)
-    rest = np.zeros((coarse[1].shape[0], STEP_ROWS * LANES))
+    unloaded = np.zeros((coarse[1].shape[0], STEP_ROWS * LANES))
     fine_rest = np.zeros((fine[1].shape[0], STEP_ROWS * LANES))
     for first in range(0, gamma.shape[0], LANES):
         count = min(LANES, gamma.shape[0] - first)
         load_all(lanes, gamma, first, count)
-        rest_frames(work, lanes, coarse[0], coarse[1], rest)
+        rest_frames(work, lanes, coarse[0], coarse[1], unloaded)
         _aim(w, work, gravity)
         _set_out(w, work, guesses, first, count, increment, widest)
         walks = 0
         while walks < most[0]:
-            walk_tangents(w, rest, coarse[2], tip)
+            walk_tangents(w, unloaded, coarse[2], tip)
             walks += 1
             if _advance_all(w, small, widest) == 0:
                 break
@@ -200,9 +200,9 @@ def base_directions(gamma, tip, directions, fine, out):
     """
     lanes = np.zeros((fine[0].shape[2] - 1, LANES))
     work, w = np.zeros(REST_WORK), np.zeros(WHOLE)
-    rest = np.zeros((fine[1].shape[0], STEP_ROWS * LANES))
+    unloaded = np.zeros((fine[1].shape[0], STEP_ROWS * LANES))
     load_all(lanes, gamma, 0, 1)
-    rest_frames(work, lanes, fine[0], fine[1], rest)
+    rest_frames(work, lanes, fine[0], fine[1], unloaded)
     for first in range(0, directions.shape[0], LANES):
         count = min(LANES, directions.shape[0] - first)
         for i in range(LANES):
@@ -210,7 +210,7 @@ def base_directions(gamma, tip, directions, fine, out):
             g = (directions[n, 0], directions[n, 1], directions[n, 2])
             put(w, TRIAL, i, turned(turn_at(work, TURN, i), g))
             w[LOAD + i] = 1.0
-        walk_tip(w, rest, fine[2], tip)
+        walk_tip(w, unloaded, fine[2], tip)
         for i in range(count):
             g = turned(back(turn_at(work, TURN, i)), get(w, X, i))
             for axis in range(3):

@@ -78,13 +78,13 @@ class PushingTip:
             force: With which the tip pushes [N].
             near: Where the search begins; None for the unloaded arm, by way of the whole load.
         """
-        solver, one = self._solver(force, self.steps), gamma[None]
-        known = solver.find(one) if near is None else solver.near(one, near.equilibrium)
-        found = solver.respond(one, compliance=True, known=known)
-        slopes = np.empty_like(found.twists[:, :3])
-        position_slopes(found.tips, found.twists, slopes)
-        retreat = found.compliance[0] @ self.direction
-        return TipResponse(found.tips[0], slopes[0], retreat, known)
+        solver, sample = self._solver(force, self.steps), gamma[None]
+        known = solver.find(sample) if near is None else solver.near(sample, near.equilibrium)
+        response = solver.respond(sample, compliance=True, known=known)
+        slopes = np.empty_like(response.twists[:, :3])
+        position_slopes(response.tips, response.twists, slopes)
+        retreat = response.compliance[0] @ self.direction
+        return TipResponse(response.tips[0], slopes[0], retreat, known)
 
     def is_stable(self, gamma: Array, force: float, response: TipResponse) -> bool:
         """True if this equilibrium is stable; in doubt steps half as long decide."""
