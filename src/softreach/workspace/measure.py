@@ -275,17 +275,8 @@ def length_sum(runs: Runs, spacing: int = 1, parity: int = 0) -> Array:
     return total
 
 
-class LineVolume(NamedTuple):
-    """A volume and its noise."""
-
-    value: float
-    """Volume [m³]."""
-    noise: float
-    """Error due to where the lines happen to lie [m³]."""
-
-
-def line_volume(crossings: Crossings) -> LineVolume:
-    """Volume from the lines along all three axes; each axis counts by the square of its lines.
+def line_volume(crossings: Crossings) -> Estimate:
+    """Volume from the lines along all three axes [m³]; each counts by the square of its lines.
 
     On average over where the lattice lies the sum of lengths is the volume, so that what it errs by
     is noise. Every other line along each axis, looked at on every other center, tells how much: the
@@ -296,7 +287,7 @@ def line_volume(crossings: Crossings) -> LineVolume:
     axes = [runs_along(crossings, axis) for axis in range(3)]
     lines = np.array([float(len(np.unique(runs.line))) for runs in axes])
     if not lines.all():
-        return LineVolume(0.0, np.inf)
+        return Estimate(0.0, np.inf)
     weights = lines**2 / (lines**2).sum()
     values = np.array([length_sum(runs).sum() for runs in axes])
     coarse = np.array([_sparse(runs) for runs in axes])  # (axis, 8)
@@ -304,7 +295,7 @@ def line_volume(crossings: Crossings) -> LineVolume:
     variances = np.mean((coarse - values[:, None]) ** 2, axis=1) / 4.0
     spread = float(weights @ (values - value) ** 2)
     noise = 2.0 * np.sqrt(float(weights**2 @ variances) + spread / 3.0)
-    return LineVolume(value * lattice.cell**3, float(noise) * lattice.cell**3)
+    return Estimate(value * lattice.cell**3, float(noise) * lattice.cell**3)
 
 
 def _sparse(runs: Runs) -> list[float]:

@@ -135,7 +135,7 @@ def _search(
     area = len(crossings.edges.cell) * edge**2 / 1.5  # a plane cuts 1.5 edges to a square of a cell
     slack = area * (ENOUGH * edge + rod.tol * rod.length)
     convex = _hull(crossings, tips[_not_among(flood, tips)])
-    noise = volume.noise if np.isfinite(volume.noise) else convex.value + convex.error
+    noise = volume.error if np.isfinite(volume.error) else convex.value + convex.error
     error = noise + missed + slack
     return Searched(cells, Estimate(volume.value, error), convex)
 
@@ -225,13 +225,8 @@ def _not_among(flood: Flood, tips: Array) -> Mask:
 
 def _convex_volume(points: Array, fewer: Array) -> Estimate:
     """Limit of the hulls of ever more boundary points, as far as two of them tell."""
-    volumes = np.empty(2)
-
-    def measure(place: int, some: Array) -> None:
-        volumes[place] = convex_hull(some).volume
-
-    parallel.run([partial(measure, 0, points), partial(measure, 1, fewer)])
-    value, rough = volumes.tolist()
+    hulls = parallel.in_order(partial(convex_hull, places) for places in (points, fewer))
+    value, rough = (hull.volume for hull in hulls)
     missing = max(value - rough, 0.0) / 3.0
     return Estimate(value + 0.5 * missing, missing)
 
