@@ -32,10 +32,9 @@ from softreach.rod.kinematics import configuration, shape_dataset, stations_alon
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import LoadTables
-from softreach.rod.placed import PlacedRod
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap, TipStatus, has_tip
-from softreach.rod.view import View
+from softreach.rod.view import PlacedRod, View
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput, warn
 
