@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.number import as_numbers, number
 from softreach.arm.part import Part
+from softreach.support.arrays import read_only
 from softreach.support.errors import Fault
 
 __all__ = ["POINTS", "UPRIGHT", "Base", "rotation_matrices"]
@@ -90,8 +91,7 @@ class Base(Part):
         if self.turn:
             c, s = np.cos(self.turn), np.sin(self.turn)
             turned = turned @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        turned.setflags(write=False)
-        return turned
+        return read_only(turned)
 
     @cached_property
     def is_identity(self) -> bool:

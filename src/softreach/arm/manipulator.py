@@ -29,7 +29,7 @@ from softreach.support.arguments import (
     as_text,
     plain,
 )
-from softreach.support.arrays import as_stations
+from softreach.support.arrays import as_stations, read_only
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
 from softreach.support.files.atomic import writing
 
@@ -259,11 +259,8 @@ class Manipulator:
     @cached_property
     def bounds(self) -> Array:
         """Lower and upper activation of each bundle [unit], shape (bundles, 2), read-only."""
-        bounds = np.concatenate(
-            [np.empty((0, 2)), *(actuator.bounds for actuator in self.actuators)]
-        )
-        bounds.setflags(write=False)
-        return bounds
+        bounds = (actuator.bounds for actuator in self.actuators)
+        return read_only(np.concatenate([np.empty((0, 2)), *bounds]))
 
     @cached_property
     def breakpoints(self) -> tuple[float, ...]:

@@ -44,7 +44,7 @@ from softreach.kernels.branches import folds, newton
 from softreach.kernels.branches.newton import CONVERGED, RUNNING, STAGNATED, Search
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
-from softreach.support.arrays import Array, Index, rows
+from softreach.support.arrays import Array, Index, joined_by, rows
 
 __all__ = ["distinct", "every_branch"]
 
@@ -83,7 +83,7 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
         parts = list(
             parallel.in_order(partial(_alone, prepared, request, chosen) for chosen in sets)
         )
-    return Roots.sorted_by_target(parts)
+    return joined_by("target", parts)
 
 
 def _sets(order: Index, size: int) -> list[Index]:
@@ -250,7 +250,7 @@ def _partner_starts(prepared: PreparedMap, roots: Roots) -> Starts:
         )
         roots, unknown = rows(roots, near), np.zeros((int(near.sum()), 3, 3))
         parts.append(Starts(roots.target, roots.cell, start[near], unknown))
-    return Starts.by_target(parts)
+    return joined_by("target", parts)
 
 
 def distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:

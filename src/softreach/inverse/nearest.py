@@ -33,8 +33,7 @@ def nearest(prepared: PreparedMap, request: Request, known: Roots | None = None)
         target = np.concatenate([target, known.target])
         start = np.concatenate([start, known.gamma])
     minima = local_minima(rod, request.of(target), start)
-    order = np.lexsort((minima.value, target))
-    best = order[np.searchsorted(target[order], np.arange(len(targets)))]
+    best = first_of_each(target, minima.value, len(targets))
     return _nearest_at(rod, targets, minima.gamma[best])
 
 

@@ -12,7 +12,7 @@ from softreach.inverse.request import Request
 from softreach.kernels.branches import newton
 from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
 from softreach.support import parallel
-from softreach.support.arrays import Array, Index, Mask, joined, rows
+from softreach.support.arrays import Array, Index, Mask, joined_by, rows
 
 _EFFORTS = ((500, 20, 0.1), (2000, 100, 0.08))
 """Seeds near the target, most starts from them, their least distance in ranges."""
@@ -44,13 +44,7 @@ class Roots(NamedTuple):
 
     def joined(self, other: Roots) -> Roots:
         """Both, sorted by target as each of them is."""
-        return Roots.sorted_by_target([self, other]) if len(other.target) else self
-
-    @staticmethod
-    def sorted_by_target(parts: list[Roots]) -> Roots:
-        """All of them, sorted by target."""
-        everything = joined(parts)
-        return rows(everything, np.argsort(everything.target, kind="stable"))
+        return joined_by("target", [self, other]) if len(other.target) else self
 
     def missing(self, targets: int, residual: float = np.inf) -> Index:
         """Numbers of the targets, of so many, that have no stable root within a residual [m]."""

@@ -9,7 +9,7 @@ import numpy as np
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.kernels.branches import candidates
-from softreach.support.arrays import Array, Index, joined, rows
+from softreach.support.arrays import Array, Index, joined, joined_by, rows
 
 __all__ = ["Starts", "spatial_order", "starts_from_cells", "with_torn_cells"]
 
@@ -35,12 +35,6 @@ class Starts(NamedTuple):
         """Space for so many."""
         target, cell = np.empty(room, np.int64), np.empty(room, np.int64)
         return Starts(target, cell, np.empty((room, 3)), np.empty((room, 3, 3)))
-
-    @staticmethod
-    def by_target(parts: list[Starts]) -> Starts:
-        """All of them, sorted by target."""
-        everything = joined(parts)
-        return rows(everything, np.argsort(everything.target, kind="stable"))
 
 
 def starts_from_cells(
@@ -74,7 +68,7 @@ def with_torn_cells(prepared: PreparedMap, request: Request, starts: Starts) -> 
     """The starts, and more from corners of cells that have no image."""
     target, gamma = prepared.torn_cells.starts(request.targets)
     nowhere, unknown = np.full(len(target), -1), np.zeros((len(target), 3, 3))
-    return Starts.by_target([starts, Starts(target, nowhere, gamma, unknown)])
+    return joined_by("target", [starts, Starts(target, nowhere, gamma, unknown)])
 
 
 def spatial_order(points: Array) -> Index:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.kernels.box.box_projection import project
-from softreach.support.arrays import as_rows
+from softreach.support.arrays import as_rows, read_only
 from softreach.support.errors import InvalidInput
 
 Array = NDArray[np.float64]
@@ -51,22 +51,22 @@ class ActivationBox:
     @cached_property
     def low(self) -> Array:
         """Lower bounds, shape (bundles,)."""
-        return _frozen(np.array([low for low, _ in self.bounds]))
+        return read_only(np.array([low for low, _ in self.bounds]))
 
     @cached_property
     def high(self) -> Array:
         """Upper bounds, shape (bundles,)."""
-        return _frozen(np.array([high for _, high in self.bounds]))
+        return read_only(np.array([high for _, high in self.bounds]))
 
     @cached_property
     def widths(self) -> Array:
         """Upper minus lower bounds, shape (bundles,)."""
-        return _frozen(self.high - self.low)
+        return read_only(self.high - self.low)
 
     @cached_property
     def scales(self) -> Array:
         """`widths`, with 1 for fixed bundles: the measure of changes of activation."""
-        return _frozen(np.where(self.widths > 0, self.widths, 1.0))
+        return read_only(np.where(self.widths > 0, self.widths, 1.0))
 
     @cached_property
     def is_free(self) -> NDArray[np.bool_]:
@@ -167,11 +167,6 @@ class ActivationBox:
         """All corners, shape (2^bundles, bundles), the last bundle varying fastest."""
         upper = np.indices((2,) * self.bundles).reshape(self.bundles, 2**self.bundles).T
         return np.where(upper, self.high, self.low)
-
-
-def _frozen(values: Array) -> Array:
-    values.setflags(write=False)
-    return values
 
 
 # The damped step toward a target that no activation takes beyond its bounds.

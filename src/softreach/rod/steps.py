@@ -21,6 +21,7 @@ from softreach.kernels.rod import tips as rod
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.tip_map import MOST_TURN_OF_STEP, check_tol
 from softreach.support import parallel
+from softreach.support.arrays import read_only
 from softreach.support.errors import InvalidInput
 
 Array = NDArray[np.float64]
@@ -99,7 +100,7 @@ class StepRule:
         return self._packed(self.edges(steps))
 
     def _packed(self, edges: Array) -> Array:
-        return _read_only(rod.pack(*self.nodes(edges)))
+        return read_only(rod.pack(*self.nodes(edges)))
 
     def _halves(self, steps: int) -> tuple[Array, Array]:
         """Packed tables of the steps, and of both halves of each."""
@@ -123,7 +124,7 @@ class StepRule:
     def packed_stations(self, stations: Array, steps: int) -> tuple[Array, NDArray[np.int64]]:
         """`station_nodes` as a packed table, read-only."""
         nodes, ends = self.station_nodes(stations, steps)
-        return _read_only(rod.pack(*nodes)), ends
+        return read_only(rod.pack(*nodes)), ends
 
     def steps_for(self, tol: float) -> int:
         """The number of uniform steps in S for which no tip is off by more than `tol`.
@@ -239,12 +240,6 @@ def edges_between(profile: Profile, marks: Array, steps: int) -> Array:
 def step_counts(profile: Profile, gaps: Array, steps: int) -> NDArray[np.int64]:
     """Steps in each gap of S; a gap that only rounding makes longer takes no more for it."""
     return np.ceil(gaps * (steps / profile.slender_length) - 1e-9).astype(np.int64)
-
-
-def _read_only(table: Array) -> Array:
-    """The same for all tables: kernels are compiled once more for those that can be written."""
-    table.setflags(write=False)
-    return table
 
 
 def pilot_activations(arm: Manipulator, box: ActivationBox) -> Array:

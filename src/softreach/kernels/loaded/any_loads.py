@@ -15,6 +15,7 @@ import numpy as np
 from softreach.kernels.branches.chord import by_inverse, chord_with, keep_inverse
 from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.lanes import copy, get, load_all, put, turn_at
+from softreach.kernels.loaded.direction_walk import unit
 from softreach.kernels.loaded.frame_step import COLUMN_ROWS, PLANE, SIZE, STATE, TARGET
 from softreach.kernels.loaded.frame_walk import TRACE, adjugate_rows, walk
 from softreach.kernels.loaded.load_continuation import (
@@ -80,9 +81,8 @@ def _newton(w, i):
 
 @inline
 def _orthonormal(g, h):
-    g = times(1.0 / math.sqrt(dot(g, g)), g)
-    h = minus(h, times(dot(g, h), g))
-    return g, times(1.0 / math.sqrt(dot(h, h)), h)
+    g = unit(g)
+    return g, unit(minus(h, times(dot(g, h), g)))
 
 
 @inline

@@ -13,7 +13,7 @@ from softreach.kernels.loaded.unloaded_frames import NODE_ROWS
 from softreach.kernels.rod.tips import LANES
 from softreach.kernels.vector import cross, dot, minus, times
 
-__all__ = ["PLANE", "SIZE", "A", "B", "X", "Y", "tangents", "walk_tangents", "walk_tip"]
+__all__ = ["PLANE", "SIZE", "A", "B", "X", "Y", "tangents", "unit", "walk_tangents", "walk_tip"]
 
 # Rows of the workspace, after those of the continuation.
 X = HEAD  # G, M as walked
@@ -39,16 +39,9 @@ def _put_six(w, at, i, v):
 @inline
 def _node(unloaded, scalars, n, i, share):
     at, weight = NODE_ROWS * n * LANES + i, scalars[n, 3] * share
+    growth, extension = unloaded[at], unloaded[at + 4 * LANES]
     d = (unloaded[at + LANES], unloaded[at + 2 * LANES], unloaded[at + 3 * LANES])
-    return (
-        unloaded[at],
-        unloaded[at + 4 * LANES],
-        d,
-        scalars[n, 0],
-        scalars[n, 1],
-        scalars[n, 2],
-        weight,
-    )
+    return growth, extension, d, scalars[n, 0], scalars[n, 1], scalars[n, 2], weight
 
 
 @inline
@@ -66,7 +59,8 @@ def _nodes(w, unloaded, scalars, i):
 
 
 @inline
-def _unit(v):
+def unit(v):
+    """v / |v|."""
     return times(1.0 / math.sqrt(dot(v, v)), v)
 
 
@@ -141,7 +135,7 @@ def _watch(w, i):
     """
     g, a, b = get(w, X, i), get(w, A, i), get(w, B, i)
     e = get(w, AXIS, i)
-    e = _unit(minus(e, times(dot(e, g), g)))
+    e = unit(minus(e, times(dot(e, g), g)))
     f = cross(g, e)
     p, q = w[PLANE + i], w[PLANE + LANES + i]
     r, s = w[PLANE + 2 * LANES + i], w[PLANE + 3 * LANES + i]

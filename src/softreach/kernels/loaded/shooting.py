@@ -21,6 +21,7 @@ from softreach.kernels.loaded.direction_walk import (
     X,
     Y,
     tangents,
+    unit,
     walk_tangents,
     walk_tip,
 )
@@ -53,11 +54,6 @@ WHOLE = SIZE + 3 * LANES
 
 
 @inline
-def _unit(v):
-    return times(1.0 / math.sqrt(dot(v, v)), v)
-
-
-@inline
 def _missing(w, i):
     """Residual at the base, in the plane normal to G(0), whose size steps do not keep at 1."""
     g, t = get(w, X, i), get(w, TARGET, i)
@@ -87,7 +83,7 @@ def _newton(w, i):
 
 @inline
 def _move(w, i):
-    put(w, TRIAL, i, _unit(plus(get(w, TRIAL, i), get(w, STEP, i))))
+    put(w, TRIAL, i, unit(plus(get(w, TRIAL, i), get(w, STEP, i))))
 
 
 @inline
@@ -101,7 +97,7 @@ def _extrapolate(w, i, last, first):
     """The parabola of theory (71)."""
     g, p, o = get(w, HELD, i), get(w, PAST, i), get(w, OLD, i)
     ahead = plus(times(last, minus(g, p)), times(first, minus(p, o)))
-    put(w, TRIAL, i, _unit(plus(g, ahead)))
+    put(w, TRIAL, i, unit(plus(g, ahead)))
 
 
 _advance_all = advance_with(_newton, _move, _extrapolate)
@@ -126,7 +122,7 @@ def _set_out(w, work, guesses, first, count, increment, widest):
         for i in range(LANES):
             n = first + min(i, count - 1)
             g = (guesses[n, 0], guesses[n, 1], guesses[n, 2])
-            put(w, TRIAL, i, _unit(turned(turn_at(work, TURN, i), g)))
+            put(w, TRIAL, i, unit(turned(turn_at(work, TURN, i), g)))
 
 
 @kernel
