@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -72,19 +73,19 @@ def with_actuator_name(arm: Manipulator, old: str, new: str) -> Manipulator:
     Raises:
         InvalidDesign: Another one has this name.
     """
-    return arm.replace(
-        actuators=tuple(
-            actuator.replace(name=new) if actuator.name == old else actuator
-            for actuator in arm.actuators
-        )
-    )
+    return _with_changed(arm, old, name=new)
 
 
 def with_actuator_ring(arm: Manipulator, name: str, ring: int) -> Manipulator:
     """The arm with one of its actuators in another ring, counted from 0."""
+    return _with_changed(arm, name, ring=ring)
+
+
+def _with_changed(arm: Manipulator, name: str, /, **changes: Any) -> Manipulator:
+    """The arm with an actuator changed."""
     return arm.replace(
         actuators=tuple(
-            actuator.replace(ring=ring) if actuator.name == name else actuator
+            actuator.replace(**changes) if actuator.name == name else actuator
             for actuator in arm.actuators
         )
     )
@@ -124,10 +125,8 @@ def without_ring(arm: Manipulator, index: int) -> Manipulator:
         raise InvalidInput("rings", ring_label(arm, index), "without actuators to be removed", hint)
     kept = tuple(ring for k, ring in enumerate(rings) if k != index)
     section = arm.section.replace(rings=kept)
-    return arm.replace(
-        section=section,
-        actuators=tuple(_shifted(actuator, arm, kept) for actuator in arm.actuators),
-    )
+    shifted = tuple(_shifted(actuator, arm, kept) for actuator in arm.actuators)
+    return arm.replace(section=section, actuators=shifted)
 
 
 def with_ring_name(arm: Manipulator, index: int, name: str) -> Manipulator:

@@ -141,9 +141,8 @@ class Manipulator:
         pairs = np.broadcast_to(np.asarray(activation_bounds, float), (self.bundles, 2))
         ends = np.cumsum([actuator.bundles for actuator in self.actuators], dtype=int)
         shares = zip(self.actuators, np.split(pairs, ends)[:-1], strict=True)
-        return self.replace(
-            actuators=tuple(actuator.with_bounds(share) for actuator, share in shares)
-        )
+        actuators = tuple(actuator.with_bounds(share) for actuator, share in shares)
+        return self.replace(actuators=actuators)
 
     def split(self, fiber: str | int, count: int, *, keep_extent: bool = True) -> Self:
         """Replace an architecture of one bundle by `count` independent ones beside each other.
@@ -237,9 +236,7 @@ class Manipulator:
     @property
     def fibers(self) -> tuple[FiberArchitecture, ...]:
         """Those actuators that are fiber architectures."""
-        return tuple(
-            actuator for actuator in self.actuators if isinstance(actuator, FiberArchitecture)
-        )
+        return tuple(each for each in self.actuators if isinstance(each, FiberArchitecture))
 
     @property
     def bundles(self) -> int:
@@ -252,9 +249,14 @@ class Manipulator:
         return tuple(name for actuator in self.actuators for name in actuator.bundle_names)
 
     @cached_property
+    def bundle_actuators(self) -> tuple[Actuator, ...]:
+        """The actuator of each bundle."""
+        return tuple(actuator for actuator in self.actuators for _ in range(actuator.bundles))
+
+    @cached_property
     def bundle_units(self) -> tuple[str, ...]:
         """The unit of the activation of each bundle."""
-        return tuple(actuator.unit for actuator in self.actuators for _ in range(actuator.bundles))
+        return tuple(actuator.unit for actuator in self.bundle_actuators)
 
     @cached_property
     def bounds(self) -> Array:
@@ -276,16 +278,12 @@ class Manipulator:
     @property
     def bundle_courses(self) -> tuple[str, ...]:
         """Direction of contraction within each bundle; see `Actuator.course`."""
-        return tuple(
-            actuator.course for actuator in self.actuators for _ in range(actuator.bundles)
-        )
+        return tuple(actuator.course for actuator in self.bundle_actuators)
 
     def outline(self, z: ArrayLike) -> Outline:
         """Places of all bundles in the sections at stations Z [m], shape (station,)."""
         stations = as_stations("z", z)
-        each = [
-            actuator.outline(self.profile, self.section, stations) for actuator in self.actuators
-        ]
+        each = [part.outline(self.profile, self.section, stations) for part in self.actuators]
         each = each or [Outline.empty(len(stations))]
         return Outline(
             center=np.concatenate([part.center for part in each], axis=1),
@@ -413,9 +411,8 @@ def _named(actuators: Sequence[Actuator]) -> Iterator[Actuator]:
 
 def _shared_names(arm: Manipulator) -> Iterator[Fault]:
     """Names that two actuators or two bundles share."""
-    yield from (
-        faults := list(name_faults([actuator.name for actuator in arm.actuators], "actuators"))
-    )
+    names = [actuator.name for actuator in arm.actuators]
+    yield from (faults := list(name_faults(names, "actuators")))
     names = arm.bundle_names
     if not faults and len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)

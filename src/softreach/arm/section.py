@@ -183,11 +183,8 @@ class Section(Part):
         outer = np.asarray(radius, float)
         area = np.pi * self._sum(_modulus, 2)
         inertia = np.pi / 4 * self._sum(_modulus, 4)
-        polar = (
-            np.pi
-            / 4
-            * self._sum(lambda material: _modulus(material) / (1 + material.poisson_ratio), 4)
-        )
+        shear = self._sum(lambda material: _modulus(material) / (1 + material.poisson_ratio), 4)
+        polar = np.pi / 4 * shear
         return Stiffness(area * outer**2, inertia * outer**4, polar * outer**4)
 
     def mass_per_length(self, radius: ArrayLike) -> Array:
@@ -198,11 +195,8 @@ class Section(Part):
         """
         if faults := self.density_faults("where weight counts"):
             raise InvalidDesign(faults)
-        return (
-            np.pi
-            * self._sum(lambda material: material.density or 0.0, 2)
-            * np.asarray(radius, float) ** 2
-        )
+        density = self._sum(lambda material: material.density or 0.0, 2)
+        return np.pi * density * np.asarray(radius, float) ** 2
 
     def modulus_faults(self, why: str) -> list[Fault]:
         """A fault for each material whose Young's modulus is needed and left out.

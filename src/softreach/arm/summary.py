@@ -105,9 +105,7 @@ def describe(arm: Manipulator) -> DesignSummary:
         bundle_extension=_pairs(extension_range(alone) for alone in _alone(arm)),
         bundle_bending=_pairs(_slender_bending(alone) for alone in _alone(arm)),
         breakpoints=arm.breakpoints,
-        validity=tuple(
-            dict.fromkeys(_validity(actuator) for actuator in arm.actuators if actuator.validity)
-        ),
+        validity=tuple(dict.fromkeys(_validity(each) for each in arm.actuators if each.validity)),
         warnings=design_warnings(arm),
         **_of_matter(arm),
     )
@@ -312,8 +310,7 @@ def _ring_of_each_bundle(arm: Manipulator) -> list[int | None]:
     """Index of the ring that a bundle fills a sector of; None for other kinds."""
     return [
         arm.section.ring_index(actuator.ring) if isinstance(actuator, SectorActuator) else None
-        for actuator in arm.actuators
-        for _ in range(actuator.bundles)
+        for actuator in arm.bundle_actuators
     ]
 
 

@@ -67,7 +67,7 @@ def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
     resistance = np.stack([stiffness.bending, stiffness.bending, stiffness.torsion], axis=1)
     extension = np.concatenate([load.force for load in loads], axis=1) / stiffness.axial[:, None]
     curvature = np.concatenate([load.moment for load in loads], axis=2) / resistance[..., None]
-    is_force = [actuator.is_force for actuator in arm.actuators for _ in range(actuator.bundles)]
+    is_force = [actuator.is_force for actuator in arm.bundle_actuators]
     growth = np.where(is_force, 0.0, extension) if any(is_force) else extension
     return Tables(z, extension, curvature, growth)
 

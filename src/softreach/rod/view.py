@@ -27,6 +27,7 @@ from softreach.rod.tip_map import (
     Strains,
     TipMap,
     TipStatus,
+    drop,
 )
 from softreach.support.arguments import as_instance
 
@@ -299,11 +300,8 @@ class View(_DerivedMap):
         """Make NaN, and say that there is no equilibrium, where only stable ones count."""
         if not self.only_stable or status is None:
             return
-        lost = status != TipStatus.STABLE
-        status[lost] = TipStatus.NO_EQUILIBRIUM
-        for some in values:
-            if some is not None:
-                some[lost] = np.nan
+        lost = np.flatnonzero(status != TipStatus.STABLE)
+        drop(lost, status, *(some for some in values if some is not None))
 
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
         """The smallest ζ along the arm [-] and the largest turn of a step [rad] at x."""

@@ -13,7 +13,7 @@ from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index
 from softreach.workspace.crossings import Crossings
 from softreach.workspace.flux import signed_volume
-from softreach.workspace.image import Image, Spans
+from softreach.workspace.image import Image, Spans, covered_cubes
 
 T = TypeVar("T")
 _LEFT = 0.35  # of what is removed; for four bundles 0.28 to 0.34 of it were found wrong
@@ -171,10 +171,7 @@ def _outer_vertices(image: Image) -> Array:
     used = np.zeros(len(image.vertices), bool)
     used[image.triangles[:, :3]] = True
     vertices = image.vertices[used] / image.unit
-    covered = image.counts[0] > 0
-    for axis in range(3):
-        rolled = np.moveaxis(covered, axis, 0)
-        covered = np.moveaxis(rolled[:-1] & rolled[1:], 0, axis)
+    covered = covered_cubes(image.counts[0] > 0)
     i, j, k = np.floor(vertices).astype(int).T
     return vertices[~covered[i, j, k]]
 

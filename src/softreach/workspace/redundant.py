@@ -23,7 +23,7 @@ from softreach.support.errors import InvalidInput
 from softreach.support.progress import Progress
 from softreach.workspace.boundary import ReachedCells
 from softreach.workspace.crossings import Crossings
-from softreach.workspace.image import Lattice
+from softreach.workspace.image import Lattice, covered_cubes
 from softreach.workspace.measure import Estimate, line_volume
 from softreach.workspace.search import ENOUGH, Flood
 
@@ -213,10 +213,7 @@ def _hull(crossings: Crossings, tips: Array) -> Estimate:
 
 def _not_among(flood: Flood, tips: Array) -> Mask:
     """Mask of tips not between eight centers that are reached, where no hull has a corner."""
-    cubes = flood.reached
-    for axis in range(3):
-        rolled = np.moveaxis(cubes, axis, 0)
-        cubes = np.moveaxis(rolled[:-1] & rolled[1:], 0, axis)
+    cubes = covered_cubes(flood.reached)
     index = np.floor(flood.lattice.coordinates(tips)).astype(np.int64)
     inside = np.all((index >= 0) & (index < cubes.shape), axis=1)
     x, y, z = (index * inside[:, None]).T

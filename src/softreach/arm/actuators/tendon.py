@@ -108,10 +108,8 @@ class Tendon(PolarActuator):
 
     def breakpoints(self, profile: Profile) -> tuple[float, ...]:
         """Stations where it begins, ends, or its route is not smooth [m]."""
-        bent = [
-            function for function in (self.distance, self.routing) if isinstance(function, AlongArm)
-        ]
-        breaks = [profile.length * x for function in bent for x in function.breaks]
+        bent = [along for along in (self.distance, self.routing) if isinstance(along, AlongArm)]
+        breaks = [profile.length * x for along in bent for x in along.breaks]
         return (*super().breakpoints(profile), *breaks)
 
     def section_faults(self, profile: Profile, section: Section) -> list[Fault]:

@@ -78,11 +78,8 @@ class Parameter(ABC):
         the same.
         """
         first, *others = self.values(arm)
-        return (
-            first
-            if all(math.isclose(first, other, rel_tol=_ROUNDING) for other in others)
-            else _NAN
-        )
+        same = all(math.isclose(first, other, rel_tol=_ROUNDING) for other in others)
+        return first if same else _NAN
 
     @abstractmethod
     def values(self, arm: Manipulator) -> tuple[float, ...]:

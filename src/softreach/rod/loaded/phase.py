@@ -118,9 +118,6 @@ def _force(loads: Loads, z: Array, mass: Array) -> Array:
 def _moment(loads: Loads) -> float:
     """The sizes of all moments, added, that of the payload on its lever among them [N m]."""
     weight = loads.payload * math.hypot(*loads.gravity)
-    moments = [
-        loads.tip_moment,
-        loads.follower_moment,
-        *(load.moment for load in loads.point_loads),
-    ]
+    moments = [loads.tip_moment, loads.follower_moment]
+    moments += [load.moment for load in loads.point_loads]
     return weight * math.hypot(*loads.payload_arm) + sum(math.hypot(*moment) for moment in moments)
