@@ -94,9 +94,9 @@ class Growth:
 
     Args:
         pushing: The tip that pushes.
-        place: Where it is fixed [m], shape (3,).
+        place: Its fixed position [m], shape (3,).
         start: Activations near those that put it there without force, shape (bundles,).
-        residual: How far off its place the tip may be [m].
+        residual: Largest distance of the tip from its place [m].
     """
 
     pushing: PushingTip
@@ -182,7 +182,7 @@ class Growth:
         """The change that lets the force grow most while no activation changes by more.
 
         Args:
-            fixed: Where it begins.
+            fixed: The tip to begin with.
             reach: Largest change of each activation, of its range.
         """
         from scipy.optimize import linprog

@@ -56,7 +56,7 @@ def blocked_force(
 
     Args:
         arm: A design with three free bundles or more, or its tip map.
-        places: Where the tip is held [m], shape (n, 3); None for the tips of `start`.
+        places: Places at which the tip is held [m], shape (n, 3); None for the tips of `start`.
         direction: Along which the tip pushes, of any length, shape (3,) or (n, 3).
         start: Activations near which the force begins to grow [unit of each], shape (bundles,) or
             (n, bundles); by default all that `solve_inverse` finds for the places.

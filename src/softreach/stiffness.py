@@ -89,7 +89,7 @@ def principal_compliances(compliance: ArrayLike) -> PrincipalCompliances:
     these are its eigenvalues.
 
     Args:
-        compliance: What `tip_compliance` gives [m/N], shape (n, 3, 3).
+        compliance: As of `tip_compliance` [m/N], shape (n, 3, 3).
 
     Raises:
         InvalidInput: Another shape.
@@ -108,7 +108,7 @@ def stiffness_along(compliance: ArrayLike, direction: ArrayLike) -> Array:
     The tip is free to give way sideways. Infinite where it does not yield at all.
 
     Args:
-        compliance: What `tip_compliance` gives [m/N], shape (n, 3, 3).
+        compliance: As of `tip_compliance` [m/N], shape (n, 3, 3).
         direction: d, of any length, shape (3,) or (n, 3).
 
     Raises:

@@ -95,7 +95,7 @@ class Manipulator:
             young_modulus: E [Pa]; None where it cancels: nothing weighs and only fibers or muscles
                 act.
             density: ρ [kg/m³]; None where nothing weighs.
-            actuators: What drives the arm.
+            actuators: Actuators that drive the arm.
             activation_bounds: (lower, upper) of γ for every bundle, or one pair per bundle [-];
                 None for their own.
 
@@ -154,7 +154,7 @@ class Manipulator:
 
         Args:
             fiber: Name or index of the architecture.
-            count: How many take its place; 1 leaves the design as it is.
+            count: Number of those that take its place; 1 leaves the design as it is.
             keep_extent: True gives each the extent σ of the original, False its share σ / count, so
                 that together they fill the sector of the original.
 

@@ -182,7 +182,7 @@ def series_faults(values: Mapping[str, Any], field: str, per_station: bool = Tru
 
     Args:
         values: `stations_over_length` and the values themselves.
-        field: What the values are called.
+        field: Name of the values.
         per_station: One for each station; else one for each gap between them.
     """
     stations, along = as_numbers(values["stations_over_length"]), as_numbers(values[field])

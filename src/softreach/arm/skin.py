@@ -167,7 +167,7 @@ def body_skin(arm: Body, line: Centerline, sides: int = 32) -> Surface:
 
     Args:
         arm: The design.
-        line: Where its sections are.
+        line: Centerline with its sections.
         sides: Corners of each section.
 
     Raises:
@@ -194,8 +194,8 @@ def bundle_skins(
 
     Args:
         arm: The design; bundle j covers a_j - σ_j/2 to a_j + σ_j/2.
-        line: Where its sections are; give it `arm.breakpoints`, so that bundles end there.
-        lift: How far bands are above their ring, in R2 [-].
+        line: Centerline with its sections; give it `arm.breakpoints`, so that bundles end there.
+        lift: Height of bands above their ring, in R2 [-].
         step: Largest angle between neighboring points across a band [rad].
     """
 
@@ -214,7 +214,7 @@ def bundle_solids(
 
     Args:
         arm: The design.
-        line: Where its sections are; give it `arm.breakpoints`, so that bundles end there.
+        line: Centerline with its sections; give it `arm.breakpoints`, so that bundles end there.
         thickness: Of the skins, in R2 [-].
         step: Largest angle between neighboring points across a band [rad].
     """

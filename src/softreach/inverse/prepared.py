@@ -122,7 +122,7 @@ def prepared_map(
         arm: The design, or its tip map; what is prepared already is returned as it is.
         tol: Largest tip error, in L.
         cells: With three free bundles: cells along each axis of the activation box.
-        depth: How often a cell is halved where det ∂r/∂γ changes sign or is uneven; once at least
+        depth: Halvings of a cell where det ∂r/∂γ changes sign or is uneven; once at least
             for an arm under loads.
         frame: In which targets are told: that of the "world" or of the "base".
     """

@@ -49,9 +49,9 @@ def gap_bounds(
         rod: The tip map.
         coarse: Its cells.
         targets: Shape (t, 3) [m].
-        gap: How near to each the best place known is [m], shape (t,).
-        allowance: What a bound has to exceed to prove anything of the arm itself [m]; every gap
-            does.
+        gap: Distance of the best place known from each [m], shape (t,).
+        allowance: Distance that a bound must exceed to prove anything of the arm itself [m]; every
+            gap does.
 
     Returns:
         Bounds [m], shape (t,); 0 where nothing is proved.
@@ -158,9 +158,9 @@ def least_of_cells(
     Args:
         rod: The tip map.
         half: Half widths of the cells [-], shape (m,).
-        cells: Where to begin.
+        cells: Cells to begin with.
         enough: Bounds at which a cell is done and which the result does not exceed, shape (t,).
-        bound: What is bounded.
+        bound: The lower bound of a cell.
         most: Cells that one target is worth.
 
     Returns:

@@ -66,7 +66,7 @@ def as_activations(name: str, activations: ArrayLike, box: ActivationBox, count:
     """An activation for each target, of the free bundles only, shape (t, dimension).
 
     Args:
-        name: What the argument is called.
+        name: Name of the argument.
         activations: Of all bundles [-], shape (bundles,) or (t, bundles).
         box: The bounds of all bundles.
         count: Number of targets t.
@@ -102,7 +102,7 @@ def positions_in(text: str, source: str) -> list[list[float]]:
 
     Args:
         text: Content of the file.
-        source: What errors call it.
+        source: Its name in errors.
 
     Raises:
         InvalidInput: A line that is not three numbers, or no line.

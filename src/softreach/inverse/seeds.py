@@ -52,7 +52,7 @@ class Seeds:
 
         Args:
             candidates: Activations for each target, best first, shape (t, k, m).
-            most: How many for one target.
+            most: Largest number for one target.
             least_distance: Between any two, in ranges.
 
         Returns:

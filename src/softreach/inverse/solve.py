@@ -231,7 +231,7 @@ def _solutions(
 
     Args:
         prepared: The tip map.
-        request: What was asked.
+        request: The request.
         roots: The roots found, sorted by target.
         missing: Numbers of the targets without a root.
         closest: The nearest points to these; some may prove to be roots.

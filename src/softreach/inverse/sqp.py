@@ -39,7 +39,7 @@ def sqp(
     Args:
         rod: The tip map.
         request: A target for each start, and what to stay near to.
-        start: Where to begin, inside the bounds [-], shape (n, m).
+        start: Activations to begin with, inside the bounds [-], shape (n, m).
         penalty: Least penalty. A high one keeps a search near the target once it is there, as it
             must where the target lies next to a fold or to the boundary of the reachable set.
         settled: Step at which a search ends, in ranges.
@@ -73,7 +73,7 @@ def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Arr
     Args:
         rod: The tip map.
         request: A target for each start, and what is preferred.
-        start: Where to begin [-], shape (n, m).
+        start: Activations to begin with [-], shape (n, m).
 
     Returns:
         Activations [-], shape (n, m), and their |tip - target| [m], shape (n,).

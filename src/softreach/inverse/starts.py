@@ -44,7 +44,7 @@ def starts_from_cells(
 
     Args:
         prepared: The tip map, with its cells and their tree.
-        request: What is asked; targets that follow each other are best near to each other.
+        request: The request; targets that follow each other are best near to each other.
         chosen: Numbers of the targets, ascending.
         with_root: Whether to leave out tetrahedra whose quadratic does not reach the target.
     """

@@ -93,7 +93,7 @@ class ActivationBox:
 
         Args:
             cube: Points in [0, 1], shape (n, bundles).
-            out: Where to put them; `cube` itself is allowed.
+            out: Array to put them into; `cube` itself is allowed.
 
         Returns:
             Activations, shape (n, bundles), never outside the bounds.
@@ -179,7 +179,7 @@ def damped_steps(
 
     Args:
         box: The bounds.
-        gamma: Where the steps begin, inside the bounds [-], shape (n, m).
+        gamma: Beginnings of the steps, inside the bounds [-], shape (n, m).
         miss: Tips minus targets, in any unit, shape (n, 3).
         slopes: ∂r/∂γ in that unit, shape (n, 3, m).
         damping: μ > 0, the square of that unit, shape (n,).

@@ -92,7 +92,7 @@ def bundle_skins(
     Args:
         arm: The design; band j covers a_j - σ_j/2 to a_j + σ_j/2 on the outside of its ring.
         configuration: One configuration of that arm.
-        lift: How far bands are above their ring, in R2 [-].
+        lift: Height of bands above their ring, in R2 [-].
         step: Largest angle between neighboring points across a band [rad].
 
     Returns:

@@ -26,7 +26,7 @@ def tip_map(
     Args:
         arm: The design, or a tip map, whose own tolerance then counts.
         tol: Largest tip error, in L.
-        frame: Where places are told: in the "world", or in the frame of the "base", whose z is
+        frame: Frame of places: the "world", or that of the "base", whose z is
             along the straight arm. That of a tip map, if it is not of the world, counts.
         warn: Whether to warn of loads beyond what was verified.
 

@@ -299,12 +299,12 @@ def worsened(
 
     Args:
         error: Errors of activations (n, bundles), shape (n,).
-        pilot: Where to begin, shape (n, bundles).
+        pilot: Activations to begin with, shape (n, bundles).
         known: Their errors, shape (n,).
         box: The bounds.
 
     Returns:
-        Where the searches ended, shape (at most 8, bundles), and the errors there.
+        Ends of the searches, shape (at most 8, bundles), and the errors there.
     """
     chosen = np.argsort(-known, kind="stable")[:_SEARCHED]
     gamma, worst = pilot[chosen].copy(), known[chosen].copy()

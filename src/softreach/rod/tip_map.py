@@ -385,7 +385,7 @@ def no_equilibrium_message(tried: int, sought: str = "a stable equilibrium") -> 
 
     Args:
         tried: Number of activations.
-        sought: What they do not have.
+        sought: The thing that they do not have.
     """
     return f"none of {tried} activations tried has {sought}"
 

@@ -303,7 +303,7 @@ def _derivative(
         rods: Their tip maps.
         cube: Places in the unit cube of the free bundles, shape (n, 3).
         along: The function.
-        noise: How far off a value may be.
+        noise: Largest error of a value.
     """
     values = np.array([along(rod.tips(rod.box.from_free_cube(cube))) for rod in rods])
     value, rough = float(shifts.weights @ values), float(shifts.rough_weights @ values)

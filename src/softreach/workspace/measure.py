@@ -56,10 +56,10 @@ def partial_volume(fine: Image, common: Image, coarse: Image, remainder: float) 
     to reach.
 
     Args:
-        fine: What the cells of the grid reach that are not left out.
-        common: What those of them reach that the coarse grid holds too.
+        fine: Image of the cells of the grid that are not left out.
+        common: Image of those of them that the coarse grid holds too.
         coarse: The same from a grid of half as many cells.
-        remainder: What cells at the edge reach beside [m³].
+        remainder: Volume that cells at the edge reach beside [m³].
     """
     sense = 1 if _signed_volume(fine) >= 0 else -1
     at_fine, at_common, at_coarse = (_covered(image, sense) for image in (fine, common, coarse))
@@ -86,7 +86,7 @@ def multiply_covered(
     Args:
         fine: Of n cells along each axis.
         coarse: Of half as many.
-        common: What the fine cells reach that the coarse grid holds too, if not all of them are.
+        common: Image of the fine cells that the coarse grid holds too, if not all of them are.
 
     Returns:
         The volumes, and by how much their sum changes on half as fine a grid.
@@ -256,7 +256,7 @@ def length_sum(runs: Runs, spacing: int = 1, parity: int = 0) -> Array:
     Args:
         runs: Stretches between crossings.
         spacing: Every how many centers are looked at.
-        parity: Which of them comes first.
+        parity: Number of the first of them.
 
     Returns:
         Shape (runs,): what each run adds to its line.

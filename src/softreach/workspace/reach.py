@@ -87,7 +87,7 @@ def reachable_set(
         tol: Largest tip error, in L.
         frame: In which places are told: that of the "world", or of the "base", whose z is along the
             straight arm.
-        memory: What more than three free bundles may use [bytes]; by default a quarter of what is
+        memory: Limit for more than three free bundles [bytes]; by default a quarter of what is
             free. Cells do not become smaller than it allows.
         progress: Called with the number of grid vertices or cells done since its last call.
 

@@ -61,7 +61,7 @@ def searched_set(
         accuracy: Relative error asked of the volume: cells become smaller until it is met, or
             `memory` is used.
         cell: Edge of a cell [m], instead of the rule's.
-        memory: What the search may use [bytes].
+        memory: Memory that the search may use [bytes].
         progress: Called with the number of centers searched since its last call.
 
     Raises:

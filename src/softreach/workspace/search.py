@@ -129,7 +129,7 @@ def nearest_tips(rod: TipMap, start: Array, targets: Array, enough: float) -> Ne
 
     Args:
         rod: The tip map.
-        start: Where to begin, within the bounds, shape (n, bundles).
+        start: Activations to begin with, within the bounds, shape (n, bundles).
         targets: Places [m], shape (n, 3).
         enough: Distance at which a target counts as reached [m].
     """

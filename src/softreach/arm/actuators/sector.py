@@ -90,7 +90,7 @@ class SectorActuator(PolarActuator):
         """Several actuators of one bundle in place of this one, evenly about its center.
 
         Args:
-            count: How many.
+            count: Number of actuators.
             keep_extent: True gives each the extent σ of the original, one extent apart; False its
                 share σ / count, so that together they fill the sector of the original.
 

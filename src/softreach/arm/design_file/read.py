@@ -84,8 +84,8 @@ def document_of(
 
     Args:
         text: The text of a design file.
-        source: What errors call it.
-        number: What makes a value of a number with a point or an exponent.
+        source: Its name in errors.
+        number: Maker of the value of a number with a point or an exponent.
 
     Raises:
         InvalidDesign: Text that is no TOML, or too long or too deeply nested to be a design.
@@ -107,7 +107,7 @@ def parse(text: str, source: str) -> Parts:
 
     Args:
         text: The text of a design file.
-        source: What errors call it.
+        source: Its name in errors.
 
     Raises:
         InvalidDesign: Every fault of the text, with its key, value and what is allowed.

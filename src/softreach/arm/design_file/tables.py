@@ -51,8 +51,8 @@ class TableReader:
 
         Args:
             kind: Its class.
-            raw: What the file holds.
-            path: Where that is.
+            raw: Table as the file holds it.
+            path: Its path in the file.
             without: Keys that the table does not have here.
             others: Further fields of the part.
         """

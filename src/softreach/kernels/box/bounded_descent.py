@@ -55,7 +55,7 @@ def judge(running, n, tips, ahead, targets, ends, enough, low, high, scales):  #
 
     Args:
         running: The searches; those that go on become the first.
-        n: How many run.
+        n: Number of those that run.
         tips: Of their trials [m], `NOWHERE` if they do not count, shape (n, 3).
         ahead: ∂r/∂γ of their trials [m], shape (n, 3, m).
         targets: Of all searches [m], shape (all, 3).
@@ -66,7 +66,7 @@ def judge(running, n, tips, ahead, targets, ends, enough, low, high, scales):  #
         scales: Ranges of the bounds, shape (m,).
 
     Returns:
-        How many go on.
+        Number of those that go on.
     """
     gamma, best, distance = ends
     kept = 0
@@ -124,7 +124,7 @@ def next_trials(running, n, step, multiplier, gamma, low, high, scales):
 
     Args:
         running: The searches.
-        n: How many run.
+        n: Number of those that run.
         step: In ranges of the bounds, shape (n, m).
         multiplier: Of the steps, shape (n, 3): what is left by the softness.
         gamma: Best activations of all searches, shape (all, m).

@@ -34,7 +34,7 @@ def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start, 
 
     Args:
         mesh: Cells of the activation box.
-        tree: Where their images lie.
+        tree: Octree of their images.
         targets: Targets [m], shape (t, 3).
         low: Lower bounds, shape (3,).
         high: Upper bounds, shape (3,).
@@ -46,7 +46,7 @@ def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start, 
             singular, shape (room, 3, 3).
 
     Returns:
-        How many targets are done, and how many starts were found.
+        Number of targets that are done, and of starts found.
     """
     # Memory that a kernel makes takes longer to compile.
     room = quadratic(), np.empty(MOST_STARTS), np.empty(_AT_ONCE, np.int32)

@@ -91,11 +91,11 @@ def sort_into_children(planes, boxes, centers, half, first, count, item, counts,
         boxes: Boxes round them, shape (tetrahedron, 2, 3).
         centers: Centers of the nodes' children, shape (node, 8, 3).
         half: Half the edge of a child.
-        first: Where each node's items begin in `item`.
-        count: How many there are.
+        first: Beginning of each node's items in `item`.
+        count: Number of each node's items.
         item: Items of the nodes.
         counts: Filled with the items of each child, shape (node, 8).
-        starts: Where to write each child's items, shape (node, 8).
+        starts: Beginning of each child's items in `out`, shape (node, 8).
         out: Receives the items; empty to count only.
     """
     for n in range(centers.shape[0]):

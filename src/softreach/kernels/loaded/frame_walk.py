@@ -149,7 +149,7 @@ def walk(w, columns, count, lanes, unloaded, tables, bundles, trace):
     Args:
         w: Workspace.
         columns: Tangents: three of rotations, `bundles` of activations, three of unit forces.
-        count: How many.
+        count: Number of them.
         lanes: Activations.
         unloaded: The unloaded arm (step, rows).
         tables: (pieces, lengths, scalars, bends, jumps).

@@ -61,7 +61,7 @@ def load_phase(
 
     Args:
         arm: The design.
-        loads: What acts on it.
+        loads: Loads on it.
         compliance: 1/K0 [1/N], 1/K1 and 1/K3 [1/(N m²)] at `phase_stations`.
         mass: Per length there [kg/m].
     """

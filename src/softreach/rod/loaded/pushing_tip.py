@@ -76,7 +76,7 @@ class PushingTip:
         Args:
             gamma: Activations, shape (bundles,).
             force: With which the tip pushes [N].
-            near: Where the search begins; None for the unloaded arm, by way of the whole load.
+            near: Response to begin with; None for the unloaded arm, by way of the whole load.
         """
         solver, sample = self._solver(force, self.steps), gamma[None]
         known = solver.find(sample) if near is None else solver.near(sample, near.equilibrium)

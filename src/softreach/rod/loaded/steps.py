@@ -52,7 +52,7 @@ def fewest_steps(
         solver_of: A solver of so many steps.
         pilot: Activations to judge by, shape (n, bundles).
         steps: The fewest to try.
-        differences: What must be within the tolerance.
+        differences: Differences that must be within the tolerance.
 
     Returns:
         Steps; None where even the most are too few, `UNJUDGED` where nothing can be judged.
