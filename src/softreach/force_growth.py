@@ -1,4 +1,4 @@
-"""How a force grows while the tip stays where it is: linear programs, each corrected by Newton.
+"""Growth of a force while the tip stays where it is: linear programs, each corrected by Newton.
 
 The bundles move so that the force with which the tip pushes grows most: a linear program in the
 change of activations, of which none may be large, and of the force, under ∂r/∂γ δγ + ∂r/∂F δF = 0
@@ -38,7 +38,7 @@ _MULTIPLIER = 1e-4  # of the largest one, below which a bound does not count
 
 
 class Stop(IntEnum):
-    """Why a force grows no further."""
+    """Reason why a force grows no further."""
 
     BOUND = 0
     """Bundles are at their bounds."""
@@ -68,7 +68,7 @@ class Grown(NamedTuple):
     fixed: FixedTip
     stop: Stop
     limits: Mask
-    """Which bundles are at a bound that keeps the force from growing, shape (bundles,)."""
+    """Mask of the bundles at a bound that keeps the force from growing, shape (bundles,)."""
     slope: float
     """By how much the force would change if the place moved [N/m]."""
 
@@ -83,7 +83,7 @@ class _Program(NamedTuple):
     rate: float
     """The same in units of force per range of activation."""
     multipliers: Array
-    """What each bundle's bounds cost, shape (bundles,)."""
+    """Lagrange multiplier of each bundle's bounds, shape (bundles,)."""
     slope: float
     """By how much the force would change if the place moved [N/m]; NaN if it was not solved."""
 
@@ -94,9 +94,9 @@ class Growth:
 
     Args:
         pushing: The tip that pushes.
-        place: Where it is fixed [m], shape (3,).
+        place: Its fixed position [m], shape (3,).
         start: Activations near those that put it there without force, shape (bundles,).
-        residual: How far off its place the tip may be [m].
+        residual: Largest distance of the tip from its place [m].
     """
 
     pushing: PushingTip
@@ -182,7 +182,7 @@ class Growth:
         """The change that lets the force grow most while no activation changes by more.
 
         Args:
-            fixed: Where it begins.
+            fixed: The tip to begin with.
             reach: Largest change of each activation, of its range.
         """
         from scipy.optimize import linprog
@@ -195,29 +195,31 @@ class Growth:
         ends = [*zip(np.minimum(lowest, 0.0), np.maximum(highest, 0.0), strict=True), (0.0, most)]
         goal = np.zeros(box.bundles + 1)
         goal[-1] = -1.0
-        found = linprog(goal, A_eq=columns, b_eq=np.zeros(3), bounds=ends, method="highs-ds")
-        if found.x is None:
-            found = linprog(goal, A_eq=columns, b_eq=np.zeros(3), bounds=ends, method="highs-ipm")
-        if found.x is None:
+        solution = linprog(goal, A_eq=columns, b_eq=np.zeros(3), bounds=ends, method="highs-ds")
+        if solution.x is None:
+            solution = linprog(
+                goal, A_eq=columns, b_eq=np.zeros(3), bounds=ends, method="highs-ipm"
+            )
+        if solution.x is None:
             return _Program(np.zeros(box.bundles), 0.0, 0.0, np.zeros(box.bundles), np.nan)
-        change = reach * found.x
-        price = found.lower.marginals + found.upper.marginals
+        change = reach * solution.x
+        price = solution.lower.marginals + solution.upper.marginals
         return _Program(
             change[:-1] * box.scales,
             float(change[-1]) * self.unit,
-            float(found.x[-1]),
+            float(solution.x[-1]),
             price[:-1],
-            float(np.linalg.norm(found.eqlin.marginals)) * self.unit / length,
+            float(np.linalg.norm(solution.eqlin.marginals)) * self.unit / length,
         )
 
     def _columns(self, response: TipResponse, unit: float) -> Array:
-        """How the tip moves [L] with each activation over its range and with the unit of force."""
+        """Motion of the tip [L] by each activation over its range and by the unit of force."""
         moves = response.slope * np.where(self.box.is_free, self.box.scales, 0.0)
         columns = np.column_stack([moves, -unit * response.retreat])
         return columns / self.pushing.rod.length
 
     def _at_bound(self, gamma: Array) -> Mask:
-        """Which free bundles are at a bound."""
+        """Mask of the free bundles that are at a bound."""
         box = self.box
         room = np.minimum(gamma - box.low, box.high - gamma) / box.scales
         return box.is_free & (room <= _AT_BOUND)
@@ -259,8 +261,8 @@ class Growth:
         high = np.append((box.high - gamma) / box.scales, np.inf)
         step, open_ = np.zeros(len(low)), np.append(moves, True)
         for _ in range(len(low)):
-            rest = missing - columns[:, ~open_] @ step[~open_]
-            step[open_] = np.linalg.lstsq(columns[:, open_], rest, rcond=1e-12)[0]
+            left = missing - columns[:, ~open_] @ step[~open_]
+            step[open_] = np.linalg.lstsq(columns[:, open_], left, rcond=1e-12)[0]
             over = open_ & ((step < low) | (step > high))
             if not over.any():
                 break
@@ -280,7 +282,7 @@ class Growth:
             )
         )
         gradient = np.append(np.zeros(box.bundles), -1.0)
-        found: Any = minimize(
+        solution: Any = minimize(
             lambda x: -x[-1],
             x,
             jac=lambda x: gradient,
@@ -293,8 +295,10 @@ class Growth:
             },
             options={"ftol": 1e-10, "maxiter": 25},
         )
-        gamma = box.clip(box.low + found.x[:-1] * box.scales)
-        better = self._corrected(gamma, float(found.x[-1]) * self.unit, self.unit, fixed.response)
+        gamma = box.clip(box.low + solution.x[:-1] * box.scales)
+        better = self._corrected(
+            gamma, float(solution.x[-1]) * self.unit, self.unit, fixed.response
+        )
         if better is None or better.force < fixed.force:
             return fixed
         return better if self._is_stable(better) else fixed

@@ -56,7 +56,7 @@ def blocked_force(
 
     Args:
         arm: A design with three free bundles or more, or its tip map.
-        places: Where the tip is held [m], shape (n, 3); None for the tips of `start`.
+        places: Places at which the tip is held [m], shape (n, 3); None for the tips of `start`.
         direction: Along which the tip pushes, of any length, shape (3,) or (n, 3).
         start: Activations near which the force begins to grow [unit of each], shape (bundles,) or
             (n, bundles); by default all that `solve_inverse` finds for the places.
@@ -89,8 +89,8 @@ def blocked_force(
     best = []
     for target, along, choice in zip(targets, directions, starts, strict=True):
         push, place = rod.pose.directions_to_base(along), rod.pose.to_base(target)
-        found = [_grown(yielding, push, place, gamma) for gamma in choice]
-        best.append(max((one for one in found if one), key=_force, default=None))
+        results = [_grown(yielding, push, place, gamma) for gamma in choice]
+        best.append(max((result for result in results if result), key=_force, default=None))
         progress(1)
     return _dataset(rod, targets, directions, best)
 
@@ -104,8 +104,8 @@ class _Best(NamedTuple):
     settles: bool
 
 
-def _force(one: _Best) -> float:
-    return one.end.fixed.force
+def _force(result: _Best) -> float:
+    return result.end.fixed.force
 
 
 def _starts(
@@ -117,7 +117,7 @@ def _starts(
             raise InvalidInput("places", None, "given, or `start`")
         targets = as_targets("places", places)
         solutions = solve_inverse(rod, targets, family=family)
-        return targets, [one.activations for one in solutions]
+        return targets, [solution.activations for solution in solutions]
     if places is None:
         gamma = rod.check_activations("start", np.atleast_2d(as_floats("start", start)))
         return rod.tips(gamma), list(gamma[:, None])
@@ -142,7 +142,7 @@ def _grown(rod: LoadedRod, direction: Array, place: Array, start: Array) -> _Bes
 
 
 def _rows(best: list[_Best | None]) -> Iterator[tuple[int, _Best]]:
-    return ((k, one) for k, one in enumerate(best) if one is not None)
+    return ((k, result) for k, result in enumerate(best) if result is not None)
 
 
 def _dataset(rod: TipMap, places: Array, directions: Array, best: list[_Best | None]) -> xr.Dataset:
@@ -153,10 +153,10 @@ def _dataset(rod: TipMap, places: Array, directions: Array, best: list[_Best | N
     activation, begun = np.full((2, n, bundles), np.nan)
     status, limit = np.full(n, Stop.NO_START, np.int8), np.zeros((n, bundles), bool)
     settles = np.zeros(n, bool)
-    for k, one in _rows(best):
-        force[k], status[k], limit[k] = one.end.fixed.force, one.end.stop, one.end.limits
-        error[k] = one.end.slope * one.tip_error
-        activation[k], begun[k], settles[k] = one.end.fixed.gamma, one.start, one.settles
+    for k, result in _rows(best):
+        force[k], status[k], limit[k] = result.end.fixed.force, result.end.stop, result.end.limits
+        error[k] = result.end.slope * result.tip_error
+        activation[k], begun[k], settles[k] = result.end.fixed.gamma, result.start, result.settles
     units = activation_attributes(rod.arm)
     dead = np.array(yielding_rod(rod).loads.tip_force)
     acting = rod.pose.directions_to_world(dead) - force[:, None] * directions

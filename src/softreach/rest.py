@@ -18,18 +18,18 @@ __all__ = ["Rest", "rest"]
 
 @dataclass(frozen=True)
 class Rest:
-    """Where an arm rests that nothing drives."""
+    """Equilibrium of an arm that nothing drives."""
 
     activation: NDArray[np.float64]
     """The activation of least size within the bounds, zero where these hold it [unit]."""
     tip: NDArray[np.float64]
     """Of the loaded arm in the world [m]; NaN without equilibrium."""
     sag: float
-    """How far the loads move the tip [m]; NaN without equilibrium."""
+    """Distance by which the loads move the tip [m]; NaN without equilibrium."""
     sag_over_length: float
     """The same over the length of the arm [-]."""
     status: TipStatus
-    """Whether the equilibrium is stable, and whether one was found."""
+    """Status of the equilibrium: stable or not, or none found."""
 
 
 def rest(arm: Manipulator, *, tol: float = 1e-6) -> Rest:
@@ -50,13 +50,13 @@ def rest(arm: Manipulator, *, tol: float = 1e-6) -> Rest:
     # Nothing but rest is asked for, and the steps need suit no other activation.
     held = arm.with_bounds(np.stack([activation, activation], axis=1)) if arm.bundles else arm
     rod = LoadedRod(held, tol)
-    found = rod.equilibria(activation[None])
+    equilibria = rod.equilibria(activation[None])
     free = FreeRod(held.replace(loads=None), tol).tips(activation[None])[0]
-    sag = float(np.linalg.norm(found.tips[0] - free))
+    sag = float(np.linalg.norm(equilibria.tips[0] - free))
     return Rest(
         activation=activation,
-        tip=arm.base.to_world(found.tips[0]),
+        tip=arm.base.to_world(equilibria.tips[0]),
         sag=sag,
         sag_over_length=sag / arm.length,
-        status=TipStatus(int(found.status[0])),
+        status=TipStatus(int(equilibria.status[0])),
     )

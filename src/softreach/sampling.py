@@ -42,7 +42,7 @@ def sample_cube(sampler: str, n: int, dim: int, seed: int = 0) -> Array:
             `sobol` (scrambled, n a power of two) or `grid` (n a dim-th power, ends included).
         n: Number of points.
         dim: Dimension of the cube.
-        seed: What random samplers start from.
+        seed: Seed of random samplers.
 
     Raises:
         InvalidInput: An unknown sampler, an n that the sampler cannot spread, or more points than

@@ -1,4 +1,4 @@
-"""What is stored and passed on: names, dimensions, units and version of every dataset."""
+"""Schema of every dataset that is stored or passed on: names, dimensions, units and version."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def with_status(cloud: xr.Dataset, status: NDArray[np.int8]) -> xr.Dataset:
 
 
 def is_stable(data: xr.Dataset | xr.DataArray) -> Mask:
-    """Which samples hold the arm in a stable equilibrium; all, of an arm without loads."""
+    """Mask of the samples at a stable equilibrium; all, of an arm without loads."""
     if "status" not in data.coords:
         return np.ones(data.sizes["sample"], bool)
     return np.asarray(data.coords["status"].values == 0)
@@ -150,11 +150,11 @@ def check_cloud(cloud: xr.Dataset) -> xr.Dataset:
         raise InvalidInput("cloud", as_given(cloud), "a cloud: a dataset from compute_cloud")
     for name, (dims, _, _) in _CLOUD.items():
         if name not in cloud or cloud[name].dims != dims:
-            found = cloud[name].dims if name in cloud else "missing"
-            raise InvalidInput(f"cloud.{name}", found, f"a variable over {dims}")
-    found = cloud.attrs.get("schema_version")
-    if found != SCHEMA_VERSION:
-        raise InvalidInput("cloud.attrs['schema_version']", found, str(SCHEMA_VERSION))
+            actual = cloud[name].dims if name in cloud else "missing"
+            raise InvalidInput(f"cloud.{name}", actual, f"a variable over {dims}")
+    version = cloud.attrs.get("schema_version")
+    if version != SCHEMA_VERSION:
+        raise InvalidInput("cloud.attrs['schema_version']", version, str(SCHEMA_VERSION))
     return cloud
 
 
@@ -203,16 +203,16 @@ _ATTRIBUTES = {
 
 
 def _disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[InvalidInput]:
-    """What of a cloud is not as its design says."""
+    """Disagreements of a cloud with its design."""
     seed = cloud.attrs.get("seed", 0)  # a cloud of another program has none
     if not isinstance(seed, int) or isinstance(seed, bool):
         yield InvalidInput("cloud.attrs['seed']", repr(seed), "a whole number")
-    found = {
+    pairs = {
         "axis": (cloud.get("axis"), AXES),
         "bundle": (cloud.get("bundle"), arm.bundle_names),
         "unit": (cloud.get("unit"), arm.bundle_units),
     }
-    for name, (labels, wanted) in found.items():
+    for name, (labels, wanted) in pairs.items():
         if labels is not None and tuple(map(str, labels.values)) != tuple(wanted):
             shown = ", ".join(map(str, labels.values))
             yield InvalidInput(f"cloud.{name}", shown, f"{', '.join(wanted)}, as its design says")
@@ -232,8 +232,8 @@ def _disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[InvalidInput
 def _pose_disagreements(cloud: xr.Dataset, arm: Manipulator) -> Iterator[InvalidInput]:
     """A pose of the base that is not that of the design; clouds made before poses have none."""
     for name, wanted in _pose(arm).items():
-        found = as_numbers(cloud.attrs.get(name, wanted))
-        if found.shape != (len(wanted),) or not np.allclose(found, wanted):
+        values = as_numbers(cloud.attrs.get(name, wanted))
+        if values.shape != (len(wanted),) or not np.allclose(values, wanted):
             shown = as_given(cloud.attrs[name])
             yield InvalidInput(f"cloud.attrs['{name}']", shown, f"{wanted}, as its design says")
 
@@ -256,7 +256,7 @@ _SYMBOLS = {"1": "γ", "N": "τ", "Pa": "P"}
 
 
 def activation_symbols(units: Iterable[str]) -> tuple[str, ...]:
-    """What formulas call activations of these units: γ, the tension τ, the pressure P."""
+    """Symbols of activations of these units: γ, the tension τ, the pressure P."""
     return tuple(_SYMBOLS.get(unit, "a") for unit in units)
 
 
@@ -318,7 +318,7 @@ def frame_of(data: xr.Dataset) -> Literal["world", "base"]:
 
 
 def base_of(data: xr.Dataset) -> Array:
-    """Where the arm of a dataset is clamped, in the frame of its places [m], shape (3,)."""
+    """Position of the clamped end of the arm, in the frame of the dataset [m], shape (3,)."""
     place = data.attrs.get("base_position", (0.0, 0.0, 0.0))
     return np.array(place if frame_of(data) == "world" else (0.0, 0.0, 0.0), float)
 

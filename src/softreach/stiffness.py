@@ -1,4 +1,4 @@
-"""How far the tip yields to a force, and in which directions it is soft."""
+"""Compliance of the tip, and the directions in which it is soft."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def tip_compliance(arm: Manipulator | TipMap, activations: ArrayLike, tol: float
 
 
 class PrincipalCompliances(NamedTuple):
-    """What forces of one size in all directions do: they move the tip to an ellipsoid."""
+    """Axes of the ellipsoid to which forces of one size in all directions move the tip."""
 
     values: Array
     """|∂r| per |F| along each axis of the ellipsoid, largest first [m/N], shape (n, 3)."""
@@ -73,12 +73,12 @@ class PrincipalCompliances(NamedTuple):
 
     @property
     def largest(self) -> Array:
-        """How far the tip yields where it is softest [m/N], shape (n,)."""
+        """Compliance where the tip is softest [m/N], shape (n,)."""
         return self.values[:, 0]
 
     @property
     def smallest(self) -> Array:
-        """How far the tip yields where it is stiffest [m/N], shape (n,)."""
+        """Compliance where the tip is stiffest [m/N], shape (n,)."""
         return self.values[:, 2]
 
 
@@ -89,7 +89,7 @@ def principal_compliances(compliance: ArrayLike) -> PrincipalCompliances:
     these are its eigenvalues.
 
     Args:
-        compliance: What `tip_compliance` gives [m/N], shape (n, 3, 3).
+        compliance: As of `tip_compliance` [m/N], shape (n, 3, 3).
 
     Raises:
         InvalidInput: Another shape.
@@ -108,7 +108,7 @@ def stiffness_along(compliance: ArrayLike, direction: ArrayLike) -> Array:
     The tip is free to give way sideways. Infinite where it does not yield at all.
 
     Args:
-        compliance: What `tip_compliance` gives [m/N], shape (n, 3, 3).
+        compliance: As of `tip_compliance` [m/N], shape (n, 3, 3).
         direction: d, of any length, shape (3,) or (n, 3).
 
     Raises:

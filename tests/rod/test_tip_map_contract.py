@@ -22,9 +22,9 @@ from softreach.cloud.curvature import stream_statistics
 from softreach.rod import equilibria
 from softreach.rod.free import FreeRod
 from softreach.rod.loaded.rod import LoadedRod
-from softreach.rod.placed import PlacedRod
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
+from softreach.rod.view import PlacedRod
 from softreach.support.errors import InvalidDesign, InvalidInput
 from tests.bodies import rubber
 from tests.kinds import fibers_and_a_tendon

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.number import as_numbers, number
 from softreach.arm.part import Part
+from softreach.support.arrays import read_only
 from softreach.support.errors import Fault
 
 __all__ = ["POINTS", "UPRIGHT", "Base", "rotation_matrices"]
@@ -41,7 +42,7 @@ _ALLOWED = (
 _FARTHEST = 1e6
 """Farthest from the origin [m]: beyond, rounding of places in the world is too coarse."""
 _NEAR = 1e-6
-"""How far the numbers of a rotation may be off: what is typed with seven digits."""
+"""Largest error of the numbers of a rotation: what is typed with seven digits."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,12 +91,11 @@ class Base(Part):
         if self.turn:
             c, s = np.cos(self.turn), np.sin(self.turn)
             turned = turned @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        turned.setflags(write=False)
-        return turned
+        return read_only(turned)
 
     @cached_property
     def is_identity(self) -> bool:
-        """Whether the frame of the base is that of the world."""
+        """True if the frame of the base is that of the world."""
         return not any(self.position) and bool((self.rotation == np.eye(3)).all())
 
     def to_world(self, points: ArrayLike) -> Array:
@@ -125,11 +125,11 @@ class Base(Part):
 
 
 class _Reading(NamedTuple):
-    """What `points` means."""
+    """Rotation that `points` means."""
 
     matrix: Array
     wrong: str = ""
-    """What is wrong with it, if anything."""
+    """Fault of `points`; empty if there is none."""
 
 
 def _as_rotation(points: Any) -> _Reading:
@@ -137,39 +137,39 @@ def _as_rotation(points: Any) -> _Reading:
     if isinstance(points, str):
         rows = POINTS.get(points)
         return _Reading(np.array(rows or POINTS["up"]), "" if rows else _ALLOWED)
-    given = as_numbers(points.as_matrix() if hasattr(points, "as_matrix") else points)
-    if not np.isfinite(given).all():
+    numbers = as_numbers(points.as_matrix() if hasattr(points, "as_matrix") else points)
+    if not np.isfinite(numbers).all():
         return _Reading(np.eye(3), _ALLOWED)
-    if given.shape == (3,):
-        return _of_vector(given)
-    if given.shape == (4,):
-        return _of_quaternion(given)
-    return _of_matrix(given) if given.shape == (3, 3) else _Reading(np.eye(3), _ALLOWED)
+    if numbers.shape == (3,):
+        return _of_vector(numbers)
+    if numbers.shape == (4,):
+        return _of_quaternion(numbers)
+    return _of_matrix(numbers) if numbers.shape == (3, 3) else _Reading(np.eye(3), _ALLOWED)
 
 
-def _of_matrix(given: Array) -> _Reading:
-    off = float(np.abs(given.T @ given - np.eye(3)).max())
+def _of_matrix(matrix: Array) -> _Reading:
+    off = float(np.abs(matrix.T @ matrix - np.eye(3)).max())
     if off > _NEAR:
         columns = f"its columns are not of length 1 and at right angles, by {off:.2g}"
         return _Reading(np.eye(3), f"must be a rotation; {columns}")
-    if np.linalg.det(given) < 0:
+    if np.linalg.det(matrix) < 0:
         return _Reading(np.eye(3), "must be a rotation; these axes are left-handed")
-    return _Reading(given)
+    return _Reading(matrix)
 
 
-def _of_quaternion(given: Array) -> _Reading:
-    size = float(np.linalg.norm(given))
+def _of_quaternion(quaternion: Array) -> _Reading:
+    size = float(np.linalg.norm(quaternion))
     if abs(size - 1.0) > _NEAR:
         return _Reading(np.eye(3), f"must be a quaternion (w, x, y, z) of length 1, not {size:.4g}")
-    return _Reading(rotation_matrices(given / size))
+    return _Reading(rotation_matrices(quaternion / size))
 
 
-def _of_vector(given: Array) -> _Reading:
-    angle = float(np.linalg.norm(given))
+def _of_vector(vector: Array) -> _Reading:
+    angle = float(np.linalg.norm(vector))
     if abs(angle - 1.0) < _NEAR:  # (0, 0, -1) is meant to be down, and would be up, turned by 1 rad
         why = "three numbers are a rotation vector [rad], and these look like a direction"
         return _Reading(np.eye(3), f"must be a word or a rotation; {why}: say it by a matrix")
-    x, y, z = (np.sinc(0.5 * angle / np.pi) * 0.5 * given).tolist()
+    x, y, z = (np.sinc(0.5 * angle / np.pi) * 0.5 * vector).tolist()
     return _of_quaternion(np.array([np.cos(0.5 * angle), x, y, z]))
 
 

@@ -136,10 +136,10 @@ def _largest(arm: Manipulator, measure: Callable[[Array], Array]) -> Extreme:
     stations = [grid.ravel()]
     for _ in range(_ROUNDS):
         inside = np.linspace(low, high, _POINTS, axis=1)
-        found = measure(inside.ravel())
+        finer = measure(inside.ravel())
         stations.append(inside.ravel())
-        values = np.concatenate([values, found])
-        best = found.reshape(inside.shape).argmax(axis=1)
+        values = np.concatenate([values, finer])
+        best = finer.reshape(inside.shape).argmax(axis=1)
         row = np.arange(len(inside))
         low, high = (
             inside[row, np.maximum(best - 1, 0)],
@@ -168,8 +168,8 @@ def _grid(arm: Manipulator) -> Array:
     ends = np.array([0.0, *arm.breakpoints, arm.length])
     start, end = ends[:-1].copy(), ends[1:].copy()
     start[1:], end[:-1] = np.nextafter(start[1:], np.inf), np.nextafter(end[:-1], -np.inf)
-    whole = _STATIONS + _PER_TURN * _turns(arm)
-    count = math.ceil(whole * float((end - start).max()) / arm.length)
+    along = _STATIONS + _PER_TURN * _turns(arm)
+    count = math.ceil(along * float((end - start).max()) / arm.length)
     return np.linspace(start, end, max(_FEWEST, count), axis=1)
 
 

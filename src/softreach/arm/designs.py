@@ -54,7 +54,7 @@ def minimal_trunk(
         taper: φ [rad].
         length: L [m].
         radius_ratio: R1/R2 [-].
-        material: What all of the arm is made of; None for an incompressible one whose Young's
+        material: Material of all of the arm; None for an incompressible one whose Young's
             modulus cancels.
     """
     turn, body = fields_of(FiberArchitecture)["revolution"], fields_of(LinearTaper)
@@ -94,7 +94,7 @@ def redundant_trunk(
         taper: φ [rad].
         length: L [m].
         radius_ratio: R1/R2 [-].
-        material: What all of the arm is made of; None for an incompressible one whose Young's
+        material: Material of all of the arm; None for an incompressible one whose Young's
             modulus cancels.
     """
     arm = minimal_trunk(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -49,7 +50,7 @@ def with_actuator(arm: Manipulator, kind: str) -> Manipulator:
     Raises:
         InvalidDesign: A tendon or a chamber in an arm without Young's modulus.
     """
-    name = _new_name(kind, [one.name for one in arm.actuators])
+    name = _new_name(kind, [actuator.name for actuator in arm.actuators])
     actuator = ACTUATOR_KINDS[kind](arm, name, _widest_gap(arm))
     return arm.replace(actuators=(*arm.actuators, actuator))
 
@@ -60,7 +61,7 @@ def without_actuator(arm: Manipulator, name: str) -> Manipulator:
     Raises:
         InvalidInput: It is the last one.
     """
-    others = tuple(one for one in arm.actuators if one.name != name)
+    others = tuple(actuator for actuator in arm.actuators if actuator.name != name)
     if not others:
         raise InvalidInput("actuators", name, "more than one to remove one of them")
     return arm.replace(actuators=others)
@@ -72,16 +73,20 @@ def with_actuator_name(arm: Manipulator, old: str, new: str) -> Manipulator:
     Raises:
         InvalidDesign: Another one has this name.
     """
-    return arm.replace(
-        actuators=tuple(one.replace(name=new) if one.name == old else one for one in arm.actuators)
-    )
+    return _with_changed(arm, old, name=new)
 
 
 def with_actuator_ring(arm: Manipulator, name: str, ring: int) -> Manipulator:
     """The arm with one of its actuators in another ring, counted from 0."""
+    return _with_changed(arm, name, ring=ring)
+
+
+def _with_changed(arm: Manipulator, name: str, /, **changes: Any) -> Manipulator:
+    """The arm with an actuator changed."""
     return arm.replace(
         actuators=tuple(
-            one.replace(ring=ring) if one.name == name else one for one in arm.actuators
+            actuator.replace(**changes) if actuator.name == name else actuator
+            for actuator in arm.actuators
         )
     )
 
@@ -112,15 +117,16 @@ def without_ring(arm: Manipulator, index: int) -> Manipulator:
     rings, gone = arm.section.rings, arm.section.rings[index]
     if len(rings) == 1:
         raise InvalidInput("rings", ring_label(arm, index), "more than one to remove one of them")
-    inside = [one.name for one in _in_rings(arm) if arm.section.ring(one.ring) is gone]
+    inside = [
+        actuator.name for actuator in _in_rings(arm) if arm.section.ring(actuator.ring) is gone
+    ]
     if inside:
         hint = f"move or remove {', '.join(inside)} first"
         raise InvalidInput("rings", ring_label(arm, index), "without actuators to be removed", hint)
     kept = tuple(ring for k, ring in enumerate(rings) if k != index)
     section = arm.section.replace(rings=kept)
-    return arm.replace(
-        section=section, actuators=tuple(_shifted(one, arm, kept) for one in arm.actuators)
-    )
+    shifted = tuple(_shifted(actuator, arm, kept) for actuator in arm.actuators)
+    return arm.replace(section=section, actuators=shifted)
 
 
 def with_ring_name(arm: Manipulator, index: int, name: str) -> Manipulator:
@@ -132,8 +138,10 @@ def with_ring_name(arm: Manipulator, index: int, name: str) -> Manipulator:
     rings = _with(arm, index, lambda ring: ring.replace(name=name))
     old = arm.section.rings[index].name
     moved = tuple(
-        one.replace(ring=index) if isinstance(one, SectorActuator) and one.ring == old else one
-        for one in arm.actuators
+        actuator.replace(ring=index)
+        if isinstance(actuator, SectorActuator) and actuator.ring == old
+        else actuator
+        for actuator in arm.actuators
     )
     return arm.replace(section=arm.section.replace(rings=rings), actuators=moved)
 
@@ -225,7 +233,7 @@ def _new_name(kind: str, taken: Iterable[str]) -> str:
 
 
 def _in_rings(arm: Manipulator) -> list[SectorActuator]:
-    return [one for one in arm.actuators if isinstance(one, SectorActuator)]
+    return [actuator for actuator in arm.actuators if isinstance(actuator, SectorActuator)]
 
 
 def _shifted(actuator: Actuator, arm: Manipulator, kept: tuple[Ring, ...]) -> Actuator:

@@ -84,7 +84,7 @@ class Loads(Part):
     def _faults(self) -> list[Fault]:
         points = self.point_loads
         are_loads = isinstance(points, tuple | list) and all(
-            isinstance(one, PointLoad) for one in points
+            isinstance(load, PointLoad) for load in points
         )
         wrong = [] if are_loads else [Fault("point_loads", points, "must be PointLoads")]
         return super()._faults() + wrong
@@ -96,9 +96,9 @@ class Loads(Part):
             faults += section.density_faults("where weight counts")
         allowed = f"must be on the arm, at most {length:g} m"
         return faults + [
-            Fault(f"loads.point_loads[{k}].station", one.station, allowed)
-            for k, one in enumerate(self.point_loads)
-            if one.station > length
+            Fault(f"loads.point_loads[{k}].station", load.station, allowed)
+            for k, load in enumerate(self.point_loads)
+            if load.station > length
         ]
 
     def seen_from(self, base: Base) -> Self:
@@ -106,11 +106,11 @@ class Loads(Part):
         if base.is_identity:
             return self
         points = tuple(
-            one.replace(
-                force=base.directions_to_base(one.force),
-                moment=base.directions_to_base(one.moment),
+            load.replace(
+                force=base.directions_to_base(load.force),
+                moment=base.directions_to_base(load.moment),
             )
-            for one in self.point_loads
+            for load in self.point_loads
         )
         dead = ("gravity", "tip_force", "tip_moment", "force_per_length")
         turned = {name: base.directions_to_base(getattr(self, name)) for name in dead}
@@ -119,5 +119,5 @@ class Loads(Part):
     @property
     def conservative(self) -> bool:
         """The loads have a potential, so that stable means of least energy."""
-        moments = (self.tip_moment, *(one.moment for one in self.point_loads))
+        moments = (self.tip_moment, *(load.moment for load in self.point_loads))
         return not any(map(any, (self.follower_force, self.follower_moment, *moments)))

@@ -29,7 +29,7 @@ from softreach.support.arguments import (
     as_text,
     plain,
 )
-from softreach.support.arrays import as_stations
+from softreach.support.arrays import as_stations, read_only
 from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
 from softreach.support.files.atomic import writing
 
@@ -60,7 +60,7 @@ class Manipulator:
     loads: Loads | None = None
     """Loads beside them; None for nothing, not even its weight."""
     base: Base = UPRIGHT
-    """Where in the world it is clamped, and which way it points; upright at the origin."""
+    """Pose of its clamped end in the world; upright at the origin."""
 
     def __post_init__(self) -> None:
         if faults := list(_part_faults(self)):
@@ -95,7 +95,7 @@ class Manipulator:
             young_modulus: E [Pa]; None where it cancels: nothing weighs and only fibers or muscles
                 act.
             density: ρ [kg/m³]; None where nothing weighs.
-            actuators: What drives the arm.
+            actuators: Actuators that drive the arm.
             activation_bounds: (lower, upper) of γ for every bundle, or one pair per bundle [-];
                 None for their own.
 
@@ -141,7 +141,8 @@ class Manipulator:
         pairs = np.broadcast_to(np.asarray(activation_bounds, float), (self.bundles, 2))
         ends = np.cumsum([actuator.bundles for actuator in self.actuators], dtype=int)
         shares = zip(self.actuators, np.split(pairs, ends)[:-1], strict=True)
-        return self.replace(actuators=tuple(one.with_bounds(share) for one, share in shares))
+        actuators = tuple(actuator.with_bounds(share) for actuator, share in shares)
+        return self.replace(actuators=actuators)
 
     def split(self, fiber: str | int, count: int, *, keep_extent: bool = True) -> Self:
         """Replace an architecture of one bundle by `count` independent ones beside each other.
@@ -153,7 +154,7 @@ class Manipulator:
 
         Args:
             fiber: Name or index of the architecture.
-            count: How many take its place; 1 leaves the design as it is.
+            count: Number of those that take its place; 1 leaves the design as it is.
             keep_extent: True gives each the extent σ of the original, False its share σ / count, so
                 that together they fill the sector of the original.
 
@@ -235,7 +236,7 @@ class Manipulator:
     @property
     def fibers(self) -> tuple[FiberArchitecture, ...]:
         """Those actuators that are fiber architectures."""
-        return tuple(one for one in self.actuators if isinstance(one, FiberArchitecture))
+        return tuple(each for each in self.actuators if isinstance(each, FiberArchitecture))
 
     @property
     def bundles(self) -> int:
@@ -248,22 +249,26 @@ class Manipulator:
         return tuple(name for actuator in self.actuators for name in actuator.bundle_names)
 
     @cached_property
+    def bundle_actuators(self) -> tuple[Actuator, ...]:
+        """The actuator of each bundle."""
+        return tuple(actuator for actuator in self.actuators for _ in range(actuator.bundles))
+
+    @cached_property
     def bundle_units(self) -> tuple[str, ...]:
         """The unit of the activation of each bundle."""
-        return tuple(one.unit for one in self.actuators for _ in range(one.bundles))
+        return tuple(actuator.unit for actuator in self.bundle_actuators)
 
     @cached_property
     def bounds(self) -> Array:
         """Lower and upper activation of each bundle [unit], shape (bundles, 2), read-only."""
-        bounds = np.concatenate([np.empty((0, 2)), *(one.bounds for one in self.actuators)])
-        bounds.setflags(write=False)
-        return bounds
+        bounds = (actuator.bounds for actuator in self.actuators)
+        return read_only(np.concatenate([np.empty((0, 2)), *bounds]))
 
     @cached_property
     def breakpoints(self) -> tuple[float, ...]:
         """Stations inside (0, L) where profile or actuators are not smooth, ascending [m]."""
         places = {0.0, self.length, *self.profile.breakpoints}
-        places.update(z for one in self.actuators for z in one.breakpoints(self.profile))
+        places.update(z for actuator in self.actuators for z in actuator.breakpoints(self.profile))
         ascending = np.array(sorted(places))
         # Two that differ by rounding alone are one.
         apart = np.diff(ascending, prepend=-np.inf) > 1e-12 * self.length
@@ -273,20 +278,20 @@ class Manipulator:
     @property
     def bundle_courses(self) -> tuple[str, ...]:
         """Direction of contraction within each bundle; see `Actuator.course`."""
-        return tuple(one.course for one in self.actuators for _ in range(one.bundles))
+        return tuple(actuator.course for actuator in self.bundle_actuators)
 
     def outline(self, z: ArrayLike) -> Outline:
         """Places of all bundles in the sections at stations Z [m], shape (station,)."""
         stations = as_stations("z", z)
-        each = [one.outline(self.profile, self.section, stations) for one in self.actuators]
+        each = [part.outline(self.profile, self.section, stations) for part in self.actuators]
         each = each or [Outline.empty(len(stations))]
         return Outline(
-            center=np.concatenate([one.center for one in each], axis=1),
-            extent=np.concatenate([one.extent for one in each]),
-            inner_ratio=np.concatenate([one.inner_ratio for one in each], axis=1),
-            outer_ratio=np.concatenate([one.outer_ratio for one in each], axis=1),
-            shape=tuple(shape for one in each for shape in one.shape),
-            acts=np.concatenate([one.acts for one in each], axis=1),
+            center=np.concatenate([part.center for part in each], axis=1),
+            extent=np.concatenate([part.extent for part in each]),
+            inner_ratio=np.concatenate([part.inner_ratio for part in each], axis=1),
+            outer_ratio=np.concatenate([part.outer_ratio for part in each], axis=1),
+            shape=tuple(shape for part in each for shape in part.shape),
+            acts=np.concatenate([part.acts for part in each], axis=1),
         )
 
     def __repr__(self) -> str:
@@ -406,7 +411,8 @@ def _named(actuators: Sequence[Actuator]) -> Iterator[Actuator]:
 
 def _shared_names(arm: Manipulator) -> Iterator[Fault]:
     """Names that two actuators or two bundles share."""
-    yield from (faults := list(name_faults([one.name for one in arm.actuators], "actuators")))
+    names = [actuator.name for actuator in arm.actuators]
+    yield from (faults := list(name_faults(names, "actuators")))
     names = arm.bundle_names
     if not faults and len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)

@@ -91,16 +91,16 @@ class Number:
             return []
         if self.shape == "series":
             return [
-                Fault(f"{self.field}[{k}]", one, self.allowed)
-                for k, one in enumerate(as_numbers(value).ravel().tolist())
-                if math.isfinite(one) and not self.allowed.admits(one)
+                Fault(f"{self.field}[{k}]", element, self.allowed)
+                for k, element in enumerate(as_numbers(value).ravel().tolist())
+                if math.isfinite(element) and not self.allowed.admits(element)
             ]
         if self.shape == "triple":
             allowed = "must be three finite numbers"
             return [] if _is_triple(value) else [Fault(self.field, value, allowed)]
         if self.along is not None and isinstance(value, self.along):
-            outside = [one for one in value.values if not self.allowed.admits(one)]  # pyright: ignore
-            return [Fault(self.field, one, self.allowed) for one in outside]
+            outside = [element for element in value.values if not self.allowed.admits(element)]  # pyright: ignore
+            return [Fault(self.field, element, self.allowed) for element in outside]
         single = plain(value)
         if self.shape == "single" and self.allowed.admits(single):
             return []
@@ -182,7 +182,7 @@ def series_faults(values: Mapping[str, Any], field: str, per_station: bool = Tru
 
     Args:
         values: `stations_over_length` and the values themselves.
-        field: What the values are called.
+        field: Name of the values.
         per_station: One for each station; else one for each gap between them.
     """
     stations, along = as_numbers(values["stations_over_length"]), as_numbers(values[field])

@@ -26,8 +26,8 @@ class Part:
     def __post_init__(self) -> None:
         if faults := self._faults():
             raise InvalidDesign(faults)
-        for one in fields_of(type(self)).values():
-            object.__setattr__(self, one.field, one.normal(getattr(self, one.field)))
+        for declared in fields_of(type(self)).values():
+            object.__setattr__(self, declared.field, declared.normal(getattr(self, declared.field)))
 
     def replace(self, **changes: Any) -> Self:
         """A copy with some fields changed, checked like a new one."""
@@ -36,6 +36,8 @@ class Part:
     def _faults(self) -> list[Fault]:
         """Everything wrong with its fields; kinds add their own."""
         numbers = fields_of(type(self)).values()
-        faults = [fault for one in numbers for fault in one.faults(getattr(self, one.field))]
+        faults = [
+            fault for number in numbers for fault in number.faults(getattr(self, number.field))
+        ]
         name = getattr(self, "name", "")
         return faults if isinstance(name, str) else [*faults, Fault("name", name, "must be text")]

@@ -117,7 +117,7 @@ class Section(Part):
         super().__post_init__()
 
     def _faults(self) -> list[Fault]:
-        faults = super()._faults() + list(name_faults([one.name for one in self.rings], "rings"))
+        faults = super()._faults() + list(name_faults([ring.name for ring in self.rings], "rings"))
         outer = [ring.outer_ratio for ring in self.rings]
         if (reach := max(outer)) != 1.0:
             allowed = "must be 1 for the outermost ring, which reaches the surface of the arm"
@@ -183,7 +183,8 @@ class Section(Part):
         outer = np.asarray(radius, float)
         area = np.pi * self._sum(_modulus, 2)
         inertia = np.pi / 4 * self._sum(_modulus, 4)
-        polar = np.pi / 4 * self._sum(lambda one: _modulus(one) / (1 + one.poisson_ratio), 4)
+        shear = self._sum(lambda material: _modulus(material) / (1 + material.poisson_ratio), 4)
+        polar = np.pi / 4 * shear
         return Stiffness(area * outer**2, inertia * outer**4, polar * outer**4)
 
     def mass_per_length(self, radius: ArrayLike) -> Array:
@@ -194,7 +195,8 @@ class Section(Part):
         """
         if faults := self.density_faults("where weight counts"):
             raise InvalidDesign(faults)
-        return np.pi * self._sum(lambda one: one.density or 0.0, 2) * np.asarray(radius, float) ** 2
+        density = self._sum(lambda material: material.density or 0.0, 2)
+        return np.pi * density * np.asarray(radius, float) ** 2
 
     def modulus_faults(self, why: str) -> list[Fault]:
         """A fault for each material whose Young's modulus is needed and left out.
@@ -223,7 +225,7 @@ class Section(Part):
     def _merged(self) -> tuple[Layer, ...]:
         """The layers, those of one material that touch made one, so that no digit is lost."""
         merged: list[Layer] = []
-        for layer in sorted(self.layers, key=lambda one: one.inner_ratio):
+        for layer in sorted(self.layers, key=lambda layer: layer.inner_ratio):
             last = merged[-1] if merged else None
             touches = last is not None and last.outer_ratio == layer.inner_ratio
             if last and touches and last.material.same_matter(layer.material):

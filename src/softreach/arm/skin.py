@@ -167,7 +167,7 @@ def body_skin(arm: Body, line: Centerline, sides: int = 32) -> Surface:
 
     Args:
         arm: The design.
-        line: Where its sections are.
+        line: Centerline with its sections.
         sides: Corners of each section.
 
     Raises:
@@ -184,7 +184,7 @@ def bundle_curves(arm: Body, line: Centerline) -> Array:
     """
     every = np.ones((len(line.z) - 1, arm.bundles), bool)
     spans = [next(parts) for parts in _spans(arm, line, every)]
-    return np.stack([one.curve() for one in spans])
+    return np.stack([span.curve() for span in spans])
 
 
 def bundle_skins(
@@ -194,13 +194,13 @@ def bundle_skins(
 
     Args:
         arm: The design; bundle j covers a_j - σ_j/2 to a_j + σ_j/2.
-        line: Where its sections are; give it `arm.breakpoints`, so that bundles end there.
-        lift: How far bands are above their ring, in R2 [-].
+        line: Centerline with its sections; give it `arm.breakpoints`, so that bundles end there.
+        lift: Height of bands above their ring, in R2 [-].
         step: Largest angle between neighboring points across a band [rad].
     """
 
-    def sector(one: _Span) -> Surface:
-        band = one.band(lift, step)
+    def sector(span: _Span) -> Surface:
+        band = span.band(lift, step)
         # along x across is d3 x e_θ = -e_R: turned, so that faces point outwards
         return Surface(vertices=band.reshape(-1, 3), faces=grid_faces(*band.shape[:2])[:, ::-1])
 
@@ -214,14 +214,14 @@ def bundle_solids(
 
     Args:
         arm: The design.
-        line: Where its sections are; give it `arm.breakpoints`, so that bundles end there.
+        line: Centerline with its sections; give it `arm.breakpoints`, so that bundles end there.
         thickness: Of the skins, in R2 [-].
         step: Largest angle between neighboring points across a band [rad].
     """
 
-    def sector(one: _Span) -> Surface:
+    def sector(span: _Span) -> Surface:
         # along x across is d3 x e_θ = -e_R: the inner patch is the upper one
-        return ribbon_surface(one.band(thickness / 2, step), one.band(-thickness / 2, step))
+        return ribbon_surface(span.band(thickness / 2, step), span.band(-thickness / 2, step))
 
     return _skins(arm, line, sector)
 
@@ -243,7 +243,9 @@ def arm_card(arm: Body) -> str:
     line = line.with_stations(arm.breakpoints)
     body = body_skin(arm, line)
     bundles = bundle_skins(arm, line, lift=0.01, step=_CARD_STEP)
-    skins = (Skin(one.vertices, one.faces, bundle_color(k)) for k, one in enumerate(bundles))
+    skins = (
+        Skin(bundle.vertices, bundle.faces, bundle_color(k)) for k, bundle in enumerate(bundles)
+    )
     body_card = Skin(body.vertices, body.faces, BODY, clear=any(inside(arm)))
     return html_card(repr(arm), body_card, *skins)
 
@@ -251,9 +253,9 @@ def arm_card(arm: Body) -> str:
 def _skins(arm: Body, line: Centerline, sector: Callable[[_Span], Surface]) -> list[Surface]:
     middle = 0.5 * (line.z[1:] + line.z[:-1])
     width = _LINE * arm.length
-    make = {"sector": sector, "line": lambda one: _line_tube(one, width), "lumen": _lumen}
+    make = {"sector": sector, "line": lambda span: _line_tube(span, width), "lumen": _lumen}
     return [
-        joined([make[one.shape](one) for one in spans])
+        joined([make[span.shape](span) for span in spans])
         for spans in _spans(arm, line, arm.outline(middle).acts)
     ]
 
@@ -285,19 +287,21 @@ def _runs(acts: NDArray[np.bool_]) -> list[slice]:
     return [slice(int(start), int(end) + 1) for start, end in pairs]
 
 
-def _line_tube(one: _Span, radius: float) -> Surface:
+def _line_tube(span: _Span, radius: float) -> Surface:
     """A thin tube, round across its own direction."""
-    curve = one.curve()
+    curve = span.curve()
     along = _unit(np.gradient(curve, axis=0))
-    spoke = one.points(one.center[:, None], np.ones(len(curve)))[:, 0] - one.position
+    spoke = span.points(span.center[:, None], np.ones(len(curve)))[:, 0] - span.position
     normal = _unit(_across(spoke, along))
     return tube_surface(curve, normal, np.cross(along, normal), radius, _LINE_SIDES)
 
 
-def _lumen(one: _Span) -> Surface:
+def _lumen(span: _Span) -> Surface:
     """A tube, round in the sections."""
-    radius = 0.5 * (one.outer_ratio - one.inner_ratio) * one.arm_radius
-    return tube_surface(one.curve(), one.directors[:, 0], one.directors[:, 1], radius, _LUMEN_SIDES)
+    radius = 0.5 * (span.outer_ratio - span.inner_ratio) * span.arm_radius
+    return tube_surface(
+        span.curve(), span.directors[:, 0], span.directors[:, 1], radius, _LUMEN_SIDES
+    )
 
 
 def _across(vector: Array, along: Array) -> Array:

@@ -102,10 +102,10 @@ def describe(arm: Manipulator) -> DesignSummary:
             smallest_bending(arm).value * arm.length,
             largest_bending(arm).value * arm.length,
         ),
-        bundle_extension=_pairs(extension_range(one) for one in _alone(arm)),
-        bundle_bending=_pairs(_slender_bending(one) for one in _alone(arm)),
+        bundle_extension=_pairs(extension_range(alone) for alone in _alone(arm)),
+        bundle_bending=_pairs(_slender_bending(alone) for alone in _alone(arm)),
         breakpoints=arm.breakpoints,
-        validity=tuple(dict.fromkeys(_validity(one) for one in arm.actuators if one.validity)),
+        validity=tuple(dict.fromkeys(_validity(each) for each in arm.actuators if each.validity)),
         warnings=design_warnings(arm),
         **_of_matter(arm),
     )
@@ -229,9 +229,9 @@ def _of_loads(arm: Manipulator, loads: Loads) -> tuple[float, float]:
     force = payload + math.hypot(*loads.tip_force) + math.hypot(*loads.follower_force)
     moment = payload * math.hypot(*loads.payload_arm)
     moment += math.hypot(*loads.tip_moment) + math.hypot(*loads.follower_moment)
-    for one in loads.point_loads:
-        force += math.hypot(*one.force)
-        moment += math.hypot(*one.moment)
+    for load in loads.point_loads:
+        force += math.hypot(*load.force)
+        moment += math.hypot(*load.moment)
     return per_length, force + moment / arm.length
 
 
@@ -309,9 +309,8 @@ def _chambers_outside(arm: Manipulator) -> Iterator[str]:
 def _ring_of_each_bundle(arm: Manipulator) -> list[int | None]:
     """Index of the ring that a bundle fills a sector of; None for other kinds."""
     return [
-        arm.section.ring_index(one.ring) if isinstance(one, SectorActuator) else None
-        for one in arm.actuators
-        for _ in range(one.bundles)
+        arm.section.ring_index(actuator.ring) if isinstance(actuator, SectorActuator) else None
+        for actuator in arm.bundle_actuators
     ]
 
 

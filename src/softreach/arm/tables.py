@@ -67,7 +67,7 @@ def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
     resistance = np.stack([stiffness.bending, stiffness.bending, stiffness.torsion], axis=1)
     extension = np.concatenate([load.force for load in loads], axis=1) / stiffness.axial[:, None]
     curvature = np.concatenate([load.moment for load in loads], axis=2) / resistance[..., None]
-    is_force = [one.is_force for one in arm.actuators for _ in range(one.bundles)]
+    is_force = [actuator.is_force for actuator in arm.bundle_actuators]
     growth = np.where(is_force, 0.0, extension) if any(is_force) else extension
     return Tables(z, extension, curvature, growth)
 
@@ -129,13 +129,13 @@ def check_extension(arm: Manipulator) -> None:
 
 def _winding_faults(arm: Manipulator) -> Iterator[Fault]:
     """Fibers and tendons that wind so often about the arm that no steps follow them."""
-    for one in arm.actuators:
-        if "revolution" in fields_of(type(one)):
+    for actuator in arm.actuators:
+        if "revolution" in fields_of(type(actuator)):
             with np.errstate(all="ignore"):
-                turns = abs(one.value_on("revolution", arm.profile, arm.section)) / (2 * np.pi)
+                turns = abs(actuator.value_on("revolution", arm.profile, arm.section)) / (2 * np.pi)
             if not turns <= MOST_TURN / (2 * np.pi):
                 allowed = f"must be at most {MOST_TURN / (2 * np.pi):g}: give a smaller angle"
-                yield Fault(f"turns of {one.name}", float(turns), allowed)
+                yield Fault(f"turns of {actuator.name}", float(turns), allowed)
 
 
 def extension_range(arm: Manipulator) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
@@ -56,27 +56,6 @@ def _metrics_of(choice: str | Metric) -> tuple[Metric, ...]:
     if not isinstance(choice, str) or choice not in METRIC_GROUPS:
         raise InvalidInput("metrics", as_given(choice), _ALLOWED)
     return METRIC_GROUPS[choice]
-
-
-def _metric(
-    name: str,
-    unit: str,
-    meaning: str,
-    compute: Callable[..., Any],
-    needs: tuple[Need, ...],
-    nan_if: str = "",
-    over: tuple[str, ...] = (),
-) -> Metric:
-    """A row of the table."""
-    return Metric(
-        name=name,
-        unit=unit,
-        meaning=meaning,
-        needs=needs,
-        compute=compute,
-        over=over,
-        nan_if=nan_if,
-    )
 
 
 def _lowest(axis: int, tips: Array) -> float:
@@ -136,6 +115,8 @@ _SET, _ALPHA = (Need.REACHABLE_SET,), (Need.ALPHA_COMPLEX, Need.ALPHA)
 _FINITE = "the design has other than three bundles"
 _ENDS = (("min", "lower", _lowest), ("max", "upper", _highest))
 
+_COLUMNS = ("name", "unit", "meaning", "compute", "needs", "nan_if", "over")
+
 # fmt: off
 _ROWS: dict[str, list[tuple[Any, ...]]] = {
     "extent": [
@@ -193,7 +174,10 @@ _ROWS: dict[str, list[tuple[Any, ...]]] = {
 }
 # fmt: on
 
-METRIC_GROUPS = {group: tuple(_metric(*row) for row in rows) for group, rows in _ROWS.items()}
+METRIC_GROUPS = {
+    group: tuple(Metric(**dict(zip(_COLUMNS, row, strict=False))) for row in rows)
+    for group, rows in _ROWS.items()
+}
 """Group -> its metrics. Those of `curvature` are quantiles at stations, the others numbers."""
 
 _KNOWN = {metric.name: metric for group in METRIC_GROUPS.values() for metric in group}

@@ -139,7 +139,7 @@ def _rows_for_machines(arm: Manipulator, facts: DesignSummary) -> Rows:
 
 
 def load_rows(arm: Manipulator) -> Rows:
-    """How the base stands, gravity, and all other loads that are not 0; all of it in the world."""
+    """Posture of the base, gravity, and all other loads that are not 0; all of it in the world."""
     from softreach.arm.number import fields_of
 
     loads, posed = arm.loads, not arm.base.is_identity

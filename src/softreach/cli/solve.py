@@ -74,7 +74,7 @@ def solve(
 
 
 def _hints(arm: Manipulator, solutions: Solutions) -> list[str]:
-    """What may be meant by targets out of reach; of the first of many."""
+    """Hints at what targets out of reach may mean; for the first of many."""
     from softreach.inverse import twin_hints
 
     hints = [""] * len(solutions)

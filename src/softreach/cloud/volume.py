@@ -204,13 +204,7 @@ def _alpha_complex(positions: np.ndarray, method: Method) -> AlphaComplex:
 
 def _alpha_complexes(clouds: list[np.ndarray], method: Method) -> list[AlphaComplex]:
     """Triangulate and measure several clouds, each on a thread of its own."""
-    complexes: dict[int, AlphaComplex] = {}
-
-    def build(number: int) -> None:
-        complexes[number] = _alpha_complex(clouds[number], method)
-
-    parallel.run(partial(build, number) for number in range(len(clouds)))
-    return [complexes[number] for number in range(len(clouds))]
+    return list(parallel.in_order(partial(_alpha_complex, cloud, method) for cloud in clouds))
 
 
 def _quarter(positions: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""How every activation that puts the tip at a target is found, with three free bundles.
+"""All activations that put the tip at a target, with three free bundles.
 
 1. The activation box is cut into cells of six tetrahedra each; tips and Jacobians are computed at
    their corners, once for an arm (`cells`).
@@ -44,7 +44,7 @@ from softreach.kernels.branches import folds, newton
 from softreach.kernels.branches.newton import CONVERGED, RUNNING, STAGNATED, Search
 from softreach.rod.tip_map import TipMap
 from softreach.support import parallel
-from softreach.support.arrays import Array, Index, rows
+from softreach.support.arrays import Array, Index, joined_by, rows
 
 __all__ = ["distinct", "every_branch"]
 
@@ -83,7 +83,7 @@ def every_branch(prepared: PreparedMap, request: Request) -> Roots:
         parts = list(
             parallel.in_order(partial(_alone, prepared, request, chosen) for chosen in sets)
         )
-    return Roots.sorted_by_target(parts)
+    return joined_by("target", parts)
 
 
 def _sets(order: Index, size: int) -> list[Index]:
@@ -97,7 +97,7 @@ def _sets(order: Index, size: int) -> list[Index]:
 
 
 def _set_size(prepared: PreparedMap, count: int) -> int:
-    """How many targets to solve together: enough of them for kernels, enough sets for threads.
+    """Number of targets to solve together: enough of them for kernels, enough sets for threads.
 
     Rods under loads are work enough to be shared out among threads by themselves.
     """
@@ -250,7 +250,7 @@ def _partner_starts(prepared: PreparedMap, roots: Roots) -> Starts:
         )
         roots, unknown = rows(roots, near), np.zeros((int(near.sum()), 3, 3))
         parts.append(Starts(roots.target, roots.cell, start[near], unknown))
-    return Starts.by_target(parts)
+    return joined_by("target", parts)
 
 
 def distinct(prepared: PreparedMap, request: Request, roots: Roots) -> Roots:

@@ -36,7 +36,7 @@ def activation_cells(rod: TipMap, cells: int, depth: int = 0) -> tuple[Activatio
     Args:
         rod: A tip map of three bundles, each free to move.
         cells: Cells along each axis of the box.
-        depth: How often a cell may be halved where det J is uneven or changes sign.
+        depth: Most halvings of a cell where det J is uneven or changes sign.
     """
     lattice = _Lattice(rod, cells << depth)
     low, width = _even_cells(cells, depth)

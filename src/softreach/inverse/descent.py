@@ -47,32 +47,32 @@ def descend(
     tip, slope = linearized(rod, start)
     away = np.linalg.norm(tip - targets, axis=1)
     # A start without a tip leads nowhere, and a step to a place without one fails.
-    found = Descent(start.copy(), tip, slope, np.where(np.isnan(away), np.inf, away))
+    ends = Descent(start.copy(), tip, slope, np.where(np.isnan(away), np.inf, away))
     damping, floor = np.full(len(start), _FIRST_DAMPING), 1e-3 * residual
-    active = np.flatnonzero((found.residual > floor) & (found.residual < np.inf))
+    active = np.flatnonzero((ends.residual > floor) & (ends.residual < np.inf))
     stay = np.zeros(len(start), np.int64)
     for _ in range(most):
         if not len(active):
             break
-        goal, gamma = targets[active], found.gamma[active]
-        trial = _trials(rod, rows(found, active), goal, damping[active])
+        goal, gamma = targets[active], ends.gamma[active]
+        trial = _trials(rod, rows(ends, active), goal, damping[active])
         tip, slope = linearized(rod, trial)
         miss = np.linalg.norm(tip - goal, axis=1)
-        better = miss < found.residual[active]
+        better = miss < ends.residual[active]
         taken = active[better]
-        gain = 1.0 - miss[better] / found.residual[taken]
-        found.gamma[taken], found.tip[taken] = trial[better], tip[better]
-        found.slope[taken], found.residual[taken] = slope[better], miss[better]
+        gain = 1.0 - miss[better] / ends.residual[taken]
+        ends.gamma[taken], ends.tip[taken] = trial[better], tip[better]
+        ends.slope[taken], ends.residual[taken] = slope[better], miss[better]
         damping[active] *= np.where(better, 0.2, 8.0)
         damping[taken] = np.maximum(damping[taken], _LEAST_DAMPING)
         # A minimum of the distance that is no root is approached ever more slowly.
         stay[taken] = np.where(gain < 1e-3, stay[taken] + 1, 0)
         still = (np.abs(trial - gamma) / scales).max(axis=1) <= _STALLED
-        reached = found.residual[active] <= residual
-        end = (found.residual[active] <= floor) | (reached & ~better) | still
+        reached = ends.residual[active] <= residual
+        end = (ends.residual[active] <= floor) | (reached & ~better) | still
         end |= (damping[active] > _LARGEST_DAMPING) | (stay[active] > 4)
         active = active[~end]
-    return found
+    return ends
 
 
 def minimize(evaluate: Evaluate, start: Array, box: ActivationBox) -> Minima:
@@ -174,7 +174,7 @@ def linearized(rod: TipMap, gamma: Array) -> tuple[Array, Array]:
 
 
 class Descent(NamedTuple):
-    """Where searches ended."""
+    """Ends of searches."""
 
     gamma: Array
     """Activations [-], shape (n, m)."""
@@ -190,11 +190,11 @@ class Minima(NamedTuple):
     """Local minima."""
 
     gamma: Array
-    """Where [-], shape (n, m)."""
+    """Activations [-], shape (n, m)."""
     value: Array
     """The functions there, shape (n,)."""
     converged: Mask
-    """Whether the last step was negligible, shape (n,)."""
+    """Mask of the searches whose last step was negligible, shape (n,)."""
 
 
 def _trials(rod: TipMap, at: Descent, targets: Array, damping: Array) -> Array:

@@ -104,8 +104,8 @@ class Drag:
         return float(np.sign(np.linalg.det(scaled))) if sizes[2] > 1e-6 * sizes[0] else 0.0
 
     def _dragged(self, gamma: Array, target: Array) -> Dragged:
-        whole = self._prepared.whole
-        activation = whole.box.with_fixed(gamma[None])[0] * self._prepared.measures
+        rod = self._prepared.whole
+        activation = rod.box.with_fixed(gamma[None])[0] * self._prepared.measures
         tip = self._tracker.at(gamma).tip
         gap = float(np.linalg.norm(tip - target))
         within = tuple(float(value) for value in activation)

@@ -52,19 +52,19 @@ def least_changes(prepared: PreparedMap, request: Request) -> tuple[Index, Array
     others = rng.uniform(box.low, box.high, (request.family - 1, box.bundles))
     known = _in_blocks(prepared, replace(request, direction=None))
     reached = np.flatnonzero(known.residual <= request.residual)
-    asked = request.of(reached)
-    targets, found = [reached], [known.gamma[reached]]
+    wanted = request.of(reached)
+    targets, activations = [reached], [known.gamma[reached]]
     if request.direction is not None:
-        found = [_turned(prepared, asked, found[0])]
+        activations = [_turned(prepared, wanted, activations[0])]
     for near in others:
-        one = replace(asked, near=np.tile(near, (len(reached), 1)), direction=None)
+        variant = replace(wanted, near=np.tile(near, (len(reached), 1)), direction=None)
         targets.append(reached)
-        found.append(_in_blocks(prepared, one, found[0]).gamma)
+        activations.append(_in_blocks(prepared, variant, activations[0]).gamma)
         if request.direction is None:
-            _put_least_first(found[0], found[-1], asked.near)
+            _put_least_first(activations[0], activations[-1], wanted.near)
     target = np.concatenate(targets)
     order = np.argsort(target, kind="stable")
-    return target[order], np.concatenate([np.empty((0, box.bundles)), *found])[order], known
+    return target[order], np.concatenate([np.empty((0, box.bundles)), *activations])[order], known
 
 
 def _put_least_first(first: Array, other: Array, near: Array) -> None:
@@ -95,42 +95,42 @@ def _least_change(prepared: PreparedMap, request: Request, known: Array | None) 
         owner, start = np.concatenate([owner, np.arange(count)]), np.concatenate([start, known])
     gamma, residual = sqp(prepared.rod, request.of(owner), start)
     best = _least(owner, gamma, residual, request)
-    found = Reached(gamma[best], residual[best])
-    left = np.flatnonzero(found.residual > request.residual)
-    more = reach(prepared, request.of(left), found.gamma[left])
-    found.gamma[left], found.residual[left] = more
+    ends = Reached(gamma[best], residual[best])
+    left = np.flatnonzero(ends.residual > request.residual)
+    more = reach(prepared, request.of(left), ends.gamma[left])
+    ends.gamma[left], ends.residual[left] = more
     # Where some search lost its target, the target lies next to a fold or a boundary.
     lost = np.bincount(owner, residual > request.residual, count) > 0
-    found = _searched_again(prepared, request, found, np.flatnonzero(lost), owner, start)
-    return _polished(prepared, request, found)
+    ends = _searched_again(prepared, request, ends, np.flatnonzero(lost), owner, start)
+    return _polished(prepared, request, ends)
 
 
-def _polished(prepared: PreparedMap, request: Request, found: Reached) -> Reached:
+def _polished(prepared: PreparedMap, request: Request, ends: Reached) -> Reached:
     """The best once more, until its steps are negligible; kept where that changes less."""
     gamma, residual = sqp(
-        prepared.rod, request, found.gamma, settled=_POLISHED, most=_MOST_POLISHING
+        prepared.rod, request, ends.gamma, settled=_POLISHED, most=_MOST_POLISHING
     )
     owner = np.tile(np.arange(len(gamma)), 2)
-    gamma = np.concatenate([found.gamma, gamma])
-    residual = np.concatenate([found.residual, residual])
+    gamma = np.concatenate([ends.gamma, gamma])
+    residual = np.concatenate([ends.residual, residual])
     best = _least(owner, gamma, residual, request)
     return Reached(gamma[best], residual[best])
 
 
 def _searched_again(
-    prepared: PreparedMap, request: Request, found: Reached, rows: Index, owner: Index, start: Array
+    prepared: PreparedMap, request: Request, ends: Reached, rows: Index, owner: Index, start: Array
 ) -> Reached:
     """Search once more for some targets: first for them, then for less change without leaving."""
     rod, chosen = prepared.rod, np.isin(owner, rows)
     owner = np.concatenate([owner[chosen], rows])
-    start = np.concatenate([start[chosen], found.gamma[rows]])
+    start = np.concatenate([start[chosen], ends.gamma[rows]])
     at = descend(rod, request.targets[owner], start, request.residual)
     hit = at.residual <= request.residual
     gamma, residual = sqp(rod, request.of(owner[hit]), at.gamma[hit], penalty=_HIGH_PENALTY)
     count = len(request.targets)
     owner = np.concatenate([np.arange(count), owner[hit], owner[hit]])
-    gamma = np.concatenate([found.gamma, at.gamma[hit], gamma])
-    residual = np.concatenate([found.residual, at.residual[hit], residual])
+    gamma = np.concatenate([ends.gamma, at.gamma[hit], gamma])
+    residual = np.concatenate([ends.residual, at.residual[hit], residual])
     best = _least(owner, gamma, residual, request)
     return Reached(gamma[best], residual[best])
 
@@ -160,7 +160,7 @@ def _starts(prepared: PreparedMap, request: Request) -> tuple[Index, Array]:
 def _promising(
     prepared: PreparedMap, request: Request, owner: Index, start: Array
 ) -> tuple[Index, Array]:
-    """Where the best searches of each target are after a few steps, those that are apart."""
+    """Activations of the best searches of each target after a few steps, those that are apart."""
     gamma, merit = survey(prepared.rod, request.of(owner), start, _SURVEY)
     order = np.lexsort((merit, owner))
     counts = np.bincount(owner, minlength=len(request.targets))

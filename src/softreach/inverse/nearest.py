@@ -33,8 +33,7 @@ def nearest(prepared: PreparedMap, request: Request, known: Roots | None = None)
         target = np.concatenate([target, known.target])
         start = np.concatenate([start, known.gamma])
     minima = local_minima(rod, request.of(target), start)
-    order = np.lexsort((minima.value, target))
-    best = order[np.searchsorted(target[order], np.arange(len(targets)))]
+    best = first_of_each(target, minima.value, len(targets))
     return _nearest_at(rod, targets, minima.gamma[best])
 
 
@@ -68,11 +67,11 @@ def reach(prepared: PreparedMap, request: Request, start: Array) -> Reached:
         if not len(left):
             break
         for rows in np.array_split(left, 1 + len(left) * effort.neighbors // 100_000):
-            owner, found = _searched(prepared, request.of(rows), effort, anywhere)
-            best = first_of_each(owner, found.residual, len(rows))
-            better = found.residual[best] < residual[rows]
-            gamma[rows[better]] = found.gamma[best[better]]
-            residual[rows[better]] = found.residual[best[better]]
+            owner, ends = _searched(prepared, request.of(rows), effort, anywhere)
+            best = first_of_each(owner, ends.residual, len(rows))
+            better = ends.residual[best] < residual[rows]
+            gamma[rows[better]] = ends.gamma[best[better]]
+            residual[rows[better]] = ends.residual[best[better]]
     return Reached(gamma, residual)
 
 
@@ -113,7 +112,7 @@ def _nearest_at(rod: TipMap, targets: Array, gamma: Array) -> Nearest:
 
 
 class _Effort(NamedTuple):
-    """How many searches a target that is still left is worth."""
+    """Searches spent on a target that is still left."""
 
     neighbors: int
     """Seeds looked at."""

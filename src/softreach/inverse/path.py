@@ -86,8 +86,8 @@ def track_path(
     else:
         first = _best_start(rod, tracker, points[0], residual)
     followed, end = ([], None) if first is None else _followed(tracker, first, points)
-    asked = {"tol": rod.tol, "residual_over_length": residual}
-    return _dataset(rod, points, followed, end).assign_attrs(asked)
+    tolerances = {"tol": rod.tol, "residual_over_length": residual}
+    return _dataset(rod, points, followed, end).assign_attrs(tolerances)
 
 
 class PathStatus(IntEnum):
@@ -124,10 +124,10 @@ class Continuation:
 
     def corrected_start(self, gamma: Array, target: Array) -> BranchPoint | None:
         """The activation corrected to a first target, if it can be within the bounds."""
-        found = self._corrected(gamma, target, self.box.is_free)
-        if found is None or (self.box.excess(found.gamma) > _AT_BOUND).any():
+        start = self._corrected(gamma, target, self.box.is_free)
+        if start is None or (self.box.excess(start.gamma) > _AT_BOUND).any():
             return self._within_bounds(gamma, target[None])
-        return self._clipped(found)
+        return self._clipped(start)
 
     def follow(self, point: BranchPoint, begin: Array, end: Array) -> BranchEnd:
         """Move the tip from one place straight to another, as far as the branch goes."""
@@ -174,18 +174,18 @@ class Continuation:
             if not blocked.any():
                 if size > _LONGEST:
                     return _Substep(shorten=0.9 * _LONGEST / size)
-                found = self._corrected(ahead, target, moving)
-                if found is None:
+                corrected = self._corrected(ahead, target, moving)
+                if corrected is None:
                     return _Substep(shorten=0.5, torn=self._torn)
-                if self._left_branch(point, ahead, found):
+                if self._left_branch(point, ahead, corrected):
                     return _Substep(shorten=0.5)
-                over = self.box.excess(found.gamma) > _AT_BOUND
+                over = self.box.excess(corrected.gamma) > _AT_BOUND
                 if not over.any():
-                    return _Substep(point=self._clipped(found))
+                    return _Substep(point=self._clipped(corrected))
                 blocked = over & self._at_bound(gamma)
                 if not blocked.any():
-                    return _Substep(shorten=self._part_within(gamma, found.gamma, over))
-                ahead = found.gamma
+                    return _Substep(shorten=self._part_within(gamma, corrected.gamma, over))
+                ahead = corrected.gamma
             bundle = int(np.flatnonzero(blocked)[0])
             upper = bool(ahead[bundle] > self.box.high[bundle])
             moving = moving & ~blocked
@@ -196,19 +196,19 @@ class Continuation:
 
         All of the way there has to be as near to the reachable set: half of it is looked at.
         """
-        found = self._within_bounds(point.gamma, np.array([0.5 * (point.tip + target), target]))
-        if found is None or self._left_branch(point, found.gamma, found):
+        beside = self._within_bounds(point.gamma, np.array([0.5 * (point.tip + target), target]))
+        if beside is None or self._left_branch(point, beside.gamma, beside):
             return None
-        far = np.abs(found.gamma - point.gamma) > _LONGEST * self.box.scales
-        return None if far.any() else found
+        far = np.abs(beside.gamma - point.gamma) > _LONGEST * self.box.scales
+        return None if far.any() else beside
 
     def _within_bounds(self, gamma: Array, targets: Array) -> BranchPoint | None:
         """Nearest to the last of some places (k, 3), if all are as near as tips can tell."""
         start = np.tile(gamma, (len(targets), 1))
-        found = descend(self.rod, targets, start, self.residual)
-        if not (found.residual <= self.allowance).all():
+        ends = descend(self.rod, targets, start, self.residual)
+        if not (ends.residual <= self.allowance).all():
             return None
-        return BranchPoint(found.gamma[-1], found.tip[-1], found.slope[-1])
+        return BranchPoint(ends.gamma[-1], ends.tip[-1], ends.slope[-1])
 
     def _corrected(self, gamma: Array, target: Array, moving: Mask) -> BranchPoint | None:
         """Newton's method with the least-norm step of the moving bundles; None if it fails."""
@@ -230,18 +230,18 @@ class Continuation:
                 return None
         return None
 
-    def _left_branch(self, point: BranchPoint, ahead: Array, found: BranchPoint) -> bool:
-        """Whether the correction was large, or passed a fold."""
+    def _left_branch(self, point: BranchPoint, ahead: Array, corrected: BranchPoint) -> bool:
+        """True if the correction was large, or passed a fold."""
         predicted = np.linalg.norm((ahead - point.gamma) / self.box.scales)
-        correction = np.linalg.norm((found.gamma - ahead) / self.box.scales)
+        correction = np.linalg.norm((corrected.gamma - ahead) / self.box.scales)
         if correction > _CORRECTION * predicted + 1e-9:
             return True
         if point.slope.shape[1] > 3:
             return False
-        return bool(np.linalg.det(point.slope) * np.linalg.det(found.slope) <= 0)
+        return bool(np.linalg.det(point.slope) * np.linalg.det(corrected.slope) <= 0)
 
     def _leaps(self, point: BranchPoint) -> bool:
-        """Whether a branch ends here though no fold is near: an arm under loads leaps."""
+        """True if a branch ends here though no fold is near: an arm under loads leaps."""
         if not self.rod.supports_unstable:
             return False
         sizes = np.linalg.svd(point.slope * self.box.scales, compute_uv=False)
@@ -255,11 +255,13 @@ class Continuation:
     def _at_bound(self, gamma: Array) -> Mask:
         return self.box.excess(gamma) >= -2 * _AT_BOUND
 
-    def _part_within(self, gamma: Array, found: Array, over: Mask) -> float:
+    def _part_within(self, gamma: Array, corrected: Array, over: Mask) -> float:
         """The part of a substep that ends just inside the bounds."""
-        bound = np.where(found > self.box.high, self.box.high, self.box.low)
-        inside = 1.0 - 0.5 * _AT_BOUND * self.box.scales / np.abs(found - gamma).clip(1e-300)
-        part = (bound - gamma)[over] / (found - gamma)[over] * np.minimum(inside[over], 1 - 1e-6)
+        bound = np.where(corrected > self.box.high, self.box.high, self.box.low)
+        inside = 1.0 - 0.5 * _AT_BOUND * self.box.scales / np.abs(corrected - gamma).clip(1e-300)
+        part = (
+            (bound - gamma)[over] / (corrected - gamma)[over] * np.minimum(inside[over], 1 - 1e-6)
+        )
         return float(np.clip(part.min(), 1e-6, 0.9999))
 
 
@@ -275,7 +277,7 @@ class BranchPoint(NamedTuple):
 
 
 class BranchEnd(NamedTuple):
-    """How far a branch was followed."""
+    """End of a branch as far as it was followed."""
 
     status: PathStatus
     point: BranchPoint
@@ -283,11 +285,11 @@ class BranchEnd(NamedTuple):
     bundle: int = -1
     """The bundle at its bound."""
     upper: bool = False
-    """Which bound that is."""
+    """True for its upper bound."""
     done: float = 0.0
     """The part of the way to the next point that was followed [-]."""
     error: float = 0.0
-    """How much farther the branch may go [m]."""
+    """Largest distance that the branch may go farther [m]."""
 
 
 class _Substep(NamedTuple):
@@ -297,7 +299,7 @@ class _Substep(NamedTuple):
     shorten: float = 1.0
     end: BranchEnd | None = None
     torn: bool = False
-    """Whether it met a place without a stable equilibrium."""
+    """True if it met a place without a stable equilibrium."""
 
 
 def _least_norm(slope: Array, moving: Mask) -> Array:

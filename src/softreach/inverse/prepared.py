@@ -38,11 +38,11 @@ class PreparedMap:
     cells: int = _CELLS
     """With three free bundles: cells along each axis of the activation box."""
     depth: int = 0
-    """How often a cell may be halved where det ∂r/∂γ changes sign or is uneven."""
+    """Most halvings of a cell where det ∂r/∂γ changes sign or is uneven."""
 
     @cached_property
     def measures(self) -> Array:
-        """What one unit of each activation is in its own unit, shape (bundles,)."""
+        """Size of one unit of each activation in the unit of its bundle, shape (bundles,)."""
         return self.whole.measures
 
     @cached_property
@@ -60,7 +60,7 @@ class PreparedMap:
 
     @cached_property
     def proves(self) -> bool:
-        """Whether what a cell of activations reaches is bounded; of loaded arms it is not."""
+        """True if what a cell of activations reaches is bounded; of loaded arms it is not."""
         return bool(np.isfinite(self.whole.farthest()))
 
     @property
@@ -84,7 +84,7 @@ class PreparedMap:
 
     @property
     def torn_cells(self) -> TornCells:
-        """Where roots are searched that lie in cells without an image."""
+        """Starts of searches for roots in cells without an image."""
         return self._cut[1]
 
     @cached_property
@@ -94,17 +94,17 @@ class PreparedMap:
 
     @cached_property
     def seeds(self) -> Seeds:
-        """Where searches for a minimum begin."""
+        """Starts of searches for a minimum."""
         return seeds(self.rod)
 
     @cached_property
     def coarse_cells(self) -> CoarseCells:
-        """Where proofs that a target is out of reach begin."""
+        """Cells with which proofs that a target is out of reach begin."""
         return CoarseCells(self.rod)
 
     @cached_property
     def face_seeds(self) -> Seeds:
-        """Where searches begin for places on the boundary of the reachable set."""
+        """Starts of searches for places on the boundary of the reachable set."""
         return face_seeds(self.rod)
 
 
@@ -122,7 +122,7 @@ def prepared_map(
         arm: The design, or its tip map; what is prepared already is returned as it is.
         tol: Largest tip error, in L.
         cells: With three free bundles: cells along each axis of the activation box.
-        depth: How often a cell is halved where det ∂r/∂γ changes sign or is uneven; once at least
+        depth: Halvings of a cell where det ∂r/∂γ changes sign or is uneven; once at least
             for an arm under loads.
         frame: In which targets are told: that of the "world" or of the "base".
     """

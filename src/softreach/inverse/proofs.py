@@ -49,9 +49,9 @@ def gap_bounds(
         rod: The tip map.
         coarse: Its cells.
         targets: Shape (t, 3) [m].
-        gap: How near to each the best place known is [m], shape (t,).
-        allowance: What a bound has to exceed to prove anything of the arm itself [m]; every gap
-            does.
+        gap: Distance of the best place known from each [m], shape (t,).
+        allowance: Distance that a bound must exceed to prove anything of the arm itself [m]; every
+            gap does.
 
     Returns:
         Bounds [m], shape (t,); 0 where nothing is proved.
@@ -122,7 +122,7 @@ class Linearized(NamedTuple):
     slopes: Array
     """∂r/∂γ there [m], shape (n, 3, m)."""
     errors: Array
-    """How far a tip may lie from its linearization [m], shape (n,)."""
+    """Bounds of the distance from tips to their linearization [m], shape (n,)."""
 
 
 Bound = Callable[[Cells, Linearized], Array]
@@ -158,9 +158,9 @@ def least_of_cells(
     Args:
         rod: The tip map.
         half: Half widths of the cells [-], shape (m,).
-        cells: Where to begin.
+        cells: Cells to begin with.
         enough: Bounds at which a cell is done and which the result does not exceed, shape (t,).
-        bound: What is bounded.
+        bound: The lower bound of a cell.
         most: Cells that one target is worth.
 
     Returns:
@@ -170,7 +170,7 @@ def least_of_cells(
     spent = np.zeros(count, np.int64)
     while len(cells.owner):
         owner = cells.owner
-        found = np.concatenate(
+        bounds = np.concatenate(
             [
                 bound(part, linearized(rod, half, part.center))
                 for first in range(0, len(owner), _BLOCK)
@@ -178,10 +178,10 @@ def least_of_cells(
             ]
         )
         spent += np.bincount(owner, minlength=count)
-        open_cells = found < enough[owner]
+        open_cells = bounds < enough[owner]
         left = np.bincount(owner[open_cells], minlength=count)
         hopeless = open_cells & (spent + 2 * left > most)[owner]
-        np.minimum.at(least, owner[hopeless], found[hopeless])
+        np.minimum.at(least, owner[hopeless], bounds[hopeless])
         half, cells = _halved(rod, half, rows(cells, open_cells & ~hopeless))
     return least
 
@@ -225,14 +225,14 @@ def _exclusion_of_block(rod: TipMap, coarse: CoarseCells, targets: Array, enough
 
 
 def _most_cells(bundles: int) -> int:
-    """How many cells may be examined for one target."""
+    """Most cells that are examined for one target."""
     if bundles <= 3:
         return _MOST_OF_THREE
     return _MOST_EXCLUSION_CELLS if bundles <= MOST_BUNDLES else 0
 
 
 def _distances(targets: Array, at: Linearized) -> Array:
-    """How far each target is at least from the image of its cell, negative if it may be in it."""
+    """Least distance of each target from the image of its cell, negative if it may be in it."""
     n, _, m = at.slopes.shape
     away, slopes = targets - at.tips, at.slopes * at.half
     softness = _SOFTNESS * (slopes**2).sum(axis=(1, 2)) + 1e-30
@@ -255,8 +255,8 @@ def _least_of_block(
     cells = Cells(owner, coarse.center[np.concatenate(rows)])
 
     def bound(part: Cells, at: Linearized) -> Array:
-        one = part.owner
-        return _of_cells(targets[one], near[one], enough[one], part.center, at)
+        owner = part.owner
+        return _of_cells(targets[owner], near[owner], enough[owner], part.center, at)
 
     return least_of_cells(rod, coarse.half, cells, enough, bound, _MOST_LEAST_CELLS)
 
@@ -271,6 +271,6 @@ def _within(coarse: CoarseCells, target: Array, near: Array, change: float) -> I
 def _of_cells(targets: Array, near: Array, enough: Array, center: Array, at: Linearized) -> Array:
     """The bound for each cell, `enough` at most, shape (n,)."""
     wanted = targets - at.tips + np.einsum("nij,nj->ni", at.slopes, center)
-    low, high, found = center - at.half, center + at.half, np.empty(len(center))
-    dual.change_bounds(near, at.slopes, wanted, at.errors, low, high, enough, found)
-    return found
+    low, high, bounds = center - at.half, center + at.half, np.empty(len(center))
+    dual.change_bounds(near, at.slopes, wanted, at.errors, low, high, enough, bounds)
+    return bounds

@@ -1,4 +1,4 @@
-"""What is asked of the inverse problem, checked."""
+"""Request to the inverse problem: targets and preferences, checked."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from softreach.support.errors import InvalidInput, Range
 from softreach.support.quantity import numbers_in, shortened
 
 FARTHEST = 1e100
-"""How far a target may lie [m]: squares of larger distances leave the range of numbers."""
+"""Largest coordinate of a target [m]: squares of larger ones leave the range of numbers."""
 
 _RESIDUALS = (1e-13, 1e-2)  # in L; below, rounding of the tips decides
 
@@ -25,7 +25,7 @@ class Request:
     """Targets, and which activations to prefer where there is a choice."""
 
     targets: Array
-    """Where the tip should be [m], shape (t, 3)."""
+    """Wanted positions of the tip [m], shape (t, 3)."""
     residual: float
     """|tip - target| at which a search has found its target [m]."""
     allowance: float
@@ -36,13 +36,13 @@ class Request:
     direction: Array | None = None
     """Wanted tip tangents, unit vectors, shape (t, 3)."""
     direction_weight: float = 0.0
-    """What |d3 - direction| counts for, against |γ - near| or a distance in L [-]."""
+    """Weight of |d3 - direction| against |γ - near| or a distance in L [-]."""
     family: int = 1
     """Activations wanted for each target where there are infinitely many."""
     seed: int = 0
     """Seed of the random activations that the others stay near to."""
     prove_least: bool = False
-    """Whether to bound the change of all activations that reach a target from below."""
+    """True to bound the change of all activations that reach a target from below."""
 
     def of(self, rows: slice | Index) -> Request:
         """The request for some of the targets."""
@@ -66,7 +66,7 @@ def as_activations(name: str, activations: ArrayLike, box: ActivationBox, count:
     """An activation for each target, of the free bundles only, shape (t, dimension).
 
     Args:
-        name: What the argument is called.
+        name: Name of the argument.
         activations: Of all bundles [-], shape (bundles,) or (t, bundles).
         box: The bounds of all bundles.
         count: Number of targets t.
@@ -102,7 +102,7 @@ def positions_in(text: str, source: str) -> list[list[float]]:
 
     Args:
         text: Content of the file.
-        source: What errors call it.
+        source: Its name in errors.
 
     Raises:
         InvalidInput: A line that is not three numbers, or no line.
@@ -128,5 +128,5 @@ def position_in(name: str, text: str) -> list[float]:
 
 
 def _is_header(line: str) -> bool:
-    """Whether a line holds names: no part of it begins as a number does."""
+    """True if a line holds names: no part of it begins as a number does."""
     return not any(part.strip().startswith(tuple("+-.0123456789")) for part in line.split(","))

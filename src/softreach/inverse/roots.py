@@ -12,7 +12,7 @@ from softreach.inverse.request import Request
 from softreach.kernels.branches import newton
 from softreach.rod.tip_map import BLOCK, TipMap, TipStatus
 from softreach.support import parallel
-from softreach.support.arrays import Array, Index, Mask, joined, rows
+from softreach.support.arrays import Array, Index, Mask, joined_by, rows
 
 _EFFORTS = ((500, 20, 0.1), (2000, 100, 0.08))
 """Seeds near the target, most starts from them, their least distance in ranges."""
@@ -40,20 +40,14 @@ class Roots(NamedTuple):
     cell: Index
     """Cell of the mesh where the search began; -1 if in none, shape (n,)."""
     stable: Mask
-    """Whether the arm can be there, shape (n,)."""
+    """Mask of the roots at stable equilibria, shape (n,)."""
 
     def joined(self, other: Roots) -> Roots:
         """Both, sorted by target as each of them is."""
-        return Roots.sorted_by_target([self, other]) if len(other.target) else self
-
-    @staticmethod
-    def sorted_by_target(parts: list[Roots]) -> Roots:
-        """All of them, sorted by target."""
-        everything = joined(parts)
-        return rows(everything, np.argsort(everything.target, kind="stable"))
+        return joined_by("target", [self, other]) if len(other.target) else self
 
     def missing(self, targets: int, residual: float = np.inf) -> Index:
-        """Which of so many targets have no stable root within a residual [m]."""
+        """Numbers of the targets, of so many, that have no stable root within a residual [m]."""
         known = self.target[self.stable & (self.residual <= residual)]
         return np.flatnonzero(np.bincount(known, minlength=targets) == 0)
 
@@ -184,12 +178,12 @@ def _closed_form(slope: Array) -> tuple[Array, Array]:
 def _from_starts(rod: TipMap, request: Request, owner: Index, start: Array) -> Roots:
     """Roots from starts."""
     gamma = affine_invariant_newton(rod, request.targets[owner], start, request.residual)
-    found = roots_at(rod, request.targets, owner, gamma)
-    return rows(found, found.residual <= request.residual)
+    roots = roots_at(rod, request.targets, owner, gamma)
+    return rows(roots, roots.residual <= request.residual)
 
 
 class _Valley(NamedTuple):
-    """Where the tip has the right place along the direction in which it moves most."""
+    """Activations whose tips are right along the direction in which the tip moves most."""
 
     rod: TipMap
     low: Array

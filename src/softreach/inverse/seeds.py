@@ -52,7 +52,7 @@ class Seeds:
 
         Args:
             candidates: Activations for each target, best first, shape (t, k, m).
-            most: How many for one target.
+            most: Largest number for one target.
             least_distance: Between any two, in ranges.
 
         Returns:
@@ -72,10 +72,10 @@ def seeds(rod: TipMap) -> Seeds:
         gamma = box.from_cube(np.array(sample_cube("grid", int(_MOST ** (1 / m)) ** m, m)))
     else:
         gamma = box.from_cube(np.array(sample_cube("sobol", _SOBOL, m)))
-    found = _with_tips(rod, gamma)
-    if not len(found.gamma):
+    samples = _with_tips(rod, gamma)
+    if not len(samples.gamma):
         raise no_stable_equilibrium(len(gamma))
-    return found
+    return samples
 
 
 def face_seeds(rod: TipMap) -> Seeds:

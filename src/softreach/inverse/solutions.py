@@ -1,4 +1,4 @@
-"""What the inverse problem answers, readable as a list of solutions."""
+"""Solutions of the inverse problem, readable as a list."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Solution:
     """The activations that reach one target, or come nearest to it."""
 
     target: Array
-    """Where the tip should be [m], shape (3,)."""
+    """Wanted position of the tip [m], shape (3,)."""
     status: Status
     """Outcome of the search."""
     activations: Array
@@ -65,9 +65,9 @@ class Solution:
     or of each over its range where units differ; 0 if nothing is proved, which it is only where
     `prove_least` asks for it."""
     least_proved: bool
-    """Whether the bound is the |γ - near| of the first activation, but for 1e-6."""
+    """True if the bound is the |γ - near| of the first activation, but for 1e-6."""
     unstable: int
-    """How many activations were found, with three free bundles, that would put the tip of an arm
+    """Number of activations found, with three free bundles, that would put the tip of an arm
     under loads at the target, but in an unstable equilibrium; they are left out."""
 
     def __len__(self) -> int:
@@ -81,8 +81,8 @@ class Solution:
             near = f"nearest point {self.gap:.3g} m away"
             return f"<Solution for ({place}) m: {outcome}, {near}{unstable}>"
         count, worst = counted(len(self), "activation"), self.residuals.max()
-        found = f"{count}, largest residual {worst:.1e} m"
-        return f"<Solution for ({place}) m: {outcome}, {found}{unstable}>"
+        summary = f"{count}, largest residual {worst:.1e} m"
+        return f"<Solution for ({place}) m: {outcome}, {summary}{unstable}>"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -123,7 +123,7 @@ class Solutions(Sequence[Solution]):
     In the unit of the activations; where units differ, each counts in its own range.
     """
     least_proved: Mask
-    """Whether the first activation of a target is proved to change least, to 1e-6, shape (t,)."""
+    """Mask of the targets whose first activation is proved to change least, to 1e-6, shape (t,)."""
     unstable: Index
     """Activations found that end in an unstable equilibrium and are left out, shape (t,)."""
 

@@ -109,14 +109,14 @@ def solve_inverse(
         raise InvalidInput("prove_least", prove_least, "False where a direction is wanted")
     prepared = prepared_map(arm, tol, frame=frame)
     points, box = as_targets("targets", targets), prepared.whole.box
-    rest = np.zeros(box.bundles) if near is None else near
+    preferred = np.zeros(box.bundles) if near is None else near
     unit = None if direction is None else as_directions("direction", direction, len(points))
     residual = as_residual(residual_over_length) * prepared.whole.length
     request = Request(
         targets=points,
         residual=residual,
         allowance=allowance(prepared.whole, residual),
-        near=as_activations("near", rest, box, len(points)) / prepared.measures[box.free],
+        near=as_activations("near", preferred, box, len(points)) / prepared.measures[box.free],
         direction=unit,
         direction_weight=as_number("direction_weight", direction_weight, Range(0.0, 1e6)),
         family=as_integer("family", family, 1, 10_000),
@@ -135,10 +135,10 @@ def solve_inverse(
 
 def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
     """All roots, and the nearest points to the targets that have none."""
-    found = every_branch(prepared, request)
+    branches = every_branch(prepared, request)
     count = len(request.targets)
-    unstable = np.bincount(found.target[~found.stable], minlength=count)
-    roots = rows(found, found.stable)
+    unstable = np.bincount(branches.target[~branches.stable], minlength=count)
+    roots = rows(branches, branches.stable)
     missing = roots.missing(count)
     blocks = parallel.blocks(len(missing), _BLOCK) or [slice(0)]
     closest = joined([nearest(prepared, request.of(missing[block])) for block in blocks])
@@ -153,7 +153,7 @@ def _by_branches(prepared: PreparedMap, request: Request) -> Solutions:
 
 
 def _perhaps_singular(prepared: PreparedMap, request: Request, gap: Array, bound: Array) -> Mask:
-    """Which targets may have roots that only a search of nearly singular ones finds.
+    """Mask of the targets that may have roots that only a search of nearly singular ones finds.
 
     Those not proved to be out of reach; where nothing is proved, those that are nearly reached.
     """
@@ -171,8 +171,8 @@ def _by_distance(prepared: PreparedMap, request: Request) -> Solutions:
 
 
 def _stable_roots(prepared: PreparedMap, request: Request) -> Roots:
-    found = every_branch(prepared, request)
-    return rows(found, found.stable)
+    branches = every_branch(prepared, request)
+    return rows(branches, branches.stable)
 
 
 def _by_least_change(prepared: PreparedMap, request: Request) -> Solutions:
@@ -190,11 +190,11 @@ def _with_proofs(prepared: PreparedMap, request: Request, solutions: Solutions) 
     """The solutions, with bounds of the change where targets are reached to the residual."""
     reached = np.flatnonzero(solutions.gaps <= request.residual)
     first = solutions.activations[solutions.offsets[reached]][:, prepared.whole.box.free]
-    asked = request.of(reached)
-    change = np.linalg.norm(first - asked.near, axis=1)
-    found = change_bounds(prepared.rod, prepared.coarse_cells, asked.targets, asked.near, change)
+    solved = request.of(reached)
+    change = np.linalg.norm(first - solved.near, axis=1)
+    least = change_bounds(prepared.rod, prepared.coarse_cells, solved.targets, solved.near, change)
     bounds, proved = np.zeros(len(request.targets)), np.zeros(len(request.targets), bool)
-    bounds[reached], proved[reached] = found, found >= change - SLACK
+    bounds[reached], proved[reached] = least, least >= change - SLACK
     return replace(solutions, change_bounds=bounds, least_proved=proved)
 
 
@@ -213,8 +213,8 @@ def _gap_bounds(prepared: PreparedMap, request: Request, gap: Array) -> Array:
     # Where the position yields to a direction, the gap says nothing of what can be reached.
     yielding = request.direction is not None and prepared.dimension <= 3
     if len(out) and not yielding and (prepared.proves or not prepared.dimension):
-        asked = request.targets[out], gap[out], request.allowance
-        bounds[out] = gap_bounds(prepared.rod, prepared.coarse_cells, *asked)
+        gaps = request.targets[out], gap[out], request.allowance
+        bounds[out] = gap_bounds(prepared.rod, prepared.coarse_cells, *gaps)
     # Within the error of the tips, what is true of them need not be true of the arm.
     return np.where(bounds > request.allowance, bounds, 0.0)
 
@@ -231,7 +231,7 @@ def _solutions(
 
     Args:
         prepared: The tip map.
-        request: What was asked.
+        request: The request.
         roots: The roots found, sorted by target.
         missing: Numbers of the targets without a root.
         closest: The nearest points to these; some may prove to be roots.

@@ -39,7 +39,7 @@ def sqp(
     Args:
         rod: The tip map.
         request: A target for each start, and what to stay near to.
-        start: Where to begin, inside the bounds [-], shape (n, m).
+        start: Activations to begin with, inside the bounds [-], shape (n, m).
         penalty: Least penalty. A high one keeps a search near the target once it is there, as it
             must where the target lies next to a fold or to the boundary of the reachable set.
         settled: Step at which a search ends, in ranges.
@@ -49,12 +49,12 @@ def sqp(
         Activations [-], shape (n, m), and their |tip - target| [m], shape (n,).
     """
     state = _searched(rod, request, start, penalty, settled, most)
-    found = descend(rod, request.targets, state.gamma, request.residual, most=20)
-    return found.gamma, found.residual
+    ends = descend(rod, request.targets, state.gamma, request.residual, most=20)
+    return ends.gamma, ends.residual
 
 
 def survey(rod: TipMap, request: Request, start: Array, most: int) -> tuple[Array, Array]:
-    """Where searches as those of `sqp` are after a few steps, and what they promise.
+    """Activations of searches as those of `sqp` after a few steps, and what they promise.
 
     Returns:
         Activations [-], shape (n, m), and what each search minimizes, ½|γ - near|² and the penalty
@@ -73,7 +73,7 @@ def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Arr
     Args:
         rod: The tip map.
         request: A target for each start, and what is preferred.
-        start: Where to begin [-], shape (n, m).
+        start: Activations to begin with [-], shape (n, m).
 
     Returns:
         Activations [-], shape (n, m), and their |tip - target| [m], shape (n,).
@@ -98,8 +98,8 @@ def constrained_minima(rod: TipMap, request: Request, start: Array) -> tuple[Arr
         error = (linearized(rod, gamma[rows])[0] - part.targets) / rod.length
         multiplier[rows] += penalty * error  # theory (40)
         residual[rows] = np.linalg.norm(error, axis=1) * rod.length
-    found = descend(rod, request.targets, gamma, request.residual)
-    return found.gamma, found.residual
+    ends = descend(rod, request.targets, gamma, request.residual)
+    return ends.gamma, ends.residual
 
 
 class _State(NamedTuple):
@@ -112,7 +112,7 @@ class _State(NamedTuple):
     slope: Array
     """(∂r/∂γ)/L, shape (n, 3, m)."""
     penalty: Array
-    """What a miss of L costs, beside ½|γ - near|², shape (n,)."""
+    """Penalty of a miss of L, beside ½|γ - near|², shape (n,)."""
     proximity: Array
     """σ: ½σ|step|² is added to what a step minimizes, shape (n,)."""
 

@@ -1,4 +1,4 @@
-"""Where searches for the activations with a given tip begin, with three free bundles."""
+"""Starts of searches for the activations with a given tip, with three free bundles."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.kernels.branches import candidates
-from softreach.support.arrays import Array, Index, joined, rows
+from softreach.support.arrays import Array, Index, joined, joined_by, rows
 
 __all__ = ["Starts", "spatial_order", "starts_from_cells", "with_torn_cells"]
 
@@ -19,7 +19,7 @@ _PLACES = 32  # along each axis, when targets are put in order
 
 
 class Starts(NamedTuple):
-    """Where searches begin."""
+    """Activations at which searches begin."""
 
     target: Index
     """Number of the target, shape (n,)."""
@@ -36,12 +36,6 @@ class Starts(NamedTuple):
         target, cell = np.empty(room, np.int64), np.empty(room, np.int64)
         return Starts(target, cell, np.empty((room, 3)), np.empty((room, 3, 3)))
 
-    @staticmethod
-    def by_target(parts: list[Starts]) -> Starts:
-        """All of them, sorted by target."""
-        everything = joined(parts)
-        return rows(everything, np.argsort(everything.target, kind="stable"))
-
 
 def starts_from_cells(
     prepared: PreparedMap, request: Request, chosen: Index, with_root: bool = True
@@ -50,7 +44,7 @@ def starts_from_cells(
 
     Args:
         prepared: The tip map, with its cells and their tree.
-        request: What is asked; targets that follow each other are best near to each other.
+        request: The request; targets that follow each other are best near to each other.
         chosen: Numbers of the targets, ascending.
         with_root: Whether to leave out tetrahedra whose quadratic does not reach the target.
     """
@@ -61,10 +55,10 @@ def starts_from_cells(
     low, high, out = box.low.copy(), box.high.copy(), Starts.empty(_ROOM)
     first = 0
     while first < len(chosen):
-        done, found = candidates.find_starts(
+        done, count = candidates.find_starts(
             prepared.mesh, prepared.tree, targets[first:], low, high, with_root, *out
         )
-        part = rows(out, np.arange(found))
+        part = rows(out, np.arange(count))
         parts.append(part._replace(target=chosen[part.target + first]))
         first += done
     return joined(parts)
@@ -74,7 +68,7 @@ def with_torn_cells(prepared: PreparedMap, request: Request, starts: Starts) -> 
     """The starts, and more from corners of cells that have no image."""
     target, gamma = prepared.torn_cells.starts(request.targets)
     nowhere, unknown = np.full(len(target), -1), np.zeros((len(target), 3, 3))
-    return Starts.by_target([starts, Starts(target, nowhere, gamma, unknown)])
+    return joined_by("target", [starts, Starts(target, nowhere, gamma, unknown)])
 
 
 def spatial_order(points: Array) -> Index:

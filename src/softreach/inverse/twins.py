@@ -20,7 +20,7 @@ __all__ = ["twin_hints"]
 def twin_hints(
     arm: Manipulator | TipMap, targets: ArrayLike, *, tol: float = 1e-6
 ) -> tuple[str, ...]:
-    """What may be meant by targets out of reach: another base, or a z axis that points down.
+    """Hints at what targets out of reach may mean: another base, or a z axis that points down.
 
     A hint for the place that the arm would reach if its base pointed another way; its loads turn
     with it here, so that a loaded arm may reach it not quite.
@@ -38,8 +38,8 @@ def twin_hints(
     """
     rod, places = tip_map(arm, tol), as_targets("targets", targets)
     twins = _twins(rod, places)
-    found = solve_inverse(rod, np.concatenate(list(twins.values())))
-    reached = (found.statuses == Status.REACHED).reshape(len(twins), len(places))
+    solutions = solve_inverse(rod, np.concatenate(list(twins.values())))
+    reached = (solutions.statuses == Status.REACHED).reshape(len(twins), len(places))
     words = list(twins)
     return tuple(words[int(each.argmax())] if each.any() else "" for each in reached.T)
 

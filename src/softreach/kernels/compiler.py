@@ -1,4 +1,4 @@
-"""How every kernel is compiled: without the interpreter lock, with loops cached on disk.
+"""Compiler of every kernel: without the interpreter lock, with loops cached on disk.
 
 A `kernel` calls nothing but what is inlined, so that all of its arithmetic is fused and rounded in
 one place. What is `strict` rounds as written in every process and may call its like; it calls
@@ -115,10 +115,10 @@ class _Cache(FunctionCache):
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled code, or None if there is none that can be read."""
         try:
-            found = super().load_overload(sig, target_context)
-            if found is not None and found.signature.args != getattr(sig, "args", sig):
-                raise TypeError(f"compiled for {found.signature.args}")
-            return found
+            overload = super().load_overload(sig, target_context)
+            if overload is not None and overload.signature.args != getattr(sig, "args", sig):
+                raise TypeError(f"compiled for {overload.signature.args}")
+            return overload
         except Exception as error:  # unpickling raises whatever it likes
             _LOG.info("cache of %r discarded: %s: %s", self, type(error).__name__, error)
             self._attempt(self.flush)

@@ -1,4 +1,4 @@
-"""What kernels call: handed over as it is written, and compiled where it is called.
+"""Parts that kernels call: handed over as they are written, and compiled where they are called.
 
 Numba compiles a callee as if it were called from Python as well: it wraps it, optimizes it, turns
 it into machine code, and then optimizes it again with each caller. A part stops after lowering, in
@@ -57,7 +57,7 @@ class _PartLibrary(JITCodeLibrary):
     """Code to be linked, of which its callers make machine code."""
 
     inlined = False
-    """Whether callers must inline it: then it is optimized with them, else once, by itself."""
+    """True if callers must inline it: then it is optimized with them, else once, by itself."""
 
     def finalize(self) -> None:
         """Link what the part calls itself."""
@@ -164,5 +164,5 @@ class PartedDispatcher(KernelDispatcher):
         return self._part.get_call_template(args, kws)
 
     def get_overload(self, sig: Any) -> Any:
-        """What a kernel calls."""
+        """The overload that a kernel calls."""
         return self._part.get_overload(sig)

@@ -157,7 +157,7 @@ def _bundles(arm: Manipulator, placed: Collection[PlacedBundle]) -> Iterator[tup
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    symbols = [actuator.symbol for actuator in arm.actuators for _ in range(actuator.bundles)]
+    symbols = [actuator.symbol for actuator in arm.bundle_actuators]
     for bundle in placed:
         if bundle.shape == "line":
             handle: Artist = Line2D([], [], **tendon_style(bundle.color))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from softreach.kernels.box.box_projection import project
-from softreach.support.arrays import as_rows
+from softreach.support.arrays import as_rows, read_only
 from softreach.support.errors import InvalidInput
 
 Array = NDArray[np.float64]
@@ -51,22 +51,22 @@ class ActivationBox:
     @cached_property
     def low(self) -> Array:
         """Lower bounds, shape (bundles,)."""
-        return _frozen(np.array([low for low, _ in self.bounds]))
+        return read_only(np.array([low for low, _ in self.bounds]))
 
     @cached_property
     def high(self) -> Array:
         """Upper bounds, shape (bundles,)."""
-        return _frozen(np.array([high for _, high in self.bounds]))
+        return read_only(np.array([high for _, high in self.bounds]))
 
     @cached_property
     def widths(self) -> Array:
         """Upper minus lower bounds, shape (bundles,)."""
-        return _frozen(self.high - self.low)
+        return read_only(self.high - self.low)
 
     @cached_property
     def scales(self) -> Array:
         """`widths`, with 1 for fixed bundles: the measure of changes of activation."""
-        return _frozen(np.where(self.widths > 0, self.widths, 1.0))
+        return read_only(np.where(self.widths > 0, self.widths, 1.0))
 
     @cached_property
     def is_free(self) -> NDArray[np.bool_]:
@@ -93,7 +93,7 @@ class ActivationBox:
 
         Args:
             cube: Points in [0, 1], shape (n, bundles).
-            out: Where to put them; `cube` itself is allowed.
+            out: Array to put them into; `cube` itself is allowed.
 
         Returns:
             Activations, shape (n, bundles), never outside the bounds.
@@ -104,7 +104,7 @@ class ActivationBox:
 
     @cached_property
     def _overshoots(self) -> bool:
-        """Whether rounding carries some low + width past its bound, where 1 would then lie."""
+        """True if rounding carries some low + width past its bound, where 1 would then lie."""
         return bool((self.low + self.widths > self.high).any())
 
     def from_free_cube(self, cube: Array) -> Array:
@@ -169,11 +169,6 @@ class ActivationBox:
         return np.where(upper, self.high, self.low)
 
 
-def _frozen(values: Array) -> Array:
-    values.setflags(write=False)
-    return values
-
-
 # The damped step toward a target that no activation takes beyond its bounds.
 
 
@@ -184,7 +179,7 @@ def damped_steps(
 
     Args:
         box: The bounds.
-        gamma: Where the steps begin, inside the bounds [-], shape (n, m).
+        gamma: Beginnings of the steps, inside the bounds [-], shape (n, m).
         miss: Tips minus targets, in any unit, shape (n, 3).
         slopes: ∂r/∂γ in that unit, shape (n, 3, m).
         damping: μ > 0, the square of that unit, shape (n,).

@@ -1,4 +1,4 @@
-"""What the free rod and the loaded one have in common: one arm, and how far activations bend it."""
+"""Rod of one arm, free or loaded: its steps, and how far activations bend it."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class ArmRod(TipMap):
         return tables(self.arm, strain_stations(self.arm))
 
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
-        """How far activations (n, bundles) go: the smallest ζ, or η, along the arm, shape (n,).
+        """Smallest ζ, or η, along the arm at activations (n, bundles), shape (n,).
 
         And the largest angle by which a step turns the arm [rad], η |Uγ| R2 dS, shape (n,).
         """

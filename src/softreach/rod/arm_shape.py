@@ -87,12 +87,12 @@ def bundle_curves(arm: Manipulator, configuration: xr.Dataset) -> Array:
 def bundle_skins(
     arm: Manipulator, configuration: xr.Dataset, *, lift: float = 0.0, step: float = np.pi / 32
 ) -> list[Surface]:
-    """What shows every bundle, where it acts: a band, a thin tube for a line, a tube for a lumen.
+    """Surfaces of all bundles where they act: bands, thin tubes for lines, tubes for lumens.
 
     Args:
         arm: The design; band j covers a_j - σ_j/2 to a_j + σ_j/2 on the outside of its ring.
         configuration: One configuration of that arm.
-        lift: How far bands are above their ring, in R2 [-].
+        lift: Height of bands above their ring, in R2 [-].
         step: Largest angle between neighboring points across a band [rad].
 
     Returns:
@@ -128,8 +128,8 @@ def _drawn_line(arm: Manipulator, configuration: xr.Dataset) -> Centerline:
 def _line(configuration: xr.Dataset) -> Centerline:
     if not (least := float(configuration["extension"].min())) > 0.0:
         hint = "ask for the configuration of activations within the bounds of the design"
-        found = f"with extension ζ = {least:.4g}"
-        raise InvalidInput("configuration", found, "of an arm that has a length, ζ > 0", hint)
+        extension = f"with extension ζ = {least:.4g}"
+        raise InvalidInput("configuration", extension, "of an arm that has a length, ζ > 0", hint)
     if "sample" in configuration.dims:
         count = configuration.sizes["sample"]
         hint = "choose one with configuration.isel(sample=0)"

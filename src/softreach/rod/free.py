@@ -112,15 +112,15 @@ class FreeRod(ArmRod):
         gamma, lost = self.with_arms(self.box.check(activations))
         z = self.check_stations(stations)
         table, ends = self._station_table(z)
-        found = Frames(np.empty((len(gamma), len(z), 3)), np.empty((len(gamma), len(z), 3, 3)))
+        result = Frames(np.empty((len(gamma), len(z), 3)), np.empty((len(gamma), len(z), 3, 3)))
         parallel.run(
-            partial(frames.frames, table, ends, gamma[b], found.position[b], found.directors[b])
+            partial(frames.frames, table, ends, gamma[b], result.position[b], result.directors[b])
             for b in parallel.blocks(len(gamma), 1024)
         )
         if status is not None:
             status[:] = TipStatus.STABLE
-        drop(lost, status, *found)
-        return found
+        drop(lost, status, *result)
+        return result
 
     def strains_at(self, stations: ArrayLike) -> Callable[..., Strains]:
         """u = Uγ η/ζ and ζ = 1 + z·γ at stations Z [m] as a function of activations: theory (7)."""
@@ -128,11 +128,11 @@ class FreeRod(ArmRod):
 
         def strains(activations: ArrayLike, status: Status | None = None) -> Strains:
             gamma, lost = self.with_arms(self.box.check(activations))
-            found = per_length(*linear_strains(table, gamma))
+            strain = per_length(*linear_strains(table, gamma))
             if status is not None:
                 status[:] = TipStatus.STABLE
-            drop(lost, status, *found)
-            return found
+            drop(lost, status, *strain)
+            return strain
 
         return strains
 
@@ -154,7 +154,7 @@ class FreeRod(ArmRod):
 
 
 class LinearStrains(NamedTuple):
-    """What is linear in the activations, (n, station) of each."""
+    """Strains that are linear in the activations, (n, station) of each."""
 
     curvature: Array
     """Uγ [1/m] in the directors, per length of η."""

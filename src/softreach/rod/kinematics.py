@@ -113,14 +113,14 @@ def configuration(
             under which there is no arm (ζ <= 0).
     """
     rod = tip_map(arm, tol, frame=frame)
-    given = as_floats("activation", activation)
-    gamma = rod.check_activations("activation", np.atleast_2d(given))
+    values = as_floats("activation", activation)
+    gamma = rod.check_activations("activation", np.atleast_2d(values))
     z = stations_along(rod, stations, _COLUMNS * max(1, len(gamma)))
     status = np.empty(len(gamma), np.int8)
     dataset = shape_dataset(rod, gamma, z, rod.frames(gamma, z, status), rod.strains(gamma, z))
     if rod.supports_unstable:
         dataset = schema.with_status(dataset, status)
-    return dataset.isel(sample=0) if given.ndim == 1 else dataset
+    return dataset.isel(sample=0) if values.ndim == 1 else dataset
 
 
 def shape_dataset(

@@ -9,9 +9,8 @@ from softreach.arm.manipulator import Manipulator
 from softreach.arm.summary import VERIFIED_LOAD_NUMBER, is_overloaded
 from softreach.rod.arm_rod import ArmRod
 from softreach.rod.free import FreeRod
-from softreach.rod.placed import PlacedRod
 from softreach.rod.tip_map import Frame, TipMap, check_tol
-from softreach.rod.view import View
+from softreach.rod.view import PlacedRod, View
 from softreach.support.arguments import as_flag, as_given, as_one_of
 from softreach.support.errors import InvalidInput
 from softreach.support.errors import warn as issue_warning
@@ -27,7 +26,7 @@ def tip_map(
     Args:
         arm: The design, or a tip map, whose own tolerance then counts.
         tol: Largest tip error, in L.
-        frame: Where places are told: in the "world", or in the frame of the "base", whose z is
+        frame: Frame of places: the "world", or that of the "base", whose z is
             along the straight arm. That of a tip map, if it is not of the world, counts.
         warn: Whether to warn of loads beyond what was verified.
 
@@ -50,7 +49,7 @@ def _from_base(rod: TipMap) -> TipMap:
     """The same map in the frame of the base."""
     if isinstance(rod, View):
         return replace(rod, base=_from_base(rod.base))
-    return rod.rod if isinstance(rod, PlacedRod) else rod
+    return rod.base if isinstance(rod, PlacedRod) else rod
 
 
 def refined(rod: TipMap, tol: float) -> TipMap:

@@ -21,6 +21,7 @@ from softreach.kernels.rod import tips as rod
 from softreach.rod.activation_box import ActivationBox
 from softreach.rod.tip_map import MOST_TURN_OF_STEP, check_tol
 from softreach.support import parallel
+from softreach.support.arrays import read_only
 from softreach.support.errors import InvalidInput
 
 Array = NDArray[np.float64]
@@ -99,7 +100,7 @@ class StepRule:
         return self._packed(self.edges(steps))
 
     def _packed(self, edges: Array) -> Array:
-        return _read_only(rod.pack(*self.nodes(edges)))
+        return read_only(rod.pack(*self.nodes(edges)))
 
     def _halves(self, steps: int) -> tuple[Array, Array]:
         """Packed tables of the steps, and of both halves of each."""
@@ -123,7 +124,7 @@ class StepRule:
     def packed_stations(self, stations: Array, steps: int) -> tuple[Array, NDArray[np.int64]]:
         """`station_nodes` as a packed table, read-only."""
         nodes, ends = self.station_nodes(stations, steps)
-        return _read_only(rod.pack(*nodes)), ends
+        return read_only(rod.pack(*nodes)), ends
 
     def steps_for(self, tol: float) -> int:
         """The number of uniform steps in S for which no tip is off by more than `tol`.
@@ -153,11 +154,11 @@ class StepRule:
         steps, pilot = self._fewest_steps(turn), self.pilot
         while steps <= _MOST_STEPS:
             difference = halving(steps)
-            found = difference(pilot)
-            error = float(found.max())
+            errors = difference(pilot)
+            error = float(errors.max())
             if error <= allowed:
-                worse, found = worsened(difference, pilot, found, self.box)
-                error = float(found.max())
+                worse, errors = worsened(difference, pilot, errors, self.box)
+                error = float(errors.max())
                 if error <= allowed:
                     return steps
                 pilot = np.concatenate([pilot, worse])
@@ -241,12 +242,6 @@ def step_counts(profile: Profile, gaps: Array, steps: int) -> NDArray[np.int64]:
     return np.ceil(gaps * (steps / profile.slender_length) - 1e-9).astype(np.int64)
 
 
-def _read_only(table: Array) -> Array:
-    """The same for all tables: kernels are compiled once more for those that can be written."""
-    table.setflags(write=False)
-    return table
-
-
 def pilot_activations(arm: Manipulator, box: ActivationBox) -> Array:
     """Corners, points on faces and points inside the activation box.
 
@@ -298,21 +293,21 @@ def _stations(arm: Manipulator) -> Array:
 
 
 def worsened(
-    error: Callable[[Array], Array], pilot: Array, found: Array, box: ActivationBox
+    error: Callable[[Array], Array], pilot: Array, known: Array, box: ActivationBox
 ) -> tuple[Array, Array]:
     """Activations of larger error, by moving one bundle to a bound at a time, from the worst.
 
     Args:
         error: Errors of activations (n, bundles), shape (n,).
-        pilot: Where to begin, shape (n, bundles).
-        found: Their errors, shape (n,).
+        pilot: Activations to begin with, shape (n, bundles).
+        known: Their errors, shape (n,).
         box: The bounds.
 
     Returns:
-        Where the searches ended, shape (at most 8, bundles), and the errors there.
+        Ends of the searches, shape (at most 8, bundles), and the errors there.
     """
-    chosen = np.argsort(-found, kind="stable")[:_SEARCHED]
-    gamma, worst = pilot[chosen].copy(), found[chosen].copy()
+    chosen = np.argsort(-known, kind="stable")[:_SEARCHED]
+    gamma, worst = pilot[chosen].copy(), known[chosen].copy()
     free, rows = box.free, np.arange(len(chosen))
     for _ in range(_ROUNDS if len(free) else 0):
         moved = np.repeat(gamma[:, None], 2 * len(free), axis=1)

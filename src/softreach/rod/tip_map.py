@@ -26,7 +26,7 @@ from softreach.support.errors import InvalidInput, Range, counted
 Array = NDArray[np.float64]
 Status = NDArray[np.int8]
 Frame = Literal["world", "base"]
-"""Where places are told: in the world, or from the base, whose z is along the straight arm."""
+"""Frame of places: the world, or that of the base, whose z is along the straight arm."""
 
 BLOCK = 16_384
 """Samples per task: large against a thread's cost, small enough for Ctrl-C to be prompt."""
@@ -51,7 +51,7 @@ class TipStatus(IntEnum):
 
 
 def has_tip(status: Status) -> NDArray[np.bool_]:
-    """Whether each `TipStatus` is that of an equilibrium, stable or not."""
+    """Mask of each `TipStatus` that is an equilibrium's, stable or not."""
     return status <= TipStatus.UNSTABLE
 
 
@@ -132,7 +132,7 @@ class TipMap(ABC):
 
     @property
     def supports_unstable(self) -> bool:
-        """Whether a tip can have another status than stable."""
+        """True if a tip can have another status than stable."""
         return False
 
     @property
@@ -149,14 +149,14 @@ class TipMap(ABC):
         """Compute what every sample needs, once for all threads."""
 
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
-        """How far activations (n, bundles) go: the smallest ζ, or η, along the arm, shape (n,).
+        """Smallest ζ, or η, along the arm at activations (n, bundles), shape (n,).
 
         And the largest angle by which a step turns the arm [rad], shape (n,).
         """
         return np.ones(len(gamma)), np.zeros(len(gamma))
 
     def has_arm(self, gamma: Array) -> NDArray[np.bool_]:
-        """Whether ζ > 0 and the steps follow the arm at activations (n, bundles), shape (n,).
+        """Mask of activations (n, bundles) at which ζ > 0 and the steps follow the arm, shape (n,).
 
         Within the bounds they do.
         """
@@ -385,7 +385,7 @@ def no_equilibrium_message(tried: int, sought: str = "a stable equilibrium") -> 
 
     Args:
         tried: Number of activations.
-        sought: What they do not have.
+        sought: The thing that they do not have.
     """
     return f"none of {tried} activations tried has {sought}"
 

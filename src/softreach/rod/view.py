@@ -1,4 +1,4 @@
-"""Views of a tip map: some of its bundles, other measures of activation, stable tips alone.
+"""Views of a tip map: in the world, of some bundles, in other measures, of stable tips alone.
 
 How far two activations are apart has a meaning where all bundles share a unit. Where tensions,
 pressures and strains drive one arm together it has none, until each is counted in its own range.
@@ -15,7 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.arm.base import Base
 from softreach.arm.manipulator import Manipulator
+from softreach.kernels.rod.placing import move, turn
 from softreach.rod.activation_box import ActivationBox
+from softreach.rod.arm_rod import ArmRod
 from softreach.rod.tip_map import (
     Array,
     Frame,
@@ -25,10 +27,18 @@ from softreach.rod.tip_map import (
     Strains,
     TipMap,
     TipStatus,
+    drop,
 )
 from softreach.support.arguments import as_instance
 
-__all__ = ["View", "activation_measures", "free_bundles", "measured_bundles", "stable_tips"]
+__all__ = [
+    "PlacedRod",
+    "View",
+    "activation_measures",
+    "free_bundles",
+    "measured_bundles",
+    "stable_tips",
+]
 
 
 def free_bundles(rod: TipMap) -> TipMap:
@@ -78,21 +88,10 @@ def _view(rod: TipMap) -> View:
 
 
 @dataclass(frozen=True, repr=False)
-class View(TipMap):
-    """A tip map in other coordinates x of its activations, γ = offset + scale ∘ x.
-
-    A search that takes NaN for a failed step ends at places that the arm can hold, where unstable
-    equilibria are NaN as missing ones are.
-    """
+class _DerivedMap(TipMap):
+    """A tip map made of another one, which answers where nothing changes."""
 
     base: TipMap
-    """The map of all activations in their own units; no view itself."""
-    scale: tuple[float, ...]
-    """Size of one unit of x, for each bundle of the base."""
-    free: tuple[int, ...]
-    """The bundles of the base that x has; the others are fixed at their lower bounds."""
-    only_stable: bool = False
-    """Whether unstable equilibria count as none."""
     arm: Manipulator = field(init=False, compare=False)
     tol: float = field(init=False, compare=False)
 
@@ -112,8 +111,126 @@ class View(TipMap):
 
     @property
     def supports_unstable(self) -> bool:
-        """Whether a tip can have another status than stable."""
+        """True if a tip can have another status than stable."""
         return self.base.supports_unstable
+
+    @cached_property
+    def box(self) -> ActivationBox:
+        """The activations within bounds."""
+        return self.base.box
+
+    def prepare(self) -> None:
+        """Compute what every sample needs, once for all threads."""
+        self.base.prepare()
+
+    def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
+        """The smallest ζ along the arm [-] and the largest turn of a step [rad], (n,) each."""
+        return self.base.extension_and_turn(gamma)
+
+    def farthest(self) -> float:
+        """No tip is farther from the base than this [m]."""
+        return self.base.farthest()
+
+    def linearization_error(self, half_widths: Array) -> float:
+        """The largest |r(γ + d) - r(γ) - r'(γ) d| [m] for |dj| <= half_widths[j] in the box."""
+        return self.base.linearization_error(half_widths)
+
+    def linearization_errors(self, centers: Array, half_widths: Array) -> Array:
+        """The same [m] for |dj| <= half_widths[j] around each center only, shape (n,)."""
+        return self.base.linearization_errors(centers, half_widths)
+
+    def strains_at(self, stations: ArrayLike) -> Callable[..., Strains]:
+        """The strains at stations Z [m], in any order, as a function of activations."""
+        return self.base.strains_at(stations)
+
+    def strain_range(self, stations: ArrayLike) -> StrainRange:
+        """Ranges of the strains at stations Z [m] within the activation box."""
+        return self.base.strain_range(stations)
+
+
+@dataclass(frozen=True, repr=False)
+class PlacedRod(_DerivedMap):
+    """A free or loaded rod as the world sees it: r = r(0) + R r', with r' in the base's frame.
+
+    Its base stands, hangs or leans anywhere.
+    """
+
+    base: ArmRod
+    """The rod in the frame of its base."""
+
+    @property
+    def pose(self) -> Base:
+        """Pose of the base in the world."""
+        return self.arm.base
+
+    @property
+    def frame(self) -> Frame:
+        """The world."""
+        return "world"
+
+    @property
+    def steps(self) -> int:
+        """Steps that the integrator makes along the arm."""
+        return self.base.steps
+
+    def fill(
+        self,
+        gamma: Array,
+        tips: Array,
+        slopes: Array | None = None,
+        *,
+        twists: Array | None = None,
+        status: Status | None = None,
+        directions: Array | None = None,
+    ) -> None:
+        """Put tips, and what else is asked for, into place; they are turned and moved there."""
+        self.base.fill(gamma, tips, slopes, twists=twists, status=status, directions=directions)
+        rotation, position = self._pose
+        move(tips, rotation, position)
+        if slopes is not None:
+            turn(slopes, rotation)
+        if directions is not None:
+            move(directions, rotation, np.zeros(3))
+        if twists is not None:
+            turn(twists, rotation)
+            if position.any():  # v is that of the origin, which is another point now
+                v, w = twists[:, :3], twists[:, 3:]
+                for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+                    v[:, i] += position[j] * w[:, k] - position[k] * w[:, j]
+
+    @cached_property
+    def _pose(self) -> tuple[Array, Array]:
+        """Rotation and position as the kernels take them."""
+        return np.array(self.pose.rotation), np.array(self.pose.position)
+
+    def frames(
+        self, activations: ArrayLike, stations: ArrayLike, status: Status | None = None
+    ) -> Frames:
+        """Centerline and directors at ascending stations Z [m]."""
+        return self.placed(self.base.frames(activations, stations, status))
+
+    def placed(self, frames: Frames) -> Frames:
+        """Centerlines and directors in the world of those in the frame of the base."""
+        directors = self.pose.directions_to_world(frames.directors)
+        return Frames(self.pose.to_world(frames.position), directors)
+
+
+@dataclass(frozen=True, repr=False)
+class View(_DerivedMap):
+    """A tip map in other coordinates x of its activations, γ = offset + scale ∘ x.
+
+    A search that takes NaN for a failed step ends at places that the arm can hold, where unstable
+    equilibria are NaN as missing ones are.
+    """
+
+    base: TipMap
+    """The map of all activations in their own units; no view itself."""
+    scale: tuple[float, ...]
+    """Size of one unit of x, for each bundle of the base."""
+    free: tuple[int, ...]
+    """The bundles of the base that x has; the others are fixed at their lower bounds."""
+    only_stable: bool = False
+    """True if unstable equilibria count as none."""
 
     @cached_property
     def box(self) -> ActivationBox:
@@ -135,8 +252,8 @@ class View(TipMap):
 
     @cached_property
     def _is_plain(self) -> bool:
-        """Whether x are the activations of the base."""
-        return len(self.free) == len(self.scale) and all(one == 1.0 for one in self.scale)
+        """True if x are the activations of the base."""
+        return len(self.free) == len(self.scale) and all(factor == 1.0 for factor in self.scale)
 
     def activations(self, x: Array) -> Array:
         """Activations of the base, (n, its bundles), at checked x (n, bundles)."""
@@ -145,10 +262,6 @@ class View(TipMap):
         gamma = np.tile(self.base.box.low, (len(x), 1))
         gamma[:, self._columns] = x * self.measures
         return gamma
-
-    def prepare(self) -> None:
-        """Compute what every sample needs, once for all threads."""
-        self.base.prepare()
 
     def fill(
         self,
@@ -187,19 +300,12 @@ class View(TipMap):
         """Make NaN, and say that there is no equilibrium, where only stable ones count."""
         if not self.only_stable or status is None:
             return
-        lost = status != TipStatus.STABLE
-        status[lost] = TipStatus.NO_EQUILIBRIUM
-        for some in values:
-            if some is not None:
-                some[lost] = np.nan
+        lost = np.flatnonzero(status != TipStatus.STABLE)
+        drop(lost, status, *(some for some in values if some is not None))
 
     def extension_and_turn(self, gamma: Array) -> tuple[Array, Array]:
         """The smallest ζ along the arm [-] and the largest turn of a step [rad] at x."""
         return self.base.extension_and_turn(self.activations(gamma))
-
-    def farthest(self) -> float:
-        """No tip is farther from the base than this [m]."""
-        return self.base.farthest()
 
     def linearization_error(self, half_widths: Array) -> float:
         """The largest |r(γ + d) - r(γ) - r'(γ) d| [m] for |dj| <= half_widths[j] in the box."""
@@ -234,12 +340,8 @@ class View(TipMap):
             gamma = self.activations(self.box.check(activations))
             if self.only_stable and status is None:
                 status = np.empty(len(gamma), np.int8)
-            found = of_base(gamma, status)
-            self._drop(status, *found)
-            return found
+            strain = of_base(gamma, status)
+            self._drop(status, *strain)
+            return strain
 
         return strains
-
-    def strain_range(self, stations: ArrayLike) -> StrainRange:
-        """Ranges of the strains at stations Z [m] within the activation box."""
-        return self.base.strain_range(stations)

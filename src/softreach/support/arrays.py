@@ -32,6 +32,8 @@ __all__ = [
     "as_stations",
     "check_finite",
     "joined",
+    "joined_by",
+    "read_only",
     "rows",
 ]
 
@@ -80,6 +82,18 @@ def joined(tables: Sequence[Table]) -> Table:
     if len(tables) == 1:
         return tables[0]
     return type(tables[0])(*map(np.concatenate, zip(*tables, strict=True)))
+
+
+def joined_by(column: str, tables: Sequence[Table]) -> Table:
+    """The rows of tables, of one at least, sorted by a column."""
+    table = joined(tables)
+    return rows(table, np.argsort(getattr(table, column), kind="stable"))
+
+
+def read_only(values: Array) -> Array:
+    """The array itself, not to be written: kernels are compiled once more for those that are."""
+    values.setflags(write=False)
+    return values
 
 
 def as_floats(name: str, values: object, allowed: str = _NUMBERS) -> Array:

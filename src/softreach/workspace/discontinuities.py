@@ -67,7 +67,7 @@ def remainder(rod: TipMap, image: Image, stretches: Array, left_out: Mask) -> Re
         rod: The tip map, with three free bundles.
         image: Of the other cells.
         stretches: det J at the vertices of the grid, 0 where there is no stable equilibrium.
-        left_out: Which cells are left out, shape (cells, cells, cells).
+        left_out: Mask of the cells that are left out, shape (cells, cells, cells).
     """
     cells = left_out.shape[0]
     corners = corner_values(np.abs(stretches).reshape((cells + 1,) * 3)).reshape(-1, 8)

@@ -227,8 +227,8 @@ class _Base:
         volume = _swept(self._flux, shifts, rods)
         convex = _limit({n: _dragged(each, shifts, rods) for n, each in self._corners.items()})
         if self._solid.route == "raster":
-            rest, _ = self._by_raster(parameter)
-            volume = Estimate(volume.value + rest.value, volume.error + rest.error)
+            beyond, _ = self._by_raster(parameter)
+            volume = Estimate(volume.value + beyond.value, volume.error + beyond.error)
         return volume, convex
 
     def _by_raster(self, parameter: Parameter) -> tuple[Estimate, Estimate]:
@@ -303,7 +303,7 @@ def _derivative(
         rods: Their tip maps.
         cube: Places in the unit cube of the free bundles, shape (n, 3).
         along: The function.
-        noise: How far off a value may be.
+        noise: Largest error of a value.
     """
     values = np.array([along(rod.tips(rod.box.from_free_cube(cube))) for rod in rods])
     value, rough = float(shifts.weights @ values), float(shifts.rough_weights @ values)

@@ -56,6 +56,14 @@ class Lattice(NamedTuple):
         return (points - self.origin) / self.cell
 
 
+def covered_cubes(covered: Mask) -> Mask:
+    """Cubes between eight neighboring centers of a lattice that are all covered."""
+    for axis in range(3):
+        rolled = np.moveaxis(covered, axis, 0)
+        covered = np.moveaxis(rolled[:-1] & rolled[1:], 0, axis)
+    return covered
+
+
 class Spans(NamedTuple):
     """Pieces of lines of sight between crossings, line by line, upwards."""
 

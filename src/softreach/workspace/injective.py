@@ -19,7 +19,7 @@ from softreach.workspace.discontinuities import corner_values
 from softreach.workspace.flux import box_slopes, grid_faces, signed_volume
 from softreach.workspace.grid import cube_grid, grid_stretches, grid_tips
 from softreach.workspace.image import Image, Lattice, image_of
-from softreach.workspace.measure import Estimate, extrapolated_hull
+from softreach.workspace.measure import extrapolated_hull
 from softreach.workspace.solid import ReachableSolid
 
 _LIMIT = 0.8  # of 1, for slopes between the samples
@@ -70,7 +70,8 @@ def solid_by_flux(
     places = grid_faces(cells)
     tips = rod.tips(rod.box.from_free_cube(places))
     lattice = lattice_for(tips)
-    convex = _convex_volume(tips, places * cells)
+    even = (np.rint(places * cells) % 2 == 0).all(axis=1)
+    convex = extrapolated_hull(tips, tips[even])
     progress(len(places))
     volume = abs(flux.value)
     return ReachableSolid(
@@ -251,8 +252,8 @@ def _parted(patches: _Patches, a: Index, b: Index, bend: Array) -> Mask:
     Tried are planes along either of them, and across the line between their centers.
     """
     sides = patches.slopes * patches.half[:, None, :]  # of parallelograms, halved
-    rest = 0.5 * np.einsum("ij,jk,ik->i", patches.half, bend, patches.half)
-    radius = np.linalg.norm(sides, axis=1).sum(axis=1) + rest
+    bulge = 0.5 * np.einsum("ij,jk,ik->i", patches.half, bend, patches.half)
+    radius = np.linalg.norm(sides, axis=1).sum(axis=1) + bulge
     between = patches.tips[b] - patches.tips[a]
     mask = np.linalg.norm(between, axis=1) > radius[a] + radius[b]
     normal = _normals(patches)
@@ -260,7 +261,7 @@ def _parted(patches: _Patches, a: Index, b: Index, bend: Array) -> Mask:
     for direction, tilted in ((between, (a, b)), (normal[a], (b,)), (normal[b], (a,))):
         left = np.flatnonzero(~mask)
         unit = direction[left] / np.linalg.norm(direction[left], axis=1).clip(1e-300)[:, None]
-        reach = rest[a[left]] + rest[b[left]]
+        reach = bulge[a[left]] + bulge[b[left]]
         for each in tilted:
             reach += np.abs(unit[:, None, :] @ sides[each[left]]).sum(axis=(1, 2))
         mask[left] = np.abs((unit * between[left]).sum(axis=1)) > reach
@@ -312,12 +313,6 @@ def _keeps_sign(stretch: Array) -> bool:
         curved += np.pad(second, [(int(other == axis),) * 2 for other in range(3)], "edge")
     least = np.abs(corner_values(stretch)).min(axis=-1)
     return bool((least > _MARGIN / 8.0 * corner_values(curved).max(axis=-1)).all())
-
-
-def _convex_volume(tips: Array, vertices: Array) -> Estimate:
-    """From all vertices on the faces and from every second one, as from images of grids."""
-    second = (np.rint(vertices) % 2 == 0).all(axis=1)
-    return extrapolated_hull(tips, tips[second])
 
 
 def _rasterized(rod: TipMap, cells: int, lattice: Lattice) -> Image:

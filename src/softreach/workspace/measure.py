@@ -13,7 +13,7 @@ from softreach.rod.tip_map import TipMap
 from softreach.support.arrays import Array, Index
 from softreach.workspace.crossings import Crossings
 from softreach.workspace.flux import signed_volume
-from softreach.workspace.image import Image, Spans
+from softreach.workspace.image import Image, Spans, covered_cubes
 
 T = TypeVar("T")
 _LEFT = 0.35  # of what is removed; for four bundles 0.28 to 0.34 of it were found wrong
@@ -42,9 +42,9 @@ def solid_volume(rod: TipMap, fine: Image, coarse: Image) -> Estimate:
     signed = signed_volume(rod, _NODES)
     sense = 1 if signed.value >= 0 else -1
     at_fine, at_coarse = _correction(fine, sense), _correction(coarse, sense)
-    rest = extrapolated(at_fine, at_coarse)
-    removed = abs(rest.value - at_fine.value)
-    return Estimate(abs(signed.value) + rest.value, signed.error + removed + at_fine.error)
+    beyond = extrapolated(at_fine, at_coarse)
+    removed = abs(beyond.value - at_fine.value)
+    return Estimate(abs(signed.value) + beyond.value, signed.error + removed + at_fine.error)
 
 
 def partial_volume(fine: Image, common: Image, coarse: Image, remainder: float) -> Estimate:
@@ -56,10 +56,10 @@ def partial_volume(fine: Image, common: Image, coarse: Image, remainder: float) 
     to reach.
 
     Args:
-        fine: What the cells of the grid reach that are not left out.
-        common: What those of them reach that the coarse grid holds too.
+        fine: Image of the cells of the grid that are not left out.
+        common: Image of those of them that the coarse grid holds too.
         coarse: The same from a grid of half as many cells.
-        remainder: What cells at the edge reach beside [m³].
+        remainder: Volume that cells at the edge reach beside [m³].
     """
     sense = 1 if _signed_volume(fine) >= 0 else -1
     at_fine, at_common, at_coarse = (_covered(image, sense) for image in (fine, common, coarse))
@@ -86,7 +86,7 @@ def multiply_covered(
     Args:
         fine: Of n cells along each axis.
         coarse: Of half as many.
-        common: What the fine cells reach that the coarse grid holds too, if not all of them are.
+        common: Image of the fine cells that the coarse grid holds too, if not all of them are.
 
     Returns:
         The volumes, and by how much their sum changes on half as fine a grid.
@@ -171,10 +171,7 @@ def _outer_vertices(image: Image) -> Array:
     used = np.zeros(len(image.vertices), bool)
     used[image.triangles[:, :3]] = True
     vertices = image.vertices[used] / image.unit
-    covered = image.counts[0] > 0
-    for axis in range(3):
-        rolled = np.moveaxis(covered, axis, 0)
-        covered = np.moveaxis(rolled[:-1] & rolled[1:], 0, axis)
+    covered = covered_cubes(image.counts[0] > 0)
     i, j, k = np.floor(vertices).astype(int).T
     return vertices[~covered[i, j, k]]
 
@@ -259,7 +256,7 @@ def length_sum(runs: Runs, spacing: int = 1, parity: int = 0) -> Array:
     Args:
         runs: Stretches between crossings.
         spacing: Every how many centers are looked at.
-        parity: Which of them comes first.
+        parity: Number of the first of them.
 
     Returns:
         Shape (runs,): what each run adds to its line.
@@ -275,17 +272,8 @@ def length_sum(runs: Runs, spacing: int = 1, parity: int = 0) -> Array:
     return total
 
 
-class LineVolume(NamedTuple):
-    """A volume and its noise."""
-
-    value: float
-    """Volume [m³]."""
-    noise: float
-    """Error due to where the lines happen to lie [m³]."""
-
-
-def line_volume(crossings: Crossings) -> LineVolume:
-    """Volume from the lines along all three axes; each axis counts by the square of its lines.
+def line_volume(crossings: Crossings) -> Estimate:
+    """Volume from the lines along all three axes [m³]; each counts by the square of its lines.
 
     On average over where the lattice lies the sum of lengths is the volume, so that what it errs by
     is noise. Every other line along each axis, looked at on every other center, tells how much: the
@@ -296,7 +284,7 @@ def line_volume(crossings: Crossings) -> LineVolume:
     axes = [runs_along(crossings, axis) for axis in range(3)]
     lines = np.array([float(len(np.unique(runs.line))) for runs in axes])
     if not lines.all():
-        return LineVolume(0.0, np.inf)
+        return Estimate(0.0, np.inf)
     weights = lines**2 / (lines**2).sum()
     values = np.array([length_sum(runs).sum() for runs in axes])
     coarse = np.array([_sparse(runs) for runs in axes])  # (axis, 8)
@@ -304,7 +292,7 @@ def line_volume(crossings: Crossings) -> LineVolume:
     variances = np.mean((coarse - values[:, None]) ** 2, axis=1) / 4.0
     spread = float(weights @ (values - value) ** 2)
     noise = 2.0 * np.sqrt(float(weights**2 @ variances) + spread / 3.0)
-    return LineVolume(value * lattice.cell**3, float(noise) * lattice.cell**3)
+    return Estimate(value * lattice.cell**3, float(noise) * lattice.cell**3)
 
 
 def _sparse(runs: Runs) -> list[float]:

@@ -87,7 +87,7 @@ def reachable_set(
         tol: Largest tip error, in L.
         frame: In which places are told: that of the "world", or of the "base", whose z is along the
             straight arm.
-        memory: What more than three free bundles may use [bytes]; by default a quarter of what is
+        memory: Limit for more than three free bundles [bytes]; by default a quarter of what is
             free. Cells do not become smaller than it allows.
         progress: Called with the number of grid vertices or cells done since its last call.
 
@@ -205,19 +205,19 @@ def lattice_for(tips: Array, *, cell: float | None, accuracy: float) -> Lattice:
     return Lattice.around(tips, float(max(edge, sides.max() / 1024.0)))
 
 
-def is_settled(found: ReachableSolid, accuracy: float) -> bool:
+def is_settled(solid: ReachableSolid, accuracy: float) -> bool:
     """True if a finer grid would hardly change the volume or how much of it is reached twice."""
-    return found.volume_error <= accuracy * found.volume
+    return solid.volume_error <= accuracy * solid.volume
 
 
-def is_worthwhile(found: ReachableSolid, accuracy: float) -> bool:
+def is_worthwhile(solid: ReachableSolid, accuracy: float) -> bool:
     """True if grids that memory holds may be fine enough.
 
     Where cells are left out the error falls as 1/n, as fast as n grows and no faster.
     """
-    cells = 2 * found.cells
-    while found.lost_share > 0.0 and found.volume_error > accuracy * found.volume * (
-        cells / found.cells
+    cells = 2 * solid.cells
+    while solid.lost_share > 0.0 and solid.volume_error > accuracy * solid.volume * (
+        cells / solid.cells
     ):
         cells *= 2
     return _fits(cells)
@@ -328,9 +328,9 @@ def _entire(rod: TipMap, fine: Image, coarse: Image) -> _Measures | None:
 def _in_part(rod: TipMap, grid: _Grid, fine: Image, coarse: Image) -> _Measures:
     """Measures of the image of the cells that are not left out, and of the rest of those."""
     common = grid.in_common().image(fine.lattice)
-    rest = remainder(rod, fine, grid.stretches, grid.left_out)
-    volume = measure.partial_volume(fine, common, coarse, rest.volume)
-    convex = measure.partial_convex_volume(fine, common, coarse, rest.tips)
+    edge = remainder(rod, fine, grid.stretches, grid.left_out)
+    volume = measure.partial_volume(fine, common, coarse, edge.volume)
+    convex = measure.partial_convex_volume(fine, common, coarse, edge.tips)
     return volume, convex, _overlaps(volume, fine, coarse, common)
 
 

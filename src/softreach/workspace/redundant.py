@@ -23,7 +23,7 @@ from softreach.support.errors import InvalidInput
 from softreach.support.progress import Progress
 from softreach.workspace.boundary import ReachedCells
 from softreach.workspace.crossings import Crossings
-from softreach.workspace.image import Lattice
+from softreach.workspace.image import Lattice, covered_cubes
 from softreach.workspace.measure import Estimate, line_volume
 from softreach.workspace.search import ENOUGH, Flood
 
@@ -61,7 +61,7 @@ def searched_set(
         accuracy: Relative error asked of the volume: cells become smaller until it is met, or
             `memory` is used.
         cell: Edge of a cell [m], instead of the rule's.
-        memory: What the search may use [bytes].
+        memory: Memory that the search may use [bytes].
         progress: Called with the number of centers searched since its last call.
 
     Raises:
@@ -135,7 +135,7 @@ def _search(
     area = len(crossings.edges.cell) * edge**2 / 1.5  # a plane cuts 1.5 edges to a square of a cell
     slack = area * (ENOUGH * edge + rod.tol * rod.length)
     convex = _hull(crossings, tips[_not_among(flood, tips)])
-    noise = volume.noise if np.isfinite(volume.noise) else convex.value + convex.error
+    noise = volume.error if np.isfinite(volume.error) else convex.value + convex.error
     error = noise + missed + slack
     return Searched(cells, Estimate(volume.value, error), convex)
 
@@ -213,10 +213,7 @@ def _hull(crossings: Crossings, tips: Array) -> Estimate:
 
 def _not_among(flood: Flood, tips: Array) -> Mask:
     """Mask of tips not between eight centers that are reached, where no hull has a corner."""
-    cubes = flood.reached
-    for axis in range(3):
-        rolled = np.moveaxis(cubes, axis, 0)
-        cubes = np.moveaxis(rolled[:-1] & rolled[1:], 0, axis)
+    cubes = covered_cubes(flood.reached)
     index = np.floor(flood.lattice.coordinates(tips)).astype(np.int64)
     inside = np.all((index >= 0) & (index < cubes.shape), axis=1)
     x, y, z = (index * inside[:, None]).T
@@ -225,15 +222,10 @@ def _not_among(flood: Flood, tips: Array) -> Mask:
 
 def _convex_volume(points: Array, fewer: Array) -> Estimate:
     """Limit of the hulls of ever more boundary points, as far as two of them tell."""
-    volumes = np.empty(2)
-
-    def measure(place: int, some: Array) -> None:
-        volumes[place] = convex_hull(some).volume
-
-    parallel.run([partial(measure, 0, points), partial(measure, 1, fewer)])
-    value, rough = volumes.tolist()
-    rest = max(value - rough, 0.0) / 3.0
-    return Estimate(value + 0.5 * rest, rest)
+    hulls = parallel.in_order(partial(convex_hull, places) for places in (points, fewer))
+    value, rough = (hull.volume for hull in hulls)
+    missing = max(value - rough, 0.0) / 3.0
+    return Estimate(value + 0.5 * missing, missing)
 
 
 def _cloud(rod: TipMap, seed: int) -> tuple[Array, Array]:

@@ -129,7 +129,7 @@ def nearest_tips(rod: TipMap, start: Array, targets: Array, enough: float) -> Ne
 
     Args:
         rod: The tip map.
-        start: Where to begin, within the bounds, shape (n, bundles).
+        start: Activations to begin with, within the bounds, shape (n, bundles).
         targets: Places [m], shape (n, 3).
         enough: Distance at which a target counts as reached [m].
     """
@@ -189,5 +189,5 @@ def _room(count: int, m: int) -> tuple[Running, Array]:
     """Place for as many searches side by side, and where their steps are centered."""
     integers = np.zeros(count, np.int64), np.zeros(count, np.int64)
     numbers = [np.zeros(shape) for shape in ((count,), (count,), (count, 3, m), (count, 3))]
-    rest = [np.zeros(shape) for shape in ((count,), (count, m), (count, m), (count, m))]
-    return Running(*integers, *numbers, *rest), np.zeros((count, m))
+    others = [np.zeros(shape) for shape in ((count,), (count, m), (count, m), (count, m))]
+    return Running(*integers, *numbers, *others), np.zeros((count, m))

@@ -53,7 +53,7 @@ def shifts_along(arm: Manipulator, parameter: Parameter, reach: int, relative: f
 
     Args:
         arm: The design.
-        parameter: What changes.
+        parameter: The parameter that changes.
         reach: Steps to either side; twice as many to one side.
         relative: Size of a step as a part of the parameter, of the smallest where parts differ.
 

@@ -236,8 +236,8 @@ def _of_cells(tips: Array, left_out: Mask) -> Estimate:
     lost = coarser(left_out)
     rough = np.where(lost, 0.0, _sizes(every_second(tips, cells, m), cells // 2, m))
     removed = (float(sizes[~finer(lost)].sum()) - float(rough.sum())) / 3.0
-    rest = 0.5 * float(_largest_neighbor(sizes)[left_out].sum())
-    return Estimate(float(sizes.sum()) + removed + rest, abs(removed) + rest)
+    unknown = 0.5 * float(_largest_neighbor(sizes)[left_out].sum())
+    return Estimate(float(sizes.sum()) + removed + unknown, abs(removed) + unknown)
 
 
 def _sizes(tips: Array, cells: int, m: int) -> Array:

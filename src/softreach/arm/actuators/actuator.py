@@ -107,7 +107,7 @@ class Actuator(Part, ABC):
     activation: ClassVar[str] = "activation"
     """Quantity that an activation is."""
     is_force: ClassVar[bool] = False
-    """Whether it loads matter and leaves its length at rest, per which curvature then counts.
+    """True if it loads matter and leaves its length at rest, per which curvature then counts.
 
     Tendons and chambers do; fibers and muscles change that length, and curvature with it: (7).
     """

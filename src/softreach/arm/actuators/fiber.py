@@ -126,7 +126,7 @@ def helical_rotation(
         profile: R2(Z).
         ratio: R/R2 of the cone on which α is measured [-].
         angle: α, constant or along the arm [rad].
-        start: Where the fiber begins [m].
+        start: Station of its beginning [m].
         z: Stations Z [m], any shape.
     """
     z = np.asarray(z, float)

@@ -90,7 +90,7 @@ class SectorActuator(PolarActuator):
         """Several actuators of one bundle in place of this one, evenly about its center.
 
         Args:
-            count: How many.
+            count: Number of actuators.
             keep_extent: True gives each the extent σ of the original, one extent apart; False its
                 share σ / count, so that together they fill the sector of the original.
 
@@ -139,8 +139,8 @@ def cone_integrals(ring: Ring, slope: Array, angle: Array) -> RingIntegrals:
     if not (len(pairs) and (pairs == pairs[0]).all()):
         pairs, station = np.unique(pairs, return_inverse=True)
         return RingIntegrals(*(integral[station] for integral in _integrals(ring, pairs)))
-    one = _integrals(ring, pairs[:1])
-    return RingIntegrals(*(np.broadcast_to(integral, pairs.shape) for integral in one))
+    single = _integrals(ring, pairs[:1])
+    return RingIntegrals(*(np.broadcast_to(integral, pairs.shape) for integral in single))
 
 
 def _integrals(ring: Ring, pairs: NDArray[np.complex128]) -> RingIntegrals:

@@ -108,8 +108,8 @@ class Tendon(PolarActuator):
 
     def breakpoints(self, profile: Profile) -> tuple[float, ...]:
         """Stations where it begins, ends, or its route is not smooth [m]."""
-        bent = [one for one in (self.distance, self.routing) if isinstance(one, AlongArm)]
-        breaks = [profile.length * x for one in bent for x in one.breaks]
+        bent = [along for along in (self.distance, self.routing) if isinstance(along, AlongArm)]
+        breaks = [profile.length * x for along in bent for x in along.breaks]
         return (*super().breakpoints(profile), *breaks)
 
     def section_faults(self, profile: Profile, section: Section) -> list[Fault]:

@@ -69,7 +69,7 @@ def text_of(path: str | PathLike[str]) -> str:
 
 
 def is_design(path: str | PathLike[str]) -> bool:
-    """Whether a file has the tables of a design and no others, whatever is in them."""
+    """True if a file has the tables of a design and no others, whatever is in them."""
     try:
         tables = set(document_of(text_of(path), ""))
     except SoftreachError:
@@ -84,8 +84,8 @@ def document_of(
 
     Args:
         text: The text of a design file.
-        source: What errors call it.
-        number: What makes a value of a number with a point or an exponent.
+        source: Its name in errors.
+        number: Maker of the value of a number with a point or an exponent.
 
     Raises:
         InvalidDesign: Text that is no TOML, or too long or too deeply nested to be a design.
@@ -107,7 +107,7 @@ def parse(text: str, source: str) -> Parts:
 
     Args:
         text: The text of a design file.
-        source: What errors call it.
+        source: Its name in errors.
 
     Raises:
         InvalidDesign: Every fault of the text, with its key, value and what is allowed.
@@ -148,15 +148,15 @@ class _DesignReader(TableReader):
         loads = None if raw is None else self.part(Loads, raw, "loads")
         raw = self._table("base")
         base = Base() if raw is None else self.part(Base, raw, "base")
-        names = [one.get("name") if isinstance(one, dict) else None for one in tables or ()]
+        names = [table.get("name") if isinstance(table, dict) else None for table in tables or ()]
         self.faults += name_faults(names, "actuators")
         if profile is None or section is None:
             return None
-        sound = [(k, one) for k, one in actuators if one is not None]
+        sound = [(k, actuator) for k, actuator in actuators if actuator is not None]
         self._check_fit(profile, section, sound)
         if loads is not None:
             self.faults += self._of_section(loads.section_faults(section, profile.length))
-        return Parts(profile, section, tuple(one for _, one in sound), loads, base)
+        return Parts(profile, section, tuple(actuator for _, actuator in sound), loads, base)
 
     def _check_layout(self) -> None:
         """Top of the file: keys that are unknown or missing, and values of another type."""
@@ -172,7 +172,7 @@ class _DesignReader(TableReader):
         for key in self._document:
             if key not in LAYOUT:
                 place = _place(key)
-                known = {one: one for one in LAYOUT}
+                known = {name: name for name in LAYOUT}
                 said = f"unknown key; {place}" if place else unknown_key(key, known)
                 self.refused(key_text(key), self._document[key], said)
 
@@ -183,9 +183,9 @@ class _DesignReader(TableReader):
         elif key == "rings" and not value:
             self.refused(key, value, "must not be empty")
         else:
-            for k, one in enumerate(value):
-                if not isinstance(one, dict):
-                    self.refused(f"{key}[{k}]", one, "must be a table")
+            for k, table in enumerate(value):
+                if not isinstance(table, dict):
+                    self.refused(f"{key}[{k}]", table, "must be a table")
 
     def _table(self, key: str) -> dict[str, Any] | None:
         """A table at the top; None if there is none, or something else."""
@@ -248,7 +248,7 @@ class _DesignReader(TableReader):
         try:
             section = Section(rings=made, **values)
         except InvalidDesign as error:
-            certain = [one for one in error.faults if not is_doubtful(one, wrong)]
+            certain = [fault for fault in error.faults if not is_doubtful(fault, wrong)]
             self.faults += self._of_section(certain)
             return None
         return None if wrong or self._unknown_material else section

@@ -51,8 +51,8 @@ class TableReader:
 
         Args:
             kind: Its class.
-            raw: What the file holds.
-            path: Where that is.
+            raw: Table as the file holds it.
+            path: Its path in the file.
             without: Keys that the table does not have here.
             others: Further fields of the part.
         """
@@ -66,7 +66,7 @@ class TableReader:
             part = kind(**values, **others)
         except InvalidDesign as error:
             keys = field_keys(kind)
-            certain = (one for one in error.faults if not is_doubtful(one, wrong))
+            certain = (fault for fault in error.faults if not is_doubtful(fault, wrong))
             self.faults += [_in_keys(fault, keys, raw, path) for fault in certain]
             return None
         return None if wrong else part
@@ -133,7 +133,7 @@ class TableReader:
         kind = raw.get("interpolation", "cubic")
         if kind not in kinds:
             self.refused(f"{path}.interpolation", kind, f"must be one of {', '.join(kinds)}")
-        for name in (one for one in raw if one not in _ALONG_KEYS):
+        for name in (key for key in raw if key not in _ALONG_KEYS):
             self.refused(f"{path}.{name}", raw[name], unknown_key(name, _ALONG_KEYS))
         if len(self.faults) > before:
             return WRONG
@@ -170,7 +170,7 @@ class TableReader:
         return int(value) if number.allowed.whole else float(value)
 
     def _all(self, number: Number, raw: list[Any], path: str) -> Any:
-        values = [self._single(number, one, f"{path}[{k}]") for k, one in enumerate(raw)]
+        values = [self._single(number, element, f"{path}[{k}]") for k, element in enumerate(raw)]
         return WRONG if any(value is WRONG for value in values) else tuple(values)
 
     def _judged(self, value: Any, path: str, faults: list[Fault], shown: Any = None) -> Any:
@@ -181,7 +181,7 @@ class TableReader:
     def _point_loads(self, raw: Any, path: str) -> Any:
         if not isinstance(raw, list):
             return self.refused(path, raw, "must be a list")
-        loads = [self.part(PointLoad, one, f"{path}[{k}]") for k, one in enumerate(raw)]
+        loads = [self.part(PointLoad, table, f"{path}[{k}]") for k, table in enumerate(raw)]
         return WRONG if None in loads else tuple(loads)
 
 
@@ -202,7 +202,7 @@ def unknown_key(name: str, keys: Mapping[str, str]) -> str:
 def is_doubtful(fault: Fault, wrong: Iterable[str]) -> bool:
     """A fault of fields that are wrong anyway."""
     fields = set(fault.path.split(", "))
-    decisive = fields | {one for field in fields for one in _RESTS_ON.get(field, ())}
+    decisive = fields | {basis for field in fields for basis in _RESTS_ON.get(field, ())}
     return not decisive.isdisjoint(wrong)
 
 
@@ -217,7 +217,7 @@ def _in_keys(fault: Fault, keys: Mapping[str, str], raw: Mapping[str, Any], path
         allowed = re.sub(r"\w+", lambda word: keys.get(word[0], word[0]), allowed)
     values = tuple(raw.get(name) for name in names)
     value = values[0] if len(values) == 1 else values
-    if all(one is None for one in values):
+    if all(part is None for part in values):
         value = None
     return Fault(", ".join(f"{path}.{name}" for name in names), value, allowed)
 

@@ -66,7 +66,7 @@ def render(
         blocks.append(["[[actuators]]", *_actuator_lines(actuator)])
     if loads is not None:
         blocks.append(["[loads]", *_lines(loads)])
-        blocks += [["[[loads.point_loads]]", *_lines(one)] for one in loads.point_loads]
+        blocks += [["[[loads.point_loads]]", *_lines(load)] for load in loads.point_loads]
     if not base.is_identity:
         blocks.append(["[base]", *_lines(base)])
     return "\n\n".join("\n".join(block) for block in blocks) + "\n"

@@ -64,7 +64,7 @@ def find_parameters(
             raise unknown_parameter(in_short(name), known)
         if (first := aliases.setdefault(listed[name], name)) != name:
             raise InvalidInput("parameter", name, "given once", f"{first} is the same")
-    return {aliases[one]: _renamed(known[one], aliases[one]) for one in known if one in aliases}
+    return {aliases[key]: _renamed(known[key], aliases[key]) for key in known if key in aliases}
 
 
 def changed(arm: Manipulator, values: Mapping[str, float]) -> Manipulator:
@@ -109,13 +109,13 @@ def unknown_parameter(name: str, known: Mapping[str, Parameter]) -> InvalidInput
         hint = "the arm has no loads: give it some first"
     if name.startswith("base.") and not any(key.startswith("base.") for key in known):
         hint = "the arm stands upright at the origin: give it another base first"
-    owners = list(dict.fromkeys(one.owner for one in known.values() if one.owner))
+    owners = list(dict.fromkeys(parameter.owner for parameter in known.values() if parameter.owner))
     meant = max((own for own in owners if name.startswith(f"{own}.")), key=len, default="")
-    own = [key for key, one in known.items() if one.owner == meant]
+    own = [key for key, parameter in known.items() if parameter.owner == meant]
     allowed = f"one of {', '.join(_shortened(own))}"
     if owners and not meant:
         parts = ", ".join(owners[:_FEW]) + (", ..." if len(owners) > _FEW else "")
-        example = next(key for key, one in known.items() if one.owner)
+        example = next(key for key, parameter in known.items() if parameter.owner)
         allowed += f", or of one part ({parts}), such as {example}"
     return InvalidInput("parameter", name, allowed, hint)
 
@@ -123,9 +123,9 @@ def unknown_parameter(name: str, known: Mapping[str, Parameter]) -> InvalidInput
 def _by_ring_name(arm: Manipulator, known: Mapping[str, Parameter]) -> dict[str, str]:
     """Further names of parameters, `rings[skin].inner_ratio` for `rings[0].inner_ratio`."""
     names: dict[str, str] = {}
-    for listed, one in known.items():
-        if isinstance(one, OwnParameter) and one.path.part[0] == "rings":
-            k = one.path.part[1]
+    for listed, parameter in known.items():
+        if isinstance(parameter, OwnParameter) and parameter.path.part[0] == "rings":
+            k = parameter.path.part[1]
             ring = arm.section.rings[int(k)].name
             name = f"rings[{ring}]" + listed.removeprefix(f"rings[{k}]")
             if ring and name not in known:

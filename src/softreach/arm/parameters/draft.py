@@ -40,19 +40,19 @@ class Path(NamedTuple):
     @property
     def owner(self) -> str:
         """Start of names of numbers of this part; "" for the arm itself."""
-        kind, *rest = self.part
+        kind, *path = self.part
         if kind == "actuators":
-            return str(rest[0])
+            return str(path[0])
         if kind == "rings":
-            return "".join((f"rings[{rest[0]}]", *(f".{one}" for one in rest[1:])))
+            return "".join((f"rings[{path[0]}]", *(f".{step}" for step in path[1:])))
         of_arm = kind == "section" or (kind == "profile" and not self.place)
         return "" if of_arm else str(kind)
 
     @property
     def faulty(self) -> str:
         """Path of faults of the field, or of the series in it."""
-        inner = [one for one in self.place if isinstance(one, str)]
-        return ".".join(one for one in (self.owner, self.field, *inner) if one)
+        inner = [step for step in self.place if isinstance(step, str)]
+        return ".".join(name for name in (self.owner, self.field, *inner) if name)
 
     @property
     def text(self) -> str:
@@ -60,8 +60,8 @@ class Path(NamedTuple):
         if self.field == _BOUNDS:
             side, *bundle = self.place
             assert isinstance(side, int)
-            return _SIDES[side] + "".join(f"[{one}]" for one in bundle)
-        places = (f"[{one}]" if isinstance(one, int) else f".{one}" for one in self.place)
+            return _SIDES[side] + "".join(f"[{number}]" for number in bundle)
+        places = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in self.place)
         return self.field + "".join(places)
 
 
@@ -76,7 +76,7 @@ def parts(arm: Manipulator) -> dict[PartKey, Any]:
         keyed |= {("rings", k): ring, ("rings", k, "material"): ring.material}
     if arm.section.core is not None:
         keyed["core",] = arm.section.core
-    return keyed | {("actuators", one.name): one for one in arm.actuators}
+    return keyed | {("actuators", actuator.name): actuator for actuator in arm.actuators}
 
 
 def part_of(arm: Manipulator, key: PartKey) -> Any:
@@ -109,7 +109,7 @@ class _PartDraft:
         for (name, inner), new in elements.items():
             before = series.get(name, getattr(self.start, name))
             numbers: Any = getattr(before, str(inner[0])) if inner else before
-            numbers = tuple(new.get(k, one) for k, one in enumerate(numbers))
+            numbers = tuple(new.get(k, number) for k, number in enumerate(numbers))
             series[name] = _along(before, name, str(inner[0]), numbers) if inner else numbers
         return fields | series
 
@@ -138,7 +138,7 @@ class _ActuatorDraft(_PartDraft):
         if not isinstance(bundles, int) or bundles < 1:
             return None
         new: dict[Any, float] = {
-            place: one for (name, place), one in self.values.items() if name == _BOUNDS
+            place: value for (name, place), value in self.values.items() if name == _BOUNDS
         }
         if not new:
             return None if bundles == len(start) else tuple(start[0].tolist())
@@ -206,14 +206,14 @@ class Draft:
             changes["loads"] = self._made(("loads",))
         if ("base",) in self._parts:
             changes["base"] = self._made(("base",))
-        keys = [("actuators", one.name) for one in self.arm.actuators]
+        keys = [("actuators", actuator.name) for actuator in self.arm.actuators]
         changes["actuators"] = tuple(self._made(key) for key in keys)
         if not self._faults:
             made = self._tried(None, lambda: self.arm.replace(**changes))
             if made is not None:
                 return made
         raise InvalidDesign(
-            list({(one.path, str(one.allowed)): one for one in self._faults}.values())
+            list({(fault.path, str(fault.allowed)): fault for fault in self._faults}.values())
         )
 
     def _actuator(self, key: PartKey) -> _ActuatorDraft:

@@ -78,7 +78,8 @@ class Parameter(ABC):
         the same.
         """
         first, *others = self.values(arm)
-        return first if all(math.isclose(first, one, rel_tol=_ROUNDING) for one in others) else _NAN
+        same = all(math.isclose(first, other, rel_tol=_ROUNDING) for other in others)
+        return first if same else _NAN
 
     @abstractmethod
     def values(self, arm: Manipulator) -> tuple[float, ...]:
@@ -216,37 +217,37 @@ def parameters(arm: Manipulator) -> dict[str, Parameter]:
     their name: `left.offset`, `left.helical_angle.values[2]`, `left.lower[1]`.
     """
     arm = a_manipulator("arm", arm)
-    own = [one for key, part in parts(arm).items() for one in _of_part(key, part)]
-    every = [*_of_arm(arm, own), *(one for one in own if one.owner)]
-    return {one.name: one for one in every}
+    own = [parameter for key, part in parts(arm).items() for parameter in _of_part(key, part)]
+    every = [*_of_arm(arm, own), *(parameter for parameter in own if parameter.owner)]
+    return {parameter.name: parameter for parameter in every}
 
 
 def _of_arm(arm: Manipulator, own: list[OwnParameter]) -> Iterator[Parameter]:
     """Parameters of the arm as a whole, from those of its parts."""
-    plain = {one.name: one for one in own if not one.owner}
-    if any(one.path.field == "revolution" for one in own):
+    plain = {parameter.name: parameter for parameter in own if not parameter.owner}
+    if any(parameter.path.field == "revolution" for parameter in own):
         turn = fields_of(FiberArchitecture)["revolution"]
         meaning = "revolution of all that is helical, each in its own sense"
         yield _Revolution(name="revolution", number=dataclasses.replace(turn, meaning=meaning))
     if (taper := plain.pop("taper", None)) is not None:
         yield _Taper(name="taper", number=taper.number, path=taper.path)
-    inner = tuple(one for one in own if one.path.field == "inner_ratio")
-    if len({one.value(arm) for one in inner}) == 1:
+    inner = tuple(parameter for parameter in own if parameter.path.field == "inner_ratio")
+    if len({parameter.value(arm) for parameter in inner}) == 1:
         ratio = fields_of(Ring)["inner_ratio"]
         ratio = dataclasses.replace(ratio, meaning="inner over outer radius")
         yield _Shared(name="radius_ratio", number=ratio, parts=inner)
     if "outer_radius" not in plain and hasattr(arm.profile, "radii"):
         yield _OuterRadius(name="outer_radius", number=fields_of(LinearTaper)["outer_radius"])
     yield from plain.values()
-    poisson = tuple(one for one in own if one.path.field == "poisson_ratio")
+    poisson = tuple(parameter for parameter in own if parameter.path.field == "poisson_ratio")
     number = fields_of(Material)["poisson_ratio"]
     yield _Shared(name="poisson_ratio", number=number, parts=poisson)
     by_field: dict[str, list[OwnParameter]] = {}
-    for one in own:
-        by_field.setdefault(one.path.text, []).append(one)
+    for parameter in own:
+        by_field.setdefault(parameter.path.text, []).append(parameter)
     for field in ("extent", "lower", "upper"):
         same = tuple(by_field.get(field, ()))
-        if len({one.unit for one in same}) == 1:
+        if len({parameter.unit for parameter in same}) == 1:
             yield _Shared(name=field, number=same[0].number, parts=same)
 
 
@@ -303,10 +304,12 @@ def _own(path: Path, number: Number) -> OwnParameter:
 def _revolutions(arm: Manipulator) -> dict[PartKey, float]:
     """Ω of all that winds by a single number [rad], by its key."""
     return {
-        ("actuators", one.name): float(one.value_on("revolution", arm.profile, arm.section))
-        for one in arm.actuators
-        if "revolution" in (numbers := fields_of(type(one)))
-        and not any(isinstance(getattr(one, field), AlongArm) for field in numbers)
+        ("actuators", actuator.name): float(
+            actuator.value_on("revolution", arm.profile, arm.section)
+        )
+        for actuator in arm.actuators
+        if "revolution" in (numbers := fields_of(type(actuator)))
+        and not any(isinstance(getattr(actuator, field), AlongArm) for field in numbers)
     }
 
 

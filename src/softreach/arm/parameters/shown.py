@@ -27,7 +27,8 @@ def with_suffix(name: str, suffix: str) -> str:
 
 def written_parameters(arm: Manipulator) -> dict[str, Parameter]:
     """Every parameter by its name with the unit."""
-    return {written_name(n, one.unit): one for n, one in parameters_by_every_name(arm).items()}
+    known = parameters_by_every_name(arm).items()
+    return {written_name(name, parameter.unit): parameter for name, parameter in known}
 
 
 def from_written(value: float, unit: str) -> float:

@@ -28,7 +28,7 @@ class Running(NamedTuple):
     """Searches side by side, and the step each takes next."""
 
     row: np.ndarray
-    """Which search it is, shape (n,), int64."""
+    """Number of the search, shape (n,), int64."""
     steps: np.ndarray
     """Steps it has taken, shape (n,), int64."""
     damping: np.ndarray
@@ -42,33 +42,33 @@ class Running(NamedTuple):
     softness: np.ndarray
     """Damping times that mean square [m²], shape (n,)."""
     low: np.ndarray
-    """How far the lower bounds are, in ranges, shape (n, m)."""
+    """Signed distances to the lower bounds, in ranges, shape (n, m)."""
     high: np.ndarray
-    """How far the upper bounds are, shape (n, m)."""
+    """Distances to the upper bounds, in ranges, shape (n, m)."""
     trial: np.ndarray
     """Activations to evaluate next [-], shape (n, m)."""
 
 
 @kernel
-def judge(running, n, tips, ahead, targets, found, enough, low, high, scales):  # noqa: C901
+def judge(running, n, tips, ahead, targets, ends, enough, low, high, scales):  # noqa: C901
     """Take in the trials of the first n, and set up the next steps of those that go on.
 
     Args:
         running: The searches; those that go on become the first.
-        n: How many run.
+        n: Number of those that run.
         tips: Of their trials [m], `NOWHERE` if they do not count, shape (n, 3).
         ahead: ∂r/∂γ of their trials [m], shape (n, 3, m).
         targets: Of all searches [m], shape (all, 3).
-        found: Best activations, their tips and distances of all searches.
+        ends: Best activations, their tips and distances of all searches.
         enough: Distance at which a search ends [m].
         low: Lower bounds, shape (m,).
         high: Upper bounds, shape (m,).
         scales: Ranges of the bounds, shape (m,).
 
     Returns:
-        How many go on.
+        Number of those that go on.
     """
-    gamma, best, distance = found
+    gamma, best, distance = ends
     kept = 0
     for i in range(n):
         row, damping = running.row[i], running.damping[i]
@@ -120,11 +120,11 @@ def judge(running, n, tips, ahead, targets, found, enough, low, high, scales):  
 
 @kernel
 def next_trials(running, n, step, multiplier, gamma, low, high, scales):
-    """Where the steps of the first n lead, and what the linear map leaves there.
+    """Ends of the steps of the first n, and what the linear map leaves there.
 
     Args:
         running: The searches.
-        n: How many run.
+        n: Number of those that run.
         step: In ranges of the bounds, shape (n, m).
         multiplier: Of the steps, shape (n, 3): what is left by the softness.
         gamma: Best activations of all searches, shape (all, m).

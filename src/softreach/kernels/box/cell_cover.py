@@ -1,4 +1,4 @@
-"""Which cells of the activation box may come near a target."""
+"""Cells of the activation box that may come near a target."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ def near_cells(tips, slopes, radii, errors, target, distance, out):
         tips: At the centers, shape (n, 3).
         slopes: Jacobians times half widths, shape (n, 3, m).
         radii: Sums of the lengths of their columns, shape (n,).
-        errors: How far a tip may lie from its linearization, shape (n,).
+        errors: Largest distance of a tip from its linearization, shape (n,).
         target: Shape (3,).
         distance: Cells farther than this are left out.
         out: Room for all, shape (n,).
 
     Returns:
-        How many there are.
+        Number of them.
     """
     count = 0
     p = target[0], target[1], target[2]

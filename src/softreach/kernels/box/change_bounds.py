@@ -61,7 +61,7 @@ def change_bounds(center, slope, wanted, error, low, high, enough, out):
 
 @inline
 def _usual_size(center, slope, low, high, n):
-    """What |y| would be if all of A had a part in the change to the middle of the box."""
+    """|y| if all of A had a part in the change to the middle of the box."""
     square, change = 0.0, 0.0
     for j in range(center.shape[1]):
         change += (0.5 * (low[n, j] + high[n, j]) - center[n, j]) ** 2
@@ -72,7 +72,7 @@ def _usual_size(center, slope, low, high, n):
 
 @inline
 def _meets(center, x, n, miss, softness, y, error, goal):
-    """Whether x meets the equations by too small a change: then no bound is large enough."""
+    """True if x meets the equations by too small a change: then no bound is large enough."""
     square, change = 0.0, 0.0
     for i in range(3):
         square += (miss[i] + softness[n] * y[i]) ** 2

@@ -32,15 +32,15 @@ def chains(m: int, k: int) -> Ints:
     Returns:
         Corners as bit masks, the first 0, shape (count, k + 1), read-only.
     """
-    found = [(0,)]
+    longer = [(0,)]
     for _ in range(k):
-        found = [
+        longer = [
             (*chain, corner)
-            for chain in found
+            for chain in longer
             for corner in range(1 << m)
             if corner != chain[-1] and corner & chain[-1] == chain[-1]
         ]
-    table = np.array(found, np.int64).reshape(-1, k + 1)
+    table = np.array(longer, np.int64).reshape(-1, k + 1)
     table.setflags(write=False)
     return table
 

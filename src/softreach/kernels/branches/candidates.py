@@ -34,7 +34,7 @@ def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start, 
 
     Args:
         mesh: Cells of the activation box.
-        tree: Where their images lie.
+        tree: Octree of their images.
         targets: Targets [m], shape (t, 3).
         low: Lower bounds, shape (3,).
         high: Upper bounds, shape (3,).
@@ -46,7 +46,7 @@ def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start, 
             singular, shape (room, 3, 3).
 
     Returns:
-        How many targets are done, and how many starts were found.
+        Number of targets that are done, and of starts found.
     """
     # Memory that a kernel makes takes longer to compile.
     room = quadratic(), np.empty(MOST_STARTS), np.empty(_AT_ONCE, np.int32)
@@ -59,11 +59,11 @@ def find_starts(mesh, tree, targets, low, high, with_root, target, cell, start, 
 def _find_starts(
     mesh, tree, targets, low, high, with_root, q, side, held, target, cell, start, inverse
 ):
-    found = np.intp(0)  # typed: compiled once
+    count = np.intp(0)  # typed: compiled once
     for t in range(targets.shape[0]):
-        if found + MOST_STARTS > start.shape[0]:
-            return t, found
-        first = found
+        if count + MOST_STARTS > start.shape[0]:
+            return t, count
+        first = count
         p = row(targets, t)
         begin, end = leaf_at(tree.low, tree.size, tree.child, tree.first, tree.length, p)
         for part in range(begin, end, _AT_ONCE):
@@ -72,14 +72,14 @@ def _find_starts(
                 v, axes = tetrahedron(mesh.corner, c, which), axes_of(which)
                 most, least, even = _determinants(mesh.slope, v)
                 expand(mesh, v, axes, p, q)
-                for attempt in range(_attempts(even, found - first)):
+                for attempt in range(_attempts(even, count - first)):
                     weights = _linear_weights(mesh.tip, v, p)
                     if attempt > 0:
                         weights = _near_vertex((most, least)[attempt - 1])
                     reached, weights, det = _search(q, weights, even, mesh.remainder[c])
                     guess, det = _place(mesh.gamma, v, weights), det * orientation(which)
                     if (reached or not with_root) and _is_new(
-                        mesh, c, guess, det, start, side, first, found
+                        mesh, c, guess, det, start, side, first, count
                     ):
                         _put(
                             guess,
@@ -88,26 +88,26 @@ def _find_starts(
                             orientation(which) * det,
                             low,
                             high,
-                            found,
+                            count,
                             start,
                             inverse,
                         )
-                        target[found], cell[found], side[found - first] = t, c, det
-                        found += 1
-    return targets.shape[0], found
+                        target[count], cell[count], side[count - first] = t, c, det
+                        count += 1
+    return targets.shape[0], count
 
 
 @inline
-def _attempts(even, found):
-    """How many searches to begin in a tetrahedron: one, or also on either side of a fold."""
-    if found >= MOST_STARTS:
+def _attempts(even, count):
+    """Number of searches to begin in a tetrahedron: one, or also on either side of a fold."""
+    if count >= MOST_STARTS:
         return 0
-    return 1 if even or found >= _MANY else 3
+    return 1 if even or count >= _MANY else 3
 
 
 @inline
 def _search(q, weights, even, remainder):
-    """Whether a search reaches the target, where it ends, and the determinant there."""
+    """Outcome of a search: true if it reaches the target, its end, and the determinant there."""
     reached, weights, det = refine(q, weights, remainder)
     if reached and even:
         reached = is_inside(q, weights, det, _MARGIN * remainder)
@@ -182,7 +182,7 @@ def _linear_weights(tip, v, p):
 
 @inline
 def _is_new(mesh, c, guess, det, start, side, begin, end):
-    """Whether no start of the target is so near, on one side of a fold, that both lead to one."""
+    """True if no start of the target is so near, on one side of a fold, that both lead to one."""
     gamma, first, last = mesh.gamma, mesh.corner[c, 0], mesh.corner[c, 7]
     for i in range(begin, end):
         apart = 0.0

@@ -58,7 +58,7 @@ def chord_with(missing, move):
     where it is then, so that it does not depend on its neighbors.
 
     Args:
-        missing: What the base lacks.
+        missing: Residual at the base.
         move: Takes the step in STEP.
     """
 

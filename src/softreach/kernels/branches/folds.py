@@ -26,8 +26,8 @@ def second_preimages(mesh, cell, gamma, slope, smallest, reach, overshoot, low, 
         gamma: Solutions, shape (n, 3).
         slope: Jacobians there [m], shape (n, 3, 3).
         smallest: Their smallest singular values [m], shape (n,).
-        reach: How many widths of its cell a solution may move.
-        overshoot: What to put for 2 in -2σ/κ. From beyond the other root Newton's method converges
+        reach: Largest move of a solution, in widths of its cell.
+        overshoot: Put for 2 in -2σ/κ. From beyond the other root Newton's method converges
             to it, from short of it perhaps back to the one that is known.
         low: Lower bounds, shape (3,).
         high: Upper bounds, shape (3,).

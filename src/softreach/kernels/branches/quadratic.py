@@ -125,7 +125,7 @@ def _step(q, s, miss, a):
 
 @inline
 def is_inside(q, weights, det, margin):
-    """Whether a target can lie in the image of a tetrahedron, if it is off by so much at most.
+    """True if a target can lie in the image of a tetrahedron that is off by so much at most.
 
     Each barycentric coordinate then changes by no more than its gradient in space times that.
     """

@@ -23,16 +23,16 @@ class SpaceTree(NamedTuple):
     child: np.ndarray
     """First child of each node, 0 for a leaf."""
     first: np.ndarray
-    """Where a leaf's tetrahedra begin in `item`."""
+    """Beginning of a leaf's tetrahedra in `item`."""
     length: np.ndarray
-    """How many there are."""
+    """Number of its tetrahedra."""
     item: np.ndarray
     """Tetrahedra, leaf after leaf."""
 
 
 @inline
 def may_meet(planes, k, p, half):
-    """Whether a box round p, of half-sizes, meets tetrahedron k as far as its face planes tell."""
+    """True if a box round p, of half-sizes, meets tetrahedron k as far as its face planes tell."""
     for i in range(4):
         a, b, c = planes[k, i, 0], planes[k, i, 1], planes[k, i, 2]
         reach = abs(a) * half[0] + abs(b) * half[1] + abs(c) * half[2]
@@ -77,7 +77,7 @@ def listed(tree, p, begin, end, held):
 
 @inline
 def _is_beyond(planes, k, i, p):
-    """Whether p lies on the inner side of face i of tetrahedron k."""
+    """True if p lies on the inner side of face i of tetrahedron k."""
     inward = planes[k, i, 0] * p[0] + planes[k, i, 1] * p[1] + planes[k, i, 2] * p[2]
     return inward >= planes[k, i, 3]
 
@@ -91,29 +91,29 @@ def sort_into_children(planes, boxes, centers, half, first, count, item, counts,
         boxes: Boxes round them, shape (tetrahedron, 2, 3).
         centers: Centers of the nodes' children, shape (node, 8, 3).
         half: Half the edge of a child.
-        first: Where each node's items begin in `item`.
-        count: How many there are.
+        first: Beginning of each node's items in `item`.
+        count: Number of each node's items.
         item: Items of the nodes.
         counts: Filled with the items of each child, shape (node, 8).
-        starts: Where to write each child's items, shape (node, 8).
+        starts: Beginning of each child's items in `out`, shape (node, 8).
         out: Receives the items; empty to count only.
     """
     for n in range(centers.shape[0]):
         for o in range(8):
             p = (centers[n, o, 0], centers[n, o, 1], centers[n, o, 2])
-            found = 0
+            size = 0
             for entry in range(first[n], first[n] + count[n]):
                 k = item[entry]
                 if _boxes_meet(boxes, k, p, half) and may_meet(planes, k, p, (half, half, half)):
                     if out.shape[0]:
-                        out[starts[n, o] + found] = k
-                    found += 1
-            counts[n, o] = found
+                        out[starts[n, o] + size] = k
+                    size += 1
+            counts[n, o] = size
 
 
 @inline
 def _boxes_meet(boxes, k, p, half):
-    """Whether the box of tetrahedron k meets the cube round p."""
+    """True if the box of tetrahedron k meets the cube round p."""
     for axis in range(3):
         if p[axis] + half < boxes[k, 0, axis] or p[axis] - half > boxes[k, 1, axis]:
             return False

@@ -14,7 +14,7 @@ def choose_apart(points, scales, most, least_distance, chosen):
     Args:
         points: Candidates of each set, best first, shape (t, k, m).
         scales: By which distances along each axis are measured, shape (m,).
-        most: How many of one set.
+        most: Largest number of one set.
         least_distance: The largest component of the distance between two is to exceed it.
         chosen: Whether each is chosen, shape (t, k).
     """

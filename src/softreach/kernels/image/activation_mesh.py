@@ -52,11 +52,11 @@ class ActivationMesh(NamedTuple):
     corner: np.ndarray
     """Vertices of each cell, bit j of a corner along axis j, shape (cell, 8)."""
     interpolation_error: np.ndarray
-    """How far the true image may lie from the linear one [m], shape (cell,)."""
+    """Largest distance of the true image from the linear one [m], shape (cell,)."""
     remainder: np.ndarray
-    """How far it may lie from the quadratic through tips and Jacobians [m], shape (cell,)."""
+    """Its largest distance from the quadratic through tips and Jacobians [m], shape (cell,)."""
     slope_change: np.ndarray
-    """How much the Jacobian changes across the cell at most [m], shape (cell,)."""
+    """Largest change of the Jacobian across the cell [m], shape (cell,)."""
 
 
 @kernel
@@ -75,15 +75,15 @@ def interpolation_errors(gamma, tip, slope, corner, error, remainder):
     |f'''[e, e, e]|/12.
     """
     for c in range(corner.shape[0]):
-        worst, rest = 0.0, 0.0
+        worst, cubic = 0.0, 0.0
         for a, b in _EDGES:
             i, j = corner[c, a], corner[c, b]
             bend = _second_difference(gamma, slope, i, j)
             worst = max(worst, dot(bend, bend))
             twist = _cubic_difference(gamma, tip, slope, i, j)
-            rest = max(rest, dot(twist, twist))
+            cubic = max(cubic, dot(twist, twist))
         error[c] = _SHARE * math.sqrt(worst)
-        remainder[c] = _CUBIC_SHARE * math.sqrt(rest) + _QUARTIC_SHARE * error[c]
+        remainder[c] = _CUBIC_SHARE * math.sqrt(cubic) + _QUARTIC_SHARE * error[c]
 
 
 @kernel
@@ -112,7 +112,7 @@ def face_planes(mesh, rounding, planes):
 
 @inline
 def _larger_faces(normals, i):
-    """How many faces are larger than face i, or as large and before it."""
+    """Number of faces that are larger than face i, or as large and before it."""
     size, larger = dot(normals[i], normals[i]), 0
     for j in range(4):
         other = dot(normals[j], normals[j])
@@ -135,7 +135,7 @@ def _bends(gamma, slope, v):
 
 @inline
 def _bulge(bends, n, i, height):
-    """How far the quadratic image may lie beyond face i along its inward unit normal n.
+    """Largest distance of the quadratic image beyond face i along its inward unit normal n.
 
     Where λi = t it lies at t height - ½ Σ λj λk n·bend. Only edges along which n·bend > 0 bulge
     outward: of the face by g each, with Σ λj λk g <= (1 - t)² min(max g / 3, Σ g / 4), and those to

@@ -125,7 +125,7 @@ def critical_triangles(points, stretches, cells, left_out, first, last, star, ou
         left_out: Whether the cell with least vertex v has no image, shape (n,).
         first: First vertex of this task.
         last: One past its last.
-        star: What `stars` says of one vertex.
+        star: Star of one vertex, as of `stars`.
         out: Result, one row a triangle: its three vertices; tetrahedra on the side of its normal
             (b - a) × (c - a) minus those on the other, each 1 if oriented as it should be, else
             -1; the same with 1 if it keeps the orientation, else -1.

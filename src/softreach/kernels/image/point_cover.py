@@ -1,4 +1,4 @@
-"""How many tetrahedra cover any given points: the critical triangles below each of them."""
+"""Number of tetrahedra that cover any given point: from the critical triangles below it."""
 
 from __future__ import annotations
 

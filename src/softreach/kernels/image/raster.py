@@ -34,14 +34,14 @@ Ints = NDArray[np.int64]
 
 
 class Crossings(NamedTuple):
-    """Where lines of sight meet critical triangles, one row a crossing."""
+    """Crossings of lines of sight and critical triangles, one row each."""
 
     column: Ints
-    """Which line, (i, j) as i · width + j."""
+    """Number of the line, (i, j) as i · width + j."""
     center: Ints
     """Number of the first cell center behind it, or on it."""
     height: NDArray[np.float64]
-    """How far along the line, in cells."""
+    """Position along the line, in cells."""
     cover: Ints
     """By how much the number of covering tetrahedra grows there."""
     degree: Ints
@@ -159,7 +159,7 @@ def twice_area(points, a, b, x, y, p, q):
 
 @strict
 def left_of_edge(points, a, b, area, p, q):
-    """Whether (x + ε, y + ε²) is on the left of edge ab, given twice the area at ε = 0."""
+    """True if (x + ε, y + ε²) is on the left of edge ab, given twice the area at ε = 0."""
     if area != 0:
         return area > 0
     across = points[b, q] - points[a, q]

@@ -1,4 +1,4 @@
-"""Which of many points is nearest to each center of a lattice, among those in the cubes around."""
+"""Nearest of many points to each center of a lattice, among those in the cubes around."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def claim_corners(points, number, steps, closest, owner):
 
     Args:
         points: In cells from the first center, within the lattice, shape (n, 3).
-        number: What to write where a point is closest, shape (n,).
+        number: Number to write where a point is closest, shape (n,).
         steps: From a center to the next along each axis in the flat arrays, shape (3,).
         closest: Distance in cells below which a claim counts, lowered to the closest, flat.
         owner: Filled with the number of the closest, flat.

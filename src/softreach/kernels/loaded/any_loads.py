@@ -15,6 +15,7 @@ import numpy as np
 from softreach.kernels.branches.chord import by_inverse, chord_with, keep_inverse
 from softreach.kernels.compiler import inline, kernel
 from softreach.kernels.lanes import copy, get, load_all, put, turn_at
+from softreach.kernels.loaded.direction_walk import unit
 from softreach.kernels.loaded.frame_step import COLUMN_ROWS, PLANE, SIZE, STATE, TARGET
 from softreach.kernels.loaded.frame_walk import TRACE, adjugate_rows, walk
 from softreach.kernels.loaded.load_continuation import (
@@ -80,9 +81,8 @@ def _newton(w, i):
 
 @inline
 def _orthonormal(g, h):
-    g = times(1.0 / math.sqrt(dot(g, g)), g)
-    h = minus(h, times(dot(g, h), g))
-    return g, times(1.0 / math.sqrt(dot(h, h)), h)
+    g = unit(g)
+    return g, unit(minus(h, times(dot(g, h), g)))
 
 
 @inline
@@ -124,7 +124,7 @@ _chord_all = chord_with(_missing, _move)
 
 @inline
 def _aim(w, work, axes):
-    """What the base must see, in the frame of the walk, theory (65)."""
+    """Directions that the base must see, in the frame of the walk, theory (65)."""
     for i in range(LANES):
         q = turn_at(work, TURN, i)
         put(w, TARGET, i, turned(q, (axes[0, 0], axes[0, 1], axes[0, 2])))
@@ -159,7 +159,7 @@ def _move_all(w):
 
 
 @kernel
-def solve(gamma, axes, guesses, coarse, fine, limits, most, found, slopes, compliance, trace):
+def solve(gamma, axes, guesses, coarse, fine, limits, most, ends, slopes, compliance, trace):
     """Equilibria of n rods and what the answers ask for.
 
     Args:
@@ -173,7 +173,7 @@ def solve(gamma, axes, guesses, coarse, fine, limits, most, found, slopes, compl
             1 if all loads are along the first axis, so that no turn about it is looked for, else 0.
         most: Walks (coarse, fine) allowed; with none on fine tables, the last Newton step is taken
             linearly.
-        found: Filled with the tip, G, H as in `guesses`, the margin of stability, and the state (0
+        ends: Filled with the tip, G, H as in `guesses`, the margin of stability, and the state (0
             not found, 1 found, 2 the branch has ended, 3 given up), (n, 11).
         slopes: Filled with (v, ω) of the tip per activation, (n, 6, bundle); or (0, 6, bundle).
         compliance: Zeros, to which the change of the tip per force there is added, (n, 3, 3); or
@@ -186,7 +186,7 @@ def solve(gamma, axes, guesses, coarse, fine, limits, most, found, slopes, compl
     work, w = np.zeros(REST_WORK), np.zeros(WHOLE)
     w[AXIAL] = axial
     steps = max(coarse[1].shape[0], fine[1].shape[0])
-    rest = np.zeros((steps, (STEP_ROWS + TURN_ROWS) * LANES))
+    unloaded = np.zeros((steps, (STEP_ROWS + TURN_ROWS) * LANES))
     bundles = gamma.shape[1] if slopes.shape[0] > 0 else 0
     units = 3 if compliance.shape[0] > 0 else 0
     columns = np.zeros((3 + bundles + units, COLUMN_ROWS * LANES))
@@ -196,11 +196,11 @@ def solve(gamma, axes, guesses, coarse, fine, limits, most, found, slopes, compl
         walks, turn, tables, tangents = 0, -1, coarse, columns.shape[0]
         while True:
             if walks == 0 or turn == 0:
-                rest_frames(work, lanes, tables[0], tables[1], rest[: tables[1].shape[0]])
+                rest_frames(work, lanes, tables[0], tables[1], unloaded[: tables[1].shape[0]])
                 _aim(w, work, axes)
             if walks == 0:
                 _set_out(w, work, guesses, first, count, increment, widest)
-            walk(w, columns, tangents, lanes, rest, tables, bundles, trace[first:])
+            walk(w, columns, tangents, lanes, unloaded, tables, bundles, trace[first:])
             walks += 1
             waiting = _improve(w, turn, limits)
             turn += turn >= 0
@@ -211,21 +211,21 @@ def solve(gamma, axes, guesses, coarse, fine, limits, most, found, slopes, compl
             turn, tables, tangents = 0, fine, 0
             _move_all(w)
         respond(w, work, columns, first, count, bundles, slopes, compliance)
-        _store(w, work, columns, first, count, turn, tiny, found)
+        _store(w, work, columns, first, count, turn, tiny, ends)
 
 
 @inline
-def _store(w, work, columns, first, count, turn, tiny, found):
+def _store(w, work, columns, first, count, turn, tiny, ends):
     for i in range(count):
         q, n = back(turn_at(work, TURN, i)), first + i
         r = corrected_tip(w, columns, i) if turn < 0 else get(w, STATE + 9 * LANES, i)
         r, g = turned(q, r), turned(q, get(w, TRIAL, i))
         h = turned(q, get(w, TRIAL + 3 * LANES, i))
         for axis in range(3):
-            found[n, axis] = r[axis]
-            found[n, 3 + axis] = g[axis]
-            found[n, 6 + axis] = h[axis]
-        found[n, 9] = w[MARGIN + i]
-        found[n, 10] = w[DONE + i]
+            ends[n, axis] = r[axis]
+            ends[n, 3 + axis] = g[axis]
+            ends[n, 6 + axis] = h[axis]
+        ends[n, 9] = w[MARGIN + i]
+        ends[n, 10] = w[DONE + i]
         if turn >= 0 and w[DONE + i] == FOUND and w[LEFT + i] > tiny * tiny:
-            found[n, 10] = 0.0
+            ends[n, 10] = 0.0

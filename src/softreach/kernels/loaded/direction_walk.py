@@ -13,7 +13,7 @@ from softreach.kernels.loaded.unloaded_frames import NODE_ROWS
 from softreach.kernels.rod.tips import LANES
 from softreach.kernels.vector import cross, dot, minus, times
 
-__all__ = ["PLANE", "SIZE", "A", "B", "X", "Y", "tangents", "walk_tangents", "walk_tip"]
+__all__ = ["PLANE", "SIZE", "A", "B", "X", "Y", "tangents", "unit", "walk_tangents", "walk_tip"]
 
 # Rows of the workspace, after those of the continuation.
 X = HEAD  # G, M as walked
@@ -37,28 +37,30 @@ def _put_six(w, at, i, v):
 
 
 @inline
-def _node(rest, scalars, n, i, share):
+def _node(unloaded, scalars, n, i, share):
     at, weight = NODE_ROWS * n * LANES + i, scalars[n, 3] * share
-    d = (rest[at + LANES], rest[at + 2 * LANES], rest[at + 3 * LANES])
-    return rest[at], rest[at + 4 * LANES], d, scalars[n, 0], scalars[n, 1], scalars[n, 2], weight
+    growth, extension = unloaded[at], unloaded[at + 4 * LANES]
+    d = (unloaded[at + LANES], unloaded[at + 2 * LANES], unloaded[at + 3 * LANES])
+    return growth, extension, d, scalars[n, 0], scalars[n, 1], scalars[n, 2], weight
 
 
 @inline
-def _nodes(w, rest, scalars, i):
+def _nodes(w, unloaded, scalars, i):
     share = w[LOAD + i]
     return at_stages(
         (
-            _node(rest, scalars, 0, i, share),
-            _node(rest, scalars, 1, i, share),
-            _node(rest, scalars, 2, i, share),
-            _node(rest, scalars, 3, i, share),
-            _node(rest, scalars, 4, i, share),
+            _node(unloaded, scalars, 0, i, share),
+            _node(unloaded, scalars, 1, i, share),
+            _node(unloaded, scalars, 2, i, share),
+            _node(unloaded, scalars, 3, i, share),
+            _node(unloaded, scalars, 4, i, share),
         )
     )
 
 
 @inline
-def _unit(v):
+def unit(v):
+    """v / |v|."""
     return times(1.0 / math.sqrt(dot(v, v)), v)
 
 
@@ -83,13 +85,13 @@ def _begin_tip(w, tip, i):
 
 
 @pasted
-def walk_tip(w, rest, scalars, tip):
+def walk_tip(w, unloaded, scalars, tip):
     """The direction that the base would have to see, and the tip."""
     for i in range(LANES):
         _begin_tip(w, tip, i)
         put(w, Y, i, (0.0, 0.0, 0.0))
-    for k in range(rest.shape[0]):
-        r, c = rest[k], scalars[k]
+    for k in range(unloaded.shape[0]):
+        r, c = unloaded[k], scalars[k]
         for i in range(LANES):
             (x, y), _ = tip_step(_nodes(w, r, c, i), (_six(w, X, i), get(w, Y, i)))
             _put_six(w, X, i, x)
@@ -97,7 +99,7 @@ def walk_tip(w, rest, scalars, tip):
 
 
 @pasted
-def walk_tangents(w, rest, scalars, tip):
+def walk_tangents(w, unloaded, scalars, tip):
     """The direction that the base would have to see, and its two tangents, theory (68)."""
     for i in range(LANES):
         g, share = _begin_tip(w, tip, i), w[LOAD + i]
@@ -111,8 +113,8 @@ def walk_tangents(w, rest, scalars, tip):
         w[PLANE + 2 * LANES + i] = 0.0
         w[PLANE + 3 * LANES + i] = 1.0
         w[MARGIN + i] = 1.0
-    for k in range(rest.shape[0]):
-        r, c = rest[k], scalars[k]
+    for k in range(unloaded.shape[0]):
+        r, c = unloaded[k], scalars[k]
         for i in range(LANES):
             state = _six(w, X, i), _six(w, A, i), _six(w, B, i)
             (x, a, b), _ = tangent_step(_nodes(w, r, c, i), state)
@@ -133,7 +135,7 @@ def _watch(w, i):
     """
     g, a, b = get(w, X, i), get(w, A, i), get(w, B, i)
     e = get(w, AXIS, i)
-    e = _unit(minus(e, times(dot(e, g), g)))
+    e = unit(minus(e, times(dot(e, g), g)))
     f = cross(g, e)
     p, q = w[PLANE + i], w[PLANE + LANES + i]
     r, s = w[PLANE + 2 * LANES + i], w[PLANE + 3 * LANES + i]

@@ -141,13 +141,13 @@ def _step_column(w, c, change):
 
 
 @inline
-def _drive(w, lanes, rest, bends, change, j):
-    """How an activation turns the unloaded arm over a step: δω̂ of theory (73) at its five nodes.
+def _drive(w, lanes, unloaded, bends, change, j):
+    """Turn of the unloaded arm over a step by an activation: δω̂ of theory (73) at its five nodes.
 
     Args:
         w: Workspace.
         lanes: Activations.
-        rest: Unloaded arm at the nodes.
+        unloaded: Unloaded arm at the nodes.
         bends: U at the nodes (node, 3, bundle).
         change: dη dZ at the nodes (node,).
         j: Bundle.
@@ -159,18 +159,18 @@ def _drive(w, lanes, rest, bends, change, j):
                 x += bends[n, 0, b] * lanes[b, i]
                 y += bends[n, 1, b] * lanes[b, i]
                 z += bends[n, 2, b] * lanes[b, i]
-            length, c = rest[NODE_ROWS * n * LANES + i], change[n]
+            length, c = unloaded[NODE_ROWS * n * LANES + i], change[n]
             bend = (
                 c * x + length * bends[n, 0, j],
                 c * y + length * bends[n, 1, j],
                 c * z + length * bends[n, 2, j],
             )
-            q = turn_at(rest, (STEP_ROWS + 4 * n) * LANES, i)
+            q = turn_at(unloaded, (STEP_ROWS + 4 * n) * LANES, i)
             put(w, DRIVE + 3 * n * LANES, i, turned(q, bend))
 
 
 @pasted
-def step_columns(w, columns, count, lanes, rest, scalars, lengths, bends, bundles):
+def step_columns(w, columns, count, lanes, unloaded, scalars, lengths, bends, bundles):
     """Step the first `count` tangents: three of rotations, `bundles` of activations, the others."""
     c = _all_constants(scalars)
     for n in range(count):
@@ -181,7 +181,7 @@ def step_columns(w, columns, count, lanes, rest, scalars, lengths, bends, bundle
                 (lengths[0, j], lengths[1, j], lengths[2, j], lengths[3, j], lengths[4, j]),
                 (lengths[5, j], lengths[6, j], lengths[7, j], lengths[8, j], lengths[9, j]),
             )
-            _drive(w, lanes, rest, bends, lengths[:, j], j)
+            _drive(w, lanes, unloaded, bends, lengths[:, j], j)
         elif n == 0 or j == bundles:
             w[DRIVE : DRIVE + 15 * LANES] = 0.0
         copy(w, COLUMN, columns[n], 0, COLUMN_ROWS * LANES)

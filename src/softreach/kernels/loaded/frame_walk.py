@@ -48,10 +48,10 @@ def _dead_moment(jump, share, levers, axes):
 
 
 @inline
-def _jump(w, columns, count, rest, jump):
+def _jump(w, columns, count, unloaded, jump):
     """Loads at the tip end of a step, theory (67): lever x force (3, 3), moment, following two."""
     for i in range(LANES):
-        q, share = turn_at(rest, STEP_ROWS * LANES, i), w[LOAD + i]
+        q, share = turn_at(unloaded, STEP_ROWS * LANES, i), w[LOAD + i]
         body = (
             turned(q, (share, 0.0, 0.0)),
             turned(q, (0.0, share, 0.0)),
@@ -143,15 +143,15 @@ def _watch(w, columns, i):
 
 
 @pasted
-def walk(w, columns, count, lanes, rest, tables, bundles, trace):
+def walk(w, columns, count, lanes, unloaded, tables, bundles, trace):
     """From tip to base, with the first `count` tangents.
 
     Args:
         w: Workspace.
         columns: Tangents: three of rotations, `bundles` of activations, three of unit forces.
-        count: How many.
+        count: Number of them.
         lanes: Activations.
-        rest: The unloaded arm (step, rows).
+        unloaded: The unloaded arm (step, rows).
         tables: (pieces, lengths, scalars, bends, jumps).
         bundles: Columns of activations.
         trace: Filled with the sections between steps; or empty.
@@ -160,24 +160,26 @@ def walk(w, columns, count, lanes, rest, tables, bundles, trace):
     _begin(w, columns, count, 3 + bundles)
     for k in range(lengths.shape[0]):
         if jumps[k].any():
-            _jump(w, columns, count, rest[k], jumps[k])
-        copy(w, REST, rest[k], 0, STEP_ROWS * LANES)
+            _jump(w, columns, count, unloaded[k], jumps[k])
+        copy(w, REST, unloaded[k], 0, STEP_ROWS * LANES)
         if k == 0 and trace.shape[0] > 0:
-            _keep(w, rest[k], STEP_ROWS * LANES, trace[:, 0])
+            _keep(w, unloaded[k], STEP_ROWS * LANES, trace[:, 0])
         step_state(w, scalars[k])
-        step_columns(w, columns, count, lanes, rest[k], scalars[k], lengths[k], bends[k], bundles)
+        step_columns(
+            w, columns, count, lanes, unloaded[k], scalars[k], lengths[k], bends[k], bundles
+        )
         if count > 0:
             for i in range(LANES):
                 _watch(w, columns, i)
         if trace.shape[0] > 0:
-            _keep(w, rest[k], (STEP_ROWS + 16) * LANES, trace[:, k + 1])
+            _keep(w, unloaded[k], (STEP_ROWS + 16) * LANES, trace[:, k + 1])
 
 
 @inline
-def _keep(w, rest, turn, trace):
+def _keep(w, unloaded, turn, trace):
     """Put the sections that the lanes are at into their places."""
     for i in range(min(LANES, trace.shape[0])):
-        q, f = turn_at(rest, turn, i), get(w, FOLLOWING, i)
+        q, f = turn_at(unloaded, turn, i), get(w, FOLLOWING, i)
         for row in range(12):
             trace[i, row] = w[STATE + row * LANES + i]
         for row in range(4):

@@ -15,7 +15,7 @@ def interpolate(values, points, low, scale, sizes, out):
 
     Args:
         values: At the nodes (node, component), the last axis of the grid varying fastest.
-        points: Where (n, axis); outside the grid the nearest cell is continued.
+        points: Places (n, axis); outside the grid the nearest cell is continued.
         low: The first node of every axis (axis,).
         scale: Cells per unit of every axis, 0 for an axis of one node (axis,).
         sizes: Nodes of every axis (axis,).

@@ -136,7 +136,7 @@ def _apart(w, a, b, i):
 
 @inline
 def _whereabouts(w, i):
-    """Whether the equilibrium on trial is on the branch of those held.
+    """Relation of the equilibrium on trial to the branch of those held.
 
     On a branch the tip turns no faster than before, in a limit, and det D goes on as it went. Where
     det D vanishes another branch meets or almost meets this one, and the next equilibrium may be of
@@ -164,7 +164,7 @@ def _whereabouts(w, i):
 
 @inline
 def _is_too_far(w, i, allowed):
-    """Whether the tip turned by more than allowed, and not by half as much for half the load.
+    """True if the tip turned by more than allowed, and not by half as much for half the load.
 
     So it does where a branch turns ever faster; the way to another branch stays as long as it is.
     """
@@ -214,7 +214,7 @@ def _go_back_with(predict):
 
 @inline
 def _is_fold(w, i):
-    """Whether det D goes to zero as at a fold, like the root of the load that is left to it.
+    """True if det D goes to zero as at a fold, like the root of the load that is left to it.
 
     Its square is then linear in the load, its zero no farther than what could not be done, and the
     tip turns ever faster. Where branches cross, it does not.

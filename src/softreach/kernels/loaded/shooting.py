@@ -21,6 +21,7 @@ from softreach.kernels.loaded.direction_walk import (
     X,
     Y,
     tangents,
+    unit,
     walk_tangents,
     walk_tip,
 )
@@ -53,13 +54,8 @@ WHOLE = SIZE + 3 * LANES
 
 
 @inline
-def _unit(v):
-    return times(1.0 / math.sqrt(dot(v, v)), v)
-
-
-@inline
 def _missing(w, i):
-    """What is missing at the base, in the plane normal to G(0), which steps do not keep at 1."""
+    """Residual at the base, in the plane normal to G(0), whose size steps do not keep at 1."""
     g, t = get(w, X, i), get(w, TARGET, i)
     return minus(t, times(dot(g, t) / dot(g, g), g))
 
@@ -87,7 +83,7 @@ def _newton(w, i):
 
 @inline
 def _move(w, i):
-    put(w, TRIAL, i, _unit(plus(get(w, TRIAL, i), get(w, STEP, i))))
+    put(w, TRIAL, i, unit(plus(get(w, TRIAL, i), get(w, STEP, i))))
 
 
 @inline
@@ -101,7 +97,7 @@ def _extrapolate(w, i, last, first):
     """The parabola of theory (71)."""
     g, p, o = get(w, HELD, i), get(w, PAST, i), get(w, OLD, i)
     ahead = plus(times(last, minus(g, p)), times(first, minus(p, o)))
-    put(w, TRIAL, i, _unit(plus(g, ahead)))
+    put(w, TRIAL, i, unit(plus(g, ahead)))
 
 
 _advance_all = advance_with(_newton, _move, _extrapolate)
@@ -110,7 +106,7 @@ _chord_all = chord_with(_missing, _move)
 
 @inline
 def _aim(w, work, gravity):
-    """What the base must see, in the frame of the walk, theory (65)."""
+    """Directions that the base must see, in the frame of the walk, theory (65)."""
     for i in range(LANES):
         q = turn_at(work, TURN, i)
         put(w, TARGET, i, turned(q, (gravity[0], gravity[1], gravity[2])))
@@ -126,7 +122,7 @@ def _set_out(w, work, guesses, first, count, increment, widest):
         for i in range(LANES):
             n = first + min(i, count - 1)
             g = (guesses[n, 0], guesses[n, 1], guesses[n, 2])
-            put(w, TRIAL, i, _unit(turned(turn_at(work, TURN, i), g)))
+            put(w, TRIAL, i, unit(turned(turn_at(work, TURN, i), g)))
 
 
 @kernel
@@ -149,17 +145,17 @@ def solve(gamma, gravity, tip, guesses, coarse, fine, limits, most, out):
     increment, widest, small, tiny = limits
     lanes = np.zeros((coarse[0].shape[2] - 1, LANES))
     work, w = np.zeros(REST_WORK), np.zeros(WHOLE)
-    rest = np.zeros((coarse[1].shape[0], STEP_ROWS * LANES))
+    unloaded = np.zeros((coarse[1].shape[0], STEP_ROWS * LANES))
     fine_rest = np.zeros((fine[1].shape[0], STEP_ROWS * LANES))
     for first in range(0, gamma.shape[0], LANES):
         count = min(LANES, gamma.shape[0] - first)
         load_all(lanes, gamma, first, count)
-        rest_frames(work, lanes, coarse[0], coarse[1], rest)
+        rest_frames(work, lanes, coarse[0], coarse[1], unloaded)
         _aim(w, work, gravity)
         _set_out(w, work, guesses, first, count, increment, widest)
         walks = 0
         while walks < most[0]:
-            walk_tangents(w, rest, coarse[2], tip)
+            walk_tangents(w, unloaded, coarse[2], tip)
             walks += 1
             if _advance_all(w, small, widest) == 0:
                 break
@@ -200,9 +196,9 @@ def base_directions(gamma, tip, directions, fine, out):
     """
     lanes = np.zeros((fine[0].shape[2] - 1, LANES))
     work, w = np.zeros(REST_WORK), np.zeros(WHOLE)
-    rest = np.zeros((fine[1].shape[0], STEP_ROWS * LANES))
+    unloaded = np.zeros((fine[1].shape[0], STEP_ROWS * LANES))
     load_all(lanes, gamma, 0, 1)
-    rest_frames(work, lanes, fine[0], fine[1], rest)
+    rest_frames(work, lanes, fine[0], fine[1], unloaded)
     for first in range(0, directions.shape[0], LANES):
         count = min(LANES, directions.shape[0] - first)
         for i in range(LANES):
@@ -210,7 +206,7 @@ def base_directions(gamma, tip, directions, fine, out):
             g = (directions[n, 0], directions[n, 1], directions[n, 2])
             put(w, TRIAL, i, turned(turn_at(work, TURN, i), g))
             w[LOAD + i] = 1.0
-        walk_tip(w, rest, fine[2], tip)
+        walk_tip(w, unloaded, fine[2], tip)
         for i in range(count):
             g = turned(back(turn_at(work, TURN, i)), get(w, X, i))
             for axis in range(3):

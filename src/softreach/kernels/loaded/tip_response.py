@@ -1,4 +1,4 @@
-"""How tips answer to activations and forces: the tangents of a walk with the base held."""
+"""Response of tips to activations and forces: the tangents of a walk with the base fixed."""
 
 from __future__ import annotations
 

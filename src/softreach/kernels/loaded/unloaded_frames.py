@@ -82,9 +82,9 @@ def _keep_turn(values, work):
 
 @inline
 def _fill_lengths(values, lanes, weights):
-    rest = weights[-1]
+    constant = weights[-1]
     for i in range(LANES):
-        values[i] = rest
+        values[i] = constant
     for j in range(0, lanes.shape[0], 4):
         a, b, c, d = weights[j], weights[j + 1], weights[j + 2], weights[j + 3]
         g0, g1, g2, g3 = lanes[j], lanes[j + 1], lanes[j + 2], lanes[j + 3]

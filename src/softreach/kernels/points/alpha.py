@@ -101,7 +101,7 @@ def boundary_faces(cells, neighbors, kept, faces):
     Args:
         cells: Vertices, shape (m, 4).
         neighbors: Neighbors, -1 for none, shape (m, 4).
-        kept: Which cells belong to the shape, shape (m,).
+        kept: Mask of the cells that belong to the shape, shape (m,).
         faces: Result, shape (f, 3); empty to count only.
     """
     count = 0
@@ -117,7 +117,7 @@ def boundary_faces(cells, neighbors, kept, faces):
 
 @strict
 def is_boundary(neighbors, kept, t, i):
-    """Whether cell t is kept and its neighbor i is not."""
+    """True if cell t is kept and its neighbor i is not."""
     return kept[t] and (neighbors[t, i] < 0 or not kept[neighbors[t, i]])
 
 
@@ -172,7 +172,7 @@ def radius_of_one_region(neighbors, radii, parent, regions, order):
         neighbors: Neighbors, -1 for none, shape (m, 4).
         radii: Circumscribed radii, shape (m,).
         parent: Regions so far, from `join_regions`; changed.
-        regions: How many they are.
+        regions: Number of them.
         order: The cells still to come, by increasing radius.
     """
     for k in range(len(order)):

@@ -111,12 +111,12 @@ def _insert(points, mesh, start, same, table, w, at, used, free, last, crowded):
             return p, 0, used, free, last
         if p == start[0] or p == start[1] or p == start[2] or p == start[3]:
             continue
-        found = locate(points, mesh, p, last, w)
-        twin = twin_in(points, mesh, p, found)
+        cell = locate(points, mesh, p, last, w)
+        twin = twin_in(points, mesh, p, cell)
         if twin >= 0:
             same[p] = twin
             continue
-        dug, walls = dig(points, mesh, p, found, w)
+        dug, walls = dig(points, mesh, p, cell, w)
         if used + walls > len(mesh.mark) or 8 * walls > table.shape[1]:
             return p, walls, used, free, last
         used, free, last = fill(mesh, p, dug, walls, used, free, table)
@@ -150,7 +150,7 @@ def first_cell(points, mesh, start, w):
 
 @strict
 def equal(points, a, b):
-    """Whether two points are the same."""
+    """True if two points are the same."""
     return (
         points[a, 0] == points[b, 0]
         and points[a, 1] == points[b, 1]

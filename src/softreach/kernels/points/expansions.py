@@ -62,8 +62,8 @@ def two_product(a, b):
     product = a * b
     a_high, a_low = split(a)
     b_high, b_low = split(b)
-    rest = ((a_high * b_high - product) + a_high * b_low) + a_low * b_high
-    return product, rest + a_low * b_low
+    tail = ((a_high * b_high - product) + a_high * b_low) + a_low * b_high
+    return product, tail + a_low * b_low
 
 
 @strict
@@ -93,8 +93,8 @@ def merge_add(w, top, e, f, factor):
         else:
             term = factor * w[j]
             j += 1
-        total, rest = two_sum(total, term)
-        at = push(w, at, rest)
+        total, tail = two_sum(total, term)
+        at = push(w, at, tail)
     at = push(w, at, total)
     return top, at - top
 
@@ -117,10 +117,10 @@ def scale(w, top, e, b):
     at, total = top, 0.0
     for i in range(e[0], e[0] + e[1]):
         product, low = two_product(w[i], b)
-        total, rest = two_sum(total, low)
-        at = push(w, at, rest)
-        total, rest = two_sum(product, total)
-        at = push(w, at, rest)
+        total, tail = two_sum(total, low)
+        at = push(w, at, tail)
+        total, tail = two_sum(product, total)
+        at = push(w, at, tail)
     at = push(w, at, total)
     return top, at - top
 

@@ -31,7 +31,7 @@ _COLUMN = 1 << PLACE_BITS
 _DIGIT_BITS = 11
 _DIGIT = 1 << _DIGIT_BITS
 SHIFTS = tuple(row * _ROW + column * _COLUMN for row in (-1, 0, 1) for column in (-1, 0, 1))
-"""What takes a key to the same place in each of the nine columns around."""
+"""Differences from a key to those of the same place in each of the nine columns around."""
 
 
 @strict
@@ -137,7 +137,7 @@ def _first_at_least(keys, start, wanted):
 
 @strict
 def find_windows(keys, first, last, start, stop):
-    """Where the windows of queries lie among the points.
+    """Ranges of points in the windows of queries.
 
     Args:
         keys: Keys of all points in increasing order, shape (n,).

@@ -21,7 +21,7 @@ def distances_to_faces(points, vertices, faces, incident, starts, near, out):
         vertices: Corners, shape (v, 3).
         faces: Indices of the corners, shape (f, 3).
         incident: Triangles around vertex 0, then around vertex 1, ..., shape (3 f,).
-        starts: Where each vertex's begin, shape (v + 1,).
+        starts: Beginning of each vertex's, shape (v + 1,).
         near: Vertices near each point, shape (n, k).
         out: Result, shape (n,).
     """

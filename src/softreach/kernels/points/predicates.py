@@ -186,7 +186,7 @@ def insphere_exact(points, a, b, c, d, e, w):
 
 @strict
 def collinear(points, a, b, c, w):
-    """Whether three points lie on one line, exactly."""
+    """True if three points lie on one line, exactly."""
     ax, ay, az = edge(w, BOTTOM, points, a, c)
     bx, by, bz = edge(w, end(az), points, b, c)
     top = end(bz)

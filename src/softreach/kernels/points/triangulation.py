@@ -96,7 +96,7 @@ def face(cells, t, i):
 
 @strict
 def ghost_slot(cells, t):
-    """Which vertex of cell t is the ghost; -1 if none."""
+    """Number of the vertex of cell t that is the ghost; -1 if none."""
     for i in range(4):
         if cells[t, i] == GHOST:
             return i
@@ -105,7 +105,7 @@ def ghost_slot(cells, t):
 
 @strict
 def slot_of(neighbors, u, t):
-    """Which neighbor of u is t."""
+    """Number of t among the neighbors of u."""
     for i in range(3):
         if neighbors[u, i] == t:
             return i

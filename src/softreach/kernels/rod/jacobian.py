@@ -131,7 +131,7 @@ def _store_twists(columns, i, out, n):
 
 @inline
 def _store_slopes(columns, i, tip, out, n):
-    """How the tip moves: v + ω × r."""
+    """Velocity of the tip: v + ω × r."""
     for j in range(out.shape[2]):
         a, b, c = columns[j, i], columns[j, LANES + i], columns[j, 2 * LANES + i]
         x, y, z = tip

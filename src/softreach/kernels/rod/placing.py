@@ -10,7 +10,7 @@ def move(points, rotation, position):
     Args:
         points: To be overwritten, shape (n, 3).
         rotation: Matrix (3, 3).
-        position: Where the origin goes, shape (3,).
+        position: New place of the origin, shape (3,).
     """
     a, b, c = rotation[0, 0], rotation[0, 1], rotation[0, 2]
     d, e, f = rotation[1, 0], rotation[1, 1], rotation[1, 2]

@@ -86,9 +86,9 @@ def node_values(work, lanes, table, k):
 
 @inline
 def _first_group(values, g0, g1, g2, g3, weights):
-    a, b, c, d, rest = weights[0], weights[1], weights[2], weights[3], weights[-1]
+    a, b, c, d, constant = weights[0], weights[1], weights[2], weights[3], weights[-1]
     for i in range(LANES):
-        values[i] = (rest + a * g0[i] + b * g1[i]) + (c * g2[i] + d * g3[i])
+        values[i] = (constant + a * g0[i] + b * g1[i]) + (c * g2[i] + d * g3[i])
 
 
 @inline

@@ -32,10 +32,9 @@ from softreach.rod.kinematics import configuration, shape_dataset, stations_alon
 from softreach.rod.loaded.rod import LoadedRod
 from softreach.rod.loaded.solver import Solver
 from softreach.rod.loaded.tables import LoadTables
-from softreach.rod.placed import PlacedRod
 from softreach.rod.rods import tip_map
 from softreach.rod.tip_map import TipMap, TipStatus, has_tip
-from softreach.rod.view import View
+from softreach.rod.view import PlacedRod, View
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput, warn
 
@@ -75,7 +74,7 @@ class AllEquilibria:
     """The one that follows continuously from the unloaded arm, which is that of the tip map; None
     where that branch has ended."""
     complete: bool
-    """Whether the degree is 1, and the branch is among them: nothing says that one is missing."""
+    """True if the degree is 1, and the branch is among them: nothing says that one is missing."""
 
     @property
     def degree(self) -> int:
@@ -114,9 +113,9 @@ class AllEquilibria:
             "activation": (("bundle",), self.activation),
         }
         names = {"axis": list(schema.AXES), **schema.bundle_coordinates(self.rod.arm)}
-        whole = {"degree": self.degree, "complete": int(self.complete)}
+        numbers = {"degree": self.degree, "complete": int(self.complete)}
         return xr.Dataset(
-            values, names, {**schema.provenance(self.rod.arm, self.rod.frame), **whole}
+            values, names, {**schema.provenance(self.rod.arm, self.rod.frame), **numbers}
         )
 
     def __len__(self) -> int:
@@ -154,7 +153,7 @@ _NEUTRAL = 1e-5  # what tolerances leave of the margin of a ring, which is 0
 _SAME = 1e-3  # [rad], of equilibria that were found in two ways
 
 
-class _Found(NamedTuple):
+class _Roots(NamedTuple):
     """Equilibria as directions of gravity at the tip."""
 
     directions: Array
@@ -197,8 +196,8 @@ def equilibria(
     solver = _resolving(Solver(loaded.tables, FreeRod(rod.arm, rod.tol).steps, rod.tol), gamma)
     branch = solver.find(gamma)
     known = branch.frame[has_tip(branch.status)]
-    solver, found = _accurate(solver, gamma, _search(solver, gamma, known))
-    return _judged(rod, solver, gamma, found, known)
+    solver, roots = _accurate(solver, gamma, _search(solver, gamma, known))
+    return _judged(rod, solver, gamma, roots, known)
 
 
 def _one(rod: TipMap, activations: ArrayLike) -> Array:
@@ -232,8 +231,8 @@ def _crossing(loads: Loads, direction: Array) -> list[str]:
     names += [name for name in ("tip_moment", "follower_force") if any(getattr(loads, name))]
     return names + [
         f"point_loads[{k}]"
-        for k, one in enumerate(loads.point_loads)
-        if across(one.force) or any(one.moment)
+        for k, load in enumerate(loads.point_loads)
+        if across(load.force) or any(load.moment)
     ]
 
 
@@ -253,14 +252,14 @@ def _without_loads(rod: TipMap, gamma: Array) -> AllEquilibria:
     )
 
 
-def _search(solver: Solver, gamma: Array, known: Array) -> _Found:
+def _search(solver: Solver, gamma: Array, known: Array) -> _Roots:
     """All of them; the known ones are tried first."""
     image, axis = _image(solver, gamma), solver.tables.axes[0]
     if is_axisymmetric(image, axis, _SYMMETRIC):
         rings = pole_rings(image, axis, known[0] if len(known) else axis)
         directions = np.concatenate([axis[None], rings.points])
         is_ring = np.arange(len(directions)) > 0
-        return _Found(directions, np.append(1, rings.signs), is_ring, rings.complete)
+        return _Roots(directions, np.append(1, rings.signs), is_ring, rings.complete)
     return _isolated(image, axis, known, _MOST_WALKED // solver.steps)
 
 
@@ -270,7 +269,7 @@ def _isolated(
     known: Array,
     most: int,
     searches: Sequence[tuple[int, float]] = _SEARCHES,
-) -> _Found:
+) -> _Roots:
     """Those of an arm that is not axisymmetric, searched more finely if the degree is not 1."""
     (levels, caution), *finer = searches
     roots, cut = sphere_roots(image, axis, levels=levels, caution=caution, starts=known, most=most)
@@ -280,9 +279,9 @@ def _isolated(
     return _isolated(image, axis, known, most, finer)
 
 
-def _of_roots(roots: Roots, *, complete: bool) -> _Found:
+def _of_roots(roots: Roots, *, complete: bool) -> _Roots:
     signs = np.sign(roots.determinants).astype(np.int8)
-    return _Found(roots.points, signs, np.zeros(len(signs), bool), complete)
+    return _Roots(roots.points, signs, np.zeros(len(signs), bool), complete)
 
 
 def _image(solver: Solver, gamma: Array) -> Map:
@@ -307,7 +306,7 @@ def _resolving(solver: Solver, gamma: Array) -> Solver:
     return solver
 
 
-def _accurate(solver: Solver, gamma: Array, found: _Found) -> tuple[Solver, _Found]:
+def _accurate(solver: Solver, gamma: Array, roots: _Roots) -> tuple[Solver, _Roots]:
     """With steps halved until no tip moves by more than half of the tolerance.
 
     Those to begin with are enough without loads. The steps of the tip map are those of the branch
@@ -316,46 +315,46 @@ def _accurate(solver: Solver, gamma: Array, found: _Found) -> tuple[Solver, _Fou
     allowed = 0.5 * solver.tol * solver.tables.arm.length
     while 2 * solver.steps <= _MOST_STEPS:
         finer = solver.halved()
-        again = _again(finer, gamma, found)
-        if len(again.directions) == len(found.directions):
-            apart = _tips(finer, gamma, again) - _tips(solver, gamma, found)
+        again = _again(finer, gamma, roots)
+        if len(again.directions) == len(roots.directions):
+            apart = _tips(finer, gamma, again) - _tips(solver, gamma, roots)
             if np.linalg.norm(apart, axis=1).max(initial=0.0) <= allowed:
-                return solver, found
-            solver, found = finer, again
+                return solver, roots
+            solver, roots = finer, again
         else:
-            solver, found = finer, _search(finer, gamma, found.directions)
+            solver, roots = finer, _search(finer, gamma, roots.directions)
     warn(f"tips of some equilibria miss tol = {solver.tol:g}")
-    return solver, found
+    return solver, roots
 
 
-def _again(solver: Solver, gamma: Array, found: _Found) -> _Found:
+def _again(solver: Solver, gamma: Array, roots: _Roots) -> _Roots:
     """The same with other steps."""
-    if found.is_ring.any():
-        return _search(solver, gamma, found.directions[1:])
+    if roots.is_ring.any():
+        return _search(solver, gamma, roots.directions[1:])
     image, axis = _image(solver, gamma), solver.tables.axes[0]
-    return _of_roots(polished_roots(image, axis, found.directions), complete=found.complete)
+    return _of_roots(polished_roots(image, axis, roots.directions), complete=roots.complete)
 
 
-def _tips(solver: Solver, gamma: Array, found: _Found) -> Array:
-    many = np.repeat(gamma, len(found.directions), axis=0)
+def _tips(solver: Solver, gamma: Array, roots: _Roots) -> Array:
+    many = np.repeat(gamma, len(roots.directions), axis=0)
     stations = np.array([solver.tables.arm.length])
-    return solver.shapes_facing(many, found.directions, stations)[0].frames.position[:, 0]
+    return solver.shapes_facing(many, roots.directions, stations)[0].frames.position[:, 0]
 
 
 def _judged(
-    rod: TipMap, solver: Solver, gamma: Array, found: _Found, known: Array
+    rod: TipMap, solver: Solver, gamma: Array, roots: _Roots, known: Array
 ) -> AllEquilibria:
     """In order, with tips and status."""
-    axis, many = solver.tables.axes[0], np.repeat(gamma, len(found.directions), axis=0)
-    shapes, margin = solver.shapes_facing(many, found.directions, np.array([rod.length]))
-    margin = np.where(found.is_ring & (margin > -_NEUTRAL), 0.0, margin)
-    stable = (found.signs > 0) & np.where(found.is_ring, margin == 0.0, margin > 0.0)
+    axis, many = solver.tables.axes[0], np.repeat(gamma, len(roots.directions), axis=0)
+    shapes, margin = solver.shapes_facing(many, roots.directions, np.array([rod.length]))
+    margin = np.where(roots.is_ring & (margin > -_NEUTRAL), 0.0, margin)
+    stable = (roots.signs > 0) & np.where(roots.is_ring, margin == 0.0, margin > 0.0)
     places = np.round(shapes.frames.position[:, 0, ::-1] / rod.length, 6)  # part mirror images
     order = np.lexsort((*places.T, -np.round(margin, 6), ~stable))
-    followed = _nearest(found, known, axis)
-    complete = found.complete and (followed is not None or not len(known))
+    followed = _nearest(roots, known, axis)
+    complete = roots.complete and (followed is not None or not len(known))
     if not complete:
-        total = int(found.signs[~found.is_ring].sum())
+        total = int(roots.signs[~roots.is_ring].sum())
         warn(f"equilibria may be missing: the degree of those found is {total}")
     return AllEquilibria(
         rod=rod,
@@ -364,20 +363,20 @@ def _judged(
         tips=rod.pose.to_world(shapes.frames.position[order, 0]),
         status=np.where(stable, TipStatus.STABLE, TipStatus.UNSTABLE).astype(np.int8)[order],
         margin=margin[order],
-        directions=found.directions[order],
-        signs=np.where(found.is_ring, 0, found.signs).astype(np.int8)[order],
-        is_ring=found.is_ring[order],
+        directions=roots.directions[order],
+        signs=np.where(roots.is_ring, 0, roots.signs).astype(np.int8)[order],
+        is_ring=roots.is_ring[order],
         followed=None if followed is None else int(np.flatnonzero(order == followed)[0]),
         complete=complete,
     )
 
 
-def _nearest(found: _Found, known: Array, axis: Array) -> int | None:
+def _nearest(roots: _Roots, known: Array, axis: Array) -> int | None:
     """Index of the one at which the branch of the unloaded arm ends, if it does."""
-    if not len(known) or not len(found.directions):
+    if not len(known) or not len(roots.directions):
         return None
-    apart = np.linalg.norm(found.directions - known[0], axis=1)
-    latitudes = np.abs(found.directions @ axis - known[0] @ axis)
-    apart = np.where(found.is_ring, latitudes, apart)
+    apart = np.linalg.norm(roots.directions - known[0], axis=1)
+    latitudes = np.abs(roots.directions @ axis - known[0] @ axis)
+    apart = np.where(roots.is_ring, latitudes, apart)
     nearest = int(apart.argmin())
     return nearest if apart[nearest] < _SAME else None

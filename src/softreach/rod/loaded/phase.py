@@ -61,7 +61,7 @@ def load_phase(
 
     Args:
         arm: The design.
-        loads: What acts on it.
+        loads: Loads on it.
         compliance: 1/K0 [1/N], 1/K1 and 1/K3 [1/(N m²)] at `phase_stations`.
         mass: Per length there [kg/m].
     """
@@ -91,11 +91,11 @@ def check_phase(arm: Manipulator, phase: LoadPhase) -> None:
         InvalidInput: Too heavy loads.
     """
     if not phase.entire <= _MOST_GROWTH:
-        found = f"of load number {load_number(arm):.3g}"
+        load = f"of load number {load_number(arm):.3g}"
         allowed = (
             f"lighter: their phase is {phase.entire:.3g} rad, at most {_MOST_GROWTH:g} allowed"
         )
-        raise InvalidInput("loads", found, allowed, "lighten the load or stiffen the arm")
+        raise InvalidInput("loads", load, allowed, "lighten the load or stiffen the arm")
 
 
 def phase_stations(arm: Manipulator) -> Array:
@@ -110,7 +110,7 @@ def _force(loads: Loads, z: Array, mass: Array) -> Array:
     per_length = math.hypot(*loads.force_per_length) + mass * gravity
     each = 0.5 * (per_length[1:] + per_length[:-1]) * np.diff(z)
     along = np.append(np.cumsum(each[::-1])[::-1], 0.0)
-    points = sum((math.hypot(*one.force) * (one.station >= z) for one in loads.point_loads), 0.0)
+    points = sum((math.hypot(*load.force) * (load.station >= z) for load in loads.point_loads), 0.0)
     at_tip += math.hypot(*loads.follower_force) + loads.payload * gravity
     return at_tip + along + points
 
@@ -118,5 +118,6 @@ def _force(loads: Loads, z: Array, mass: Array) -> Array:
 def _moment(loads: Loads) -> float:
     """The sizes of all moments, added, that of the payload on its lever among them [N m]."""
     weight = loads.payload * math.hypot(*loads.gravity)
-    moments = [loads.tip_moment, loads.follower_moment, *(one.moment for one in loads.point_loads)]
-    return weight * math.hypot(*loads.payload_arm) + sum(math.hypot(*one) for one in moments)
+    moments = [loads.tip_moment, loads.follower_moment]
+    moments += [load.moment for load in loads.point_loads]
+    return weight * math.hypot(*loads.payload_arm) + sum(math.hypot(*moment) for moment in moments)

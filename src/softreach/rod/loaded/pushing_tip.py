@@ -76,18 +76,18 @@ class PushingTip:
         Args:
             gamma: Activations, shape (bundles,).
             force: With which the tip pushes [N].
-            near: Where the search begins; None for the unloaded arm, by way of the whole load.
+            near: Response to begin with; None for the unloaded arm, by way of the whole load.
         """
-        solver, one = self._solver(force, self.steps), gamma[None]
-        known = solver.find(one) if near is None else solver.near(one, near.equilibrium)
-        found = solver.respond(one, compliance=True, known=known)
-        slopes = np.empty_like(found.twists[:, :3])
-        position_slopes(found.tips, found.twists, slopes)
-        retreat = found.compliance[0] @ self.direction
-        return TipResponse(found.tips[0], slopes[0], retreat, known)
+        solver, sample = self._solver(force, self.steps), gamma[None]
+        known = solver.find(sample) if near is None else solver.near(sample, near.equilibrium)
+        response = solver.respond(sample, compliance=True, known=known)
+        slopes = np.empty_like(response.twists[:, :3])
+        position_slopes(response.tips, response.twists, slopes)
+        retreat = response.compliance[0] @ self.direction
+        return TipResponse(response.tips[0], slopes[0], retreat, known)
 
     def is_stable(self, gamma: Array, force: float, response: TipResponse) -> bool:
-        """Whether this equilibrium is stable; in doubt steps half as long decide."""
+        """True if this equilibrium is stable; in doubt steps half as long decide."""
         if abs(response.margin) > _DOUBTFUL:
             return response.margin > 0
         fine = self._solver(force, 2 * self.steps).near(gamma[None], response.equilibrium)
@@ -99,7 +99,7 @@ class PushingTip:
         return float(np.linalg.norm(fine.tips[0] - response.tip))
 
     def settles(self, gamma: Array, force: float, response: TipResponse) -> bool:
-        """Whether the arm that is activated first and loaded slowly then ends there."""
+        """True if the arm that is activated first and loaded slowly then ends there."""
         branch = self._solver(force, self.steps).find(gamma[None])
         apart = float(np.linalg.norm(branch.tips[0] - response.tip))
         return apart <= self.rod.tol * self.rod.length

@@ -60,7 +60,7 @@ class LoadedRod(ArmRod):
 
     @property
     def supports_unstable(self) -> bool:
-        """Whether a tip can have another status than stable."""
+        """True if a tip can have another status than stable."""
         return True
 
     @cached_property
@@ -133,15 +133,15 @@ class LoadedRod(ArmRod):
         self.prepare()
         gamma, lost = self.with_arms(self.box.check(activations))
         solver = self.solver
-        found = solver.empty(len(gamma))
+        equilibria = solver.empty(len(gamma))
         blocks = parallel.blocks(len(gamma), _BLOCK)
-        parallel.run(partial(solver.direct, gamma[b], found.of(b)) for b in blocks)
+        parallel.run(partial(solver.direct, gamma[b], equilibria.of(b)) for b in blocks)
         for rung in LATER_RUNGS:
-            rows = solver.doubtful(found, rung)
+            rows = solver.doubtful(equilibria, rung)
             blocks = parallel.blocks(len(rows), LANES)
-            parallel.run(partial(solver.again, gamma, rows[b], rung, found) for b in blocks)
-        drop(lost, found.status, found.tips, found.margin)
-        return found
+            parallel.run(partial(solver.again, gamma, rows[b], rung, equilibria) for b in blocks)
+        drop(lost, equilibria.status, equilibria.tips, equilibria.margin)
+        return equilibria
 
     def fill(
         self,
@@ -155,18 +155,18 @@ class LoadedRod(ArmRod):
     ) -> None:
         """Put tips, and what else is asked for, into place; each equilibrium is found once."""
         if slopes is None and twists is None and directions is None:
-            found = self.solver.find(gamma)
+            equilibria = self.solver.find(gamma)
         else:
-            found = self.solver.respond(gamma, directions=directions is not None)
+            equilibria = self.solver.respond(gamma, directions=directions is not None)
             if slopes is not None:
-                position_slopes(found.tips, found.twists, slopes)
+                position_slopes(equilibria.tips, equilibria.twists, slopes)
             if twists is not None:
-                twists[:] = found.twists
+                twists[:] = equilibria.twists
             if directions is not None:
-                directions[:] = found.directions
-        tips[:] = found.tips
+                directions[:] = equilibria.directions
+        tips[:] = equilibria.tips
         if status is not None:
-            status[:] = found.status
+            status[:] = equilibria.status
 
     def compliance(self, activations: ArrayLike) -> Array:
         """∂r/∂F [m/N]: how a tip yields to a small dead force on it, shape (n, 3, 3)."""
@@ -234,14 +234,14 @@ class LoadedRod(ArmRod):
             InvalidInput: None of the pilot has an equilibrium.
         """
         gamma = pilot_activations(self.arm, self.box)
-        found = self.strains_at(stations)(gamma)
-        if np.isnan(found.extension).all():
+        strains = self.strains_at(stations)(gamma)
+        if np.isnan(strains.extension).all():
             raise loads_too_heavy(no_equilibrium_message(len(gamma), "an equilibrium"))
-        bend = np.hypot(found.curvature[..., 0], found.curvature[..., 1])
+        bend = np.hypot(strains.curvature[..., 0], strains.curvature[..., 1])
         return StrainRange(
             np.stack([np.zeros(bend.shape[1]), np.nanmax(bend, axis=0)], axis=1),
-            _range(found.curvature[..., 2]),
-            _range(found.extension),
+            _range(strains.curvature[..., 2]),
+            _range(strains.extension),
         )
 
 

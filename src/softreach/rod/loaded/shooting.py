@@ -81,7 +81,7 @@ def shoot(
 ) -> Walked:
     """Searches under any loads; see `loaded_general.solve`."""
     n, columns = len(gamma), _columns(gamma)
-    found = np.empty((n, 11))
+    ends = np.empty((n, 11))
     answers = (
         np.zeros((n if slopes else 0, 6, columns.shape[1])),
         np.zeros((n if compliance else 0, 3, 3)),
@@ -89,8 +89,8 @@ def shoot(
     )
     guessed = np.zeros((0, 6)) if guesses is None else guesses
     steps = tuple(coarse), tuple(fine)
-    loaded_general.solve(columns, axes, guessed, *steps, limits, most, found, *answers)
-    shots = Shots(found[:, :3], found[:, 3:9], found[:, 9], found[:, 10])
+    loaded_general.solve(columns, axes, guessed, *steps, limits, most, ends, *answers)
+    shots = Shots(ends[:, :3], ends[:, 3:9], ends[:, 9], ends[:, 10])
     return Walked(shots, answers[0][:, :, : gamma.shape[1]], *answers[1:])
 
 

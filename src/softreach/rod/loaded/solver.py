@@ -107,40 +107,42 @@ class Solver:
             gamma: Activations.
             patient: Whether to climb the last rung too.
         """
-        found = self.empty(len(gamma))
-        self.direct(gamma, found)
+        equilibria = self.empty(len(gamma))
+        self.direct(gamma, equilibria)
         for rung in LATER_RUNGS if patient else [Rung.CONTINUATION]:
-            rows = self.doubtful(found, rung)
+            rows = self.doubtful(equilibria, rung)
             if len(rows):
-                self.again(gamma, rows, rung, found)
-        return found
+                self.again(gamma, rows, rung, equilibria)
+        return equilibria
 
-    def direct(self, gamma: Array, found: Equilibria) -> None:
+    def direct(self, gamma: Array, equilibria: Equilibria) -> None:
         """The first rung, for all of some activations (n, bundles), on the calling thread."""
         guesses = None if self.starts is None else self.starts.at(gamma)
-        self._try(gamma, slice(None), DIRECT, Rung.DIRECT, found, guesses)
+        self._try(gamma, slice(None), DIRECT, Rung.DIRECT, equilibria, guesses)
 
-    def doubtful(self, found: Equilibria, rung: Rung) -> NDArray[np.intp]:
+    def doubtful(self, equilibria: Equilibria, rung: Rung) -> NDArray[np.intp]:
         """Rows that a later rung is to search again."""
-        lost = ~has_tip(found.status)
+        lost = ~has_tip(equilibria.status)
         least = 0.0 if rung == Rung.PATIENT else _DOUBTFUL
-        return np.flatnonzero(lost | (found.margin < least))
+        return np.flatnonzero(lost | (equilibria.margin < least))
 
-    def again(self, gamma: Array, rows: NDArray[np.intp], rung: Rung, found: Equilibria) -> None:
+    def again(
+        self, gamma: Array, rows: NDArray[np.intp], rung: Rung, equilibria: Equilibria
+    ) -> None:
         """A later rung, for some rows of all activations, on the calling thread."""
-        self._try(gamma, rows, LATER_RUNGS[rung], rung, found)
+        self._try(gamma, rows, LATER_RUNGS[rung], rung, equilibria)
 
     def near(self, gamma: Array, known: Equilibria) -> Equilibria:
         """Equilibria near known ones of other steps."""
-        found = self.empty(len(gamma))
-        self._try(gamma, slice(None), DIRECT, Rung.DIRECT, found, known.frame)
-        return found
+        equilibria = self.empty(len(gamma))
+        self._try(gamma, slice(None), DIRECT, Rung.DIRECT, equilibria, known.frame)
+        return equilibria
 
     def slowly(self, gamma: Array) -> Equilibria:
         """Equilibria found by the most patient continuation alone."""
-        found = self.empty(len(gamma))
-        self._try(gamma, slice(None), PATIENT, Rung.PATIENT, found)
-        return found
+        equilibria = self.empty(len(gamma))
+        self._try(gamma, slice(None), PATIENT, Rung.PATIENT, equilibria)
+        return equilibria
 
     def _try(
         self,
@@ -148,32 +150,32 @@ class Solver:
         rows: slice | NDArray[np.intp],
         search: Search,
         rung: Rung,
-        found: Equilibria,
+        equilibria: Equilibria,
         guesses: Array | None = None,
     ) -> None:
         """Search at some rows, and put down what is found."""
-        self._put(found, rows, rung, self._shoot(gamma[rows], search, guesses))
+        self._put(equilibria, rows, rung, self._shoot(gamma[rows], search, guesses))
         if self.tables.phase.squeeze >= 1.0:
-            self._give_up_squeezed(gamma, rows, found)
+            self._give_up_squeezed(gamma, rows, equilibria)
 
     def _give_up_squeezed(
-        self, gamma: Array, rows: slice | NDArray[np.intp], found: Equilibria
+        self, gamma: Array, rows: slice | NDArray[np.intp], equilibria: Equilibria
     ) -> None:
         """No arm is where ζ = ζ̂ + η n3/K0 is not positive: it would be turned inside out."""
         squeezed = np.arange(len(gamma))[rows]
         edges = self.tables.edges(np.array([]), self.steps)[::-1]
         z = self.tables.arm.profile.station(edges)
-        force = self.shapes(gamma[squeezed], z, found.of(squeezed)).force[..., 2]
+        force = self.shapes(gamma[squeezed], z, equilibria.of(squeezed)).force[..., 2]
         _, extension, growth = linear_strains(tables(self.tables.arm, z), gamma[squeezed])
         extension = extension + growth * force * self.tables.body.compliance(z)[0]
         squeezed = squeezed[(extension <= 0.0).any(axis=1)]
-        found.tips[squeezed] = np.nan
-        found.status[squeezed] = TipStatus.NO_EQUILIBRIUM
-        found.rung[squeezed] = Rung.NONE
+        equilibria.tips[squeezed] = np.nan
+        equilibria.status[squeezed] = TipStatus.NO_EQUILIBRIUM
+        equilibria.rung[squeezed] = Rung.NONE
 
     def _put(
         self,
-        found: Equilibria,
+        equilibria: Equilibria,
         rows: slice | NDArray[np.intp],
         rung: Rung,
         shots: Shots,
@@ -182,11 +184,11 @@ class Solver:
         tips, frame, margin, state = shots
         good = (state == _FOUND) & np.isfinite(tips).all(axis=1) & ~np.isnan(margin)
         stable = np.where(margin > 0, TipStatus.STABLE, TipStatus.UNSTABLE)
-        found.tips[rows] = np.where(good[:, None], tips, np.nan)
-        found.frame[rows], found.margin[rows] = frame, margin
+        equilibria.tips[rows] = np.where(good[:, None], tips, np.nan)
+        equilibria.frame[rows], equilibria.margin[rows] = frame, margin
         none = np.where(state == _ENDED, TipStatus.NO_EQUILIBRIUM, TipStatus.UNDECIDED)
-        found.status[rows] = np.where(good, stable, none)
-        found.rung[rows] = np.where(good, rung, Rung.NONE)
+        equilibria.status[rows] = np.where(good, stable, none)
+        equilibria.rung[rows] = np.where(good, rung, Rung.NONE)
 
     def _shoot(self, gamma: Array, search: Search, guesses: Array | None) -> Shots:
         """One search for each activation (n, bundles)."""
@@ -226,19 +228,19 @@ class Solver:
         return shapes.on_base(), walked.shots.margin
 
     def _walk(
-        self, gamma: Array, frames: Array, table: StepTables, search: Search, **asked: bool
+        self, gamma: Array, frames: Array, table: StepTables, search: Search, **outputs: bool
     ) -> Walked:
         """Newton steps from frames of tips (n, 6), with whatever more is asked for."""
         axial = float(self.tables.one_direction)
         limits = (search.increment, search.widest, _NEAR_STEP, 0.0, axial)
         return shoot(
-            gamma, self.tables.axes, frames, table, table, limits, (search.walks, 0), **asked
+            gamma, self.tables.axes, frames, table, table, limits, (search.walks, 0), **outputs
         )
 
-    def _near(self, gamma: Array, known: Equilibria, table: StepTables, **asked: bool) -> Walked:
+    def _near(self, gamma: Array, known: Equilibria, table: StepTables, **outputs: bool) -> Walked:
         """The last walk again, from known equilibria, with whatever more is asked for."""
         frames = with_across(known.frame) if self.tables.one_direction else known.frame
-        walked = self._walk(gamma, frames, table, NEAR, **asked)
+        walked = self._walk(gamma, frames, table, NEAR, **outputs)
         lost = ~has_tip(known.status) | (walked.shots.state != _FOUND)
         for values in (walked.shots.tips, walked.slopes, walked.compliance):
             if len(values):
@@ -357,6 +359,6 @@ class StartGrid:
     def at(self, gamma: Array) -> Array:
         """Frames to begin from."""
         sizes = np.array(self.sizes)
-        found = np.empty((len(gamma), self.frames.shape[1]))
-        interpolate(self.frames, gamma, self.box.low, (sizes - 1) / self.box.scales, sizes, found)
-        return found
+        frames = np.empty((len(gamma), self.frames.shape[1]))
+        interpolate(self.frames, gamma, self.box.low, (sizes - 1) / self.box.scales, sizes, frames)
+        return frames

@@ -52,7 +52,7 @@ def fewest_steps(
         solver_of: A solver of so many steps.
         pilot: Activations to judge by, shape (n, bundles).
         steps: The fewest to try.
-        differences: What must be within the tolerance.
+        differences: Differences that must be within the tolerance.
 
     Returns:
         Steps; None where even the most are too few, `UNJUDGED` where nothing can be judged.
@@ -78,10 +78,10 @@ def _enough(
     while steps <= _MOST_STEPS:
         solver = solver_of(steps)
         allowed = tol * solver.tables.arm.length / _SAFETY
-        found = _bulk(differences(solver, *_settled(solver, gamma)))
-        if not len(found):
+        errors = _bulk(differences(solver, *_settled(solver, gamma)))
+        if not len(errors):
             return UNJUDGED
-        error = float(found.max())
+        error = float(errors.max())
         if error <= allowed:
             return steps
         steps = max(steps + 1, int(0.97 * steps * (error / allowed) ** (1 / 8)))
@@ -90,9 +90,9 @@ def _enough(
 
 def _settled(solver: Solver, gamma: Array) -> tuple[Array, Equilibria]:
     """The activations that judge the steps, and their equilibria."""
-    found = solver.find(gamma, patient=False)
-    settled = has_tip(found.status) & (np.abs(found.margin) > _CRITICAL)
-    return gamma[settled], found.of(settled)
+    equilibria = solver.find(gamma, patient=False)
+    settled = has_tip(equilibria.status) & (np.abs(equilibria.margin) > _CRITICAL)
+    return gamma[settled], equilibria.of(settled)
 
 
 def _bulk(distances: Array) -> Array:
@@ -111,8 +111,8 @@ def tip_differences(solver: Solver, gamma: Array, known: Equilibria) -> Array:
 def shape_differences(solver: Solver, gamma: Array, known: Equilibria) -> Array:
     """Between centerlines, along the arm."""
     stations = np.linspace(0.0, solver.tables.arm.length, _STATIONS)
-    shapes = [one.shapes(gamma, stations, known) for one in (solver, solver.halved())]
-    return _distances(*(one.frames.position for one in shapes)).max(axis=1, initial=0.0)
+    shapes = [each.shapes(gamma, stations, known) for each in (solver, solver.halved())]
+    return _distances(*(shape.frames.position for shape in shapes)).max(axis=1, initial=0.0)
 
 
 def _distances(a: Array, b: Array) -> Array:

@@ -92,7 +92,7 @@ class LoadTables:
         Without gravity that of the largest dead force, so that a tip force alone needs no more than
         one direction.
         """
-        forces = [self._at_tip, *(np.array(one.force) for one in self.loads.point_loads)]
+        forces = [self._at_tip, *(np.array(load.force) for load in self.loads.point_loads)]
         forces = [np.array(self.loads.gravity), np.array(self.loads.force_per_length), *forces]
         first = next((f for f in forces if np.any(f)), np.array([0.0, 0.0, -1.0]))
         first = first / np.linalg.norm(first)
@@ -103,14 +103,14 @@ class LoadTables:
 
     @cached_property
     def one_direction(self) -> bool:
-        """Whether all forces are dead and along the first axis, so that two unknowns are enough."""
+        """True if all forces are dead and along the first axis, so that two unknowns are enough."""
         loads = self.loads
         dead = [self._at_tip, loads.gravity, loads.force_per_length]
-        dead += [one.force for one in loads.point_loads]
+        dead += [load.force for load in loads.point_loads]
         across = np.array(dead) @ self.axes[1:].T
         size = np.abs(np.array(dead)).max(axis=1, keepdims=True)
         moments = [loads.tip_moment, loads.follower_force]
-        moments += [one.moment for one in loads.point_loads]
+        moments += [load.moment for load in loads.point_loads]
         return bool((np.abs(across) <= 1e-14 * size).all()) and not np.any(moments)
 
     @cached_property
@@ -145,7 +145,7 @@ class LoadTables:
         No step is longer in S than those of `steps` uniform ones.
         """
         profile = self.arm.profile
-        breaks = [*self.arm.breakpoints, *(one.station for one in self.loads.point_loads)]
+        breaks = [*self.arm.breakpoints, *(load.station for load in self.loads.point_loads)]
         z = np.unique(np.concatenate([[0.0, self.arm.length], breaks, stations]))
         return edges_between(profile, profile.slender_coordinate(z), steps)[::-1]
 
@@ -207,8 +207,8 @@ class LoadTables:
         beyond = np.cumsum(half * (mass @ _WEIGHTS)).reshape(z.shape)
         force = self._at_tip + beyond[..., None] * np.array(loads.gravity)
         force = force + (length - z)[..., None] * np.array(loads.force_per_length)
-        for one in loads.point_loads:
-            force[_step_inward(z[:, 0], one.station) :] += one.force
+        for load in loads.point_loads:
+            force[_step_inward(z[:, 0], load.station) :] += load.force
         return force
 
     def _jumps(self, z: Array) -> Array:
@@ -217,9 +217,9 @@ class LoadTables:
         jumps[0, :9] = np.outer(loads.payload_arm, self.axes @ self._weight).ravel()
         jumps[0, 9:12] = self.axes @ np.array(loads.tip_moment)
         jumps[0, 12:15], jumps[0, 15:18] = loads.follower_force, loads.follower_moment
-        for one in loads.point_loads:
-            step = _step_inward(z, one.station)
-            jumps[step : step + 1, 9:12] += self.axes @ np.array(one.moment)
+        for load in loads.point_loads:
+            step = _step_inward(z, load.station)
+            jumps[step : step + 1, 9:12] += self.axes @ np.array(load.moment)
         return jumps
 
 
@@ -272,14 +272,14 @@ class TipForceTables(LoadTables):
             return self.origin.axes
         loads = self.loads
         forces = [loads.gravity, loads.force_per_length, loads.tip_force]
-        if any(map(any, (*forces, *(one.force for one in loads.point_loads)))):
+        if any(map(any, (*forces, *(load.force for load in loads.point_loads)))):
             return self._given.axes
         alone = loads.replace(tip_force=tuple(self.direction))
         return LoadTables(self.arm, alone, self.body).axes
 
     @cached_property
     def one_direction(self) -> bool:
-        """Whether all forces, this one included, are dead and along the first axis."""
+        """True if all forces, this one included, are dead and along the first axis."""
         if self.origin is not None:
             return self.origin.one_direction
         along = np.abs(self.axes[1:] @ self.direction).max() <= 1e-14

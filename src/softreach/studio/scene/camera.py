@@ -214,7 +214,7 @@ class Viewpoint:
     position: Array
     look_at: Array
     base: Array
-    """Where the arm is clamped, shape (3,)."""
+    """Position of the clamped end, shape (3,)."""
     centers: Array
     """Shape (n, 3)."""
     radii: Array

@@ -135,7 +135,7 @@ class InversePanel:
 
 
 def _straight_tip(session: Session) -> tuple[float, ...]:
-    """Where the tip of the straight arm is [L]."""
+    """Position of the tip of the straight arm [L]."""
     arm = session.state.design
     return tuple((arm.base.to_world([0.0, 0.0, arm.length]) / arm.length).tolist())
 
