@@ -1,0 +1,109 @@
+"""Units of length that a user chooses: places, areas and volumes shown and written in them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from softreach.support.errors import InvalidInput
+from softreach.support.quantity import quantity
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from softreach.support.arrays import Array
+
+__all__ = ["METER", "UNITS", "LengthUnit", "as_unit", "handy_unit", "in_lengths"]
+
+UNITS = ("m", "cm", "mm", "L")
+"""Names of the units; L is the length of an arm."""
+
+_SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+_VOLUMES = {"m": ("m³", 1.0), "cm": ("liters", 1e-3), "mm": ("mL", 1e-6)}
+"""Unit of length -> that of volumes beside it, and its size [m³]. L alone is never a liter here."""
+
+_SUPERSCRIPTS = {1: "", 2: "²", 3: "³"}
+
+
+class LengthUnit(NamedTuple):
+    """A unit of length with those of areas and volumes beside it."""
+
+    name: str
+    """One of `UNITS`."""
+    size: float
+    """[m]; of L, the length of the arm."""
+
+    @property
+    def relative(self) -> bool:
+        """True if it is L, the length of the arm."""
+        return self.name == "L"
+
+    def of(self, values: ArrayLike, power: int = 1) -> Array:
+        """Lengths [m] in this unit; areas [m²] for power 2, volumes [m³] for 3."""
+        import numpy as np  # the command line reads units before it needs arrays
+
+        plain, scale = np.asarray(values, float), self._scale(power)
+        return plain if scale == 1.0 else plain / scale
+
+    def symbol(self, power: int = 1) -> str:
+        """Behind a number: "mm", "mm²", "mL"."""
+        if power == 3 and not self.relative:
+            return _VOLUMES[self.name][0]
+        return self.name + _SUPERSCRIPTS[power]
+
+    def label(self, name: str, power: int = 1) -> str:
+        """Of an axis with lengths, areas or volumes, such as "x / L", "x [mm]" or "V [mL]"."""
+        symbol = self.symbol(power)
+        return f"{name} / {symbol}" if self.relative else f"{name} [{symbol}]"
+
+    def text(self, value: float, power: int = 1, error: float = math.nan) -> str:
+        """A value in SI units to the first digit of its error, such as "312.4 ± 0.2 mL"."""
+        scale = self._scale(power)
+        return quantity(value / scale, self.symbol(power), error / scale)
+
+    def _scale(self, power: int) -> float:
+        if power == 3 and not self.relative:
+            return _VOLUMES[self.name][1]
+        return self.size**power
+
+
+METER = LengthUnit("m", 1.0)
+
+
+def in_lengths(length: float | None) -> LengthUnit:
+    """L for a given length [m], the meter for None.
+
+    Raises:
+        InvalidInput: A length that is not positive.
+    """
+    if length is None:
+        return METER
+    if not length > 0:
+        raise InvalidInput("length", length, "> 0 m")
+    return LengthUnit("L", length)
+
+
+def as_unit(unit: object, length: float | None = None) -> LengthUnit:
+    """The unit of that name.
+
+    Args:
+        unit: One of `UNITS`, or a unit.
+        length: L [m] of the arm; None where it is not known, and L no unit.
+
+    Raises:
+        InvalidInput: No such unit, or L where it is not known.
+    """
+    if isinstance(unit, LengthUnit):
+        return unit
+    if unit == "L" and length is not None:
+        return in_lengths(length)
+    if isinstance(unit, str) and unit in _SIZES:
+        return LengthUnit(unit, _SIZES[unit])
+    hint = "the length L of the arm is not known here" if unit == "L" else ""
+    names = [name for name in UNITS if name in _SIZES or length is not None or not hint]
+    raise InvalidInput("unit", unit, f"one of {', '.join(names)}", hint)
+
+
+def handy_unit(length: float) -> str:
+    """The unit for an arm of that length [m]: mm below a meter, m from there."""
+    return "mm" if length < 1.0 else "m"
