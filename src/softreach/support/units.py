@@ -6,17 +6,30 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from softreach.support.errors import InvalidInput
-from softreach.support.quantity import quantity
+from softreach.support.quantity import quantity, read_number, read_quantity, unit_names
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from softreach.support.arrays import Array
 
-__all__ = ["METER", "UNITS", "LengthUnit", "as_unit", "handy_unit", "in_lengths"]
+__all__ = [
+    "METER",
+    "TYPED",
+    "UNITS",
+    "LengthUnit",
+    "as_unit",
+    "handy_unit",
+    "in_lengths",
+    "lengths_in",
+    "read_length",
+]
 
 UNITS = ("m", "cm", "mm", "L")
 """Names of the units; L is the length of an arm."""
+
+TYPED = ", ".join(unit_names("m"))
+"""Units that lengths may be typed in, beside L where the arm is known."""
 
 _SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 _VOLUMES = {"m": ("m³", 1.0), "cm": ("liters", 1e-3), "mm": ("mL", 1e-6)}
@@ -107,3 +120,47 @@ def as_unit(unit: object, length: float | None = None) -> LengthUnit:
 def handy_unit(length: float) -> str:
     """The unit for an arm of that length [m]: mm below a meter, m from there."""
     return "mm" if length < 1.0 else "m"
+
+
+def read_length(text: str, length: float | None = None) -> float:
+    """A length [m] as it is typed: "80mm", "0.08" in m, or "0.1L".
+
+    Args:
+        text: A number and its unit.
+        length: L [m]; None where it is not known, and L no unit.
+
+    Raises:
+        ValueError: No finite number, or another unit.
+    """
+    text = text.strip()
+    if length is not None and text.endswith("L"):
+        return length * read_number(text[:-1])
+    return read_number(text) if _is_number(text) else read_quantity(text, "m")
+
+
+def lengths_in(text: str, count: int, length: float | None = None) -> list[float] | None:
+    """Comma-separated lengths [m], each with its unit or all without.
+
+    Args:
+        text: What was typed.
+        count: How many there must be.
+        length: As in `read_length`.
+
+    Returns:
+        The lengths; None if the text is anything else.
+    """
+    parts = text.split(",")
+    if len(parts) != count or len({_is_number(part) for part in parts}) != 1:
+        return None
+    try:
+        return [read_length(part, length) for part in parts]
+    except ValueError:
+        return None
+
+
+def _is_number(text: str) -> bool:
+    try:
+        read_number(text)
+    except ValueError:
+        return False
+    return True
