@@ -136,8 +136,8 @@ def position_in(name: str, text: str, length: float | None = None) -> list[float
     if values is None or max(map(abs, values)) > FARTHEST:
         units = TYPED if length is None else f"{TYPED}, L"
         allowed = (
-            f"three comma-separated numbers x,y,z, each with its unit ({units}) or all without, "
-            f"in m, up to {FARTHEST:g}"
+            f"three comma-separated numbers x,y,z in m, up to {FARTHEST:g}, or each with its unit "
+            f"({units})"
         )
         raise InvalidInput(name, shortened(text) or "''", allowed)
     return values

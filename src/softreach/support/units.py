@@ -55,7 +55,7 @@ class LengthUnit(NamedTuple):
         """Lengths [m] in this unit; areas [m²] for power 2, volumes [m³] for 3."""
         import numpy as np  # the command line reads units before it needs arrays
 
-        plain, scale = np.asarray(values, float), self._scale(power)
+        plain, scale = np.asarray(values, float), self.scale(power)
         return plain if scale == 1.0 else plain / scale
 
     def symbol(self, power: int = 1) -> str:
@@ -71,10 +71,11 @@ class LengthUnit(NamedTuple):
 
     def text(self, value: float, power: int = 1, error: float = math.nan) -> str:
         """A value in SI units to the first digit of its error, such as "312.4 ± 0.2 mL"."""
-        scale = self._scale(power)
+        scale = self.scale(power)
         return quantity(value / scale, self.symbol(power), error / scale)
 
-    def _scale(self, power: int) -> float:
+    def scale(self, power: int = 1) -> float:
+        """Size of the unit of lengths [m], of areas [m²] for power 2, of volumes [m³] for 3."""
         if power == 3 and not self.relative:
             return _VOLUMES[self.name][1]
         return self.size**power
