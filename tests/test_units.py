@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 import softreach as sr
 from softreach import export, plot
-from softreach.arm.summary import design_warnings, scale_warnings
+from softreach.arm.scale import scale_warnings
+from softreach.arm.summary import design_warnings
 from softreach.cli.app import run
 from softreach.support.errors import InvalidDesign, InvalidInput, SoftreachWarning
 from softreach.support.units import UNITS, as_unit, lengths_in, read_length
@@ -182,7 +183,7 @@ class TestWritten:
 
     def test_a_mesh_alone_has_no_l(self, tmp_path):
         mesh = (np.eye(3), [[0, 1, 2]])
-        with pytest.raises(InvalidInput, match="unit = L: must be one of m, cm, mm"):
+        with pytest.raises(InvalidInput, match="unit = 'L': must be one of m, cm, mm"):
             export.export_mesh(mesh, tmp_path / "a.stl", unit="L")
 
 
@@ -251,7 +252,7 @@ class TestDrawn:
     def test_a_cloud_that_does_not_know_its_length_has_no_l(self, cloud):
         del (unknown := cloud.copy())["tip"].attrs["length"]
         assert plot.plot_cloud(unknown).get_xlabel() == "x [m]"
-        with pytest.raises(InvalidInput, match="unit = L: must be one of m, cm, mm"):
+        with pytest.raises(InvalidInput, match="unit = 'L': must be one of m, cm, mm"):
             plot.plot_cloud(unknown, unit="L")
 
 
@@ -276,7 +277,7 @@ class TestCommands:
     def test_a_unit_that_does_not_exist_costs_one_line(self, arguments, unit, folder, capsys):
         assert run([*arguments, "--unit", unit]) == 2
         streams = capsys.readouterr()
-        assert streams.err == f"error: unit = {unit}: must be one of m, cm, mm, L\n"
+        assert streams.err == f"error: unit = '{unit}': must be one of m, cm, mm, L\n"
         assert streams.out == ""
         assert not list(folder.iterdir())
 
@@ -391,7 +392,8 @@ def straight(length, radius):
 class TestScale:
     @pytest.mark.parametrize("name", sr.designs.__all__)
     def test_named_designs_are_of_a_size_that_arms_have(self, name):
-        assert scale_warnings(getattr(sr.designs, name)()) == ()
+        arm = getattr(sr.designs, name)()
+        assert scale_warnings(arm.profile, arm.section) == ()
 
     @pytest.mark.filterwarnings("always::softreach.support.errors.SoftreachWarning")
     @pytest.mark.parametrize(
@@ -418,7 +420,7 @@ class TestScale:
     def test_what_weighs_as_a_mountain_is_told_its_mass(self, lce):
         text = lce.to_toml().replace("length_m = 0.09", "length_m = 90.0")
         text = text.replace("outer_radius_m = 0.0045", "outer_radius_m = 4.5")
-        (line,) = scale_warnings(sr.Manipulator.from_toml(text))
+        (line,) = design_warnings(sr.Manipulator.from_toml(text))[:1]
         assert re.search(r"90 m long and weighs \d\.\d\de\+0\d kg", line)
 
     def test_slender_arms_are_not_warned_of(self):

@@ -19,6 +19,7 @@ from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.loads import Loads
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper, Profile
+from softreach.arm.scale import scale_warnings
 from softreach.arm.section import Ring, Section, name_faults
 from softreach.support.arguments import (
     as_flag,
@@ -216,11 +217,9 @@ class Manipulator:
         Warns:
             SoftreachWarning: A length or a radius that may be in another unit.
         """
-        from softreach.arm.summary import scale_warnings
-
         source = as_path("path", path)
         arm = cls.from_toml(design_file.text_of(source), source=source)
-        for text in scale_warnings(arm):
+        for text in scale_warnings(arm.profile, arm.section):
             warn(f"{source}: {text}")
         return arm
 
@@ -374,8 +373,9 @@ def _part_faults(arm: Manipulator) -> Iterator[Fault]:
         yield Fault("loads", arm.loads, "must be Loads or None")
     if not isinstance(arm.base, Base):
         yield Fault("base", arm.base, 'must be a Base, such as Base(points="down")')
-    if arm.display_unit is not None and arm.display_unit not in UNITS:
-        yield Fault("display_unit", arm.display_unit, f"must be one of {', '.join(UNITS)}")
+    unit = arm.display_unit
+    if unit is not None and not (isinstance(unit, str) and unit in UNITS):
+        yield Fault("display_unit", unit, f"must be one of {', '.join(UNITS)}")
     yield from _kind_faults(arm.actuators)
 
 

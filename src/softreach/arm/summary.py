@@ -16,6 +16,7 @@ from softreach.arm.along import AlongArm
 from softreach.arm.bending import bending_at, largest_bending, sharpest_bending, smallest_bending
 from softreach.arm.loads import GRAVITY, Loads
 from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.arm.scale import body_mass, scale_warnings
 from softreach.arm.section import Stiffness
 from softreach.arm.tables import both_sides, check_extension, extension_range
 from softreach.support.errors import Fault, InvalidDesign
@@ -29,23 +30,12 @@ __all__ = [
     "load_number",
     "load_number_faults",
     "mass",
-    "scale_warnings",
 ]
 
 Array = NDArray[np.float64]
 
 VERIFIED_LOAD_NUMBER = 12.0
 """Largest Λ for which loaded arms were verified over the whole box of activations [-]."""
-
-_LONG = 10.0
-"""Length from which mm may be meant [m]."""
-_SLENDER = 5.0
-"""Least L/R2(0) of a slender arm [-]."""
-_WIDE = 1.0
-"""Outer radius from which mm may be meant [m]."""
-
-# Exact for the square of a cubic, which is the mass of a piece of any profile.
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
 @dataclass(frozen=True)
@@ -180,11 +170,7 @@ def mass(arm: Manipulator) -> float:
     Raises:
         InvalidDesign: A layer without a density.
     """
-    ends = np.array([0.0, *arm.profile.breakpoints, arm.length])
-    half = 0.5 * np.diff(ends)[:, None]
-    z = ends[:-1, None] + half * (1.0 + _NODES)
-    per_length = arm.section.mass_per_length(arm.profile.radius(z))
-    return float(np.sum(half * _WEIGHTS * per_length))
+    return body_mass(arm.profile, arm.section)
 
 
 def load_number(arm: Manipulator) -> float:
@@ -246,40 +232,13 @@ def _of_loads(arm: Manipulator, loads: Loads) -> tuple[float, float]:
 def design_warnings(arm: Manipulator) -> tuple[str, ...]:
     """One line for each limit that the design touches: none of them makes a result impossible."""
     return (
-        *scale_warnings(arm),
+        *scale_warnings(arm.profile, arm.section),
         *_overlaps(arm),
         *_chambers_outside(arm),
         *_sharp_bending(arm),
         *_large_activations(arm),
         *_large_loads(arm),
     )
-
-
-def scale_warnings(arm: Manipulator) -> tuple[str, ...]:
-    """One line for a length that looks like one in mm, and one for an arm that is not slender."""
-    return (*_long(arm), *_stout(arm))
-
-
-def _long(arm: Manipulator) -> Iterator[str]:
-    if arm.length >= _LONG:
-        heavy = "" if arm.section.density_faults("") else f" and weighs {mass(arm):.3g} kg"
-        yield (
-            f"the arm is {arm.length:g} m long{heavy}; if that is meant in mm: lengths are in m, "
-            f"{arm.length:g} mm are {arm.length / 1e3:g}"
-        )
-
-
-def _stout(arm: Manipulator) -> Iterator[str]:
-    radius = float(arm.profile.radius(0.0))
-    slenderness = arm.length / radius
-    if slenderness < _SLENDER:
-        meant = f"lengths are in m, {radius:g} mm are {radius / 1e3:g}"
-        cause = f"if that is meant in mm: {meant}" if radius >= _WIDE else "is it a diameter?"
-        yield (
-            f"the arm is {slenderness:.3g} times as long as its outer radius at the base, "
-            f"{radius:g} m, and the theory is one of slender arms, {_SLENDER:g} times or more; "
-            f"{cause}"
-        )
 
 
 def _sharp_bending(arm: Manipulator) -> Iterator[str]:

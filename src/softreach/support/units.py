@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
+from softreach.support.arguments import as_given
 from softreach.support.errors import InvalidInput
 from softreach.support.quantity import quantity, read_number, read_quantity, unit_names
 
@@ -109,13 +110,14 @@ def as_unit(unit: object, length: float | None = None) -> LengthUnit:
     """
     if isinstance(unit, LengthUnit):
         return unit
-    if unit == "L" and length is not None:
+    name = unit if isinstance(unit, str) else ""
+    if name == "L" and length is not None:
         return in_lengths(length)
-    if isinstance(unit, str) and unit in _SIZES:
-        return LengthUnit(unit, _SIZES[unit])
-    hint = "the length L of the arm is not known here" if unit == "L" else ""
-    names = [name for name in UNITS if name in _SIZES or length is not None or not hint]
-    raise InvalidInput("unit", unit, f"one of {', '.join(names)}", hint)
+    if name in _SIZES:
+        return LengthUnit(name, _SIZES[name])
+    known = UNITS if length is not None else tuple(_SIZES)
+    hint = "the length L of the arm is not known here" if name == "L" else ""
+    raise InvalidInput("unit", as_given(unit), f"one of {', '.join(known)}", hint)
 
 
 def handy_unit(length: float) -> str:
