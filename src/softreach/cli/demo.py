@@ -62,6 +62,8 @@ def demo(
         plot.save_figure(figure, out / "cloud.png", overwrite=overwrite)
         concave, convex = result()
     export.export_mesh(concave, out / "hull.ply", unit=lengths.written, overwrite=overwrite)
+    for name in ("cloud.ply", "hull.ply"):
+        lengths.say_written(out / name)
 
     rows = volume_rows(concave, convex)
     rows["time to compute the cloud"] = (round(computed, 3), "s")

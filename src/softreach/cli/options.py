@@ -49,8 +49,8 @@ Unit = Annotated[
     Parameter(
         name="--unit",
         group=OUTPUT,
-        help="Unit of lengths in tables, pictures, meshes: m, cm, mm, or L, the arm's length. If "
-        "left out that of the design file; else m, but mm to print and draw arms below 1 m.",
+        help="Unit of lengths: m, cm, mm, or L, the arm's length. If left out, that of the design "
+        "file; else mm for arms below 1 m, m for others, and m for meshes and tables.",
     ),
 ]
 Durable = Annotated[
