@@ -73,14 +73,15 @@ class Lengths:
     def for_people(self, rows: Mapping[str, tuple[Any, str]]) -> Rows:
         """The rows with lengths, areas and volumes in the unit, each beside its error."""
         shown: Rows = {}
+        beside: set[str] = set()  # errors that stand in the row of their value
         for name, (value, unit) in rows.items():
-            power = _POWERS.get(unit)
-            error = rows.get(f"{name}{_ERROR}", (math.nan, ""))[0]
+            power, error = _POWERS.get(unit), rows.get(f"{name}{_ERROR}", (None, ""))[0]
             if power is None:
                 shown[name] = (value, unit)
-            elif isinstance(value, float) and 0.0 < error < math.inf and math.isfinite(value):
+            elif error is not None and math.isfinite(value) and 0.0 < error < math.inf:
                 shown[name] = (self.unit.text(value, power, error), "")
-            elif name.removesuffix(_ERROR) not in shown or not name.endswith(_ERROR):
+                beside.add(f"{name}{_ERROR}")
+            elif name not in beside:
                 shown[name] = (_over(value, self.unit.scale(power)), self.unit.symbol(power))
         return shown
 
