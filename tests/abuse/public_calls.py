@@ -117,7 +117,7 @@ NAMES = {
         half_width high length memory radius radius_ratio residual_over_length revolution size
         taper thickness threshold tol width""",
     "whole number": "bins cells count depth family n seed segments sides",
-    "word": "color fiber frame method metric name quantity sampler view",
+    "word": "color fiber frame method metric name quantity sampler unit view",
     "words": "metrics names panels parameters",
     "flag": """bias durable keep_clouds keep_extent key legend overwrite prove_least rest smallest
         warn""",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 from typing import Any, Self, TypeVar
@@ -19,6 +19,7 @@ from softreach.arm.base import UPRIGHT, Base
 from softreach.arm.loads import Loads
 from softreach.arm.material import Material
 from softreach.arm.profile import LinearTaper, Profile
+from softreach.arm.scale import scale_warnings
 from softreach.arm.section import Ring, Section, name_faults
 from softreach.support.arguments import (
     as_flag,
@@ -30,8 +31,9 @@ from softreach.support.arguments import (
     plain,
 )
 from softreach.support.arrays import as_stations, read_only
-from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
 from softreach.support.files.atomic import writing
+from softreach.support.units import UNITS
 
 __all__ = ["Manipulator", "a_manipulator"]
 
@@ -61,6 +63,9 @@ class Manipulator:
     """Loads beside them; None for nothing, not even its weight."""
     base: Base = UPRIGHT
     """Pose of its clamped end in the world; upright at the origin."""
+    display_unit: str | None = field(default=None, compare=False)
+    """Unit that the command line shows it in, "m", "cm", "mm" or "L"; None for one that is handy.
+    Designs that differ in it alone are equal, and `to_toml` leaves it out."""
 
     def __post_init__(self) -> None:
         if faults := list(_part_faults(self)):
@@ -191,6 +196,8 @@ class Manipulator:
     def to_toml(self) -> str:
         """The design as the text of a file, from which `from_toml` makes an equal one.
 
+        It identifies the design in clouds and atlases, and holds no `display_unit`.
+
         Raises:
             InvalidDesign: A profile or an actuator of one's own that no table can describe.
         """
@@ -207,9 +214,15 @@ class Manipulator:
         Raises:
             InvalidDesign: The file's faults, all of them, in the file's own names and units.
             InvalidInput: No file that can be read, or no text in UTF-8.
+
+        Warns:
+            SoftreachWarning: A length or a radius that may be in another unit.
         """
         source = as_path("path", path)
-        return cls.from_toml(design_file.text_of(source), source=source)
+        arm = cls.from_toml(design_file.text_of(source), source=source)
+        for text in scale_warnings(arm.profile, arm.section):
+            warn(f"{source}: {text}")
+        return arm
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write a design file; an older one is replaced.
@@ -224,7 +237,7 @@ class Manipulator:
             InvalidDesign: The design has no text; see `to_toml`.
         """
         path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-        text = self.to_toml()
+        text = self.to_toml() + design_file.display_text(self.display_unit)
         with writing(path, design_file.DESIGN_FILE[".toml"], overwrite=overwrite) as stream:
             stream.write(text.encode())
 
@@ -365,6 +378,9 @@ def _part_faults(arm: Manipulator) -> Iterator[Fault]:
         yield Fault("loads", arm.loads, "must be Loads or None")
     if not isinstance(arm.base, Base):
         yield Fault("base", arm.base, 'must be a Base, such as Base(points="down")')
+    unit = arm.display_unit
+    if unit is not None and not (isinstance(unit, str) and unit in UNITS):
+        yield Fault("display_unit", unit, f"must be one of {', '.join(UNITS)}")
     yield from _kind_faults(arm.actuators)
 
 

@@ -16,6 +16,7 @@ from softreach.arm.along import AlongArm
 from softreach.arm.bending import bending_at, largest_bending, sharpest_bending, smallest_bending
 from softreach.arm.loads import GRAVITY, Loads
 from softreach.arm.manipulator import Manipulator, a_manipulator
+from softreach.arm.scale import body_mass, scale_warnings
 from softreach.arm.section import Stiffness
 from softreach.arm.tables import both_sides, check_extension, extension_range
 from softreach.support.errors import Fault, InvalidDesign
@@ -35,9 +36,6 @@ Array = NDArray[np.float64]
 
 VERIFIED_LOAD_NUMBER = 12.0
 """Largest Λ for which loaded arms were verified over the whole box of activations [-]."""
-
-# Exact for the square of a cubic, which is the mass of a piece of any profile.
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
 @dataclass(frozen=True)
@@ -172,11 +170,7 @@ def mass(arm: Manipulator) -> float:
     Raises:
         InvalidDesign: A layer without a density.
     """
-    ends = np.array([0.0, *arm.profile.breakpoints, arm.length])
-    half = 0.5 * np.diff(ends)[:, None]
-    z = ends[:-1, None] + half * (1.0 + _NODES)
-    per_length = arm.section.mass_per_length(arm.profile.radius(z))
-    return float(np.sum(half * _WEIGHTS * per_length))
+    return body_mass(arm.profile, arm.section)
 
 
 def load_number(arm: Manipulator) -> float:
@@ -238,6 +232,7 @@ def _of_loads(arm: Manipulator, loads: Loads) -> tuple[float, float]:
 def design_warnings(arm: Manipulator) -> tuple[str, ...]:
     """One line for each limit that the design touches: none of them makes a result impossible."""
     return (
+        *scale_warnings(arm.profile, arm.section),
         *_overlaps(arm),
         *_chambers_outside(arm),
         *_sharp_bending(arm),

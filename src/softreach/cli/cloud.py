@@ -10,6 +10,7 @@ from cyclopts import Parameter
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import Rows, console
 from softreach.cli.design import load_rows
+from softreach.cli.lengths import Lengths
 from softreach.cli.options import (
     SAMPLING,
     AsJson,
@@ -17,6 +18,7 @@ from softreach.cli.options import (
     Durable,
     Overwrite,
     Sampling,
+    Unit,
     check_output,
     out_option,
 )
@@ -36,6 +38,7 @@ def cloud(
     out: Annotated[Path, out_option("Where the cloud goes (.zarr).")] = Path("cloud.zarr"),
     overwrite: Overwrite = False,
     durable: Durable = False,
+    unit: Unit = None,
     json: AsJson = False,
 ) -> None:
     """Sample the reachability cloud of a design and store it as Zarr.
@@ -49,6 +52,7 @@ def cloud(
     from softreach.support.memory import check_disk
 
     arm = design_from(design, changes)
+    lengths = Lengths.of(arm, unit)
     check_output(out, CLOUD_STORE, overwrite)
     arguments = sampling.arguments
     check_disk("n", sampling.count, sample_bytes(arm.bundles) * sampling.count, out)
@@ -64,11 +68,11 @@ def cloud(
         "time to compute": (round(seconds, 3), "s"),
         **load_rows(arm),
         **_status_rows(dataset),
-        "highest tip": (float(dataset.tip[:, 2].max()) / arm.length, "L"),
-        "lowest tip": (float(dataset.tip[:, 2].min()) / arm.length, "L"),
+        "highest tip": (float(dataset.tip[:, 2].max()), "m"),
+        "lowest tip": (float(dataset.tip[:, 2].min()), "m"),
         "cloud": (str(out), ""),
     }
-    console.rows(f"cloud of {design}", rows, json)
+    console.rows(f"cloud of {design}", rows, json, lengths)
 
 
 def _status_rows(cloud: xr.Dataset) -> Rows:

@@ -20,6 +20,8 @@ from softreach.support.errors import NotWritten, SoftreachWarning
 if TYPE_CHECKING:
     from rich.console import Console as RichConsole
 
+    from softreach.cli.lengths import Lengths
+
 
 Rows = dict[str, tuple[Any, str]]
 """Name -> (value, unit)."""
@@ -51,17 +53,28 @@ class Console:
         """A result for machines; null where there is no number."""
         self.line(json.dumps(finite(value), indent=indent, allow_nan=False))
 
-    def rows(self, title: str, rows: Mapping[str, tuple[Any, str]], as_json: bool) -> None:
+    def rows(
+        self,
+        title: str,
+        rows: Mapping[str, tuple[Any, str]],
+        as_json: bool,
+        lengths: Lengths | None = None,
+    ) -> None:
         """Named values with their units, one below the other.
 
         Args:
             title: Heading for people.
             rows: Name -> (value, unit); JSON keys are the names with their units.
             as_json: Print JSON.
+            lengths: The unit of lengths, areas and volumes, which are given in SI units; None for
+                that.
         """
         if as_json:
-            self.json({key(name, unit): value for name, (value, unit) in rows.items()})
+            plain = ((name, *pair) for name, pair in rows.items())
+            each = plain if lengths is None else lengths.for_machines(rows)
+            self.json({key(name, unit): value for name, value, unit in each})
             return
+        rows = rows if lengths is None else lengths.for_people(rows)
         width = max(len(name) for name in rows)
         texts = {name: (shown(value), unit) for name, (value, unit) in rows.items()}
         self.line(title)

@@ -8,7 +8,8 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from softreach.cli.console import console
-from softreach.cli.options import AsJson, Overwrite, check_output, out_option
+from softreach.cli.lengths import Lengths
+from softreach.cli.options import AsJson, Overwrite, Unit, check_output, out_option
 from softreach.cli.values import WHOLE
 from softreach.cli.volume import check_hull_memory, volume_rows
 
@@ -21,6 +22,7 @@ def demo(
     n: Annotated[int, WHOLE, Parameter(name=("--n", "-n"), help="Number of samples.")] = 400_000,
     out: Annotated[Path, out_option("Folder for the results.")] = Path("out"),
     overwrite: Overwrite = False,
+    unit: Unit = None,
     json: AsJson = False,
 ) -> None:
     """Start here: cloud, volumes and picture of the paper's design.
@@ -41,6 +43,7 @@ def demo(
 
     start = perf_counter()
     arm = designs.minimal_trunk()
+    lengths = Lengths.of(arm, unit)
     _check(out, overwrite)
     check_hull_memory(n)
     check_disk("n", n, _BYTES * n, out)
@@ -53,18 +56,20 @@ def demo(
     with parallel.meanwhile(hulls) as result:
         arm.save(out / "design.toml", overwrite=overwrite)
         save_cloud(cloud, out / "cloud.zarr", overwrite=overwrite)
-        export.export_cloud(cloud, out / "cloud.ply", overwrite=overwrite)
+        export.export_cloud(cloud, out / "cloud.ply", unit=lengths.written, overwrite=overwrite)
         shape = configuration(arm, [-1.0, 0.0, -0.4])
-        figure = plot.plot_views(cloud, arm, shape)
+        figure = plot.plot_views(cloud, arm, shape, unit=lengths.unit)
         plot.save_figure(figure, out / "cloud.png", overwrite=overwrite)
         concave, convex = result()
-    export.export_mesh(concave, out / "hull.ply", overwrite=overwrite)
+    export.export_mesh(concave, out / "hull.ply", unit=lengths.written, overwrite=overwrite)
+    for name in ("cloud.ply", "hull.ply"):
+        lengths.say_written(out / name)
 
-    rows = volume_rows(concave, convex, arm.length)
+    rows = volume_rows(concave, convex)
     rows["time to compute the cloud"] = (round(computed, 3), "s")
     rows["time in all"] = (round(perf_counter() - start, 3), "s")
     rows["written"] = ([str(out / name) for name in _FILES], "")
-    console.rows("minimal trunk, revolution 108°, taper 2°", rows, json)
+    console.rows("minimal trunk, revolution 108°, taper 2°", rows, json, lengths)
 
 
 def _check(folder: Path, overwrite: bool) -> None:

@@ -10,9 +10,10 @@ from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import Rows, console
-from softreach.cli.options import AsJson, Design, Overwrite, check_output, out_option, refuse
+from softreach.cli.lengths import Lengths
+from softreach.cli.options import AsJson, Design, Overwrite, Unit, check_output, out_option, refuse
 from softreach.cli.values import to_degrees
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, no_warnings
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
@@ -30,11 +31,13 @@ def design(
     changes: Changes = UNCHANGED,
     out: Annotated[Path | None, out_option("Write the design to this TOML file.")] = None,
     overwrite: Overwrite = False,
+    unit: Unit = None,
     json: AsJson = False,
 ) -> None:
     """Describe a design: angles, radii, stiffness, weight, warnings.
 
-    With --verbose it also says where the linear laws of the actuators end.
+    With --verbose it also says where the linear laws of the actuators end; --unit
+    with --out goes into the design file.
 
     Example: softreach design minimal_trunk --taper-deg 3
     """
@@ -43,18 +46,22 @@ def design(
 
     if schema:
         changes.refuse("left out with --schema")
-        refuse("left out with --schema", design=design, out=out, overwrite=overwrite)
+        given = {"design": design, "out": out, "overwrite": overwrite, "unit": unit}
+        refuse("left out with --schema", **given)
         _print_schema()
         return
     if design is None:
         raise InvalidInput("design", design, "a design file or a built-in design, or use --schema")
-    arm = design_from(design, changes)
+    with no_warnings():  # the report has them all
+        arm = design_from(design, changes)
+    lengths = Lengths.of(arm, unit)
     check_output(out, DESIGN_FILE, overwrite)
     facts = describe(arm)
     if out is not None:
-        arm.save(out, overwrite=overwrite)
+        shown = arm if unit is None else arm.replace(display_unit=unit)
+        shown.save(out, overwrite=overwrite)
     details = _rows_for_machines(arm, facts) if json else _bundle_rows(arm, facts)
-    console.rows(f"design {design}", _rows(arm, facts) | details, json)
+    console.rows(f"design {design}", _rows(arm, facts) | details, json, lengths)
     if not json:
         for note in (*facts.lacking, *(facts.validity if console.verbose else ())):
             console.line(f"  {note}")
@@ -215,6 +222,5 @@ def _stability(rest: Rest | None) -> str:
 
 
 def _sag(how: str, rest: Rest | None) -> Rows:
-    """The distance that the tip sinks, as a share of the length and as a length."""
-    sag = (None, None) if rest is None else (rest.sag_over_length, 1e3 * rest.sag)
-    return {f"sag at rest{how}": (sag[0], "L"), f"sag of the tip at rest{how}": (sag[1], "mm")}
+    """The distance that the tip sinks."""
+    return {f"sag at rest{how}": (None if rest is None else rest.sag, "m")}

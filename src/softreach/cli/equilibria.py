@@ -9,17 +9,19 @@ from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
+from softreach.cli.lengths import Lengths
 from softreach.cli.options import (
     Activation,
     AsJson,
     Design,
     Overwrite,
+    Unit,
     activation_of,
     check_picture,
     out_option,
     refuse,
 )
-from softreach.cli.values import activation_text, position_text
+from softreach.cli.values import activation_text
 from softreach.support.errors import counted
 
 if TYPE_CHECKING:
@@ -38,6 +40,7 @@ def equilibria(
     changes: Changes = UNCHANGED,
     out: Annotated[Path | None, out_option("Draw them: .png .pdf .svg")] = None,
     overwrite: Overwrite = False,
+    unit: Unit = None,
     json: AsJson = False,
 ) -> None:
     """Find every equilibrium of a loaded arm at given activations.
@@ -56,23 +59,24 @@ def equilibria(
         view_angles(view)  # what is wrong with it is said before anything is computed
     check_picture(out, overwrite)
     arm = design_from(design, changes)
+    lengths = Lengths.of(arm, unit)
     result = all_of(arm, activation_of(activation, arm))
     if out is not None:
         from softreach import plot
 
-        figure = plot.plot_equilibria(result, view=view or "oblique")
+        figure = plot.plot_equilibria(result, view=view or "oblique", unit=lengths.unit)
         plot.save_figure(figure, out, overwrite=overwrite)
     if json:
-        console.json(_record(result))
+        console.json(_record(result, lengths))
     else:
-        _print(result)
+        _print(result, lengths)
 
 
-def _record(result: AllEquilibria) -> dict[str, object]:
+def _record(result: AllEquilibria, lengths: Lengths) -> dict[str, object]:
     loaded = result.solver is not None
     return {
         "activation": result.activation.tolist(),
-        "tips_m": result.tips.tolist(),
+        **lengths.record("tips", result.tips.tolist()),
         "status": _statuses(result),
         "margins": result.margin.tolist(),
         "directions": result.directions.tolist() if loaded else None,
@@ -90,12 +94,12 @@ def _statuses(result: AllEquilibria) -> list[str]:
     return [TipStatus(status).name.lower() for status in result.status]
 
 
-def _print(result: AllEquilibria) -> None:
+def _print(result: AllEquilibria, lengths: Lengths) -> None:
     at = activation_text(result.rod.arm, result.activation)
     count = counted(len(result), "solution")
     console.line(f"equilibria{f' at {at}' if at else ''}: {count}, degree {result.degree}")
     for k, status in enumerate(_statuses(result)):
         kind = f"{status}, any way around" if result.is_ring[k] else status
         which = ", from the unloaded arm" if k == result.followed else ""
-        tip = position_text(result.tips[k])
+        tip = lengths.place(result.tips[k])
         console.line(f"  tip {tip}: {kind}, margin {result.margin[k]:.3g}{which}")

@@ -9,10 +9,12 @@ from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
+from softreach.cli.lengths import Lengths, check_unit
 from softreach.cli.options import (
     Activation,
     Overwrite,
     Source,
+    Unit,
     check_output,
     check_surface,
     is_stored,
@@ -31,6 +33,9 @@ Format = Annotated[
 ]
 
 
+_OTHER = "left out for ActiveFilaments.jl, whose lengths are in m"
+
+
 def export(
     source: Source,
     out: Annotated[Path, Parameter(help="The file to write; its suffix chooses the format.")],
@@ -40,6 +45,7 @@ def export(
     format: Format = None,
     changes: Changes = UNCHANGED,
     overwrite: Overwrite = False,
+    unit: Unit = None,
 ) -> None:
     """Convert a cloud or an arm for other programs.
 
@@ -49,28 +55,35 @@ def export(
 
     Example: softreach export minimal_trunk arm.glb --activation -1,0,-0.5
     """
+    check_unit(unit)
     if format not in (None, "activefilaments"):
         raise InvalidInput("format", format, "activefilaments, or left out")
     if is_stored(source):
         refuse("left out for a cloud, which has many", activation=activation)
         changes.refuse("left out for a stored cloud: give the design instead")
-        written = _cloud(source, out, format, overwrite)
+        written = _cloud(source, out, format, overwrite, unit)
     else:
         arm = design_from(source, changes)
-        written = _design(arm, out, activation, format, overwrite)
+        written = _design(arm, out, activation, format, overwrite, unit)
     for path in written:
         console.line(path)
 
 
-def _cloud(source: str, out: Path, format: str | None, overwrite: bool) -> list[Path]:
-    from softreach.cloud.clouds import open_cloud
+def _cloud(
+    source: str, out: Path, format: str | None, overwrite: bool, unit: str | None
+) -> list[Path]:
+    from softreach.cloud.clouds import design_of, open_cloud
 
     if format is None:
         from softreach.export.clouds import CLOUD_FILES, export_cloud
 
         check_output(out, CLOUD_FILES, overwrite)
-        export_cloud(open_cloud(source), out, overwrite=overwrite)
+        cloud = open_cloud(source)
+        lengths = Lengths.of(design_of(cloud), unit)
+        export_cloud(cloud, out, unit=lengths.written, overwrite=overwrite)
+        lengths.say_written(out)
         return [out]
+    refuse(_OTHER, unit=unit)
     from softreach.exchange.activefilaments.cloud import CLOUD_PAIR, gamma_path, write_cloud
 
     if out.suffix != ".csv":
@@ -85,12 +98,18 @@ def _cloud(source: str, out: Path, format: str | None, overwrite: bool) -> list[
 
 
 def _design(
-    arm: Manipulator, out: Path, activation: str | None, format: str | None, overwrite: bool
+    arm: Manipulator,
+    out: Path,
+    activation: str | None,
+    format: str | None,
+    overwrite: bool,
+    unit: str | None,
 ) -> list[Path]:
     if out.suffix == ".jl":
         from softreach.exchange.activefilaments.script import FILAMENT_SCRIPT, write_design
 
         refuse("left out for a filament's definition, which has none", activation=activation)
+        refuse(_OTHER, unit=unit)
         check_output(out, FILAMENT_SCRIPT, overwrite)
         write_design(arm, out, overwrite=overwrite)
         return [out]
@@ -99,5 +118,7 @@ def _design(
     from softreach.export import export_arm
 
     check_surface(out, overwrite)
-    export_arm(arm, shape_of(activation, arm), out, overwrite=overwrite)
+    lengths, shape = Lengths.of(arm, unit), shape_of(activation, arm)
+    export_arm(arm, shape, out, unit=lengths.written, overwrite=overwrite)
+    lengths.say_written(out)
     return [out]

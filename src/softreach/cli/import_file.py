@@ -9,7 +9,8 @@ from cyclopts import Parameter
 
 from softreach.cli.changes import design_from
 from softreach.cli.console import Rows, console
-from softreach.cli.options import AsJson, Overwrite, check_output, refuse
+from softreach.cli.lengths import Lengths
+from softreach.cli.options import AsJson, Overwrite, Unit, check_output, refuse
 from softreach.cli.values import NUMBER
 from softreach.support.errors import InvalidInput
 
@@ -28,6 +29,7 @@ def import_file(
         Parameter(help="Largest error of the tips that a cloud is compared with, in L (1e-6)."),
     ] = None,
     overwrite: Overwrite = False,
+    unit: Unit = None,
     json: AsJson = False,
 ) -> None:
     """Convert a filament or a cloud of ActiveFilaments.jl.
@@ -39,19 +41,20 @@ def import_file(
     """
     if source.suffix == ".jl":
         refuse("left out for a filament: it is of clouds", design=design, tol=tol)
-        _design(source, out, overwrite, json)
+        _design(source, out, overwrite, unit, json)
     elif source.suffix == ".csv":
-        _cloud(source, out, design, 1e-6 if tol is None else tol, overwrite, json)
+        _cloud(source, out, design, 1e-6 if tol is None else tol, overwrite, unit, json)
     else:
         raise InvalidInput("source", source, "a file name ending in .jl or .csv")
 
 
-def _design(source: Path, out: Path, overwrite: bool, json: bool) -> None:
+def _design(source: Path, out: Path, overwrite: bool, unit: str | None, json: bool) -> None:
     from softreach.arm.design_file import DESIGN_FILE
     from softreach.exchange.activefilaments import read_design
 
     check_output(out, DESIGN_FILE, overwrite)
     arm = read_design(source)
+    lengths = Lengths.of(arm, unit)
     arm.save(out, overwrite=overwrite)
     rows: Rows = {
         "length": (arm.length, "m"),
@@ -59,11 +62,17 @@ def _design(source: Path, out: Path, overwrite: bool, json: bool) -> None:
         "bundle names": (list(arm.bundle_names), ""),
         "design": (str(out), ""),
     }
-    console.rows(f"filament of {source}", rows, json)
+    console.rows(f"filament of {source}", rows, json, lengths)
 
 
 def _cloud(
-    source: Path, out: Path, design: str | None, tol: float, overwrite: bool, json: bool
+    source: Path,
+    out: Path,
+    design: str | None,
+    tol: float,
+    overwrite: bool,
+    unit: str | None,
+    json: bool,
 ) -> None:
     from softreach.cloud.clouds import CLOUD_STORE, save_cloud
     from softreach.exchange.activefilaments import read_cloud, read_design
@@ -73,12 +82,13 @@ def _cloud(
         allowed = "the design that the cloud was computed for"
         raise InvalidInput("design", None, allowed, "pass --design filament.toml")
     arm = read_design(design) if design.endswith(".jl") else design_from(design)
+    lengths = Lengths.of(arm, unit)
     cloud = read_cloud(arm, source, tol=tol)
     save_cloud(cloud, out, overwrite=overwrite)
-    difference = cloud.attrs["largest_tip_difference"]
+    difference = float(cloud.attrs["largest_tip_difference"])
     rows: Rows = {
         "samples": (cloud.sizes["sample"], ""),
-        "largest difference of tips": (difference / arm.length, "L"),
+        "largest difference of tips": (difference, "m"),
         "cloud": (str(out), ""),
     }
-    console.rows(f"cloud of {source}", rows, json)
+    console.rows(f"cloud of {source}", rows, json, lengths)

@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter
 
 from softreach.cli.changes import Changes, design_from
+from softreach.cli.lengths import Lengths, check_unit
 from softreach.cli.values import WHOLE
 from softreach.support.errors import InvalidInput
 from softreach.support.files.text import MEGABYTE, read_text
 from softreach.support.quantity import numbers_in, shortened
+from softreach.support.units import TYPED, read_length
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,6 +43,15 @@ Activation = Annotated[
 ]
 AsJson = Annotated[
     bool, Parameter(name="--json", group=OUTPUT, help="Print JSON; null where there is no number.")
+]
+Unit = Annotated[
+    str | None,
+    Parameter(
+        name="--unit",
+        group=OUTPUT,
+        help="Unit of lengths: m, cm, mm, or L, the arm's length. If left out, that of the design "
+        "file; else mm for arms below 1 m, m for others, and m for meshes and tables.",
+    ),
 ]
 Durable = Annotated[
     bool,
@@ -105,18 +116,25 @@ def is_stored(source: str) -> bool:
 
 
 def cloud_of(
-    source: str, sampling: Sampling, changes: Changes, check: Callable[[int], None] | None = None
-) -> xr.Dataset:
-    """The stored cloud, or one of the design once its number of samples is checked."""
-    from softreach.cloud.clouds import compute_cloud, open_cloud
+    source: str,
+    sampling: Sampling,
+    changes: Changes,
+    unit: str | None,
+    check: Callable[[int], None] | None = None,
+) -> tuple[xr.Dataset, Lengths]:
+    """The stored cloud, or one of the design once its number of samples is checked; its lengths."""
+    from softreach.cloud.clouds import compute_cloud, design_of, open_cloud
 
+    check_unit(unit)
     if is_stored(source):
         changes.refuse(_STORED)
         refuse(_STORED, **vars(sampling))
-        return open_cloud(source)
+        cloud = open_cloud(source)
+        return cloud, Lengths.of(design_of(cloud), unit)
     if check is not None:
         check(sampling.count)
-    return compute_cloud(design_from(source, changes), **sampling.arguments)
+    arm = design_from(source, changes)
+    return compute_cloud(arm, **sampling.arguments), Lengths.of(arm, unit)
 
 
 def activation_of(text: str | None, arm: Manipulator) -> list[float]:
@@ -144,21 +162,23 @@ def shape_of(text: str | None, arm: Manipulator) -> xr.Dataset:
     return shape
 
 
-def points_in(name: str, file: Path) -> list[list[float]]:
-    """Positions [m] from a CSV file with columns x, y, z; a header is skipped."""
+def points_in(name: str, file: Path, arm: Manipulator) -> list[list[float]]:
+    """Positions [m] from a CSV file with columns x, y, z; a header says no more than units."""
     from softreach.inverse.request import positions_in
 
-    return positions_in(read_text(name, file, _MOST_TARGETS), str(file))
+    return positions_in(read_text(name, file, _MOST_TARGETS), str(file), arm.length)
 
 
 def radius_of(text: str, length: float) -> float | str:
-    """An alpha radius in m from `0.05L`, `0.05` (m) or `critical`."""
+    """An alpha radius in m from `0.05L`, `5cm`, `0.05` (m) or `critical`."""
     if text == "critical":
         return text
-    values = numbers_in(text.removesuffix("L"), 1)
-    radius = (length if text.endswith("L") else 1.0) * (values[0] if values else 0.0)
+    try:
+        radius = read_length(text, length)
+    except ValueError:
+        radius = 0.0
     if not 0.0 < radius < math.inf:
-        allowed = "a radius > 0 like 0.05L or 0.05 (m), or critical"
+        allowed = f"a radius > 0 like 0.05L, 5cm ({TYPED}) or 0.05 (m), or critical"
         raise InvalidInput("alpha", shortened(text) or "''", allowed)
     return radius
 

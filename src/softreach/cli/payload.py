@@ -9,7 +9,8 @@ from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from, read_mass
 from softreach.cli.console import Rows, console
-from softreach.cli.options import AsJson, Design, Overwrite, check_picture, out_option
+from softreach.cli.lengths import Lengths
+from softreach.cli.options import AsJson, Design, Overwrite, Unit, check_picture, out_option
 from softreach.cli.values import NUMBER
 from softreach.support.errors import InvalidInput
 
@@ -30,6 +31,7 @@ def payload(
     changes: Changes = UNCHANGED,
     out: Annotated[Path | None, out_option("Draw the curve: .png .pdf .svg")] = None,
     overwrite: Overwrite = False,
+    unit: Unit = None,
     json: AsJson = False,
 ) -> None:
     """Compute how much of its reach a payload costs an arm.
@@ -43,6 +45,7 @@ def payload(
     from softreach.workspace.payload import payload_curve
 
     arm = design_from(design, changes)
+    lengths = Lengths.of(arm, unit)
     check_picture(out, overwrite)
     if arm.loads is None:
         raise InvalidInput("gravity", None, "given for a design without loads: down, up, sideways")
@@ -54,14 +57,13 @@ def payload(
         from softreach.plot import plot_payload_curve, save_figure
 
         save_figure(plot_payload_curve(curve, largest=[largest]), out, overwrite=overwrite)
-    cube = arm.length**3
     rows: Rows = {
         "payloads": (curve.payloads.tolist(), "kg"),
-        "volumes": ((curve.volumes / cube).tolist(), "L³"),
-        "volume errors": ((curve.volume_errors / cube).tolist(), "L³"),
+        "volumes": (curve.volumes.tolist(), "m³"),
+        "volume errors": (curve.volume_errors.tolist(), "m³"),
         "shares": (curve.shares.tolist(), ""),
         "share to keep": (share, ""),
         "largest payload": (largest.payload, "kg"),
         "largest payload error": (largest.payload_error, "kg"),
     }
-    console.rows(f"payload of {design}", rows, json)
+    console.rows(f"payload of {design}", rows, json, lengths)

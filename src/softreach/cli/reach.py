@@ -10,7 +10,8 @@ from cyclopts import Parameter
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import Rows, console
 from softreach.cli.design import load_rows
-from softreach.cli.options import AsJson, Design, Overwrite, check_output, out_option
+from softreach.cli.lengths import Lengths
+from softreach.cli.options import AsJson, Design, Overwrite, Unit, check_output, out_option
 from softreach.cli.values import NUMBER
 from softreach.support.errors import InvalidInput
 
@@ -35,6 +36,7 @@ def reach(
         ),
     ] = None,
     overwrite: Overwrite = False,
+    unit: Unit = None,
     json: AsJson = False,
 ) -> None:
     """Compute the exact reachable set: volume, multiplicity, folds.
@@ -48,7 +50,7 @@ def reach(
     from softreach.workspace import reachable_set
 
     arm = design_from(design, changes)
-    outs = out or []
+    lengths, outs = Lengths.of(arm, unit), out or []
     _check_outputs(arm, outs, overwrite)
     with progress.bar("mapping the activation box", None) as step:
         reached = reachable_set(arm, accuracy=accuracy, progress=step)
@@ -56,8 +58,8 @@ def reach(
     if reached.lost_share > 0.0:  # not stable, or torn
         rows["activation box left out"] = (100.0 * reached.lost_share, "%")
     for path in outs:
-        _write(reached, path, overwrite)
-    console.rows(f"reachable set of {design}", rows, json)
+        _write(reached, path, lengths, overwrite)
+    console.rows(f"reachable set of {design}", rows, json, lengths)
 
 
 def _check_outputs(arm: Manipulator, outs: list[Path], overwrite: bool) -> None:
@@ -82,7 +84,7 @@ def _no_such_output(path: Path) -> InvalidInput:
     return InvalidInput("out", path, "left out for a design with so few free bundles")
 
 
-def _write(reached: ReachableSet, path: Path, overwrite: bool) -> None:
+def _write(reached: ReachableSet, path: Path, lengths: Lengths, overwrite: bool) -> None:
     from softreach.workspace import ReachableSolid, ReachableSurface
 
     if _is_picture(path):
@@ -90,46 +92,44 @@ def _write(reached: ReachableSet, path: Path, overwrite: bool) -> None:
 
         if not isinstance(reached, ReachableSolid):
             raise _no_such_output(path)
-        save_figure(plot_slices(reached.grid), path, overwrite=overwrite)
+        save_figure(plot_slices(reached.grid, unit=lengths.unit), path, overwrite=overwrite)
     else:
         from softreach.export import export_mesh
 
         if not isinstance(reached, ReachableSolid | ReachableSurface):
             raise _no_such_output(path)
-        export_mesh(reached.surface(), path, overwrite=overwrite)
+        export_mesh(reached.surface(), path, unit=lengths.written, overwrite=overwrite)
+        lengths.say_written(path)
 
 
 def _rows(reached: ReachableSet) -> Rows:
     from softreach.workspace import ReachableCurve, ReachablePoint, ReachableSolid, ReachableSurface
 
-    length = reached.arm.length
-    convex: Rows = {"convex volume": (reached.convex_volume / length**3, "L³")}
+    convex: Rows = {"convex volume": (reached.convex_volume, "m³")}
     match reached:
         case ReachableSolid():
-            size = _size("volume", reached.volume, reached.volume_error, length, 3)
+            size = _size("volume", reached.volume, reached.volume_error, "m³")
             return size | convex | _solid_rows(reached)
         case ReachableSurface():
-            return _size("area", reached.area, reached.area_error, length, 2) | convex
+            return _size("area", reached.area, reached.area_error, "m²") | convex
         case ReachableCurve():
             size = (reached.curve_length, reached.curve_length_error)
-            return _size("length", *size, length, 1) | convex
+            return _size("length", *size, "m") | convex
         case ReachablePoint():
             places = zip("xyz", reached.tip, strict=True)
-            return {axis: (float(place) / length, "L") for axis, place in places}
+            return {axis: (float(place), "m") for axis, place in places}
     raise AssertionError(reached)
 
 
-def _size(name: str, value: float, error: float, length: float, dimension: int) -> Rows:
-    scale, unit = length**dimension, ("", "L", "L²", "L³")[dimension]
-    return {name: (value / scale, unit), f"{name} error (estimate)": (error / scale, unit)}
+def _size(name: str, value: float, error: float, unit: str) -> Rows:
+    return {name: (value, unit), f"{name} error (estimate)": (error, unit)}
 
 
 def _solid_rows(reached: ReachableSolid) -> Rows:
-    cube = reached.arm.length**3
     rows: Rows = {"unreachability": (reached.unreachability, ""), "route": (reached.route, "")}
     for times, volume in reached.multiplicity.items():
         if volume > 1e-7 * reached.volume:
-            rows[f"reached by {times} activation{'s' * (times > 1)}"] = (volume / cube, "L³")
+            rows[f"reached by {times} activation{'s' * (times > 1)}"] = (volume, "m³")
     if reached.multiplicity:
-        rows["behind folds"] = (reached.fold_volume / cube, "L³")
+        rows["behind folds"] = (reached.fold_volume, "m³")
     return rows

@@ -15,6 +15,7 @@ from softreach.cli.options import (
     Overwrite,
     Sampling,
     Source,
+    Unit,
     check_picture,
     cloud_of,
     out_option,
@@ -37,6 +38,7 @@ def show(
     changes: Changes = UNCHANGED,
     out: Annotated[Path, out_option("Picture file: .png .pdf .svg")] = Path("cloud.png"),
     overwrite: Overwrite = False,
+    unit: Unit = None,
 ) -> None:
     """Draw a cloud and its arm from four sides.
 
@@ -48,10 +50,11 @@ def show(
     from softreach.cloud.clouds import design_of
 
     check_picture(out, overwrite)
-    cloud = cloud_of(source, sampling, changes)
+    cloud, lengths = cloud_of(source, sampling, changes, unit)
     arm = design_of(cloud)
     shape = None if activation is None else shape_of(activation, arm)
-    figure = plot.plot_views(cloud, arm, shape, color=_colors(cloud, color))
+    colors = _colors(cloud, color)
+    figure = plot.plot_views(cloud, arm, shape, color=colors, unit=lengths.unit)
     plot.save_figure(figure, out, overwrite=overwrite)
     console.line(out)
 

@@ -9,8 +9,9 @@ from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
-from softreach.cli.options import AsJson, Design, points_in, refuse
-from softreach.cli.values import WHOLE, activation_text, position_text
+from softreach.cli.lengths import Lengths
+from softreach.cli.options import AsJson, Design, Unit, points_in, refuse
+from softreach.cli.values import WHOLE, activation_text
 from softreach.support.errors import InvalidInput, counted
 
 if TYPE_CHECKING:
@@ -25,9 +26,15 @@ def solve(
     /,
     *,
     target: Annotated[
-        str | None, Parameter(help="Tip position x,y,z [m].", allow_leading_hyphen=True)
+        str | None,
+        Parameter(
+            help="Tip position x,y,z, in m unless each has a unit: 80mm,50mm,-24cm.",
+            allow_leading_hyphen=True,
+        ),
     ] = None,
-    targets: Annotated[Path | None, Parameter(help="CSV file with columns x, y, z [m].")] = None,
+    targets: Annotated[
+        Path | None, Parameter(help="CSV file with columns x, y, z; in m, or as x_mm, y_mm, z_mm.")
+    ] = None,
     family: Annotated[
         int | None,
         WHOLE,
@@ -38,6 +45,7 @@ def solve(
         Parameter(help="With more than three free bundles: prove that the activation is least."),
     ] = False,
     changes: Changes = UNCHANGED,
+    unit: Unit = None,
     json: AsJson = False,
 ) -> None:
     """Find every activation that puts the tip at a target.
@@ -53,22 +61,23 @@ def solve(
     if (target is None) == (targets is None):
         raise InvalidInput("target", target, "given, or --targets, and not both")
     arm = design_from(design, changes)
+    lengths = Lengths.of(arm, unit)
     if int((arm.bounds[:, 0] < arm.bounds[:, 1]).sum()) <= 3:
         why = "left out for a design with three free bundles or fewer: all solutions are found"
         refuse(why, family=family, prove_least=prove_least)
     if targets is None:
-        points = [position_in("target", target or "")]
+        points = [position_in("target", target or "", arm.length)]
     else:
-        points = points_in("targets", targets)
+        points = points_in("targets", targets, arm)
     count = 1 if family is None else family
     solutions = solve_inverse(arm, points, family=count, prove_least=prove_least)
     hints = _hints(arm, solutions)
     if json:
         records = zip(solutions, hints, strict=True)
-        console.json([{**_record(one), "hint": hint or None} for one, hint in records])
+        console.json([{**_record(one, lengths), "hint": hint or None} for one, hint in records])
         return
     for solution, hint in zip(solutions, hints, strict=True):
-        _print(solution, arm)
+        _print(solution, arm, lengths)
         if hint:
             console.line(f"  {hint}")
 
@@ -86,27 +95,27 @@ def _hints(arm: Manipulator, solutions: Solutions) -> list[str]:
     return hints
 
 
-def _record(solution: Solution) -> dict[str, object]:
+def _record(solution: Solution, lengths: Lengths) -> dict[str, object]:
     return {
-        "target_m": solution.target.tolist(),
+        **lengths.record("target", solution.target.tolist()),
         "status": solution.status.name.lower(),
         "activations": solution.activations.tolist(),
-        "residuals_m": solution.residuals.tolist(),
+        **lengths.record("residuals", solution.residuals.tolist()),
         "conditions": [value if value < 1e300 else None for value in solution.conditions.tolist()],
         "margins": solution.margins.tolist(),
-        "nearest_m": solution.nearest.tolist(),
+        **lengths.record("nearest", solution.nearest.tolist()),
         "nearest_activation": solution.nearest_activation.tolist(),
-        "gap_m": solution.gap,
-        "gap_bound_m": solution.gap_bound,
+        **lengths.record("gap", solution.gap),
+        **lengths.record("gap_bound", solution.gap_bound),
         "change_bound": solution.change_bound,
         "least_proved": solution.least_proved,
         "unstable": solution.unstable,
     }
 
 
-def _print(solution: Solution, arm: Manipulator) -> None:
+def _print(solution: Solution, arm: Manipulator, lengths: Lengths) -> None:
     status = solution.status.name.lower().replace("_", " ")
-    console.line(f"target {position_text(solution.target)}: {status}")
+    console.line(f"target {lengths.place(solution.target)}: {status}")
     rows = zip(
         solution.activations,
         solution.residuals,
@@ -115,7 +124,8 @@ def _print(solution: Solution, arm: Manipulator) -> None:
         strict=True,
     )
     for gamma, residual, condition, margin in rows:
-        quality = f"residual {residual:.1e} m, condition {condition:.3g}, margin {margin:.3g}"
+        apart = lengths.text(residual, ".1e")
+        quality = f"residual {apart}, condition {condition:.3g}, margin {margin:.3g}"
         console.line(f"  {activation_text(arm, gamma)}  ({quality})")
     if solution.unstable:
         left_out = counted(solution.unstable, "activation")
@@ -126,9 +136,10 @@ def _print(solution: Solution, arm: Manipulator) -> None:
         least = f"{solution.change_bound:.6g}{_size_unit(arm)}"
         console.line(f"  no activation of a size below {least} reaches it")
     if not len(solution):
-        bound = f", proved to be at least {solution.gap_bound:.4g} m" if solution.gap_bound else ""
-        nearest = position_text(solution.nearest)
-        console.line(f"  nearest {nearest}, {solution.gap:.4g} m away{bound}")
+        least = lengths.text(solution.gap_bound, ".4g")
+        bound = f", proved to be at least {least}" if solution.gap_bound else ""
+        gap = lengths.text(solution.gap, ".4g")
+        console.line(f"  nearest {lengths.place(solution.nearest)}, {gap} away{bound}")
         console.line(f"  reached by {activation_text(arm, solution.nearest_activation)}")
 
 

@@ -9,9 +9,11 @@ from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import console
+from softreach.cli.lengths import Lengths
 from softreach.cli.options import (
     Design,
     Overwrite,
+    Unit,
     activation_of,
     check_output,
     out_option,
@@ -24,7 +26,9 @@ if TYPE_CHECKING:
 
 def track(
     design: Design,
-    path: Annotated[Path, Parameter(help="CSV file with columns x, y, z [m], in order.")],
+    path: Annotated[
+        Path, Parameter(help="CSV file with columns x, y, z, in order; m or as it says.")
+    ],
     /,
     *,
     start: Annotated[
@@ -34,6 +38,7 @@ def track(
     changes: Changes = UNCHANGED,
     out: Annotated[Path, out_option("CSV file for the activations.")] = Path("activations.csv"),
     overwrite: Overwrite = False,
+    unit: Unit = None,
 ) -> None:
     """Follow a path of tip positions, and say where it ends.
 
@@ -48,23 +53,24 @@ def track(
 
     table = {".csv": FileKind("a table of activations along a path", text_with(",tip_error_m\n"))}
     arm = design_from(design, changes)
+    lengths = Lengths.of(arm, unit)
     check_output(out, table, overwrite)
     first = None if start is None else activation_of(start, arm)
-    tracked = track_path(arm, points_in("path", path), first)
+    tracked = track_path(arm, points_in("path", path, arm), first)
     with writing(out, table[".csv"], overwrite=overwrite) as file:
         file.write(path_csv(tracked).encode())
     followed = int((tracked.status == 0).sum())
     share = f"{followed} of {tracked.sizes['point']} points followed"
-    console.line(f"{share}, up to {_end(tracked)}: {out}")
+    console.line(f"{share}, up to {_end(tracked, lengths)}: {out}")
 
 
-def _end(tracked: xr.Dataset) -> str:
+def _end(tracked: xr.Dataset, lengths: Lengths) -> str:
     """The place where the branch ends, and the reason."""
     end = tracked.attrs["end"]
-    at = f"{float(tracked.end_length):.7g} m of path"
+    at = f"{lengths.text(float(tracked.end_length), '.7g')} of path"
     if end == "unstable":
-        error = float(tracked.end_length_error)
-        return f"{at} (± {error:.1g} m), where the arm loses its stability"
+        error = lengths.text(float(tracked.end_length_error), ".1g")
+        return f"{at} (± {error}), where the arm loses its stability"
     ends = {
         "": "the end of the path",
         "fold": f"{at}, where the branch turns back (a fold)",

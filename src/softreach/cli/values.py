@@ -60,11 +60,6 @@ def activation_text(arm: Manipulator, values: Iterable[float]) -> str:
     )
 
 
-def position_text(point: Iterable[float]) -> str:
-    """A position: "(0.2, 0.1, 0.6) m"."""
-    return f"({', '.join(f'{x:.6g}' for x in point)}) m"
-
-
 def shown(value: Any) -> str:
     """A value in a table; a dash where there is none."""
     if value is None or (isinstance(value, float) and not math.isfinite(value)):

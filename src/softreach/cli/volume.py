@@ -15,6 +15,7 @@ from softreach.cli.options import (
     Overwrite,
     Sampling,
     Source,
+    Unit,
     check_surface,
     cloud_of,
     out_option,
@@ -30,7 +31,7 @@ def volume(
     /,
     *,
     alpha: Annotated[
-        str, Parameter(help="α-shape radius: 0.05L, 0.05 (m), or critical.")
+        str, Parameter(help="α-shape radius: 0.05L, 5cm, 0.05 (m), or critical.")
     ] = "0.05L",
     sampling: Sampling = SAMPLING,
     changes: Changes = UNCHANGED,
@@ -38,6 +39,7 @@ def volume(
         Path | None, out_option("Write the α-shape here: .ply .stl .obj .glb .vtu .vtk")
     ] = None,
     overwrite: Overwrite = False,
+    unit: Unit = None,
     json: AsJson = False,
 ) -> None:
     """Estimate volumes and unreachability from a cloud.
@@ -51,16 +53,16 @@ def volume(
 
     check_surface(out, overwrite)
     radius_of(alpha, 1.0)  # what is wrong with it is said before the cloud is computed
-    cloud = cloud_of(source, sampling, changes, check_hull_memory)
-    length = float(cloud.tip.attrs["length"])
+    cloud, lengths = cloud_of(source, sampling, changes, unit, check_hull_memory)
     bias = cloud.attrs["sampler"] == "uniform"
-    concave = concave_hull(cloud.tip, radius_of(alpha, length), bias=bias)
-    rows = volume_rows(concave, convex_hull(cloud.tip), length)
+    concave = concave_hull(cloud.tip, radius_of(alpha, lengths.length), bias=bias)
+    rows = volume_rows(concave, convex_hull(cloud.tip))
     if out is not None:
         from softreach.export import export_mesh
 
-        export_mesh(concave, out, overwrite=overwrite)
-    console.rows(f"volume of {source}", rows, json)
+        export_mesh(concave, out, unit=lengths.written, overwrite=overwrite)
+        lengths.say_written(out)
+    console.rows(f"volume of {source}", rows, json, lengths)
 
 
 _BYTES = 700  # of memory that a sample and its share of the triangulation take at most
@@ -73,19 +75,16 @@ def check_hull_memory(n: int) -> None:
     check_memory("n", n, _BYTES * n)
 
 
-def volume_rows(concave: Hull, convex: Hull, length: float) -> Rows:
+def volume_rows(concave: Hull, convex: Hull) -> Rows:
     """The size of a cloud and the trust that it deserves."""
-    cube = length**3
-    corrected = concave.volume_corrected
-    unbiased = None if corrected is None else corrected / cube
     share = 1 - concave.volume / convex.volume if convex.volume else None
     return {
         "points": (concave.n, ""),
-        "alpha": (concave.alpha / length, "L"),
-        "mean spacing": (concave.spacing / length, "L"),
+        "alpha": (concave.alpha, "m"),
+        "mean spacing": (concave.spacing, "m"),
         "regions": (concave.regions, ""),
-        "volume": (concave.volume / cube, "L³"),
-        "volume without sampling bias (estimate)": (unbiased, "L³"),
-        "convex volume": (convex.volume / cube, "L³"),
+        "volume": (concave.volume, "m³"),
+        "volume without sampling bias (estimate)": (concave.volume_corrected, "m³"),
+        "convex volume": (convex.volume, "m³"),
         "unreachability": (share, ""),
     }

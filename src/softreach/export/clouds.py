@@ -28,6 +28,7 @@ from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
 from softreach.support.files.kinds import Formats, beginning_with, text_with
 from softreach.support.palette import activation_colors
+from softreach.support.units import METER, LengthUnit, as_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,7 +43,7 @@ class CloudTable(NamedTuple):
     """Tips and activations as plain arrays."""
 
     tip: Array
-    """[m], shape (sample, 3)."""
+    """In the unit of the table, shape (sample, 3)."""
     activation: Array
     """γ, shape (sample, bundle)."""
     bundles: tuple[str, ...]
@@ -53,6 +54,7 @@ class CloudTable(NamedTuple):
     """`TipStatus` of an arm under loads, shape (sample,)."""
     metadata: dict[str, str | int | float]
     """Design (TOML), seed, tolerance, versions and units."""
+    unit: LengthUnit
 
     @property
     def gammas(self) -> list[str]:
@@ -74,11 +76,12 @@ class CloudTable(NamedTuple):
             yield self.columns(slice(start, start + _BLOCK))
 
 
-def cloud_table(cloud: xr.Dataset) -> CloudTable:
+def cloud_table(cloud: xr.Dataset, unit: LengthUnit = METER) -> CloudTable:
     """The arrays and the description of a cloud.
 
     Args:
         cloud: tip(sample, axis) [m] and activation(sample, bundle), each in its unit.
+        unit: Of the tips in the table.
 
     Raises:
         InvalidInput: The dataset is not a cloud.
@@ -89,12 +92,13 @@ def cloud_table(cloud: xr.Dataset) -> CloudTable:
         raise InvalidInput("cloud", names, "a dataset with tip and activation")
     tip, activation = cloud["tip"], cloud["activation"]
     return CloudTable(
-        tip.transpose("sample", "axis").values.astype(float, copy=False),
+        unit.of(tip.transpose("sample", "axis").values),
         activation.transpose("sample", "bundle").values.astype(float, copy=False),
         _bundle_names(activation),
         _bundle_units(activation),
         cloud["status"].values.astype(np.uint8) if "status" in cloud else None,
-        _metadata(cloud),
+        _metadata(cloud, unit),
+        unit,
     )
 
 
@@ -113,28 +117,37 @@ def column_names(bundles: Sequence[str]) -> list[str]:
     return names
 
 
-def export_cloud(cloud: xr.Dataset, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+def export_cloud(
+    cloud: xr.Dataset,
+    path: str | PathLike[str],
+    *,
+    unit: str | LengthUnit = "m",
+    overwrite: bool = False,
+) -> None:
     """Write a cloud as .ply, .csv, .parquet, .npz, .mat, .vtu or .vtk, chosen by the suffix.
 
-    Tables have the columns x, y, z [m] and one activation per bundle, such as ``gamma_left``;
-    NPZ and MAT hold the arrays tip, activation and bundle. Clouds of arms under loads have the
-    column or array status too: 0 stable, 1 unstable; 2 no equilibrium and 3 undecided, whose tips
-    are NaN. Design, seed, tolerance, version and units go along, except in CSV, VTU and VTK, which
-    have no place for them. PLY carries the picture's colors too.
+    Tables have the columns x, y, z and one activation per bundle, such as ``gamma_left``; in CSV,
+    where nothing else would say the unit, x_mm, y_mm, z_mm if it is not the meter. NPZ and MAT hold
+    the arrays tip, activation and bundle. Clouds of arms under loads have the column or array
+    status too: 0 stable, 1 unstable; 2 no equilibrium and 3 undecided, whose tips are NaN. Design,
+    seed, tolerance, version and units go along, except in CSV, VTU and VTK, which have no place for
+    them. PLY carries the picture's colors too.
 
     Args:
         cloud: tip(sample, axis) [m] and activation(sample, bundle), each in its unit.
         path: The file; it is replaced only when the new one is complete.
+        unit: Of the places: "m", "cm", "mm", or "L" if the cloud knows it.
         overwrite: Whether it may replace any file, and not only a table of that format.
 
     Raises:
-        InvalidInput: Unknown suffix, not a cloud, more than the format can hold, or something else
-            is there.
+        InvalidInput: Unknown suffix or unit, not a cloud, more than the format can hold, or
+            something else is there.
         MissingExtra: The format needs a library that is not installed.
         NotWritten: It cannot be written.
     """
     path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
-    table = cloud_table(a_cloud("cloud", cloud))
+    cloud = a_cloud("cloud", cloud)
+    table = cloud_table(cloud, as_unit(unit, _length(cloud)))
     takes = _BYTES * (table.tip.size + table.activation.size)
     write_by_suffix(path, CLOUD_FILES, table, overwrite=overwrite, takes=takes)
 
@@ -164,15 +177,21 @@ def _bundle_units(activation: xr.DataArray) -> tuple[str, ...]:
     return (activation.attrs.get("units", "1"),) * activation.sizes["bundle"]
 
 
-def _metadata(cloud: xr.Dataset) -> dict[str, str | int | float]:
+def _metadata(cloud: xr.Dataset, unit: LengthUnit) -> dict[str, str | int | float]:
     each = _bundle_units(cloud["activation"])
     units = {
-        "tip_units": cloud["tip"].attrs.get("units", "m"),
+        "tip_units": unit.name,
         "activation_units": ", ".join(each if len(set(each)) > 1 else each[:1]),
     }
-    length = cloud["tip"].attrs.get("length")
+    length = _length(cloud)
     known = cloud.attrs | units | ({} if length is None else {"length_m": length})
     return {str(key): _plain(value) for key, value in known.items()}
+
+
+def _length(cloud: xr.Dataset) -> float | None:
+    """L [m], if the cloud knows it."""
+    length = cloud["tip"].attrs.get("length") if "tip" in cloud else None
+    return None if length is None else float(length)
 
 
 def _plain(value: Any) -> str | int | float:
@@ -196,18 +215,21 @@ def _write_ply(table: CloudTable, file: BufferedWriter) -> None:
 
 def _write_csv(table: CloudTable, file: BufferedWriter) -> None:
     pa, csv = load_library("pyarrow"), load_library("pyarrow.csv")
-    fields = [(name, pa.float64()) for name in ("x", "y", "z", *table.gammas)]
+    suffix = {"m": "", "L": "_over_length"}.get(table.unit.name, f"_{table.unit.name}")
+    names = {name: f"{name}{suffix}" for name in "xyz"}
+    fields = [(name, pa.float64()) for name in (*names.values(), *table.gammas)]
     if table.status is not None:
         fields.append(("status", pa.uint8()))
     schema = pa.schema(fields)
     with csv.CSVWriter(file, schema) as writer:
         for block in table.blocks():
-            writer.write_batch(pa.record_batch(block, schema=schema))
+            named = {names.get(name, name): values for name, values in block.items()}
+            writer.write_batch(pa.record_batch(named, schema=schema))
 
 
 def _write_parquet(table: CloudTable, file: BufferedWriter) -> None:
     pa, parquet = load_library("pyarrow"), load_library("pyarrow.parquet")
-    fields = [pa.field(name, pa.float64(), metadata={"units": "m"}) for name in "xyz"]
+    fields = [pa.field(name, pa.float64(), metadata={"units": table.unit.name}) for name in "xyz"]
     fields += [
         pa.field(name, pa.float64(), metadata={"units": unit})
         for name, unit in zip(table.gammas, table.units, strict=True)
@@ -277,10 +299,15 @@ def _is_npz(path: Path) -> bool:
         return False
 
 
+_UNIT_HEADERS = tuple(f'"x_{unit}","y_{unit}"'.encode() for unit in ("cm", "mm", "over_length"))
+
 CLOUD_FILES: Formats = {
     ".ply": format_file("a PLY", beginning_with(b"ply\n", b"ply\r"), _write_ply),
     ".csv": format_file(
-        "a cloud's CSV", beginning_with(b'"x","y","z",', b"x,y,z,gamma_"), _write_csv, "pyarrow"
+        "a cloud's CSV",
+        beginning_with(b'"x","y","z",', b"x,y,z,gamma_", *_UNIT_HEADERS),
+        _write_csv,
+        "pyarrow",
     ),
     ".parquet": format_file("a Parquet", beginning_with(b"PAR1"), _write_parquet, "pyarrow"),
     ".npz": format_file("a cloud's NPZ", _is_npz, _write_npz),

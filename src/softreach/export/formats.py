@@ -107,7 +107,10 @@ def write_ply_points(
 
 
 def write_ply_mesh(
-    file: BinaryIO, vertices: Mapping[str, NDArray[np.generic]], faces: NDArray[np.integer]
+    file: BinaryIO,
+    vertices: Mapping[str, NDArray[np.generic]],
+    faces: NDArray[np.integer],
+    description: Mapping[str, object],
 ) -> None:
     """Write triangles as a binary PLY (Turk's polygon format, version 1.0).
 
@@ -115,12 +118,13 @@ def write_ply_mesh(
         file: Where to.
         vertices: Columns of float64, float32 or uint8, by name.
         faces: Corners, shape (f, 3).
+        description: As for `write_ply_points`.
     """
     rows = _ply_rows(vertices)
     triangles = np.empty(len(faces), [("count", "u1"), ("corners", "<i4", 3)])
     triangles["count"], triangles["corners"] = 3, faces
     element = f"element face {len(faces)}\nproperty list uchar int vertex_indices\n"
-    file.write(_ply_header(len(rows), rows.dtype, {}, element))
+    file.write(_ply_header(len(rows), rows.dtype, description, element))
     file.write(rows.data)
     file.write(triangles.data)
 

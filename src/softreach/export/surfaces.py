@@ -29,6 +29,7 @@ from softreach.support.arrays import Array, Faces, as_faces, as_points
 from softreach.support.errors import InvalidInput
 from softreach.support.files.kinds import Formats, beginning_with, text_with
 from softreach.support.palette import BODY, Color, bundle_color
+from softreach.support.units import METER, LengthUnit, as_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,11 +47,18 @@ class Part(NamedTuple):
 
     name: str
     vertices: Array
-    """[m], shape (v, 3)."""
+    """In the unit of the scene, shape (v, 3)."""
     faces: Faces
     """Shape (f, 3)."""
     color: Color = BODY
     opacity: float = 1.0
+
+
+class Scene(NamedTuple):
+    """Surfaces that belong together."""
+
+    parts: Sequence[Part]
+    unit: LengthUnit
 
 
 def _a_mesh(name: str, value: Any) -> tuple[Array, Faces]:
@@ -68,34 +76,42 @@ def export_mesh(
     mesh_or_hull: SurfaceMesh | tuple[ArrayLike, ArrayLike],
     path: str | PathLike[str],
     *,
+    unit: str | LengthUnit = "m",
     overwrite: bool = False,
 ) -> None:
     """Write a triangle mesh as .ply, .stl, .obj, .glb, .vtu or .vtk, chosen by the suffix.
 
-    Lengths are in meters. STL and GLB keep single precision. glTF has y up: a GLB holds our
-    coordinates under one node that turns z up into y up.
+    STL and GLB keep single precision. glTF has y up: a GLB holds our coordinates under one node
+    that turns z up into y up. PLY and OBJ say the unit in a comment; readers of GLB take all for
+    meters.
 
     Args:
         mesh_or_hull: An object with vertices [m] and faces, or the pair of them.
         path: The file; it is replaced only when the new one is complete.
+        unit: Of lengths in the file: "m", "cm" or "mm".
         overwrite: Whether it may replace any file, and not only a surface of that format.
 
     Raises:
-        InvalidInput: Unknown suffix, no triangles to write, or something else is there.
+        InvalidInput: Unknown suffix or unit, no triangles to write, or something else is there.
         MissingExtra: The format needs a library that is not installed.
         NotWritten: It cannot be written.
     """
     vertices, faces = _a_mesh("mesh_or_hull", mesh_or_hull)
     path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
+    written = as_unit(unit)
     if not len(faces):
         raise InvalidInput("mesh.faces", "none", "at least one triangle")
-    write_parts([Part("surface", vertices, faces)], path, overwrite=overwrite)
+    write_parts([Part("surface", vertices, faces)], path, written, overwrite=overwrite)
 
 
 def write_parts(
-    parts: Sequence[Part], path: str | PathLike[str], *, overwrite: bool = False
+    parts: Sequence[Part],
+    path: str | PathLike[str],
+    unit: LengthUnit = METER,
+    *,
+    overwrite: bool = False,
 ) -> None:
-    """Write surfaces that belong together.
+    """Write surfaces [m] that belong together.
 
     Names survive in OBJ (objects), GLB (nodes) and VTK (a number per triangle, in order); colors in
     PLY, OBJ and GLB.
@@ -106,7 +122,8 @@ def write_parts(
         NotWritten: It cannot be written.
     """
     takes = _BYTES * sum(len(part.faces) for part in parts)
-    write_by_suffix(path, SURFACE_FILES, parts, overwrite=overwrite, takes=takes)
+    scaled = [part._replace(vertices=unit.of(part.vertices)) for part in parts]
+    write_by_suffix(path, SURFACE_FILES, Scene(scaled, unit), overwrite=overwrite, takes=takes)
 
 
 def export_arm(
@@ -115,6 +132,7 @@ def export_arm(
     path: str | PathLike[str],
     *,
     sides: int = 64,
+    unit: str | LengthUnit = "m",
     overwrite: bool = False,
 ) -> None:
     """Write a deformed arm as .ply, .stl, .obj, .glb, .vtu or .vtk, chosen by the suffix.
@@ -129,22 +147,24 @@ def export_arm(
         configuration: One configuration of that arm [m].
         path: The file; it is replaced only when the new one is complete.
         sides: Corners of each section of the body.
+        unit: Of lengths in the file: "m", "cm", "mm" or "L".
         overwrite: Whether it may replace any file, and not only a surface of that format.
 
     Raises:
-        InvalidInput: Unknown suffix, several configurations, or something else is there.
+        InvalidInput: Unknown suffix or unit, several configurations, or something else is there.
         MissingExtra: The format needs a library that is not installed.
         NotWritten: It cannot be written.
     """
     arm, configuration = a_manipulator("arm", arm), a_configuration("configuration", configuration)
     path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
+    written = as_unit(unit, arm.length)
     body = arm_surface(arm, configuration, as_integer("sides", sides, 3, 10_000))
     opacity = _CLEAR if any(inside(arm)) else 1.0
     parts = [Part("body", body.vertices, body.faces, opacity=opacity)]
     for index, skin in enumerate(bundle_surfaces(arm, configuration)):
         name = _part_name(arm.bundle_names, index)
         parts.append(Part(name, skin.vertices, skin.faces, bundle_color(index)))
-    write_parts(parts, path, overwrite=overwrite)
+    write_parts(parts, path, written, overwrite=overwrite)
 
 
 def _parts_of(value: Any) -> tuple[Any, Any] | None:
@@ -154,45 +174,47 @@ def _parts_of(value: Any) -> tuple[Any, Any] | None:
     return value.vertices, value.faces
 
 
-def _write_ply(parts: Sequence[Part], file: BufferedWriter) -> None:
+def _write_ply(scene: Scene, file: BufferedWriter) -> None:
+    parts = scene.parts
     vertices, faces = _joined(parts)
     colors = np.concatenate([np.tile(_rgba(part), (len(part.vertices), 1)) for part in parts])
     columns = dict(zip("xyz", vertices.T, strict=True))
     columns |= dict(zip(("red", "green", "blue", "alpha"), colors.T, strict=True))
-    write_ply_mesh(file, columns, faces)
+    write_ply_mesh(file, columns, faces, {"units": scene.unit.name})
 
 
-def _write_stl(parts: Sequence[Part], file: BufferedWriter) -> None:
+def _write_stl(scene: Scene, file: BufferedWriter) -> None:
     trimesh = load_library("trimesh")
-    mesh = trimesh.util.concatenate([_colored(part) for part in parts])
+    mesh = trimesh.util.concatenate([_colored(part) for part in scene.parts])
     file.write(mesh.export(file_type="stl"))
 
 
-def _write_obj(parts: Sequence[Part], file: BufferedWriter) -> None:
+def _write_obj(scene: Scene, file: BufferedWriter) -> None:
     trimesh = load_library("trimesh")
-    scene = trimesh.Scene([_colored(part) for part in parts])
+    meshes = trimesh.Scene([_colored(part) for part in scene.parts])
     # exact enough for an arm of a millimeter; a name of ours, not an address, in the first line
-    options = {"include_normals": False, "digits": 12, "header": "softreach, lengths in m"}
-    file.write(trimesh.exchange.obj.export_obj(scene, **options).encode())
+    header = f"softreach, lengths in {scene.unit.name}"
+    options = {"include_normals": False, "digits": 12, "header": header}
+    file.write(trimesh.exchange.obj.export_obj(meshes, **options).encode())
 
 
-def _write_glb(parts: Sequence[Part], file: BufferedWriter) -> None:
+def _write_glb(scene: Scene, file: BufferedWriter) -> None:
     trimesh = load_library("trimesh")
-    scene = trimesh.Scene(base_frame="world")
+    meshes = trimesh.Scene(base_frame="world")
     # as a node and not in the numbers, so that a reader gets back the vertices we have
-    scene.graph.update(frame_to="z_up", frame_from="world", matrix=_Z_UP_TO_Y_UP)
-    for part in parts:
+    meshes.graph.update(frame_to="z_up", frame_from="world", matrix=_Z_UP_TO_Y_UP)
+    for part in scene.parts:
         names = {"node_name": part.name, "geom_name": part.name}
-        scene.add_geometry(_shiny(part), parent_node_name="z_up", **names)
-    file.write(scene.export(file_type="glb"))
+        meshes.add_geometry(_shiny(part), parent_node_name="z_up", **names)
+    file.write(meshes.export(file_type="glb"))
 
 
-def _write_vtu(parts: Sequence[Part], file: BufferedWriter) -> None:
-    write_vtu(_mesh(parts), file)
+def _write_vtu(scene: Scene, file: BufferedWriter) -> None:
+    write_vtu(_mesh(scene.parts), file)
 
 
-def _write_vtk(parts: Sequence[Part], file: BufferedWriter) -> None:
-    write_vtk(_mesh(parts), file)
+def _write_vtk(scene: Scene, file: BufferedWriter) -> None:
+    write_vtk(_mesh(scene.parts), file)
 
 
 def _mesh(parts: Sequence[Part]) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,10 +13,14 @@ from softreach.rod.tip_map import TipMap
 from softreach.support.arguments import as_number
 from softreach.support.arrays import Array, Index, as_floats, as_rows, check_finite
 from softreach.support.errors import InvalidInput, Range
-from softreach.support.quantity import numbers_in, shortened
+from softreach.support.quantity import shortened, unit_names
+from softreach.support.units import TYPED, lengths_in
 
 FARTHEST = 1e100
 """Largest coordinate of a target [m]: squares of larger ones leave the range of numbers."""
+
+_HEADER = re.compile(r"[xyz](?:_(m|cm|mm|over_length)|\s*[\[(]\s*([^\])]*?)\s*[\])])")
+"""Name of a column with its unit."""
 
 _RESIDUALS = (1e-13, 1e-2)  # in L; below, rounding of the tips decides
 
@@ -97,34 +102,64 @@ def allowance(rod: TipMap, residual: float) -> float:
     return max(residual, rod.tol * rod.length)
 
 
-def positions_in(text: str, source: str) -> list[list[float]]:
-    """Positions [m] from lines x,y,z; a header is skipped.
+def positions_in(text: str, source: str, length: float | None = None) -> list[list[float]]:
+    """Positions [m] from lines x,y,z; a header is skipped, but for units such as x_mm,y_mm,z_mm.
 
     Args:
         text: Content of the file.
         source: Its name in errors.
+        length: L [m], for places in L; None where it is not known.
 
     Raises:
-        InvalidInput: A line that is not three numbers, or no line.
+        InvalidInput: A line that is not three lengths, an unknown unit in the header, or no line.
     """
     lines = [line for line in text.splitlines() if line.strip()]
-    rows = lines[1:] if lines and _is_header(lines[0]) else lines
+    units = _header_units(lines[0], source) if lines and _is_header(lines[0]) else None
+    rows = lines if units is None else [_with_units(line, units) for line in lines[1:]]
     if not rows:
         raise InvalidInput("targets", source, "a CSV file with a row x,y,z for each position")
-    return [position_in(f"{source}, point {k + 1}", row) for k, row in enumerate(rows)]
+    return [position_in(f"{source}, point {k + 1}", row, length) for k, row in enumerate(rows)]
 
 
-def position_in(name: str, text: str) -> list[float]:
-    """One position [m] from x,y,z.
+def position_in(name: str, text: str, length: float | None = None) -> list[float]:
+    """One position [m] from x,y,z, each with its unit or all of them in m.
+
+    Args:
+        name: What errors call it.
+        text: What was typed.
+        length: L [m], for places in L; None where it is not known.
 
     Raises:
-        InvalidInput: The text, called `name`, is not three numbers.
+        InvalidInput: The text is not three lengths.
     """
-    values = numbers_in(text, 3)
+    values = lengths_in(text, 3, length)
     if values is None or max(map(abs, values)) > FARTHEST:
-        allowed = f"three comma-separated numbers x,y,z in m, up to {FARTHEST:g}"
+        units = TYPED if length is None else f"{TYPED}, L"
+        allowed = (
+            f"three comma-separated numbers x,y,z in m, up to {FARTHEST:g}, or each with its unit "
+            f"({units})"
+        )
         raise InvalidInput(name, shortened(text) or "''", allowed)
     return values
+
+
+def _header_units(line: str, source: str) -> list[str]:
+    """The unit of each column of a header such as x_mm,y_mm,z_mm or x [mm],y [mm],z [mm]."""
+    units: list[str] = []
+    for name in line.split(","):
+        match = _HEADER.fullmatch(name.strip().strip('"'))
+        unit = "" if match is None else match[1] or match[2] or ""
+        if match is not None and match[2] and unit not in (*unit_names("m"), "L"):
+            raise InvalidInput(f"{source}, header", shortened(line), f"in {TYPED} or L")
+        units.append({"over_length": "L"}.get(unit, unit))
+    return units
+
+
+def _with_units(line: str, units: list[str]) -> str:
+    parts = line.split(",")
+    if len(parts) != len(units):
+        return line
+    return ",".join(f"{part.strip()}{unit}" for part, unit in zip(parts, units, strict=True))
 
 
 def _is_header(line: str) -> bool:

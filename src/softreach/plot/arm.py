@@ -15,7 +15,7 @@ from softreach.picture.shading import draw_mesh, faces_to_eye
 from softreach.picture.zbuffer import ZBuffer
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.cross_section import plot_cross_section, section_reach
-from softreach.plot.lengths import in_lengths
+from softreach.plot.lengths import Unit, unit_for
 from softreach.plot.style import (
     WIDTH,
     figure_style,
@@ -29,6 +29,7 @@ from softreach.support.arguments import as_flag, as_given, as_instance, as_numbe
 from softreach.support.arrays import Array, as_stations
 from softreach.support.errors import InvalidInput
 from softreach.support.palette import BODY, bundle_color
+from softreach.support.units import LengthUnit, in_lengths
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,6 +51,7 @@ def plot_arm(
     rest: bool = True,
     bundles: Collection[int] | None = None,
     box: ArrayLike | None = None,
+    unit: Unit = None,
 ) -> Axes:
     """Draw an arm; where both are shown, the arm at rest is pale and behind.
 
@@ -62,21 +64,22 @@ def plot_arm(
         rest: Whether to draw the arm at rest beside its configurations.
         bundles: Which to draw, by index; None for all.
         box: What to show, lower and upper corner [m], shape (2, 3); None for all that is drawn.
+        unit: Of the axes: "m", "cm", "mm" or "L"; None for L.
 
     Returns:
-        The axes, in L.
+        The axes, in that unit.
 
     Raises:
-        InvalidInput: Unknown view.
+        InvalidInput: Unknown view or unit.
         MissingExtra: matplotlib is not installed.
     """
     arm, rest = a_manipulator("arm", arm), as_flag("rest", rest)
     ax, box = panel_arguments(ax, view, box)
-    shapes = shapes_of(configuration)
+    shapes, counted = shapes_of(configuration), unit_for(arm.length, unit)
     resting = [rest_configuration(arm)] if rest or not shapes else []
     with figure_style(ax):
-        points = np.concatenate([arm_points(arm, shape) for shape in shapes + resting])
-        panel = Panel.opened(points, in_lengths(arm.length), ax, view, box)
+        points = np.concatenate([arm_points(arm, shape, counted) for shape in shapes + resting])
+        panel = Panel.opened(points, counted, ax, view, box)
         drawn = range(arm.bundles) if bundles is None else some_bundles("bundles", bundles, arm)
         draw_arms(panel, arm, resting, drawn, _FADE if shapes else 0.0)
         draw_arms(panel, arm, shapes, drawn)
@@ -93,15 +96,15 @@ def shapes_of(configuration: xr.Dataset | None) -> list[xr.Dataset]:
     return [configuration.isel(sample=k) for k in range(configuration.sizes["sample"])]
 
 
-def arm_points(arm: Manipulator, shape: xr.Dataset) -> Array:
-    """Points of one configuration [L]: its surface, and bundles outside of it; shape (n, 3)."""
+def arm_points(arm: Manipulator, shape: xr.Dataset, unit: LengthUnit) -> Array:
+    """Points of one configuration: its surface, and bundles outside of it; shape (n, 3)."""
     outline = arm.outline(shape["Z"].values)
     out = (outline.outer_ratio > _BULGE) & outline.acts
     surfaces = [arm_surface(arm, shape, _SIDES)]
     if out.any():
         skins = bundle_skins(arm, shape)
         surfaces += [skin for k, skin in enumerate(skins) if out[:, k].any()]
-    return np.concatenate([surface.vertices for surface in surfaces]) / arm.length
+    return unit.of(np.concatenate([surface.vertices for surface in surfaces]))
 
 
 def draw_arms(
@@ -128,14 +131,15 @@ def arm_images(
     hidden = inside(arm)
     clear = any(hidden[index] for index in bundles)
     for shape in shapes:
-        _draw_body(buffer, arm, shape, panel.view, fade)
+        _draw_body(buffer, arm, shape, panel, fade)
         skins = bundle_skins(arm, shape, lift=0.008)
         for index in bundles:
             color, points, faces = bundle_color(index), skins[index].vertices, skins[index].faces
-            draw_mesh(buffer, points / arm.length, faces, color, panel.view, fade)
+            places = panel.unit.of(points)
+            draw_mesh(buffer, places, faces, color, panel.view, fade)
             if clear:
                 faces = faces_to_eye(points, faces, panel.view)
-                draw_mesh(within, points / arm.length, faces, color, panel.view, fade)
+                draw_mesh(within, places, faces, color, panel.view, fade)
     return buffer, within if clear else None
 
 
@@ -154,6 +158,7 @@ def plot_designs(
     *,
     stations_over_length: Sequence[float] = (0.0,),
     width: float | None = None,
+    unit: Unit = None,
 ) -> Figure:
     """Draw arms at rest, and under each its cross-sections, all at one scale (figures 1b-d, 4a).
 
@@ -161,6 +166,7 @@ def plot_designs(
         panels: The arms, from left to right.
         stations_over_length: Z / L of the cross-sections [-], from 0 to 1; none for the arms alone.
         width: Of the figure [inch]; None for 1.5 a panel.
+        unit: As in `plot_arm`.
 
     Raises:
         InvalidInput: A station off an arm, or an unknown view.
@@ -174,7 +180,9 @@ def plot_designs(
         raise InvalidInput("panels", "none", "at least one DesignPanel")
     stations = as_stations("stations_over_length", stations_over_length).tolist()
     width = 1.5 * len(panels) if width is None else as_number("width", width, WIDTH)
-    box = bounding_box(*(arm_points(p.arm, rest_configuration(p.arm)) for p in panels))
+    box = bounding_box(
+        *(arm_points(p.arm, rest_configuration(p.arm), in_lengths(p.arm.length)) for p in panels)
+    )
     reach = 1.08 * max(
         section_reach(p.arm, s * p.arm.length) / p.arm.length
         for p in panels
@@ -190,11 +198,12 @@ def plot_designs(
         for k, panel in enumerate(panels):
             arm, length = panel.arm, panel.arm.length
             drawn, shown = panel.bundles, length * box
-            plot_arm(arm, ax=axes[0, k], view=panel.view, bundles=drawn, box=shown)
+            plot_arm(arm, ax=axes[0, k], view=panel.view, bundles=drawn, box=shown, unit=unit)
             axes[0, k].set_title(panel.title)
             for ax, station in zip(axes[1:, k], stations, strict=True):
                 z, half = station * length, reach * length
-                plot_cross_section(arm, z, ax=ax, bundles=drawn, half_width=half, legend=False)
+                shared = {"bundles": drawn, "half_width": half, "legend": False, "unit": unit}
+                plot_cross_section(arm, z, ax=ax, **shared)
                 ax.set_title(f"Z = {station:.2g} L" if station else "Z = 0")
         for ax in np.ravel(axes[:, 1:]):
             ax.set(ylabel="", yticklabels=[])
@@ -202,9 +211,9 @@ def plot_designs(
 
 
 def _draw_body(
-    buffer: ZBuffer, arm: Manipulator, shape: xr.Dataset, view: View, fade: float
+    buffer: ZBuffer, arm: Manipulator, shape: xr.Dataset, panel: Panel, fade: float
 ) -> None:
     body = arm_surface(arm, shape, _SIDES)
     caps = 2 * _SIDES  # the last faces; apart, so that light breaks at the rim
     for part in (body.faces[:-caps], body.faces[-caps:]):
-        draw_mesh(buffer, body.vertices / arm.length, part, BODY, view, fade)
+        draw_mesh(buffer, panel.unit.of(body.vertices), part, BODY, panel.view, fade)

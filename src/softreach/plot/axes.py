@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from softreach.picture.projection import View, is_mirrored, plane_of, project, view_axes
 from softreach.picture.shading import seen_through
 from softreach.picture.zbuffer import Extent, ZBuffer
-from softreach.plot.lengths import LengthUnit
 from softreach.plot.style import DPI, pyplot
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
+from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -114,7 +114,7 @@ class Panel:
         pixels = buffer.rgba() if within is None else seen_through(buffer.rgba(), within.rgba())
         # "none": vector files get the pixels as they are
         image = ax.imshow(pixels, extent=extent, interpolation="none", zorder=order)
-        image.set_label(_UNIT_MARK + self.unit.symbol)
+        image.set_label(_UNIT_MARK + self.unit.name)
         _widen(ax, extent, first, mirror)
         if plane:
             ax.set(xlabel=self.unit.label(plane[0]), ylabel=self.unit.label(plane[1]))
@@ -236,9 +236,9 @@ def _framed_axes(box: Array, view: View) -> Axes:
 def _check_unit(ax: Axes, unit: LengthUnit) -> None:
     marks = (str(image.get_label()) for image in ax.images)
     symbols = {mark.removeprefix(_UNIT_MARK) for mark in marks if mark.startswith(_UNIT_MARK)}
-    if symbols - {unit.symbol}:
-        hint = "give length= or data with attrs['length'] to all that shares axes, or to none"
-        raise InvalidInput("ax", f"counted in {', '.join(symbols)}", f"in {unit.symbol}", hint)
+    if symbols - {unit.name}:
+        hint = "give one unit= to all that shares axes, or length= to all of it or to none"
+        raise InvalidInput("ax", f"counted in {', '.join(symbols)}", f"in {unit.name}", hint)
 
 
 def _span(extent: Extent) -> Array:

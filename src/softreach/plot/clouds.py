@@ -14,7 +14,7 @@ from softreach.picture.zbuffer import ZBuffer
 from softreach.plot.arm import arm_images, arm_points, shapes_of
 from softreach.plot.axes import Panel, bounding_box
 from softreach.plot.coloring import color_samples, draw_figure_key, draw_key
-from softreach.plot.lengths import LengthUnit, common_unit, in_lengths, unit_of
+from softreach.plot.lengths import Unit, common_unit, unit_for, unit_of
 from softreach.plot.style import (
     LENGTH,
     PLACE,
@@ -31,6 +31,7 @@ from softreach.support import parallel
 from softreach.support.arguments import as_flag, as_number
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
+from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -55,6 +56,7 @@ def plot_cloud(
     size: float | None = None,
     key: bool = True,
     box: ArrayLike | None = None,
+    unit: Unit = None,
 ) -> Axes:
     """Draw a cloud in one view.
 
@@ -68,20 +70,22 @@ def plot_cloud(
         size: Diameter of a point [pixels at 250 per inch]; None chooses by their number.
         key: Whether to explain the colors.
         box: What to show, lower and upper corner [m], shape (2, 3); None for all points.
+        unit: Of the axes: "m", "cm", "mm" or "L"; None for L if the cloud knows it, else m.
 
     Returns:
-        The axes, in L if the cloud knows it, else in meters.
+        The axes, in that unit.
 
     Raises:
-        InvalidInput: Unknown view, bundle or color, or no finite tip.
+        InvalidInput: Unknown view, bundle, color or unit, or no finite tip.
         MissingExtra: matplotlib is not installed.
     """
     cloud, key = a_cloud("cloud", cloud), as_flag("key", key)
     size = None if size is None else as_number("size", size, SIZE)
     ax, box = panel_arguments(ax, view, box)
     with figure_style(ax):
-        tips = drawn_tips(cloud)
-        panel = Panel.opened(tips, unit_of(cloud["tip"]), ax, view, box)
+        counted = unit_of(cloud["tip"], unit)
+        tips = drawn_tips(cloud, counted)
+        panel = Panel.opened(tips, counted, ax, view, box)
         coloring = color_samples(cloud, color)
         panel.show(cloud_image(panel, tips, coloring.rgb, size))
         if key:
@@ -106,10 +110,9 @@ def cloud_image(panel: Panel, tips: Array, rgb: NDArray[np.uint8], size: float |
     return buffer
 
 
-def drawn_tips(cloud: xr.Dataset) -> Array:
-    """Tip positions in the units of the axes, shape (sample, 3)."""
-    tip = cloud["tip"].transpose("sample", "axis")
-    return unit_of(tip).of(tip.values)
+def drawn_tips(cloud: xr.Dataset, unit: LengthUnit) -> Array:
+    """Tip positions in the unit of the axes, shape (sample, 3)."""
+    return unit.of(cloud["tip"].transpose("sample", "axis").values)
 
 
 def point_size(samples: int, box: Array) -> float:
@@ -129,6 +132,7 @@ def plot_slab(
     size: float | None = None,
     key: bool = True,
     box: ArrayLike | None = None,
+    unit: Unit = None,
 ) -> Axes:
     """Draw the tips in a slab across the line of sight; a note in the axes says which.
 
@@ -145,9 +149,10 @@ def plot_slab(
         size: As in `plot_cloud`.
         key: As in `plot_cloud`.
         box: As in `plot_cloud`.
+        unit: As in `plot_cloud`.
 
     Returns:
-        The axes, in L if the cloud knows it, else in meters.
+        The axes, in that unit.
 
     Raises:
         InvalidInput: Not a view along an axis, unknown color, or no tip in the slab.
@@ -158,22 +163,23 @@ def plot_slab(
     thickness = None if thickness is None else as_number("thickness", thickness, LENGTH)
     size = None if size is None else as_number("size", size, SIZE)
     ax, box = panel_arguments(ax, view, box)
-    tips, unit, axis = drawn_tips(cloud), unit_of(cloud["tip"]), sight_axis(view)
+    counted, axis = unit_of(cloud["tip"], unit), sight_axis(view)
+    tips = drawn_tips(cloud, counted)
     at = float(base_of(cloud)["xyz".index(axis)]) if at is None else at
-    middle, half = float(unit.of(at)), _half(thickness, tips, unit)
+    middle, half = float(counted.of(at)), _half(thickness, tips, counted)
     depth = tips[:, "xyz".index(axis)] - middle
     inside = np.abs(depth) <= half
     if not inside.any():
         allowed = f"such that a tip lies in the slab about {axis} = {at:.4g} m"
-        raise InvalidInput("thickness", f"{2 * half * unit.size:.4g} m", allowed)
+        raise InvalidInput("thickness", f"{2 * half * counted.size:.4g} m", allowed)
     coloring = color_samples(cloud, color)
     with figure_style(ax):
-        panel = Panel.opened(tips, unit, ax, view, box)
+        panel = Panel.opened(tips, counted, ax, view, box)
         slab, rgb = cloud.isel(sample=np.flatnonzero(inside)), coloring.rgb[inside] / 255
         pixels = size or _point_size(len(rgb), panel)
-        shown = {"box": panel.box * unit.size, "key": False}
+        shown = {"box": panel.box * counted.size, "key": False, "unit": counted}
         plot_cloud(slab, ax=panel.ax, view=view, color=rgb, size=pixels, **shown)
-        write_note(panel.ax, _place(axis, middle, half, unit), 0.03, 0.02)
+        write_note(panel.ax, _place(axis, middle, half, counted), 0.03, 0.02)
         if key:
             draw_key(panel.ax, coloring.key)
     return panel.ax
@@ -188,6 +194,7 @@ def plot_views(
     color: str | int | ArrayLike = "rgb",
     size: float | None = None,
     width: float = 6.9,
+    unit: Unit = None,
 ) -> Figure:
     """Draw a cloud in three orthogonal views at one scale and an oblique one.
 
@@ -199,30 +206,32 @@ def plot_views(
         color: As in `plot_cloud`.
         size: As in `plot_cloud`.
         width: Of the figure [inch].
+        unit: As in `plot_cloud`.
 
     Returns:
         The figure, with the axes front, side, top and oblique, and those of the color bar if there
         is one.
 
     Raises:
-        InvalidInput: As `plot_cloud`; an arm beside a cloud that does not know L.
+        InvalidInput: As `plot_cloud`; an arm beside a cloud that does not know L, without a unit.
         MissingExtra: matplotlib is not installed.
     """
     cloud, width = a_cloud("cloud", cloud), as_number("width", width, WIDTH)
     size = None if size is None else as_number("size", size, SIZE)
     view_angles(view)
-    unit, tips = unit_of(cloud["tip"]), drawn_tips(cloud)
+    counted = unit_of(cloud["tip"], unit)
+    tips = drawn_tips(cloud, counted)
     shown, shapes = [tips], shapes_of(configuration)
     if arm is not None:
         arm = a_manipulator("arm", arm)
-        common_unit([unit, in_lengths(arm.length)])
+        common_unit([counted, unit_for(arm.length, unit)])
         shapes = shapes or [rest_configuration(arm)]
-        shown += [arm_points(arm, shape) for shape in shapes]
+        shown += [arm_points(arm, shape, counted) for shape in shapes]
     box = _not_too_slim(bounding_box(*shown))
     coloring = color_samples(cloud, color)
     with figure_style():
         figure, axes, top = _layout(np.ptp(box, axis=0), width, view)
-        panels = [Panel(ax, box, seen, unit) for seen, ax in axes]
+        panels = [Panel(ax, box, seen, counted) for seen, ax in axes]
         images: list[list[Images]] = [[] for _ in panels]
 
         def draw(panel: Panel, drawn: list[Images]) -> None:
@@ -254,8 +263,8 @@ def _half(thickness: float | None, tips: Array, unit: LengthUnit) -> float:
 
 def _place(axis: str, middle: float, half: float, unit: LengthUnit) -> str:
     """Name of a slab, such as |x| ≤ 0.01 L."""
-    distance = f"{axis} - {middle:.3g} {unit.symbol}" if middle else axis
-    return f"|{distance}| ≤ {half:.3g} {unit.symbol}"
+    distance = f"{axis} - {middle:.3g} {unit.name}" if middle else axis
+    return f"|{distance}| ≤ {half:.3g} {unit.name}"
 
 
 def _point_size(count: int, panel: Panel) -> float:

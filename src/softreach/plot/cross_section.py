@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator, a_manipulator
-from softreach.plot.lengths import in_lengths
+from softreach.plot.lengths import Unit, unit_for
 from softreach.plot.section_parts import (
     PlacedBundle,
     draw_bundles,
@@ -85,6 +85,7 @@ def plot_cross_section(
     bundles: Collection[int] | None = None,
     half_width: float | None = None,
     legend: bool | None = None,
+    unit: Unit = None,
 ) -> Axes:
     """Draw the cross-section at Z, seen from the tip (figure 1c): layers, and the bundles that act.
 
@@ -101,9 +102,10 @@ def plot_cross_section(
             section.
         legend: Whether to name materials and bundles beside it; None where there are several
             materials, or bundles other than fibers.
+        unit: As in `plot_arm`.
 
     Returns:
-        The axes, in L.
+        The axes, in that unit.
 
     Raises:
         InvalidInput: A station off the arm.
@@ -114,8 +116,8 @@ def plot_cross_section(
     legend = needs_section_key(arm) if legend is None else as_flag("legend", legend)
     if not 0 <= z <= arm.length:
         raise InvalidInput("z", z, f"within [0, {arm.length:g}] m")
-    unit = in_lengths(arm.length)
-    outer = float(unit.of(arm.profile.radius(z)))
+    counted = unit_for(arm.length, unit)
+    outer = float(counted.of(arm.profile.radius(z)))
     placed = placed_bundles(
         arm, z, range(arm.bundles) if bundles is None else some_bundles("bundles", bundles, arm)
     )
@@ -125,9 +127,9 @@ def plot_cross_section(
         draw_layers(ax, arm.section, outer)
         draw_bundles(ax, placed, outer)
         half = _MARGIN * section_reach(arm, z) if half_width is None else half_width
-        half = float(unit.of(half))
+        half = float(counted.of(half))
         ax.set(aspect="equal", xlim=(-half, half), ylim=(-half, half))
-        ax.set(xlabel=unit.label("x"), ylabel=unit.label("y"))
+        ax.set(xlabel=counted.label("x"), ylabel=counted.label("y"))
         ax.locator_params(nbins=3)
         if key:
             key.draw(ax)

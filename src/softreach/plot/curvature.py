@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from softreach.plot.lengths import LengthUnit, common_unit, unit_of
+from softreach.plot.lengths import Unit, common_unit, unit_of
 from softreach.plot.style import as_axes, figure_style, small_axes
 from softreach.support.arguments import as_dataset, as_mapping, as_one_of
 from softreach.support.arrays import Array
 from softreach.support.errors import InvalidInput
+from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,18 +26,23 @@ _BINS = 64
 
 
 def plot_curvature(
-    statistics: Mapping[str, xr.Dataset], *, ax: Axes | None = None, quantity: str = "bending"
+    statistics: Mapping[str, xr.Dataset],
+    *,
+    ax: Axes | None = None,
+    quantity: str = "bending",
+    unit: Unit = None,
 ) -> Axes:
     """Distributions at the stations of one or two designs (figure 3c); dots are medians.
 
     Each distribution is drawn to the same width. Curvatures are shown times L, or in 1/m if the
-    statistics do not know L.
+    statistics do not know L, unless there is a unit.
 
     Args:
         statistics: Label -> what `curvature_statistics` returned; the first is drawn to the left
             of each station and the second to the right.
         ax: Axes to draw in; None for a new figure.
         quantity: "bending", "torsion" or "extension".
+        unit: Of lengths: "m", "cm", "mm" or "L"; None for L if the statistics know it, else m.
 
     Raises:
         InvalidInput: Not one or two designs, an unknown quantity, stations at other places along
@@ -46,15 +52,20 @@ def plot_curvature(
     if not 1 <= len(statistics) <= 2:
         raise InvalidInput("statistics", f"of {len(statistics)} designs", "of one or two")
     as_one_of("quantity", quantity, _SYMBOLS)
-    unit = common_unit([unit_of(data) for data in statistics.values()])
-    places = _common_places(statistics)
+    units = [unit_of(data, unit) for data in statistics.values()]
+    counted = common_unit(units)
+    places = _common_places(statistics, units)
     with figure_style(ax):
         ax = small_axes() if ax is None else ax
         sides = (-1, 1) if len(statistics) == 2 else (0,)
-        for (label, data), side, color in zip(statistics.items(), sides, _COLORS, strict=False):
-            _draw(ax, data, quantity, side, color, label)
-        ax.set(xlabel=unit.label("station Z"), ylabel=_label(quantity, unit))
-        ax.set_xticks(range(len(places)), [f"{place:.2g}" for place in places])
+        for (label, data), side, color, one in zip(
+            statistics.items(), sides, _COLORS, units, strict=False
+        ):
+            scale = 1.0 if quantity == "extension" else one.size
+            _draw(ax, data, quantity, side, color, label, scale)
+        ax.set(xlabel=counted.label("station Z"), ylabel=_label(quantity, counted))
+        digits = ".2g" if counted.relative else ".4g"
+        ax.set_xticks(range(len(places)), [f"{place:{digits}}" for place in places])
         ax.legend(loc="upper left")
     return ax
 
@@ -63,9 +74,10 @@ def _statistics(name: str, value: object) -> xr.Dataset:
     return as_dataset(name, value, "bending_count", "Z")
 
 
-def _common_places(statistics: Mapping[str, xr.Dataset]) -> Array:
+def _common_places(statistics: Mapping[str, xr.Dataset], units: list[LengthUnit]) -> Array:
     """The stations on the axis, which all designs share."""
-    places = [unit_of(data).of(data["Z"].values) for data in statistics.values()]
+    both = zip(units, statistics.values(), strict=True)
+    places = [unit.of(data["Z"].values) for unit, data in both]
     for other in places[1:]:
         if other.shape != places[0].shape or not np.allclose(other, places[0]):
             raise InvalidInput(
@@ -78,11 +90,12 @@ def _label(quantity: str, unit: LengthUnit) -> str:
     symbol = _SYMBOLS[quantity]
     if quantity == "extension":
         return symbol
-    return f"{symbol}L" if unit.relative else f"{symbol} [1/m]"
+    return f"{symbol}L" if unit.relative else f"{symbol} [1/{unit.name}]"
 
 
-def _draw(ax: Axes, data: xr.Dataset, quantity: str, side: int, color: str, label: str) -> None:
-    scale = 1.0 if quantity == "extension" else unit_of(data).size
+def _draw(
+    ax: Axes, data: xr.Dataset, quantity: str, side: int, color: str, label: str, scale: float
+) -> None:
     medians = data[f"{quantity}_quantile"].sel(quantile=0.5).values * scale
     for k in range(len(medians)):
         edges, density = _coarse(data.isel(station=k), quantity)

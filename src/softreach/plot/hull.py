@@ -12,7 +12,7 @@ from softreach.geometry.surface import SurfaceMesh
 from softreach.picture.projection import View
 from softreach.picture.shading import draw_mesh
 from softreach.plot.axes import Panel
-from softreach.plot.lengths import in_lengths
+from softreach.plot.lengths import Unit, unit_for
 from softreach.plot.style import (
     LENGTH,
     a_surface,
@@ -48,6 +48,7 @@ def plot_hull(
     length: float | None = None,
     color: tuple[float, float, float] = STEEL,
     box: ArrayLike | None = None,
+    unit: Unit = None,
 ) -> Axes:
     """Draw the boundary of a hull in one view.
 
@@ -55,24 +56,27 @@ def plot_hull(
         hull: A hull, the surface of a reachable set, or anything with vertices [m] and faces.
         ax: Axes to draw in; None for a new figure.
         view: As in `plot_cloud`.
-        length: L [m], by which coordinates are divided; None leaves them in meters.
+        length: L [m], by which coordinates are divided unless `unit` says otherwise; None leaves
+            them in meters.
         color: RGB from 0 to 1.
         box: What to show, lower and upper corner [m], shape (2, 3); None for all of it.
+        unit: Of the axes: "m", "cm", "mm", or "L" with `length`; None for L if `length` is given,
+            else m.
 
     Returns:
-        The axes, in L if `length` is given, else in meters.
+        The axes, in that unit.
 
     Raises:
-        InvalidInput: Unknown view, or no vertices.
+        InvalidInput: Unknown view or unit, or no vertices.
         MissingExtra: matplotlib is not installed.
     """
     hull, color = a_surface("hull", hull), _rgb("color", color)
     length = None if length is None else as_number("length", length, LENGTH)
     ax, box = panel_arguments(ax, view, box)
     with figure_style(ax):
-        unit = in_lengths(length)
-        vertices = unit.of(hull.vertices)
-        panel = Panel.opened(vertices, unit, ax, view, box)
+        counted = unit_for(length, unit)
+        vertices = counted.of(hull.vertices)
+        panel = Panel.opened(vertices, counted, ax, view, box)
         buffer = panel.buffer(oversample=3)
         draw_mesh(buffer, vertices, hull.faces, color, view)
         panel.show(buffer)
@@ -87,6 +91,7 @@ def plot_volume_curve(
     length: float | None = None,
     exact: float | None = None,
     convex: float | None = None,
+    unit: Unit = None,
 ) -> Axes:
     """Draw V(α) of clouds.
 
@@ -97,9 +102,10 @@ def plot_volume_curve(
         length: L [m], by which radii, and volumes by its cube, are divided; None leaves them in m.
         exact: Volume of the reachable set [m³], drawn as a line.
         convex: Volume of its convex hull [m³], likewise.
+        unit: As in `plot_hull`; volumes in liters beside cm, in mL beside mm.
 
     Returns:
-        The axes, in L if `length` is given, else in meters.
+        The axes, in that unit.
 
     Raises:
         InvalidInput: Radii and volumes of different shapes.
@@ -109,18 +115,17 @@ def plot_volume_curve(
     length = None if length is None else as_number("length", length, LENGTH)
     exact = None if exact is None else as_number("exact", exact, _VOLUMES)
     convex = None if convex is None else as_number("convex", convex, _VOLUMES)
-    ax, unit = as_axes(ax), in_lengths(length)
+    ax, counted = as_axes(ax), unit_for(length, unit)
     with figure_style(ax):
         ax = small_axes(3.4, 2.6) if ax is None else ax
         for label, volumes in curves.items():
             if np.shape(volumes) != radii.shape:
                 raise InvalidInput(label, np.shape(volumes), f"volumes of {radii.shape} radii")
-            volume = np.asarray(volumes) / unit.size**3
-            ax.plot(unit.of(radii), volume, linewidth=1.2, label=label)
+            ax.plot(counted.of(radii), counted.of(volumes, 3), linewidth=1.2, label=label)
         for value, name, style in ((exact, "exact", "-"), (convex, "convex hull", ":")):
             if value is not None:
-                ax.axhline(value / unit.size**3, color="0.3", lw=0.8, ls=style, label=name)
-        ax.set(xscale="log", xlabel=unit.label("radius α"), ylim=(0, None))
-        ax.set_ylabel(unit.label("V", 3))
+                ax.axhline(float(counted.of(value, 3)), color="0.3", lw=0.8, ls=style, label=name)
+        ax.set(xscale="log", xlabel=counted.label("radius α"), ylim=(0, None))
+        ax.set_ylabel(counted.label("V", 3))
         ax.legend(loc="lower right")
     return ax

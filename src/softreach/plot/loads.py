@@ -13,7 +13,7 @@ from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.picture.projection import View, is_mirrored, project, view_axes
 from softreach.plot.arm import arm_points, draw_arms, plot_arm, shapes_of
 from softreach.plot.axes import Panel, bounding_box
-from softreach.plot.lengths import in_lengths
+from softreach.plot.lengths import Unit, unit_for
 from softreach.plot.style import figure_style, panel_arguments, small_axes
 from softreach.rod.tip_map import TipStatus
 from softreach.schema import a_configuration
@@ -48,6 +48,7 @@ def plot_equilibria(
     ax: Axes | None = None,
     view: View = "front",
     box: ArrayLike | None = None,
+    unit: Unit = None,
 ) -> Axes:
     """Draw every equilibrium of an arm: stable ones solid, unstable ones dashed.
 
@@ -60,9 +61,10 @@ def plot_equilibria(
         ax: Axes to draw in; None for a new figure.
         view: As in `plot_cloud`.
         box: What to show, lower and upper corner [m], shape (2, 3); None for all that is drawn.
+        unit: As in `plot_arm`.
 
     Returns:
-        The axes, in L.
+        The axes, in that unit.
 
     Raises:
         InvalidInput: Unknown view.
@@ -77,19 +79,21 @@ def plot_equilibria(
     stable = equilibria.status == TipStatus.STABLE
     pale = [shapes[k] for k in np.flatnonzero(stable) if k != equilibria.followed]
     followed = [] if equilibria.followed is None else [shapes[equilibria.followed]]
-    circles = {k: _circle(equilibria, k) for k, ring in enumerate(equilibria.is_ring) if ring}
+    counted = unit_for(arm.length, unit)
+    rings = [k for k, ring in enumerate(equilibria.is_ring) if ring]
+    circles = {k: counted.of(_circle(equilibria, k)) for k in rings}
     with figure_style(ax):
         rim = _rim(float(arm.profile.radius(0.0)))
-        rim = equilibria.rod.pose.to_world(rim) / arm.length
-        points = [rim, *(arm_points(arm, shape) for shape in shapes), *circles.values()]
-        panel = Panel.opened(np.concatenate(points), in_lengths(arm.length), ax, view, box)
+        rim = counted.of(equilibria.rod.pose.to_world(rim))
+        points = [rim, *(arm_points(arm, shape, counted) for shape in shapes), *circles.values()]
+        panel = Panel.opened(np.concatenate(points), counted, ax, view, box)
         draw_arms(panel, arm, pale, range(arm.bundles), _PALE)
         draw_arms(panel, arm, followed, range(arm.bundles))
         for k, circle in circles.items():
             color = _STABLE if stable[k] else _UNSTABLE
             _line(panel, circle, color=color, linestyle=":", linewidth=0.8)
         for k, shape in enumerate(shapes):
-            _line(panel, shape["position"].values / arm.length, **_style(equilibria, k))
+            _line(panel, counted.of(shape["position"].values), **_style(equilibria, k))
         _line(panel, rim, color="0.2", linewidth=2.0)
         _gravity_arrow(panel, equilibria)
         _add_legend(panel.ax, own_figure=ax is None)
@@ -106,6 +110,7 @@ def plot_compliance(
     force: float | None = None,
     rest: bool = False,
     box: ArrayLike | None = None,
+    unit: Unit = None,
 ) -> Axes:
     """Draw an arm with the ellipsoids over which a small force in any direction moves its tip.
 
@@ -120,9 +125,10 @@ def plot_compliance(
         force: Size of the force [N]; None for a round one.
         rest: Whether to draw the arm at rest too.
         box: What to show, lower and upper corner [m], shape (2, 3); None for all that is drawn.
+        unit: As in `plot_arm`.
 
     Returns:
-        The axes, in L.
+        The axes, in that unit.
 
     Raises:
         InvalidInput: Unknown view, a force that is not positive, or another number of compliances.
@@ -141,13 +147,14 @@ def plot_compliance(
     force = _round_force(matrices, arm.length) if force is None else force
     if not 0 < force < np.inf:
         raise InvalidInput("force", force, "> 0 N")
-    tips = np.array([shape["position"].values[-1] for shape in shapes]) / arm.length
-    axes = force * matrices / arm.length
+    counted = unit_for(arm.length, unit)
+    tips = counted.of([shape["position"].values[-1] for shape in shapes])
+    axes = counted.of(force * matrices)
     with figure_style(ax):
         if box is None:
-            surfaces = [arm_points(arm, shape) for shape in shapes]
-            box = arm.length * bounding_box(*surfaces, *_ends(tips, axes))
-        ax = plot_arm(arm, configuration, ax=ax, view=view, rest=rest, box=box)
+            surfaces = [arm_points(arm, shape, counted) for shape in shapes]
+            box = counted.size * bounding_box(*surfaces, *_ends(tips, axes))
+        ax = plot_arm(arm, configuration, ax=ax, view=view, rest=rest, box=box, unit=counted)
         for outline in _outlines(tips, axes, view):
             ax.fill(*outline, facecolor=_COLOR, alpha=0.3, zorder=3)
             ax.plot(*outline, color=_COLOR, linewidth=0.8, zorder=3)
@@ -216,14 +223,14 @@ def _line(panel: Panel, points: Array, **style: Any) -> None:
 
 
 def _circle(equilibria: AllEquilibria, k: int) -> Array:
-    """Circle of tips of a ring of equilibria [L]."""
+    """Circle of tips of a ring of equilibria [m]."""
     assert equilibria.solver is not None
     pose = equilibria.rod.pose
     axis, tip = equilibria.solver.tables.axes[0], pose.to_base(equilibria.tips[k])
     angle = np.linspace(0.0, 2.0 * np.pi, 97)[:, None]
     along, across = (tip @ axis) * axis, np.cross(axis, tip)
     turned = along + np.cos(angle) * (tip - along) + np.sin(angle) * across
-    return pose.to_world(turned) / equilibria.rod.length
+    return pose.to_world(turned)
 
 
 def _rim(radius: float) -> Array:

@@ -20,7 +20,7 @@ from softreach.plot.coloring import (
     color_samples,
     draw_key,
 )
-from softreach.plot.lengths import common_unit, unit_of
+from softreach.plot.lengths import Unit, common_unit, unit_of
 from softreach.plot.style import (
     LENGTH,
     SIZE,
@@ -69,6 +69,7 @@ def plot_distance(
     size: float | None = None,
     key: bool = True,
     box: ArrayLike | None = None,
+    unit: Unit = None,
 ) -> Axes:
     """Draw the evaluated tips, their color D̄; isolated ones are light gray and behind.
 
@@ -83,9 +84,10 @@ def plot_distance(
         size: As in `plot_cloud`.
         key: As in `plot_cloud`.
         box: As in `plot_cloud`.
+        unit: As in `plot_cloud`.
 
     Returns:
-        The axes, in L if the cloud knows it, else in meters.
+        The axes, in that unit.
 
     Raises:
         InvalidInput: Unknown view, or no finite tip.
@@ -95,9 +97,10 @@ def plot_distance(
     high = largest_distance([distance]) if high is None else as_number("high", high, POSITIVE)
     size, key = None if size is None else as_number("size", size, SIZE), as_flag("key", key)
     (ax, box), values = panel_arguments(ax, view, box), distance.values
-    tips = drawn_tips(cloud)[distance["sample"].values]
+    counted = unit_of(cloud["tip"], unit)
+    tips = drawn_tips(cloud, counted)[distance["sample"].values]
     with figure_style(ax):
-        panel = Panel.opened(tips, unit_of(cloud["tip"]), ax, view, box)
+        panel = Panel.opened(tips, counted, ax, view, box)
         buffer = panel.buffer(oversample=2)
         seen = project(tips, view)
         seen[np.isnan(values), 2] -= 10.0 * np.ptp(panel.box)  # behind all others
@@ -154,6 +157,7 @@ def plot_redundancy(
     bundles: Mapping[str, str | int] | None = None,
     thickness: float | None = None,
     width: float = 6.9,
+    unit: Unit = None,
 ) -> Figure:
     """Draw clouds, their slabs through the base and D̄ of several designs (figures 4b-d).
 
@@ -163,6 +167,7 @@ def plot_redundancy(
         bundles: Name or index of the bundle whose |γ| colors each cloud; None for the last.
         thickness: Of the slabs [m]; None as in `plot_slab`.
         width: Of the figure [inch].
+        unit: As in `plot_cloud`.
 
     Returns:
         The figure: a row for each title with the cloud from the front, the slabs from the front and
@@ -180,8 +185,9 @@ def plot_redundancy(
     width = as_number("width", width, WIDTH)
     if not clouds or set(clouds) != set(distances):
         raise InvalidInput("distances", sorted(distances), f"of the clouds {sorted(clouds)}")
-    common_unit([unit_of(cloud["tip"]) for cloud in clouds.values()])
-    box = bounding_box(*(drawn_tips(cloud) for cloud in clouds.values()))
+    units = {title: unit_of(cloud["tip"], unit) for title, cloud in clouds.items()}
+    common_unit([*units.values()])
+    box = bounding_box(*(drawn_tips(cloud, units[title]) for title, cloud in clouds.items()))
     high = largest_distance(distances.values())
     with figure_style():
         figure, rows = _rows(list(clouds), box, width)
@@ -190,7 +196,8 @@ def plot_redundancy(
             last = bundle_activations(cloud).shape[1] - 1
             coloring = color_samples(cloud, last if bundles is None else bundles[title])
             rgb = coloring.rgb / 255
-            shared = {"box": box * unit_of(cloud["tip"]).size, "key": False}
+            counted = units[title]
+            shared = {"box": box * counted.size, "key": False, "unit": counted}
             plot_cloud(cloud, ax=row["cloud"], color=rgb, **shared)
             for view in _SLABS:
                 slab = {"view": view, "thickness": thickness, "color": rgb}

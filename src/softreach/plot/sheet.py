@@ -18,7 +18,7 @@ from softreach.plot.arm import plot_arm
 from softreach.plot.axes import bounding_box, view_extent
 from softreach.plot.clouds import drawn_tips, plot_cloud, point_size
 from softreach.plot.coloring import bundle_activations, bundle_names, color_samples, draw_figure_key
-from softreach.plot.lengths import unit_of
+from softreach.plot.lengths import Unit, unit_of
 from softreach.plot.metric_map import SheetAxis
 from softreach.plot.style import DPI, WIDTH, as_box, figure_style, pyplot
 from softreach.schema import a_cloud
@@ -138,6 +138,7 @@ def plot_opposite_sides(
     view: View = "oblique",
     box_over_length: ArrayLike | None = None,
     width: float = 6.9,
+    unit: Unit = None,
 ) -> Figure:
     """Clouds from two opposing sides, one column each, with their arms at rest (figure 2b).
 
@@ -147,6 +148,7 @@ def plot_opposite_sides(
         box_over_length: What each panel shows, lower and upper corner in L [-], shape (2, 3); None
             for all points.
         width: Of the figure [inch].
+        unit: Of the axes, as in `plot_cloud`.
 
     Raises:
         InvalidInput: No clouds, clouds of different bundles, an unknown view, or no finite tip.
@@ -170,8 +172,8 @@ def plot_opposite_sides(
             box = shown * arm.length
             panels[0, k].set_title(f"({k + 1})  {title}", pad=4)
             for ax, side in zip(panels[:, k], sides, strict=True):
-                plot_cloud(cloud, ax=ax, view=side, key=False, box=box)
-                plot_arm(arm, ax=ax, view=side, box=box)
+                plot_cloud(cloud, ax=ax, view=side, key=False, box=box, unit=unit)
+                plot_arm(arm, ax=ax, view=side, box=box, unit=unit)
         draw_figure_key(figure, color_samples(next(iter(clouds.values()))).key, 0.09)
     return figure
 
@@ -259,9 +261,10 @@ def _columns(ax: Axes) -> int:
 
 def _cloud_image(cloud: xr.Dataset, columns: int, box: Array, view: View) -> ZBuffer:
     extent = panel_extent(box, view)
-    if not unit_of(cloud["tip"]).relative:
+    unit = unit_of(cloud["tip"])
+    if not unit.relative:
         raise InvalidInput("cloud.tip.attrs['length']", None, "L [m], the unit of the sheet")
-    tips = drawn_tips(cloud)
+    tips = drawn_tips(cloud, unit)
     pixels = point_size(len(tips), box) * columns / (extent.right - extent.left)
     buffer = ZBuffer(extent, columns, oversample=2, color_step=8)
     colors = activation_colors(bundle_activations(cloud).values)
@@ -289,4 +292,4 @@ def _draw_scale(figure: Figure, panel: Axes, view: View) -> None:
 
 
 def _around(clouds: Mapping[str, xr.Dataset]) -> ArrayLike:
-    return bounding_box(*(drawn_tips(cloud) for cloud in clouds.values()))
+    return bounding_box(*(drawn_tips(cloud, unit_of(cloud["tip"])) for cloud in clouds.values()))

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from softreach.picture.projection import View, is_mirrored, plane_of, sight_axis
-from softreach.plot.lengths import LengthUnit, unit_of
+from softreach.plot.lengths import Unit, unit_of
 from softreach.plot.style import PLACE, WIDTH, as_axes, figure_style, pyplot, small_axes
 from softreach.support.arguments import as_dataset, as_flag, as_number
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput
+from softreach.support.units import LengthUnit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,6 +33,7 @@ def plot_slice(
     view: View = "front",
     at: float = 0.0,
     key: bool = True,
+    unit: Unit = None,
 ) -> Axes:
     """Draw one plane of a reachable set: the number of activations that reach each place.
 
@@ -44,9 +46,11 @@ def plot_slice(
         view: A view along an axis: "front" for a plane y = at, "side" for x = at, "top" for z = at.
         at: Where the plane cuts that axis [m]; the nearest layer of cells is shown.
         key: Whether to explain the colors.
+        unit: Of the axes: "m", "cm", "mm" or "L"; None for L if the grid knows it (attribute
+            `length`), else m.
 
     Returns:
-        The axes, in L if the grid knows it (attribute `length`), else in meters.
+        The axes, in that unit.
 
     Raises:
         InvalidInput: Not a view along an axis, or a plane that misses the grid.
@@ -54,19 +58,23 @@ def plot_slice(
     """
     grid, ax = as_dataset("grid", grid, "x", "y", "z"), as_axes(ax)
     at, key = as_number("at", at, PLACE), as_flag("key", key)
-    axis, unit = sight_axis(view), unit_of(grid)
+    axis, counted = sight_axis(view), unit_of(grid, unit)
     layer = _layer(grid, axis, at)
     with figure_style(ax):
         ax = small_axes(3.4, 4.2) if ax is None else ax
-        highest = _draw(ax, layer, view, unit)
-        ax.set_title(f"{axis} = {unit.of(at):.3g} {unit.symbol}")
+        highest = _draw(ax, layer, view, counted)
+        ax.set_title(f"{axis} = {counted.of(at):.3g} {counted.name}")
         if key:
             _draw_key(ax, highest, "count" in layer)
     return ax
 
 
 def plot_slices(
-    grid: xr.Dataset, *, at: Sequence[float] = (0.0, 0.0, 0.0), width: float = 9.6
+    grid: xr.Dataset,
+    *,
+    at: Sequence[float] = (0.0, 0.0, 0.0),
+    width: float = 9.6,
+    unit: Unit = None,
 ) -> Figure:
     """Draw the three planes of a reachable set that meet at a point: from the side, front and top.
 
@@ -74,6 +82,7 @@ def plot_slices(
         grid: As in `plot_slice`.
         at: The point [m].
         width: Of the figure [inch].
+        unit: As in `plot_slice`.
 
     Raises:
         InvalidInput: Not a point, or one outside the grid.
@@ -87,7 +96,7 @@ def plot_slices(
         size = (width, 0.375 * width)
         figure, axes = pyplot().subplots(1, 3, figsize=size, layout="constrained")
         for ax, view, place in zip(axes, ("side", "front", "top"), point.tolist(), strict=True):
-            plot_slice(grid, ax=ax, view=view, at=place)
+            plot_slice(grid, ax=ax, view=view, at=place, unit=unit)
     return figure
 
 

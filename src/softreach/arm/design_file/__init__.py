@@ -9,13 +9,14 @@ from softreach.arm.design_file.read import (
     parse,
     text_of,
 )
-from softreach.arm.design_file.write import render
+from softreach.arm.design_file.write import display_text, render
 from softreach.support.files.kinds import FileKind, Formats
 
 __all__ = [
     "DESIGN_FILE",
     "LONGEST",
     "Parts",
+    "display_text",
     "document_of",
     "in_file_terms",
     "parse",

@@ -30,6 +30,7 @@ from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.section import Ring, Section, name_faults
 from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError
 from softreach.support.files.text import read_text
+from softreach.support.units import UNITS
 
 __all__ = ["LONGEST", "Parts", "document_of", "is_design", "parse", "text_of"]
 
@@ -45,6 +46,7 @@ LAYOUT: Mapping[str, tuple[type, bool]] = {
     "actuators": (list, True),
     "loads": (dict, False),
     "base": (dict, False),
+    "display": (dict, False),
 }
 """Keys at the top of a file, their types, and whether they are required."""
 
@@ -57,6 +59,7 @@ class Parts(NamedTuple):
     actuators: tuple[Actuator, ...]
     loads: Loads | None
     base: Base
+    display_unit: str | None
 
 
 def text_of(path: str | PathLike[str]) -> str:
@@ -148,6 +151,7 @@ class _DesignReader(TableReader):
         loads = None if raw is None else self.part(Loads, raw, "loads")
         raw = self._table("base")
         base = Base() if raw is None else self.part(Base, raw, "base")
+        unit = self._display_unit()
         names = [table.get("name") if isinstance(table, dict) else None for table in tables or ()]
         self.faults += name_faults(names, "actuators")
         if profile is None or section is None:
@@ -156,7 +160,19 @@ class _DesignReader(TableReader):
         self._check_fit(profile, section, sound)
         if loads is not None:
             self.faults += self._of_section(loads.section_faults(section, profile.length))
-        return Parts(profile, section, tuple(actuator for _, actuator in sound), loads, base)
+        return Parts(profile, section, tuple(actuator for _, actuator in sound), loads, base, unit)
+
+    def _display_unit(self) -> str | None:
+        """Unit that the table of the display names, if there is one."""
+        raw = self._table("display") or {}
+        for key in raw:
+            if key != "unit":
+                said = unknown_key(key, {"unit": "unit"})
+                self.refused(f"display.{key_text(key)}", raw[key], said)
+        unit = raw.get("unit")
+        if unit is not None and unit not in UNITS:
+            self.refused("display.unit", unit, f"must be one of {', '.join(UNITS)}")
+        return unit
 
     def _check_layout(self) -> None:
         """Top of the file: keys that are unknown or missing, and values of another type."""

@@ -15,6 +15,7 @@ from softreach.arm.material import Material
 from softreach.arm.number import Number
 from softreach.arm.section import Ring, Section
 from softreach.support.errors import Range
+from softreach.support.units import UNITS
 
 __all__ = ["json_schema"]
 
@@ -72,6 +73,12 @@ def json_schema() -> dict[str, Any]:
         },
         "loads": _of("loads"),
         "base": _of("base"),
+        "display": {
+            "description": "How the design is shown; it changes nothing about the arm",
+            **_object(
+                {"unit": {"enum": [*UNITS], "description": "Unit of lengths; L is the arm's"}}, []
+            ),
+        },
     }
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",

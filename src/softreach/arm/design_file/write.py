@@ -24,7 +24,7 @@ from softreach.arm.profile import Profile
 from softreach.arm.section import Section
 from softreach.support.errors import Fault, InvalidDesign
 
-__all__ = ["render"]
+__all__ = ["display_text", "render"]
 
 _ALWAYS = {"activation_bounds", "gravity", "offset", "taper"}
 """Fields that are written even where they are the default, for people to change."""
@@ -70,6 +70,11 @@ def render(
     if not base.is_identity:
         blocks.append(["[base]", *_lines(base)])
     return "\n\n".join("\n".join(block) for block in blocks) + "\n"
+
+
+def display_text(unit: str | None) -> str:
+    """Text that follows a design in a file which says in what unit to show it."""
+    return "" if unit is None else f"\n[display]\nunit = {value_text(unit)}\n"
 
 
 def _profile_lines(profile: Profile) -> Iterator[str]:

@@ -1,0 +1,169 @@
+"""Units of length that a user chooses: places, areas and volumes shown and written in them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from softreach.support.arguments import as_given
+from softreach.support.errors import InvalidInput
+from softreach.support.quantity import quantity, read_number, read_quantity, unit_names
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from softreach.support.arrays import Array
+
+__all__ = [
+    "METER",
+    "TYPED",
+    "UNITS",
+    "LengthUnit",
+    "as_unit",
+    "handy_unit",
+    "in_lengths",
+    "lengths_in",
+    "read_length",
+]
+
+UNITS = ("m", "cm", "mm", "L")
+"""Names of the units; L is the length of an arm."""
+
+TYPED = ", ".join(unit_names("m"))
+"""Units that lengths may be typed in, beside L where the arm is known."""
+
+_SIZES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+_VOLUMES = {"m": ("m³", 1.0), "cm": ("liters", 1e-3), "mm": ("mL", 1e-6)}
+"""Unit of length -> that of volumes beside it, and its size [m³]. L alone is never a liter here."""
+
+_SUPERSCRIPTS = {1: "", 2: "²", 3: "³"}
+
+
+class LengthUnit(NamedTuple):
+    """A unit of length with those of areas and volumes beside it."""
+
+    name: str
+    """One of `UNITS`."""
+    size: float
+    """[m]; of L, the length of the arm."""
+
+    @property
+    def relative(self) -> bool:
+        """True if it is L, the length of the arm."""
+        return self.name == "L"
+
+    def of(self, values: ArrayLike, power: int = 1) -> Array:
+        """Lengths [m] in this unit; areas [m²] for power 2, volumes [m³] for 3."""
+        import numpy as np  # the command line reads units before it needs arrays
+
+        plain, scale = np.asarray(values, float), self.scale(power)
+        return plain if scale == 1.0 else plain / scale
+
+    def symbol(self, power: int = 1) -> str:
+        """Behind a number: "mm", "mm²", "mL"."""
+        if power == 3 and not self.relative:
+            return _VOLUMES[self.name][0]
+        return self.name + _SUPERSCRIPTS[power]
+
+    def label(self, name: str, power: int = 1) -> str:
+        """Of an axis with lengths, areas or volumes, such as "x / L", "x [mm]" or "V [mL]"."""
+        symbol = self.symbol(power)
+        return f"{name} / {symbol}" if self.relative else f"{name} [{symbol}]"
+
+    def text(self, value: float, power: int = 1, error: float = math.nan) -> str:
+        """A value in SI units to the first digit of its error, such as "312.4 ± 0.2 mL"."""
+        scale = self.scale(power)
+        return quantity(value / scale, self.symbol(power), error / scale)
+
+    def scale(self, power: int = 1) -> float:
+        """Size of the unit of lengths [m], of areas [m²] for power 2, of volumes [m³] for 3."""
+        if power == 3 and not self.relative:
+            return _VOLUMES[self.name][1]
+        return self.size**power
+
+
+METER = LengthUnit("m", 1.0)
+
+
+def in_lengths(length: float | None) -> LengthUnit:
+    """L for a given length [m], the meter for None.
+
+    Raises:
+        InvalidInput: A length that is not positive.
+    """
+    if length is None:
+        return METER
+    if not length > 0:
+        raise InvalidInput("length", length, "> 0 m")
+    return LengthUnit("L", length)
+
+
+def as_unit(unit: object, length: float | None = None) -> LengthUnit:
+    """The unit of that name.
+
+    Args:
+        unit: One of `UNITS`, or a unit.
+        length: L [m] of the arm; None where it is not known, and L no unit.
+
+    Raises:
+        InvalidInput: No such unit, or L where it is not known.
+    """
+    if isinstance(unit, LengthUnit):
+        return unit
+    name = unit if isinstance(unit, str) else ""
+    if name == "L" and length is not None:
+        return in_lengths(length)
+    if name in _SIZES:
+        return LengthUnit(name, _SIZES[name])
+    known = UNITS if length is not None else tuple(_SIZES)
+    hint = "the length L of the arm is not known here" if name == "L" else ""
+    raise InvalidInput("unit", as_given(unit), f"one of {', '.join(known)}", hint)
+
+
+def handy_unit(length: float) -> str:
+    """The unit for an arm of that length [m]: mm below a meter, m from there."""
+    return "mm" if length < 1.0 else "m"
+
+
+def read_length(text: str, length: float | None = None) -> float:
+    """A length [m] as it is typed: "80mm", "0.08" in m, or "0.1L".
+
+    Args:
+        text: A number and its unit.
+        length: L [m]; None where it is not known, and L no unit.
+
+    Raises:
+        ValueError: No finite number, or another unit.
+    """
+    text = text.strip()
+    if length is not None and text.endswith("L"):
+        return length * read_number(text[:-1])
+    return read_number(text) if _is_number(text) else read_quantity(text, "m")
+
+
+def lengths_in(text: str, count: int, length: float | None = None) -> list[float] | None:
+    """Comma-separated lengths [m], each with its unit or all without.
+
+    Args:
+        text: What was typed.
+        count: How many there must be.
+        length: As in `read_length`.
+
+    Returns:
+        The lengths; None if the text is anything else.
+    """
+    parts = text.split(",")
+    if len(parts) != count or len({_is_number(part) for part in parts}) != 1:
+        return None
+    try:
+        return [read_length(part, length) for part in parts]
+    except ValueError:
+        return None
+
+
+def _is_number(text: str) -> bool:
+    try:
+        read_number(text)
+    except ValueError:
+        return False
+    return True
