@@ -82,6 +82,7 @@ def test_a_design_that_kills_its_workers_is_given_up_and_the_rest_goes_on(tmp_pa
     assert (status.done, status.messages) == (15, {3: "its worker died repeatedly"})
 
 
+@pytest.mark.large
 def test_dask_workers_survive_the_death_of_one(whole, tmp_path):
     pytest.importorskip("distributed")
     store = tmp_path / "a.zarr"

@@ -45,6 +45,7 @@ for values in results:
 """
 
 
+@pytest.mark.large
 def test_runs_that_compile_at_once_have_the_numbers_of_those_that_load(tmp_path):
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
 
