@@ -34,6 +34,15 @@ def trunk() -> Manipulator:
     return designs.minimal_trunk()
 
 
+@pytest.fixture(scope="session", autouse=True)
+def coarse() -> Iterator[None]:
+    """Few pixels, since laws do not depend on their number."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in ("axes", "sheet", "style"):
+            patch.setattr(f"softreach.plot.{module}.DPI", 60)
+        yield
+
+
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(7)

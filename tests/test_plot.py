@@ -21,12 +21,6 @@ def close_figures():
     plt.close("all")
 
 
-@pytest.fixture
-def coarse(monkeypatch):
-    """Few pixels, for laws that do not depend on their number."""
-    monkeypatch.setattr("softreach.plot.axes.DPI", 60)
-
-
 @pytest.fixture(scope="module")
 def cloud(trunk):
     return sr.compute_cloud(trunk, n=2000, seed=1)
@@ -94,7 +88,6 @@ class TestColors:
 
 class TestFigures:
     @pytest.mark.parametrize("view", [*VIEWS, (1.0, -0.3)])
-    @pytest.mark.usefixtures("coarse")
     def test_axes_contain_the_data(self, view, cloud):
         ax = plot_cloud(cloud, view=view)
         seen = project(cloud.tip.values, view)
@@ -104,7 +97,6 @@ class TestFigures:
         assert ax.get_ylim()[0] < seen[:, 1].min() < seen[:, 1].max() < ax.get_ylim()[1]
 
     @pytest.mark.parametrize("view", ["front", "back", "side", "left", "top"])
-    @pytest.mark.usefixtures("coarse")
     def test_the_image_lies_under_its_coordinates(self, view, cloud):
         """One far sample is found again where the axes say it is."""
         one = cloud.isel(sample=[int(cloud.tip.values[:, 0].argmax())])
@@ -121,7 +113,6 @@ class TestFigures:
         np.testing.assert_allclose(found, there[view], atol=1.1 / rows)
         assert (ax.xaxis_inverted(), left > right) == ((view in ("back", "left"),) * 2)
 
-    @pytest.mark.usefixtures("coarse")
     def test_coordinates_are_counted_in_lengths(self, trunk, cloud):
         small = sr.designs.minimal_trunk(length=0.2)
         scaled = cloud.copy(deep=True)
@@ -134,13 +125,11 @@ class TestFigures:
             np.testing.assert_allclose(*limits)
             assert panels[0].get_xlabel().endswith("/ L")
 
-    @pytest.mark.usefixtures("coarse")
     def test_views_of_a_thin_arm_fit_a_page(self, trunk):
         thin = trunk.with_bounds([(0, 0)] * 3)
         width, height = plot_views(sr.compute_cloud(thin, 10), thin).get_size_inches()
         assert height < 1.5 * width
 
-    @pytest.mark.usefixtures("coarse")
     def test_orthogonal_views_share_one_scale(self, trunk, cloud, bent):
         front, side, top, _ = plot_views(cloud, trunk, bent).axes
         scales = []
@@ -151,7 +140,6 @@ class TestFigures:
         np.testing.assert_allclose(front.get_ylim(), side.get_ylim())
         np.testing.assert_allclose(front.get_xlim(), top.get_xlim())
 
-    @pytest.mark.usefixtures("coarse")
     def test_axes_of_the_caller_are_used_and_grow(self, trunk, cloud, bent):
         _, mine = plt.subplots()
         assert plot_arm(trunk, ax=mine) is mine

@@ -71,7 +71,14 @@ def test_a_local_minimum_larger_than_the_activation_drawn_is_left(bundles, seed,
     assert changes(found)[0] <= np.linalg.norm(gamma) * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("place", ["interior", "faces", "edges", "corners"])
+@pytest.mark.parametrize(
+    "place",
+    [
+        "interior",
+        "edges",
+        *(pytest.param(p, marks=pytest.mark.large) for p in ("faces", "corners")),
+    ],
+)
 def test_four_bundles_are_proved_to_change_least(place):
     arm = designs.redundant_trunk()
     targets = tip_positions(arm, activations(arm, 12, place, seed=2))

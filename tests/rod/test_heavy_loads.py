@@ -143,6 +143,7 @@ def test_an_arm_squeezed_to_nothing_has_no_equilibrium(share):
     assert np.isnan(found.tips).all()
 
 
+@pytest.mark.large
 def test_steps_of_an_arm_that_never_rests_are_no_fewer_than_those_of_the_free_one():
     arm = stubby(1.5).arm
     rod = LoadedRod(arm.with_bounds(np.full((3, 2), [-1e-3, 0.0])), 1e-4)

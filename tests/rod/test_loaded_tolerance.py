@@ -40,7 +40,14 @@ def samples(box, inside=300):
 
 
 @pytest.mark.parametrize(
-    ("taper_deg", "load"), [(0, 0.1), (0, 12), (2, 2.5), (2, 12), (3, 0.1), (3, 8), (3, 12)]
+    ("taper_deg", "load"),
+    [
+        (0, 12),
+        (2, 2.5),
+        (3, 0.1),
+        (3, 12),
+        *(pytest.param(*case, marks=pytest.mark.large) for case in [(0, 0.1), (2, 12), (3, 8)]),
+    ],
 )
 @pytest.mark.parametrize("gravity", [UP, SIDE, DOWN], ids=["up", "side", "down"])
 def test_the_tolerance_is_kept_over_the_box(gravity, taper_deg, load):
