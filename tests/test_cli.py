@@ -224,6 +224,29 @@ class TestVolume:
         assert trimesh.load("hull.ply").volume == pytest.approx(facts["volume_L3"], rel=1e-6)
 
 
+class TestReach:
+    ARM = ("reach", "three_tendon_robot", "--accuracy", "0.2")  # its set misses the plane z = 0
+
+    def test_slices_are_drawn_where_the_set_is_or_where_asked(self, folder, capsys):
+        pytest.importorskip("matplotlib")
+        assert run([*self.ARM, "--out", "a.png"]) == 0
+        assert run([*self.ARM, "--out", "b.png", "--at", "0,0,0.19"]) == 0
+        assert (folder / "a.png").read_bytes() != (folder / "b.png").read_bytes()
+
+    def test_what_was_computed_is_printed_and_saved_before_a_picture_fails(self, folder, capsys):
+        pytest.importorskip("matplotlib")
+        outs = ["--out", "a.png", "--out", "a.ply", "--at", "0,0,9"]
+        assert run([*self.ARM, *outs]) == 2
+        streams = capsys.readouterr()
+        assert "volume" in streams.out
+        assert "at = 9.0: must be between" in streams.err
+        assert [path.name for path in folder.iterdir()] == ["a.ply"]
+
+    def test_a_place_without_slices_is_refused(self, capsys):
+        assert run([*self.ARM, "--at", "0,0,0.1"]) == 2
+        assert "left out without a picture" in capsys.readouterr().err
+
+
 class TestShow:
     @pytest.mark.parametrize(
         "options",

@@ -57,15 +57,15 @@ def equilibria(
     check_picture(out, overwrite)
     arm = design_from(design, changes)
     result = all_of(arm, activation_of(activation, arm))
+    if json:
+        console.json(_record(result))
+    else:
+        _print(result)
     if out is not None:
         from softreach import plot
 
         figure = plot.plot_equilibria(result, view=view or "oblique")
         plot.save_figure(figure, out, overwrite=overwrite)
-    if json:
-        console.json(_record(result))
-    else:
-        _print(result)
 
 
 def _record(result: AllEquilibria) -> dict[str, object]:

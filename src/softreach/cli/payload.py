@@ -50,10 +50,6 @@ def payload(
     with progress.bar("computing volumes", None) as step:
         curve = payload_curve(arm, masses, accuracy=accuracy, progress=step)
         largest = curve.largest_payload(share)
-    if out is not None:
-        from softreach.plot import plot_payload_curve, save_figure
-
-        save_figure(plot_payload_curve(curve, largest=[largest]), out, overwrite=overwrite)
     cube = arm.length**3
     rows: Rows = {
         "payloads": (curve.payloads.tolist(), "kg"),
@@ -65,3 +61,7 @@ def payload(
         "largest payload error": (largest.payload_error, "kg"),
     }
     console.rows(f"payload of {design}", rows, json)
+    if out is not None:
+        from softreach.plot import plot_payload_curve, save_figure
+
+        save_figure(plot_payload_curve(curve, largest=[largest]), out, overwrite=overwrite)

@@ -10,7 +10,15 @@ from cyclopts import Parameter
 from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import Rows, console
 from softreach.cli.design import load_rows
-from softreach.cli.options import AsJson, Design, Overwrite, check_output, out_option
+from softreach.cli.options import (
+    OUTPUT,
+    AsJson,
+    Design,
+    Overwrite,
+    check_output,
+    out_option,
+    refuse,
+)
 from softreach.cli.values import NUMBER
 from softreach.support.errors import InvalidInput
 
@@ -30,8 +38,16 @@ def reach(
     out: Annotated[
         list[Path] | None,
         out_option(
-            "Write the boundary (.ply .stl .obj .glb .vtu .vtk), or draw slices through the base "
-            "(.png .pdf .svg). May be repeated."
+            "Write the boundary (.ply .stl .obj .glb .vtu .vtk), or draw slices (.png .pdf .svg). "
+            "May be repeated."
+        ),
+    ] = None,
+    at: Annotated[
+        str | None,
+        Parameter(
+            group=OUTPUT,
+            help="Point x,y,z [m] that the slices meet at: the middle of the set if left out.",
+            allow_leading_hyphen=True,
         ),
     ] = None,
     overwrite: Overwrite = False,
@@ -44,20 +60,24 @@ def reach(
 
     Example: softreach reach minimal_trunk --out reach.stl --out reach.png
     """
+    from softreach.inverse.request import position_in
     from softreach.support import progress
     from softreach.workspace import reachable_set
 
     arm = design_from(design, changes)
-    outs = out or []
+    outs = sorted(out or [], key=_is_picture)  # pictures come last
     _check_outputs(arm, outs, overwrite)
+    if not any(map(_is_picture, outs)):
+        refuse("left out without a picture: give --out slices.png too", at=at)
+    point = None if at is None else position_in("at", at)
     with progress.bar("mapping the activation box", None) as step:
         reached = reachable_set(arm, accuracy=accuracy, progress=step)
     rows = load_rows(arm) | _rows(reached)
     if reached.lost_share > 0.0:  # not stable, or torn
         rows["activation box left out"] = (100.0 * reached.lost_share, "%")
-    for path in outs:
-        _write(reached, path, overwrite)
     console.rows(f"reachable set of {design}", rows, json)
+    for path in outs:
+        _write(reached, path, point, overwrite)
 
 
 def _check_outputs(arm: Manipulator, outs: list[Path], overwrite: bool) -> None:
@@ -82,7 +102,9 @@ def _no_such_output(path: Path) -> InvalidInput:
     return InvalidInput("out", path, "left out for a design with so few free bundles")
 
 
-def _write(reached: ReachableSet, path: Path, overwrite: bool) -> None:
+def _write(
+    reached: ReachableSet, path: Path, point: list[float] | None, overwrite: bool
+) -> None:
     from softreach.workspace import ReachableSolid, ReachableSurface
 
     if _is_picture(path):
@@ -90,7 +112,7 @@ def _write(reached: ReachableSet, path: Path, overwrite: bool) -> None:
 
         if not isinstance(reached, ReachableSolid):
             raise _no_such_output(path)
-        save_figure(plot_slices(reached.grid), path, overwrite=overwrite)
+        save_figure(plot_slices(reached.grid, at=point), path, overwrite=overwrite)
     else:
         from softreach.export import export_mesh
 

@@ -56,11 +56,11 @@ def volume(
     bias = cloud.attrs["sampler"] == "uniform"
     concave = concave_hull(cloud.tip, radius_of(alpha, length), bias=bias)
     rows = volume_rows(concave, convex_hull(cloud.tip), length)
+    console.rows(f"volume of {source}", rows, json)
     if out is not None:
         from softreach.export import export_mesh
 
         export_mesh(concave, out, overwrite=overwrite)
-    console.rows(f"volume of {source}", rows, json)
 
 
 _BYTES = 700  # of memory that a sample and its share of the triangulation take at most
