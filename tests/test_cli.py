@@ -185,6 +185,17 @@ class TestCloud:
         for name in ("highest_tip_L", "lowest_tip_L"):
             assert short[name] == pytest.approx(long[name], rel=1e-6)
 
+    def test_a_cloud_is_named_after_its_design_and_replaces_none_of_another(self, folder, capsys):
+        changed_arm = ["cloud", "minimal_trunk", "--n", "40", "--taper-deg", "1"]
+        assert run(["cloud", "minimal_trunk", "--n", "50"]) == 0
+        assert run(["cloud", "minimal_trunk", "--n", "60"]) == 0
+        assert run(changed_arm) == 2
+        assert "or a stored cloud of the same design" in capsys.readouterr().err
+        assert sr.open_cloud("minimal_trunk.zarr").sizes["sample"] == 60
+        assert run([*changed_arm, "--overwrite"]) == 0
+        assert sr.open_cloud("minimal_trunk.zarr").sizes["sample"] == 40
+        assert [path.name for path in folder.iterdir()] == ["minimal_trunk.zarr"]
+
 
 class TestVolume:
     def test_volumes_are_those_of_the_library(self, stored, capsys):
@@ -318,6 +329,12 @@ helical_angle_deg = 0.0
             ["design", "elephant"],
             "elephant: must be a .toml file, or one of elephant_trunk, filament",
         ),
+        (["design", "minimal_trank"], 'did you mean "minimal_trunk"?'),
+        (
+            ["design", "minimal_trunk", "--set", "left.tension=3"],
+            "commands; their bounds are left.lower and left.upper",
+        ),
+        (["cloud", "minimal_trunk", "--sampler", "unifrom"], 'did you mean "uniform"?'),
         (["design", "minimal_trunk", "--tapr-deg", "3"], "Did you mean --taper-deg"),
         (
             ["design", "minimal_trunk", "--taper-deg", "steep"],
@@ -333,7 +350,15 @@ helical_angle_deg = 0.0
         ),
         (["cloud", "minimal_trunk", "--sampler", "sobol", "--n", "1000"], "512 or 1024"),
         (["cloud", "minimal_trunk", "--sampler", "grid", "--n", "999"], "9^3 = 729 or 10^3 = 1000"),
-        (["volume", "nowhere.zarr"], "must be a Zarr store written by softreach"),
+        (
+            ["volume", "nowhere.zarr"],
+            "nowhere.zarr: must be a Zarr store written by softreach; it does not exist",
+        ),
+        (
+            ["atlas", "status", "nowhere.zarr"],
+            "must be an atlas written by build_atlas; it does not exist",
+        ),
+        (["studio", "nowhere.zarr", "--no-open"], "it does not exist"),
         (["volume", "minimal_trunk", "--n", "9", "--alpha", "wide"], "alpha = wide"),
         (["volume", "minimal_trunk", "--n", "9", "--alpha=-1L"], "alpha = -1L"),
         (["show", "minimal_trunk", "--n", "9", "--color", "pink"], "left, right, longitudinal"),

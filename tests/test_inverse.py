@@ -12,6 +12,7 @@ from softreach.inverse import Solutions, Status, branches, prepared_map, solve_i
 from softreach.rod import tip_map
 from softreach.rod.kinematics import configuration, tip_positions
 from softreach.support.errors import InvalidInput
+from softreach.workspace import reachable_set
 
 DESIGNS = [(108, 2), (75, 3), (36, 3), (0, 0)]
 
@@ -37,6 +38,19 @@ def miss_of_original(solutions: Solutions, gamma: np.ndarray) -> np.ndarray:
 def folded() -> Manipulator:
     """A design whose activations overlap: many tips have two of them."""
     return trunk_at(36, 3)
+
+
+def test_one_place_or_activation_may_stand_alone(folded):
+    gamma = [-0.9, -0.3, -0.6]
+    np.testing.assert_array_equal(tip_positions(folded, gamma), tip_positions(folded, [gamma]))
+    target = tip_positions(folded, gamma)[0]
+    np.testing.assert_array_equal(
+        solve_inverse(folded, target).activations, solve_inverse(folded, [target]).activations
+    )
+    solid = reachable_set(folded, accuracy=0.2)
+    assert solid.distance(target).tolist() == solid.distance([target]).tolist()
+    with pytest.raises(InvalidInput, match=r"targets.shape = \(2,\)"):
+        solve_inverse(folded, target[:2])
 
 
 @pytest.mark.parametrize(
@@ -275,7 +289,7 @@ def test_an_arm_its_tip_map_and_what_was_prepared_of_it_give_equal_answers(folde
 @pytest.mark.parametrize(
     ("targets", "named"),
     [
-        ([0.0, 0.0, 1.0], "targets.shape"),
+        ([0.0, 0.0, 1.0, 0.0], "targets.shape"),
         ([[0.0, 1.0]], "targets.shape"),
         ([["far", "away", "up"]], "targets"),
         ([[0.0, 0.0, 1.0], [0.0, np.nan, 1.0]], r"targets\[1\]"),

@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 
+import pytest
+
 import softreach as sr
 
 MODULES = [
@@ -228,3 +230,9 @@ def test_every_public_name_is_in_the_reference():
         and not isinstance(thing, ModuleType)
     ]
     assert missing == []
+
+
+def test_a_public_name_that_is_misspelled_is_told():
+    with pytest.raises(AttributeError, match=r'no attribute .reachable_sett.; did you mean "reach'):
+        _ = sr.reachable_sett
+    assert not hasattr(sr, "q")

@@ -115,7 +115,7 @@ NAMES = {
         stations_over_length targets z""",
     "number": """accuracy alpha alpha_over_length at cell convex direction_weight exact force
         half_width high length memory radius radius_ratio residual_over_length revolution size
-        taper thickness threshold tol width""",
+        taper thickness threshold tip_radius tol width""",
     "whole number": "bins cells count depth family n seed segments sides",
     "word": "color fiber frame method metric name quantity sampler view",
     "words": "metrics names panels parameters",

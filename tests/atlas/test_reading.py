@@ -85,7 +85,7 @@ def test_best_designs_are_the_best_that_meet_the_constraints(paper):
 
 
 def test_what_is_not_there_is_not_opened(tmp_path):
-    with pytest.raises(InvalidInput, match="an atlas written by build_atlas"):
+    with pytest.raises(InvalidInput, match="by build_atlas; it does not exist"):
         open_atlas(tmp_path / "nothing.zarr")
     assert not (tmp_path / "nothing.zarr").exists()
 

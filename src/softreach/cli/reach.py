@@ -102,9 +102,7 @@ def _no_such_output(path: Path) -> InvalidInput:
     return InvalidInput("out", path, "left out for a design with so few free bundles")
 
 
-def _write(
-    reached: ReachableSet, path: Path, point: list[float] | None, overwrite: bool
-) -> None:
+def _write(reached: ReachableSet, path: Path, point: list[float] | None, overwrite: bool) -> None:
     from softreach.workspace import ReachableSolid, ReachableSurface
 
     if _is_picture(path):

@@ -72,7 +72,7 @@ def solve_inverse(
 
     Args:
         arm: The design, its tip map, or what `prepared_map` made of it.
-        targets: Tip positions to reach [m], shape (t, 3).
+        targets: Tip positions to reach [m], shape (t, 3), or (3,) for one.
         residual_over_length: |tip - target| to which a solution is searched, in L. Where the arm
             comes no nearer than to within `tol`, its nearest activations are the solutions: whether
             it reaches such a target is more than its tips can say.

@@ -6,7 +6,7 @@ import math
 import re
 import sys
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import NamedTuple
@@ -35,6 +35,14 @@ _MOST = 50
 def counted(number: int, noun: str) -> str:
     """A number of things in words: "1 design", "2 designs"."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def did_you_mean(name: str, known: Iterable[str], cutoff: float = 0.7) -> str:
+    """A hint at the known name that is closest to an unknown one; empty if none is close."""
+    from difflib import get_close_matches
+
+    close = get_close_matches(name, list(known), n=1, cutoff=cutoff)
+    return f'did you mean "{close[0]}"?' if close else ""
 
 
 def in_short(value: object) -> str:
