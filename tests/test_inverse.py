@@ -368,6 +368,17 @@ def test_a_family_reaches_its_target_in_different_ways():
         assert np.ptp(solution.activations, axis=0).max() > 0.01
 
 
+def test_members_of_a_family_differ_and_are_fewer_where_there_are_no_more():
+    arm = designs.redundant_trunk()
+    corner = tip_positions(arm, arm.bounds[:, 0])[0]  # where a single activation leads
+    near_edge = tip_positions(arm, [-0.5, -1.0, 0.0, -1.6])[0]
+    solutions = solve_inverse(arm, [corner, near_edge], family=8)
+    assert solutions.counts.tolist() == [1, 8]
+    members = solutions[1].activations
+    apart = np.abs(members[:, None] - members).max(axis=2) + np.eye(8)
+    assert apart.min() > 1e-3
+
+
 def test_four_bundles_cannot_reach_beyond_their_length():
     solution = solve_inverse(designs.redundant_trunk(), [[0.0, 0.0, 3.0]])[0]
     assert solution.status is Status.UNREACHABLE
