@@ -69,10 +69,8 @@ def solve(
         return
     for solution, hint in zip(solutions, hints, strict=True):
         _print(solution, arm)
-        if 0 < len(solution) < count:
-            console.line(f"  no others found: further searches end at {_known(solution)}")
-        if prove_least and len(solution):
-            console.line(f"  {_proof(solution, arm)}")
+        if len(solution):
+            _print_more(solution, arm, count, prove_least)
         if hint:
             console.line(f"  {hint}")
 
@@ -131,8 +129,13 @@ def _print(solution: Solution, arm: Manipulator) -> None:
         console.line(f"  reached by {activation_text(arm, solution.nearest_activation)}")
 
 
-def _known(solution: Solution) -> str:
-    return "this one" if len(solution) == 1 else f"one of these {len(solution)}"
+def _print_more(solution: Solution, arm: Manipulator, wanted: int, prove_least: bool) -> None:
+    """Remarks on the family and the proof that were asked for."""
+    if len(solution) < wanted:
+        known = "this one" if len(solution) == 1 else f"one of these {len(solution)}"
+        console.line(f"  no others found: further searches end at {known}")
+    if prove_least:
+        console.line(f"  {_proof(solution, arm)}")
 
 
 def _proof(solution: Solution, arm: Manipulator) -> str:
