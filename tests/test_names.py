@@ -191,12 +191,13 @@ def classes_in(hint: object) -> Iterator[type]:
 
 def return_hint(function: Callable) -> object:
     """The hint of what a function returns, whatever its arguments are."""
+    import pandas
     import xarray
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     hint = function.__annotations__["return"]
-    seen = {"xr": xarray, "Axes": Axes, "Figure": Figure, "Self": object}
+    seen = {"xr": xarray, "pd": pandas, "Axes": Axes, "Figure": Figure, "Self": object}
     known = {**seen, **inspect.unwrap(function).__globals__}
     return eval(hint, known) if isinstance(hint, str) else hint
 
@@ -230,6 +231,12 @@ def test_every_public_name_is_in_the_reference():
         and not isinstance(thing, ModuleType)
     ]
     assert missing == []
+
+
+def test_the_package_says_that_it_is_typed():
+    from importlib.resources import files
+
+    assert files("softreach").joinpath("py.typed").is_file()
 
 
 def test_a_public_name_that_is_misspelled_is_told():

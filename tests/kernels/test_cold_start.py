@@ -6,6 +6,7 @@ import importlib
 import pkgutil
 import re
 
+import pytest
 from benchmarks.bench_cold import COMMANDS, ROOT, measured, recorded
 
 from softreach import kernels
@@ -59,7 +60,25 @@ OF_NUMBA = 20
 """Functions of Numba itself that a command may compile: each costs a twentieth of a second."""
 
 FEW = ("--n", "2000")
-WARM_UP = "warmup --loads"
+WARM_UP = "warmup"
+CRITICAL = "volume minimal_trunk --n 5000 --alpha critical"  # its cells are joined one by one
+LATER = (
+    CRITICAL,
+    "design lce_arm",
+    "show lce_arm --n 500 --color compliance --out a.png",
+    "export lce_arm a.stl --payload 1g",
+    "reach redundant_trunk --accuracy 0.2 --out a.png --overwrite",
+    "reach lce_arm --base x --payload 1g --accuracy 0.2 --out b.stl",
+    "payload lce_arm --gravity up --payloads 1g --accuracy 0.2",
+    "gradient lce_arm taper --accuracy 0.2",
+    "solve redundant_trunk --target 0.2,0.1,0.6 --family 3 --prove-least",
+    "solve lce_arm --payload 1g --target 0.02,0.01,0.06",
+    "equilibria lce_arm --payload 1g",
+    "cloud lce_arm --n 500 --set loads.follower_force[1]=1mN --payload 1g",
+    "atlas build a.zarr --design lce_arm --payload 1g --vary taper_deg=0:1:2 --n 500 --alpha 0.5L",
+    "paper --quick --out paper",
+)
+"""Commands that need kernels for other types, or what few need."""
 
 
 def test_a_first_run_compiles_its_kernels_once_and_nothing_after_a_warm_up(tmp_path):
@@ -85,13 +104,21 @@ def test_a_first_run_compiles_its_kernels_once_and_nothing_after_a_warm_up(tmp_p
     warm_up = recorded(WARM_UP.split(), tmp_path, own_cache=False)
     assert _kernels() <= warm_up.used.keys()
 
-    others = [line for line in _of_readme() if line not in COMMANDS.values()]
+    others = [line for line in _of_readme() if line not in COMMANDS.values()] + [CRITICAL]
     afterwards = [recorded(line.split(), tmp_path, own_cache=False) for line in others]
     assert len(runs) + len(afterwards) >= 7
     assert [run.compiled for run in afterwards if run.compiled] == []
     for run in (*runs.values(), *afterwards):
         for kernel, types in run.used.items():
             assert set(types) <= set(warm_up.used[kernel]), kernel
+
+
+@pytest.mark.large
+def test_no_command_compiles_after_a_warm_up_of_an_empty_cache(tmp_path):
+    pytest.importorskip("matplotlib")
+    assert recorded(WARM_UP.split(), tmp_path).compiled
+    compiled = {line: recorded(line.split(), tmp_path).compiled for line in LATER}
+    assert compiled == {line: {} for line in LATER}
 
 
 def of_numba(name: str) -> bool:

@@ -59,6 +59,8 @@ for _group, _names in _COMMANDS:
 for _flag in ("--help", "--version"):
     app[_flag].group = _MORE
 app.meta.suppress_keyboard_interrupt = False
+app.register_install_completion_command(add_to_startup=False)
+app["--install-completion"].group = _MORE
 
 _ALWAYS = Group("Options of every command", sort_key=9)
 

@@ -260,7 +260,7 @@ def _executor(
     try:
         from distributed import Client
     except ModuleNotFoundError as error:
-        raise MissingExtra("distributed", "cluster") from error
+        raise MissingExtra(("distributed", "cluster")) from error
     return Client(scheduler) if scheduler else Client(scheduler_file=str(scheduler_file))
 
 

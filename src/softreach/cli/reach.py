@@ -83,11 +83,21 @@ def reach(
 def _check_outputs(arm: Manipulator, outs: list[Path], overwrite: bool) -> None:
     """Refuse files that cannot be written, or that a set of so few dimensions does not have."""
     from softreach.export.surfaces import SURFACE_FILES
-    from softreach.support.files.kinds import PICTURES
+    from softreach.support.files.kinds import PICTURES, check_installed
 
+    formats = {**SURFACE_FILES, **PICTURES}
+    needed = [
+        (library, kind.extra)
+        for path in outs
+        if (kind := formats.get(path.suffix.lower()))
+        for library in kind.libraries
+    ]
+    if any(path.suffix.lower() in SURFACE_FILES for path in outs):
+        needed.append(("skimage", "surface"))
+    check_installed(*needed)
     free = int((arm.bounds[:, 0] < arm.bounds[:, 1]).sum())
     for path in outs or [None]:
-        check_output(path, {**SURFACE_FILES, **PICTURES}, overwrite)
+        check_output(path, formats, overwrite)
         if path is not None and free < (3 if _is_picture(path) else 2):
             raise _no_such_output(path)
 

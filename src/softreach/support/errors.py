@@ -172,10 +172,17 @@ class InvalidDesign(SoftreachError, ValueError):
 
 
 class MissingExtra(SoftreachError, ImportError):
-    """An optional library is needed but not installed."""
+    """Optional libraries are needed but not installed."""
 
-    def __init__(self, library: str, extra: str) -> None:
-        super().__init__(f"this needs {library}; install it with: pip install 'softreach[{extra}]'")
+    def __init__(self, *missing: tuple[str, str]) -> None:
+        """Each of `missing` is a library and the extra of softreach that brings it."""
+        libraries = " and ".join(dict.fromkeys(library for library, _ in missing))
+        extras = ",".join(dict.fromkeys(extra for _, extra in missing))
+        them = "it" if len({library for library, _ in missing}) == 1 else "them"
+        super().__init__(
+            f"this needs {libraries}; install {them} with: pip install 'softreach[{extras}]', "
+            "or in a clone with: make setup"
+        )
 
 
 class NotWritten(SoftreachError, OSError):
