@@ -112,8 +112,8 @@ def run(arguments: list[str]) -> int:
                 console.error(traceback.format_exc().rstrip())
             console.error(f"error: {_message(error)}")
             return 2
-        except KeyboardInterrupt:
-            console.error(INTERRUPTED)
+        except KeyboardInterrupt as error:
+            console.error("; ".join([INTERRUPTED, *getattr(error, "__notes__", ())]))
             return 130
     return 0
 
