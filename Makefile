@@ -47,7 +47,7 @@ ready: setup
 
 # Compiled once here, and not by every process of the tests.
 kernels: setup
-	$(BIN)/softreach warmup --loads
+	$(BIN)/softreach warmup
 
 # The studio is tested in a real browser. Only root installs one; whoever has none is told at the end
 # of the tests what to type.

@@ -33,14 +33,14 @@ COMMANDS = {
     "atlas, 2 workers": "atlas build a.zarr --vary taper_deg=0:3:9 --n 20000 --workers 2",
     "paper": "paper --out paper --quick",
     "demo": "demo --out demo",
-    "warmup": "warmup --loads",
-    "warmup, empty cache": "warmup",
+    "warmup": "warmup",
+    "warmup, empty cache": "warmup --no-loads",
     "studio": "studio minimal_trunk --no-open",
 }
 SAID = {
-    signal.SIGINT: "interrupted: nothing half-written was left behind\n",
-    signal.SIGTERM: "terminated: nothing half-written was left behind\n",
-    signal.SIGHUP: "hung up: nothing half-written was left behind\n",
+    signal.SIGINT: "interrupted: nothing half-written was left behind",
+    signal.SIGTERM: "terminated: nothing half-written was left behind",
+    signal.SIGHUP: "hung up: nothing half-written was left behind",
 }
 UNFINISHED = ".softreach-unfinished-*"
 """What is being written, or was when its process was killed."""
@@ -73,7 +73,7 @@ class Ending(NamedTuple):
         killed = number == signal.SIGKILL
         faults = {
             f"exit code {self.code}": self.code != (-9 if killed else 128 + number),
-            f"said {self.said!r}": not killed and not self.said.endswith(SAID.get(number, "")),
+            f"said {self.said!r}": not killed and SAID.get(number, "") not in self.said,
             f"traceback {self.said!r}": "Traceback" in self.said or "rror" in self.said,
             f"{self.seconds:.1f} s": self.seconds > LIMIT,
             f"{self.survivors} processes left": self.survivors > 0,

@@ -185,6 +185,17 @@ class TestCloud:
         for name in ("highest_tip_L", "lowest_tip_L"):
             assert short[name] == pytest.approx(long[name], rel=1e-6)
 
+    def test_a_cloud_is_named_after_its_design_and_replaces_none_of_another(self, folder, capsys):
+        changed_arm = ["cloud", "minimal_trunk", "--n", "40", "--taper-deg", "1"]
+        assert run(["cloud", "minimal_trunk", "--n", "50"]) == 0
+        assert run(["cloud", "minimal_trunk", "--n", "60"]) == 0
+        assert run(changed_arm) == 2
+        assert "or a stored cloud of the same design" in capsys.readouterr().err
+        assert sr.open_cloud("minimal_trunk.zarr").sizes["sample"] == 60
+        assert run([*changed_arm, "--overwrite"]) == 0
+        assert sr.open_cloud("minimal_trunk.zarr").sizes["sample"] == 40
+        assert [path.name for path in folder.iterdir()] == ["minimal_trunk.zarr"]
+
 
 class TestVolume:
     def test_volumes_are_those_of_the_library(self, stored, capsys):
@@ -222,6 +233,29 @@ class TestVolume:
         trimesh = pytest.importorskip("trimesh")
         facts = printed_json(capsys, "volume", stored, "--alpha", "0.4L", "--out", "hull.ply")
         assert trimesh.load("hull.ply").volume == pytest.approx(facts["volume_L3"], rel=1e-6)
+
+
+class TestReach:
+    ARM = ("reach", "three_tendon_robot", "--accuracy", "0.2")  # its set misses the plane z = 0
+
+    def test_slices_are_drawn_where_the_set_is_or_where_asked(self, folder, capsys):
+        pytest.importorskip("matplotlib")
+        assert run([*self.ARM, "--out", "a.png"]) == 0
+        assert run([*self.ARM, "--out", "b.png", "--at", "0,0,0.19"]) == 0
+        assert (folder / "a.png").read_bytes() != (folder / "b.png").read_bytes()
+
+    def test_what_was_computed_is_printed_and_saved_before_a_picture_fails(self, folder, capsys):
+        pytest.importorskip("matplotlib")
+        outs = ["--out", "a.png", "--out", "a.ply", "--at", "0,0,9"]
+        assert run([*self.ARM, *outs]) == 2
+        streams = capsys.readouterr()
+        assert "volume" in streams.out
+        assert "at = 9.0: must be between" in streams.err
+        assert [path.name for path in folder.iterdir()] == ["a.ply"]
+
+    def test_a_place_without_slices_is_refused(self, capsys):
+        assert run([*self.ARM, "--at", "0,0,0.1"]) == 2
+        assert "left out without a picture" in capsys.readouterr().err
 
 
 class TestShow:
@@ -295,6 +329,12 @@ helical_angle_deg = 0.0
             ["design", "elephant"],
             "elephant: must be a .toml file, or one of elephant_trunk, filament",
         ),
+        (["design", "minimal_trank"], 'did you mean "minimal_trunk"?'),
+        (
+            ["design", "minimal_trunk", "--set", "left.tension=3"],
+            "commands; their bounds are left.lower and left.upper",
+        ),
+        (["cloud", "minimal_trunk", "--sampler", "unifrom"], 'did you mean "uniform"?'),
         (["design", "minimal_trunk", "--tapr-deg", "3"], "Did you mean --taper-deg"),
         (
             ["design", "minimal_trunk", "--taper-deg", "steep"],
@@ -310,7 +350,15 @@ helical_angle_deg = 0.0
         ),
         (["cloud", "minimal_trunk", "--sampler", "sobol", "--n", "1000"], "512 or 1024"),
         (["cloud", "minimal_trunk", "--sampler", "grid", "--n", "999"], "9^3 = 729 or 10^3 = 1000"),
-        (["volume", "nowhere.zarr"], "must be a Zarr store written by softreach"),
+        (
+            ["volume", "nowhere.zarr"],
+            "nowhere.zarr: must be a Zarr store written by softreach; it does not exist",
+        ),
+        (
+            ["atlas", "status", "nowhere.zarr"],
+            "must be an atlas written by build_atlas; it does not exist",
+        ),
+        (["studio", "nowhere.zarr", "--no-open"], "it does not exist"),
         (["volume", "minimal_trunk", "--n", "9", "--alpha", "wide"], "alpha = wide"),
         (["volume", "minimal_trunk", "--n", "9", "--alpha=-1L"], "alpha = -1L"),
         (["show", "minimal_trunk", "--n", "9", "--color", "pink"], "left, right, longitudinal"),

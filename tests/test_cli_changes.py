@@ -168,7 +168,7 @@ def test_a_loaded_cloud_counts_its_stable_samples(folder, capsys):
     assert (facts["stable"], facts["unstable"], facts["no_equilibrium"]) == (64, 0, 0)
     assert (facts["payload_kg"], facts["base"]) == (0.002, "hanging")
     arm = sr.designs.lce_arm().replace(loads=sr.Loads(gravity=(0, 0, 9.81), payload=0.002))
-    assert sr.open_cloud("cloud.zarr").identical(sr.compute_cloud(arm, 64))
+    assert sr.open_cloud("lce_arm.zarr").identical(sr.compute_cloud(arm, 64))
 
 
 class TestRestInTheSummary:

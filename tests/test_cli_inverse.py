@@ -66,7 +66,17 @@ def test_a_proof_of_the_least_activation_is_asked_for(capsys):
     least = np.linalg.norm(found["activations"][0])
     assert least - 1e-6 <= found["change_bound"] <= least
     assert run(["solve", "redundant_trunk", f"--target={text}", "--prove-least"]) == 0
-    assert "proved to be the least" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert f"proved to be the least: no activation of a size √Σγ² below {least:.5f}" in said
+    assert run(["solve", "elephant_trunk", "--target=0.4,0.1,1.5", "--prove-least"]) == 0
+    assert "nothing is proved: that takes 6 free bundles" in capsys.readouterr().out
+
+
+def test_a_family_that_is_smaller_than_asked_says_so(capsys):
+    arm = sr.designs.redundant_trunk()
+    text = ",".join(f"{x:.17g}" for x in sr.tip_positions(arm, arm.bounds[:, 0])[0])
+    assert run(["solve", "redundant_trunk", f"--target={text}", "--family", "3"]) == 0
+    assert "no others found: further searches end at this one" in capsys.readouterr().out
 
 
 def test_a_path_is_tracked_into_a_file(tmp_path, trunk, capsys):

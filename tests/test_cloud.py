@@ -52,6 +52,16 @@ def test_a_cloud_knows_where_it_comes_from(cloud, trunk):
     assert again.identical(cloud)
 
 
+def test_a_cloud_of_another_design_is_replaced_only_if_one_says_so(cloud, tmp_path):
+    path, other = tmp_path / "a.zarr", sr.compute_cloud(designs.lce_arm(), 50)
+    sr.save_cloud(cloud, path)
+    with pytest.raises(InvalidInput, match="a stored cloud of the same design"):
+        sr.save_cloud(other, path)
+    assert sr.open_cloud(path).identical(cloud)
+    sr.save_cloud(other, path, overwrite=True)
+    assert sr.open_cloud(path).identical(other)
+
+
 def test_a_cloud_survives_the_disk(cloud, tmp_path):
     path = tmp_path / "cloud.zarr"
     sr.save_cloud(cloud, path)

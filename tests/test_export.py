@@ -47,6 +47,15 @@ def left_over(folder, *known):
     return {p.name for p in folder.iterdir()} - set(known)
 
 
+def test_a_cloud_is_a_tidy_table_of_one_row_a_sample(cloud, expected):
+    table = sr.cloud_table(cloud)
+    assert list(table.columns) == COLUMNS
+    for name, values in expected.items():
+        np.testing.assert_array_equal(table[name], values)
+    assert table.attrs["seed"] == 5
+    assert sr.Manipulator.from_toml(table.attrs["design"]) == sr.cloud.design_of(cloud)
+
+
 class TestCloud:
     def test_csv_reads_back_equal(self, cloud, expected, tmp_path):
         export_cloud(cloud, tmp_path / "cloud.csv")

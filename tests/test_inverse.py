@@ -12,6 +12,7 @@ from softreach.inverse import Solutions, Status, branches, prepared_map, solve_i
 from softreach.rod import tip_map
 from softreach.rod.kinematics import configuration, tip_positions
 from softreach.support.errors import InvalidInput
+from softreach.workspace import reachable_set
 
 DESIGNS = [(108, 2), (75, 3), (36, 3), (0, 0)]
 
@@ -37,6 +38,19 @@ def miss_of_original(solutions: Solutions, gamma: np.ndarray) -> np.ndarray:
 def folded() -> Manipulator:
     """A design whose activations overlap: many tips have two of them."""
     return trunk_at(36, 3)
+
+
+def test_one_place_or_activation_may_stand_alone(folded):
+    gamma = [-0.9, -0.3, -0.6]
+    np.testing.assert_array_equal(tip_positions(folded, gamma), tip_positions(folded, [gamma]))
+    target = tip_positions(folded, gamma)[0]
+    np.testing.assert_array_equal(
+        solve_inverse(folded, target).activations, solve_inverse(folded, [target]).activations
+    )
+    solid = reachable_set(folded, accuracy=0.2)
+    assert solid.distance(target).tolist() == solid.distance([target]).tolist()
+    with pytest.raises(InvalidInput, match=r"targets.shape = \(2,\)"):
+        solve_inverse(folded, target[:2])
 
 
 @pytest.mark.parametrize(
@@ -275,7 +289,7 @@ def test_an_arm_its_tip_map_and_what_was_prepared_of_it_give_equal_answers(folde
 @pytest.mark.parametrize(
     ("targets", "named"),
     [
-        ([0.0, 0.0, 1.0], "targets.shape"),
+        ([0.0, 0.0, 1.0, 0.0], "targets.shape"),
         ([[0.0, 1.0]], "targets.shape"),
         ([["far", "away", "up"]], "targets"),
         ([[0.0, 0.0, 1.0], [0.0, np.nan, 1.0]], r"targets\[1\]"),
@@ -352,6 +366,17 @@ def test_a_family_reaches_its_target_in_different_ways():
         norms = np.linalg.norm(solution.activations, axis=1)
         assert norms.argmin() == 0
         assert np.ptp(solution.activations, axis=0).max() > 0.01
+
+
+def test_members_of_a_family_differ_and_are_fewer_where_there_are_no_more():
+    arm = designs.redundant_trunk()
+    corner = tip_positions(arm, arm.bounds[:, 0])[0]  # where a single activation leads
+    near_edge = tip_positions(arm, [-0.5, -1.0, 0.0, -1.6])[0]
+    solutions = solve_inverse(arm, [corner, near_edge], family=8)
+    assert solutions.counts.tolist() == [1, 8]
+    members = solutions[1].activations
+    apart = np.abs(members[:, None] - members).max(axis=2) + np.eye(8)
+    assert apart.min() > 1e-3
 
 
 def test_four_bundles_cannot_reach_beyond_their_length():

@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 
+import pytest
+
 import softreach as sr
 
 MODULES = [
@@ -189,12 +191,13 @@ def classes_in(hint: object) -> Iterator[type]:
 
 def return_hint(function: Callable) -> object:
     """The hint of what a function returns, whatever its arguments are."""
+    import pandas
     import xarray
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     hint = function.__annotations__["return"]
-    seen = {"xr": xarray, "Axes": Axes, "Figure": Figure, "Self": object}
+    seen = {"xr": xarray, "pd": pandas, "Axes": Axes, "Figure": Figure, "Self": object}
     known = {**seen, **inspect.unwrap(function).__globals__}
     return eval(hint, known) if isinstance(hint, str) else hint
 
@@ -228,3 +231,15 @@ def test_every_public_name_is_in_the_reference():
         and not isinstance(thing, ModuleType)
     ]
     assert missing == []
+
+
+def test_the_package_says_that_it_is_typed():
+    from importlib.resources import files
+
+    assert files("softreach").joinpath("py.typed").is_file()
+
+
+def test_a_public_name_that_is_misspelled_is_told():
+    with pytest.raises(AttributeError, match=r'no attribute .reachable_sett.; did you mean "reach'):
+        _ = sr.reachable_sett
+    assert not hasattr(sr, "q")

@@ -397,6 +397,18 @@ def test_boxes_and_points_of_another_shape_are_refused(everything):
         plot.plot_slice(everything.grid, at=1.0)
 
 
+def test_slices_go_through_the_middle_of_the_set_unless_a_place_is_given(everything):
+    z = everything.grid.z.values
+    away = everything.grid.assign_coords(z=z + 9.0)  # misses the plane z = 0
+    reached = away.z.values[(away["count"] > 0).any(["x", "y"])]
+    middle = (reached[0] + reached[-1]) / 2
+    title = plot.plot_slice(away, view="top").get_title()
+    assert float(title.split()[2]) == pytest.approx(middle / everything.length, rel=1e-2)
+    assert plot.plot_slices(away).axes[2].get_title() == title
+    with pytest.raises(InvalidInput, match="along z"):
+        plot.plot_slices(away, at=(0.0, 0.0, 0.0))
+
+
 def test_stations_of_two_designs_stand_at_the_same_places(everything):
     other = sr.curvature.curvature_statistics(everything.cloud, [0.1, 0.2])
     with pytest.raises(InvalidInput, match="stations"):

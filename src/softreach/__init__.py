@@ -7,4 +7,15 @@ nothing.
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+_public, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+
+def __getattr__(name: str) -> object:
+    """A public name, loaded at its first use."""
+    if name in __all__:
+        return _public(name)
+    from softreach.support.errors import did_you_mean
+
+    hint = did_you_mean(name, __all__)
+    message = f"module {__name__!r} has no attribute {name!r}"
+    raise AttributeError(f"{message}; {hint}" if hint else message)

@@ -37,6 +37,7 @@ from .cloud import volume as volume
 from .cloud.redundancy import activation_distance as activation_distance
 from .cloud.volume import concave_hull as concave_hull
 from .cloud.volume import convex_hull as convex_hull
+from .export import cloud_table as cloud_table
 from .inverse import path as path
 from .inverse import solve_inverse as solve_inverse
 from .inverse.path import track_path as track_path

@@ -115,7 +115,7 @@ NAMES = {
         stations_over_length targets z""",
     "number": """accuracy alpha alpha_over_length at cell convex direction_weight exact force
         half_width high length memory radius radius_ratio residual_over_length revolution size
-        taper thickness threshold tol width""",
+        taper thickness threshold tip_radius tol width""",
     "whole number": "bins cells count depth family n seed segments sides",
     "word": "color fiber frame method metric name quantity sampler unit view",
     "words": "metrics names panels parameters",
@@ -225,6 +225,7 @@ CALLS: dict[str, Call] = {
         lambda: dict(arm=sr.designs.filament(), path="missing/x.jl")
     ),
     "export.export_arm": Call(lambda: dict(arm=ARM, configuration=shape(), path="missing/x.stl")),
+    "export.cloud_table": Call(lambda: dict(cloud=cloud())),
     "export.export_cloud": Call(lambda: dict(cloud=cloud(), path="missing/x.csv")),
     "export.export_mesh": Call(lambda: dict(mesh_or_hull=hull(), path="missing/x.stl")),
     "forces.blocked_force": Call(lambda: dict(arm=HEAVY, places=TIP, direction=(1.0, 0.0, 0.0))),

@@ -7,6 +7,9 @@ import json
 import os
 import re
 import shutil
+import subprocess
+import sys
+import textwrap
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -613,3 +616,25 @@ def test_any_flipped_bit_of_an_atlas_is_noticed(atlas_files, tmp_path_factory, p
     failed = fails_in_one_line(lambda: verify_atlas(folder).damaged == 1, folder)
     assert failed == (name.split("/")[0] not in (*FIRST, "message") or name.endswith(".json"))
     shutil.rmtree(folder)
+
+
+def test_many_damaged_chunks_are_one_error_and_nothing_is_printed_at_the_end(tmp_path):
+    """Zarr reads chunks at once, and all errors but the first would be printed at the exit."""
+    script = """
+        from pathlib import Path
+        import softreach as sr
+        from softreach.cloud import clouds
+
+        clouds._CHUNK = 50
+        sr.save_cloud(sr.compute_cloud(sr.designs.minimal_trunk(), 2000), "a.zarr")
+        for path in Path("a.zarr/tip/c").glob("*/0"):
+            path.write_bytes(path.read_bytes()[:-3] + b"abc")
+        try:
+            sr.open_cloud("a.zarr")
+        except sr.errors.InvalidInput as error:
+            print(error)
+    """
+    command = [sys.executable, "-c", textwrap.dedent(script)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert "of array tip in a.zarr = of a wrong checksum" in done.stdout
+    assert done.stderr == ""

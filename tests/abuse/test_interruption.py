@@ -170,7 +170,7 @@ def test_a_block_done_as_a_whole_ends_before_the_process_and_none_begins_after(t
             Path("begun").touch()
         """,
     )
-    assert process.communicate(timeout=600) == ("", SAID[signal.SIGTERM])
+    assert process.communicate(timeout=600) == ("", SAID[signal.SIGTERM] + "\n")
     assert process.returncode == 143
     assert (tmp_path / "whole").exists()
     assert not (tmp_path / "begun").exists()
@@ -218,7 +218,7 @@ def test_a_terminal_is_left_usable_or_may_be_gone(closed, tmp_path):
     assert process.wait(600) == (129 if closed else 130)
     assert list(broken_files(tmp_path)) == []
     if not closed:
-        assert shown.endswith(b"\x1b[2K\x1b[?25h" + SAID[signal.SIGINT][:-1].encode() + b"\r\n")
+        assert shown.endswith(b"\x1b[2K\x1b[?25h" + SAID[signal.SIGINT].encode() + b"\r\n")
 
 
 def _take_terminal() -> None:

@@ -356,6 +356,24 @@ def test_a_missing_extra_is_named_before_the_work(
     assert f"this needs {library}; install it with: pip install 'softreach[{extra}]'" in said
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            f"reach {TRUNK} --out a.stl --out a.png",
+            "trimesh and matplotlib and scikit-image; install them with: "
+            "pip install 'softreach[export,plot,surface]', or in a clone with: make setup",
+        ),
+        ("paper", "matplotlib and scikit-image and jinja2; install them with: pip install"),
+    ],
+)
+def test_missing_extras_are_named_all_at_once(words, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for library in ("trimesh", "matplotlib", "skimage", "jinja2"):
+        monkeypatch.setitem(sys.modules, library, None)
+    assert said in refusal_of(words.split(), capsys, tmp_path)
+
+
 def test_more_than_half_of_the_memory_is_announced(monkeypatch):
     from softreach.support.memory import check_memory
 

@@ -6,11 +6,13 @@ import io
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from softreach.cli.app import run
 from softreach.cli.console import console
+from softreach.support import progress
 
 ENCODINGS = ["ascii", "latin-1", "cp1252", "cp437", "koi8-r", "utf-8"]
 
@@ -159,3 +161,28 @@ def test_processes_end_as_they_should(line, code, error, tmp_path):
     assert error in done.stderr
     if not error:
         assert not [one for one in done.stderr.splitlines() if not one.startswith("softreach: ")]
+
+
+def test_progress_in_a_pipe_is_a_line_now_and_then_and_none_if_quiet(capsys, monkeypatch):
+    clock = iter([0.0, 10.0, 31.0, 40.0, 70.0, 125.0])
+    monkeypatch.setattr(progress.time, "monotonic", lambda: next(clock))
+    with progress.bar("computing designs", 2_000) as done:
+        for _ in range(5):
+            done(300)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "computing designs: 600 of 2,000, 0:31 so far"
+    assert lines[-1] == "computing designs: 1,500 of 2,000, 2:05 so far"
+    assert len(lines) == 3
+    monkeypatch.setattr(progress, "hidden", True)
+    with progress.bar("computing designs", 2_000) as done:
+        done(300)
+    assert capsys.readouterr().err == ""
+
+
+def test_a_shell_learns_to_complete_commands(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(Path, "home", lambda: tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert run(["--install-completion", "--shell", "bash"]) == 0
+    (script,) = (path for path in tmp_path.rglob("*") if path.is_file())
+    assert str(script) in capsys.readouterr().out
+    assert "--accuracy" in script.read_text(encoding="utf-8")

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from tools.materials import page_with_table
 
+import softreach as sr
 from softreach.arm.material import material_names, material_record, named_material
 from softreach.support.errors import InvalidInput
 
@@ -77,6 +78,19 @@ def test_a_name_like_no_other_is_refused_with_where_the_names_are():
         named_material("xyz")
     assert "did you mean" not in str(error.value)
     assert len(str(error.value)) < 160
+
+
+def test_a_name_stands_for_its_material_wherever_one_is_wanted():
+    silicone = named_material("dragon_skin_30")
+    ring = sr.Ring(inner_ratio=0.5, material="dragon_skin_30")
+    assert ring == sr.Ring(inner_ratio=0.5, material=silicone)
+    assert ring.replace(material="pla").material == named_material("pla")
+    assert sr.Section(rings=(ring,), core="dragon_skin_30").core == silicone
+    assert sr.designs.minimal_trunk(material="pla") == sr.designs.minimal_trunk(
+        material=named_material("pla")
+    )
+    with pytest.raises(sr.InvalidDesign, match="did you mean dragon_skin_30"):
+        sr.Ring(inner_ratio=0.5, material="dragon_skin_3")
 
 
 def test_the_library_cannot_be_changed():

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
+import softreach as sr
 from softreach.arm import LinearTaper
 from softreach.support.errors import InvalidDesign
 
@@ -74,6 +75,19 @@ def test_rotation_of_a_fiber_is_the_integral_of_appendix_b(taper_deg):
 def test_the_untapered_rotation_is_z_over_radius():
     profile = LinearTaper(length=1.0, outer_radius=1 / 16)
     assert profile.surface_coordinate(0.7) == pytest.approx(0.7 * 16, rel=1e-15)
+
+
+def test_a_cone_may_be_given_by_the_radius_of_its_tip():
+    cone = LinearTaper(length=0.3, outer_radius=0.02, tip_radius=0.005)
+    assert cone.radius(0.3) == pytest.approx(0.005)
+    assert cone.taper == math.atan(0.015 / 0.3)
+    again = LinearTaper(length=0.3, outer_radius=0.02).replace(tip_radius=cone.tip_radius)
+    assert again.taper == pytest.approx(cone.taper)
+    assert sr.designs.minimal_trunk(tip_radius=0.03).profile.tip_radius == pytest.approx(0.03)
+    with pytest.raises(InvalidDesign, match="left out beside a taper"):
+        LinearTaper(length=0.3, outer_radius=0.02, taper=0.1, tip_radius=0.005)
+    with pytest.raises(InvalidDesign, match=r"tip_radius = 0: must be a finite number > 0 m"):
+        LinearTaper(length=0.3, outer_radius=0.02, tip_radius=0)
 
 
 def test_numpy_scalars_are_taken_as_numbers():

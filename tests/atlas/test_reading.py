@@ -77,6 +77,11 @@ def test_best_designs_are_the_best_that_meet_the_constraints(paper):
     found = best_designs(paper, "volume", where={"taper": (None, 0.01)}, count=3)
     truth = np.sort(paper.volume.sel(taper=0.0).values)[::-1]
     np.testing.assert_array_equal(found.volume, truth[:3])
+    for where in (["taper_deg<=0.57"], "taper<=0.01", {"taper_deg": (None, 0.57)}):
+        assert best_designs(paper, "volume", where=where, count=3).identical(found)
+    between = best_designs(paper, "volume", where=["taper_deg>=0.9", "taper_deg<=2.1"], count=99)
+    taper = np.degrees(between.taper)
+    assert 0.9 < taper.min() <= taper.max() < 2.1  # both constraints of one name
     least = best_designs(paper, "unreachability", smallest=True)
     np.testing.assert_allclose(least.unreachability, [paper.unreachability.min()])
     assert best_designs(paper, "volume", where={"volume": (9.0, None)}).sizes["rank"] == 0
@@ -85,7 +90,7 @@ def test_best_designs_are_the_best_that_meet_the_constraints(paper):
 
 
 def test_what_is_not_there_is_not_opened(tmp_path):
-    with pytest.raises(InvalidInput, match="an atlas written by build_atlas"):
+    with pytest.raises(InvalidInput, match="by build_atlas; it does not exist"):
         open_atlas(tmp_path / "nothing.zarr")
     assert not (tmp_path / "nothing.zarr").exists()
 

@@ -45,6 +45,31 @@ def test_three_kills_leave_the_same_numbers_as_no_kill(whole, tmp_path):
     assert_same(build16(store).load(), whole)
 
 
+def test_an_interrupt_tells_what_is_done_and_that_the_same_again_continues(tmp_path, capsys):
+    def interrupted(_: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        build_atlas(small_space(), tmp_path / "a.zarr", **SMALL, progress=interrupted)
+    (note,) = caught.value.__notes__
+    designs = small_space().size
+    assert note.endswith(f" of {designs} designs are done, and the same command continues")
+    assert 1 <= int(note.split()[0]) <= designs
+
+
+def test_ctrl_c_ends_a_process_with_a_line_of_what_is_done(tmp_path):
+    body = """
+        from softreach.cli.signals import end_on_signals
+        end_on_signals()
+        build(sys.argv[1], progress=lambda _: os.kill(os.getpid(), signal.SIGINT))
+    """
+    process = run_script(tmp_path, body, str(tmp_path / "a.zarr"))
+    _, said = ended(process)
+    assert process.returncode == 130
+    assert "interrupted: nothing half-written was left behind; " in said
+    assert said.endswith(" of 16 designs are done, and the same command continues\n")
+
+
 def test_a_second_call_computes_nothing(tmp_path, monkeypatch):
     first = build_atlas(small_space(), tmp_path / "a.zarr", **SMALL).load()
     monkeypatch.setattr(TipMap, "tips_and_status", lambda *_: 1 / 0)

@@ -60,14 +60,32 @@ OF_NUMBA = 20
 """Functions of Numba itself that a command may compile: each costs a twentieth of a second."""
 
 FEW = ("--n", "2000")
-WARM_UP = "warmup --loads"
+WARM_UP = "warmup"
+CRITICAL = "volume minimal_trunk --n 5000 --alpha critical"  # its cells are joined one by one
+LATER = (
+    CRITICAL,
+    "design lce_arm",
+    "show lce_arm --n 500 --color compliance --out a.png",
+    "export lce_arm a.stl --payload 1g",
+    "reach redundant_trunk --accuracy 0.2 --out a.png --overwrite",
+    "reach lce_arm --base x --payload 1g --accuracy 0.2 --out b.stl",
+    "payload lce_arm --gravity up --payloads 1g --accuracy 0.2",
+    "gradient lce_arm taper --accuracy 0.2",
+    "solve redundant_trunk --target 0.2,0.1,0.6 --family 3 --prove-least",
+    "solve lce_arm --payload 1g --target 0.02,0.01,0.06",
+    "equilibria lce_arm --payload 1g",
+    "cloud lce_arm --n 500 --set loads.follower_force[1]=1mN --payload 1g",
+    "atlas build a.zarr --design lce_arm --payload 1g --vary taper_deg=0:1:2 --n 500 --alpha 0.5L",
+    "paper --quick --out paper",
+)
+"""Commands that need kernels for other types, or what few need."""
 
 
 def test_nothing_is_compiled_after_a_warm_up(tmp_path):
     """Kernels of all tests from here on: most have been compiled already."""
     warm_up = recorded(WARM_UP.split(), tmp_path, own_cache=False)
     assert _kernels() <= warm_up.used.keys()
-    runs = [recorded(line.split(), tmp_path, own_cache=False) for line in _of_readme()]
+    runs = [recorded(line.split(), tmp_path, own_cache=False) for line in (*_of_readme(), CRITICAL)]
     assert len(runs) >= 6
     assert [run.compiled for run in runs if run.compiled] == []
     for run in runs:
@@ -94,6 +112,14 @@ def test_a_first_run_compiles_its_kernels_once(tmp_path):
     kernels = set().union(*KERNELS.values())
     compiled = [f for run in runs.values() for f in run.compiled if f in kernels]
     assert sorted(compiled) == sorted(kernels)
+
+
+@pytest.mark.large
+def test_no_command_compiles_after_a_warm_up_of_an_empty_cache(tmp_path):
+    pytest.importorskip("matplotlib")
+    assert recorded(WARM_UP.split(), tmp_path).compiled
+    compiled = {line: recorded(line.split(), tmp_path).compiled for line in LATER}
+    assert compiled == {line: {} for line in LATER}
 
 
 def of_numba(name: str) -> bool:

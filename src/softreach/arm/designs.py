@@ -40,8 +40,9 @@ def minimal_trunk(
     taper: float = math.radians(2),
     *,
     length: float = 1.0,
+    tip_radius: float | None = None,
     radius_ratio: float = 0.75,
-    material: Material | None = None,
+    material: Material | str | None = None,
 ) -> Manipulator:
     """The paper's minimal design: two helical bundles of opposite hand and a longitudinal one.
 
@@ -53,17 +54,19 @@ def minimal_trunk(
         revolution: Ω of the right-handed bundle; the left-handed one has -Ω [rad].
         taper: φ [rad].
         length: L [m].
+        tip_radius: R2(L) [m], which takes the place of the taper.
         radius_ratio: R1/R2 [-].
-        material: Material of all of the arm; None for an incompressible one whose Young's
-            modulus cancels.
+        material: Material of all of the arm, also by its name in the library; None for an
+            incompressible one whose Young's modulus cancels.
     """
     turn, body = fields_of(FiberArchitecture)["revolution"], fields_of(LinearTaper)
     revolution = as_number("revolution", revolution, turn.allowed)
     taper = as_number("taper", taper, body["taper"].allowed)
     length = as_number("length", length, body["length"].allowed)
     radius_ratio = as_number("radius_ratio", radius_ratio, fields_of(Ring)["inner_ratio"].allowed)
-    if material is not None:
-        as_instance("material", material, Material, "a Material, or None")
+    matter = named_material(material) if isinstance(material, str) else material
+    if matter is not None:
+        as_instance("material", matter, Material, "a Material, its name, or None")
     helices = (
         FiberArchitecture(
             name="left", revolution=-revolution, offset=math.radians(66), extent=_PAPER_EXTENT
@@ -72,7 +75,10 @@ def minimal_trunk(
             name="right", revolution=revolution, offset=math.radians(114), extent=_PAPER_EXTENT
         ),
     )
-    return _trunk((*helices, _longitudinal(270)), taper, length, radius_ratio, material)
+    arm = _trunk((*helices, _longitudinal(270)), taper, length, radius_ratio, matter)
+    if tip_radius is None:
+        return arm
+    return arm.replace(profile=arm.profile.replace(tip_radius=tip_radius))
 
 
 def redundant_trunk(
@@ -80,8 +86,9 @@ def redundant_trunk(
     taper: float = math.radians(2),
     *,
     length: float = 1.0,
+    tip_radius: float | None = None,
     radius_ratio: float = 0.75,
-    material: Material | None = None,
+    material: Material | str | None = None,
 ) -> Manipulator:
     """The paper's redundant design: the longitudinal bundle of `minimal_trunk` split in two.
 
@@ -93,12 +100,18 @@ def redundant_trunk(
         revolution: Ω of the right-handed bundle; the left-handed one has -Ω [rad].
         taper: φ [rad].
         length: L [m].
+        tip_radius: R2(L) [m], which takes the place of the taper.
         radius_ratio: R1/R2 [-].
-        material: Material of all of the arm; None for an incompressible one whose Young's
-            modulus cancels.
+        material: Material of all of the arm, also by its name in the library; None for an
+            incompressible one whose Young's modulus cancels.
     """
     arm = minimal_trunk(
-        revolution, taper, length=length, radius_ratio=radius_ratio, material=material
+        revolution,
+        taper,
+        length=length,
+        tip_radius=tip_radius,
+        radius_ratio=radius_ratio,
+        material=material,
     )
     pair = (_longitudinal(246, "longitudinal 1"), _longitudinal(294, "longitudinal 2"))
     return arm.replace(actuators=(*arm.actuators[:2], *pair))

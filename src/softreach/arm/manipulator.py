@@ -82,6 +82,7 @@ class Manipulator:
         outer_radius: float,
         inner_radius: float,
         taper: float = 0.0,
+        tip_radius: float | None = None,
         poisson_ratio: float = 0.5,
         young_modulus: float | None = None,
         density: float | None = None,
@@ -96,6 +97,7 @@ class Manipulator:
             inner_radius: R1(0), where the ring of fibers begins, at the base [m]; R1/R2 is the same
                 all along.
             taper: φ, taper angle [rad].
+            tip_radius: R2(L), at the tip [m], instead of the taper.
             poisson_ratio: ν [-].
             young_modulus: E [Pa]; None where it cancels: nothing weighs and only fibers or muscles
                 act.
@@ -110,9 +112,8 @@ class Manipulator:
         faults = list(_kind_faults(actuators))
         bundles = None if faults else sum(actuator.bundles for actuator in actuators)
         faults += _inner_radius_faults(plain(inner_radius), plain(outer_radius))
-        profile = _part_or_faults(
-            faults, LinearTaper, length=length, outer_radius=outer_radius, taper=taper
-        )
+        cone = {"length": length, "outer_radius": outer_radius, "taper": taper}
+        profile = _part_or_faults(faults, LinearTaper, **cone, tip_radius=tip_radius)
         matter = {
             "young_modulus": young_modulus,
             "poisson_ratio": poisson_ratio,

@@ -14,12 +14,14 @@ from typing import Any
 from softreach.arm.number import number
 from softreach.arm.part import Part
 from softreach.support.arguments import as_text
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import Fault, InvalidInput
 
 __all__ = [
     "LIBRARY_HINT",
     "Material",
     "MaterialRecord",
+    "as_material",
+    "material_faults",
     "material_names",
     "material_record",
     "named_material",
@@ -108,6 +110,21 @@ def named_material(name: str) -> Material:
     return material_record(as_text("name", name)).material
 
 
+def as_material(material: Any) -> Any:
+    """The material of the library for its name; anything else as it is."""
+    known = isinstance(material, str) and material in _library()
+    return _library()[material].material if known else material
+
+
+def material_faults(field: str, value: object, *, optional: bool = False) -> list[Fault]:
+    """A fault for a field of a part that is no material and no name of one."""
+    if isinstance(value, Material) or (optional and value is None):
+        return []
+    hint = f"; {_hint(value, material_names())}" if isinstance(value, str) else ""
+    others = "the name of one of the library" + (", or None" if optional else "")
+    return [Fault(field, value, f"must be a Material, or {others}{hint}")]
+
+
 @cache
 def _library() -> Mapping[str, MaterialRecord]:
     text = files("softreach.arm").joinpath("materials.toml").read_text(encoding="utf-8")
@@ -130,7 +147,10 @@ def _record(name: str, row: Mapping[str, Any]) -> MaterialRecord:
 
 
 def _unknown(name: object, names: tuple[str, ...]) -> InvalidInput:
+    return InvalidInput("material", name, "a material of the library", _hint(name, names))
+
+
+def _hint(name: object, names: tuple[str, ...]) -> str:
     spelled = str(name).strip().lower().replace(" ", "_").replace("-", "_")
     close = difflib.get_close_matches(spelled, names, n=3, cutoff=0.5)
-    hint = f"did you mean {' or '.join(close)}?" if close else LIBRARY_HINT
-    return InvalidInput("material", name, "a material of the library", hint)
+    return f"did you mean {' or '.join(close)}?" if close else LIBRARY_HINT

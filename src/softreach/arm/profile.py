@@ -10,7 +10,7 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,8 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.arm.along import monotone_cubic
 from softreach.arm.number import number, series_faults, stations
 from softreach.arm.part import Part
+from softreach.support.arguments import plain
 from softreach.support.arrays import as_floats
-from softreach.support.errors import Fault, Range
+from softreach.support.errors import Fault, InvalidDesign, Range
 
 __all__ = ["LinearTaper", "PiecewiseTaper", "Profile", "SampledTaper"]
 
@@ -80,9 +81,15 @@ class Profile(Part, ABC):
         return float(self.slender_coordinate(self.length))
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, init=False)
 class LinearTaper(Profile):
     """R2(Z) = R2(0) - Z tan φ, theory (13): a cone, or a cylinder for φ = 0.
+
+    Args:
+        length: L [m].
+        taper: φ [rad].
+        outer_radius: R2(0) [m].
+        tip_radius: R2(L) [m], instead of the taper.
 
     Raises:
         InvalidDesign: A field is out of its range, or the taper leaves no tip.
@@ -101,6 +108,31 @@ class LinearTaper(Profile):
     """φ, taper angle [rad]; negative widens toward the tip."""
     outer_radius: float = number("R2(0)", "m", "outer radius at the base", low=1e-12, high=1e9)
     """R2(0), outer radius at the base [m]."""
+
+    def __init__(
+        self,
+        *,
+        length: float,
+        taper: float = 0.0,
+        outer_radius: float,
+        tip_radius: float | None = None,
+    ) -> None:
+        if tip_radius is not None:
+            taper = _taper_to(plain(tip_radius), plain(length), plain(outer_radius), taper)
+        for field, value in (("length", length), ("taper", taper), ("outer_radius", outer_radius)):
+            object.__setattr__(self, field, value)
+        self.__post_init__()
+
+    def replace(self, **changes: Any) -> Self:
+        """A copy with some fields changed, checked like a new one; `tip_radius` is one of them."""
+        if changes.get("tip_radius") is not None:
+            changes.setdefault("taper", 0.0)
+        return super().replace(**changes)
+
+    @property
+    def tip_radius(self) -> float:
+        """R2(L), outer radius at the tip [m]."""
+        return float(self.radius(self.length))
 
     @property
     def breakpoints(self) -> tuple[float, ...]:
@@ -139,6 +171,22 @@ class LinearTaper(Profile):
         limit = math.atan((1.0 - _SLIMMEST) * self.outer_radius / self.length)
         why = f"leaves no tip (R2(L) = {tip:.4g} m, R2(0) = {self.outer_radius:.4g} m)"
         return [Fault("taper", self.taper, Range(high=limit, unit="rad", open_high=True, why=why))]
+
+
+def _taper_to(tip_radius: Any, length: Any, outer_radius: Any, taper: Any) -> float:
+    """φ [rad] by which a cone ends with a radius; 0 if the cone is wrong anyway.
+
+    Raises:
+        InvalidDesign: No radius of a tip, or a taper beside it.
+    """
+    positive = Range(0.0, unit="m", open_low=True)
+    if not positive.admits(tip_radius):
+        raise InvalidDesign([Fault("tip_radius", tip_radius, positive)])
+    if taper != 0.0:
+        raise InvalidDesign([Fault("tip_radius", tip_radius, "must be left out beside a taper")])
+    if not (positive.admits(length) and positive.admits(outer_radius)):
+        return 0.0
+    return math.atan((outer_radius - tip_radius) / length)
 
 
 @dataclass(frozen=True, kw_only=True)

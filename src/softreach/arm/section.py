@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.material import Material
+from softreach.arm.material import Material, as_material, material_faults
 from softreach.arm.number import number
 from softreach.arm.part import Part
 from softreach.support.errors import Fault, InvalidDesign
@@ -37,9 +37,13 @@ class Ring(Part):
     )
     """Outer radius of the ring over the outer radius of the arm [-]."""
     material: Material = field(default_factory=Material)
-    """Material of the ring."""
+    """Material of the ring, or the name of one of the library."""
     name: str = ""
     """Name in actuators, files and pictures."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "material", as_material(self.material))
+        super().__post_init__()
 
     @property
     def radius_ratio(self) -> float:
@@ -56,9 +60,7 @@ class Ring(Part):
         if not faults and self.inner_ratio >= self.outer_ratio:
             allowed = f"must be below outer_ratio = {self.outer_ratio:g}"
             faults = [Fault("inner_ratio", self.inner_ratio, allowed)]
-        if not isinstance(self.material, Material):
-            faults.append(Fault("material", self.material, "must be a Material"))
-        return faults
+        return faults + material_faults("material", self.material)
 
 
 class Layer(NamedTuple):
@@ -101,7 +103,7 @@ class Section(Part):
     rings: tuple[Ring, ...]
     """Layers that actuators live in, by index or name."""
     core: Material | None = None
-    """Material inside; None for that of the innermost ring."""
+    """Material inside, or the name of one of the library; None for that of the innermost ring."""
     bore_ratio: float = number(
         "R0/R2", "", "radius of the bore over R2", low=0.0, high=1.0, open_high=True, default=0.0
     )
@@ -111,8 +113,9 @@ class Section(Part):
         rings = tuple(self.rings) if isinstance(self.rings, tuple | list) else ()
         if not rings or not all(isinstance(ring, Ring) for ring in rings):
             raise InvalidDesign([Fault("section.rings", self.rings, "must hold one Ring or more")])
-        if not isinstance(self.core, Material | None):
-            raise InvalidDesign([Fault("section.core", self.core, "must be a Material or None")])
+        object.__setattr__(self, "core", as_material(self.core))
+        if faults := material_faults("section.core", self.core, optional=True):
+            raise InvalidDesign(faults)
         object.__setattr__(self, "rings", rings)
         super().__post_init__()
 

@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike
 from softreach.support.arguments import as_given, as_number, as_path, plain
 from softreach.support.arrays import as_floats
 from softreach.support.errors import InvalidInput
+from softreach.support.quantity import numbers_in, shortened
 
-__all__ = ["a_store", "an_atlas", "an_interval", "column", "shard_of"]
+__all__ = ["a_store", "an_atlas", "an_interval", "column", "constraint", "shard_of"]
 
 _PLACE = "a path, a URL or a Zarr store"
 
@@ -103,3 +104,20 @@ def an_interval(name: str, value: object) -> tuple[float, float]:
 def _limit(name: str, value: object) -> float:
     number = plain(value)
     return number if number in (math.inf, -math.inf) else as_number(name, number)
+
+
+def constraint(text: str) -> tuple[str, tuple[float, float]]:
+    """`taper_deg<=1` -> its name, and the numbers between which it is.
+
+    Raises:
+        InvalidInput: No name, <= or >=, and a number.
+    """
+    for sign in ("<=", ">=", "<", ">"):
+        name, separator, number = text.partition(sign)
+        if separator:
+            break
+    values = numbers_in(number, 1)
+    if values is None:
+        allowed = "a name, <= or >=, and a finite number"
+        raise InvalidInput("where", shortened(text) or "''", allowed)
+    return name.strip(), (-math.inf, values[0]) if "<" in sign else (values[0], math.inf)

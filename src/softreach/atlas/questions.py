@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from softreach.arm.manipulator import Manipulator
-from softreach.atlas.arguments import a_store, an_atlas, an_interval
+from softreach.arm.parameters.shown import from_written, written_name
+from softreach.atlas.arguments import a_store, an_atlas, an_interval, constraint
 from softreach.atlas.design_task import activations_of
 from softreach.atlas.reading import TOLD, command_of, contents, opened_atlas
 from softreach.atlas.store import (
@@ -25,8 +26,15 @@ from softreach.atlas.store import (
 )
 from softreach.rod.rods import tip_map
 from softreach.schema import cloud_dataset, with_status
-from softreach.support.arguments import as_flag, as_integer, as_mapping, as_number, as_text
-from softreach.support.errors import InvalidInput, warn
+from softreach.support.arguments import (
+    as_flag,
+    as_integer,
+    as_mapping,
+    as_names,
+    as_number,
+    as_text,
+)
+from softreach.support.errors import InvalidInput, did_you_mean, warn
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -159,7 +167,7 @@ def best_designs(
     metric: str,
     *,
     smallest: bool = False,
-    where: Mapping[str, Interval] | None = None,
+    where: Mapping[str, Interval] | Iterable[str] | None = None,
     count: int = 1,
 ) -> xr.Dataset:
     """The designs with the largest or smallest metric among those that meet the constraints.
@@ -168,7 +176,9 @@ def best_designs(
         atlas: A store, or a dataset from `open_atlas`.
         metric: What to compare.
         smallest: Whether smaller values are better.
-        where: Metric or parameter -> (lowest, highest) allowed; None leaves an end open.
+        where: Metric or parameter -> (lowest, highest) allowed; None leaves an end open. Or texts
+            like `unreachability<=0.4`; parameters are called by their names, or with the units
+            of the command line, as in `taper_deg<=1`.
         count: How many designs at most.
 
     Returns:
@@ -178,19 +188,41 @@ def best_designs(
         InvalidInput: No such metric or parameter, or an argument of another kind.
     """
     metric, smallest = as_text("metric", metric), as_flag("smallest", smallest)
-    limits = {} if where is None else as_mapping("where", where, an_interval)
     count, opened = as_integer("count", count, 1), opened_atlas(atlas)
+    limits = _limits(where, opened)
     dims = opened["status"].dims
     numbers = [name for name in opened.data_vars if opened[name].dims == dims]
     _check_known(metric, [str(name) for name in numbers if opened[name].dtype.kind == "f"])
     stacked = opened[[*numbers, *_parameters(opened)]].stack(rank=dims, create_index=False)
     allowed = np.isfinite(stacked[metric].values)
-    for name, (low, high) in limits.items():
+    for name, (low, high) in limits:
         _check_known(name, [str(known) for known in stacked.variables])
         values = stacked[name].values
         allowed &= (values >= low) & (values <= high)
     order = np.argsort(stacked[metric].values * (1 if smallest else -1), kind="stable")
     return stacked.isel(rank=order[allowed[order]][:count])
+
+
+def _limits(
+    where: Mapping[str, Interval] | Iterable[str] | None, atlas: xr.Dataset
+) -> list[tuple[str, tuple[float, float]]]:
+    """Every constraint: the name of a metric or parameter, and between which numbers it is."""
+    if where is None:
+        return []
+    if isinstance(where, Mapping):
+        pairs = list(as_mapping("where", where, an_interval).items())
+    else:
+        pairs = [constraint(text) for text in as_names("where", where)]
+    written = {
+        written_name(str(name), unit): (str(name), unit)
+        for name, values in atlas.variables.items()
+        if (unit := values.attrs.get("units", "1"))
+    }
+    limits: list[tuple[str, tuple[float, float]]] = []
+    for text, (low, high) in pairs:
+        name, unit = written.get(text, (text, "1"))
+        limits.append((name, (from_written(low, unit), from_written(high, unit))))
+    return limits
 
 
 def _is_small(store: AtlasStore) -> bool:
@@ -250,4 +282,5 @@ def _parameters(atlas: xr.Dataset) -> list[str]:
 
 def _check_known(name: str, known: list[str]) -> None:
     if name not in known:
-        raise InvalidInput("metric", name, f"one of {', '.join(dict.fromkeys(known))}")
+        hint = did_you_mean(name, known)
+        raise InvalidInput("metric", name, f"one of {', '.join(dict.fromkeys(known))}", hint)

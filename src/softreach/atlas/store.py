@@ -38,6 +38,7 @@ from softreach.support.files.stores import (
     REMEDY,
     CheckedStore,
     Opened,
+    absence,
     absolute,
     checked_place,
     checksums_by_key,
@@ -122,7 +123,8 @@ class AtlasStore:
         opened = opened_root(location, "atlas", mode, durable=durable)
         text = None if opened is None else opened.group.attrs.get("command")
         if opened is None or not isinstance(text, str):
-            raise InvalidInput("store", location, "an atlas written by build_atlas")
+            hint = absence(location) if opened is None else "this is no atlas"
+            raise InvalidInput("store", location, "an atlas written by build_atlas", hint)
         if SEAL not in opened.group:
             hint = "it is not complete: the command that began it goes on"
             raise InvalidInput("store", location, "an atlas written by build_atlas", hint)

@@ -59,6 +59,8 @@ for _group, _names in _COMMANDS:
 for _flag in ("--help", "--version"):
     app[_flag].group = _MORE
 app.meta.suppress_keyboard_interrupt = False
+app.register_install_completion_command(add_to_startup=False)
+app["--install-completion"].group = _MORE
 
 _ALWAYS = Group("Options of every command", sort_key=9)
 
@@ -110,8 +112,8 @@ def run(arguments: list[str]) -> int:
                 console.error(traceback.format_exc().rstrip())
             console.error(f"error: {_message(error)}")
             return 2
-        except KeyboardInterrupt:
-            console.error(INTERRUPTED)
+        except KeyboardInterrupt as error:
+            console.error("; ".join([INTERRUPTED, *getattr(error, "__notes__", ())]))
             return 130
     return 0
 

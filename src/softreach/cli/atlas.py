@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -25,8 +24,6 @@ from softreach.support.errors import InvalidInput, MissingExtra
 from softreach.support.quantity import numbers_in, shortened
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from softreach.atlas import AtlasStatus
     from softreach.atlas.executor import ExecutorLike
     from softreach.atlas.space import DesignSpace
@@ -176,10 +173,7 @@ def best(
     """
     from softreach.atlas import best_designs, open_atlas
 
-    opened = open_atlas(store)
-    written = _written_coordinates(opened)
-    limits = dict(_constraint(text, written) for text in where or ())
-    designs = best_designs(opened, metric, smallest=smallest, where=limits, count=count)
+    designs = best_designs(open_atlas(store), metric, smallest=smallest, where=where, count=count)
     columns = {str(name): column for name, column in designs.variables.items()}
     rows: Rows = {
         name: as_read(column.values, str(column.attrs.get("units", "1")))
@@ -266,7 +260,7 @@ def _executor(
     try:
         from distributed import Client
     except ModuleNotFoundError as error:
-        raise MissingExtra("distributed", "cluster") from error
+        raise MissingExtra(("distributed", "cluster")) from error
     return Client(scheduler) if scheduler else Client(scheduler_file=str(scheduler_file))
 
 
@@ -284,35 +278,3 @@ def _shard(text: str) -> tuple[int, int]:
     if not (text.isascii() and first.isdigit() and count.isdigit() and len(text) < 20):
         raise InvalidInput("shard", shortened(text) or "''", "i/k with 0 <= i < k")
     return int(first), int(count)
-
-
-def _written_coordinates(atlas: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Parameters of an atlas by their names with units."""
-    from softreach.arm.parameters.shown import written_name
-
-    return {
-        written_name(str(name), values.attrs.get("units", "1")): values
-        for name, values in atlas.coords.items()
-    }
-
-
-def _constraint(
-    text: str, written: Mapping[str, xr.DataArray]
-) -> tuple[str, tuple[float | None, float | None]]:
-    """`taper_deg<=1` -> taper between anything and 1 degree, in radians."""
-    from softreach.arm.parameters.shown import from_written
-
-    for sign in ("<=", ">=", "<", ">"):
-        name, separator, number = text.partition(sign)
-        if separator:
-            break
-    values = numbers_in(number, 1)
-    if values is None:
-        allowed = "a name, <= or >=, and a finite number"
-        raise InvalidInput("where", shortened(text) or "''", allowed)
-    value = values[0]
-    name = name.strip()
-    if name in written:
-        name, unit = str(written[name].name), str(written[name].attrs.get("units", "1"))
-        value = from_written(value, unit)
-    return name, (None, value) if "<" in sign else (value, None)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Group, Parameter
 
 from softreach.cli.values import NUMBER
-from softreach.support.errors import InvalidDesign, InvalidInput
+from softreach.support.errors import InvalidDesign, InvalidInput, did_you_mean
 
 if TYPE_CHECKING:
     from softreach.arm.loads import Loads
@@ -228,9 +228,12 @@ def _unchanged(text: str) -> Manipulator:
     is_named = path.exists() and not path.is_dir() and path.suffix != ".jl"
     if is_named or path.suffix == ".toml":
         return Manipulator.load(text)  # which refuses what is no file, such as a pipe
-    hint = f"softreach import {text} {text[:-3]}.toml makes one of a filament"
+    if text.endswith(".jl"):
+        hint = f"softreach import {text} {text[:-3]}.toml makes one of a filament"
+    else:
+        hint = did_you_mean(text, designs.__all__)
     allowed = f"a .toml file, or one of {', '.join(designs.__all__)}"
-    raise InvalidInput("design", text, allowed, hint if text.endswith(".jl") else "")
+    raise InvalidInput("design", text, allowed, hint)
 
 
 def read_mass(name: str, text: str) -> float:

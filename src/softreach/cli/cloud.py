@@ -35,7 +35,10 @@ def cloud(
     sampling: Sampling = SAMPLING,
     tol: Annotated[float, NUMBER, Parameter(help="Largest tip error, in L.")] = 1e-6,
     changes: Changes = UNCHANGED,
-    out: Annotated[Path, out_option("Where the cloud goes (.zarr).")] = Path("cloud.zarr"),
+    out: Annotated[
+        Path | None,
+        out_option("Where the cloud goes (.zarr): DESIGN.zarr, in this folder, if left out."),
+    ] = None,
     overwrite: Overwrite = False,
     durable: Durable = False,
     unit: Unit = None,
@@ -47,13 +50,14 @@ def cloud(
     """
     from time import perf_counter
 
-    from softreach.cloud.clouds import CLOUD_STORE, compute_cloud, sample_bytes, save_cloud
+    from softreach.cloud.clouds import cloud_store, compute_cloud, sample_bytes, save_cloud
     from softreach.rod.rods import tip_map
     from softreach.support.memory import check_disk
 
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
-    check_output(out, CLOUD_STORE, overwrite)
+    out = out or Path(f"{Path(design).stem}.zarr")
+    check_output(out, cloud_store(arm), overwrite)
     arguments = sampling.arguments
     check_disk("n", sampling.count, sample_bytes(arm.bundles) * sampling.count, out)
     start = perf_counter()

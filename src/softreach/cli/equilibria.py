@@ -61,15 +61,15 @@ def equilibria(
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
     result = all_of(arm, activation_of(activation, arm))
+    if json:
+        console.json(_record(result, lengths))
+    else:
+        _print(result, lengths)
     if out is not None:
         from softreach import plot
 
         figure = plot.plot_equilibria(result, view=view or "oblique", unit=lengths.unit)
         plot.save_figure(figure, out, overwrite=overwrite)
-    if json:
-        console.json(_record(result, lengths))
-    else:
-        _print(result, lengths)
 
 
 def _record(result: AllEquilibria, lengths: Lengths) -> dict[str, object]:

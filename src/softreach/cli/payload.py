@@ -23,7 +23,8 @@ def payload(
         float, NUMBER, Parameter(help="Share to keep of the volume without a payload.")
     ] = 0.8,
     payloads: Annotated[
-        str | None, Parameter(help="Masses to compute volumes for: 2g,5g,10g")
+        str | None,
+        Parameter(help="Masses at the tip, instead of the design's own payload: 2g,5g,10g"),
     ] = None,
     accuracy: Annotated[
         float, NUMBER, Parameter(help="Relative error allowed in each volume.")
@@ -36,8 +37,8 @@ def payload(
 ) -> None:
     """Compute how much of its reach a payload costs an arm.
 
-    The volumes under several payloads, and the largest payload that keeps a
-    share of the volume.
+    The volumes under several payloads, which take the place of the design's own,
+    and the largest payload that keeps a share of the volume.
 
     Example: softreach payload lce_arm --gravity up --share 0.8
     """
@@ -53,17 +54,20 @@ def payload(
     with progress.bar("computing volumes", None) as step:
         curve = payload_curve(arm, masses, accuracy=accuracy, progress=step)
         largest = curve.largest_payload(share)
-    if out is not None:
-        from softreach.plot import plot_payload_curve, save_figure
-
-        save_figure(plot_payload_curve(curve, largest=[largest]), out, overwrite=overwrite)
     rows: Rows = {
         "payloads": (curve.payloads.tolist(), "kg"),
         "volumes": (curve.volumes.tolist(), "m³"),
         "volume errors": (curve.volume_errors.tolist(), "m³"),
-        "shares": (curve.shares.tolist(), ""),
-        "share to keep": (share, ""),
+        "shares": ((100.0 * curve.shares).tolist(), "%"),
+        "share errors": ((100.0 * curve.share_errors).tolist(), "%"),
+        "share to keep": (100.0 * share, "%"),
         "largest payload": (largest.payload, "kg"),
         "largest payload error": (largest.payload_error, "kg"),
     }
     console.rows(f"payload of {design}", rows, json, lengths)
+    if arm.loads.payload and not json:
+        console.line(f"  they take the place of the design's own payload, {arm.loads.payload:g} kg")
+    if out is not None:
+        from softreach.plot import plot_payload_curve, save_figure
+
+        save_figure(plot_payload_curve(curve, largest=[largest]), out, overwrite=overwrite)

@@ -11,7 +11,16 @@ from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import Rows, console
 from softreach.cli.design import load_rows
 from softreach.cli.lengths import Lengths
-from softreach.cli.options import AsJson, Design, Overwrite, Unit, check_output, out_option
+from softreach.cli.options import (
+    OUTPUT,
+    AsJson,
+    Design,
+    Overwrite,
+    Unit,
+    check_output,
+    out_option,
+    refuse,
+)
 from softreach.cli.values import NUMBER
 from softreach.support.errors import InvalidInput
 
@@ -31,8 +40,16 @@ def reach(
     out: Annotated[
         list[Path] | None,
         out_option(
-            "Write the boundary (.ply .stl .obj .glb .vtu .vtk), or draw slices through the base "
-            "(.png .pdf .svg). May be repeated."
+            "Write the boundary (.ply .stl .obj .glb .vtu .vtk), or draw slices (.png .pdf .svg). "
+            "May be repeated."
+        ),
+    ] = None,
+    at: Annotated[
+        str | None,
+        Parameter(
+            group=OUTPUT,
+            help="Point x,y,z [m] that the slices meet at: the middle of the set if left out.",
+            allow_leading_hyphen=True,
         ),
     ] = None,
     overwrite: Overwrite = False,
@@ -46,30 +63,45 @@ def reach(
 
     Example: softreach reach minimal_trunk --out reach.stl --out reach.png
     """
+    from softreach.inverse.request import position_in
     from softreach.support import progress
     from softreach.workspace import reachable_set
 
     arm = design_from(design, changes)
-    lengths, outs = Lengths.of(arm, unit), out or []
+    lengths = Lengths.of(arm, unit)
+    outs = sorted(out or [], key=_is_picture)  # pictures come last
     _check_outputs(arm, outs, overwrite)
+    if not any(map(_is_picture, outs)):
+        refuse("left out without a picture: give --out slices.png too", at=at)
+    point = None if at is None else position_in("at", at, arm.length)
     with progress.bar("mapping the activation box", None) as step:
         reached = reachable_set(arm, accuracy=accuracy, progress=step)
     rows = load_rows(arm) | _rows(reached)
     if reached.lost_share > 0.0:  # not stable, or torn
         rows["activation box left out"] = (100.0 * reached.lost_share, "%")
-    for path in outs:
-        _write(reached, path, lengths, overwrite)
     console.rows(f"reachable set of {design}", rows, json, lengths)
+    for path in outs:
+        _write(reached, path, point, lengths, overwrite)
 
 
 def _check_outputs(arm: Manipulator, outs: list[Path], overwrite: bool) -> None:
     """Refuse files that cannot be written, or that a set of so few dimensions does not have."""
     from softreach.export.surfaces import SURFACE_FILES
-    from softreach.support.files.kinds import PICTURES
+    from softreach.support.files.kinds import PICTURES, check_installed
 
+    formats = {**SURFACE_FILES, **PICTURES}
+    needed = [
+        (library, kind.extra)
+        for path in outs
+        if (kind := formats.get(path.suffix.lower()))
+        for library in kind.libraries
+    ]
+    if any(path.suffix.lower() in SURFACE_FILES for path in outs):
+        needed.append(("skimage", "surface"))
+    check_installed(*needed)
     free = int((arm.bounds[:, 0] < arm.bounds[:, 1]).sum())
     for path in outs or [None]:
-        check_output(path, {**SURFACE_FILES, **PICTURES}, overwrite)
+        check_output(path, formats, overwrite)
         if path is not None and free < (3 if _is_picture(path) else 2):
             raise _no_such_output(path)
 
@@ -84,7 +116,9 @@ def _no_such_output(path: Path) -> InvalidInput:
     return InvalidInput("out", path, "left out for a design with so few free bundles")
 
 
-def _write(reached: ReachableSet, path: Path, lengths: Lengths, overwrite: bool) -> None:
+def _write(
+    reached: ReachableSet, path: Path, point: list[float] | None, lengths: Lengths, overwrite: bool
+) -> None:
     from softreach.workspace import ReachableSolid, ReachableSurface
 
     if _is_picture(path):
@@ -92,7 +126,8 @@ def _write(reached: ReachableSet, path: Path, lengths: Lengths, overwrite: bool)
 
         if not isinstance(reached, ReachableSolid):
             raise _no_such_output(path)
-        save_figure(plot_slices(reached.grid, unit=lengths.unit), path, overwrite=overwrite)
+        figure = plot_slices(reached.grid, at=point, unit=lengths.unit)
+        save_figure(figure, path, overwrite=overwrite)
     else:
         from softreach.export import export_mesh
 

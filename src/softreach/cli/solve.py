@@ -78,6 +78,8 @@ def solve(
         return
     for solution, hint in zip(solutions, hints, strict=True):
         _print(solution, arm, lengths)
+        if len(solution):
+            _print_more(solution, arm, count, prove_least)
         if hint:
             console.line(f"  {hint}")
 
@@ -130,17 +132,35 @@ def _print(solution: Solution, arm: Manipulator, lengths: Lengths) -> None:
     if solution.unstable:
         left_out = counted(solution.unstable, "activation")
         console.line(f"  {left_out} left out because the arm is unstable there")
-    if solution.least_proved:
-        console.line("  proved to be the least")
-    elif solution.change_bound:
-        least = f"{solution.change_bound:.6g}{_size_unit(arm)}"
-        console.line(f"  no activation of a size below {least} reaches it")
     if not len(solution):
         least = lengths.text(solution.gap_bound, ".4g")
         bound = f", proved to be at least {least}" if solution.gap_bound else ""
         gap = lengths.text(solution.gap, ".4g")
         console.line(f"  nearest {lengths.place(solution.nearest)}, {gap} away{bound}")
         console.line(f"  reached by {activation_text(arm, solution.nearest_activation)}")
+
+
+def _print_more(solution: Solution, arm: Manipulator, wanted: int, prove_least: bool) -> None:
+    """Remarks on the family and the proof that were asked for."""
+    if len(solution) < wanted:
+        known = "this one" if len(solution) == 1 else f"one of these {len(solution)}"
+        console.line(f"  no others found: further searches end at {known}")
+    if prove_least:
+        console.line(f"  {_proof(solution, arm)}")
+
+
+def _proof(solution: Solution, arm: Manipulator) -> str:
+    """A line on what is proved about the size √Σγ² of the activations that reach a target."""
+    from softreach.inverse.proofs import MOST_BUNDLES
+
+    bound = f"no activation of a size √Σγ² below {solution.change_bound:.6g}{_size_unit(arm)}"
+    if solution.least_proved:
+        return f"proved to be the least: {bound} reaches it"
+    if solution.change_bound:
+        return f"proved: {bound} reaches it; whether the first is the least is open"
+    if arm.loads is not None:
+        return "nothing is proved: of arms under loads nothing can be"
+    return f"nothing is proved: that takes {MOST_BUNDLES} free bundles or fewer, and less effort"
 
 
 def _size_unit(arm: Manipulator) -> str:

@@ -57,12 +57,12 @@ def volume(
     bias = cloud.attrs["sampler"] == "uniform"
     concave = concave_hull(cloud.tip, radius_of(alpha, lengths.length), bias=bias)
     rows = volume_rows(concave, convex_hull(cloud.tip))
+    console.rows(f"volume of {source}", rows, json, lengths)
     if out is not None:
         from softreach.export import export_mesh
 
         export_mesh(concave, out, unit=lengths.written, overwrite=overwrite)
         lengths.say_written(out)
-    console.rows(f"volume of {source}", rows, json, lengths)
 
 
 _BYTES = 700  # of memory that a sample and its share of the triangulation take at most

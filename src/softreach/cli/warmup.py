@@ -14,14 +14,18 @@ from softreach.cli.console import console
 def warmup(
     *,
     loads: Annotated[
-        bool, Parameter(help="Also what arms under loads need: half a minute more.")
-    ] = False,
+        bool,
+        Parameter(
+            negative="--no-loads",
+            help="Also what arms under loads need, for half a minute more.",
+        ),
+    ] = True,
 ) -> None:
     """Compile all kernels now, so that no later command has to.
 
     They are kept in a cache on disk; if it has them already, this takes seconds.
 
-    Example: softreach warmup --loads
+    Example: softreach warmup --no-loads
     """
     from softreach.support.errors import no_warnings
     from softreach.support.progress import bar
@@ -31,7 +35,7 @@ def warmup(
         for job in jobs:
             job()
             done(1)
-    console.line("all kernels are compiled")
+    console.line("all kernels are compiled" + ("" if loads else ", but for those of loads"))
 
 
 def _free() -> list[Callable[[], object]]:
@@ -52,7 +56,7 @@ def _free() -> list[Callable[[], object]]:
         partial(tip_jacobian, arm, [[-1.0, 0.0, -0.4]]),
         partial(tip_jacobian, hanging, [[-1.0, 0.0, -0.4]]),
         partial(configuration, arm, [-1.0, 0.0, -0.4]),
-        partial(workspace.reachable_set, arm, accuracy=0.1),
+        _set,
         partial(solve_inverse, arm, [target, beyond]),
         partial(track_path, arm, path),
         partial(workspace.direction_spread, arm, n=1024),
@@ -63,8 +67,21 @@ def _free() -> list[Callable[[], object]]:
     ]
 
 
+def _set() -> None:
+    """Places asked of a small reachable set."""
+    from softreach.arm import designs
+    from softreach.workspace import ReachableSolid, reachable_set
+
+    reached = reachable_set(designs.minimal_trunk(), accuracy=0.1)
+    assert isinstance(reached, ReachableSolid)
+    reached.contains((0.2, 0.1, 0.6))
+    reached.distance((2.0, 0.0, 0.0))
+
+
 def _hulls() -> None:
     """Hulls and distances of a small cloud."""
+    import numpy as np
+
     from softreach.arm import designs
     from softreach.cloud.clouds import compute_cloud
     from softreach.cloud.redundancy import activation_distance
@@ -75,7 +92,10 @@ def _hulls() -> None:
     concave_hull(cloud.tip, alpha=0.2)
     hull = concave_hull(cloud.tip, alpha="critical")
     Surface(vertices=hull.vertices, faces=hull.faces).distance(hull.vertices[:2])
-    activation_distance(cloud, 0.1)
+    tips = cloud.tip.values
+    concave_hull(np.concatenate([tips, tips + 9.0]), alpha="critical")  # in two parts
+    for design in (designs.minimal_trunk(), designs.redundant_trunk()):
+        activation_distance(compute_cloud(design, 2000), 0.1)
 
 
 def _loaded() -> list[Callable[[], object]]:

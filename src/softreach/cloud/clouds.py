@@ -21,18 +21,19 @@ from softreach.sampling import check_sampler, cube_blocks
 from softreach.support import parallel
 from softreach.support.arguments import as_dataset, as_flag, as_function, as_path
 from softreach.support.arrays import Array
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidDesign, InvalidInput
 from softreach.support.files.atomic import replacing
-from softreach.support.files.damage import Watch, storage_errors
+from softreach.support.files.damage import Watch, raised_at_the_end, storage_errors
 from softreach.support.files.documents import ARRAYS
 from softreach.support.files.kinds import FileKind, Formats
 from softreach.support.files.stores import (
     READING,
     REMEDY,
+    absence,
+    attributes_of,
     check_arrays,
     checked_place,
     foreign_entry,
-    kind_of,
     list_arrays,
     opened_root,
 )
@@ -123,8 +124,8 @@ def save_cloud(
         cloud: From `compute_cloud`, or a part of its samples.
         path: The folder to write.
         durable: Whether to return only when not even a power cut can lose it, which takes longer.
-        overwrite: Whether it may replace any file and an atlas, and not only a cloud; a folder with
-            anything in it that softreach did not write is never replaced.
+        overwrite: Whether it may replace any file, an atlas and a cloud of another design; a folder
+            with anything in it that softreach did not write is never replaced.
 
     Raises:
         InvalidInput: The dataset is no cloud, its design, bundles and length do not agree, or
@@ -133,7 +134,8 @@ def save_cloud(
     """
     place = as_path("path", path)
     overwrite, durable = as_flag("overwrite", overwrite), as_flag("durable", durable)
-    kind, size = CLOUD_STORE[".zarr"], schema.check_stored_cloud(cloud).nbytes
+    size = schema.check_stored_cloud(cloud).nbytes
+    kind = cloud_store(design_of(cloud))[".zarr"]
     with (
         replacing(place, kind, takes=size, overwrite=overwrite, durable=durable) as partial_path,
         _few_chunks_at_a_time(),
@@ -154,12 +156,12 @@ def open_cloud(path: str | PathLike[str]) -> xr.Dataset:
     location = as_path("path", path)
     opened = opened_root(location, "cloud")
     if opened is None or "command" in opened.group.attrs:
-        hint = "" if opened is None else "this is an atlas"
+        hint = absence(location) if opened is None else "this is an atlas"
         raise InvalidInput("cloud", location, "a Zarr store written by softreach", hint)
     opened.watch.required = lambda _: True
     with _few_chunks_at_a_time(), storage_errors(f"{location} cannot be read"):
         check_arrays(opened)
-        with xr.open_zarr(opened.place, **READING) as stored:
+        with raised_at_the_end(opened.watch), xr.open_zarr(opened.place, **READING) as stored:
             cloud = stored.load()
         cloud.attrs.pop(ARRAYS, None)
         return schema.check_stored_cloud(cloud)
@@ -215,18 +217,20 @@ def _of_all_bundles(rod: TipMap) -> TipMap:
     return rod.base if isinstance(rod, View) else rod
 
 
-def _is_cloud(path: Path) -> bool:
-    """True if the store of softreach at a path is a cloud."""
+def _is_cloud_of(arm: Manipulator, path: Path) -> bool:
+    """True if the store of softreach at a path is a cloud of a design."""
     try:
-        return kind_of(path) == "cloud"
-    except InvalidInput:
+        attributes = attributes_of(path)
+        text = "" if "command" in attributes else attributes.get("design", "")
+        return text == arm.to_toml() or Manipulator.from_toml(text) == arm
+    except (InvalidInput, InvalidDesign):
         return False
 
 
-CLOUD_STORE: Formats = {
-    ".zarr": FileKind("a stored cloud", _is_cloud, foreign=foreign_entry),
-}
-"""Files that `save_cloud` writes, and replaces."""
+def cloud_store(arm: Manipulator) -> Formats:
+    """Stores that `save_cloud` writes, and replaces: clouds of the same design."""
+    kind = FileKind("a stored cloud of the same design", partial(_is_cloud_of, arm))
+    return {".zarr": kind._replace(foreign=foreign_entry)}
 
 
 def _write(cloud: xr.Dataset, path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from softreach.export.clouds import export_cloud
+from softreach.export.clouds import cloud_table, export_cloud
 from softreach.export.surfaces import export_arm, export_mesh
 
-__all__ = ["export_arm", "export_cloud", "export_mesh"]
+__all__ = ["cloud_table", "export_arm", "export_cloud", "export_mesh"]

@@ -31,6 +31,7 @@ from softreach.support.palette import activation_colors
 from softreach.support.units import METER, LengthUnit, as_unit
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
 
@@ -76,7 +77,28 @@ class CloudTable(NamedTuple):
             yield self.columns(slice(start, start + _BLOCK))
 
 
-def cloud_table(cloud: xr.Dataset, unit: LengthUnit = METER) -> CloudTable:
+def cloud_table(cloud: xr.Dataset) -> pd.DataFrame:
+    """A cloud as a tidy table of pandas: one row a sample, as in the files of `export_cloud`.
+
+    The columns are x, y, z [m], one activation per bundle such as ``gamma_left``, and of arms under
+    loads the `status`; `attrs` hold the design, seed, tolerance, versions and units.
+
+    Args:
+        cloud: tip(sample, axis) [m] and activation(sample, bundle), each in its unit.
+
+    Raises:
+        InvalidInput: The dataset is not a cloud.
+    """
+    import xarray as xr
+
+    arrays = arrays_of(a_cloud("cloud", cloud))
+    columns = {name: ("sample", values) for name, values in arrays.columns().items()}
+    table = xr.Dataset(columns).to_dataframe()
+    table.attrs.update(arrays.metadata)
+    return table
+
+
+def arrays_of(cloud: xr.Dataset, unit: LengthUnit = METER) -> CloudTable:
     """The arrays and the description of a cloud.
 
     Args:
@@ -147,7 +169,7 @@ def export_cloud(
     """
     path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
     cloud = a_cloud("cloud", cloud)
-    table = cloud_table(cloud, as_unit(unit, _length(cloud)))
+    table = arrays_of(cloud, as_unit(unit, _length(cloud)))
     takes = _BYTES * (table.tip.size + table.activation.size)
     write_by_suffix(path, CLOUD_FILES, table, overwrite=overwrite, takes=takes)
 

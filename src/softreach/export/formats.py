@@ -141,7 +141,7 @@ def load_library(module: str) -> Any:
         library = module.partition(".")[0]
         if error.name is None or error.name.partition(".")[0] != library:
             raise
-        raise MissingExtra(library, "export") from error
+        raise MissingExtra((library, "export")) from error
 
 
 def _ply_rows(columns: Mapping[str, NDArray[np.generic]]) -> NDArray[np.void]:

@@ -7,6 +7,7 @@ target otherwise. The least of them is the answer.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from softreach.inverse.prepared import PreparedMap
 from softreach.inverse.request import Request
 from softreach.inverse.sqp import constrained_minima, sqp, survey
 from softreach.rod.tip_map import TipMap
-from softreach.support.arrays import Array, Index
+from softreach.support.arrays import Array, Index, Mask
 
 __all__ = ["least_changes"]
 
@@ -28,7 +29,9 @@ _APART = 0.15
 _SURVEY = 5  # steps after which searches are compared
 _SURVIVORS, _MERGED = 6, 0.05  # searches of a target that go on, and how far they are apart
 _HIGH_PENALTY = 1e4
-_EQUAL = 1e-6  # difference of activations below which they are one
+_EQUAL = 1e-6  # difference of changes below which neither is less
+_APART_IN_FAMILY = 1e-3  # least difference of two of a family, in ranges
+_ROUNDS = 4  # of random activations as many as are wanted
 _POLISHED, _MOST_POLISHING = 1e-9, 300
 _BLOCK = 4096  # targets at once: bounds the memory of their candidates
 
@@ -36,7 +39,8 @@ _BLOCK = 4096  # targets at once: bounds the memory of their candidates
 def least_changes(prepared: PreparedMap, request: Request) -> tuple[Index, Array, Reached]:
     """The activation of least change for each target, then others of the solution family.
 
-    The others are those nearest to `family - 1` random activations, whatever their direction.
+    The others are those nearest to random activations, whatever their direction, and apart from
+    each other: fewer than `family` where further searches end at what is known.
 
     Args:
         prepared: The tip map.
@@ -46,34 +50,72 @@ def least_changes(prepared: PreparedMap, request: Request) -> tuple[Index, Array
         Number of the target and activation, sorted by target, those of least change first; and the
         best place found for every target, reached or not.
     """
-    box = prepared.rod.box
-    rng = np.random.default_rng(request.seed)
-    # One set for all targets, so that a target's family does not depend on its neighbors.
-    others = rng.uniform(box.low, box.high, (request.family - 1, box.bundles))
     known = _in_blocks(prepared, replace(request, direction=None))
     reached = np.flatnonzero(known.residual <= request.residual)
-    wanted = request.of(reached)
-    targets, activations = [reached], [known.gamma[reached]]
+    asked = request.of(reached)
+    first = known.gamma[reached]
     if request.direction is not None:
-        activations = [_turned(prepared, wanted, activations[0])]
-    for near in others:
-        variant = replace(wanted, near=np.tile(near, (len(reached), 1)), direction=None)
-        targets.append(reached)
-        activations.append(_in_blocks(prepared, variant, activations[0]).gamma)
-        if request.direction is None:
-            _put_least_first(activations[0], activations[-1], wanted.near)
-    target = np.concatenate(targets)
-    order = np.argsort(target, kind="stable")
-    return target[order], np.concatenate([np.empty((0, box.bundles)), *activations])[order], known
+        first = _turned(prepared, asked, first)
+    families = _Families(first, request.family, prepared.rod.box.scales)
+    for near in _random_activations(prepared.rod, request):
+        rows = np.flatnonzero(families.counts < request.family)
+        if not len(rows):
+            break
+        one = replace(asked.of(rows), near=np.tile(near, (len(rows), 1)), direction=None)
+        other = _in_blocks(prepared, one, families.members[rows, 0]).gamma
+        families.add(rows, other, None if request.direction is not None else asked.near[rows])
+    return np.repeat(reached, families.counts), families.members[families.is_member], known
 
 
-def _put_least_first(first: Array, other: Array, near: Array) -> None:
-    """Exchange activations where the other changes less; make them one where they are equal."""
-    equal = np.abs(first - other).max(axis=1, initial=0.0) <= _EQUAL
-    other[equal] = first[equal]
-    change, others = np.linalg.norm(first - near, axis=1), np.linalg.norm(other - near, axis=1)
-    less = others < change
-    first[less], other[less] = other[less], first[less]
+def _random_activations(rod: TipMap, request: Request) -> Iterator[Array]:
+    """Activations that others of a family stay near to.
+
+    One sequence for all targets, so that a target's family does not depend on its neighbors.
+    """
+    rng = np.random.default_rng(request.seed)
+    for _ in range(_ROUNDS):
+        yield from rng.uniform(rod.box.low, rod.box.high, (request.family - 1, rod.box.bundles))
+
+
+class _Families:
+    """Activations of each target that are apart from each other."""
+
+    def __init__(self, first: Array, most: int, scales: Array) -> None:
+        """Begin with one of each target, shape (t, m); `most` is for how many there is room."""
+        self.members = np.repeat(first[:, None], most, axis=1)
+        self.counts = np.ones(len(first), np.int64)
+        self._scales = scales
+
+    @property
+    def is_member(self) -> Mask:
+        """Entries of `members` that are taken, shape (t, most)."""
+        return np.arange(self.members.shape[1]) < self.counts[:, None]
+
+    def add(self, rows: Index, other: Array, near: Array | None) -> None:
+        """Add one activation to some targets, if it is a new one, and put the least change first.
+
+        Args:
+            rows: Numbers of the targets.
+            other: An activation for each.
+            near: Activations from which changes count; None where the first stays first.
+        """
+        apart = np.abs(self.members[rows] - other[:, None]) / self._scales
+        distance = np.where(self.is_member[rows], apart.max(axis=2), np.inf)
+        alike = (distance <= _APART_IN_FAMILY).sum(axis=1)
+        is_new = alike == 0
+        place = np.where(is_new, self.counts[rows], distance.argmin(axis=1))
+        old = np.where(is_new[:, None], other, self.members[rows, place])
+        if near is not None:  # of two that are one, that of less change
+            change = np.linalg.norm(other - near, axis=1)
+            less = (change < np.linalg.norm(old - near, axis=1) - _EQUAL) & (alike == 1)
+            old = np.where(less[:, None], other, old)
+        self.members[rows, place] = old
+        self.counts[rows] += is_new
+        if near is not None:
+            first = self.members[rows, 0]
+            less = np.linalg.norm(old - near, axis=1) < np.linalg.norm(first - near, axis=1)
+            rows, place = rows[less], place[less]
+            self.members[rows, place], self.members[rows, 0] = first[less], old[less]
 
 
 def _in_blocks(prepared: PreparedMap, request: Request, known: Array | None = None) -> Reached:

@@ -72,7 +72,7 @@ def solve_inverse(
 
     Args:
         arm: The design, its tip map, or what `prepared_map` made of it.
-        targets: Tip positions to reach [m], shape (t, 3).
+        targets: Tip positions to reach [m], shape (t, 3), or (3,) for one.
         residual_over_length: |tip - target| to which a solution is searched, in L. Where the arm
             comes no nearer than to within `tol`, its nearest activations are the solutions: whether
             it reaches such a target is more than its tips can say.
@@ -85,7 +85,8 @@ def solve_inverse(
             least |tip - target|²/L² + w² |d3 - direction|².
         direction_weight: w [-].
         family: With more than three free bundles: how many activations to give for each target,
-            the others being those nearest to random activations.
+            the others being those nearest to random activations and apart by a thousandth of a
+            range; fewer where no more of them are found.
         prove_least: With more than three free bundles: bound |γ - near| from below, over all
             activations that reach a target, and say whether the one found is the least. Takes
             some ten milliseconds for a target with four, up to half a second with five or six,

@@ -114,7 +114,7 @@ def report_template() -> Any:
     try:
         from jinja2 import Environment, StrictUndefined
     except ModuleNotFoundError as error:
-        raise MissingExtra("jinja2", "paper") from error
+        raise MissingExtra(("jinja2", "paper")) from error
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     text = files("softreach.paper").joinpath("report.html.jinja").read_text(encoding="utf-8")
     return environment.from_string(text)

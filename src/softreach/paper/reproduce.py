@@ -14,7 +14,7 @@ from typing import Any
 
 from softreach.atlas.build import STORED
 from softreach.paper.notebook import FULL, QUICK, Notebook
-from softreach.paper.report import REPORT, report_template, write_report
+from softreach.paper.report import REPORT, write_report
 from softreach.paper.sections.misprints import misprints
 from softreach.paper.sections.model import model
 from softreach.paper.sections.redundancy import redundancy
@@ -23,6 +23,7 @@ from softreach.paper.sections.uniqueness import uniqueness
 from softreach.paper.sections.volume import volume
 from softreach.plot.style import pyplot
 from softreach.support.files.atomic import check_place
+from softreach.support.files.kinds import check_installed
 
 __all__ = ["PARTS", "reproduce_paper"]
 
@@ -61,12 +62,13 @@ def reproduce_paper(
         The report: one HTML file that needs nothing beside it.
 
     Raises:
-        MissingExtra: matplotlib or Jinja2 is not installed.
+        MissingExtra: matplotlib, scikit-image or Jinja2 is not installed.
         InvalidInput: Something else is where the report goes.
         NotWritten: The folder cannot be written to.
     """
+    # What is missing is reported now, not after a quarter of an hour.
+    check_installed(("matplotlib", "plot"), ("skimage", "surface"), ("jinja2", "paper"))
     pyplot()
-    report_template()  # what is missing is reported now, not after a quarter of an hour
     settings = QUICK if quick else FULL
     folder = Path(out) / "quick" if quick else Path(out)
     report = folder / "report.html"

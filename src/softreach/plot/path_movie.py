@@ -148,7 +148,7 @@ def _gif(frames: Sequence[Image]) -> bytes:
     try:
         from PIL import Image as images
     except ModuleNotFoundError as error:
-        raise MissingExtra("Pillow", "plot") from error
+        raise MissingExtra(("Pillow", "plot")) from error
     # One palette for all frames: colors that change from frame to frame flicker.
     first = images.fromarray(frames[len(frames) // 2]).quantize(256, dither=images.Dither.NONE)
     made = [

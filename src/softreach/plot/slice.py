@@ -31,7 +31,7 @@ def plot_slice(
     *,
     ax: Axes | None = None,
     view: View = "front",
-    at: float = 0.0,
+    at: float | None = None,
     key: bool = True,
     unit: Unit = None,
 ) -> Axes:
@@ -44,7 +44,8 @@ def plot_slice(
         grid: `ReachableSet.grid`: `count` and `degree`, or `occupied`, over x, y, z [m].
         ax: Axes to draw in; None for a new figure.
         view: A view along an axis: "front" for a plane y = at, "side" for x = at, "top" for z = at.
-        at: Where the plane cuts that axis [m]; the nearest layer of cells is shown.
+        at: Where the plane cuts that axis [m]; the nearest layer of cells is shown. None for the
+            middle of the set.
         key: Whether to explain the colors.
         unit: Of the axes: "m", "cm", "mm" or "L"; None for L if the grid knows it (attribute
             `length`), else m.
@@ -57,8 +58,8 @@ def plot_slice(
         MissingExtra: matplotlib is not installed.
     """
     grid, ax = as_dataset("grid", grid, "x", "y", "z"), as_axes(ax)
-    at, key = as_number("at", at, PLACE), as_flag("key", key)
-    axis, counted = sight_axis(view), unit_of(grid, unit)
+    axis, counted, key = sight_axis(view), unit_of(grid, unit), as_flag("key", key)
+    at = _middle(grid, axis) if at is None else as_number("at", at, PLACE)
     layer = _layer(grid, axis, at)
     with figure_style(ax):
         ax = small_axes(3.4, 4.2) if ax is None else ax
@@ -72,7 +73,7 @@ def plot_slice(
 def plot_slices(
     grid: xr.Dataset,
     *,
-    at: Sequence[float] = (0.0, 0.0, 0.0),
+    at: Sequence[float] | None = None,
     width: float = 9.6,
     unit: Unit = None,
 ) -> Figure:
@@ -80,7 +81,7 @@ def plot_slices(
 
     Args:
         grid: As in `plot_slice`.
-        at: The point [m].
+        at: The point [m]; None for the middle of the set.
         width: Of the figure [inch].
         unit: As in `plot_slice`.
 
@@ -89,7 +90,7 @@ def plot_slices(
         MissingExtra: matplotlib is not installed.
     """
     grid, width = as_dataset("grid", grid, "x", "y", "z"), as_number("width", width, WIDTH)
-    point = as_floats("at", at)
+    point = as_floats("at", [_middle(grid, axis) for axis in "xyz"] if at is None else at)
     if point.shape != (3,):
         raise InvalidInput("at.shape", point.shape, "a point (x, y, z) [m]")
     with figure_style():
@@ -100,10 +101,18 @@ def plot_slices(
     return figure
 
 
+def _middle(grid: xr.Dataset, axis: str) -> float:
+    """Middle of what is reached along an axis [m]."""
+    reached = grid["count" if "count" in grid else "occupied"] > 0
+    extent = grid[axis].values[reached.any([other for other in "xyz" if other != axis]).values]
+    return float(extent[0] + extent[-1]) / 2 if len(extent) else float(grid[axis].mean())
+
+
 def _layer(grid: xr.Dataset, axis: str, at: float) -> xr.Dataset:
     centers, half = grid[axis].values, grid.attrs["cell"] / 2
     if not centers[0] - half <= at <= centers[-1] + half:
-        raise InvalidInput("at", at, f"between {centers[0]:.4g} and {centers[-1]:.4g} m")
+        inside = f"between {centers[0]:.4g} and {centers[-1]:.4g} m along {axis}"
+        raise InvalidInput("at", at, inside)
     return grid.sel({axis: at}, method="nearest")
 
 

@@ -65,7 +65,7 @@ def pyplot() -> Any:
     try:
         from matplotlib import pyplot as plt
     except ModuleNotFoundError as error:
-        raise MissingExtra("matplotlib", "plot") from error
+        raise MissingExtra(("matplotlib", "plot")) from error
     except ValueError as error:  # of a backend that does not exist
         backend = os.environ.get("MPLBACKEND", "")
         allowed = "a backend of matplotlib"

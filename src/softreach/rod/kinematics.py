@@ -41,8 +41,8 @@ def tip_positions(
 
     Args:
         arm: The design, or its tip map.
-        activations: γ [-], shape (n, bundles); values outside the bounds are allowed, but `tol` is
-            promised inside them.
+        activations: γ [-], shape (n, bundles), or (bundles,) for one; values outside the bounds are
+            allowed, but `tol` is promised inside them.
         tol: Largest tip error, in L; it decides the number of steps.
         frame: In which tips are told: that of the "world", or of the "base", whose z is along the
             straight arm.

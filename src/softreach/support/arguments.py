@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterable, Mapping
 from numbers import Integral, Real
 from typing import Any
 
-from softreach.support.errors import InvalidInput, Range
+from softreach.support.errors import InvalidInput, Range, did_you_mean
 
 __all__ = [
     "POSITIVE",
@@ -115,7 +115,8 @@ def as_one_of(name: str, value: object, words: Iterable[str]) -> str:
     """
     if isinstance(value, str) and value in words:
         return value
-    raise InvalidInput(name, as_given(value), f"one of {', '.join(words)}")
+    hint = did_you_mean(value, words) if isinstance(value, str) else ""
+    raise InvalidInput(name, as_given(value), f"one of {', '.join(words)}", hint)
 
 
 def as_names(name: str, value: object) -> tuple[str, ...]:

@@ -121,19 +121,20 @@ def as_floats(name: str, values: object, allowed: str = _NUMBERS) -> Array:
 
 
 def as_rows(name: str, values: object, columns: int, allowed: str) -> Array:
-    """Finite numbers of shape (n, columns).
+    """Finite numbers of shape (n, columns); one row may stand alone.
 
     Raises:
         InvalidInput: No numbers, another shape, or rows that are not finite.
     """
     rows = as_floats(name, values, allowed)
+    rows = rows[None] if rows.shape == (columns,) else rows
     if rows.ndim != 2 or rows.shape[1] != columns:
         raise InvalidInput(f"{name}.shape", rows.shape, allowed)
     return check_finite(name, rows)
 
 
 def as_points(name: str, values: object) -> Points:
-    """Finite positions [m], shape (n, 3); nothing at all counts as none of them.
+    """Finite positions [m], shape (n, 3); one may stand alone, and nothing at all is none of them.
 
     Raises:
         InvalidInput: No numbers, another shape, or rows that are not finite.

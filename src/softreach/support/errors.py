@@ -6,7 +6,7 @@ import math
 import re
 import sys
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import NamedTuple
@@ -35,6 +35,14 @@ _MOST = 50
 def counted(number: int, noun: str) -> str:
     """A number of things in words: "1 design", "2 designs"."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def did_you_mean(name: str, known: Iterable[str], cutoff: float = 0.7) -> str:
+    """A hint at the known name that is closest to an unknown one; empty if none is close."""
+    from difflib import get_close_matches
+
+    close = get_close_matches(name, list(known), n=1, cutoff=cutoff)
+    return f'did you mean "{close[0]}"?' if close else ""
 
 
 def in_short(value: object) -> str:
@@ -164,10 +172,17 @@ class InvalidDesign(SoftreachError, ValueError):
 
 
 class MissingExtra(SoftreachError, ImportError):
-    """An optional library is needed but not installed."""
+    """Optional libraries are needed but not installed."""
 
-    def __init__(self, library: str, extra: str) -> None:
-        super().__init__(f"this needs {library}; install it with: pip install 'softreach[{extra}]'")
+    def __init__(self, *missing: tuple[str, str]) -> None:
+        """Each of `missing` is a library and the extra of softreach that brings it."""
+        libraries = " and ".join(dict.fromkeys(library for library, _ in missing))
+        extras = ",".join(dict.fromkeys(extra for _, extra in missing))
+        them = "it" if len({library for library, _ in missing}) == 1 else "them"
+        super().__init__(
+            f"this needs {libraries}; install {them} with: pip install 'softreach[{extras}]', "
+            "or in a clone with: make setup"
+        )
 
 
 class NotWritten(SoftreachError, OSError):

@@ -1,17 +1,21 @@
-"""Progress of long work: callbacks, and a bar on a terminal."""
+"""Progress of long work: callbacks, a bar on a terminal, lines elsewhere."""
 
 from __future__ import annotations
 
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from softreach.support.arguments import as_function
 
 __all__ = ["Progress", "as_progress", "bar", "hidden", "silent"]
 
 hidden = False
-"""No bars, even on a terminal; `softreach --quiet` sets it."""
+"""No bars and no lines; `softreach --quiet` sets it."""
+
+_PAUSE = 30.0  # [s] between lines
 
 Progress = Callable[[int], None]
 """Called with the number of items done since the last call."""
@@ -35,12 +39,17 @@ def as_progress(progress: object) -> Progress:
 def bar(label: str, total: int | None) -> Iterator[Progress]:
     """A progress bar with rate and time left on standard error, if that is a terminal.
 
+    In a pipe, a file or a notebook a line every half minute says how far it is.
+
     Args:
         label: What is going on.
         total: Number of items; None if it is known only in the end, for a bar that moves on.
     """
-    if hidden or not sys.stderr.isatty():
+    if hidden:
         yield silent
+        return
+    if not sys.stderr.isatty():
+        yield _Lines(label, total)
         return
     from rich.console import Console
     from rich.progress import (
@@ -60,3 +69,25 @@ def bar(label: str, total: int | None) -> Iterator[Progress]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as display:
         task = display.add_task(label, total=total)
         yield lambda done: display.update(task, advance=done)
+
+
+class _Lines:
+    """Writes a line on standard error now and then, when it is told of progress."""
+
+    def __init__(self, label: str, total: int | None) -> None:
+        self._label, self._total, self._done = label, total, 0
+        self._begun = self._told = time.monotonic()
+        self._lock = threading.Lock()
+
+    def __call__(self, done: int) -> None:
+        with self._lock:
+            self._done += done
+            now = time.monotonic()
+            if now - self._told < _PAUSE:
+                return
+            self._told = now
+            of_total = "" if self._total is None else f": {self._done:,} of {self._total:,}"
+            minutes, seconds = divmod(round(now - self._begun), 60)
+            with suppress(OSError, ValueError):  # nobody reads it
+                sys.stderr.write(f"{self._label}{of_total}, {minutes}:{seconds:02} so far\n")
+                sys.stderr.flush()

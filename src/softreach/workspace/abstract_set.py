@@ -84,7 +84,7 @@ class ReachableSet(ABC):
         """Distance of points to the set [m], shape (n,).
 
         Args:
-            points: Positions [m], shape (n, 3).
+            points: Positions [m], shape (n, 3), or (3,) for one.
 
         Raises:
             InvalidInput: Points of another shape or not finite.

@@ -193,7 +193,7 @@ def _level_set(image: Image | ReachedCells, field: Array, level: float) -> Surfa
     try:
         from skimage.measure import marching_cubes
     except ImportError as error:
-        raise MissingExtra("scikit-image", "surface") from error
+        raise MissingExtra(("scikit-image", "surface")) from error
     if not (field < level).any():
         return Surface(vertices=np.empty((0, 3)), faces=np.empty((0, 3), np.int32))
     vertices, faces, _, _ = marching_cubes(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from os import PathLike
@@ -28,7 +27,7 @@ from softreach.arm.material import LIBRARY_HINT, Material, material_names, named
 from softreach.arm.number import Number
 from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.section import Ring, Section, name_faults
-from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError
+from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError, did_you_mean
 from softreach.support.files.text import read_text
 from softreach.support.units import UNITS
 
@@ -370,10 +369,9 @@ def _place(key: str) -> str:
 
 def _materials_text(name: str, own: list[str]) -> str:
     """Materials that are allowed."""
-    close = difflib.get_close_matches(name, [*own, *material_names()], n=1, cutoff=0.5)
-    hint = f'; did you mean "{close[0]}"?' if close else ""
+    hint = did_you_mean(name, [*own, *material_names()]) or LIBRARY_HINT
     here = f"of this file ({', '.join(own)})" if own else "with a table [materials.NAME]"
-    return f"must be a material {here}, or of the library{hint or f'; {LIBRARY_HINT}'}"
+    return f"must be a material {here}, or of the library; {hint}"
 
 
 def _kinds_text(kind: Any, own: list[str]) -> str:
@@ -384,4 +382,5 @@ def _kinds_text(kind: Any, own: list[str]) -> str:
     if isinstance(kind, str) and kind in names:
         return f'must be the kind of a file; did you mean "{names[kind]}"?'
     others = ", or a class of your own that is imported" + (f": {', '.join(own)}" if own else "")
-    return f"must be one of {', '.join(ACTUATORS)}{others}"
+    hint = did_you_mean(kind, [*ACTUATORS, *own]) if isinstance(kind, str) else ""
+    return f"must be one of {', '.join(ACTUATORS)}{others}{f'; {hint}' if hint else ''}"

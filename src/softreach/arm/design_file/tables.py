@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -16,7 +15,7 @@ from softreach.arm.loads import PointLoad
 from softreach.arm.material import Material
 from softreach.arm.number import Number, series_faults
 from softreach.arm.profile import Profile
-from softreach.support.errors import Fault, InvalidDesign, Range
+from softreach.support.errors import Fault, InvalidDesign, Range, did_you_mean
 
 __all__ = ["WRONG", "TableReader", "is_doubtful", "unknown_key"]
 
@@ -192,11 +191,8 @@ def unknown_key(name: str, keys: Mapping[str, str]) -> str:
         name: The key.
         keys: Field -> key of the table.
     """
-    close = [keys[name]] if name in keys else difflib.get_close_matches(name, keys.values(), n=1)
-    known = ", ".join(keys.values())
-    return (
-        f'unknown key; did you mean "{close[0]}"?' if close else f"unknown key; known keys: {known}"
-    )
+    hint = did_you_mean(keys.get(name, name), keys.values())
+    return f"unknown key; {hint or 'known keys: ' + ', '.join(keys.values())}"
 
 
 def is_doubtful(fault: Fault, wrong: Iterable[str]) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -11,7 +10,7 @@ from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.parameters.draft import Draft
 from softreach.arm.parameters.parameter import OwnParameter, Parameter, parameters
 from softreach.support.arguments import as_instance, as_text, plain
-from softreach.support.errors import Fault, InvalidInput, in_short
+from softreach.support.errors import Fault, InvalidInput, did_you_mean, in_short
 
 __all__ = [
     "changed",
@@ -23,6 +22,8 @@ __all__ = [
 
 _ELEMENT = re.compile(r"(.*)\[(\d+)\]$")
 _FEW = 12
+_ACTIVATIONS = ("activation", "force", "pressure", "tension")
+"""Names under which activations are looked for among the parameters of an actuator."""
 
 
 def parameters_by_every_name(arm: Manipulator) -> dict[str, Parameter]:
@@ -103,15 +104,17 @@ def unknown_parameter(name: str, known: Mapping[str, Parameter]) -> InvalidInput
         name: The name.
         known: All parameters by what they are called where the name was given.
     """
-    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)
-    hint = f'did you mean "{close[0]}"?' if close else ""
+    owners = list(dict.fromkeys(parameter.owner for parameter in known.values() if parameter.owner))
+    meant = max((own for own in owners if name.startswith(f"{own}.")), key=len, default="")
+    own = [key for key, parameter in known.items() if parameter.owner == meant]
+    hint = did_you_mean(name, own if meant else known, 0.5)
+    if name.rpartition(".")[2] in _ACTIVATIONS:
+        bound = f"{meant}.lower" if f"{meant}.lower" in known else "lower"
+        hint = f"activations are given to commands; their bounds are {bound} and {bound[:-5]}upper"
     if name.startswith("loads.") and not any(key.startswith("loads.") for key in known):
         hint = "the arm has no loads: give it some first"
     if name.startswith("base.") and not any(key.startswith("base.") for key in known):
         hint = "the arm stands upright at the origin: give it another base first"
-    owners = list(dict.fromkeys(parameter.owner for parameter in known.values() if parameter.owner))
-    meant = max((own for own in owners if name.startswith(f"{own}.")), key=len, default="")
-    own = [key for key, parameter in known.items() if parameter.owner == meant]
     allowed = f"one of {', '.join(_shortened(own))}"
     if owners and not meant:
         parts = ", ".join(owners[:_FEW]) + (", ..." if len(owners) > _FEW else "")

@@ -41,7 +41,7 @@ def start_server(host: str = LOOPBACK, port: int | None = None, token: str = "")
     try:
         import viser
     except ModuleNotFoundError as error:
-        raise MissingExtra("viser", "studio") from error
+        raise MissingExtra(("viser", "studio")) from error
 
     check_address(host, port or 0)
     _check_free(host, port or 0)

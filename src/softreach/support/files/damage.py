@@ -88,6 +88,7 @@ class Watch:
     written: dict[Chunk, int] = field(default_factory=dict)
     """Checksums of the chunks that were written."""
     _noted: dict[Chunk, str] | None = field(default=None, init=False)
+    _late: list[DamagedStore] | None = field(default=None, init=False)
 
     def report(self, chunk: Chunk, found: str, allowed: str = AS_WRITTEN) -> None:
         """Note damage where that is asked for.
@@ -96,9 +97,12 @@ class Watch:
             DamagedStore: It is not.
         """
         error = DamagedStore(self.location, chunk, found, self.remedy, allowed)
-        if self._noted is None:
+        if self._noted is not None:
+            self._noted[chunk] = str(error)
+        elif self._late is not None:
+            self._late.append(error)
+        else:
             raise error
-        self._noted[chunk] = str(error)
 
     @contextmanager
     def noting(self) -> Iterator[dict[Chunk, str]]:
@@ -109,6 +113,21 @@ class Watch:
             yield noted
         finally:
             self._noted = before
+
+
+@contextmanager
+def raised_at_the_end(watch: Watch) -> Iterator[None]:
+    """Read a block to its end before its first damage is raised.
+
+    Zarr reads chunks at once: it would lose all errors but the first, and print them at the exit.
+    """
+    watch._late = late = []
+    try:
+        yield
+    finally:
+        watch._late = None
+        if late:
+            raise late[0]
 
 
 @contextmanager

@@ -27,6 +27,7 @@ _changed = threading.Condition()
 _unfinished: dict[object, Undo] = {}
 _begun = 0  # blocks that must come to their end
 _ending = False
+_remarks: list[Callable[[], str]] = []
 _own = threading.local()  # how many such blocks the thread is in
 
 
@@ -64,6 +65,26 @@ def undoing(undo: Undo) -> Iterator[None]:
             del _unfinished[key]
 
 
+@contextmanager
+def remarking(remark: Callable[[], str]) -> Iterator[None]:
+    """A block at whose interruption more is said: in the last line of the process, or in a note.
+
+    Args:
+        remark: Called then; how far the work is.
+
+    Raises:
+        KeyboardInterrupt: What is raised in the block, with the remark as its note.
+    """
+    _remarks.append(remark)
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        error.add_note(remark())
+        raise
+    finally:
+        _remarks.remove(remark)
+
+
 def stop_here(*_: object) -> None:
     """Do nothing more on this thread, as the process ends; a handler of signals.
 
@@ -89,6 +110,7 @@ def end_process(code: int, said: str = "") -> NoReturn:
             stderr = _silenced()
             _finish()
             if said:
+                said = "; ".join([said, *(remark() for remark in _remarks[-1:])])
                 os.write(stderr, f"{_cleared_line(stderr)}{said}\n".encode())
     finally:
         os._exit(code)

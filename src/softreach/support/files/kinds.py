@@ -27,6 +27,8 @@ __all__ = [
 Recognizes = Callable[[Path], bool]
 """True if what is at a path, which exists, is of some kind."""
 
+_PACKAGES = {"skimage": "scikit-image"}
+"""Packages by the name of their module, where that is another."""
 _HEAD = 4096  # bytes in which a file says what it is
 
 
@@ -71,23 +73,28 @@ def format_of(path: str | PathLike[str], formats: Formats, name: str = "path") -
     kind = formats.get(Path(path).suffix.lower())
     if kind is None:
         raise InvalidInput(name, fspath(path), "a file name ending in " + ", ".join(formats))
-    for library in kind.libraries:
-        check_installed(library, kind.extra)
+    check_installed(*((library, kind.extra) for library in kind.libraries))
     return kind
 
 
-def check_installed(library: str, extra: str) -> None:
-    """Say that a library is missing, without the time that importing it takes.
+def check_installed(*needed: tuple[str, str]) -> None:
+    """Say which libraries are missing, all at once, without the time that importing them takes.
+
+    Args:
+        needed: The name under which a library is imported, and the extra that brings it.
 
     Raises:
-        MissingExtra: It is not installed.
+        MissingExtra: Some are not installed.
     """
+    if missing := [(name, extra) for name, extra in needed if not _is_installed(name)]:
+        raise MissingExtra(*((_PACKAGES.get(name, name), extra) for name, extra in missing))
+
+
+def _is_installed(library: str) -> bool:
     try:
-        missing = importlib.util.find_spec(library) is None
+        return importlib.util.find_spec(library) is not None
     except ValueError:  # of modules without a specification
-        missing = sys.modules.get(library) is None
-    if missing:
-        raise MissingExtra(library, extra)
+        return sys.modules.get(library) is not None
 
 
 def beginning_with(*heads: bytes) -> Recognizes:

@@ -197,18 +197,34 @@ def _is_endless(path: Path) -> bool:
     return path.exists() and not (path.is_file() or path.is_dir())
 
 
+def absence(location: StoreLike) -> str:
+    """Reason why there is no store at a place: it does not exist, or holds something else."""
+    if isinstance(location, str) and "://" not in location and Path(location).exists():
+        return "there is none in it"
+    return "it does not exist"
+
+
 def kind_of(path: str | os.PathLike[str]) -> Kind:
     """The kind of a store on disk.
 
     Raises:
         InvalidInput: No store of softreach.
     """
+    return "atlas" if "command" in attributes_of(path) else "cloud"
+
+
+def attributes_of(path: str | os.PathLike[str]) -> Mapping[str, Any]:
+    """Attributes of a store on disk.
+
+    Raises:
+        InvalidInput: No store of softreach.
+    """
     try:
-        attributes = unsealed(_bytes_of(Path(path) / DOCUMENT))["attributes"]
+        return unsealed(_bytes_of(Path(path) / DOCUMENT))["attributes"]
     except (OSError, Broken) as error:
         reason = f"its {DOCUMENT} is {error.found}" if isinstance(error, Broken) else str(error)
+        reason = reason if Path(path).exists() else absence(os.fspath(path))
         raise InvalidInput("store", os.fspath(path), _ALLOWED["cloud"], reason) from None
-    return "atlas" if "command" in attributes else "cloud"
 
 
 def foreign_entry(path: Path) -> str:
