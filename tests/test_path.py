@@ -88,7 +88,7 @@ def test_a_first_point_out_of_reach_is_said(trunk):
     assert track.attrs["end"] == "no_start"
 
 
-@pytest.mark.parametrize("path", [np.empty((0, 3)), [[0.0, 0.0, np.inf]], [0.0, 0.0, 1.0]])
+@pytest.mark.parametrize("path", [np.empty((0, 3)), [[0.0, 0.0, np.inf]], [0.0, 1.0]])
 def test_what_is_no_path_is_refused(trunk, path):
     with pytest.raises(InvalidInput, match="path"):
         track_path(trunk, path)

@@ -149,7 +149,7 @@ def test_an_impossible_box_is_refused(bounds, names, message):
     ("activations", "message"),
     [
         (np.zeros((3, 3)), r"activations.shape = \(3, 3\): must be .*of shape \(n, 2\)"),
-        (np.zeros(2), r"activations.shape = \(2,\)"),
+        (np.zeros(3), r"activations.shape = \(3,\)"),
         (np.zeros((1, 1, 2)), r"activations.shape = \(1, 1, 2\)"),
         (0.0, "activations.shape"),
         ([[0, 0], [0, np.nan]], r"activations\[1\] = .*finite numbers"),

@@ -226,7 +226,7 @@ def test_one_activation_gives_one_shape_without_a_sample_axis(trunk):
     ("call", "message"),
     [
         (lambda a: sr.tip_positions(a, np.zeros((2, 4))), r"shape = \(2, 4\).*\(n, 3\)"),
-        (lambda a: sr.tip_positions(a, np.zeros(3)), "one column per bundle"),
+        (lambda a: sr.tip_positions(a, np.zeros(4)), "one column per bundle"),
         (lambda a: sr.tip_positions(a, [[0, np.nan, 0]]), r"activations\[0\].*finite"),
         (
             lambda a: sr.tip_positions(a, np.zeros((1, 3)), tol=1e-15),

@@ -349,13 +349,18 @@ def test_no_activations_give_empty_results(make, arm):
 def test_activations_are_checked_by_every_question(make, ask, trunk):
     rod = make(trunk, 1e-6)
     for gamma, message in (
-        (np.zeros(3), r"activations.shape = \(3,\).*\(n, 3\)"),
+        (np.zeros(4), r"activations.shape = \(4,\).*\(n, 3\)"),
         (np.zeros((2, 4)), r"activations.shape = \(2, 4\)"),
         ([[0, np.nan, 0]], r"activations\[0\] = .*finite"),
         ([["a", 0, 0]], "an array of numbers"),
     ):
         with pytest.raises(InvalidInput, match=message):
             ask(rod, gamma)
+
+
+def test_one_activation_may_stand_alone(make, trunk):
+    rod, gamma = make(trunk, 1e-6), np.array([-1.0, 0.0, -0.5])
+    np.testing.assert_array_equal(rod.tips(gamma), rod.tips(gamma[None]))
 
 
 @pytest.mark.parametrize(
