@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -64,9 +64,12 @@ def plot_slice(
     with figure_style(ax):
         ax = small_axes(3.4, 4.2) if ax is None else ax
         highest = _draw(ax, layer, view, counted)
-        ax.set_title(f"{axis} = {counted.of(at):.3g} {counted.name}")
+        tenth = layer.attrs["cell"] / 10  # finer digits would be noise
+        place = float(counted.of(round(at / tenth) * tenth))
+        ax.set_title(f"{axis} = {place:.3g} {counted.name}")
         if key:
-            _draw_key(ax, highest, "count" in layer)
+            below = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "borderaxespad": 4.5}
+            _draw_key(ax, highest, "count" in layer, **below)
     return ax
 
 
@@ -97,7 +100,9 @@ def plot_slices(
         size = (width, 0.375 * width)
         figure, axes = pyplot().subplots(1, 3, figsize=size, layout="constrained")
         for ax, view, place in zip(axes, ("side", "front", "top"), point.tolist(), strict=True):
-            plot_slice(grid, ax=ax, view=view, at=place, unit=unit)
+            plot_slice(grid, ax=ax, view=view, at=place, unit=unit, key=False)
+        highest = max(int(ax.images[0].get_array().max()) for ax in axes)
+        _draw_key(figure, highest, "count" in grid, loc="outside lower center")
     return figure
 
 
@@ -156,11 +161,9 @@ def _draw_folds(ax: Axes, folded: np.ndarray, across: np.ndarray, up: np.ndarray
         ax.contour(across, up, folded.astype(float), **line)
 
 
-def _draw_key(ax: Axes, highest: int, counted: bool) -> None:
+def _draw_key(owner: Axes | Figure, highest: int, counted: bool, **place: Any) -> None:
     from matplotlib.patches import Patch
 
     labels = _LABELS[1 : highest + 1] if counted else ("reachable",)
     patches = [Patch(color=c, label=t) for c, t in zip(_COLORS[1:], labels, strict=False)]
-    title = "reached by" if counted else None
-    place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.2), "ncols": 2}
-    ax.legend(handles=patches, title=title, **place)
+    owner.legend(handles=patches, title="reached by" if counted else None, ncols=2, **place)
