@@ -64,9 +64,7 @@ def plot_slice(
     with figure_style(ax):
         ax = small_axes(3.4, 4.2) if ax is None else ax
         highest = _draw(ax, layer, view, counted)
-        tenth = layer.attrs["cell"] / 10  # finer digits would be noise
-        place = float(counted.of(round(at / tenth) * tenth))
-        ax.set_title(f"{axis} = {place:.3g} {counted.name}")
+        ax.set_title(f"{axis} = {counted.of(at):.3g} {counted.name}")
         if key:
             below = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0), "borderaxespad": 4.5}
             _draw_key(ax, highest, "count" in layer, **below)
@@ -107,10 +105,12 @@ def plot_slices(
 
 
 def _middle(grid: xr.Dataset, axis: str) -> float:
-    """Middle of what is reached along an axis [m]."""
+    """Middle of what is reached along an axis, to a tenth of a cell [m]."""
     reached = grid["count" if "count" in grid else "occupied"] > 0
     extent = grid[axis].values[reached.any([other for other in "xyz" if other != axis]).values]
-    return float(extent[0] + extent[-1]) / 2 if len(extent) else float(grid[axis].mean())
+    middle = (extent[0] + extent[-1]) / 2 if len(extent) else grid[axis].values.mean()
+    tenth = grid.attrs["cell"] / 10
+    return float(np.rint(middle / tenth) * tenth)
 
 
 def _layer(grid: xr.Dataset, axis: str, at: float) -> xr.Dataset:
