@@ -1,0 +1,75 @@
+"""Scripts of users run as they stand, from a wheel that is installed outside the clone."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import softreach
+
+ROOT = Path(__file__).parent.parent
+EXAMPLES = ROOT / "examples"
+SOURCE = Path(softreach.__file__).parent
+
+
+@pytest.fixture(scope="session")
+def installed(tmp_path_factory):
+    """The environment of a user who installed the wheel; kernels are compiled already."""
+    folder = tmp_path_factory.mktemp("wheel")
+    build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
+    subprocess.run(build, cwd=ROOT, check=True, capture_output=True)
+    (wheel,) = folder.glob("*.whl")
+    site = folder / "site"
+    zipfile.ZipFile(wheel).extractall(site)
+    for path in (SOURCE / "kernels").rglob("*"):  # with their times, by which the cache knows them
+        if path.is_file():
+            target = site / "softreach" / path.relative_to(SOURCE)
+            target.parent.mkdir(exist_ok=True)
+            shutil.copy2(path, target)
+    (folder / "softreach").write_text(f'#!/bin/sh\nexec "{sys.executable}" -m softreach "$@"\n')
+    (folder / "softreach").chmod(0o755)
+    path = os.pathsep.join([str(folder), str(Path(sys.executable).parent), os.environ["PATH"]])
+    return os.environ | {"PYTHONPATH": str(site), "PATH": path, "MPLBACKEND": "agg"}
+
+
+def printed_by(environment, folder, *command):
+    done = subprocess.run(
+        [*map(str, command)], cwd=folder, env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_wheel_is_what_runs(installed, tmp_path):
+    where = "import softreach; print(softreach.__file__)"
+    assert str(SOURCE) not in printed_by(installed, tmp_path, sys.executable, "-c", where)
+
+
+def test_my_tendon_arm(installed, tmp_path):
+    text = printed_by(
+        installed, tmp_path, "bash", EXAMPLES / "tendon_arm.sh", EXAMPLES / "tendon_arm.toml"
+    )
+    assert "target (60, 40, -270) mm: reached" in text
+    written = {"slices.png", "reachable.stl", "payload.png", "cloud.zarr", "cloud.png", "cloud.csv"}
+    assert {path.name for path in tmp_path.iterdir()} == written
+
+
+def test_a_requirement_is_checked(installed, tmp_path):
+    script = EXAMPLES / "requirement_check.py"
+    text = printed_by(installed, tmp_path, sys.executable, script, EXAMPLES / "tendon_arm.toml")
+    assert text.count(": reached") == 3
+    assert text.count(": missed by") == 2
+
+
+def test_an_actuator_of_ones_own_and_an_atlas_that_is_interrupted(installed, tmp_path):
+    files = EXAMPLES / "spine.toml", EXAMPLES / "magnets.py"
+    text = printed_by(installed, tmp_path, "bash", EXAMPLES / "own_actuator.sh", *files)
+    *_, last = (line for line in text.splitlines() if line.startswith("  done"))
+    assert last.split() == ["done", "12"]
+    assert "best exact_volume of spines.zarr" in text
