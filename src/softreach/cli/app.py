@@ -84,12 +84,37 @@ def _start(
             help="Print more: what is compiled, and where an error comes from.",
         ),
     ] = False,
+    imports: Annotated[
+        list[str] | None,
+        Parameter(
+            name="--import",
+            group=_ALWAYS,
+            help="Module, or .py file, with actuators, profiles or metrics of your own, which is "
+            "run. May be repeated.",
+        ),
+    ] = None,
 ) -> None:
-    """Say how much is printed, then run the command."""
+    """Say how much is printed, import what is the user's own, then run the command."""
     if quiet and verbose:
         raise InvalidInput("quiet", quiet, "left out with --verbose")
     console.set(quiet=quiet, verbose=verbose)
+    if imports:
+        _import(imports)
     app(words, result_action="return_value")
+
+
+def _import(names: list[str]) -> None:
+    """Import modules of the user, and see that their kinds have names of their own."""
+    from softreach.support.plugins import import_module
+
+    for name in names:
+        import_module(name)
+    from softreach.arm.actuators import Actuator
+    from softreach.arm.design_file.keys import own_kinds
+    from softreach.arm.profile import Profile
+
+    for of in (Actuator, Profile):
+        own_kinds(of)
 
 
 def run(arguments: list[str]) -> int:

@@ -66,13 +66,16 @@ def materials(*, json: AsJson = False) -> None:
 def metrics(*, json: AsJson = False) -> None:
     """List the metrics of an atlas with their groups and units.
 
+    Metrics of your own are their own group; see --import.
+
     Example: softreach list metrics
     """
-    from softreach.atlas.metrics import METRIC_GROUPS
+    from softreach.atlas.metrics import METRIC_GROUPS, own_metrics
 
+    own = [(name, (metric,)) for name, metric in own_metrics().items()]
     records = [
         {"metric": metric.name, "group": group, "unit": metric.unit, "meaning": metric.meaning}
-        for group, members in METRIC_GROUPS.items()
+        for group, members in [*METRIC_GROUPS.items(), *own]
         for metric in members
     ]
     console.table(records, json)
