@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -167,8 +168,12 @@ class TestFiles:
         with pytest.raises(sr.InvalidDesign, match=message):
             sr.Manipulator.from_toml(self.written(f"[[actuators]]\n{table}\n"))
 
-    @pytest.mark.parametrize("place", [(np.float32(0.03), 0.0), (0.03, None), {"x": 0.03}])
-    def test_what_is_no_plain_value_is_not_written(self, trunk, place):
-        arm = trunk.replace(actuators=(Cable(place=place),))
-        with pytest.raises(sr.InvalidDesign, match=r"Cable.place = .*to fit in a design file"):
+    @pytest.mark.parametrize("tag", [(np.float32(0.03), 0.0), (0.03, None), {"x": 0.03}])
+    def test_what_is_no_plain_value_is_not_written(self, trunk, tag):
+        @dataclass(frozen=True, kw_only=True)
+        class TaggedCable(Cable):
+            tag: object
+
+        arm = trunk.replace(actuators=(TaggedCable(place=PLACE, tag=tag),))
+        with pytest.raises(sr.InvalidDesign, match=r"TaggedCable.tag = .*to fit in a design file"):
             arm.to_toml()

@@ -30,6 +30,7 @@ __all__ = [
     "as_numbers",
     "fields_of",
     "number",
+    "own_fields",
     "series_faults",
     "stations",
     "unit_suffix",
@@ -196,6 +197,12 @@ def fields_of(kind: type) -> Mapping[str, Number]:
             optional = declared.optional or _default(kind, field.name) is None
             numbers[field.name] = dataclasses.replace(declared, field=field.name, optional=optional)
     return MappingProxyType(numbers)
+
+
+def own_fields(kind: type) -> frozenset[str]:
+    """Numbers of a kind that are not softreach's; none for a kind of softreach."""
+    ours = (fields_of(base) for base in kind.__mro__ if _is_ours(base))
+    return frozenset(fields_of(kind)).difference(*ours)
 
 
 def series_faults(values: Mapping[str, Any], field: str, per_station: bool = True) -> list[Fault]:

@@ -15,7 +15,7 @@ from softreach.geometry.alpha_shape import AlphaComplex
 from softreach.support import plugins
 from softreach.support.arguments import as_given
 from softreach.support.arrays import Array
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, warn
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -60,7 +60,9 @@ def _metrics_of(choice: str | Metric) -> tuple[Metric, ...]:
         return METRIC_GROUPS[choice]
     own = _own_metric(choice) if isinstance(choice, str) else None
     if own is None:
-        raise InvalidInput("metrics", as_given(choice), _ALLOWED, f"or {plugins.IMPORT_HINT}")
+        raise InvalidInput(
+            "metrics", as_given(choice), _ALLOWED, "the command line imports those by --import"
+        )
     return (own,)
 
 
@@ -68,11 +70,15 @@ def own_metrics() -> dict[str, Metric]:
     """Metrics that are not softreach's and have been imported for it, or are declared for it.
 
     Raises:
-        InvalidInput: A package declares one that it does not have, or a name is taken.
+        InvalidInput: The name of an imported one is taken.
     """
-    return _imported_metrics() | {
-        name: _declared_metric(entry) for name, entry in plugins.declared(plugins.METRICS).items()
-    }
+    own = _imported_metrics()
+    for name, entry in plugins.declared(plugins.METRICS).items():
+        try:
+            own.setdefault(name, _declared_metric(entry))
+        except InvalidInput as error:  # the others can be used
+            warn(str(error))
+    return own
 
 
 def _own_metric(name: str) -> Metric | None:

@@ -15,6 +15,7 @@ from cyclopts import App, CycloptsError, Group, Parameter
 from softreach.cli.console import HelpConsole, console
 from softreach.cli.signals import INTERRUPTED
 from softreach.support.errors import InvalidInput, NotWritten, SoftreachError, with_short_words
+from softreach.support.plugins import importing
 
 _MORE = Group("More", sort_key=-1)
 _COMMANDS = (
@@ -98,17 +99,16 @@ def _start(
     if quiet and verbose:
         raise InvalidInput("quiet", quiet, "left out with --verbose")
     console.set(quiet=quiet, verbose=verbose)
-    if imports:
-        _import(imports)
-    app(words, result_action="return_value")
+    if not imports:
+        app(words, result_action="return_value")
+        return
+    with importing(imports):
+        _check_kinds()
+        app(words, result_action="return_value")
 
 
-def _import(names: list[str]) -> None:
-    """Import modules of the user, and see that their kinds have names of their own."""
-    from softreach.support.plugins import import_module
-
-    for name in names:
-        import_module(name)
+def _check_kinds() -> None:
+    """See that the kinds of the user have names of their own."""
     from softreach.arm.actuators import Actuator
     from softreach.arm.design_file.keys import own_kinds
     from softreach.arm.profile import Profile

@@ -10,7 +10,8 @@ import importlib.util
 import os
 import sys
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import ModuleType
@@ -20,13 +21,13 @@ from softreach.support.errors import InvalidInput
 
 __all__ = [
     "ACTUATORS",
-    "IMPORT_HINT",
     "METRICS",
     "PROFILES",
     "Imports",
     "declared",
     "import_module",
     "imported",
+    "importing",
     "loaded",
 ]
 
@@ -34,9 +35,6 @@ ACTUATORS, PROFILES, METRICS = (
     f"softreach.{each}" for each in ("actuators", "profiles", "metrics")
 )
 """Groups of entry points: the name of a class, or of a metric, and where it is."""
-
-IMPORT_HINT = "name its module by --import"
-"""Advice where a kind or a metric is unknown."""
 
 _A_MODULE = "a module that Python finds, or the path of a .py file"
 
@@ -69,6 +67,21 @@ def import_module(name: str) -> ModuleType:
         ) from error
     _imported[str(Path(name).resolve()) if is_file else name] = module
     return module
+
+
+@contextmanager
+def importing(names: Iterable[str]) -> Iterator[None]:
+    """A block for which modules of the user are imported, and known by their names.
+
+    Raises:
+        InvalidInput: As `import_module`.
+    """
+    try:
+        for name in names:
+            import_module(name)
+        yield
+    finally:
+        _imported.clear()
 
 
 def imported() -> tuple[ModuleType, ...]:

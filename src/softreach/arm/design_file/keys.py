@@ -32,7 +32,7 @@ from softreach.arm.part import Part
 from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
 from softreach.arm.section import Ring, Section
 from softreach.support import plugins
-from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
 
 __all__ = [
     "ACTUATORS",
@@ -42,6 +42,7 @@ __all__ = [
     "Kind",
     "WrittenFloat",
     "degrees_text",
+    "every_kind",
     "field_keys",
     "in_file_terms",
     "in_file_units",
@@ -157,6 +158,16 @@ def own_kind(of: type[Kind], name: str) -> type[Kind] | None:
         if own.get(name) is not made:
             raise InvalidInput(f"entry point {name}", entry.value, f"a class {name} of that kind")
     return own.get(name)
+
+
+def every_kind(of: type[Kind]) -> dict[str, type[Kind]]:
+    """All kinds, those of installed packages imported; warns of what they do not have."""
+    for name in plugins.declared(_GROUPS[of]):
+        try:
+            own_kind(of, name)
+        except InvalidInput as error:  # the others can be used
+            warn(str(error))
+    return {**KINDS[of], **own_kinds(of)}
 
 
 def known_kinds(of: type[Kind]) -> list[str]:

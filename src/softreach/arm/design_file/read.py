@@ -33,7 +33,6 @@ from softreach.arm.profile import LinearTaper, Profile
 from softreach.arm.section import Ring, Section, name_faults
 from softreach.support.errors import Fault, InvalidDesign, Range, SoftreachError
 from softreach.support.files.text import read_text
-from softreach.support.plugins import IMPORT_HINT
 from softreach.support.units import UNITS
 
 __all__ = ["LONGEST", "Parts", "document_of", "is_design", "parse", "text_of"]
@@ -138,6 +137,7 @@ class _DesignReader(TableReader):
         self._document = document
         self._materials: dict[str, Material | None] = {}
         self._unknown_material = False
+        self._unknown_kinds: list[Any] = []
 
     def parts(self) -> Parts | None:
         """The parts of the arm; None where there are faults."""
@@ -312,7 +312,10 @@ class _DesignReader(TableReader):
         """An actuator or a profile of a kind that is not softreach's."""
         own = own_kind(of, kind) if isinstance(kind, str) else None
         if own is None:
-            self.refused(f"{path}.kind", kind, _kinds_text(of, kind))
+            path = f"{path}.kind"
+            if not isinstance(kind, str) or kind not in self._unknown_kinds:
+                self.refused(path, kind, _kinds_text(of, kind))
+            self._unknown_kinds.append(kind)
             return None
         try:
             return _of_own_kind(own, raw)
@@ -392,7 +395,5 @@ def _kinds_text(of: type[Any], kind: Any) -> str:
     if isinstance(kind, str) and kind in names:
         return f'must be the kind of a file; did you mean "{names[kind]}"?'
     own = known_kinds(of)
-    others = (
-        f"a class of your own: {', '.join(own)}; others" if own else "a class of your own, which"
-    )
-    return f"must be one of {', '.join(known)}, or {others} must be imported first: {IMPORT_HINT}"
+    others = "or a class of your own that is imported, on the command line by --import"
+    return f"must be one of {', '.join([*known, *own])}, {others}"

@@ -39,8 +39,8 @@ def json_schema() -> dict[str, Any]:
         "loads": _table(Loads, "Gravity, payload, forces and moments"),
         "base": _table(Base, "Where in the world the arm is clamped, and which way it points"),
         "point_load": _table(PointLoad, "Force and moment on one section"),
-        "own_actuator": _own("Actuator", ACTUATORS),
-        "own_profile": _own("Profile", PROFILES),
+        "own_actuator": _own("Actuator", ACTUATORS, "kind"),
+        "own_profile": _own("Profile", PROFILES, "kind", "length"),
     }
     kinds = {**PROFILES, **ACTUATORS}
     definitions |= {
@@ -94,12 +94,12 @@ def _one_of(names: Mapping[str, Any], description: str) -> _Schema:
     return {"description": description, "anyOf": [_of(name) for name in names]}
 
 
-def _own(part: str, kinds: Mapping[str, type]) -> _Schema:
+def _own(part: str, kinds: Mapping[str, type], *required: str) -> _Schema:
     return {
         "description": f"{part} of a class of one's own: its fields, in SI units",
         "type": "object",
         "properties": {"kind": {**_TEXT, "not": {"enum": [*kinds]}}},
-        "required": ["kind"],
+        "required": [*required],
         "additionalProperties": True,
     }
 
