@@ -134,6 +134,18 @@ def test_plain_numbers_of_a_kind_of_ones_own_need_no_declaration(trunk):
     )
 
 
+def test_fields_that_are_called_like_those_of_the_body_are_not_shared_with_it(trunk):
+    @dataclass(frozen=True, kw_only=True)
+    class Namesake(Cable):
+        inner_ratio: float = 0.1
+        poisson_ratio: float = 0.2
+        revolution: float = 3.0
+
+    arm = trunk.replace(actuators=(*trunk.actuators[:2], Namesake(place=(0.0, 0.01), name="own")))
+    shared = {"radius_ratio": 0.7, "poisson_ratio": 0.4, "revolution": 1.0}
+    assert changed(arm, shared).actuators[2] == arm.actuators[2]
+
+
 @pytest.mark.parametrize(
     ("values", "said"),
     [

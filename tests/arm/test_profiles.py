@@ -106,6 +106,16 @@ class TestAProfileOfOnesOwn:
         wide = changed(self.arm, {"bulge": 1.0, "end_radius": 0.05})
         assert wide.profile == Bulge(length=1.0, bulge=1.0, end_radius=0.05)
 
+    def test_numbers_of_a_sequence_are_called_by_their_places(self):
+        @dataclass(frozen=True, kw_only=True)
+        class Waved(Bulge):
+            waves: tuple[float, ...] = (1.0, 2.0)
+
+        arm = self.arm.replace(profile=Waved(length=1.0))
+        assert changed(arm, {"profile.waves[1]": 3.0}).profile.waves == (1.0, 3.0)
+        with pytest.raises(InvalidDesign, match=r"profile.waves\[0\] = nan: must be a finite"):
+            changed(arm, {"profile.waves[0]": math.nan})
+
     def test_it_is_refused_where_its_radius_is_not_positive(self):
         with pytest.raises(InvalidDesign, match=r"radius = -0.03125: must be above 0 m all along"):
             Bulge(length=1.0, bulge=-1.5)
