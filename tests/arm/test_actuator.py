@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 import softreach as sr
 from softreach.arm import designs
+from softreach.arm.parameters import changed
 from softreach.arm.summary import design_warnings
 from softreach.arm.tables import tables
 from softreach.export import export_cloud
@@ -139,6 +140,11 @@ class TestEverythingElseWorks:
         axes = sr.plot.plot_arm(mixed, shape)
         assert axes.images
         axes.figure.clear()
+
+    def test_bundles_that_its_loads_do_not_have_are_refused(self, mixed):
+        said = r"cable 3.bundles = 2: must be that of Cable.resultants, whose .* \(\d+, 3, 1\)"
+        with pytest.raises(sr.InvalidDesign, match=said):
+            tables(changed(mixed, {"cable 3.bundles": 2}), [0.0, 0.5])
 
     def test_its_activations_are_not_taken_for_those_of_fibers(self):
         strong = Cable(place=PLACE, activation_bounds=(0.0, 5.0))

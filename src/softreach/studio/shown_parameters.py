@@ -116,21 +116,20 @@ def _is_own(arm: Manipulator, parameter: Parameter) -> bool:
 
 
 def _own_slider(arm: Manipulator, parameter: Parameter) -> _Slider | None:
-    """From zero to twice the value, or a turn, within the range; None for a zero of no known size.
+    """From zero to twice the value, or all angles, within the range; None for a zero of no size.
 
     Where the range itself does not end at zero, the slider stays off it by a hundredth.
     """
     unit, scale = _unit(parameter, _units_on_sliders(arm))
     value, allowed = parameter.value(arm) / scale, parameter.range
     low, high = allowed.low / scale, allowed.high / scale
-    turn = 180.0 if parameter.unit == "rad" else math.nan
-    size = turn if value == 0 else 2 * abs(value)
-    if not math.isfinite(size):
-        size = high - low
+    size = 2 * abs(value) or high - low
+    ends = (-size if value <= 0 else 0.0, size if value >= 0 else 0.0)
+    if parameter.unit == "rad":
+        size, ends = 200.0, (-360.0, 360.0)
     if not math.isfinite(size):
         return None
     step = max(1.0, size // 200) if parameter.whole else size / 200
-    ends = (-size if value <= 0 else 0.0, size if value >= 0 else 0.0)
     ends = (
         max(ends[0], low + step * allowed.open_low),
         min(ends[1], high - step * allowed.open_high),
