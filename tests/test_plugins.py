@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 import subprocess
 import sys
 
@@ -13,6 +14,7 @@ from softreach.arm import designs
 from softreach.cli.app import run
 from softreach.support import plugins
 from tests.atlas.families import assert_same
+from tests.cable import Cable
 
 WIRE = """
 from dataclasses import dataclass
@@ -189,6 +191,12 @@ def test_a_metric_of_a_name_that_is_taken_is_refused(name, tmp_path, capsys):
     assert run(["list", "metrics", "--import", str(module)]) == 2
     assert f"name of a metric = {name}: must be a name that no other" in capsys.readouterr().err
     del sys.modules[module.stem]
+
+
+def test_what_a_worker_cannot_import_is_told_when_it_is_needed():
+    arrived = pickle.loads(pickle.dumps(plugins.Imports(["own_nowhere"])))
+    assert "import = own_nowhere: must be a module that Python finds" in arrived.fault
+    assert not pickle.loads(pickle.dumps(plugins.Imports.needed_by([Cable(place=(0, 0))]))).fault
 
 
 class TestNothingElseRunsCode:
