@@ -3,7 +3,8 @@
 A fence in `README.md` or `docs/` is one of these, or the test fails:
 
 - `python`: executed, in order, in one namespace per page and an empty folder. One that cannot be
-  says why in its first line: `# not executed: REASON`.
+  says why in its first line: `# not executed: REASON`. One that begins with a name, `# magnets.py`,
+  is written to a file of this name, from which others can import.
 - `bash`: lines that begin with `softreach` are executed in the same folder; a line ending in
   `# exit code 2` must fail so, and `softreach studio` is ended once it serves its page. Other lines
   set up a machine and are not executed.
@@ -41,6 +42,7 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").r
 SETUP = {"pip", "make", "git", "cd", "python3", "export"}
 FEW = 20_000  # samples
 NOT_EXECUTED = re.compile(r"# not executed: \w.+")
+FILE = re.compile(r"# (\w+\.py)\n")
 FENCE = re.compile(r"^ *(`{3,})(.*)\n(?:.*\n)*?^ *\1 *$", re.MULTILINE)
 
 
@@ -53,6 +55,8 @@ def on_page(page: Path) -> str:
 def test_everything_on_a_page_runs_and_prints_what_it_says(page, tmp_path, monkeypatch):
     plt = pytest.importorskip("matplotlib.pyplot")
     monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    known = {*sys.modules}
     parsers = [
         CodeBlockParser("python", run_python),
         CodeBlockParser("bash", run_commands),
@@ -64,6 +68,9 @@ def test_everything_on_a_page_runs_and_prints_what_it_says(page, tmp_path, monke
     for example in document.examples():
         example.evaluate()
     plt.close("all")
+    for name in {*sys.modules} - known:
+        if str(getattr(sys.modules[name], "__file__", "")).startswith(str(tmp_path)):
+            del sys.modules[name]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=on_page)
@@ -104,7 +111,10 @@ def test_pictures_stay_small(picture):
 
 def run_python(example):
     """Execute a fence and keep what it prints."""
-    if NOT_EXECUTED.match(example.parsed):
+    named = FILE.match(example.parsed)
+    if named:
+        Path(named[1]).write_text(example.parsed, encoding="utf-8")
+    if named or NOT_EXECUTED.match(example.parsed):
         example.namespace["_printed"] = None
         return
     if not is_compared(example):

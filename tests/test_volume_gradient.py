@@ -7,7 +7,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from softreach.arm import Loads, Manipulator, designs
+from softreach.arm import (
+    LinearTaper,
+    Loads,
+    Manipulator,
+    Material,
+    Ring,
+    Section,
+    Tendon,
+    designs,
+)
 from softreach.arm.parameters import changed, find_parameter, parameters
 from softreach.rod.rods import tip_map
 from softreach.support.arrays import Array
@@ -16,6 +25,7 @@ from softreach.workspace import VolumeGradient, reachable_set, volume_gradient
 from softreach.workspace.flux import signed_volume
 from softreach.workspace.reach import rasterized_set
 from tests.bodies import rubber
+from tests.cable import Cable
 
 NARROW = designs.minimal_trunk().with_bounds((-0.9, -0.3))
 NAMES = ("taper", "revolution", "left.offset", "rings[0].inner_ratio", "lower", "right.upper")
@@ -186,6 +196,27 @@ def test_at_the_end_of_a_range_the_derivative_is_that_of_the_side_that_exists():
     ahead = [reachable_set(changed(straight, {"taper": h})).volume for h in (0.0, 1e-3, 2e-3)]
     expected = (4 * ahead[1] - 3 * ahead[0] - ahead[2]) / 2e-3
     assert found.volume[0] == pytest.approx(expected, rel=1e-3)
+
+
+def test_the_derivative_by_a_field_of_an_own_actuator_is_that_of_the_same_tendon():
+    """A cable at p = r (cos θ, sin θ) is a tendon: ∂V/∂r = cos θ ∂V/∂px + sin θ ∂V/∂py."""
+    r, angle, bounds = 0.015, 0.1, (0.0, 2.0)
+    x, y = r * np.cos(angle), r * np.sin(angle)
+    ring = Ring(inner_ratio=0.5, material=Material(young_modulus=1e5))
+
+    def driven_by(actuator):
+        others = (Tendon(distance=r, offset=2.1 * k, activation_bounds=bounds) for k in (1, 2))
+        return Manipulator(
+            profile=LinearTaper(length=0.3, outer_radius=0.02),
+            section=Section(rings=(ring,)),
+            actuators=(*others, actuator),
+        )
+
+    cable = driven_by(Cable(name="c", place=(x, y), activation_bounds=bounds))
+    tendon = driven_by(Tendon(name="t", distance=r, offset=angle, activation_bounds=bounds))
+    own = volume_gradient(cable, ("c.place[0]", "c.place[1]")).volume
+    same = volume_gradient(tendon, ("t.distance",)).volume
+    assert own @ [np.cos(angle), np.sin(angle)] == pytest.approx(same[0], rel=1e-6)
 
 
 def test_a_parameter_without_effect_has_derivative_zero():

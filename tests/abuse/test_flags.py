@@ -133,6 +133,16 @@ WRONG = [
         for given in ("-7,-7,-7", "-100,-100,-100", "9,9,9", "-1e300,0,0", "1e308,1e308,1e308")
     ),
     case(f"equilibria {TRUNK} --view diagonal --out a.png", "view = diagonal: must be front, side"),
+    # modules
+    *(
+        case(f"list designs --import={given}", f"import = {shown}: must be {allowed}")
+        for allowed, names in {
+            "a module that Python finds, or": ("", "own_nowhere", "own.nowhere", "..own", "own-x"),
+            "the path of a .py file that exists": ("own_nowhere.py", "a/b", ".py", "/dev/own.py"),
+        }.items()
+        for given, shown in ((name, name or "''") for name in names)
+    ),
+    case(f"list designs --import={LONG}.py", "import = nnn", "import of a long path"),
     # names of any length
     *(
         case(words.format(LONG), "n" * 100 + "...", words)
@@ -141,6 +151,7 @@ WRONG = [
             "design {}",
             "design --{}",
             "list {}",
+            "list designs --import {}",
             "studio {}",
             "warmup {}",
             "volume {}.zarr",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 import softreach as sr
 from softreach.arm import designs
+from softreach.arm.parameters import changed
 from softreach.arm.summary import design_warnings
 from softreach.arm.tables import tables
 from softreach.export import export_cloud
@@ -139,6 +141,11 @@ class TestEverythingElseWorks:
         assert axes.images
         axes.figure.clear()
 
+    def test_bundles_that_its_loads_do_not_have_are_refused(self, mixed):
+        said = r"cable 3.bundles = 2: must be that of Cable.resultants, whose .* \(\d+, 3, 1\)"
+        with pytest.raises(sr.InvalidDesign, match=said):
+            tables(changed(mixed, {"cable 3.bundles": 2}), [0.0, 0.5])
+
     def test_its_activations_are_not_taken_for_those_of_fibers(self):
         strong = Cable(place=PLACE, activation_bounds=(0.0, 5.0))
         assert not any("|γ|" in line for line in design_warnings(cylinder(strong)))
@@ -167,8 +174,12 @@ class TestFiles:
         with pytest.raises(sr.InvalidDesign, match=message):
             sr.Manipulator.from_toml(self.written(f"[[actuators]]\n{table}\n"))
 
-    @pytest.mark.parametrize("place", [(np.float32(0.03), 0.0), (0.03, None), {"x": 0.03}])
-    def test_what_is_no_plain_value_is_not_written(self, trunk, place):
-        arm = trunk.replace(actuators=(Cable(place=place),))
-        with pytest.raises(sr.InvalidDesign, match=r"Cable.place = .*to fit in a design file"):
+    @pytest.mark.parametrize("tag", [(np.float32(0.03), 0.0), (0.03, None), {"x": 0.03}])
+    def test_what_is_no_plain_value_is_not_written(self, trunk, tag):
+        @dataclass(frozen=True, kw_only=True)
+        class TaggedCable(Cable):
+            tag: object
+
+        arm = trunk.replace(actuators=(TaggedCable(place=PLACE, tag=tag),))
+        with pytest.raises(sr.InvalidDesign, match=r"TaggedCable.tag = .*to fit in a design file"):
             arm.to_toml()

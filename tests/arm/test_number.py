@@ -14,8 +14,8 @@ import softreach as sr
 from softreach.arm import Actuator, AlongArm, Loads, Pieces, PointLoad, Samples
 from softreach.arm.design_file.keys import keys_of
 from softreach.arm.design_file.schema import json_schema
-from softreach.arm.number import fields_of, number
-from softreach.arm.parameters import find_parameter, parameters
+from softreach.arm.number import fields_of, number, own_fields
+from softreach.arm.parameters import changed, find_parameter, parameters
 from softreach.arm.parameters.draft import Path
 from softreach.support.errors import InvalidDesign
 from tests.arm.test_refusals import SOUND
@@ -105,6 +105,62 @@ def test_a_number_of_a_kind_of_ones_own_is_checked_and_comes_before_inherited_on
     assert next(iter(fields_of(Wide))) == "width"
     with pytest.raises(InvalidDesign, match="width = -1: must be a finite number >= 0 m"):
         Wide(place=(0.0, 0.0), width=-1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plain(Cable):
+    """Fields of every type that is a number, and of one that is none."""
+
+    gain: float = 1.0
+    turns: int = 2
+    slack: float | None = None
+    knots: tuple[float, ...] = (0.0, 1.0)
+    mode: str = "fast"
+    activation_bounds: tuple[float, float] = (0.0, 1e-4)
+
+
+def test_plain_numbers_of_a_kind_of_ones_own_need_no_declaration(trunk):
+    own = {"gain", "turns", "slack", "knots", "place"}
+    assert own_fields(Plain) == own
+    assert own_fields(sr.Tendon) == own_fields(sr.LinearTaper) == set()
+    arm = trunk.replace(actuators=(*trunk.actuators, Plain(place=(0.0, 0.01), name="own")))
+    names = {name.partition(".")[2] for name in parameters(arm) if name.startswith("own.")}
+    mine = {"gain", "turns", "slack", "knots[0]", "knots[1]", "place[0]", "place[1]"}
+    assert names == mine | {"bundles", "lower", "upper", "start_over_length", "end_over_length"}
+    new = {"own.gain": 0.5, "own.turns": 3, "own.slack": 0.1, "own.knots[1]": 2.0}
+    made = changed(arm, new).actuators[3]
+    assert made == Plain(
+        place=(0.0, 0.01), name="own", gain=0.5, turns=3, slack=0.1, knots=(0.0, 2.0)
+    )
+
+
+def test_fields_that_are_called_like_those_of_the_body_are_not_shared_with_it(trunk):
+    @dataclass(frozen=True, kw_only=True)
+    class Namesake(Cable):
+        inner_ratio: float = 0.1
+        poisson_ratio: float = 0.2
+        revolution: float = 3.0
+
+    arm = trunk.replace(actuators=(*trunk.actuators[:2], Namesake(place=(0.0, 0.01), name="own")))
+    shared = {"radius_ratio": 0.7, "poisson_ratio": 0.4, "revolution": 1.0}
+    assert changed(arm, shared).actuators[2] == arm.actuators[2]
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"gain": "1"}, "gain = '1': must be a finite number"),
+        ({"gain": math.nan}, "gain = nan: must be a finite number"),
+        ({"gain": None}, "gain: must be a finite number"),
+        ({"turns": 1.5}, "turns = 1.5: must be a whole number"),
+        ({"knots": (0.0, math.inf)}, r"knots\[1\] = inf: must be a finite number"),
+        ({"knots": "01"}, "knots = '01': must be a sequence of numbers"),
+        ({"knots": ((0.0, 1.0),)}, "knots = .*: must be a sequence of numbers"),
+    ],
+)
+def test_plain_numbers_of_a_kind_of_ones_own_are_checked(values, said):
+    with pytest.raises(InvalidDesign, match=said):
+        Plain(place=(0.0, 0.0), **values)
 
 
 def test_a_function_along_the_arm_is_allowed_where_it_is_declared():

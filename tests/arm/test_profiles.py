@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -12,7 +13,9 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 import softreach as sr
-from softreach.arm import LinearTaper, PiecewiseTaper, SampledTaper, designs
+from softreach.arm import LinearTaper, PiecewiseTaper, Profile, SampledTaper, designs
+from softreach.arm.number import number
+from softreach.arm.parameters import changed, parameters
 from softreach.support.errors import InvalidDesign
 from tests.kinds import profiles, stations
 from tests.laws import in_box
@@ -58,6 +61,79 @@ def test_the_slope_is_what_the_radius_loses_along_z(profile, share):
     assert lost / (2 * step) == pytest.approx(
         float(profile.slope(z)), abs=1e-5 * float(profile.radius(0.0)) / profile.length
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bulge(Profile):
+    """A cylinder with a bulge, of which only the radius and its slope are said."""
+
+    end_radius: float = number("R", "m", "radius at both ends", low=0.0, default=1 / 16)
+    bulge: float = 0.5
+
+    def radius(self, z):
+        """R (1 + b sin πZ/L)."""
+        return self.end_radius * (1 + self.bulge * np.sin(np.pi * np.asarray(z) / self.length))
+
+    def slope(self, z):
+        """-R2'(Z)."""
+        rise = self.end_radius * self.bulge * np.pi / self.length
+        return -rise * np.cos(np.pi * np.asarray(z) / self.length)
+
+
+class TestAProfileOfOnesOwn:
+    arm = designs.minimal_trunk().replace(profile=Bulge(length=1.0))
+
+    def test_without_its_bulge_it_is_the_cylinder(self):
+        cylinder = self.arm.replace(profile=LinearTaper(length=1.0, outer_radius=1 / 16))
+        straight = changed(self.arm, {"bulge": 0.0})
+        gamma = in_box(cylinder, 20)
+        np.testing.assert_allclose(
+            sr.tip_positions(straight, gamma), sr.tip_positions(cylinder, gamma), atol=2e-6
+        )
+
+    @pytest.mark.parametrize("bulge", [-0.6, 0.1, 2.0])
+    def test_its_coordinates_follow_from_its_radius(self, bulge):
+        own = Bulge(length=0.7, bulge=bulge)
+        z = np.linspace(0, 0.7, 9)
+        s = [quad(lambda z: 1 / own.radius(z), 0, end, epsrel=1e-12)[0] for end in z]
+        np.testing.assert_allclose(own.slender_coordinate(z), s, rtol=1e-12)
+        np.testing.assert_allclose(own.station(s), z, atol=1e-12)
+
+    def test_it_survives_a_file_and_its_fields_are_parameters(self):
+        assert 'kind = "Bulge"' in self.arm.to_toml()
+        assert sr.Manipulator.from_toml(self.arm.to_toml()) == self.arm
+        assert {"length", "bulge", "end_radius"} <= parameters(self.arm).keys()
+        wide = changed(self.arm, {"bulge": 1.0, "end_radius": 0.05})
+        assert wide.profile == Bulge(length=1.0, bulge=1.0, end_radius=0.05)
+
+    def test_numbers_of_a_sequence_are_called_by_their_places(self):
+        @dataclass(frozen=True, kw_only=True)
+        class Waved(Bulge):
+            waves: tuple[float, ...] = (1.0, 2.0)
+
+        arm = self.arm.replace(profile=Waved(length=1.0))
+        assert changed(arm, {"profile.waves[1]": 3.0}).profile.waves == (1.0, 3.0)
+        with pytest.raises(InvalidDesign, match=r"profile.waves\[0\] = nan: must be a finite"):
+            changed(arm, {"profile.waves[0]": math.nan})
+
+    def test_it_is_refused_where_its_radius_is_not_positive(self):
+        with pytest.raises(InvalidDesign, match=r"radius = -0.03125: must be above 0 m all along"):
+            Bulge(length=1.0, bulge=-1.5)
+
+    @pytest.mark.parametrize(
+        ("old", "new", "said"),
+        [
+            ('"Bulge"', '"Bulges"', "profile.kind = 'Bulges': must be one of linear, .*Bulge"),
+            ("bulge", "bulg", "profile = 'Bulge': has other fields: .*'bulg'"),
+            ("bulge = 0.5", "bulge = -3.0", "profile.radius = -0.125: must be above 0 m"),
+            ('"Bulge"', '"LinearTaper"', 'did you mean "linear"'),
+        ],
+    )
+    def test_a_faulty_table_is_refused_with_its_place(self, old, new, said):
+        text = self.arm.to_toml()
+        assert old in text
+        with pytest.raises(InvalidDesign, match=said):
+            sr.Manipulator.from_toml(text.replace(old, new, 1))
 
 
 @given(places=stations(), taper=st.floats(-0.03, 0.05), kind=st.sampled_from(GIVEN))

@@ -27,6 +27,7 @@ from softreach.atlas.store import AtlasStore
 from softreach.rod.tip_map import TipMap
 from softreach.support.errors import InvalidInput, SoftreachWarning
 from tests.atlas.families import SMALL, assert_same, command, similar_designs, small_space
+from tests.cable import Cable
 
 
 def mean_height(tips):
@@ -232,6 +233,17 @@ def test_lambdas_are_refused_in_one_line_where_workers_compute_them(tmp_path):
     with ThreadPoolExecutor(1) as threads:
         atlas = build_atlas(small_space(), tmp_path / "a.zarr", **options | {"executor": threads})
     assert (atlas.mean_height == 0).all()
+
+
+def test_worker_processes_read_actuators_of_ones_own(tmp_path):
+    """The module of the class travels with the task."""
+    trunk = sr.designs.minimal_trunk()
+    cable = Cable(place=(0.03, 0.0), name="cable", activation_bounds=(0.0, 1e-4))
+    base = trunk.replace(actuators=(*trunk.actuators[:2], cable))
+    space = sr.DesignSpace.grid(base, **{"cable.place[0]": [0.01, 0.03]})
+    pool = worker_processes(1)
+    atlas = build_atlas(space, tmp_path / "a.zarr", 50, metrics=["extent"], executor=pool)
+    assert atlas_status(atlas).done == 2
 
 
 def test_worker_processes_compute_metrics_of_ones_own(tmp_path):

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import pytest
 from hypothesis import given
 
 from softreach.arm import designs
 from softreach.arm.actuators import FiberArchitecture
+from softreach.arm.number import number
 from softreach.arm.parameters import changed, find_parameter, parameters
 from softreach.studio.shown_parameters import (
     named_parameters,
@@ -14,6 +17,7 @@ from softreach.studio.shown_parameters import (
     parts,
     slider_parameters,
 )
+from tests.cable import Cable
 from tests.laws import arm_of, arms
 
 
@@ -46,6 +50,33 @@ def test_a_slider_that_is_not_moved_leaves_the_design_as_it_is(arm):
             assert one.values(made) == pytest.approx(
                 one.values(arm), rel=1e-9, abs=1e-9, nan_ok=True
             ), name
+
+
+def test_fields_of_an_actuator_of_ones_own_are_on_sliders_within_their_ranges():
+    @dataclass(frozen=True, kw_only=True)
+    class Slid(Cable):
+        gain: float = 4.0
+        turns: int = 3
+        angle: float = number("α", "rad", "an angle", default=0.0)
+        share: float = number("s", "", "a share", low=0.0, high=1.0, open_low=True, default=0.8)
+        width: float = number("w", "m", "a width", low=0.0, default=0.02)
+        unknown: float = 0.0
+
+    arm = arm_of(Slid(place=(0.02, -0.01)), activation_bounds=None, length=0.5)
+    name = arm.actuators[0].name
+    sliders = {one.name.removeprefix(f"{name}."): one for one in slider_parameters(arm)}
+    found = {field: one[4:7] for field, one in sliders.items()}
+    assert found["gain"] == pytest.approx((4.0, 0.0, 8.0))
+    assert found["turns"] == pytest.approx((3, 0, 6))
+    assert sliders["turns"].step == 1
+    assert found["angle"] == pytest.approx((0.0, -360.0, 360.0))
+    assert found["share"] == pytest.approx((0.8, 0.008, 1.0))
+    assert found["width"] == pytest.approx((0.04, 0.0, 0.08))
+    assert found["place[1]"] == pytest.approx((-0.01, -0.02, 0.0))
+    assert "unknown" not in found
+    assert sliders["width"].label == f"w of {name} [L]"
+    typed = part_parameters(arm, parts(arm)[name])
+    assert f"{name}.unknown" in {one.name for one in typed}
 
 
 def test_what_differs_between_fibers_is_on_sliders_and_in_fields_of_each():

@@ -3,13 +3,15 @@
     offset: float = number("θ0", "rad", "polar angle of the first bundle", default=0.0)
 
 stands in a frozen dataclass, and `fields_of` lists the numbers of a kind of part. Checks, keys and
-units of design files, their JSON schema, parameters and sliders follow from it.
+units of design files, their JSON schema, parameters and sliders follow from it. In kinds outside
+softreach, fields of type `float`, `int` or `tuple[float, ...]` are numbers too, without a unit.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass
 from functools import cache
@@ -28,16 +30,21 @@ __all__ = [
     "as_numbers",
     "fields_of",
     "number",
+    "own_fields",
     "series_faults",
     "stations",
     "unit_suffix",
 ]
 
-Shape = Literal["single", "along", "triple", "series", "stations"]
-"""One number, a function along the arm alone, a vector, several along the arm, or their places."""
+Shape = Literal["single", "along", "triple", "series", "stations", "several"]
+"""One number, a function along the arm alone, a vector, several along the arm, their places, or
+several that are none of these."""
 
 _NEAREST = 1e-12
 """Z/L by which stations differ at least: less is rounding."""
+
+_PLAIN = re.compile(r"(float|int)(\|None)?|tuple\[float(,(float|\.\.\.))*\]")
+"""Types of fields that are numbers without a declaration, blanks left out."""
 
 _SUFFIXES = {
     "": "",
@@ -95,6 +102,8 @@ class Number:
                 for k, element in enumerate(as_numbers(value).ravel().tolist())
                 if math.isfinite(element) and not self.allowed.admits(element)
             ]
+        if self.shape == "several":
+            return self._faults_of_several(value)
         if self.shape == "triple":
             allowed = "must be three finite numbers"
             return [] if _is_triple(value) else [Fault(self.field, value, allowed)]
@@ -108,11 +117,21 @@ class Number:
 
     def normal(self, value: Any) -> Any:
         """A checked value as Python's floats, integers and tuples of them."""
-        if self.shape in ("triple", "series", "stations"):
+        if self.shape in ("triple", "series", "stations", "several"):
             return tuple(np.asarray(value, float).tolist())
         if value is None or (self.along is not None and isinstance(value, self.along)):
             return value
         return int(plain(value)) if self.allowed.whole else float(plain(value))
+
+    def _faults_of_several(self, value: Any) -> list[Fault]:
+        elements = as_numbers(value)
+        if elements.ndim != 1 or len(elements) != np.size(value):
+            return [Fault(self.field, value, "must be a sequence of numbers")]
+        return [
+            Fault(f"{self.field}[{k}]", element, self.allowed)
+            for k, element in enumerate(elements.tolist())
+            if not self.allowed.admits(element)
+        ]
 
     def _allowed_instead_of(self, value: Any) -> Range | str:
         if self.along is None or (self.shape == "single" and isinstance(value, int | float)):
@@ -154,7 +173,8 @@ def number(
         open_low: Exclude `low` itself.
         open_high: Exclude `high` itself.
         integer: It counts something.
-        shape: A single number, a function along the arm, a triple, a series, or its stations.
+        shape: A single number, a function along the arm, a triple, a series, its stations, or
+            several numbers.
         along: Class of functions along the arm that may take its place.
         default: Default of the field; without one it is required, None makes it optional.
     """
@@ -167,14 +187,22 @@ def number(
 def fields_of(kind: type) -> Mapping[str, Number]:
     """Numbers of a kind of part by their fields, those of the kind itself before inherited ones."""
     numbers: dict[str, Number] = {}
-    for owner in kind.__mro__:
-        for field in _own_fields(owner):
-            if (declared := field.metadata.get("number")) and field.name not in numbers:
-                optional = _default(kind, field.name) is None
-                numbers[field.name] = dataclasses.replace(
-                    declared, field=field.name, optional=optional
-                )
+    fields = [(owner, field) for owner in kind.__mro__ for field in _own_fields(owner)]
+    known = {field.name for owner, field in fields if "number" in field.metadata or _is_ours(owner)}
+    for owner, field in fields:
+        declared = field.metadata.get("number")
+        if declared is None and field.name not in known:
+            declared = _plain_number(owner, field)
+        if declared and field.name not in numbers:
+            optional = declared.optional or _default(kind, field.name) is None
+            numbers[field.name] = dataclasses.replace(declared, field=field.name, optional=optional)
     return MappingProxyType(numbers)
+
+
+def own_fields(kind: type) -> frozenset[str]:
+    """Numbers of a kind that are not softreach's; none for a kind of softreach."""
+    ours = (fields_of(base) for base in kind.__mro__ if _is_ours(base))
+    return frozenset(fields_of(kind)).difference(*ours)
 
 
 def series_faults(values: Mapping[str, Any], field: str, per_station: bool = True) -> list[Fault]:
@@ -218,6 +246,32 @@ def _own_fields(owner: type) -> list[dataclasses.Field[Any]]:
         for name, field in declared.items()
         if not any(fields.get(name) is field for fields in inherited)
     ]
+
+
+def _plain_number(owner: type, field: dataclasses.Field[Any]) -> Number | None:
+    """The number that a field outside softreach is by its type, if it is one."""
+    typed = field.type if isinstance(field.type, str) else _type_text(field.type)
+    plain = _PLAIN.fullmatch(typed.replace(" ", ""))
+    if plain is None or not field.init:
+        return None
+    return Number(
+        symbol=field.name,
+        meaning=f"field of {owner.__name__}",
+        allowed=Range(whole=plain[1] == "int"),
+        shape="single" if plain[1] else "several",
+        optional=bool(plain[2]),
+    )
+
+
+def _is_ours(owner: type) -> bool:
+    """A class of softreach, which declares every number."""
+    return owner.__module__.partition(".")[0] == "softreach"
+
+
+def _type_text(kind: Any) -> str:
+    """`float`, `float | None` or `tuple[float, float]`, as it is written."""
+    optional = re.sub(r"typing\.Optional\[(\w+)\]", r"\1 | None", str(kind))
+    return kind.__name__ if isinstance(kind, type) and str(kind).startswith("<class") else optional
 
 
 def _default(kind: type, field: str) -> Any:

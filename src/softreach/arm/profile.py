@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 # Enough for machine precision while a radius changes by less than tenfold between two stations.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 _NEWTON_STEPS = 60
+_CHECKED = 65
+"""Places at which a radius is seen to be positive."""
 _SLIMMEST = 1e-12
 """R2(L) over R2(0), below which the radius of a tip is mostly rounding."""
 
@@ -37,15 +39,26 @@ _SLIMMEST = 1e-12
 
 @dataclass(frozen=True, kw_only=True)
 class Profile(Part, ABC):
-    """The outer radius along the arm, before activation."""
+    """The outer radius along the arm, before activation.
+
+    A new kind is a frozen dataclass that implements `radius` and `slope`, and `breakpoints` where
+    these are not smooth.
+    """
 
     length: float = number("L", "m", "length before activation", low=1e-9, high=1e9)
     """L, from base to tip before activation [m]."""
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        radii = self.radius(np.linspace(0.0, self.length, _CHECKED))
+        if not (radii > 0.0).all():
+            allowed = "must be above 0 m all along the arm"
+            raise InvalidDesign([Fault("radius", float(np.min(radii)), allowed)])
+
     @property
-    @abstractmethod
     def breakpoints(self) -> tuple[float, ...]:
         """Stations inside (0, L) where the radius is not smooth, ascending [m]."""
+        return ()
 
     @abstractmethod
     def radius(self, z: ArrayLike) -> Array:
@@ -55,30 +68,72 @@ class Profile(Part, ABC):
     def slope(self, z: ArrayLike) -> Array:
         """tan φ(Z) = -R2'(Z) [-]; positive where the arm narrows toward the tip."""
 
-    @abstractmethod
     def slender_coordinate(self, z: ArrayLike) -> Array:
         """S(Z) = ∫ dZ / R2 from 0 to Z [-]: length counted in local radii, theory (15).
 
         In S the bending of each fiber has constant magnitude and rotates at a constant rate, so
         that uniform steps in S share the bending evenly.
         """
+        z = as_floats("z", z)
+        piece = self._piece(z)
+        return self._slender_knots[piece] + self._slender_gap(piece, z - self._knots[piece])
 
-    @abstractmethod
     def station(self, s: ArrayLike) -> Array:
         """Z(S) [m], the inverse of `slender_coordinate`."""
+        s = as_floats("s", s)
+        piece = np.searchsorted(self._slender_knots[1:-1], s, "right")
+        return self._knots[piece] + self._length_gap(piece, s - self._slender_knots[piece])
 
-    @abstractmethod
     def surface_coordinate(self, z: ArrayLike, ratio: float = 1.0) -> Array:
         """∫ dZ / (R cos φ) from 0 to Z along the cone R = ratio · R2 [-].
 
         Its slope there is ratio · tan φ. Times tan α it is the rotation Θ of a fiber of constant
-        helical angle α on that cone: theory (14).
+        helical angle α on that cone: theory (14). Here by Gauss quadrature in each piece.
         """
+        z = as_floats("z", z)
+
+        def secant(station: Array) -> Array:
+            return np.hypot(1.0, ratio * self.slope(station)) / (ratio * self.radius(station))
+
+        starts, gaps = self._knots[:-1], np.diff(self._knots)
+        before = np.concatenate([[0.0], np.cumsum(_integral(secant, starts, gaps))])
+        piece = self._piece(z)
+        return before[piece] + _integral(secant, self._knots[piece], z - self._knots[piece])
 
     @property
     def slender_length(self) -> float:
         """S(L) [-]."""
         return float(self.slender_coordinate(self.length))
+
+    @cached_property
+    def _knots(self) -> Array:
+        """Base, breakpoints and tip [m]."""
+        return np.array([0.0, *self.breakpoints, self.length])
+
+    @cached_property
+    def _slender_knots(self) -> Array:
+        """S at the knots [-]."""
+        gaps = self._slender_gap(np.arange(len(self._knots) - 1), np.diff(self._knots))
+        return np.concatenate([[0.0], np.cumsum(gaps)])
+
+    def _piece(self, z: Array) -> NDArray[np.intp]:
+        return np.searchsorted(self._knots[1:-1], z, "right")
+
+    def _slender_gap(self, piece: NDArray[np.intp], gap: Array) -> Array:
+        """∫ dZ/R2 [-] over the first `gap` [m] of a piece, by Gauss quadrature."""
+        return _integral(lambda station: 1.0 / self.radius(station), self._knots[piece], gap)
+
+    def _length_gap(self, piece: NDArray[np.intp], gap: Array) -> Array:
+        """Length [m] over which the first `gap` [-] of S in a piece extends, by Newton's method."""
+        width = np.diff(self._knots)[piece]
+        length = width * gap / np.diff(self._slender_knots)[piece]
+        for _ in range(_NEWTON_STEPS):
+            residual = self._slender_gap(piece, length) - gap
+            change = residual * self.radius(self._knots[piece] + length)
+            length = np.clip(length - change, 0.0, width)
+            if np.all(np.abs(change) <= 1e-15 * self.length):
+                break
+        return length
 
 
 @dataclass(frozen=True, kw_only=True, init=False)
@@ -133,11 +188,6 @@ class LinearTaper(Profile):
     def tip_radius(self) -> float:
         """R2(L), outer radius at the tip [m]."""
         return float(self.radius(self.length))
-
-    @property
-    def breakpoints(self) -> tuple[float, ...]:
-        """None: the slope is constant."""
-        return ()
 
     def radius(self, z: ArrayLike) -> Array:
         """R2(Z) [m]."""
@@ -205,42 +255,8 @@ class _RadiiAtStations(Profile):
         """The stations between base and tip [m]."""
         return tuple(self.length * x for x in self.stations_over_length[1:-1])
 
-    @cached_property
-    def _knots(self) -> Array:
-        """The stations [m]."""
-        return np.array([0.0, *self.breakpoints, self.length])
-
-    @cached_property
-    def _slender_knots(self) -> Array:
-        """S at the stations [-]."""
-        gaps = self._slender_gap(np.arange(len(self._knots) - 1), np.diff(self._knots))
-        return np.concatenate([[0.0], np.cumsum(gaps)])
-
-    def _piece(self, z: Array) -> NDArray[np.intp]:
-        return np.searchsorted(self._knots[1:-1], z, "right")
-
-    def slender_coordinate(self, z: ArrayLike) -> Array:
-        """S(Z) [-], piece by piece: theory (15)."""
-        z = as_floats("z", z)
-        piece = self._piece(z)
-        return self._slender_knots[piece] + self._slender_gap(piece, z - self._knots[piece])
-
-    def station(self, s: ArrayLike) -> Array:
-        """Z(S) [m], the inverse of `slender_coordinate`."""
-        s = as_floats("s", s)
-        piece = np.searchsorted(self._slender_knots[1:-1], s, "right")
-        return self._knots[piece] + self._length_gap(piece, s - self._slender_knots[piece])
-
     def _faults(self) -> list[Fault]:
         return super()._faults() + series_faults(vars(self), "radii")
-
-    @abstractmethod
-    def _slender_gap(self, piece: NDArray[np.intp], gap: Array) -> Array:
-        """∫ dZ/R2 [-] over the first `gap` [m] of a piece."""
-
-    @abstractmethod
-    def _length_gap(self, piece: NDArray[np.intp], gap: Array) -> Array:
-        """Length [m] over which the first `gap` [-] of S in a piece extends."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -302,33 +318,6 @@ class SampledTaper(_RadiiAtStations):
     @cached_property
     def _curve_slope(self) -> Any:
         return self._curve.derivative()
-
-    def surface_coordinate(self, z: ArrayLike, ratio: float = 1.0) -> Array:
-        """∫ dZ/(R cos φ) [-] by Gauss quadrature in each piece: theory (14)."""
-        z = as_floats("z", z)
-
-        def secant(station: Array) -> Array:
-            return np.hypot(1.0, ratio * self.slope(station)) / (ratio * self.radius(station))
-
-        starts, gaps = self._knots[:-1], np.diff(self._knots)
-        before = np.concatenate([[0.0], np.cumsum(_integral(secant, starts, gaps))])
-        piece = self._piece(z)
-        return before[piece] + _integral(secant, self._knots[piece], z - self._knots[piece])
-
-    def _slender_gap(self, piece: NDArray[np.intp], gap: Array) -> Array:
-        return _integral(lambda station: 1.0 / self.radius(station), self._knots[piece], gap)
-
-    def _length_gap(self, piece: NDArray[np.intp], gap: Array) -> Array:
-        """By Newton's method, within the piece."""
-        width = np.diff(self._knots)[piece]
-        length = width * gap / np.diff(self._slender_knots)[piece]
-        for _ in range(_NEWTON_STEPS):
-            residual = self._slender_gap(piece, length) - gap
-            change = residual * self.radius(self._knots[piece] + length)
-            length = np.clip(length - change, 0.0, width)
-            if np.all(np.abs(change) <= 1e-15 * self.length):
-                break
-        return length
 
 
 def _integral(function: Any, start: Array, gap: Array) -> Array:

@@ -59,6 +59,9 @@ def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
     Args:
         arm: The design.
         stations: Z [m], shape (station,).
+
+    Raises:
+        InvalidDesign: An actuator loads the sections by another number of bundles than it has.
     """
     z = np.atleast_1d(np.asarray(stations, float))
     loads = [Resultants(np.empty((len(z), 0)), np.empty((len(z), 3, 0)))]
@@ -75,6 +78,12 @@ def tables(arm: Manipulator, stations: ArrayLike) -> Tables:
 def _resultants(actuator: Actuator, arm: Manipulator, z: Array) -> Resultants:
     """Load of an actuator on the sections: nothing where it does not act."""
     load, acts = actuator.resultants(arm.profile, arm.section, z), actuator.acts(arm.profile, z)
+    shapes = np.shape(load.force), np.shape(load.moment)
+    count, n = len(z), actuator.bundles
+    if shapes != ((count, n), (count, 3, n)):
+        kind = type(actuator).__name__
+        allowed = f"must be that of {kind}.resultants, whose arrays have the shapes {shapes}"
+        raise InvalidDesign([Fault(f"{actuator.name}.bundles", n, allowed)])
     if acts.all():
         return load
     return Resultants(np.where(acts, load.force, 0.0), np.where(acts[:, None], load.moment, 0.0))

@@ -5,22 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
+from importlib.metadata import EntryPoint
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 from softreach.atlas.metric import PROFILE, Metric, Need
 from softreach.cloud.curvature import QUANTITIES
 from softreach.geometry.alpha_shape import AlphaComplex
+from softreach.support import plugins
 from softreach.support.arguments import as_given
 from softreach.support.arrays import Array
-from softreach.support.errors import InvalidInput
+from softreach.support.errors import InvalidInput, warn
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from softreach.workspace import ReachableSet
 
-__all__ = ["METRIC_GROUPS", "chosen_metrics", "known_metric"]
+__all__ = ["METRIC_GROUPS", "chosen_metrics", "known_metric", "own_metrics"]
 
 
 def known_metric(name: str) -> Metric | None:
@@ -32,7 +34,8 @@ def chosen_metrics(metrics: Sequence[str | Metric]) -> tuple[Metric, ...]:
     """Metrics, each once: those of softreach in the order of its table, then others by name.
 
     Args:
-        metrics: Names of groups, and metrics.
+        metrics: Names of groups, metrics, and names of metrics that are not softreach's: of modules
+            that the command line imports, or declared by installed packages.
 
     Raises:
         InvalidInput: Nothing, an unknown group, or two metrics of one name.
@@ -53,9 +56,65 @@ def chosen_metrics(metrics: Sequence[str | Metric]) -> tuple[Metric, ...]:
 def _metrics_of(choice: str | Metric) -> tuple[Metric, ...]:
     if isinstance(choice, Metric):
         return (choice,)
-    if not isinstance(choice, str) or choice not in METRIC_GROUPS:
-        raise InvalidInput("metrics", as_given(choice), _ALLOWED)
-    return METRIC_GROUPS[choice]
+    if isinstance(choice, str) and choice in METRIC_GROUPS:
+        return METRIC_GROUPS[choice]
+    own = _own_metric(choice) if isinstance(choice, str) else None
+    if own is None:
+        raise InvalidInput(
+            "metrics", as_given(choice), _ALLOWED, "the command line imports those by --import"
+        )
+    return (own,)
+
+
+def own_metrics() -> dict[str, Metric]:
+    """Metrics that are not softreach's and have been imported for it, or are declared for it.
+
+    Raises:
+        InvalidInput: The name of an imported one is taken.
+    """
+    own = _imported_metrics()
+    for name, entry in plugins.declared(plugins.METRICS).items():
+        try:
+            own.setdefault(name, _declared_metric(entry))
+        except InvalidInput as error:  # the others can be used
+            warn(str(error))
+    return own
+
+
+def _own_metric(name: str) -> Metric | None:
+    """The metric of this name that is not softreach's, from an installed package if need be."""
+    known = _imported_metrics()
+    if name in known:
+        return known[name]
+    entry = plugins.declared(plugins.METRICS).get(name)
+    return None if entry is None else _declared_metric(entry)
+
+
+def _imported_metrics() -> dict[str, Metric]:
+    """Metrics in the modules that the user named."""
+    own: dict[str, Metric] = {}
+    for module in plugins.imported():
+        for metric in vars(module).values():
+            if isinstance(metric, Metric) and _KNOWN.get(metric.name) != metric:
+                _check_free(metric, own)
+                own[metric.name] = metric
+    return own
+
+
+def _declared_metric(entry: EntryPoint) -> Metric:
+    metric = plugins.loaded(entry)
+    if not isinstance(metric, Metric) or metric.name != entry.name:
+        allowed = f"a Metric of the name {entry.name}"
+        raise InvalidInput(f"entry point {entry.name}", entry.value, allowed)
+    _check_free(metric, {})
+    return metric
+
+
+def _check_free(metric: Metric, others: Mapping[str, Metric]) -> None:
+    """Refuse a name that another metric or a group has."""
+    if metric.name in (*METRIC_GROUPS, *_KNOWN) or others.get(metric.name, metric) != metric:
+        allowed = "a name that no other metric and no group has"
+        raise InvalidInput("name of a metric", metric.name, allowed)
 
 
 def _lowest(axis: int, tips: Array) -> float:

@@ -15,6 +15,7 @@ from cyclopts import App, CycloptsError, Group, Parameter
 from softreach.cli.console import HelpConsole, console
 from softreach.cli.signals import INTERRUPTED
 from softreach.support.errors import InvalidInput, NotWritten, SoftreachError, with_short_words
+from softreach.support.plugins import importing
 
 _MORE = Group("More", sort_key=-1)
 _COMMANDS = (
@@ -86,12 +87,36 @@ def _start(
             help="Print more: what is compiled, and where an error comes from.",
         ),
     ] = False,
+    imports: Annotated[
+        list[str] | None,
+        Parameter(
+            name="--import",
+            group=_ALWAYS,
+            help="Module, or .py file, with actuators, profiles or metrics of your own, which is "
+            "run. May be repeated.",
+        ),
+    ] = None,
 ) -> None:
-    """Say how much is printed, then run the command."""
+    """Say how much is printed, import what is the user's own, then run the command."""
     if quiet and verbose:
         raise InvalidInput("quiet", quiet, "left out with --verbose")
     console.set(quiet=quiet, verbose=verbose)
-    app(words, result_action="return_value")
+    if not imports:
+        app(words, result_action="return_value")
+        return
+    with importing(imports):
+        _check_kinds()
+        app(words, result_action="return_value")
+
+
+def _check_kinds() -> None:
+    """See that the kinds of the user have names of their own."""
+    from softreach.arm.actuators import Actuator
+    from softreach.arm.design_file.keys import own_kinds
+    from softreach.arm.profile import Profile
+
+    for of in (Actuator, Profile):
+        own_kinds(of)
 
 
 def run(arguments: list[str]) -> int:

@@ -70,7 +70,7 @@ def build(
         str | None,
         Parameter(
             help="Groups of metrics, comma-separated, if not all: extent, convex, concave, exact, "
-            "curvature, stability."
+            "curvature, stability; or names of metrics of your own."
         ),
     ] = None,
     keep_clouds: Annotated[

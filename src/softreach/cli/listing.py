@@ -13,7 +13,7 @@ from softreach.cli.values import as_read
 
 listing = App(
     name="list",
-    help="""List designs, materials, metrics, or parameters of a design.
+    help="""List designs, materials, actuators, metrics, or parameters of a design.
 
 Example: softreach list parameters minimal_trunk
 """,
@@ -63,16 +63,43 @@ def materials(*, json: AsJson = False) -> None:
 
 
 @listing.command
+def actuators(*, json: AsJson = False) -> None:
+    """List the kinds of actuators of design files, and the modules that they are in.
+
+    Those of your own are there with --import, or as entry points of a package.
+
+    Example: softreach list actuators
+    """
+    from softreach.arm.actuators import Actuator
+    from softreach.arm.design_file.keys import every_kind
+
+    records = [
+        {
+            "kind": name,
+            "activation": kind.activation,
+            "unit": kind.unit,
+            "module": kind.__module__,
+            "description": (kind.__doc__ or "").strip().partition("\n")[0],
+        }
+        for name, kind in every_kind(Actuator).items()
+    ]
+    console.table(records, json)
+
+
+@listing.command
 def metrics(*, json: AsJson = False) -> None:
     """List the metrics of an atlas with their groups and units.
 
+    Metrics of your own are their own group; see --import.
+
     Example: softreach list metrics
     """
-    from softreach.atlas.metrics import METRIC_GROUPS
+    from softreach.atlas.metrics import METRIC_GROUPS, own_metrics
 
+    own = [(name, (metric,)) for name, metric in own_metrics().items()]
     records = [
         {"metric": metric.name, "group": group, "unit": metric.unit, "meaning": metric.meaning}
-        for group, members in METRIC_GROUPS.items()
+        for group, members in [*METRIC_GROUPS.items(), *own]
         for metric in members
     ]
     console.table(records, json)

@@ -11,7 +11,10 @@ from softreach.arm.actuators import SectorActuator
 from softreach.arm.design_file import in_file_terms
 from softreach.arm.edits import ring_label
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.number import own_fields
 from softreach.arm.parameters import Parameter, parameters
+from softreach.arm.parameters.draft import part_of
+from softreach.arm.parameters.parameter import OwnParameter
 from softreach.support.errors import Fault, InvalidDesign, Range
 
 
@@ -85,17 +88,54 @@ _DEGREES: _Unit = ("deg", math.radians(1))
 def slider_parameters(arm: Manipulator) -> tuple[ShownParameter, ...]:
     """The parameters of a design that have sliders, those of the whole arm first.
 
-    What the design leaves open, such as a modulus that cancels, has none.
+    What the design leaves open, such as a modulus that cancels, has none; all that actuators and
+    profiles outside softreach declare has one, but for a zero of unknown size.
     """
     known = parameters(arm)
+    own = {name for name, parameter in known.items() if _is_own(arm, parameter)}
     sliders: list[ShownParameter] = []
     for owner in dict.fromkeys(parameter.owner for parameter in known.values()):
-        for field in dict.fromkeys((*(_OF_PART if owner else _OF_ARM), *_AROUND_VALUE)):
-            parameter = known.get(f"{owner}.{field}" if owner else field)
-            if parameter is not None and _is_offered(arm, known, parameter):
-                slider = _slider(parameter, parameter.value(arm))
-                sliders += [_on_slider(arm, parameter, slider)] if slider else []
+        fields = dict.fromkeys((*(_OF_PART if owner else _OF_ARM), *_AROUND_VALUE))
+        names = [f"{owner}.{field}" if owner else field for field in fields]
+        names += [name for name in known if name in own and known[name].owner == owner]
+        for parameter in (known[name] for name in dict.fromkeys(names) if name in known):
+            if parameter.name in own:
+                slider = _own_slider(arm, parameter)
+            else:
+                offered = _is_offered(arm, known, parameter)
+                slider = _slider(parameter, parameter.value(arm)) if offered else None
+            sliders += [_on_slider(arm, parameter, slider)] if slider else []
     return tuple(sliders)
+
+
+def _is_own(arm: Manipulator, parameter: Parameter) -> bool:
+    """True if a kind of part outside softreach declares it."""
+    if not isinstance(parameter, OwnParameter):
+        return False
+    return parameter.path.field in own_fields(type(part_of(arm, parameter.path.part)))
+
+
+def _own_slider(arm: Manipulator, parameter: Parameter) -> _Slider | None:
+    """From zero to twice the value, or all angles, within the range; None for a zero of no size.
+
+    Where the range itself does not end at zero, the slider stays off it by a hundredth.
+    """
+    unit, scale = _unit(parameter, _units_on_sliders(arm))
+    value, allowed = parameter.value(arm) / scale, parameter.range
+    low, high = allowed.low / scale, allowed.high / scale
+    size = 2 * abs(value) or high - low
+    ends = (-size if value <= 0 else 0.0, size if value >= 0 else 0.0)
+    if parameter.unit == "rad":
+        size, ends = 200.0, (-360.0, 360.0)
+    if not math.isfinite(size):
+        return None
+    step = max(1.0, size // 200) if parameter.whole else size / 200
+    ends = (
+        max(ends[0], low + step * allowed.open_low),
+        min(ends[1], high - step * allowed.open_high),
+    )
+    owner = f" of {parameter.owner}" if parameter.owner else ""
+    return _Slider(_titled(f"{parameter.symbol}{owner}", unit), *ends, step)
 
 
 def _slider(parameter: Parameter, value: float) -> _Slider | None:
@@ -134,7 +174,7 @@ def _is_offered(arm: Manipulator, known: Mapping[str, Parameter], parameter: Par
 
 
 def _on_slider(arm: Manipulator, parameter: Parameter, slider: _Slider) -> ShownParameter:
-    unit, scale = _unit(parameter, {"rad": _DEGREES, "m": ("L", arm.length)})
+    unit, scale = _unit(parameter, _units_on_sliders(arm))
     more = f"; {_MORE[parameter.field]}" if parameter.field in _MORE else ""
     return ShownParameter(
         parameter.name,
@@ -147,6 +187,10 @@ def _on_slider(arm: Manipulator, parameter: Parameter, slider: _Slider) -> Shown
         slider.high,
         slider.step,
     )
+
+
+def _units_on_sliders(arm: Manipulator) -> Mapping[str, _Unit]:
+    return {"rad": _DEGREES, "m": ("L", arm.length)}
 
 
 class Part(NamedTuple):

@@ -25,7 +25,6 @@ __all__ = [
     "Outline",
     "PolarActuator",
     "Resultants",
-    "actuator_kinds",
     "bounds_faults",
     "distance_faults",
     "length_or_ratio_faults",
@@ -261,16 +260,6 @@ def distance_faults(actuator: Actuator, profile: Profile, section: Section) -> l
         return []
     allowed = f"must be within {_FARTHEST:g} times the largest outer radius of the arm"
     return [Fault("distance over R2", ratio, allowed)]
-
-
-def actuator_kinds() -> dict[str, type[Actuator]]:
-    """Every kind of actuator that has been imported and can be made, by the name of its class."""
-    return {kind.__name__: kind for kind in _kinds(Actuator) if not kind.__abstractmethods__}
-
-
-def _kinds(of: type[Actuator]) -> list[type[Actuator]]:
-    direct = of.__subclasses__()
-    return direct + [kind for child in direct for kind in _kinds(child)]
 
 
 def _plain_bounds(bounds: ArrayLike) -> Bounds:

@@ -14,7 +14,7 @@ from dataclasses import MISSING, fields
 from decimal import Decimal, InvalidOperation
 from functools import cache
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from softreach.arm.actuators import (
     Actuator,
@@ -24,27 +24,33 @@ from softreach.arm.actuators import (
     RadialMuscle,
     Tendon,
 )
-from softreach.arm.actuators.actuator import actuator_kinds
 from softreach.arm.base import Base
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.material import Material
 from softreach.arm.number import Number, fields_of, unit_suffix
+from softreach.arm.part import Part
 from softreach.arm.profile import LinearTaper, PiecewiseTaper, Profile, SampledTaper
 from softreach.arm.section import Ring, Section
-from softreach.support.errors import Fault, InvalidDesign, Range
+from softreach.support import plugins
+from softreach.support.errors import Fault, InvalidDesign, InvalidInput, Range, warn
 
 __all__ = [
     "ACTUATORS",
+    "KINDS",
     "PROFILES",
     "Key",
+    "Kind",
     "WrittenFloat",
     "degrees_text",
+    "every_kind",
     "field_keys",
     "in_file_terms",
     "in_file_units",
     "inline_table",
     "key_text",
     "keys_of",
+    "known_kinds",
+    "own_kind",
     "own_kinds",
     "radians",
     "value_text",
@@ -65,6 +71,13 @@ ACTUATORS: Mapping[str, type[Actuator]] = MappingProxyType(
     }
 )
 """Actuators by the kind that files know them by."""
+
+Kind = TypeVar("Kind", bound=Part)
+"""Actuators or profiles."""
+
+KINDS: Mapping[type, Mapping[str, type]] = {Actuator: ACTUATORS, Profile: PROFILES}
+"""Kinds by what they are."""
+_GROUPS = {Actuator: plugins.ACTUATORS, Profile: plugins.PROFILES}
 
 _BODY = (Material, Ring, Section, Loads, PointLoad, Base)
 _PI = Decimal("3.14159265358979323846264338327950288420")
@@ -110,10 +123,61 @@ def field_keys(kind: type) -> dict[str, str]:
     return {key.field: name for name, key in keys_of(kind).items()}
 
 
-def own_kinds() -> dict[str, type[Actuator]]:
-    """Kinds of actuators that are imported and not softreach's, by the names of their classes."""
-    known = actuator_kinds().items()
-    return {name: kind for name, kind in known if kind.__module__.partition(".")[0] != "softreach"}
+def own_kinds(of: type[Kind]) -> dict[str, type[Kind]]:
+    """Imported kinds of actuators or profiles that are not softreach's, by their classes' names.
+
+    Raises:
+        InvalidInput: Two modules have a kind of one name, or one has softreach's.
+    """
+    taken = {*KINDS[of], *(kind.__name__ for kind in KINDS[of].values())}
+    own: dict[str, type[Kind]] = {}
+    for kind in _subclasses(of):
+        name, module = kind.__name__, kind.__module__
+        if module.partition(".")[0] == "softreach" or getattr(kind, "__abstractmethods__", ()):
+            continue
+        other = own.get(name, kind).__module__
+        if name in taken or other != module:
+            owner = "softreach" if name in taken else f"the module {other}"
+            allowed = f"another name, as {owner} has a kind {name}"
+            raise InvalidInput(f"class {name} of the module {module}", name, allowed)
+        own[name] = kind
+    return own
+
+
+def own_kind(of: type[Kind], name: str) -> type[Kind] | None:
+    """The kind of this name that is not softreach's, from an installed package if need be.
+
+    Raises:
+        InvalidInput: A package that declares it does not have it.
+    """
+    own = own_kinds(of)
+    entry = None if name in own else plugins.declared(_GROUPS[of]).get(name)
+    if entry is not None:
+        made = plugins.loaded(entry)
+        own = own_kinds(of)
+        if own.get(name) is not made:
+            raise InvalidInput(f"entry point {name}", entry.value, f"a class {name} of that kind")
+    return own.get(name)
+
+
+def every_kind(of: type[Kind]) -> dict[str, type[Kind]]:
+    """All kinds, those of installed packages imported; warns of what they do not have."""
+    for name in plugins.declared(_GROUPS[of]):
+        try:
+            own_kind(of, name)
+        except InvalidInput as error:  # the others can be used
+            warn(str(error))
+    return {**KINDS[of], **own_kinds(of)}
+
+
+def known_kinds(of: type[Kind]) -> list[str]:
+    """Names of the kinds that are not softreach's, of installed packages without an import."""
+    return [*dict.fromkeys([*own_kinds(of), *plugins.declared(_GROUPS[of])])]
+
+
+def _subclasses(of: type[Kind]) -> list[type[Kind]]:
+    direct = of.__subclasses__()
+    return direct + [kind for child in direct for kind in _subclasses(child)]
 
 
 @cache

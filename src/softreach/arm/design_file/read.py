@@ -14,12 +14,15 @@ from softreach.arm.along import AlongArm
 from softreach.arm.base import Base
 from softreach.arm.design_file.keys import (
     ACTUATORS,
+    KINDS,
     PROFILES,
+    Kind,
     WrittenFloat,
     field_keys,
     key_text,
     keys_of,
-    own_kinds,
+    known_kinds,
+    own_kind,
 )
 from softreach.arm.design_file.tables import WRONG, TableReader, is_doubtful, unknown_key
 from softreach.arm.loads import Loads, PointLoad
@@ -133,6 +136,7 @@ class _DesignReader(TableReader):
         self._document = document
         self._materials: dict[str, Material | None] = {}
         self._unknown_material = False
+        self._unknown_kinds: list[Any] = []
 
     def parts(self) -> Parts | None:
         """The parts of the arm; None where there are faults."""
@@ -217,10 +221,9 @@ class _DesignReader(TableReader):
         if (raw := self._table("profile")) is None:
             return None
         kind = raw.get("kind", "linear")
-        if not isinstance(kind, str) or kind not in PROFILES:
-            self.refused("profile.kind", kind, f"must be one of {', '.join(PROFILES)}")
-            return None
-        return self.part(PROFILES[kind], raw, "profile")
+        if isinstance(kind, str) and kind in PROFILES:
+            return self.part(PROFILES[kind], raw, "profile")
+        return self._own_part(Profile, kind, raw, "profile")
 
     def _own_materials(self) -> Iterator[tuple[str, Material | None]]:
         for name, raw in (self._table("materials") or {}).items():
@@ -302,12 +305,19 @@ class _DesignReader(TableReader):
         path, kind = f"actuators[{k}]", raw.get("kind")
         if isinstance(kind, str) and kind in ACTUATORS:
             return self.part(ACTUATORS[kind], raw, path)
-        own = own_kinds()
-        if not isinstance(kind, str) or kind not in own:
-            self.refused(f"{path}.kind", kind, _kinds_text(kind, [*own]))
+        return self._own_part(Actuator, kind, raw, path)
+
+    def _own_part(self, of: type[Kind], kind: Any, raw: dict[str, Any], path: str) -> Kind | None:
+        """An actuator or a profile of a kind that is not softreach's."""
+        own = own_kind(of, kind) if isinstance(kind, str) else None
+        if own is None:
+            path = f"{path}.kind"
+            if not isinstance(kind, str) or kind not in self._unknown_kinds:
+                self.refused(path, kind, _kinds_text(of, kind))
+            self._unknown_kinds.append(kind)
             return None
         try:
-            return _of_own_kind(own[kind], raw)
+            return _of_own_kind(own, raw)
         except InvalidDesign as error:
             for fault in error.faults:
                 self.faults.append(fault._replace(path=f"{path}.{fault.path}".rstrip(".")))
@@ -328,8 +338,8 @@ class _DesignReader(TableReader):
         self.faults += self._of_section(lacking)
 
 
-def _of_own_kind(kind: type[Actuator], table: Mapping[str, Any]) -> Actuator:
-    """An actuator of a class outside softreach from its fields as they are in Python, in SI units.
+def _of_own_kind(kind: type[Kind], table: Mapping[str, Any]) -> Kind:
+    """A part of a class outside softreach from its fields as they are in Python, in SI units.
 
     Raises:
         InvalidDesign: Fields that it does not have or that are wrong.
@@ -374,13 +384,15 @@ def _materials_text(name: str, own: list[str]) -> str:
     return f"must be a material {here}, or of the library; {hint}"
 
 
-def _kinds_text(kind: Any, own: list[str]) -> str:
-    """Kinds of actuators that are allowed."""
+def _kinds_text(of: type[Any], kind: Any) -> str:
+    """Kinds of actuators or profiles that are allowed."""
+    known = KINDS[of]
     if kind is None:
-        return f"required key is missing: one of {', '.join(ACTUATORS)}"
-    names = {actuator.__name__: name for name, actuator in ACTUATORS.items()}
+        return f"required key is missing: one of {', '.join(known)}"
+    names = {part.__name__: name for name, part in known.items()}
     if isinstance(kind, str) and kind in names:
         return f'must be the kind of a file; did you mean "{names[kind]}"?'
-    others = ", or a class of your own that is imported" + (f": {', '.join(own)}" if own else "")
-    hint = did_you_mean(kind, [*ACTUATORS, *own]) if isinstance(kind, str) else ""
-    return f"must be one of {', '.join(ACTUATORS)}{others}{f'; {hint}' if hint else ''}"
+    own = known_kinds(of)
+    others = "or a class of your own that is imported, on the command line by --import"
+    hint = did_you_mean(kind, [*known, *own]) if isinstance(kind, str) else ""
+    return f"must be one of {', '.join([*known, *own])}, {others}{f'; {hint}' if hint else ''}"

@@ -39,13 +39,8 @@ def json_schema() -> dict[str, Any]:
         "loads": _table(Loads, "Gravity, payload, forces and moments"),
         "base": _table(Base, "Where in the world the arm is clamped, and which way it points"),
         "point_load": _table(PointLoad, "Force and moment on one section"),
-        "own_actuator": {
-            "description": "Actuator of a class of one's own: its fields, in SI units",
-            "type": "object",
-            "properties": {"kind": {**_TEXT, "not": {"enum": [*ACTUATORS]}}},
-            "required": ["kind"],
-            "additionalProperties": True,
-        },
+        "own_actuator": _own("Actuator", ACTUATORS, "kind"),
+        "own_profile": _own("Profile", PROFILES, "kind", "length"),
     }
     kinds = {**PROFILES, **ACTUATORS}
     definitions |= {
@@ -53,7 +48,9 @@ def json_schema() -> dict[str, Any]:
     }
     top = {
         "version": {"const": 2, "description": "Version of the format"},
-        "profile": _one_of(PROFILES, "Length and outer radius along the arm"),
+        "profile": _one_of(
+            {**PROFILES, "own_profile": None}, "Length and outer radius along the arm"
+        ),
         "materials": {
             "description": "Materials by name; others are looked up in the library",
             "type": "object",
@@ -95,6 +92,16 @@ def _of(name: str) -> _Schema:
 
 def _one_of(names: Mapping[str, Any], description: str) -> _Schema:
     return {"description": description, "anyOf": [_of(name) for name in names]}
+
+
+def _own(part: str, kinds: Mapping[str, type], *required: str) -> _Schema:
+    return {
+        "description": f"{part} of a class of one's own: its fields, in SI units",
+        "type": "object",
+        "properties": {"kind": {**_TEXT, "not": {"enum": [*kinds]}}},
+        "required": [*required],
+        "additionalProperties": True,
+    }
 
 
 def _object(properties: Mapping[str, _Schema], required: list[str]) -> _Schema:

@@ -52,18 +52,17 @@ def render(
     """TOML text of a design, of version 2.
 
     Raises:
-        InvalidDesign: A profile that design files have no table for, or an actuator of one's own
-            kind that is not made of plain values.
+        InvalidDesign: A part of one's own kind that is not made of plain values.
     """
     names = _named_materials(section)
     blocks = [
         ["version = 2"] if actuators else ["version = 2", "actuators = []"],
-        ["[profile]", *_profile_lines(profile)],
+        ["[profile]", *_part_lines(profile, PROFILES)],
         *(_material_block(name, material) for name, material in names.items()),
         *_section_blocks(section, names),
     ]
     for actuator in actuators:
-        blocks.append(["[[actuators]]", *_actuator_lines(actuator)])
+        blocks.append(["[[actuators]]", *_part_lines(actuator, ACTUATORS)])
     if loads is not None:
         blocks.append(["[loads]", *_lines(loads)])
         blocks += [["[[loads.point_loads]]", *_lines(load)] for load in loads.point_loads]
@@ -77,30 +76,23 @@ def display_text(unit: str | None) -> str:
     return "" if unit is None else f"\n[display]\nunit = {value_text(unit)}\n"
 
 
-def _profile_lines(profile: Profile) -> Iterator[str]:
-    if (kind := _kind_of(profile, PROFILES)) is None:
-        raise InvalidDesign([Fault("profile", profile, "has no keys in a design file")])
-    yield f"kind = {value_text(kind)}"
-    yield from _lines(profile)
-
-
-def _actuator_lines(actuator: Actuator) -> Iterator[str]:
+def _part_lines(part: Actuator | Profile, kinds: Mapping[str, type]) -> Iterator[str]:
     """Kind and fields; of a class outside softreach the fields as they are in Python."""
-    if (kind := _kind_of(actuator, ACTUATORS)) is not None:
+    if (kind := _kind_of(part, kinds)) is not None:
         yield f"kind = {value_text(kind)}"
-        yield from _lines(actuator)
+        yield from _lines(part)
         return
-    yield f"kind = {value_text(type(actuator).__name__)}"
-    for name in (field.name for field in fields(actuator)):  # pyright: ignore[reportArgumentType]
-        if (value := getattr(actuator, name)) is not None:
-            yield f"{name} = {_plain_text(actuator, name, value)}"
+    yield f"kind = {value_text(type(part).__name__)}"
+    for field in fields(part):  # pyright: ignore[reportArgumentType]
+        if field.init and (value := getattr(part, field.name)) is not None:
+            yield f"{field.name} = {_plain_text(part, field.name, value)}"
 
 
-def _plain_text(actuator: Actuator, name: str, value: Any) -> str:
+def _plain_text(part: object, name: str, value: Any) -> str:
     try:
-        return _text(name, value)
+        return _along_text(value, value_text) if isinstance(value, AlongArm) else value_text(value)
     except (TypeError, ValueError):
-        kind = type(actuator).__name__
+        kind = type(part).__name__
         allowed = "must be a number, text or a sequence of these to fit in a design file"
         raise InvalidDesign([Fault(f"{kind}.{name}", value, allowed)]) from None
 

@@ -261,7 +261,7 @@ class Draft:
         if key is None:
             return field
         number = fields_of(type(self._parts[key].start)).get(field)
-        is_series = number is not None and number.shape in ("series", "stations")
+        is_series = number is not None and number.shape in ("series", "stations", "several")
         return Path(key, field, (0,) if is_series else ()).faulty
 
 

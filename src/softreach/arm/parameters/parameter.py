@@ -225,21 +225,22 @@ def parameters(arm: Manipulator) -> dict[str, Parameter]:
 def _of_arm(arm: Manipulator, own: list[OwnParameter]) -> Iterator[Parameter]:
     """Parameters of the arm as a whole, from those of its parts."""
     plain = {parameter.name: parameter for parameter in own if not parameter.owner}
-    if any(parameter.path.field == "revolution" for parameter in own):
+    if any(parameter.path.field == "revolution" and parameter.unit == "rad" for parameter in own):
         turn = fields_of(FiberArchitecture)["revolution"]
         meaning = "revolution of all that is helical, each in its own sense"
         yield _Revolution(name="revolution", number=dataclasses.replace(turn, meaning=meaning))
     if (taper := plain.pop("taper", None)) is not None:
         yield _Taper(name="taper", number=taper.number, path=taper.path)
-    inner = tuple(parameter for parameter in own if parameter.path.field == "inner_ratio")
+    body = [parameter for parameter in own if parameter.path.part[0] in ("rings", "core")]
+    inner = tuple(parameter for parameter in body if parameter.path.field == "inner_ratio")
     if len({parameter.value(arm) for parameter in inner}) == 1:
         ratio = fields_of(Ring)["inner_ratio"]
         ratio = dataclasses.replace(ratio, meaning="inner over outer radius")
         yield _Shared(name="radius_ratio", number=ratio, parts=inner)
-    if "outer_radius" not in plain and hasattr(arm.profile, "radii"):
+    if "outer_radius" not in plain and isinstance(getattr(arm.profile, "radii", None), tuple):
         yield _OuterRadius(name="outer_radius", number=fields_of(LinearTaper)["outer_radius"])
     yield from plain.values()
-    poisson = tuple(parameter for parameter in own if parameter.path.field == "poisson_ratio")
+    poisson = tuple(parameter for parameter in body if parameter.path.field == "poisson_ratio")
     number = fields_of(Material)["poisson_ratio"]
     yield _Shared(name="poisson_ratio", number=number, parts=poisson)
     by_field: dict[str, list[OwnParameter]] = {}
@@ -304,11 +305,12 @@ def _own(path: Path, number: Number) -> OwnParameter:
 def _revolutions(arm: Manipulator) -> dict[PartKey, float]:
     """Ω of all that winds by a single number [rad], by its key."""
     return {
-        ("actuators", actuator.name): float(
+        ("actuators", actuator.name): _float(
             actuator.value_on("revolution", arm.profile, arm.section)
         )
         for actuator in arm.actuators
         if "revolution" in (numbers := fields_of(type(actuator)))
+        and numbers["revolution"].unit == "rad"
         and not any(isinstance(getattr(actuator, field), AlongArm) for field in numbers)
     }
 
