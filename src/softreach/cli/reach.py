@@ -11,7 +11,16 @@ from softreach.cli.changes import UNCHANGED, Changes, design_from
 from softreach.cli.console import Rows, console
 from softreach.cli.design import load_rows
 from softreach.cli.lengths import Lengths
-from softreach.cli.options import AsJson, Design, Overwrite, Unit, check_output, out_option
+from softreach.cli.options import (
+    AsJson,
+    Design,
+    Overwrite,
+    Unit,
+    check_output,
+    is_page,
+    out_option,
+    write_page,
+)
 from softreach.cli.values import NUMBER
 from softreach.support.errors import InvalidInput
 
@@ -31,8 +40,8 @@ def reach(
     out: Annotated[
         list[Path] | None,
         out_option(
-            "Write the boundary (.ply .stl .obj .glb .vtu .vtk), or draw slices through the base "
-            "(.png .pdf .svg). May be repeated."
+            "Write the boundary (.ply .stl .obj .glb .vtu .vtk), draw slices through the base "
+            "(.png .pdf .svg), or the set as a web page that turns (.html). May be repeated."
         ),
     ] = None,
     overwrite: Overwrite = False,
@@ -65,12 +74,12 @@ def reach(
 def _check_outputs(arm: Manipulator, outs: list[Path], overwrite: bool) -> None:
     """Refuse files that cannot be written, or that a set of so few dimensions does not have."""
     from softreach.export.surfaces import SURFACE_FILES
-    from softreach.support.files.kinds import PICTURES
+    from softreach.support.files.kinds import PAGES, PICTURES
 
     free = int((arm.bounds[:, 0] < arm.bounds[:, 1]).sum())
     for path in outs or [None]:
-        check_output(path, {**SURFACE_FILES, **PICTURES}, overwrite)
-        if path is not None and free < (3 if _is_picture(path) else 2):
+        check_output(path, {**SURFACE_FILES, **PICTURES, **PAGES}, overwrite)
+        if path is not None and not is_page(path) and free < (3 if _is_picture(path) else 2):
             raise _no_such_output(path)
 
 
@@ -87,7 +96,9 @@ def _no_such_output(path: Path) -> InvalidInput:
 def _write(reached: ReachableSet, path: Path, lengths: Lengths, overwrite: bool) -> None:
     from softreach.workspace import ReachableSolid, ReachableSurface
 
-    if _is_picture(path):
+    if is_page(path):
+        write_page([reached, reached.arm], path, lengths, overwrite=overwrite)
+    elif _is_picture(path):
         from softreach.plot import plot_slices, save_figure
 
         if not isinstance(reached, ReachableSolid):

@@ -88,6 +88,34 @@ def compact_surface(points: Points, faces: Faces) -> tuple[Points, Faces]:
     return points[used], number[faces]
 
 
+def simplified(vertices: Points, faces: Faces, most: int) -> tuple[Points, Faces]:
+    """A coarser surface for pictures: vertices in one cube of a grid become their mean.
+
+    It is closed where the surface was, but may touch itself.
+
+    Args:
+        vertices: Corners [m], shape (v, 3).
+        faces: Shape (f, 3).
+        most: Triangles that it may have.
+    """
+    edge = np.sqrt(surface_area(vertices, faces) / max(most, 1))
+    while len(faces) > most:
+        cube = np.floor((vertices - vertices.min(axis=0)) / edge).astype(np.int64)
+        number = np.ravel_multi_index(tuple(cube.T), tuple(cube.max(axis=0) + 1))
+        _, place, count = np.unique(number, return_inverse=True, return_counts=True)
+        sums = [np.bincount(place, weights=axis) for axis in vertices.T]
+        corners = place[faces]
+        after = np.roll(corners, -1, axis=1)
+        coarse, fewer = (
+            np.stack(sums, axis=1) / count[:, None],
+            corners[(corners != after).all(axis=1)],
+        )
+        if len(fewer) <= most:
+            return compact_surface(coarse, fewer)
+        edge *= 1.2
+    return vertices, faces
+
+
 def enclosed_volume(vertices: Points, faces: Faces) -> float:
     """Volume inside an oriented closed surface [m³] by the divergence theorem."""
     if len(faces) == 0:
