@@ -33,8 +33,13 @@ def show(
     /,
     *,
     color: Annotated[
-        str, Parameter(help="rgb, the name of a bundle, or compliance: how far the tip yields.")
-    ] = "rgb",
+        str | None,
+        Parameter(
+            help="rgb (mixed lights: if left out, of up to three bundles), strongest (bundle: if "
+            "left out, of more), effort, the name of a bundle, or compliance: how far the tip "
+            "yields."
+        ),
+    ] = None,
     activation: Activation = None,
     sampling: Sampling = SAMPLING,
     changes: Changes = UNCHANGED,
@@ -68,7 +73,7 @@ def show(
     console.line(out)
 
 
-def _colors(cloud: xr.Dataset, color: str) -> str | xr.DataArray:
+def _colors(cloud: xr.Dataset, color: str | None) -> str | xr.DataArray | None:
     """The colors of the samples: a name that figures know, or numbers that they do not compute."""
     from softreach.plot.coloring import bundle_names
     from softreach.stiffness import cloud_compliance

@@ -49,6 +49,8 @@ class Swatches(NamedTuple):
 
     entries: Sequence[tuple[str, str]]
     """Label and color, as CSS has it."""
+    title: str = ""
+    """What they stand for."""
 
 
 class ColorScale(NamedTuple):

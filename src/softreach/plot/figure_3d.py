@@ -55,7 +55,7 @@ _HELP = (
 def plot_3d(
     data: Any,
     *,
-    color: str | int | ArrayLike = "rgb",
+    color: str | int | ArrayLike | None = None,
     view: View = "oblique",
     unit: Unit = None,
     caption: str | None = None,
@@ -287,7 +287,8 @@ def _page_keys(key: BundleKey | ScalarKey | None) -> list[Swatches | ColorScale]
     marks = [("unstable", css_color(np.array(UNSTABLE) / 255))] if key.unstable else []
     if isinstance(key, BundleKey):
         named = zip(key.labels, key.colors / 255, strict=True)
-        return [Swatches([*((label, css_color(rgb)) for label, rgb in named), *marks])]
+        swatches = [(label, css_color(rgb)) for label, rgb in named]
+        return [Swatches([*swatches, *marks], key.title)]
     scale = color_map(key)
     shares = np.linspace(0.0, 1.0, 17)
     colors = [css_color(rgb[:3]) for rgb in scale.cmap(shares)]

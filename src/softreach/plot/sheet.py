@@ -172,9 +172,9 @@ def plot_opposite_sides(
             box = shown * arm.length
             panels[0, k].set_title(f"({k + 1})  {title}", pad=4)
             for ax, side in zip(panels[:, k], sides, strict=True):
-                plot_cloud(cloud, ax=ax, view=side, key=False, box=box, unit=unit)
+                plot_cloud(cloud, ax=ax, view=side, color="rgb", key=False, box=box, unit=unit)
                 plot_arm(arm, ax=ax, view=side, box=box, unit=unit)
-        draw_figure_key(figure, color_samples(next(iter(clouds.values()))).key, 0.09)
+        draw_figure_key(figure, color_samples(next(iter(clouds.values())), "rgb").key, 0.09)
     return figure
 
 
