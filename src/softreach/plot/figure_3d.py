@@ -138,7 +138,8 @@ class _Scene:
             size = self.unit.text(value, reached.dimension, error)
             self.captions.append(f"Reachable set: {word.removeprefix('curve_')} {size}")
         if reached.dimension > 1:
-            self.add_surface(reached.surface(), "reachable set")
+            surface = reached.sheets() if reached.dimension == 3 else reached.surface()
+            self.add_surface(surface, "reachable set")
             return
         points = self.unit.of(reached.path if reached.dimension else reached.tip[None])
         points = points[np.isfinite(points).all(axis=1)]
