@@ -148,9 +148,10 @@ class _Scene:
 
     def add_hull(self, hull: Any) -> None:
         """A hull, whose volume is known."""
-        kind = "Convex hull" if np.isinf(hull.alpha) else "Alpha shape"
-        self.captions.append(f"{kind}: volume {self.unit.text(hull.volume, 3)}")
-        self.add_surface(hull, "hull")
+        kind = "convex hull" if np.isinf(hull.alpha) else "alpha shape"
+        volume = self.unit.text(hull.volume, 3)
+        self.captions.append(f"{kind.capitalize()}: volume {volume}")
+        self.add_surface(hull, kind)
 
     def add_surface(self, mesh: Any, word: str = "surface") -> None:
         """Triangles, fewer of them if they are many."""
