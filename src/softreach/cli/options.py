@@ -230,7 +230,8 @@ def write_page(
 
     figure = plot_3d(data, unit=lengths.unit, **look)
     save_figure(figure, path, overwrite=overwrite)
-    console.note(f"{path}: {figure.note}")
+    if figure.note:
+        console.note(f"{path}: {figure.note}")
 
 
 def check_surface(path: Path | None, overwrite: bool) -> None:

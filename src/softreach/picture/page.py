@@ -70,7 +70,7 @@ class Figure3D:
     html: str = field(repr=False)
     """The page."""
     note: str
-    """Points and triangles that it shows, and of how many."""
+    """Points and triangles that it shows, and of how many; empty for arms alone."""
 
     def _repr_html_(self) -> str:
         """The page in a frame, for notebooks."""
@@ -79,7 +79,8 @@ class Figure3D:
         return f'<iframe srcdoc="{page}" style="{style}" title="softreach"></iframe>'
 
     def __repr__(self) -> str:
-        return f"Figure3D: {self.note}, {len(self.html) / 1e6:.1f} MB"
+        size = f"{len(self.html) / 1e6:.1f} MB"
+        return f"Figure3D: {self.note}, {size}" if self.note else f"Figure3D: {size}"
 
 
 def web_page(

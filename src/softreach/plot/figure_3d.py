@@ -96,7 +96,7 @@ def plot_3d(
         note=". ".join([*scene.notes, _HELP]),
         view=view,
     )
-    return Figure3D(page, "; ".join(scene.notes) or "arms")
+    return Figure3D(page, "; ".join(scene.notes))
 
 
 class _Scene:
