@@ -6,8 +6,8 @@ arm=${1:-tendon_arm.toml}
 
 softreach design "$arm"
 
-# What it reaches: three slices, and the surface for a printer, in mm.
-softreach reach "$arm" --out slices.png --out reachable.stl --unit mm --overwrite
+# What it reaches: three slices, a page that turns in the browser, the surface for a printer in mm.
+softreach reach "$arm" --out slices.png --out reachable.html --out reachable.stl --unit mm --overwrite
 
 # A place below the ceiling, as one would say it.
 softreach solve "$arm" --target 60mm,40mm,-270mm

@@ -56,7 +56,8 @@ def test_my_tendon_arm(installed, tmp_path):
         installed, tmp_path, "bash", EXAMPLES / "tendon_arm.sh", EXAMPLES / "tendon_arm.toml"
     )
     assert "target (60, 40, -270) mm: reached" in text
-    written = {"slices.png", "reachable.stl", "payload.png", "cloud.zarr", "cloud.png", "cloud.csv"}
+    written = {"slices.png", "reachable.html", "reachable.stl", "payload.png"}
+    written |= {"cloud.zarr", "cloud.png", "cloud.csv"}
     assert {path.name for path in tmp_path.iterdir()} == written
 
 

@@ -159,6 +159,15 @@ class TestMesh:
         assert mesh.is_watertight
         assert mesh.volume == pytest.approx(ball.volume, rel=1e-6)
 
+    @pytest.mark.filterwarnings("ignore::softreach.support.errors.SoftreachWarning")
+    def test_an_alpha_shape_that_touches_itself_can_be_printed(self, rng, tmp_path):
+        hull = sr.concave_hull(rng.random((1500, 3)), alpha=0.09)
+        assert not trimesh.Trimesh(hull.vertices, hull.faces).is_watertight
+        export_mesh(hull, tmp_path / "hull.stl")
+        mesh = trimesh.load(tmp_path / "hull.stl")
+        assert mesh.is_watertight
+        assert mesh.volume == pytest.approx(hull.volume, rel=1e-3)
+
     @pytest.mark.parametrize("suffix", ["vtu", "vtk"])
     def test_vtk_keeps_vertices_and_faces(self, suffix, ball, tmp_path):
         export_mesh((ball.vertices, ball.faces), tmp_path / f"hull.{suffix}")

@@ -27,6 +27,11 @@ def cloud(trunk):
 
 
 @pytest.fixture(scope="module")
+def four():
+    return sr.compute_cloud(sr.designs.redundant_trunk(), n=500)
+
+
+@pytest.fixture(scope="module")
 def bent(trunk):
     return sr.configuration(trunk, [-1.2, -0.3, -0.8], stations=31)
 
@@ -63,6 +68,34 @@ class TestColors:
         assert isinstance(key, BundleKey)
         assert key.names == ("left", "right", "longitudinal")
         np.testing.assert_array_equal(key.colors, 255 * np.eye(3))
+
+    def test_the_strongest_bundle_gives_its_color_in_pictures_of_the_arm(self, four):
+        coloring, magnitude = color_samples(four, "strongest"), np.abs(four.activation.values)
+        paints = np.array([bundle_color(k) for k in range(4)])
+        expected = paints[magnitude.argmax(axis=1)]
+        np.testing.assert_allclose(coloring.rgb / 255, expected, atol=0.002)
+        assert isinstance(coloring.key, BundleKey)
+        assert coloring.key.labels == tuple(four.bundle.values)
+
+    def test_more_than_three_bundles_are_colored_by_the_strongest_unless_asked(self, cloud, four):
+        for data, color in ((cloud, "rgb"), (four, "strongest")):
+            np.testing.assert_array_equal(color_samples(data).rgb, color_samples(data, color).rgb)
+        assert (color_samples(four, "rgb").rgb != color_samples(four).rgb).any()
+
+    def test_effort_is_the_mean_share_of_the_largest_magnitudes(self, four):
+        magnitude = np.abs(four.activation.values)
+        share = (magnitude / magnitude.max(axis=0)).mean(axis=1)
+        coloring = color_samples(four, "effort")
+        np.testing.assert_array_equal(coloring.rgb[share.argmax()], [253, 231, 36])
+        assert isinstance(coloring.key, ScalarKey)
+        assert coloring.key.high == pytest.approx(share.max())
+        assert coloring.key.low == 0.0
+
+    def test_a_bundle_of_that_name_is_meant_before_a_word(self, cloud):
+        named = cloud.assign_coords(bundle=["effort", "strongest", "b"])
+        np.testing.assert_array_equal(
+            color_samples(named, "effort").rgb, color_samples(cloud, 0).rgb
+        )
 
     def test_missing_values_are_gray_and_the_rest_spans_the_scale(self, cloud):
         values = np.linspace(3, 7, 2000)

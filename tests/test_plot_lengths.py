@@ -275,7 +275,9 @@ def sheet(of, draw) -> Iterator[Shown]:
     margin = figure.axes[-1]
     (bar,) = margin.lines
     assert margin.texts[0].get_text() == "$L/2$"
-    inches = np.ptp(bar.get_xdata()) / np.ptp(margin.get_xlim()) * margin.get_position().width
+    ends = bar.get_xdata()
+    ends = np.clip(ends, *margin.get_xlim()) if bar.get_clip_on() else ends  # as far as it shows
+    inches = np.ptp(ends) / np.ptp(margin.get_xlim()) * margin.get_position().width
     drawn = inches / panel.get_position().width * np.ptp(panel.get_xlim())
     yield "x / L", (0, drawn), (0, LENGTH / 2)
 

@@ -107,6 +107,23 @@ def test_many_bundles_keep_the_accuracy_asked(arm, accuracy):
     assert found.volume < found.convex_volume + found.convex_volume_error
 
 
+def test_the_surface_of_a_set_with_a_thin_rim_is_closed_and_in_one_piece():
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    four = solid(designs.redundant_trunk(), accuracy=5e-2)
+    surface = four.surface()
+    sides = np.stack([surface.faces, np.roll(surface.faces, -1, axis=1)], -1).reshape(-1, 2)
+    back = np.unique(sides[:, ::-1], axis=0)
+    np.testing.assert_array_equal(np.unique(sides, axis=0), back)
+    assert len(back) == len(sides)  # two triangles at each edge, one either way
+    count = len(surface.vertices)
+    near = coo_array((np.ones(len(sides)), tuple(sides.T)), shape=(count, count))
+    assert connected_components(near, directed=False)[0] == 1
+    assert surface.volume == pytest.approx(four.volume, abs=four.volume_error)
+    assert four.distance(surface.vertices).max() < 0.5 * four.grid.attrs["cell"]
+
+
 def test_more_bundles_reach_more():
     # Of six bundles one held at 0 leaves a part of what all reach.
     six = solid(six_bundles(), accuracy=3e-2)

@@ -99,7 +99,7 @@ def draw(name: str) -> None:
         plot.plot_arm(arm, ax=rest, view="oblique")
         for ax, view in ((front, "front"), (top, "top")):
             box = _box(arm, cloud, shapes)
-            plot.plot_cloud(cloud, ax=ax, view=view, key=False, box=box)
+            plot.plot_cloud(cloud, ax=ax, view=view, color="rgb", key=False, box=box)
             plot.plot_arm(arm, shapes, ax=ax, view=view, rest=False, box=box)
         plot.plot_cross_section(arm, ax=section, legend=True)
         PICTURES.mkdir(parents=True, exist_ok=True)

@@ -236,6 +236,11 @@ CALLS: dict[str, Call] = {
     "workspace.payload.payload_curve": Call(
         lambda: dict(arm=HEAVY, payloads=[0.1]), fine={"payloads": MANY}
     ),
+    "plot.plot_3d": Call(
+        lambda: dict(data=cloud()),
+        kinds=dict(data="dataset", caption="text"),
+        fine=dict(caption={"none"}),
+    ),
     "plot.plot_arm": Call(lambda: dict(arm=ARM)),
     "plot.plot_cloud": Call(lambda: dict(cloud=cloud())),
     "plot.plot_compliance": Call(

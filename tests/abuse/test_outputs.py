@@ -14,7 +14,7 @@ import pytest
 import softreach as sr
 from softreach.exchange.activefilaments import write_cloud, write_design
 from softreach.export import export_arm, export_cloud, export_mesh
-from softreach.plot import save_figure
+from softreach.plot import plot_3d, save_figure
 from softreach.support.errors import InvalidInput, NotWritten, SoftreachWarning
 from softreach.support.files.atomic import writing
 from softreach.support.files.documents import sealed
@@ -61,6 +61,10 @@ def _figure(things, path, **options):
     save_figure(things["figure"], path, **options)
 
 
+def _page(things, path, **options):
+    save_figure(plot_3d(things["shape"]), path, **options)
+
+
 TABLES = ("ply", "csv", "parquet", "npz", "mat", "vtu", "vtk")
 WRITERS = {
     "cloud.zarr": lambda things, path, **options: sr.save_cloud(things["cloud"], path, **options),
@@ -68,6 +72,7 @@ WRITERS = {
     **{f"mesh.{suffix}": _mesh for suffix in ("ply", "stl", "obj", "glb", "vtu", "vtk")},
     "arm.stl": _arm,
     **{f"figure.{suffix}": _figure for suffix in ("png", "pdf", "svg", "jpg")},
+    "figure.html": _page,
     "design.toml": lambda things, path, **options: things["arm"].save(path, **options),
     "design.jl": lambda things, path, **options: write_design(things["arm"], path, **options),
     "pair.csv": lambda things, path, **options: write_cloud(things["cloud"], path, **options),

@@ -18,8 +18,10 @@ from softreach.cli.options import (
     Unit,
     activation_of,
     check_picture,
+    is_page,
     out_option,
     refuse,
+    write_page,
 )
 from softreach.cli.values import activation_text
 from softreach.support.errors import counted
@@ -38,7 +40,7 @@ def equilibria(
         Parameter(help="View of the picture: front, side, top or oblique (if left out)."),
     ] = None,
     changes: Changes = UNCHANGED,
-    out: Annotated[Path | None, out_option("Draw them: .png .pdf .svg")] = None,
+    out: Annotated[Path | None, out_option("Draw them: .png .pdf .svg, or .html to turn")] = None,
     overwrite: Overwrite = False,
     unit: Unit = None,
     json: AsJson = False,
@@ -57,7 +59,7 @@ def equilibria(
         refuse("left out without a picture: give --out too", view=view)
     elif view is not None:
         view_angles(view)  # what is wrong with it is said before anything is computed
-    check_picture(out, overwrite)
+    check_picture(out, overwrite, page=True)
     arm = design_from(design, changes)
     lengths = Lengths.of(arm, unit)
     result = all_of(arm, activation_of(activation, arm))
@@ -65,7 +67,9 @@ def equilibria(
         console.json(_record(result, lengths))
     else:
         _print(result, lengths)
-    if out is not None:
+    if out is not None and is_page(out):
+        write_page([result], out, lengths, overwrite=overwrite, view=view or "oblique")
+    elif out is not None:
         from softreach import plot
 
         figure = plot.plot_equilibria(result, view=view or "oblique", unit=lengths.unit)

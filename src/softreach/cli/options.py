@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Group, Parameter
 
 from softreach.cli.changes import Changes, design_from
+from softreach.cli.console import console
 from softreach.cli.lengths import Lengths, check_unit
 from softreach.cli.values import WHOLE
 from softreach.support.errors import InvalidInput
@@ -207,11 +208,30 @@ def check_output(path: Path | None, formats: Formats, overwrite: bool) -> None:
         check_place(path, kind, overwrite=overwrite, name="out")
 
 
-def check_picture(path: Path | None, overwrite: bool) -> None:
-    """Refuse a place for a picture, as `check_output`."""
-    from softreach.support.files.kinds import PICTURES
+def check_picture(path: Path | None, overwrite: bool, *, page: bool = False) -> None:
+    """Refuse a place for a picture, or for a page that turns, as `check_output`."""
+    from softreach.support.files.kinds import PAGES, PICTURES
 
-    check_output(path, PICTURES, overwrite)
+    check_output(path, {**PICTURES, **PAGES} if page else PICTURES, overwrite)
+
+
+def is_page(path: Path) -> bool:
+    """True if a figure is asked for that turns in a browser."""
+    from softreach.support.files.kinds import PAGES
+
+    return path.suffix.lower() in PAGES
+
+
+def write_page(
+    data: list[Any], path: Path, lengths: Lengths, *, overwrite: bool, **look: Any
+) -> None:
+    """Write what is given as a figure that turns in a browser, and say what part it shows."""
+    from softreach.plot import plot_3d, save_figure
+
+    figure = plot_3d(data, unit=lengths.unit, **look)
+    save_figure(figure, path, overwrite=overwrite)
+    if figure.note:
+        console.note(f"{path}: {figure.note}")
 
 
 def check_surface(path: Path | None, overwrite: bool) -> None:

@@ -18,8 +18,10 @@ from softreach.cli.options import (
     Overwrite,
     Unit,
     check_output,
+    is_page,
     out_option,
     refuse,
+    write_page,
 )
 from softreach.cli.values import NUMBER
 from softreach.support.errors import InvalidInput
@@ -40,15 +42,15 @@ def reach(
     out: Annotated[
         list[Path] | None,
         out_option(
-            "Write the boundary (.ply .stl .obj .glb .vtu .vtk), or draw slices (.png .pdf .svg). "
-            "May be repeated."
+            "Write the boundary (.ply .stl .obj .glb .vtu .vtk), draw slices (.png .pdf .svg), or "
+            "the set as a web page that turns (.html). May be repeated."
         ),
     ] = None,
     at: Annotated[
         str | None,
         Parameter(
             group=OUTPUT,
-            help="Point x,y,z [m] that the slices meet at: the middle of the set if left out.",
+            help="Point x,y,z that the slices meet at: the middle of the set if left out.",
             allow_leading_hyphen=True,
         ),
     ] = None,
@@ -87,9 +89,9 @@ def reach(
 def _check_outputs(arm: Manipulator, outs: list[Path], overwrite: bool) -> None:
     """Refuse files that cannot be written, or that a set of so few dimensions does not have."""
     from softreach.export.surfaces import SURFACE_FILES
-    from softreach.support.files.kinds import PICTURES, check_installed
+    from softreach.support.files.kinds import PAGES, PICTURES, check_installed
 
-    formats = {**SURFACE_FILES, **PICTURES}
+    formats = {**SURFACE_FILES, **PICTURES, **PAGES}
     needed = [
         (library, kind.extra)
         for path in outs
@@ -102,7 +104,7 @@ def _check_outputs(arm: Manipulator, outs: list[Path], overwrite: bool) -> None:
     free = int((arm.bounds[:, 0] < arm.bounds[:, 1]).sum())
     for path in outs or [None]:
         check_output(path, formats, overwrite)
-        if path is not None and free < (3 if _is_picture(path) else 2):
+        if path is not None and not is_page(path) and free < (3 if _is_picture(path) else 2):
             raise _no_such_output(path)
 
 
@@ -121,7 +123,9 @@ def _write(
 ) -> None:
     from softreach.workspace import ReachableSolid, ReachableSurface
 
-    if _is_picture(path):
+    if is_page(path):
+        write_page([reached, reached.arm], path, lengths, overwrite=overwrite)
+    elif _is_picture(path):
         from softreach.plot import plot_slices, save_figure
 
         if not isinstance(reached, ReachableSolid):

@@ -18,8 +18,10 @@ from softreach.cli.options import (
     Unit,
     check_picture,
     cloud_of,
+    is_page,
     out_option,
     shape_of,
+    write_page,
 )
 
 if TYPE_CHECKING:
@@ -31,35 +33,47 @@ def show(
     /,
     *,
     color: Annotated[
-        str, Parameter(help="rgb, the name of a bundle, or compliance: how far the tip yields.")
-    ] = "rgb",
+        str | None,
+        Parameter(
+            help="rgb (mixed lights: if left out, of up to three bundles), strongest (bundle: if "
+            "left out, of more), effort, the name of a bundle, or compliance: how far the tip "
+            "yields."
+        ),
+    ] = None,
     activation: Activation = None,
     sampling: Sampling = SAMPLING,
     changes: Changes = UNCHANGED,
-    out: Annotated[Path, out_option("Picture file: .png .pdf .svg")] = Path("cloud.png"),
+    out: Annotated[Path, out_option("Picture file: .png .pdf .svg, or .html to turn")] = Path(
+        "cloud.png"
+    ),
     overwrite: Overwrite = False,
     unit: Unit = None,
 ) -> None:
-    """Draw a cloud and its arm from four sides.
+    """Draw a cloud and its arm from four sides, or as a web page that turns.
 
-    Three views are orthogonal, one is oblique; --activation bends the arm.
+    Three views are orthogonal, one is oblique; --activation bends the arm. A page
+    (.html) is one file, which needs no network.
 
     Example: softreach show trunk.zarr --activation -1,0,-0.5 --out trunk.pdf
     """
     from softreach import plot
     from softreach.cloud.clouds import design_of
 
-    check_picture(out, overwrite)
+    check_picture(out, overwrite, page=True)
     cloud, lengths = cloud_of(source, sampling, changes, unit)
     arm = design_of(cloud)
     shape = None if activation is None else shape_of(activation, arm)
     colors = _colors(cloud, color)
-    figure = plot.plot_views(cloud, arm, shape, color=colors, unit=lengths.unit)
-    plot.save_figure(figure, out, overwrite=overwrite)
+    if is_page(out):
+        shown = [cloud, arm if shape is None else shape]
+        write_page(shown, out, lengths, overwrite=overwrite, color=colors)
+    else:
+        figure = plot.plot_views(cloud, arm, shape, color=colors, unit=lengths.unit)
+        plot.save_figure(figure, out, overwrite=overwrite)
     console.line(out)
 
 
-def _colors(cloud: xr.Dataset, color: str) -> str | xr.DataArray:
+def _colors(cloud: xr.Dataset, color: str | None) -> str | xr.DataArray | None:
     """The colors of the samples: a name that figures know, or numbers that they do not compute."""
     from softreach.plot.coloring import bundle_names
     from softreach.stiffness import cloud_compliance

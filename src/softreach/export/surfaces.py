@@ -21,6 +21,7 @@ from softreach.export.formats import (
     write_vtk,
     write_vtu,
 )
+from softreach.geometry.manifold import parted
 from softreach.geometry.surface import SurfaceMesh
 from softreach.rod.arm_shape import arm_surface, bundle_surfaces
 from softreach.schema import a_configuration
@@ -81,9 +82,10 @@ def export_mesh(
 ) -> None:
     """Write a triangle mesh as .ply, .stl, .obj, .glb, .vtu or .vtk, chosen by the suffix.
 
-    STL and GLB keep single precision. glTF has y up: a GLB holds our coordinates under one node
-    that turns z up into y up. PLY and OBJ say the unit in a comment; readers of GLB take all for
-    meters.
+    A closed surface that touches itself along edges is parted there in STL, by a thousandth of
+    their length, so that it can be printed. STL and GLB keep single precision. glTF has y up: a GLB
+    holds our coordinates under one node that turns z up into y up. PLY and OBJ say the unit in a
+    comment; readers of GLB take all for meters.
 
     Args:
         mesh_or_hull: An object with vertices [m] and faces, or the pair of them.
@@ -185,8 +187,11 @@ def _write_ply(scene: Scene, file: BufferedWriter) -> None:
 
 def _write_stl(scene: Scene, file: BufferedWriter) -> None:
     trimesh = load_library("trimesh")
-    mesh = trimesh.util.concatenate([_colored(part) for part in scene.parts])
-    file.write(mesh.export(file_type="stl"))
+    parts = []
+    for part in scene.parts:
+        vertices, faces = parted(part.vertices, part.faces)
+        parts.append(_colored(part._replace(vertices=vertices, faces=faces)))
+    file.write(trimesh.util.concatenate(parts).export(file_type="stl"))
 
 
 def _write_obj(scene: Scene, file: BufferedWriter) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from softreach.geometry.delaunay import unit_scale
 from softreach.kernels.points.point_distances import distances_to_faces
+from softreach.picture.shading import vertex_normals
 from softreach.support.arrays import Array, Faces, Index, Mask, Points
 
 if TYPE_CHECKING:
@@ -86,6 +87,39 @@ def compact_surface(points: Points, faces: Faces) -> tuple[Points, Faces]:
     used[faces] = True
     number = np.cumsum(used, dtype=np.int32) - np.int32(1)
     return points[used], number[faces]
+
+
+def simplified(vertices: Points, faces: Faces, most: int) -> tuple[Points, Faces]:
+    """A coarser surface for pictures: vertices in one cube of a grid become their mean.
+
+    Those that face other ways are kept apart, so that thin parts have two sides. The surface is
+    closed where it was, but may touch itself.
+
+    Args:
+        vertices: Corners [m], shape (v, 3).
+        faces: Shape (f, 3).
+        most: Triangles that it may have.
+    """
+    facing = vertex_normals(vertices, faces)
+    way = np.abs(facing).argmax(axis=1)
+    way += 3 * (facing[np.arange(len(way)), way] < 0.0)
+    edge = np.sqrt(surface_area(vertices, faces) / max(most, 1))
+    while len(faces) > most:
+        cube = np.floor((vertices - vertices.min(axis=0)) / edge).astype(np.int64)
+        places = np.column_stack([way, cube])
+        number = np.ravel_multi_index(tuple(places.T), tuple(places.max(axis=0) + 1))
+        _, place, count = np.unique(number, return_inverse=True, return_counts=True)
+        sums = [np.bincount(place, weights=axis) for axis in vertices.T]
+        corners = place[faces]
+        after = np.roll(corners, -1, axis=1)
+        coarse, fewer = (
+            np.stack(sums, axis=1) / count[:, None],
+            corners[(corners != after).all(axis=1)],
+        )
+        if len(fewer) <= most:
+            return compact_surface(coarse, fewer)
+        edge *= 1.2
+    return vertices, faces
 
 
 def enclosed_volume(vertices: Points, faces: Faces) -> float:

@@ -9,6 +9,7 @@ from softreach.plot.arm import DesignPanel, plot_arm, plot_designs
 from softreach.plot.clouds import plot_cloud, plot_slab, plot_views
 from softreach.plot.cross_section import plot_cross_section
 from softreach.plot.curvature import plot_curvature
+from softreach.plot.figure_3d import Figure3D, plot_3d
 from softreach.plot.hull import plot_hull, plot_volume_curve
 from softreach.plot.loads import plot_compliance, plot_equilibria, plot_payload_curve
 from softreach.plot.metric_map import SheetAxis, box_over_length, plot_metric_map, sheet_axes
@@ -19,8 +20,10 @@ from softreach.plot.style import save_figure
 
 __all__ = [
     "DesignPanel",
+    "Figure3D",
     "SheetAxis",
     "box_over_length",
+    "plot_3d",
     "plot_arm",
     "plot_cloud",
     "plot_cloud_sheet",

@@ -52,7 +52,7 @@ def plot_cloud(
     *,
     ax: Axes | None = None,
     view: View = "front",
-    color: str | int | ArrayLike = "rgb",
+    color: str | int | ArrayLike | None = None,
     size: float | None = None,
     key: bool = True,
     box: ArrayLike | None = None,
@@ -66,7 +66,8 @@ def plot_cloud(
         ax: Axes to draw in; None for a new figure.
         view: "front", "side", "top", "oblique", "back", "left", or azimuth and elevation of the
             camera [rad].
-        color: "rgb", the name or index of a bundle, or an array; see `color_samples`.
+        color: "rgb", "strongest" (bundle), "effort", the name or index of a bundle, or an array;
+            None for "rgb" of up to three bundles and "strongest" of more; see `color_samples`.
         size: Diameter of a point [pixels at 250 per inch]; None chooses by their number.
         key: Whether to explain the colors.
         box: What to show, lower and upper corner [m], shape (2, 3); None for all points.
@@ -128,7 +129,7 @@ def plot_slab(
     view: View = "front",
     at: float | None = None,
     thickness: float | None = None,
-    color: str | int | ArrayLike = "rgb",
+    color: str | int | ArrayLike | None = None,
     size: float | None = None,
     key: bool = True,
     box: ArrayLike | None = None,
@@ -191,7 +192,7 @@ def plot_views(
     configuration: xr.Dataset | None = None,
     *,
     view: View = "oblique",
-    color: str | int | ArrayLike = "rgb",
+    color: str | int | ArrayLike | None = None,
     size: float | None = None,
     width: float = 6.9,
     unit: Unit = None,

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from softreach.schema import activation_symbols, activation_units
 from softreach.support.arrays import Array, as_floats
 from softreach.support.errors import InvalidInput
-from softreach.support.palette import activation_colors
+from softreach.support.palette import activation_colors, bundle_color
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,12 +37,13 @@ COLORMAP = "viridis"
 _MISSING = 204  # light gray
 UNSTABLE = (255, 0, 200)
 """Magenta, RGB from 0 to 255, of unstable equilibria: no scale of colors has it."""
-_LINE = 44  # characters above axes of a column's width
+_LINE, _PAGE = 44, 100  # characters above axes of a column's width, and above a figure
+_MIXED = 3  # bundles whose lights can be told apart in a mixture
 _WIDE = 8.0  # ratio of the largest to the smallest value from which ratios are shown
 
 
 class BundleKey(NamedTuple):
-    """Each bundle adds a color."""
+    """Each bundle has a color, which it adds to a mixture or which stands for it."""
 
     names: tuple[str, ...]
     colors: NDArray[np.uint8]
@@ -50,10 +51,14 @@ class BundleKey(NamedTuple):
     """Symbol of the activation of each: γ, τ or P."""
     unstable: bool = False
     """True if some samples are marked as unstable equilibria."""
+    title: str = ""
+    """What a color alone stands for; empty if it is one part of a mixture."""
 
     @property
     def labels(self) -> tuple[str, ...]:
         """Label of each color."""
+        if self.title:
+            return self.names
         pairs = zip(self.symbols, self.names, strict=True)
         return tuple(f"|{symbol}| {name}" for symbol, name in pairs)
 
@@ -79,16 +84,19 @@ class Coloring(NamedTuple):
     key: BundleKey | ScalarKey | None
 
 
-def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike = "rgb") -> Coloring:
+def color_samples(cloud: xr.Dataset, color: str | int | ArrayLike | None = None) -> Coloring:
     """Color samples by all activations, by one bundle's magnitude, or by given values.
 
     Args:
         cloud: activation(sample, bundle), each in its unit.
-        color: "rgb" for |γ| / max |γ| of all bundles, of each where their units differ; the name or
-            index of one bundle; one number per sample, whose attributes `long_name` and `units` go
-            to the key if it is a DataArray, of which the attribute `scale` is "log" if ratios
-            count, and `clipped` true if its extreme values stand for all beyond them; or RGB from 0
-            to 1 per sample.
+        color: "rgb" for |γ| / max |γ| of all bundles, of each where their units differ, as a
+            mixture of lights; "strongest" for the bundle whose |γ| is the largest there, in the
+            color that it has in pictures of the arm; "effort" for the mean of |γ| / max |γ|; the
+            name or index of one bundle; None for "rgb" of up to three bundles, beyond which
+            mixtures cannot be told apart, and for "strongest" of more; one number per sample, whose
+            attributes `long_name` and `units` go to the key if it is a DataArray, of which the
+            attribute `scale` is "log" if ratios count, and `clipped` true if its extreme values
+            stand for all beyond them; or RGB from 0 to 1 per sample.
 
     Unstable equilibria of arms under loads are magenta, whatever the color of the others.
 
@@ -108,10 +116,14 @@ def _marked(coloring: Coloring, cloud: xr.Dataset) -> Coloring:
     return Coloring(rgb, key)
 
 
-def _colored(cloud: xr.Dataset, color: str | int | ArrayLike) -> Coloring:
+def _colored(cloud: xr.Dataset, color: str | int | ArrayLike | None) -> Coloring:
     activation = bundle_activations(cloud)
     names, units = bundle_names(cloud), activation_units(activation)
     symbols = activation_symbols(units)
+    if color is None:
+        color = "rgb" if len(names) <= _MIXED else "strongest"
+    if isinstance(color, str) and color in _OF_ALL and color not in names:
+        return _OF_ALL[color](np.abs(activation.values), names, units)
     if isinstance(color, str) and color == "rgb":
         lights = activation_colors(np.eye(len(names)))
         key = BundleKey(names, lights, symbols)
@@ -130,6 +142,31 @@ def _comparable(activation: Array, units: Sequence[str]) -> Array:
         return activation
     largest = np.nanmax(np.abs(activation), axis=0, initial=0.0)
     return activation / np.where(largest > 0, largest, 1.0)
+
+
+def _strongest(magnitude: Array, names: tuple[str, ...], units: Sequence[str]) -> Coloring:
+    """Each sample in the color of its strongest bundle; gray where none acts."""
+    shares = _comparable(magnitude, units)
+    known = np.isfinite(shares).all(axis=1) & np.any(shares > 0.0, axis=1)
+    colors = np.array([bundle_color(k) for k in range(len(names))])
+    table = np.vstack([np.rint(255 * colors), np.full(3, _MISSING)]).astype(np.uint8)
+    which = np.where(known, np.argmax(np.where(known[:, None], shares, 0.0), axis=1), len(names))
+    key = BundleKey(names, table[:-1], activation_symbols(units), title="strongest bundle:")
+    return Coloring(table[which], key)
+
+
+def _effort(magnitude: Array, names: tuple[str, ...], units: Sequence[str]) -> Coloring:
+    """Mean of |γ| over the largest of the cloud, of all bundles that act somewhere."""
+    largest = np.asarray(np.nanmax(magnitude, axis=0, initial=0.0))
+    acts = largest > 0.0
+    share = (magnitude[:, acts] / largest[acts]).sum(axis=1) / max(np.count_nonzero(acts), 1)
+    (symbol, *others) = sorted(set(activation_symbols(units)))
+    symbol = "a" if others else symbol
+    return _scalar(share, f"effort: mean |{symbol}| / max |{symbol}| [-]", 0.0)
+
+
+_OF_ALL = {"strongest": _strongest, "effort": _effort}
+"""Colors by all bundles that have a key of their own, beside the mixture; names of bundles win."""
 
 
 def bundle_activations(cloud: xr.Dataset) -> xr.DataArray:
@@ -151,8 +188,11 @@ def bundle_names(cloud: xr.Dataset) -> tuple[str, ...]:
 def draw_key(ax: Axes, key: BundleKey | ScalarKey | None) -> None:
     """Explain the colors in axes, by a legend above them or a color bar beside them."""
     if isinstance(key, BundleKey):
-        fits = sum(len(name) + 6 for name in key.names) <= _LINE
-        ax.legend(handles=_patches(key), **_ABOVE | {"ncols": 4 if fits else 2})
+        columns = _columns(key, _LINE, 2)
+        if key.title and columns == 2:  # above the others, where they do not stand in one line
+            ax.legend(handles=_patches(key)[1:], title=key.title, **_ABOVE | {"ncols": columns})
+        else:
+            ax.legend(handles=_patches(key), **_ABOVE | {"ncols": columns})
     elif key is not None:
         bar = {"label": key.label, "fraction": 0.046, "pad": 0.03, "extend": _extend(key)}
         ax.figure.colorbar(color_map(key), ax=ax, **bar)
@@ -170,7 +210,7 @@ def draw_figure_key(figure: Figure, key: BundleKey | ScalarKey | None, top: floa
     """
     if isinstance(key, BundleKey):
         options = _ABOVE | {"loc": "center", "bbox_to_anchor": (0.5, 1 - top / 2)}
-        figure.legend(handles=_patches(key), **options)
+        figure.legend(handles=_patches(key), **options | {"ncols": _columns(key, _PAGE, 4)})
     elif key is not None:
         bar = figure.add_axes((0.4, 1 - 0.5 * top, 0.4, 0.2 * top))
         figure.colorbar(color_map(key), cax=bar, orientation="horizontal", extend=_extend(key))
@@ -178,6 +218,12 @@ def draw_figure_key(figure: Figure, key: BundleKey | ScalarKey | None, top: floa
         if key.unstable:
             options = _ABOVE | {"loc": "center", "bbox_to_anchor": (0.88, 1 - 0.4 * top)}
             figure.legend(handles=_marks(key), **options)
+
+
+def _columns(key: BundleKey, room: int, otherwise: int) -> int:
+    """Columns of a legend: one for each entry if they fit into so many characters."""
+    fits = len(key.title) + sum(len(name) + 6 for name in key.names) <= room
+    return len(key.names) + 2 if fits else otherwise
 
 
 _ABOVE: dict[str, Any] = {
@@ -195,7 +241,11 @@ def _bundle(names: tuple[str, ...], color: str | int | np.integer) -> int:
     if not isinstance(color, str) and 0 <= color < len(names):
         return int(color)
     known = ", ".join(names)
-    raise InvalidInput("color", color, f'"rgb", a bundle ({known}) or its index, or an array')
+    raise InvalidInput(
+        "color",
+        color,
+        f'"rgb", "strongest", "effort", a bundle ({known}) or its index, or an array',
+    )
 
 
 def _given(color: ArrayLike, samples: int) -> Coloring:
@@ -269,7 +319,9 @@ def _patches(key: BundleKey) -> list[Any]:
     from matplotlib.patches import Patch
 
     named = zip(key.labels, key.colors / 255, strict=True)
-    return [*(Patch(facecolor=tuple(rgb), label=label) for label, rgb in named), *_marks(key)]
+    title = [Patch(facecolor="none", label=key.title)] if key.title else []
+    patches = (Patch(facecolor=tuple(rgb), label=label) for label, rgb in named)
+    return [*title, *patches, *_marks(key)]
 
 
 def _marks(key: BundleKey | ScalarKey) -> list[Any]:

@@ -172,9 +172,9 @@ def plot_opposite_sides(
             box = shown * arm.length
             panels[0, k].set_title(f"({k + 1})  {title}", pad=4)
             for ax, side in zip(panels[:, k], sides, strict=True):
-                plot_cloud(cloud, ax=ax, view=side, key=False, box=box, unit=unit)
+                plot_cloud(cloud, ax=ax, view=side, color="rgb", key=False, box=box, unit=unit)
                 plot_arm(arm, ax=ax, view=side, box=box, unit=unit)
-        draw_figure_key(figure, color_samples(next(iter(clouds.values()))).key, 0.09)
+        draw_figure_key(figure, color_samples(next(iter(clouds.values())), "rgb").key, 0.09)
     return figure
 
 
@@ -281,14 +281,16 @@ def _draw_scale(figure: Figure, panel: Axes, view: View) -> None:
     ax.set(xlim=(0, _LEFT * inch), ylim=(0, (_BOTTOM - 0.1) * inch))
     ax.set_axis_off()
     start, center = 0.08 * inch, np.array([0.22, 0.27]) * inch
-    ax.plot([start, start + 0.5], [start] * 2, color="0.2", lw=1.2, solid_capstyle="butt")
-    ax.text(start + 0.5 + 0.04 * inch, start, "$L/2$", fontsize=6, va="center")
+    # of a sheet of few columns it is longer than the margin is wide
+    style = {"color": "0.2", "lw": 1.2, "solid_capstyle": "butt", "clip_on": False}
+    ax.plot([start, start + 0.5], [start] * 2, **style)
+    ax.text(start + 0.5 + 0.04 * inch, start, "$L/2$", fontsize=7, va="center")
     for name, direction in zip("xyz", view_axes(view)[:2].T, strict=True):
         x, y = center + 0.15 * inch * direction
         arrow = {"arrowstyle": "-|>,head_width=0.1,head_length=0.2", "lw": 0.6, "shrinkA": 0}
         ax.annotate("", (x, y), tuple(center), arrowprops=arrow | {"color": "0.2", "shrinkB": 0})
-        x, y = center + 0.21 * inch * direction
-        ax.text(x, y, name, fontsize=6, ha="center", va="center")
+        x, y = center + 0.22 * inch * direction
+        ax.text(x, y, name, fontsize=7, ha="center", va="center")
 
 
 def _around(clouds: Mapping[str, xr.Dataset]) -> ArrayLike:

@@ -12,12 +12,13 @@ import numpy as np
 
 from softreach.arm.manipulator import Manipulator
 from softreach.geometry.surface import SurfaceMesh
+from softreach.picture.page import Figure3D
 from softreach.picture.projection import View, view_angles
 from softreach.support.arguments import POSITIVE, as_flag, as_given, as_path
 from softreach.support.arrays import Array, as_floats, as_indices
 from softreach.support.errors import InvalidInput, MissingExtra, Range
 from softreach.support.files.atomic import writing
-from softreach.support.files.kinds import PICTURES, format_of
+from softreach.support.files.kinds import PAGES, PICTURES, format_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -84,9 +85,11 @@ def small_axes(width: float = 3.4, height: float = 2.8) -> Axes:
 
 
 def save_figure(
-    figure: Figure | Axes, path: str | PathLike[str], *, overwrite: bool = False
+    figure: Figure | Axes | Figure3D, path: str | PathLike[str], *, overwrite: bool = False
 ) -> None:
     """Save as .png, .pdf, .svg or another format that matplotlib knows, whole or not at all.
+
+    What `plot_3d` made is saved as .html, a page in one file.
 
     Args:
         figure: The figure, or axes in it.
@@ -97,9 +100,14 @@ def save_figure(
         InvalidInput: Unknown suffix, or something else is there.
         NotWritten: It cannot be written.
     """
-    if not hasattr(figure, "get_figure") or isinstance(figure, type):
-        raise InvalidInput("figure", as_given(figure), "a figure or axes of matplotlib")
     path, overwrite = as_path("path", path), as_flag("overwrite", overwrite)
+    if isinstance(figure, Figure3D):
+        with writing(path, format_of(path, PAGES), overwrite=overwrite) as file:
+            file.write(figure.html.encode())
+        return
+    if not hasattr(figure, "get_figure") or isinstance(figure, type):
+        allowed = "a figure or axes of matplotlib, or one of plot_3d"
+        raise InvalidInput("figure", as_given(figure), allowed)
     kind, suffix = format_of(path, PICTURES), Path(path).suffix.lower()
     with pyplot().rc_context(_SAVING), writing(path, kind, overwrite=overwrite) as file:
         root = figure.get_figure(root=True)

@@ -16,7 +16,7 @@ from softreach.rod.view import stable_tips
 from softreach.support import parallel
 from softreach.support.arrays import Array, Index, Mask
 from softreach.support.errors import MissingExtra
-from softreach.workspace.crossings import Crossings
+from softreach.workspace.crossings import Crossings, Edges, boundary_edges
 from softreach.workspace.image import Image, Lattice
 from softreach.workspace.search import ENOUGH, nearest_tips
 
@@ -27,6 +27,7 @@ _STARTS = 4  # crossings nearby from which places are searched
 _CORNERS = np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 _CHUNK = 1 << 16
 _BAND = 2.5  # cells from the boundary beyond which the field is constant
+_CRUMB = 8  # cells: two along each edge
 _CLOSEST = 1e-3  # cells: a center on the boundary itself would make triangles without area
 _ASIDE = 0.02  # cells beside a triangle where is looked for the inside
 _PARTS = 4  # into which each edge of a triangle of the grid is divided
@@ -99,7 +100,8 @@ def signed_field(image: Image | ReachedCells) -> Array:
         inverse_square += _axis_distances(image, axis) ** -2
     with np.errstate(divide="ignore"):
         distance = np.clip(inverse_square**-0.5, _CLOSEST, _BAND)
-    return np.where(image.counts[0] > 0, -distance, distance)
+    inside = image.counts[0] > 0 if isinstance(image, Image) else image.resolved
+    return np.where(inside, -distance, distance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +120,25 @@ class ReachedCells:
     def counts(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """1 at centers that are reached and 0 elsewhere; no orientation, 0."""
         return self.reached.astype(np.int32), np.zeros(self.reached.shape, np.int32)
+
+    @cached_property
+    def resolved(self) -> Mask:
+        """Cells inside of a surface that can be drawn and printed.
+
+        Thin rims are met by one center and missed by the next: without what is thinner along an
+        axis than a cell, the teeth that they leave are gone, and so are crumbs: what touches at
+        sides in a part of fewer than eight cells.
+        """
+        from scipy.ndimage import label
+
+        edges = self.crossings.edges
+        thickness, sides = np.zeros((3, self.reached.size)), np.zeros((3, self.reached.size))
+        np.add.at(thickness, (edges.axis, edges.cell), self.crossings.place)
+        np.add.at(sides, (edges.axis, edges.cell), 1.0)
+        thin = ((sides == 2.0) & (thickness < 1.0)).any(axis=0).reshape(self.reached.shape)
+        number = np.zeros(self.reached.shape, np.int32)
+        label(self.reached & ~thin, output=number)
+        return (np.bincount(number.ravel()) >= _CRUMB)[number] & (number > 0)
 
     def counts_at(self, points: Array) -> Index:
         """1 for points that are reached [m], 0 for others, shape (n,)."""
@@ -155,18 +176,43 @@ class ReachedCells:
             yield within & self.reached.ravel()[cells], self.gamma[cells]
 
     def boundary_crossings(self, axis: int) -> tuple[tuple[Index, Index, Index], Array]:
-        """Places where the boundary cuts the edges between cell centers along an axis.
+        """Places where the boundary of `resolved` cuts the edges between centers along an axis.
 
         Returns:
             The centers just before the boundary, as an index of arrays of the lattice's shape, and
             how far behind them it lies, in cells, 0 to 1, shape (n,).
         """
-        edges = self.crossings.edges
+        edges, places = self._resolved_edges
         which = np.flatnonzero(edges.axis == axis)
-        place, up = self.crossings.place[which], edges.sense[which] > 0
+        place, up = places[which], edges.sense[which] > 0
         index = [np.array(i) for i in np.unravel_index(edges.cell[which], self.lattice.shape)]
         index[axis] = np.where(up, index[axis], index[axis] - 1)
         return (index[0], index[1], index[2]), np.where(up, place, 1.0 - place)
+
+    @cached_property
+    def _resolved_edges(self) -> tuple[Edges, Array]:
+        """Edges around what is resolved, and where each is cut, in cells from the center inside.
+
+        Beside a center that is reached but not resolved it is cut as far before that as the center
+        is deep, so that a smooth surface which just touches a center has no dent there.
+        """
+        edges = boundary_edges(self.resolved)
+        keys, known = (
+            2 * (3 * some.cell + some.axis) + (some.sense > 0)
+            for some in (edges, self.crossings.edges)
+        )
+        order = np.argsort(known)
+        at = order[np.minimum(np.searchsorted(known, keys, sorter=order), len(known) - 1)]
+        depth = np.full(self.reached.size, 0.5)
+        np.minimum.at(depth, self.crossings.edges.cell, self.crossings.place)
+        beside = edges.cell + edges.sense * np.array(self._steps)[edges.axis]
+        return edges, np.where(known[at] == keys, self.crossings.place[at], 1.0 - depth[beside])
+
+    @property
+    def _steps(self) -> tuple[int, int, int]:
+        """Of flat indices along the axes."""
+        _, rows, columns = self.reached.shape
+        return rows * columns, columns, 1
 
     @cached_property
     def _tree(self) -> KDTree:

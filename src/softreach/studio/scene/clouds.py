@@ -131,6 +131,8 @@ def color_names(arm: Manipulator) -> dict[str, str]:
     """Colors that points can have: name -> what the menu says."""
     box = rod_of(arm).box
     names = {"effort": "effort: mean |γ| / max |γ|", "rgb": "all activations (RGB)"}
+    if arm.bundles > 3:  # mixtures of more lights cannot be told apart
+        names["strongest"] = "strongest bundle"
     labels = zip(activation_symbols(arm.bundle_units), box.names, strict=True)
     names |= {f"bundle {k}": f"|{symbol}| {name}" for k, (symbol, name) in enumerate(labels)}
     names["manipulability"] = "manipulability"
@@ -150,13 +152,15 @@ def sample_colors(reach: Reach, level: int, color: str) -> Coloring:
     return color_samples(cloud, sample_values(reach, level, color))
 
 
-def sample_values(reach: Reach, level: int, color: str) -> Literal["rgb"] | int | xr.DataArray:
+def sample_values(
+    reach: Reach, level: int, color: str
+) -> Literal["rgb", "strongest"] | int | xr.DataArray:
     """Values behind the colors of the samples shown, as the library's own figures take them."""
     import xarray as xr
 
     color = shown_color(reach.arm, color)
-    if color == "rgb":
-        return "rgb"
+    if color == "rgb" or color == "strongest":
+        return color
     if color.startswith("bundle "):
         return int(color[7:])
     if color == "multiplicity" and not reach.fine:

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from softreach.support.errors import InvalidInput, MissingExtra
 
 __all__ = [
+    "PAGES",
     "PICTURES",
     "FileKind",
     "Formats",
@@ -137,3 +138,8 @@ PICTURES: Formats = {
     ".webp": _picture("a WebP", beginning_with(b"RIFF")),
 }
 """Formats of figures."""
+
+PAGES: Formats = {
+    ".html": FileKind("a figure as a web page", text_with("<!doctype html", "softreach figure")),
+}
+"""Formats of figures that turn in a browser."""

@@ -1,0 +1,156 @@
+"""A figure in space as one web page, which turns in a browser and asks nothing of a network.
+
+The page has its own few lines of WebGL. Arrays are in it as base64: a place in 16 bits of the box
+along each axis, a 65,536th of its side, and a color in 8 bits a channel.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from importlib.resources import files
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from softreach.picture.projection import VIEWS, View, view_angles
+from softreach.picture.thumbnail import Dots, Skin
+from softreach.support.arrays import Array
+from softreach.support.units import LengthUnit
+
+__all__ = ["ColorScale", "Figure3D", "PagePart", "Swatches", "css_color", "web_page"]
+
+_STEPS = 65535
+_HEIGHT = 560  # pixels, in notebooks
+_BUTTONS = "front", "side", "top", "oblique"
+
+
+class PagePart(NamedTuple):
+    """Something to show; parts of one name are switched on and off together."""
+
+    name: str
+    shape: Dots | Skin
+    """In the unit of the page."""
+    opacity: float = 1.0
+    through: bool = False
+    """True if it shows through what hides it."""
+    surface: bool = False
+    """True if a slider changes its opacity."""
+    size: float = 0.0
+    """Diameter of dots, in the unit of the page."""
+
+
+class Swatches(NamedTuple):
+    """Key of colors that stand for something each."""
+
+    entries: Sequence[tuple[str, str]]
+    """Label and color, as CSS has it."""
+    title: str = ""
+    """What they stand for."""
+
+
+class ColorScale(NamedTuple):
+    """Key of colors that stand for numbers."""
+
+    label: str
+    colors: Sequence[str]
+    """In even steps, as CSS has them."""
+    numbers: Sequence[str]
+    """Below the scale, in even steps from end to end."""
+
+
+@dataclass(frozen=True)
+class Figure3D:
+    """A figure that turns in a browser; `save_figure` writes it as .html, notebooks show it."""
+
+    html: str = field(repr=False)
+    """The page."""
+    note: str
+    """Points and triangles that it shows, and of how many; empty for arms alone."""
+
+    def _repr_html_(self) -> str:
+        """The page in a frame, for notebooks."""
+        page = html.escape(self.html, quote=True)
+        style = f"width:100%;height:{_HEIGHT}px;border:1px solid #ddd"
+        return f'<iframe srcdoc="{page}" style="{style}" title="softreach"></iframe>'
+
+    def __repr__(self) -> str:
+        size = f"{len(self.html) / 1e6:.1f} MB"
+        return f"Figure3D: {self.note}, {size}" if self.note else f"Figure3D: {size}"
+
+
+def web_page(
+    parts: Sequence[PagePart],
+    box: Array,
+    unit: LengthUnit,
+    *,
+    keys: Sequence[Swatches | ColorScale] = (),
+    caption: str = "",
+    note: str = "",
+    view: View = "oblique",
+) -> str:
+    """The page as HTML.
+
+    Args:
+        parts: What it shows.
+        box: Lower and upper corner around it, in the unit, shape (2, 3).
+        unit: Of places.
+        keys: To the colors.
+        caption: Text below the figure.
+        note: Small text below that.
+        view: The direction of sight at first.
+
+    Raises:
+        InvalidInput: An unknown view.
+    """
+    content = {
+        "box": box.tolist(),
+        "unit": unit.name,
+        "labels": [unit.label(axis) for axis in "xyz"],
+        "views": [(name, *VIEWS[name]) for name in _BUTTONS],
+        "start": view_angles(view),
+        "keys": [key._asdict() for key in keys],
+        "caption": caption,
+        "note": note,
+        "parts": [_packed(part, box) for part in parts],
+    }
+    # no text may end the script that it stands in
+    text = json.dumps(content, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
+    page = files("softreach.picture").joinpath("page.html").read_text(encoding="utf-8")
+    title = html.escape(caption.partition("\n")[0] or "softreach")
+    head, body = page.split("@DATA@")
+    return head.replace("@TITLE@", title) + text + body
+
+
+def css_color(rgb: ArrayLike) -> str:
+    """A color of channels from 0 to 1, as CSS has it."""
+    red, green, blue = np.rint(255 * np.asarray(rgb, float)).astype(int)
+    return f"#{red:02x}{green:02x}{blue:02x}"
+
+
+def _packed(part: PagePart, box: Array) -> dict[str, Any]:
+    shape, common = part.shape, {"name": part.name, "through": part.through}
+    common |= {"opacity": 1.0 if part.surface else part.opacity, "surface": part.surface}
+    if isinstance(shape, Dots):
+        points = np.asarray(shape.points, float)
+        colors = np.broadcast_to(np.asarray(shape.colors, np.uint8), points.shape)
+        return common | {"xyz": _places(points, box), "rgb": _text(colors), "size": part.size}
+    return common | {
+        "xyz": _places(np.asarray(shape.vertices, float), box),
+        "faces": _text(np.asarray(shape.faces, "<u4")),
+        "color": list(shape.color),
+        "start": part.opacity,
+    }
+
+
+def _places(points: Array, box: Array) -> str:
+    shares = (points - box[0]) / (box[1] - box[0])
+    return _text(np.rint(_STEPS * np.clip(shares, 0.0, 1.0)).astype("<u2"))
+
+
+def _text(array: Any) -> str:
+    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")

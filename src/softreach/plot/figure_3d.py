@@ -1,0 +1,305 @@
+"""Figures in space that turn in a browser: clouds, surfaces, arms and equilibria together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.skin import inside
+from softreach.cloud.clouds import design_of
+from softreach.geometry.surface import compact_surface, simplified
+from softreach.geometry.tube import tube_surface
+from softreach.picture.page import ColorScale, Figure3D, PagePart, Swatches, css_color, web_page
+from softreach.picture.projection import View, view_angles
+from softreach.picture.thumbnail import Dots, Skin
+from softreach.plot.arm import shapes_of
+from softreach.plot.axes import bounding_box
+from softreach.plot.clouds import drawn_tips, point_size
+from softreach.plot.coloring import UNSTABLE, BundleKey, ScalarKey, color_map, color_samples
+from softreach.plot.lengths import Unit, unit_for
+from softreach.plot.style import a_surface
+from softreach.rod.arm_shape import arm_surface, bundle_skins, rest_configuration
+from softreach.rod.tip_map import TipStatus
+from softreach.schema import a_cloud, a_configuration
+from softreach.support.arguments import as_given, as_text
+from softreach.support.arrays import Array
+from softreach.support.errors import InvalidInput, counted
+from softreach.support.palette import BODY, STEEL, Color, bundle_color
+from softreach.support.units import LengthUnit
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Figure3D", "plot_3d"]
+
+_POINTS = 200_000  # of a cloud: 2.4 MB of the page
+_TRIANGLES = 120_000  # of a surface: about as much
+_SIDES, _STATIONS = 48, 121
+_PALE = 0.62  # how far the colors of the arm at rest go toward white
+_CLEAR = 0.4  # opacity of surfaces beside others or around a cloud
+_BODY_CLEAR = 0.45  # of a body that has something inside
+_LINE = 1 / 300  # radius of the centerline of an unstable arm, in L
+_UNSTABLE: Color = (0.45, 0.45, 0.45)
+_SIZES = "", "curve_length", "area", "volume"  # of a reachable set, by its dimension
+_SURFACES: tuple[Color, ...] = (STEEL, (0.88, 0.66, 0.42), (0.62, 0.76, 0.55))
+_HELP = (
+    "Drag to turn, wheel or pinch to zoom, Shift-drag or two fingers to move, "
+    "double-click for the first view."
+)
+
+
+def plot_3d(
+    data: Any,
+    *,
+    color: str | int | ArrayLike | None = None,
+    view: View = "oblique",
+    unit: Unit = None,
+    caption: str | None = None,
+) -> Figure3D:
+    """A figure that turns in a browser: one file, which asks nothing of a network.
+
+    `save_figure` writes it as .html; a notebook shows it. Of more than 200,000 points a random part
+    is shown, of more than 120,000 triangles a coarser surface; the page says so, and its `note`.
+
+    Args:
+        data: What to show, or a list of it: clouds, reachable sets, hulls or anything with vertices
+            and faces, arms (as they are before activation), configurations, `AllEquilibria`.
+        color: Of clouds, as in `plot_cloud`.
+        view: At first, as in `plot_cloud`.
+        unit: Of the axes: "m", "cm", "mm" or "L"; None for L if the data know one, else m.
+        caption: Below the figure; None for what is shown.
+
+    Raises:
+        InvalidInput: Nothing of that, unknown view, color or unit, or nothing finite to show.
+        MissingExtra: matplotlib is not installed, or scikit-image for the surface of a set.
+    """
+    things = list(data) if isinstance(data, list | tuple) else [data]
+    kinds = [_kind(thing) for thing in things]
+    view_angles(view)
+    said = None if caption is None else as_text("caption", caption)
+    lengths = {length for thing in things if (length := _length(thing)) is not None}
+    shown_in = unit_for(lengths.pop() if len(lengths) == 1 else None, unit)
+    scene = _Scene(shown_in, color, kinds)
+    for kind, thing in zip(kinds, things, strict=True):
+        _ADD[kind](scene, thing)
+    box = bounding_box(*scene.points())
+    page = web_page(
+        scene.parts,
+        box,
+        shown_in,
+        keys=scene.keys,
+        caption=". ".join(scene.captions) if said is None else said,
+        note=". ".join([*scene.notes, _HELP]),
+        view=view,
+    )
+    return Figure3D(page, "; ".join(scene.notes))
+
+
+class _Scene:
+    """Parts of a page, with what explains them."""
+
+    def __init__(self, unit: LengthUnit, color: Any, kinds: Sequence[str]) -> None:
+        self.unit, self.color, self.kinds = unit, color, kinds
+        self.parts: list[PagePart] = []
+        self.keys: list[Swatches | ColorScale] = []
+        self.captions: list[str] = []
+        self.notes: list[str] = []
+
+    def points(self) -> list[ArrayLike]:
+        """All places, one array for each part."""
+        return [p.shape[0] for p in self.parts]
+
+    def add_cloud(self, cloud: xr.Dataset) -> None:
+        """A cloud, of which a random part is enough."""
+        tips, coloring = drawn_tips(cloud, self.unit), color_samples(cloud, self.color)
+        known = np.flatnonzero(np.isfinite(tips).all(axis=1))
+        chosen = known
+        if len(known) > _POINTS:
+            chosen = np.sort(np.random.default_rng(0).choice(known, _POINTS, replace=False))
+        shown, of = f"{len(chosen):,}", f"{len(known):,}"
+        self.notes.append(
+            f"{shown} points" if shown == of else f"{shown} of {of} points, at random"
+        )
+        self.captions.append(f"Cloud of {of} tips")
+        name, tips = self._name("cloud"), tips[chosen]
+        dots = Dots(tips, coloring.rgb[chosen])
+        size = point_size(len(tips), np.array([tips.min(axis=0), tips.max(axis=0)]))
+        self.parts.append(PagePart(name, dots, size=size))
+        self.keys += _page_keys(coloring.key)
+
+    def add_set(self, reached: Any) -> None:
+        """A reachable set: its surface, or the points of a curve."""
+        if word := _SIZES[reached.dimension]:
+            value, error = getattr(reached, word), getattr(reached, f"{word}_error")
+            size = self.unit.text(value, reached.dimension, error)
+            self.captions.append(f"Reachable set: {word.removeprefix('curve_')} {size}")
+        if reached.dimension > 1:
+            surface = reached.sheets() if reached.dimension == 3 else reached.surface()
+            self.add_surface(surface, "reachable set")
+            return
+        points = self.unit.of(reached.path if reached.dimension else reached.tip[None])
+        points = points[np.isfinite(points).all(axis=1)]
+        size = 0.01 * float(self.unit.of(reached.arm.length))
+        self.parts.append(PagePart(self._name("reachable set"), Dots(points), size=size))
+
+    def add_hull(self, hull: Any) -> None:
+        """A hull, whose volume is known."""
+        kind = "convex hull" if np.isinf(hull.alpha) else "alpha shape"
+        volume = self.unit.text(hull.volume, 3)
+        self.captions.append(f"{kind.capitalize()}: volume {volume}")
+        self.add_surface(hull, kind)
+
+    def add_surface(self, mesh: Any, word: str = "surface") -> None:
+        """Triangles, fewer of them if they are many."""
+        mesh = a_surface("data", mesh)
+        vertices, faces = self.unit.of(mesh.vertices), np.asarray(mesh.faces)
+        if len(faces) > _TRIANGLES:
+            every = len(faces)
+            vertices, faces = simplified(vertices, faces, _TRIANGLES)
+            self.notes.append(f"{len(faces):,} instead of {every:,} triangles")
+        else:
+            self.notes.append(f"{len(faces):,} triangles")
+        name, number = self._name(word), sum(part.surface for part in self.parts)
+        tint = _SURFACES[number % len(_SURFACES)]
+        several = sum(kind in ("set", "hull", "surface") for kind in self.kinds) > 1
+        opacity = _CLEAR if several or "cloud" in self.kinds else 1.0
+        skin = Skin(vertices, faces, tint)
+        self.parts.append(PagePart(name, skin, opacity=opacity, surface=True))
+        if several:
+            self.keys.append(Swatches([(name, css_color(tint))]))
+
+    def add_arm(self, arm: Manipulator) -> None:
+        """An arm before activation, pale beside configurations."""
+        beside = "configuration" in self.kinds
+        name = self._name("arm at rest" if beside else "arm")
+        self._add_body(arm, rest_configuration(arm), name, _PALE if beside else 0.0)
+        self._explain_bundles(arm)
+
+    def add_configuration(self, configuration: xr.Dataset) -> None:
+        """The arm in one configuration or several."""
+        arm, name = design_of(configuration), self._name("arm")
+        for shape in shapes_of(configuration):
+            self._add_body(arm, shape, name)
+        self._explain_bundles(arm)
+
+    def add_equilibria(self, equilibria: Any) -> None:
+        """The arm in each; those that are unstable and lead nowhere as a line."""
+        arm, shapes = equilibria.rod.arm, shapes_of(equilibria.configuration(_STATIONS))
+        stable = equilibria.status == TipStatus.STABLE
+        for k, shape in enumerate(shapes):
+            if k == equilibria.followed:
+                name = "from the unloaded arm" + ("" if stable[k] else ", unstable")
+                self._add_body(arm, shape, name)
+            elif stable[k]:
+                self._add_body(arm, shape, "other stable ones", _PALE)
+            else:
+                frame = shape["directors"].transpose("station", "director", "axis").values
+                line = shape["position"].transpose("station", "axis").values
+                tube = tube_surface(line, frame[:, 0], frame[:, 1], _LINE * arm.length, 8)
+                self._add_skin("unstable ones", tube.vertices, tube.faces, _UNSTABLE)
+        count = counted(len(shapes), "solution")
+        self.captions.append(f"Equilibria: {count}, {int(stable.sum())} of them stable")
+        self._explain_bundles(arm)
+
+    def _add_body(self, arm: Manipulator, shape: xr.Dataset, name: str, fade: float = 0.0) -> None:
+        body, caps = arm_surface(arm, shape, _SIDES), 2 * _SIDES
+        opacity = _BODY_CLEAR if any(inside(arm)) else 1.0
+        for faces in (body.faces[:-caps], body.faces[-caps:]):  # so that light breaks at the rim
+            vertices, faces = compact_surface(body.vertices, faces)
+            self._add_skin(name, vertices, faces, _faded(BODY, fade), opacity)
+        for index, skin in enumerate(bundle_skins(arm, shape, lift=0.01)):
+            tint = _faded(bundle_color(index), fade)
+            self._add_skin(name, skin.vertices, skin.faces, tint)
+
+    def _add_skin(
+        self, name: str, vertices: Array, faces: Any, tint: Color, opacity: float = 1.0
+    ) -> None:
+        skin = Skin(self.unit.of(vertices), faces, tint)
+        self.parts.append(PagePart(name, skin, opacity=opacity, through=True))
+
+    def _explain_bundles(self, arm: Manipulator) -> None:
+        names = enumerate(arm.bundle_names)
+        key = Swatches([(name, css_color(bundle_color(k))) for k, name in names])
+        if "cloud" not in self.kinds and key not in self.keys:
+            self.keys.append(key)
+
+    def _name(self, word: str) -> str:
+        """The word, with a number from the second part of that name on."""
+        number = 1 + len({p.name for p in self.parts if p.name.split(" #")[0] == word})
+        return word if number == 1 else f"{word} #{number}"
+
+
+_ADD: dict[str, Callable[[_Scene, Any], None]] = {
+    "cloud": _Scene.add_cloud,
+    "set": _Scene.add_set,
+    "hull": _Scene.add_hull,
+    "surface": _Scene.add_surface,
+    "arm": _Scene.add_arm,
+    "configuration": _Scene.add_configuration,
+    "equilibria": _Scene.add_equilibria,
+}
+
+
+def _kind(thing: Any) -> str:
+    """The kind of a thing to show, by its class, which need not be loaded, or by what it has."""
+    bases = {base.__name__ for base in type(thing).__mro__}
+    if isinstance(thing, Manipulator):
+        return "arm"
+    if "AllEquilibria" in bases:
+        return "equilibria"
+    if "ReachableSet" in bases:
+        return "set"
+    if "Hull" in bases:
+        return "hull"
+    if "Dataset" in bases and "tip" in thing and "activation" in thing:
+        a_cloud("data", thing)
+        return "cloud"
+    if "Dataset" in bases and "position" in thing and "design" in thing.attrs:
+        a_configuration("data", thing)
+        return "configuration"
+    if not isinstance(thing, type) and hasattr(thing, "vertices") and hasattr(thing, "faces"):
+        return "surface"
+    allowed = "clouds, reachable sets, hulls, surfaces, arms, configurations or equilibria"
+    raise InvalidInput("data", as_given(thing), allowed)
+
+
+def _length(thing: Any) -> float | None:
+    """L [m] of the arm that a thing is of; None where it is not known."""
+    match _kind(thing):
+        case "arm":
+            return thing.length
+        case "set":
+            return thing.arm.length
+        case "equilibria":
+            return thing.rod.arm.length
+        case "cloud":
+            return thing["tip"].attrs.get("length")
+        case "configuration":
+            return design_of(thing).length
+    return None
+
+
+def _page_keys(key: BundleKey | ScalarKey | None) -> list[Swatches | ColorScale]:
+    if key is None:
+        return []
+    marks = [("unstable", css_color(np.array(UNSTABLE) / 255))] if key.unstable else []
+    if isinstance(key, BundleKey):
+        named = zip(key.labels, key.colors / 255, strict=True)
+        swatches = [(label, css_color(rgb)) for label, rgb in named]
+        return [Swatches([*swatches, *marks], key.title)]
+    scale = color_map(key)
+    shares = np.linspace(0.0, 1.0, 17)
+    colors = [css_color(rgb[:3]) for rgb in scale.cmap(shares)]
+    values = np.asarray(scale.norm.inverse(np.array([0.0, 0.5, 1.0])), float)
+    low, middle, high = (f"{value:.3g}" for value in values)
+    ends = (f"≤ {low}", middle, f"≥ {high}") if key.clipped else (low, middle, high)
+    return [ColorScale(key.label, colors, ends), *([Swatches(marks)] if marks else [])]
+
+
+def _faded(color: Color, fade: float) -> Color:
+    red, green, blue = (channel + fade * (1.0 - channel) for channel in color)
+    return red, green, blue
