@@ -4,7 +4,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: help setup demo test test-all ready kernels browser quick fast record check lint types format bench atlas paper docs lock clean
+.PHONY: help setup demo test test-all tests all-tests ready kernels browser quick fast record check lint types format bench atlas paper docs lock clean
 
 help:
 	@echo "make demo    set up, then compute the paper's design into out/"
@@ -35,15 +35,21 @@ demo: setup
 # Tests side by side, up to four on as many cores.
 TESTS := $(BIN)/python -m pytest -q --numprocesses auto --maxprocesses 4 --dist worksteal --max-worker-restart 0
 
-test: ready
+test: TESTED = tests
+test-all: TESTED = all-tests
+
+# The checks run beside the tests, which wait now and then.
+test test-all: ready
+	$(MAKE) --no-print-directory -j2 --output-sync=line $(TESTED) check
+
+tests:
 	$(TESTS)
 
-test-all: ready
+all-tests:
 	$(TESTS) -m "large or not large"
 
-# All that comes before the tests, side by side.
 ready: setup
-	$(MAKE) --no-print-directory -j3 --output-sync=target check kernels browser
+	$(MAKE) --no-print-directory -j2 --output-sync=target kernels browser
 
 # Compiled once here, and not by every process of the tests.
 kernels: setup

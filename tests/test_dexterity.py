@@ -91,6 +91,7 @@ def solution_curve(arm, target, start, step=0.04):
     return np.array(curve)
 
 
+@pytest.mark.large
 def test_with_four_bundles_the_measure_is_the_length_of_the_curve_of_solutions():
     arm, step = designs.redundant_trunk(), 0.1
     cloud = compute_cloud(arm, n=1 << 19, sampler="sobol")

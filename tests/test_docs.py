@@ -18,7 +18,9 @@ Where no `text` follows, Python and commands are executed with few samples.
 
 from __future__ import annotations
 
+import ast
 import io
+import json
 import math
 import re
 import shlex
@@ -39,6 +41,7 @@ from softreach.cli.app import run
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 SETUP = {"pip", "make", "git", "cd", "python3", "export"}
 FEW = 20_000  # samples
 NOT_EXECUTED = re.compile(r"# not executed: \w.+")
@@ -71,6 +74,25 @@ def test_everything_on_a_page_runs_and_prints_what_it_says(page, tmp_path, monke
     for name in {*sys.modules} - known:
         if str(getattr(sys.modules[name], "__file__", "")).startswith(str(tmp_path)):
             del sys.modules[name]
+
+
+@pytest.mark.filterwarnings("always::softreach.support.errors.SoftreachWarning")
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=on_page)
+def test_every_notebook_runs_and_is_stored_without_outputs(notebook, tmp_path, monkeypatch):
+    """As Jupyter runs it: in one namespace, and what a cell ends with is shown."""
+    monkeypatch.chdir(tmp_path)
+    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    namespace = {"__name__": "__notebook__"}
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            assert cell["outputs"] == []
+            *statements, last = ast.parse("".join(cell["source"])).body
+            exec(compile(ast.Module(statements, []), notebook.name, "exec"), namespace)
+            mode = "eval" if isinstance(last, ast.Expr) else "exec"
+            tree = ast.Expression(last.value) if mode == "eval" else ast.Module([last], [])
+            shown = eval(compile(tree, notebook.name, mode), namespace)
+            for name in ("_repr_html_", "_repr_png_"):
+                getattr(shown, name, str)()
 
 
 @pytest.mark.parametrize("page", PAGES, ids=on_page)

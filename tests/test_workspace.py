@@ -390,6 +390,7 @@ def counted(cells: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     return counts
 
 
+@pytest.mark.large
 def test_the_cone_of_three_bundles_closes_with_the_cell_and_that_of_four_stays(trunk):
     def shrinks(arm: Manipulator) -> float:
         """Median cone in cells of 125 mm over that in cells half as wide."""

@@ -25,6 +25,7 @@ def test_shards_share_a_store_and_together_make_the_whole(whole, tmp_path):
         build16(store, shard=(2, 2))
 
 
+@pytest.mark.large
 def test_shards_may_start_at_the_same_moment(whole, tmp_path):
     store = tmp_path / "a.zarr"
     body = "build(sys.argv[1], shard=(int(sys.argv[2]), 2))"

@@ -147,6 +147,7 @@ def test_a_failing_design_is_recorded_and_tried_again_later(tmp_path, monkeypatc
     assert atlas_status(store).messages == {}
 
 
+@pytest.mark.large
 def test_a_full_disk_costs_one_line_and_the_rest_can_be_resumed(tmp_path):
     store = tmp_path / "a.zarr"
     body = """

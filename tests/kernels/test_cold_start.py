@@ -81,6 +81,7 @@ LATER = (
 """Commands that need kernels for other types, or what few need."""
 
 
+@pytest.mark.large
 def test_nothing_is_compiled_after_a_warm_up(tmp_path):
     """Kernels of all tests from here on: most have been compiled already."""
     warm_up = recorded(WARM_UP.split(), tmp_path, own_cache=False)

@@ -44,6 +44,7 @@ def test_an_unreachability_is_told_in_percent(atlas):
     assert f"UNR {100 * float(exact):.4g} % exact" in text
 
 
+@pytest.mark.large
 def test_enough_samples_are_not_called_too_few(tmp_path):
     dense = atlas_of(tmp_path / "a.zarr", 200_000, ("exact", "concave"))
     text = nearest_numbers(dense, "volume", designs.minimal_trunk())

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import threading
 
+import pytest
+
 from softreach.arm import designs
 from softreach.arm.parameters import changed
 from softreach.studio import Quality
@@ -19,6 +21,7 @@ def five_bundles():
     return changed(designs.minimal_trunk(), {"longitudinal.bundles": 3})
 
 
+@pytest.mark.large
 def test_a_slider_that_makes_five_bundles_leaves_the_server_alive(tab):
     tab.open("Design")
     tab.drag("bundles of longitudinal", 60)
@@ -63,6 +66,7 @@ def test_what_runs_out_of_memory_says_so_and_the_next_change_is_computed(tab, mo
     tab.page.get_by_text(f"volume {tab.session.reach.volume:.4f}").first.wait_for()
 
 
+@pytest.mark.large
 def test_a_tab_that_closes_in_mid_computation_ends_it_and_frees_its_memory(browser, studio):
     tab = Tab(browser, studio)
     session = tab.session
@@ -89,6 +93,7 @@ def test_what_is_shown_of_the_design_before_is_marked(tab, monkeypatch):
     tab.page.get_by_text("of the design before").first.wait_for(state="hidden")
 
 
+@pytest.mark.large
 def test_an_idle_page_has_nothing_done_by_the_server(tab, monkeypatch):
     tab.page.wait_for_timeout(500)
     done = []

@@ -119,6 +119,7 @@ def test_beyond_the_boundary_the_arm_stays_near_and_a_line_shows_the_gap(inverse
     assert tab.drawn("/gap")
 
 
+@pytest.mark.large
 def test_the_arm_comes_back_from_the_boundary_on_its_branch(inverse_tab):
     tab = inverse_tab
     begin = pose(tab, START)
@@ -137,6 +138,7 @@ def test_the_arm_comes_back_from_the_boundary_on_its_branch(inverse_tab):
     np.testing.assert_allclose(tab.session.state.activation, START, atol=0.02)
 
 
+@pytest.mark.large
 def test_a_handle_behind_the_arm_is_seen_through_it_and_can_be_grabbed(inverse_tab):
     tab = inverse_tab
     tab.session.look_from("oblique")
@@ -154,6 +156,7 @@ def test_a_handle_behind_the_arm_is_seen_through_it_and_can_be_grabbed(inverse_t
     tab.settle()
 
 
+@pytest.mark.large
 def test_the_handle_is_dark_on_a_light_page_and_light_on_a_dark_one(inverse_tab):
     tab = inverse_tab
     begin = pose(tab, START)

@@ -107,6 +107,7 @@ def test_a_page_that_is_reloaded_goes_on_where_it_was_beside_another_tab(browser
         one.close()
 
 
+@pytest.mark.large
 def test_a_server_that_is_started_again_goes_on_where_the_last_one_ended(browser, folder):
     with Studio(start(), work=KeptWork(folder)) as studio:
         tab = Tab(browser, studio)
@@ -122,6 +123,7 @@ def test_a_server_that_is_started_again_goes_on_where_the_last_one_ended(browser
         tab.close()
 
 
+@pytest.mark.large
 def test_work_that_cannot_be_read_is_named_and_the_studio_begins_anew(browser, folder):
     folder.mkdir()
     (folder / "latest.json").write_text('{"softreach_studio": 1, "design": "<b class=struck>"}')

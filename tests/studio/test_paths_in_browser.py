@@ -38,6 +38,7 @@ def test_a_drawn_path_is_followed_from_the_present_activation(tab):
     tab.page.locator(".uplot canvas").first.wait_for()
 
 
+@pytest.mark.large
 def test_playing_leads_the_arm_to_the_end_and_the_slider_back(tab):
     found = drawn(tab)
     tab.press("Play")
@@ -121,6 +122,7 @@ def test_the_saved_table_is_that_of_the_command_line(tab, tmp_path):
     np.testing.assert_allclose(values[0][:, :3], values[1][:, :3], atol=1e-4)
 
 
+@pytest.mark.large
 def test_an_animation_is_written_with_progress_and_can_be_canceled(tab, tmp_path):
     drawn(tab)
     tab.press("GIF")

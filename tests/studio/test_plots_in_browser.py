@@ -68,6 +68,7 @@ def test_the_volume_against_a_parameter_is_computed_while_one_looks(tab):
     assert found.volume[1] == pytest.approx(sr.reachable_set(made).volume, rel=0.02)
 
 
+@pytest.mark.large
 def test_a_sweep_in_progress_is_dropped_for_that_of_another_design(tab):
     settings = PlotSettings(shown=("sweep",), parameter="revolution")
     tab.session.update(lambda s: s.showing(plots=settings))

@@ -105,6 +105,7 @@ def test_no_text_of_a_file_or_its_name_is_markup(tab):
     assert {"color.json", "metric.json", "parameter.json"} <= set(taken)
 
 
+@pytest.mark.large
 def test_no_text_of_a_link_is_markup(tab, browser, studio, monkeypatch):
     struck = StudioState(design=designs.minimal_trunk())
     monkeypatch.setattr(StudioState, "to_json", lambda _: STATES["level"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from softreach.arm import designs
 from softreach.geometry.surface import plane_cut
@@ -48,6 +49,7 @@ def test_the_section_follows_the_slice_and_the_design(tab):
     tab.page.get_by_text(f"{changed:.4f} L²").wait_for()
 
 
+@pytest.mark.large
 def test_the_section_is_drawn_for_a_dark_page_too(tab):
     tab.session.update(lambda s: s.showing(slice=Slice(), plots=PlotSettings(shown=("section",))))
     tab.settle()
@@ -74,6 +76,7 @@ def test_beside_the_set_nothing_is_reached(tab):
     tab.settle()
 
 
+@pytest.mark.large
 def test_the_numbers_in_the_plane_are_those_of_the_inverse():
     arm = designs.minimal_trunk(revolution=np.radians(180), taper=np.radians(2))
     *_, reach = stages(arm, 14, SMALL, lambda: None)

@@ -110,6 +110,7 @@ def test_numbers_at_the_axes_of_a_phone_have_room(opened):
             assert beside > 24 or above > 12
 
 
+@pytest.mark.large
 def test_figures_are_as_wide_as_the_sheet_of_a_phone(opened):
     tab = opened("phone")
     tab.open("Plots")
@@ -157,6 +158,7 @@ def test_a_wide_table_of_designs_moves_within_the_sheet_of_a_phone(opened):
     assert place["y"] + place["height"] <= 844
 
 
+@pytest.mark.large
 def test_numbers_at_the_axes_stay_in_sight_when_plots_stand_beside_the_scene(opened):
     tab = opened("laptop")
     see_all(tab)

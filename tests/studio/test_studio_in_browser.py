@@ -239,6 +239,7 @@ def test_a_state_is_saved_loaded_and_linked_and_tabs_stay_apart(own_tab, tmp_pat
     tab.wait(lambda: set(studio.sessions) <= known, "the session of the closed tab ends")
 
 
+@pytest.mark.large
 def test_tabs_stay_apart(tab, browser, studio):
     kept, known = tab.session.state, set(studio.sessions)
     other = Tab(browser, studio)

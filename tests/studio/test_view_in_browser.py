@@ -58,6 +58,7 @@ def test_the_arm_is_seen_through_the_cloud_from_the_first_picture_on(tab):
     assert hidden < 0.75 * seen
 
 
+@pytest.mark.large
 def test_no_point_is_drawn_before_the_arm_from_any_side(tab):
     tab.session.update(lambda s: s.replace(activation=(-1.0, -0.2, -0.5)))
 
@@ -85,6 +86,7 @@ def test_a_page_that_nobody_touches_sends_no_clouds(tab, monkeypatch):
     assert sent == []
 
 
+@pytest.mark.large
 def test_the_target_is_seen_through_the_cloud(tab):
     target = np.array([0.0, 0.1, 0.5])
     show(tab, arm=False, ghosts=False, point_size=0.02)
@@ -162,6 +164,7 @@ def test_numbers_stand_outside_of_what_they_number_from_every_side(tab):
         assert ((places < low) | (places > high)).any(axis=1).all()
 
 
+@pytest.mark.large
 def test_a_dark_page_is_dark_behind_the_scene_and_around_it(tab):
     assert np.median(pixels(tab)) > 0.9
     tab.open("View")
@@ -191,6 +194,7 @@ def test_the_window_is_called_softreach(tab):
     assert tab.page.title() == "softreach"
 
 
+@pytest.mark.large
 def test_numbers_are_dark_on_light_and_light_on_dark(tab):
     show(tab, cloud=False, arm=False, handle=False)
     name = next(one for k in range(60) if (one := tab.drawn(f"/axes/label {k}")).text == "x / L")

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from softreach.arm.actuators import Actuator, FiberArchitecture, Outline, SectorActuator
 from softreach.arm.along import AlongArm
 from softreach.arm.bending import bending_at, largest_bending, sharpest_bending, smallest_bending
+from softreach.arm.lines import line_strains
 from softreach.arm.loads import GRAVITY, Loads
 from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.scale import body_mass, scale_warnings
@@ -62,6 +63,9 @@ class DesignSummary:
     """Smallest and largest ζ that each activation reaches alone [-], shape (bundle, 2)."""
     bundle_bending: Array
     """Smallest and largest |κ| R2 that each activation reaches alone [-], shape (bundle, 2)."""
+    bundle_strain: Array
+    """Smallest and largest change of length of each bundle by its own activation alone [-], along
+    its middle line, shape (bundle, 2): negative where it shortens."""
     stiffness: Stiffness | None
     """K0 [N], K1 and K3 [N m²] at base and tip; None without Young's modulus."""
     mass: float | None
@@ -102,6 +106,7 @@ def describe(arm: Manipulator) -> DesignSummary:
         ),
         bundle_extension=_pairs(extension_range(alone) for alone in _alone(arm)),
         bundle_bending=_pairs(_slender_bending(alone) for alone in _alone(arm)),
+        bundle_strain=line_strains(arm),
         breakpoints=arm.breakpoints,
         validity=tuple(dict.fromkeys(_validity(each) for each in arm.actuators if each.validity)),
         warnings=design_warnings(arm),

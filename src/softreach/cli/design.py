@@ -110,15 +110,16 @@ def _rows_of_matter(facts: DesignSummary) -> Rows:
 
 def _bundle_rows(arm: Manipulator, facts: DesignSummary) -> Rows:
     """The effect of each activation alone, in words."""
-    units = ("" if unit == "1" else f" {unit}" for unit in arm.bundle_units)
-    ranges = zip(arm.bounds, units, facts.bundle_extension, facts.bundle_bending, strict=True)
-    return {
-        f"activation {name}": (
-            f"{_span(bounds)}{unit}: ζ {_span(extension)}, |κ| R2 {_span(bending)}",
-            "",
+    rows: Rows = {}
+    for k, name in enumerate(arm.bundle_names):
+        unit = "" if arm.bundle_units[k] == "1" else f" {arm.bundle_units[k]}"
+        effects = (
+            f"length {_span(100.0 * facts.bundle_strain[k])} %",
+            f"ζ {_span(facts.bundle_extension[k])}",
+            f"|κ| R2 {_span(facts.bundle_bending[k])}",
         )
-        for name, (bounds, unit, extension, bending) in zip(arm.bundle_names, ranges, strict=True)
-    }
+        rows[f"activation {name}"] = (f"{_span(arm.bounds[k])}{unit}: {', '.join(effects)}", "")
+    return rows
 
 
 def _span(ends: Any) -> str:
@@ -126,11 +127,12 @@ def _span(ends: Any) -> str:
 
 
 def _rows_for_machines(arm: Manipulator, facts: DesignSummary) -> Rows:
-    names = ("name", "unit", "bounds", "extension", "bending_times_R2")
+    names = ("name", "unit", "bounds", "strain", "extension", "bending_times_R2")
     columns = (
         arm.bundle_names,
         arm.bundle_units,
         arm.bounds.tolist(),
+        facts.bundle_strain.tolist(),
         facts.bundle_extension.tolist(),
         facts.bundle_bending.tolist(),
     )

@@ -1,0 +1,76 @@
+"""Lengths of the lines along which bundles run, as activations change them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from softreach.arm.manipulator import Manipulator
+from softreach.arm.tables import tables
+from softreach.support.arrays import as_floats
+
+__all__ = ["line_lengths", "line_strains"]
+
+Array = NDArray[np.float64]
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+_PIECES = 32
+_STEP = 1e-5  # of a piece, for derivatives along the arm
+
+
+def line_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
+    """Length of the middle line of each bundle where it acts, without loads [m].
+
+    A line at x d₁ + y d₂ from the axis runs along
+    dp/dZ = (x' - ω₃ y) d₁ + (y' + ω₃ x) d₂ + (ζ + ω₁ y - ω₂ x) d₃, with ω = η u the turn of the
+    directors along the arm before activation, theory (6).
+
+    Args:
+        arm: The design.
+        activations: Shape (n, bundle).
+
+    Returns:
+        Shape (n, bundle).
+    """
+    gamma = as_floats("activations", activations)
+    z, weights, step = _quadrature(arm)
+    table = tables(arm, z)
+    zeta = 1.0 + gamma @ table.extension.T
+    eta = zeta if table.growth is table.extension else 1.0 + gamma @ table.growth.T
+    turn = eta[..., None] * np.einsum("nb,scb->nsc", gamma, table.curvature)
+
+    place = _places(arm, z)
+    along = (_places(arm, z + step) - _places(arm, z - step)) / (2.0 * step[:, None])
+    (x, y), (dx, dy) = place, along
+    one, two, three = (turn[..., k, None] for k in range(3))
+    speed = np.sqrt(
+        (dx - three * y) ** 2 + (dy + three * x) ** 2 + (zeta[..., None] + one * y - two * x) ** 2
+    )
+    return np.einsum("s,nsb->nb", weights, np.where(arm.outline(z).acts, speed, 0.0))
+
+
+def line_strains(arm: Manipulator) -> Array:
+    """Smallest and largest change of length of each bundle's line by its own activation [-].
+
+    The others stay zero: shape (bundle, 2), negative where the line shortens.
+    """
+    count = arm.bundles
+    ends = np.concatenate([np.diag(arm.bounds[:, 0]), np.diag(arm.bounds[:, 1])])
+    lengths = line_lengths(arm, np.concatenate([np.zeros((1, count)), ends]))
+    strains = lengths[1:].reshape(2, count, count).diagonal(axis1=1, axis2=2) / lengths[0] - 1.0
+    return np.sort(strains.T, axis=1)
+
+
+def _quadrature(arm: Manipulator) -> tuple[Array, Array, Array]:
+    """Gauss nodes between all breakpoints with their weights [m], and steps that stay between."""
+    knots = np.union1d(np.linspace(0.0, arm.length, _PIECES + 1), arm.breakpoints)
+    half = np.diff(knots)[:, None] / 2.0
+    z = knots[:-1, None] + half * (1.0 + _NODES)
+    return z.ravel(), (half * _WEIGHTS).ravel(), np.repeat(_STEP * half.ravel(), len(_NODES))
+
+
+def _places(arm: Manipulator, z: Array) -> Array:
+    """Middle of each bundle in the sections [m], shape (2, station, bundle)."""
+    outline = arm.outline(z)
+    middle = 0.5 * (outline.inner_ratio + outline.outer_ratio) * arm.profile.radius(z)[:, None]
+    return middle * np.stack([np.cos(outline.center), np.sin(outline.center)])

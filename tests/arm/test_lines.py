@@ -1,0 +1,57 @@
+"""Laws of the lines along which bundles run: closed forms, and the drawn shape as an oracle."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+import softreach as sr
+from softreach.arm.lines import line_lengths, line_strains
+from tests.kinds import fibers_and_a_tendon
+from tests.laws import arms, in_box
+
+
+def drawn_lengths(arm, gamma, stations=4001):
+    """Lengths of polygons on the middle lines of a drawn shape; lines that act everywhere."""
+    shape = sr.configuration(arm, gamma, stations=stations)
+    outline = arm.outline(shape.Z.values)
+    ratio = 0.5 * (outline.inner_ratio + outline.outer_ratio)
+    middle = ratio * shape.radius.values[:, None]
+    across, up = shape.directors.values[:, 0, None], shape.directors.values[:, 1, None]
+    x, y = middle * np.cos(outline.center), middle * np.sin(outline.center)
+    places = shape.position.values[:, None] + x[..., None] * across + y[..., None] * up
+    return np.linalg.norm(np.diff(places, axis=0), axis=-1).sum(axis=0)
+
+
+@settings(max_examples=8)
+@given(arm=arms())
+def test_lengths_are_those_of_the_drawn_shape(arm):
+    gamma = in_box(arm, 1)
+    lengths, drawn = line_lengths(arm, gamma)[0], drawn_lengths(arm, gamma[0])
+    np.testing.assert_allclose(lengths, drawn, rtol=2e-5)
+
+
+def test_forces_bend_per_length_at_rest_here_too():
+    arm = fibers_and_a_tendon()
+    gamma = in_box(arm, 1)
+    lengths, drawn = line_lengths(arm, gamma)[0], drawn_lengths(arm, gamma[0])
+    np.testing.assert_allclose(lengths, drawn, rtol=2e-5)
+
+
+def test_a_parallel_tendon_shortens_by_its_work():
+    """T (1/K0 + d²/K1) at small tension: half the energy that it puts into the arm."""
+    arm = sr.designs.three_tendon_robot()
+    stiffness = sr.describe(arm).stiffness
+    tension, distance = 1e-3, arm.actuators[0].distance
+    strain = line_strains(arm.with_bounds((0.0, tension)))
+    expected = tension * (1 / stiffness.axial[0] + distance**2 / stiffness.bending[0])
+    np.testing.assert_allclose(strain[:, 0], -expected, rtol=1e-4)
+    np.testing.assert_allclose(strain[:, 1], 0.0, atol=1e-15)
+
+
+def test_a_longitudinal_fiber_shortens_by_less_than_its_activation(trunk):
+    strain = line_strains(trunk)
+    assert (strain[:, 0] > trunk.bounds[:, 0]).all()
+    assert (strain[:, 0] < 0).all()
+    assert strain[:, 1] == pytest.approx(0.0, abs=1e-12)
