@@ -40,7 +40,7 @@ test-all: TESTED = all-tests
 
 # The checks run beside the tests, which wait now and then.
 test test-all: ready
-	$(MAKE) --no-print-directory -j2 --output-sync=line $(TESTED) check
+	$(MAKE) --no-print-directory -j2 $(TESTED) check
 
 tests:
 	$(TESTS)
