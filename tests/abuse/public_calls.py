@@ -177,6 +177,8 @@ MANY = {"seven dimensions", "seven columns"}
 
 CALLS: dict[str, Call] = {
     "arm.describe": Call(lambda: dict(arm=ARM)),
+    "arm.limit_shortening": Call(lambda: dict(arm=ARM, most=0.3), kinds=dict(most="number")),
+    "arm.line_lengths": Call(lambda: dict(arm=ARM, activations=[[0.0] * ARM.bundles])),
     "arm.named_material": Call(lambda: dict(name="steel")),
     "arm.designs.minimal_trunk": Call(),
     "arm.designs.redundant_trunk": Call(),

@@ -15,6 +15,7 @@ from softreach.arm.actuators import (
 from softreach.arm.actuators.ring_integrals import RingIntegrals
 from softreach.arm.along import AlongArm, Pieces, Samples
 from softreach.arm.base import Base
+from softreach.arm.lines import limit_shortening, line_lengths
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.manipulator import Manipulator
 from softreach.arm.material import Material, material_names, named_material
@@ -52,6 +53,8 @@ __all__ = [
     "Tendon",
     "describe",
     "designs",
+    "limit_shortening",
+    "line_lengths",
     "material_names",
     "named_material",
 ]

@@ -5,17 +5,20 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from softreach.arm.manipulator import Manipulator
+from softreach.arm.manipulator import Manipulator, a_manipulator
 from softreach.arm.tables import tables
-from softreach.support.arrays import as_floats
+from softreach.support.arguments import as_number
+from softreach.support.arrays import as_rows
+from softreach.support.errors import Range
 
-__all__ = ["line_lengths", "line_strains"]
+__all__ = ["limit_shortening", "line_lengths", "line_strains"]
 
 Array = NDArray[np.float64]
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _PIECES = 32
 _STEP = 1e-5  # of a piece, for derivatives along the arm
+_HALVINGS = 52
 
 
 def line_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
@@ -31,8 +34,12 @@ def line_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
 
     Returns:
         Shape (n, bundle).
+
+    Raises:
+        InvalidInput: No finite activations of that shape.
     """
-    gamma = as_floats("activations", activations)
+    arm = a_manipulator("arm", arm)
+    gamma = as_rows("activations", activations, arm.bundles, "of shape (n, bundles)")
     z, weights, step = _quadrature(arm)
     table = tables(arm, z)
     zeta = 1.0 + gamma @ table.extension.T
@@ -54,11 +61,38 @@ def line_strains(arm: Manipulator) -> Array:
 
     The others stay zero: shape (bundle, 2), negative where the line shortens.
     """
+    return np.sort(_strains_at(arm, arm.bounds), axis=1)
+
+
+def limit_shortening(arm: Manipulator, most: float) -> Manipulator:
+    """The arm with bounds under which no bundle shortens its line by more than a share of it.
+
+    That holds for each bundle alone, while the others are not activated. Bounds only narrow, each
+    toward zero.
+
+    Args:
+        arm: The design, without activation within its bounds.
+        most: Largest shortening [-], such as 0.3.
+
+    Raises:
+        InvalidInput: Not between 0 and 1.
+    """
+    most = as_number("most", most, Range(0.0, 1.0))
+    bounds = a_manipulator("arm", arm).bounds
+    kept, refused = np.zeros_like(bounds), bounds
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (kept + refused)
+        fits = _strains_at(arm, middle) >= -most
+        kept, refused = np.where(fits, middle, kept), np.where(fits, refused, middle)
+    return arm.with_bounds(np.where(_strains_at(arm, bounds) >= -most, bounds, kept))
+
+
+def _strains_at(arm: Manipulator, ends: Array) -> Array:
+    """Change of length of each bundle's line at activations of its own [-], shape (bundle, 2)."""
     count = arm.bundles
-    ends = np.concatenate([np.diag(arm.bounds[:, 0]), np.diag(arm.bounds[:, 1])])
-    lengths = line_lengths(arm, np.concatenate([np.zeros((1, count)), ends]))
-    strains = lengths[1:].reshape(2, count, count).diagonal(axis1=1, axis2=2) / lengths[0] - 1.0
-    return np.sort(strains.T, axis=1)
+    alone = np.concatenate([np.zeros((1, count)), np.diag(ends[:, 0]), np.diag(ends[:, 1])])
+    lengths = line_lengths(arm, alone)
+    return (lengths[1:].reshape(2, count, count).diagonal(axis1=1, axis2=2) / lengths[0] - 1.0).T
 
 
 def _quadrature(arm: Manipulator) -> tuple[Array, Array, Array]:
