@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import App, Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
-from softreach.cli.console import Rows, console
+from softreach.cli.console import console
+from softreach.cli.lengths import Rows
 from softreach.cli.options import (
     SAMPLING,
     AsJson,

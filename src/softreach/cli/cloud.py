@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
-from softreach.cli.console import Rows, console
+from softreach.cli.console import console
 from softreach.cli.design import load_rows
-from softreach.cli.lengths import Lengths
+from softreach.cli.lengths import Lengths, Rows
 from softreach.cli.options import (
     SAMPLING,
     AsJson,

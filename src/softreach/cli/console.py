@@ -18,13 +18,12 @@ from softreach.support import progress
 from softreach.support.errors import NotWritten, SoftreachWarning
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from rich.console import Console as RichConsole
 
     from softreach.cli.lengths import Lengths
 
-
-Rows = dict[str, tuple[Any, str]]
-"""Name -> (value, unit)."""
 
 _NARROWEST = 60  # columns; the tables of a help text lose words below, and lines that wrap do not
 
@@ -100,6 +99,10 @@ class Console:
         if not self.quiet:
             self.error(text)
 
+    def written(self, path: Path, lengths: Lengths) -> None:
+        """Unit in which a table or a mesh was written."""
+        self.note(f"{path}: lengths in {lengths.written.name}")
+
     def error(self, text: str) -> None:
         """A line on standard error."""
         with suppress(OSError, ValueError):  # nobody reads it
@@ -162,6 +165,7 @@ class HelpConsole:
 
 
 def _rich_console() -> RichConsole:
+
     from rich.console import Console as RichConsole
 
     class StrictConsole(RichConsole):

@@ -67,7 +67,7 @@ def demo(
         concave, convex = result()
     export.export_mesh(concave, out / "hull.ply", unit=lengths.written, overwrite=overwrite)
     for name in ("cloud.ply", "hull.ply"):
-        lengths.say_written(out / name)
+        console.written(out / name, lengths)
 
     rows = volume_rows(concave, convex)
     rows["time to compute the cloud"] = (round(computed, 3), "s")

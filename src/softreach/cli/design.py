@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
-from softreach.cli.console import Rows, console
-from softreach.cli.lengths import Lengths
+from softreach.cli.console import console
+from softreach.cli.lengths import Lengths, Rows
 from softreach.cli.options import AsJson, Design, Overwrite, Unit, check_output, out_option, refuse
 from softreach.cli.values import to_degrees
 from softreach.support.errors import InvalidInput, no_warnings

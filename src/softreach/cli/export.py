@@ -81,7 +81,7 @@ def _cloud(
         cloud = open_cloud(source)
         lengths = Lengths.of(design_of(cloud), unit)
         export_cloud(cloud, out, unit=lengths.written, overwrite=overwrite)
-        lengths.say_written(out)
+        console.written(out, lengths)
         return [out]
     refuse(_OTHER, unit=unit)
     from softreach.exchange.activefilaments.cloud import CLOUD_PAIR, gamma_path, write_cloud
@@ -120,5 +120,5 @@ def _design(
     check_surface(out, overwrite)
     lengths, shape = Lengths.of(arm, unit), shape_of(activation, arm)
     export_arm(arm, shape, out, unit=lengths.written, overwrite=overwrite)
-    lengths.say_written(out)
+    console.written(out, lengths)
     return [out]

@@ -8,8 +8,8 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from softreach.cli.changes import design_from
-from softreach.cli.console import Rows, console
-from softreach.cli.lengths import Lengths
+from softreach.cli.console import console
+from softreach.cli.lengths import Lengths, Rows
 from softreach.cli.options import AsJson, Overwrite, Unit, check_output, refuse
 from softreach.cli.values import NUMBER
 from softreach.support.errors import InvalidInput

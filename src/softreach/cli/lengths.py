@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from softreach.cli.console import Rows, console
 from softreach.support.units import METER, LengthUnit, as_unit, handy_unit
 
 if TYPE_CHECKING:
     from softreach.arm.manipulator import Manipulator
 
+Rows = dict[str, tuple[Any, str]]
+"""Name -> (value, unit)."""
 
 _POWERS = {"m": 1, "m²": 2, "m³": 3}
 _ERROR = " error (estimate)"  # behind the name of a row with the error of another
@@ -53,10 +53,6 @@ class Lengths:
     def written(self) -> LengthUnit:
         """Unit of tables and meshes, which other programs take to be in m unless it was chosen."""
         return self.unit if self.chosen else METER
-
-    def say_written(self, path: Path) -> None:
-        """Tell in what unit a table or a mesh was written."""
-        console.note(f"{path}: lengths in {self.written.name}")
 
     def place(self, point: Iterable[float]) -> str:
         """A position [m] in words: "(200, 100, 600) mm"."""

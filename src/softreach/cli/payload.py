@@ -8,8 +8,8 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from, read_mass
-from softreach.cli.console import Rows, console
-from softreach.cli.lengths import Lengths
+from softreach.cli.console import console
+from softreach.cli.lengths import Lengths, Rows
 from softreach.cli.options import AsJson, Design, Overwrite, Unit, check_picture, out_option
 from softreach.cli.values import NUMBER
 from softreach.support.errors import InvalidInput

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes, design_from
-from softreach.cli.console import Rows, console
+from softreach.cli.console import console
 from softreach.cli.design import load_rows
-from softreach.cli.lengths import Lengths
+from softreach.cli.lengths import Lengths, Rows
 from softreach.cli.options import (
     OUTPUT,
     AsJson,
@@ -138,7 +138,7 @@ def _write(
         if not isinstance(reached, ReachableSolid | ReachableSurface):
             raise _no_such_output(path)
         export_mesh(reached.surface(), path, unit=lengths.written, overwrite=overwrite)
-        lengths.say_written(path)
+        console.written(path, lengths)
 
 
 def _rows(reached: ReachableSet) -> Rows:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from softreach.cli.changes import UNCHANGED, Changes
-from softreach.cli.console import Rows, console
+from softreach.cli.console import console
+from softreach.cli.lengths import Rows
 from softreach.cli.options import (
     SAMPLING,
     AsJson,
@@ -62,7 +63,7 @@ def volume(
         from softreach.export import export_mesh
 
         export_mesh(concave, out, unit=lengths.written, overwrite=overwrite)
-        lengths.say_written(out)
+        console.written(out, lengths)
 
 
 _BYTES = 700  # of memory that a sample and its share of the triangulation take at most
