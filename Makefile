@@ -67,7 +67,7 @@ quick: lint
 	$(MAKE) --no-print-directory -j2 --output-sync=target types fast
 
 fast: setup
-	$(BIN)/python -m pytest -q --quick tests
+	$(TESTS) --quick tests
 
 # Renews the list of slow tests, which `make quick` leaves out; on an idle machine.
 record: setup browser
