@@ -35,12 +35,12 @@ demo: setup
 # Tests side by side, up to four on as many cores.
 TESTS := $(BIN)/python -m pytest -q --numprocesses auto --maxprocesses 4 --dist worksteal --max-worker-restart 0
 
-test: TESTED = tests
-test-all: TESTED = all-tests
-
 # The checks run beside the tests, which wait now and then.
-test test-all: ready
-	$(MAKE) --no-print-directory -j2 $(TESTED) check
+test: ready
+	$(MAKE) --no-print-directory -j2 tests check
+
+test-all: ready
+	$(MAKE) --no-print-directory -j2 all-tests check
 
 tests:
 	$(TESTS)

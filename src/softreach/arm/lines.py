@@ -67,11 +67,11 @@ def line_strains(arm: Manipulator) -> Array:
 def limit_shortening(arm: Manipulator, most: float) -> Manipulator:
     """The arm with bounds under which no bundle shortens its line by more than a share of it.
 
-    That holds for each bundle alone, while the others are not activated. Bounds only narrow, each
-    toward zero.
+    That holds for each bundle alone, while the others are not activated. Each bound that shortens
+    too far moves toward zero.
 
     Args:
-        arm: The design, without activation within its bounds.
+        arm: The design, whose bounds hold zero.
         most: Largest shortening [-], such as 0.3.
 
     Raises:
@@ -106,5 +106,5 @@ def _quadrature(arm: Manipulator) -> tuple[Array, Array, Array]:
 def _places(arm: Manipulator, z: Array) -> Array:
     """Middle of each bundle in the sections [m], shape (2, station, bundle)."""
     outline = arm.outline(z)
-    middle = 0.5 * (outline.inner_ratio + outline.outer_ratio) * arm.profile.radius(z)[:, None]
+    middle = outline.middle_ratio * arm.profile.radius(z)[:, None]
     return middle * np.stack([np.cos(outline.center), np.sin(outline.center)])

@@ -230,9 +230,8 @@ def inside(arm: Body) -> tuple[bool, ...]:
     """Bundles of which the body of the arm hides some part."""
     z = np.union1d(np.linspace(0.0, arm.length, 101), arm.breakpoints)
     outline = arm.outline(z)
-    middle = 0.5 * (outline.inner_ratio + outline.outer_ratio)
     sector = np.array([shape == "sector" for shape in outline.shape])
-    place = np.where(sector, outline.outer_ratio, middle)
+    place = np.where(sector, outline.outer_ratio, outline.middle_ratio)
     hidden = (place < 1.0 - _SAME) & outline.acts
     return tuple(bool(hidden[:, k].any()) for k in range(arm.bundles))
 

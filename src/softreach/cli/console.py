@@ -165,7 +165,6 @@ class HelpConsole:
 
 
 def _rich_console() -> RichConsole:
-
     from rich.console import Console as RichConsole
 
     class StrictConsole(RichConsole):

@@ -74,6 +74,11 @@ class Outline:
     acts: NDArray[np.bool_]
     """Stations at which each bundle acts, shape (station, bundle)."""
 
+    @property
+    def middle_ratio(self) -> Array:
+        """Radius of the middle line of each bundle over R2 [-], shape (station, bundle)."""
+        return 0.5 * (self.inner_ratio + self.outer_ratio)
+
     @classmethod
     def empty(cls, stations: int) -> Outline:
         """The outline of a passive rod at so many stations."""
