@@ -185,9 +185,9 @@ class LoadedRod(ArmRod):
     ) -> Frames:
         """Centerline and directors at ascending stations Z [m]."""
         gamma, z = self.box.check(activations), self.check_stations(stations)
-        return self._shapes(gamma, z, status).frames
+        return self.shapes(gamma, z, status).frames
 
-    def _shapes(self, gamma: Array, z: Array, status: Status | None) -> Shapes:
+    def shapes(self, gamma: Array, z: Array, status: Status | None) -> Shapes:
         """Shapes at ascending stations; each equilibrium is found once."""
         gamma, lost = self.with_arms(gamma)
         shapes = self._shape_solver.shapes(gamma, z, status=status)
@@ -208,7 +208,7 @@ class LoadedRod(ArmRod):
 
         def strains(activations: ArrayLike, status: Status | None = None) -> Strains:
             gamma = self.box.check(activations)
-            shape = self._shapes(gamma, ascending, status)
+            shape = self.shapes(gamma, ascending, status)
             return of_shapes(gamma, shape.moment[:, back], shape.force[:, back])
 
         return strains
