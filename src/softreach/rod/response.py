@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import partial
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,9 +36,6 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-_TURN = 0.35
-"""Largest turn of the arm between the boundaries of a step [rad]."""
-_FEWEST = 16
 _TOGETHER = 64
 """Samples to a task."""
 
@@ -76,7 +73,7 @@ class NodeTables:
 
     def combined(self, others: list[Self], factors: list[float]) -> Self:
         """Σ factor x other, of differences."""
-        values = {
+        values: dict[str, Any] = {
             field.name: sum(
                 f * getattr(o, field.name) for f, o in zip(factors, others, strict=True)
             )
@@ -105,16 +102,15 @@ def _places(arm: Manipulator, stations: Array) -> Array:
     return np.array([0.0, arm.length, *profile.breakpoints, *breaks, *points, *stations])
 
 
-def step_grid(rod: ArmRod, stations: Array) -> StepGrid:
-    """Steps short enough for an arm and its response.
+def step_grid(arm: Manipulator, stations: Array, steps: int) -> StepGrid:
+    """Steps of an inner arm, none longer in S than so many even ones.
 
     Args:
-        rod: The rod of an inner arm; its steps say how much it turns.
+        arm: The inner arm.
         stations: Z that are asked for [m], in any order.
+        steps: Even steps; a step should not turn the arm by much more than a third of a radian.
     """
-    arm = rod.arm
     s = arm.profile.slender_coordinate(np.sort(_places(arm, stations)))
-    steps = max(_FEWEST, rod.steps)
     counts = np.ceil(np.diff(s) / arm.profile.slender_length * steps - 1e-9)
     return StepGrid(np.maximum(counts, 1).astype(np.intp), len(stations))
 

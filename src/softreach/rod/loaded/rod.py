@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -121,6 +122,11 @@ class LoadedRod(ArmRod):
     def _shape_solver(self) -> Solver:
         """Solver with the steps that `tol` needs all along the arm."""
         return self._solver_of(checked(self._shape_steps, self.tol))
+
+    def in_steps(self, steps: int) -> Self:
+        """The rod in so many steps."""
+        vars(self).update(_tip_steps=steps, _shape_steps=steps)
+        return self
 
     def _prepare(self) -> None:
         self.solver  # noqa: B018
