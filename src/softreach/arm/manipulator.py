@@ -280,8 +280,9 @@ class Manipulator:
 
     @cached_property
     def breakpoints(self) -> tuple[float, ...]:
-        """Stations inside (0, L) where profile or actuators are not smooth, ascending [m]."""
+        """Stations inside (0, L) where profile, section or actuators are not smooth [m]."""
         places = {0.0, self.length, *self.profile.breakpoints}
+        places.update(self.length * x for x in self.section.breaks)
         places.update(z for actuator in self.actuators for z in actuator.breakpoints(self.profile))
         ascending = np.array(sorted(places))
         # Two that differ by rounding alone are one.

@@ -55,7 +55,9 @@ _SUFFIXES = {
     "N": "_n",
     "m/s²": "_m_s2",
     "N m": "_n_m",
+    "N m²": "_n_m2",
     "N/m": "_n_per_m",
+    "kg/m": "_kg_per_m",
 }
 
 

@@ -12,6 +12,7 @@ from softreach.arm.base import POINTS, Base
 from softreach.arm.design_file.keys import ACTUATORS, PROFILES, Key, in_file_units, keys_of
 from softreach.arm.loads import Loads, PointLoad
 from softreach.arm.material import Material
+from softreach.arm.measured import Measured
 from softreach.arm.number import Number
 from softreach.arm.section import Ring, Section
 from softreach.support.errors import Range
@@ -36,6 +37,7 @@ def json_schema() -> dict[str, Any]:
         "inline_material": _table(Material, "Material where it is used"),
         "ring": _table(Ring, "Layer between two radii"),
         "section": _table(Section, "Inside of the arm"),
+        "measured": _table(Measured, "What was measured, in place of what follows from materials"),
         "loads": _table(Loads, "Gravity, payload, forces and moments"),
         "base": _table(Base, "Where in the world the arm is clamped, and which way it points"),
         "point_load": _table(PointLoad, "Force and moment on one section"),
@@ -143,6 +145,7 @@ def _value(part: type, key: Key) -> _Schema:
     others: dict[str, _Schema] = {
         "ring": {"type": ["integer", "string"], "description": "Index or name of its ring"},
         "material": {"anyOf": [_TEXT, _of("inline_material")]},
+        "measured": _of("measured"),
         "core": {"anyOf": [_TEXT, _of("inline_material")]},
         "points": {
             "description": "The way the straight arm points, or a rotation",

@@ -118,11 +118,13 @@ def _material_block(name: str, material: Material) -> list[str]:
 
 
 def _section_blocks(section: Section, names: Mapping[str, Material]) -> Iterator[list[str]]:
-    inside = _lines(section, without=("core",))
+    inside = _lines(section, without=("core", "measured"))
     if section.core is not None:
         inside.insert(0, f"core = {_material_text(section.core, names)}")
     if inside:
         yield ["[section]", *inside]
+    if section.measured is not None:
+        yield ["[section.measured]", *_lines(section.measured)]
     for ring in section.rings:
         text = _material_text(ring.material, names)
         lines = _lines(ring, without=("material",))

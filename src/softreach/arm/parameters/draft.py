@@ -76,6 +76,8 @@ def parts(arm: Manipulator) -> dict[PartKey, Any]:
         keyed |= {("rings", k): ring, ("rings", k, "material"): ring.material}
     if arm.section.core is not None:
         keyed["core",] = arm.section.core
+    if arm.section.measured is not None:
+        keyed["measured",] = arm.section.measured
     return keyed | {("actuators", actuator.name): actuator for actuator in arm.actuators}
 
 
@@ -227,8 +229,9 @@ class Draft:
             material = self._made(("rings", k, "material"))
             rings.append(self._made(("rings", k), **({"material": material} if material else {})))
         core = self._made(("core",)) if ("core",) in self._parts else None
+        measured = self._made(("measured",)) if ("measured",) in self._parts else None
         if len(self._faults) == before:
-            return self._made(("section",), rings=tuple(rings), core=core)
+            return self._made(("section",), rings=tuple(rings), core=core, measured=measured)
         for (name, _), value in self._parts["section",].values.items():
             # by themselves, as the parts around them are faulty
             self._faults += fields_of(Section)[name].faults(value)
