@@ -418,10 +418,10 @@ def test_all_that_is_helical_turns_in_its_own_sense():
         ),
         ({"pull.distance": 0.1, "pull.distance_ratio": 0.1}, ["pull.distance, pull.distance_rat"]),
         (
-            {"length": -1.0, "rings[0].inner_ratio": 2.0, "core.density": 0.0, "bore_ratio": -1.0}
+            {"length": -1.0, "rings[0].inner_ratio": 2.0, "core.density": -1.0, "bore_ratio": -1.0}
             | {"left.helical_angle.values[0]": 9.0, "air.area_factor": 0.0},
             ["left.helical_angle.values[0] = 9", "length = -1", "rings[0].inner_ratio = 2"]
-            + ["core.density = 0", "bore_ratio = -1", "air.area_factor = 0"],
+            + ["core.density = -1", "bore_ratio = -1", "air.area_factor = 0"],
         ),
     ],
 )
