@@ -273,7 +273,7 @@ def nudged(name: str, value: float) -> float:
         return 0.1 if "angle" in name or "distance" in name else 1000.0
     if name.endswith("bundles"):
         return value + 1
-    below = name.endswith(("end_over_length", "inner_ratio", "bore_ratio", "poisson_ratio"))
+    below = name.endswith(("end_over_length", ".end", "inner_ratio", "bore_ratio", "poisson_ratio"))
     step = 0.01 * abs(value) or 0.005
     return value - step if below else value + step
 
@@ -523,6 +523,8 @@ def test_another_kind_of_actuator_has_the_parameters_that_it_declares(trunk):
         "pull.bundles",
         "pull.start_over_length",
         "pull.end_over_length",
+        "pull.start",
+        "pull.end",
         "pull.lower",
         "pull.upper",
     }

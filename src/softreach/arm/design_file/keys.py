@@ -97,6 +97,9 @@ class Key(NamedTuple):
     default: Any
     """Default of the field; MISSING where the key is required."""
 
+    of_names: bool = False
+    """It holds the name of a station, beside a key of the field that holds its place in m."""
+
     @property
     def required(self) -> bool:
         """A table without it is refused."""
@@ -114,6 +117,8 @@ def keys_of(kind: type) -> Mapping[str, Key]:
         if field.name == "activation_bounds":
             name = f"{kind.activation}_bounds{unit_suffix(kind.unit)}"
         default = field.default if field.default_factory is MISSING else None
+        if number is not None and number.named:  # text has no unit
+            keys.append(Key(field.name, field.name, None, default, of_names=True))
         if (kind, field.name) != (Section, "rings"):
             keys.append(Key(name, field.name, number, default))
     return MappingProxyType({key.name: key for key in keys})

@@ -65,6 +65,11 @@ def json_schema() -> dict[str, Any]:
             "items": _of("ring"),
             "minItems": 1,
         },
+        "stations": {
+            "description": "Places along the arm by name, Z [m]",
+            "type": "object",
+            "additionalProperties": {"type": "number", "minimum": 0},
+        },
         "actuators": {
             "description": "In the order of the activations; [] for a passive rod",
             "type": "array",
@@ -135,6 +140,8 @@ def _table(
 
 def _value(part: type, key: Key) -> _Schema:
     """The schema of one key."""
+    if key.of_names:
+        return {**_TEXT, "description": f"Name of a station, in place of {key.field}_m"}
     if key.number is not None:
         return _number(key.number)
     if key.field == "activation_bounds":

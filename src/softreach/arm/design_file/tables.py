@@ -81,9 +81,12 @@ class TableReader:
         keys = {name: key for name, key in keys_of(kind).items() if name not in without}
         values: dict[str, Any] = {}
         for name, key in keys.items():
-            if name in raw:
+            if name in raw and key.field in values:
+                allowed = f"give exactly one of {key.field} (a name) and {name}"
+                values[key.field] = self.refused(f"{path}.{name}", raw[name], allowed)
+            elif name in raw:
                 values[key.field] = self.value(key, raw[name], f"{path}.{name}")
-            elif key.required:
+            elif key.required and key.field not in values:
                 values[key.field] = self.refused(f"{path}.{name}", None, "required key is missing")
         fields = {key.field: name for name, key in keys.items()}
         for name in raw:

@@ -72,6 +72,8 @@ def parts(arm: Manipulator) -> dict[PartKey, Any]:
         keyed["loads",] = arm.loads
     if not arm.base.is_identity:
         keyed["base",] = arm.base
+    if arm.stations:
+        keyed["stations",] = arm.stations
     for k, ring in enumerate(arm.section.rings):
         keyed |= {("rings", k): ring, ("rings", k, "material"): ring.material}
     if arm.section.core is not None:
@@ -208,6 +210,8 @@ class Draft:
             changes["loads"] = self._made(("loads",))
         if ("base",) in self._parts:
             changes["base"] = self._made(("base",))
+        if ("stations",) in self._parts:
+            changes["stations"] = self._made(("stations",))
         keys = [("actuators", actuator.name) for actuator in self.arm.actuators]
         changes["actuators"] = tuple(self._made(key) for key in keys)
         if not self._faults:
