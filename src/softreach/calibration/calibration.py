@@ -113,9 +113,7 @@ def calibrate(
     table = (
         data
         if isinstance(data, Measurements)
-        else read_measurements(
-            arm, data, inputs=inputs, markers=markers, run=run, order=order
-        )
+        else read_measurements(arm, data, inputs=inputs, markers=markers, run=run, order=order)
     )
     held = _held_out(table, hold_out, as_integer("seed", seed))
     train = table.of(~held)
@@ -150,9 +148,7 @@ def _held_out(data: Measurements, share: float, seed: int) -> NDArray[np.bool_]:
     return held
 
 
-def _rivals(
-    arm: Manipulator, data: Measurements, held: NDArray[np.bool_]
-) -> tuple[Rival, ...]:
+def _rivals(arm: Manipulator, data: Measurements, held: NDArray[np.bool_]) -> tuple[Rival, ...]:
     train = data.of(~held)
     laws = {
         "constant curvature": lambda test: constant_curvature(arm, train, test),
@@ -265,8 +261,10 @@ class Calibration:
 
     def residuals_on(self, data: Any, **columns: Any) -> Array:
         """Predicted minus measured places of other measurements [m], (n, marker, 3)."""
-        table = data if isinstance(data, Measurements) else read_measurements(
-            self.start, data, **columns
+        table = (
+            data
+            if isinstance(data, Measurements)
+            else read_measurements(self.start, data, **columns)
         )
         return self._model(table).of_arm(self.arm).places - table.places
 

@@ -62,8 +62,9 @@ def started(model: MarkerModel, places: Array) -> FreeNumbers:
     start = np.array(free.arm.base.position)
     if len(turning) < 3 or len(moving) < 3:
         shift = np.median(measured - predicted, axis=0)
-        return free.started_at({name: start[POSE.index(name)] + shift[POSE.index(name)]
-                                for name in moving})
+        return free.started_at(
+            {name: start[POSE.index(name)] + shift[POSE.index(name)] for name in moving}
+        )
     rotation, shift = _kabsch(predicted, measured)
     _refuse_mirror(predicted, measured)
     vector = _rotation_vector(rotation)
@@ -114,7 +115,9 @@ def identifiable(free: FreeNumbers, slopes: Array) -> None:
     """
     scaled = slopes * free.scale
     sizes = np.linalg.norm(scaled, axis=0)
-    idle = [name for name, size in zip(free.names, sizes, strict=True) if size <= 1e-9 * sizes.max()]
+    idle = [
+        name for name, size in zip(free.names, sizes, strict=True) if size <= 1e-9 * sizes.max()
+    ]
     if idle or not sizes.max() > 0:
         allowed = "numbers that move some marker of some sample: leave out what does nothing here"
         raise InvalidInput("free", ", ".join(idle or free.names), allowed)

@@ -248,5 +248,3 @@ def _prior(number: FreeNumber, given: Any) -> tuple[float, float] | None:
 
 def _inside(bound: float, is_open: bool, scale: float) -> float:
     return bound + 1e-6 * scale if is_open and math.isfinite(bound) else bound
-
-

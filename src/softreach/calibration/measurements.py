@@ -242,7 +242,9 @@ def _triples(columns: list[str], taken: set[str | None]) -> dict[str, list[str]]
     for start, axes in found.items():
         if lacking := [axis for axis in "xyz" if axis not in axes]:
             what = f"columns of {start or 'the place'}"
-            raise InvalidInput(what, ", ".join(axes.values()), f"x, y and z: {lacking[0]} is missing")
+            raise InvalidInput(
+                what, ", ".join(axes.values()), f"x, y and z: {lacking[0]} is missing"
+            )
     if not found:
         raise InvalidInput(
             "places of markers", "none", "columns such as x_mm, y_mm, z_mm or marker1_x_mm"

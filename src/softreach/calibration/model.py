@@ -308,5 +308,3 @@ def _explicit_shortening(at: _Explicit, change: _Explicit, bend: Array, rise: Ar
         - np.einsum("i,kit,ki->t", weights, force, grown)
         - np.einsum("i,kict,kic->t", weights, turn, moved)
     )
-
-

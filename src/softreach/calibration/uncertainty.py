@@ -74,8 +74,9 @@ def uncertainty(fit: Fit, data: Measurements, noise: float | None) -> Uncertaint
     bread = np.einsum("nrp,nrq->pq", rows, rows)
     width = noise or robust_width(miss.reshape(-1, 3)[seen.ravel()])
     priors = [number.prior for number in fit.free.numbers]
-    known = np.array([0.0 if p is None else (width * s / p[1]) ** 2
-                      for p, s in zip(priors, scale, strict=True)])[open_]
+    known = np.array(
+        [0.0 if p is None else (width * s / p[1]) ** 2 for p, s in zip(priors, scale, strict=True)]
+    )[open_]
     inverse = np.linalg.pinv(bread + np.diag(known))
     meat, spread = np.diag(known * width**2), []
     half = _root(inverse)
@@ -90,9 +91,7 @@ def uncertainty(fit: Fit, data: Measurements, noise: float | None) -> Uncertaint
     whole[np.ix_(open_, open_)] = inverse @ meat @ inverse
     freedom = np.full(count, np.inf)
     freedom[open_] = _freedom(np.array(spread), rows.shape[2])
-    return Uncertainty(
-        whole * np.outer(scale, scale), freedom, "run" if by_run else "sample"
-    )
+    return Uncertainty(whole * np.outer(scale, scale), freedom, "run" if by_run else "sample")
 
 
 def _root(matrix: Array) -> Array:
