@@ -7,7 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from softreach.arm.actuators import Actuator
 from softreach.arm.manipulator import Manipulator
+from softreach.arm.tables import tables
 from softreach.calibration.measurements import Measurements
 from softreach.calibration.model import marker_stations
 
@@ -15,6 +17,8 @@ __all__ = ["constant_curvature", "quadratic", "ridge"]
 
 Array = NDArray[np.float64]
 
+_SHARES = (1.0, 0.2)
+"""Of the bends of the design, at which the fit of arcs begins."""
 _PENALTIES = np.logspace(-8, 2, 21)
 
 
@@ -85,26 +89,37 @@ def constant_curvature(
 
     arcs = _Arcs.of(arm, train)
     seen = np.isfinite(train.places)
-    start = arcs.start(arm, train)
 
     def residuals(values: Array) -> Array:
         return (arcs.places(values, train.inputs) - train.places)[seen]
 
-    result = least_squares(residuals, start, x_scale="jac", loss="linear", max_nfev=40)
-    return arcs.places(result.x, test.inputs), len(start)
+    tries = [
+        least_squares(residuals, arcs.start(arm, share), x_scale="jac", max_nfev=60)
+        for share in _SHARES
+    ]
+    best = min(tries, key=lambda result: result.cost)
+    return arcs.places(best.x, test.inputs), len(best.x)
 
 
 class _Arcs:
     """Arcs of circles in a row."""
 
-    def __init__(self, ends: Array, acts: NDArray[np.bool_], scale: Array, markers: Array) -> None:
-        self.ends, self.acts, self.scale, self.markers = ends, acts, scale, markers
+    def __init__(
+        self,
+        ends: Array,
+        acts: NDArray[np.bool_],
+        scale: Array,
+        markers: Array,
+        offsets: Array,
+    ) -> None:
+        self.ends, self.acts, self.scale = ends, acts, scale
+        self.markers, self.offsets = markers, offsets
 
     @classmethod
     def of(cls, arm: Manipulator, data: Measurements) -> _Arcs:
-        stations, _ = marker_stations(arm)
+        stations, offsets = marker_stations(arm)
         names = [marker.name for marker in arm.markers] or ["tip"]
-        stations = stations[[names.index(name) for name in data.marker_names]]
+        measured = [names.index(name) for name in data.marker_names]
         ends = [actuator.end_over_length * arm.length for actuator in arm.bundle_actuators]
         whole = np.unique(np.round([*ends, arm.length], 9))
         middles = 0.5 * (np.append(0.0, whole[:-1]) + whole)
@@ -114,17 +129,21 @@ class _Arcs:
         ]
         acts = np.array([[low <= z <= high for low, high in spans] for z in middles])
         scale = np.where(np.ptp(data.inputs, axis=0) > 0, np.abs(data.inputs).max(axis=0), 1.0)
-        return cls(whole, acts & (np.ptp(data.inputs, axis=0) > 0), scale, stations)
+        moves = np.ptp(data.inputs, axis=0) > 0
+        return cls(whole, acts & moves, scale, stations[measured], offsets[measured])
 
-    def start(self, arm: Manipulator, data: Measurements) -> Array:
-        """Straight, with the base of the design and a little bend for each input."""
+    def start(self, arm: Manipulator, share: float) -> Array:
+        """A share of the bends that the design has in the middle of each arc, without loads."""
         from scipy.spatial.transform import Rotation
 
-        del data
-        bends = np.zeros(2 * len(self.ends) + 2 * int(self.acts.sum()))
-        bends[2 * len(self.ends) :] = 0.1 / arm.length
+        middles = 0.5 * (np.append(0.0, self.ends[:-1]) + self.ends)
+        slopes = np.moveaxis(tables(arm, middles).curvature[:, :2], 1, 2) * self.scale[:, None]
+        most = np.abs(slopes).max(initial=0.0)
+        if any(unit == "m" for unit in arm.bundle_units) or not np.isfinite(most):
+            slopes *= 1.0 / (arm.length * max(most, 1e-12))
         vector = Rotation.from_matrix(arm.base.rotation).as_rotvec()
-        return np.concatenate([arm.base.position, vector, bends])
+        rest = np.zeros(2 * len(self.ends))
+        return np.concatenate([arm.base.position, vector, rest, share * slopes[self.acts].ravel()])
 
     def places(self, values: Array, inputs: Array) -> Array:
         """Of the markers, (n, marker, 3)."""
@@ -143,7 +162,9 @@ class _Arcs:
             last = k == count - 1
             for m, z in enumerate(self.markers):
                 if begin <= z < end or (last and z >= end):
-                    result[:, m] = place + np.einsum("nab,nb->na", frame, _arc(bend, z - begin)[0])
+                    along, turn = _arc(bend, z - begin)
+                    along = along + turn @ self.offsets[m]
+                    result[:, m] = place + np.einsum("nab,nb->na", frame, along)
             along, turn = _arc(bend, end - begin)
             place = place + np.einsum("nab,nb->na", frame, along)
             frame = frame @ turn

@@ -350,7 +350,7 @@ def _runs(table: pd.DataFrame, column: str | None) -> tuple[NDArray[np.intp], tu
 
 def _order(table: pd.DataFrame, run: str | None, order: str | None) -> NDArray[np.intp]:
     """Samples in the order in which they were taken: run by run, as the file has them."""
-    if order is None:
+    if order is None or table[order].dtype.kind not in "iuf":  # names of samples say nothing
         return np.arange(len(table))
     keys = _numbers(table, order)
     if run is None:
