@@ -11,7 +11,7 @@ from softreach.support.arguments import as_number
 from softreach.support.arrays import as_rows
 from softreach.support.errors import Range
 
-__all__ = ["limit_shortening", "line_lengths", "line_strains"]
+__all__ = ["limit_shortening", "line_lengths", "line_strains", "quadrature"]
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ def line_lengths(arm: Manipulator, activations: ArrayLike) -> Array:
     """
     arm = a_manipulator("arm", arm)
     gamma = as_rows("activations", activations, arm.bundles, "of shape (n, bundles)")
-    z, weights, step = _quadrature(arm)
+    z, weights, step = quadrature(arm)
     table = tables(arm, z)
     zeta = 1.0 + gamma @ table.extension.T
     eta = zeta if table.growth is table.extension else 1.0 + gamma @ table.growth.T
@@ -95,7 +95,7 @@ def _strains_at(arm: Manipulator, ends: Array) -> Array:
     return (lengths[1:].reshape(2, count, count).diagonal(axis1=1, axis2=2) / lengths[0] - 1.0).T
 
 
-def _quadrature(arm: Manipulator) -> tuple[Array, Array, Array]:
+def quadrature(arm: Manipulator) -> tuple[Array, Array, Array]:
     """Gauss nodes between all breakpoints with their weights [m], and steps that stay between."""
     knots = np.union1d(np.linspace(0.0, arm.length, _PIECES + 1), arm.breakpoints)
     half = np.diff(knots)[:, None] / 2.0
